@@ -1,0 +1,62 @@
+# make run   the panel with a simulated robot, at http://127.0.0.1:8000
+# make test  everything, on the real bridge, real ROS 2 nodes and a real browser
+# make check types and style
+# make dev   the panel, taking every change as it is saved
+
+PYTHON ?= python3
+CACHE := $(or $(XDG_CACHE_HOME),$(HOME)/.cache)/operator-panel
+PIP_INSTALL := -m pip install --disable-pip-version-check --quiet --require-hashes -r
+
+export TEST_BRIDGE := $(CACHE)/bridge/release/test-bridge
+export TEST_ROS_PYTHON := $(CURDIR)/.venv-ros/bin/python
+
+.PHONY: run test check dev test-parts bridge clean
+.DELETE_ON_ERROR:
+
+run: .venv/run
+	.venv/bin/uvicorn app.main:app
+
+dev: .venv/test
+	KIOSK_DEV=1 KIOSK_LOG_LEVEL=debug .venv/bin/uvicorn app.main:app --reload --reload-dir app
+
+test: test-parts
+	.venv/bin/pytest $(ARGS)
+
+check: .venv/test
+	.venv/bin/ruff check app tests
+	.venv/bin/ruff format --check app tests
+	.venv/bin/mypy
+
+test-parts: system .venv/test .venv-ros/ready bridge
+
+.PHONY: system
+system:
+	sh tests/system.sh
+
+bridge: system
+	cargo build --quiet --release --locked --manifest-path tests/bridge/Cargo.toml --target-dir $(CACHE)/bridge
+
+.venv/bin/python:
+	$(PYTHON) -m venv .venv
+
+.venv/run: deploy/requirements.lock | .venv/bin/python
+	.venv/bin/python $(PIP_INSTALL) $<
+	touch $@
+
+.venv/test: tests/requirements.lock | .venv/bin/python
+	.venv/bin/python $(PIP_INSTALL) $<
+	touch $@ .venv/run
+
+.venv-ros/ready: tests/ros/requirements.lock
+	$(PYTHON) -m venv .venv-ros
+	.venv-ros/bin/python $(PIP_INSTALL) $<
+	touch $@
+
+# The locked versions, anew: needs uv.
+lock:
+	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 pyproject.toml -o deploy/requirements.lock
+	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 pyproject.toml --group test -o tests/requirements.lock
+	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 tests/ros/requirements.in -o tests/ros/requirements.lock
+
+clean:
+	rm -rf .venv .venv-ros dist .mypy_cache .ruff_cache

@@ -1,0 +1,81 @@
+"""`make dev`: the panel file, templates and static files take effect when they are saved.
+
+Python files are uvicorn's to watch (`--reload`). A panel file with a fault keeps the old panel on
+the screen, with the fault above it.
+"""
+
+import asyncio
+import logging
+from collections.abc import AsyncIterator, Callable
+from contextlib import AbstractAsyncContextManager, AsyncExitStack, asynccontextmanager, suppress
+from pathlib import Path
+
+from app.assets import Assets
+from app.errors import KioskError, PanelError
+from app.kiosk import Kiosk
+from app.panel import Panel, load_panel
+from app.routes.site import Site
+from app.settings import Settings, shipped
+
+log = logging.getLogger("kiosk.development")
+
+EMPTY_PANEL = Panel.model_validate(
+    {"title": "No panel", "mode": "demo", "page": [{"id": "none", "title": "No page"}]}
+)
+
+Running = Callable[[Settings, Panel], AbstractAsyncContextManager[tuple[Kiosk, Assets]]]
+
+
+@asynccontextmanager
+async def reloading(
+    site: Site, settings: Settings, running: Running, opened: AsyncExitStack
+) -> AsyncIterator[None]:
+    """Watches while it is entered; `opened` holds what runs now and is closed when replaced."""
+    reloader = _Reloader(site, settings, running, opened)
+    task = asyncio.create_task(reloader.watch())
+    try:
+        yield
+    finally:
+        task.cancel()
+        with suppress(asyncio.CancelledError):
+            await task
+        await reloader.opened.aclose()
+
+
+class _Reloader:
+    def __init__(
+        self, site: Site, settings: Settings, running: Running, opened: AsyncExitStack
+    ) -> None:
+        self._site = site
+        self._settings = settings
+        self._running = running
+        self.opened = opened
+
+    async def watch(self) -> None:
+        from watchfiles import awatch  # needed, and installed, in development only
+
+        panel = self._settings.panel
+        watched = (panel.parent, shipped("templates"), shipped("static"))
+        async for changes in awatch(*watched, recursive=True):
+            touched = {Path(path) for _, path in changes}
+            files = {path for path in touched if path.suffix in (".html", ".css", ".js")}
+            if panel in touched or files:
+                await self._reload()
+
+    async def _reload(self) -> None:
+        try:
+            panel = load_panel(self._settings.panel)
+            opened = AsyncExitStack()
+            kiosk, assets = await opened.enter_async_context(self._running(self._settings, panel))
+        except PanelError as error:
+            log.error("%s", error)
+            self._site.kiosk.show_fault(str(error))
+        except (KioskError, OSError) as error:
+            log.error("the change was not taken: %s", error)
+            self._site.kiosk.show_fault(str(error))
+        else:
+            old, self.opened = self.opened, opened
+            self._site.kiosk, self._site.assets = kiosk, assets
+            self._site.metrics.follow(kiosk)
+            await old.aclose()
+            log.info("took the change")

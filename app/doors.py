@@ -1,0 +1,76 @@
+"""Who may come in: the Host that the panel is known by, and no page but its own.
+
+Pure ASGI, so that the event stream passes through without a task of its own. The checks follow
+what browsers send with every request: Host (DNS rebinding), Origin and Sec-Fetch-Site (requests
+made by other sites' pages).
+"""
+
+from collections.abc import Iterable
+from typing import Final
+from urllib.parse import urlsplit
+
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.responses import JSONResponse
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+GUARDED_PATHS: Final = frozenset({"/events"})
+READING: Final = frozenset({"GET", "HEAD"})
+OWN_SITE: Final = frozenset({"same-origin", "none"})
+
+SECURITY_HEADERS: Final = {
+    "content-security-policy": (
+        "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; "
+        "connect-src 'self'; form-action 'self'; base-uri 'none'; frame-ancestors 'none'"
+    ),
+    "x-content-type-options": "nosniff",
+    # Not "no-referrer": with it browsers send "Origin: null" with the panel's own form posts.
+    "referrer-policy": "same-origin",
+    "cross-origin-opener-policy": "same-origin",
+    "cross-origin-resource-policy": "same-origin",
+}
+
+
+class Doors:
+    """Refuses with 403 before anything is read; adds the security headers to what goes out."""
+
+    def __init__(self, app: ASGIApp, hosts: Iterable[str]) -> None:
+        self._app = app
+        self._hosts = frozenset(hosts)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+
+        async def send_secured(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                headers = MutableHeaders(scope=message)
+                for name, value in SECURITY_HEADERS.items():
+                    headers.setdefault(name, value)
+            await send(message)
+
+        why = self._refusal(scope)
+        answer = self._app if why is None else JSONResponse({"error": why}, status_code=403)
+        await answer(scope, receive, send_secured)
+
+    def _refusal(self, scope: Scope) -> str | None:
+        headers = Headers(scope=scope)
+        host = headers.get("host", "").lower()
+        if _without_port(host) not in self._hosts:
+            return f'"{host}" is not a name of this panel: KIOSK_HOSTS lists the names it answers to'
+        if scope["method"] in READING and scope["path"] not in GUARDED_PATHS:
+            return None
+        site = headers.get("sec-fetch-site", "none")
+        if site not in OWN_SITE:
+            return f"a page of another site ({site}) asked for this"
+        origin = headers.get("origin")
+        if origin is not None and urlsplit(origin).netloc.lower() != host:
+            return f'a page of "{origin}" asked for this'
+        return None
+
+
+def _without_port(host: str) -> str:
+    """ "localhost:8000" → "localhost"; an IPv6 address keeps its brackets."""
+    if host.startswith("["):
+        return host.partition("]")[0] + "]"
+    return host.partition(":")[0]

@@ -1,0 +1,74 @@
+"""Every error that the kiosk raises by itself.
+
+    KioskError                 what a client gets for it
+    ├── SettingsError          –    an environment variable or a file it names is unusable
+    ├── PanelError             –    the panel file has faults; `faults` has each with its place
+    ├── InterfaceError         –    a ROS 2 type or field that the definitions don't have
+    ├── FieldError             422  a value that its field does not take; `field` names it
+    ├── InputError             422  a request that is not what the contract says
+    ├── NotFound               404  no such page or widget
+    ├── DecodeError            –    bytes that are not a message of the type
+    └── LinkError              503  Zenoh refused; nothing was sent
+
+One handler (`routes.on_kiosk_error`) maps them to HTTP; "–" never reaches a client by itself.
+"""
+
+from dataclasses import dataclass
+
+
+class KioskError(Exception):
+    """The root; `status` is the HTTP status of an answer that carries it."""
+
+    status = 500
+
+
+class SettingsError(KioskError):
+    pass
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """One fault of a panel file: `place` as in `page[0].widget[2].topic`, "" for the whole file."""
+
+    place: str
+    message: str
+
+    def __str__(self) -> str:
+        return f"{self.place}: {self.message}" if self.place else self.message
+
+
+class PanelError(KioskError):
+    def __init__(self, path: str, faults: tuple[Fault, ...], *, unreadable: bool = False) -> None:
+        super().__init__("\n".join([f"{path} can't be used:", *(f"  {f}" for f in faults)]))
+        self.path = path
+        self.faults = faults
+        self.unreadable = unreadable
+
+
+class InterfaceError(KioskError):
+    pass
+
+
+class FieldError(KioskError):
+    status = 422
+
+    def __init__(self, field: str, message: str) -> None:
+        super().__init__(f"{field}: {message}" if field else message)
+        self.field = field
+        self.message = message
+
+
+class InputError(KioskError):
+    status = 422
+
+
+class NotFound(KioskError):
+    status = 404
+
+
+class DecodeError(KioskError):
+    pass
+
+
+class LinkError(KioskError):
+    status = 503

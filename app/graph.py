@@ -1,0 +1,77 @@
+"""What the liveliness tokens and the bridges' admin space say: who is there, with which types."""
+
+from collections.abc import Mapping
+
+from app.keys import DEMO_VERSION, Direction, Endpoint, Role, parsed
+
+# Whose type must equal the panel's, for what the panel does with a topic. A route of the bridge
+# has one type for all: who created it first has fixed it, be it the robot or another panel.
+_COUNTERPARTS: Mapping[Role, tuple[Role, Role, Direction]] = {
+    "MS": ("MP", "MS", "pub"),  # the panel listens: the robot's publisher, other panels' readers
+    "MP": ("MS", "MP", "sub"),  # the panel publishes: the robot's subscriber, other panels' writers
+}
+
+
+class Graph:
+    """The ROS graph behind all bridges; changed by `apply` only, on the event loop."""
+
+    def __init__(self, own_zid: str = "") -> None:
+        self._own = own_zid
+        self._tokens: dict[str, Endpoint] = {}
+        self._routes: Mapping[tuple[str, Direction, str], str] = {}
+        self._answered: Mapping[str, str] | None = None
+
+    def apply(self, token_key: str, alive: bool) -> str | None:
+        """Takes one token's appearance or end; returns the zid of a bridge that came or went."""
+        endpoint = parsed(token_key)
+        if endpoint is None or endpoint.zid == self._own:
+            return None
+        if alive:
+            self._tokens[token_key] = endpoint
+            if endpoint.role is None:
+                self._answered = None  # it was not asked yet
+        else:
+            self._tokens.pop(token_key, None)
+        return endpoint.zid if endpoint.role is None else None
+
+    def learn(self, routes: Mapping[tuple[str, Direction, str], str]) -> None:
+        """Takes what the bridges said of their routes: (bridge, direction, key) → type."""
+        self._routes = routes
+
+    def answered(self, versions: Mapping[str, str]) -> None:
+        """Takes which bridges answered when they were asked, and with which version."""
+        self._answered = versions
+
+    @property
+    def bridges(self) -> frozenset[str]:
+        return frozenset(e.zid for e in self._tokens.values() if e.role is None)
+
+    @property
+    def silent(self) -> bool:
+        """A bridge is there by its token, but not one answered when asked."""
+        asked = self._answered
+        return asked is not None and bool(self.bridges) and not self.bridges & asked.keys()
+
+    @property
+    def simulated(self) -> bool:
+        """A bridge that answered is a demo robot's."""
+        asked = self._answered or {}
+        return any(asked.get(zid) == DEMO_VERSION for zid in self.bridges)
+
+    def on_robot(self, role: Role, key: str) -> bool:
+        """Whether a node behind a bridge publishes ("MP") or subscribes ("MS")."""
+        bridges = self.bridges
+        return any(e.role == role and e.key == key and e.zid in bridges for e in self._tokens.values())
+
+    def wrong_type(self, role: Role, key: str, type_name: str) -> str | None:
+        """The other type that this topic has, if it is not what the panel needs for `role`."""
+        theirs, others, direction = _COUNTERPARTS[role]
+        bridges = self.bridges
+        for endpoint in self._tokens.values():
+            counts = endpoint.role == (theirs if endpoint.zid in bridges else others)
+            if counts and endpoint.key == key and endpoint.type != type_name:
+                return endpoint.type
+        for (zid, way, route_key), found in self._routes.items():
+            if zid in bridges and way == direction and route_key == key and found != type_name:
+                return found
+        return None

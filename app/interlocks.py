@@ -1,0 +1,77 @@
+"""May this be pressed now? Pure: (panel, robot, time) → a verdict with its reason.
+
+Nothing is permitted on a doubt: each ground must be there, and the first that is missing is the
+reason an operator reads.
+"""
+
+import math
+from dataclasses import dataclass
+
+from app.panel.model import Interlock, Publish
+from app.robot import Robot, value_of
+from app.sentences import say
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """`reason` is None when permitted; `code` is its stable name; `until` (monotonic seconds) is
+    when time alone would change the verdict."""
+
+    permitted: bool
+    code: str = "permitted"
+    reason: str | None = None
+    until: float = math.inf
+
+
+PERMITTED = Verdict(True)
+
+
+def way(robot: Robot, now: float) -> Verdict:
+    """Whether commands can reach the robot at all."""
+    if not robot.link_up:
+        return locked("no_link")
+    if not robot.graph.bridges:
+        return locked("no_bridge")
+    if robot.graph.silent:
+        return locked("bridge_silent")
+    if now < robot.settled_at:
+        return Verdict(False, "joining", say("joining"), robot.settled_at)
+    return PERMITTED
+
+
+def interlock_verdict(interlock: Interlock, robot: Robot, now: float) -> Verdict:
+    """Whether an interlock permits."""
+    passable = way(robot, now)
+    if not passable.permitted:
+        return passable
+    topic, key = interlock.topic, robot.key(interlock.topic)
+    if found := robot.graph.wrong_type("MS", key, interlock.type):
+        return locked("wrong_type", topic=topic, found=found, wanted=interlock.type)
+    reading = robot.reading(topic)
+    if reading.status != "message":
+        return locked(reading.status, topic=topic, wanted=interlock.type)
+    if interlock.require_publisher and not robot.graph.on_robot("MP", key):
+        return locked("no_publisher", topic=topic)
+    if value_of(reading.message, interlock.field) is not True:
+        return locked("forbidden", name=interlock.name, topic=topic)
+    if interlock.max_age_s is None:
+        return PERMITTED
+    stale_at = reading.at + interlock.max_age_s
+    if now >= stale_at:
+        return locked("stale", topic=topic, limit=f"{interlock.max_age_s:g}")
+    return Verdict(True, until=stale_at)
+
+
+def publish_verdict(publish: Publish, interlock: Interlock | None, robot: Robot, now: float) -> Verdict:
+    """Whether a publish widget may be pressed: a way, the right type, and its interlock."""
+    passable = way(robot, now)
+    if not passable.permitted:
+        return passable
+    topic = publish.topic
+    if found := robot.graph.wrong_type("MP", robot.key(topic), publish.type):
+        return locked("wrong_type", topic=topic, found=found, wanted=publish.type)
+    return PERMITTED if interlock is None else interlock_verdict(interlock, robot, now)
+
+
+def locked(code: str, **about: object) -> Verdict:
+    return Verdict(False, code, say(code, **about))

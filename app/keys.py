@@ -1,0 +1,112 @@
+"""The dialect of zenoh-bridge-ros2dds: ROS 2 names ↔ Zenoh key expressions. No I/O.
+
+Everything that knows this bridge's keys, liveliness tokens and admin space is here, so that a
+second dialect (rmw_zenoh) can stand beside it. Source: zenoh-plugin-ros2dds 1.10, tried.
+"""
+
+import re
+from dataclasses import dataclass
+from typing import Final, Literal
+
+TOKENS: Final = "@/*/@ros2_lv/**"  # every liveliness token of every bridge and kiosk
+VERSION: Final = "@/*/ros2/version"  # answered by a bridge whose main loop runs
+ROUTES: Final = "@/*/ros2/route/topic/**"  # a bridge's routes: JSON with `ros2_type`
+
+DEMO_VERSION: Final = '"demo robot"'  # how the demo robot answers for its version
+
+Role = Literal["MP", "MS"]  # a publisher, a subscriber
+Direction = Literal["pub", "sub"]  # of a bridge's route: from ROS to Zenoh, from Zenoh to ROS
+
+# A token that the bridge can't parse ends its main loop while its process stays up: what does not
+# match these must never become a token.
+TOPIC: Final = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
+NAMESPACE: Final = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)*")
+MESSAGE_TYPE: Final = re.compile(r"[a-z][a-z0-9_]*/msg/[A-Z][A-Za-z0-9]*")
+
+_TOKEN = re.compile(
+    r"@/(?P<zid>[^/]+)/@ros2_lv"
+    r"(?:/(?P<role>MP|MS)/(?P<key>[^/]+)/(?P<type>[^/]+)/(?P<qos>[^/]+))?"
+)
+_ROUTE = re.compile(r"@/(?P<zid>[^/]+)/ros2/route/topic/(?P<direction>pub|sub)/(?P<key>.+)")
+
+
+@dataclass(frozen=True, slots=True)
+class Qos:
+    """A topic's QoS; depth is of KEEP_LAST."""
+
+    reliable: bool = True
+    transient_local: bool = False
+    depth: int = 10
+
+
+ROSOUT: Final = Qos(transient_local=True, depth=1000)  # rmw_qos_profile_rosout_default
+
+
+@dataclass(frozen=True, slots=True)
+class Endpoint:
+    """A publisher or subscriber that a token shows; `role` is None for the bridge's own token."""
+
+    zid: str
+    role: Role | None = None
+    key: str = ""
+    type: str = ""
+
+
+def key_of(topic: str, namespace: str = "") -> str:
+    """The key expression of a topic, behind a bridge with this namespace ("" for none)."""
+    whole = namespace + topic
+    if not TOPIC.fullmatch(whole):
+        raise ValueError(f'"{whole}" is not an absolute ROS 2 topic name')
+    return whole[1:]
+
+
+def token(zid: str, role: Role, key: str, type_name: str, qos: Qos, type_hash: str) -> str:
+    """The liveliness token that makes the bridge create the DDS reader or writer."""
+    if not TOPIC.fullmatch("/" + key) or not MESSAGE_TYPE.fullmatch(type_name):
+        raise ValueError(f'"{key}" with type "{type_name}" can not be a token')
+    flags = f":{int(qos.reliable)}:{int(qos.transient_local)}:0,{qos.depth}"
+    return (
+        f"@/{zid}/@ros2_lv/{role}/{_escaped(key)}/{_escaped(type_name)}/{flags}:typehash={type_hash};"
+    )
+
+
+def bridge_token(zid: str) -> str:
+    """The token by which a bridge says that it is there."""
+    return f"@/{zid}/@ros2_lv"
+
+
+def parsed(token_key: str) -> Endpoint | None:
+    """What a token shows; None for services, actions and what is not a token."""
+    found = _TOKEN.fullmatch(token_key)
+    if found is None:
+        return None
+    if found["role"] is None:
+        return Endpoint(found["zid"])
+    role: Role = "MP" if found["role"] == "MP" else "MS"
+    return Endpoint(found["zid"], role, _unescaped(found["key"]), _unescaped(found["type"]))
+
+
+def version(zid: str) -> str:
+    """Where one bridge answers for `VERSION`."""
+    return f"@/{zid}/ros2/version"
+
+
+def zid_of(admin_key: str) -> str:
+    """Whose admin space an answer came from."""
+    return admin_key.split("/")[1]
+
+
+def route_of(admin_key: str) -> tuple[str, Direction, str] | None:
+    """(bridge, direction, topic key) of an answer from the admin space."""
+    found = _ROUTE.fullmatch(admin_key)
+    if found is None:
+        return None
+    return found["zid"], "pub" if found["direction"] == "pub" else "sub", found["key"]
+
+
+def _escaped(name: str) -> str:
+    return name.replace("/", "§")
+
+
+def _unescaped(name: str) -> str:
+    return name.replace("§", "/")

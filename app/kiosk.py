@@ -1,0 +1,180 @@
+"""The running kiosk: one panel, one link, one robot, one board, and how they are wired.
+
+Down: a callback of the link wakes the loop → `_take` → robot → `_show` → views → board → streams.
+Permissions and the link are shown at once, values at most `FRAMES_PER_S` times a second.
+"""
+
+import asyncio
+import contextlib
+import logging
+import math
+import time
+from collections.abc import Mapping
+from typing import Any, Final
+
+from app.board import Board
+from app.errors import KioskError, LinkError
+from app.interfaces import interfaces_of
+from app.interlocks import Verdict, way
+from app.joining import LOG_TYPE, Joining
+from app.link import Config, Link
+from app.logs import RosoutHandler
+from app.panel.model import Panel
+from app.presses import Presses
+from app.robot import Robot
+from app.views import Sight, sight
+
+log = logging.getLogger("kiosk")
+
+FRAMES_PER_S: Final = 20.0
+
+
+class Kiosk:
+    """Opened by `start`, closed by `stop`; between them everything is on the event loop."""
+
+    def __init__(
+        self,
+        panel: Panel,
+        config: Config,
+        revision: str,
+        *,
+        simulated: bool = False,
+        fault: str = "",
+    ) -> None:
+        """`revision` is of all that a page loads; `fault` stands above it until there is none."""
+        self.panel = panel
+        self._simulated = simulated
+        self.fault = fault
+        self.interfaces = interfaces_of(panel.distro)
+        self._loop = asyncio.get_running_loop()
+        self.link = Link(config, self._wake)
+        self.robot = Robot(panel, self.interfaces, self.link.zid)
+        self.board = Board(self._sight().view, revision)
+        self.presses = Presses(panel, self.interfaces, self.robot, self.link)
+        self._joining = Joining(panel, self.interfaces, self.robot, self.link, self._show)
+        self._urgent = {self.robot.key(i.topic) for i in panel.interlocks}
+        self._shown_at = 0.0
+        self._timer: asyncio.TimerHandle | None = None
+        self._rosout = RosoutHandler(self._publish_log)
+        self._stopped = False
+
+    async def start(self) -> None:
+        """Declares everything; whether anybody is there shows later."""
+        self._warm_up()
+        subscribe = [self.robot.key(topic) for topic in self.panel.subscriptions()]
+        publish = [self.robot.key(topic) for topic in (*self.panel.publications(), "/rosout")]
+        self.link.start(subscribe, publish)
+        logging.getLogger().addHandler(self._rosout)
+        self._joining.start()
+
+    async def stop(self) -> None:
+        """Ends the streams, takes the session down; leaves no task behind."""
+        self._stopped = True
+        self.board.close()
+        logging.getLogger().removeHandler(self._rosout)
+        if self._timer is not None:
+            self._timer.cancel()
+        await self._joining.stop()
+        try:
+            await asyncio.to_thread(self.link.close)
+        except LinkError as error:
+            log.warning("%s", error)
+
+    @property
+    def way(self) -> Verdict:
+        """Whether commands can reach the robot now."""
+        return way(self.robot, time.monotonic())
+
+    def show_fault(self, text: str) -> None:
+        """A fault of the panel file, shown on every page; "" takes it away."""
+        self.fault = text
+        self._show()
+
+    def _warm_up(self) -> None:
+        """The first use of a type compiles its codec: now, not at the first press."""
+        for type_name in {*self.panel.subscriptions().values(), *self.panel.publications().values()}:
+            self.interfaces.type_hash(type_name)
+            with contextlib.suppress(KioskError):
+                self.interfaces.decode(type_name, b"\0\1\0\0")
+
+    # Down.
+
+    def _wake(self) -> None:
+        """On a thread of Zenoh's."""
+        try:
+            self._loop.call_soon_threadsafe(self._take)
+        except RuntimeError:
+            pass  # the loop is closed: the process ends
+
+    def _take(self) -> None:
+        if self._stopped:
+            return
+        changes = self.link.drain()
+        urgent = self.robot.link_up != changes.link_up or bool(changes.tokens)
+        if self.robot.link_up != changes.link_up:
+            self.robot.link_up = changes.link_up
+            log.info("Zenoh link %s", "up" if changes.link_up else "lost")
+        had_bridge = bool(self.robot.graph.bridges)
+        for key, sample in changes.samples.items():
+            self.robot.take(key, sample)
+            urgent = urgent or key in self._urgent
+        came = False
+        for token_key, token in changes.tokens.items():
+            if token.lost_seq and (zid := self.robot.graph.apply(token_key, False)):
+                self.robot.cut(zid, token.lost_seq)
+                log.warning("bridge %s lost", zid)
+                had_bridge = had_bridge and bool(self.robot.graph.bridges)
+            if token.alive and (zid := self.robot.graph.apply(token_key, True)):
+                log.info("bridge %s found", zid)
+                came = True
+        self._joining.follow(came and not had_bridge)
+        if urgent:
+            self._show()
+        else:
+            self._show_at(self._shown_at + 1 / FRAMES_PER_S)
+
+    # Showing.
+
+    def _sight(self) -> Sight:
+        return sight(
+            self.panel,
+            self.robot,
+            time.monotonic(),
+            simulated=self._simulated,
+            fault=self.fault,
+        )
+
+    def _show(self) -> None:
+        if self._stopped:
+            return
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        self._shown_at = time.monotonic()
+        seen = self._sight()
+        self.board.post(seen.view)
+        self._show_at(seen.until)
+
+    def _show_at(self, when: float) -> None:
+        """Shows again at `when` (monotonic seconds), or sooner if that is planned already."""
+        if self._timer is not None:
+            if self._timer.when() <= when:
+                return
+            self._timer.cancel()
+        self._timer = None if when == math.inf else self._loop.call_at(when, self._show)
+
+    # Beside.
+
+    def _publish_log(self, fields: Mapping[str, Any]) -> None:
+        """A log record to /rosout; on whatever thread it was written."""
+        if self.robot.link_up and not self._stopped:
+            key = self.robot.key("/rosout")
+            payload = self.interfaces.encode(LOG_TYPE, fields)
+            self._loop.call_soon_threadsafe(self._put_quietly, key, payload)
+
+    def _put_quietly(self, key: str, payload: bytes) -> None:
+        try:
+            if not self._stopped:
+                self.link.put(key, payload)
+        except LinkError:
+            pass  # a log that can't be sent must not become one more log

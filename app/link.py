@@ -1,0 +1,246 @@
+"""The one owner of the Zenoh session: what comes in is kept as a latest value, never queued.
+
+Zenoh calls back on threads of its own. A callback writes into a slot under a lock and wakes the
+event loop at most once; `drain` then takes all that came. Only this module and the simulator
+import zenoh; its errors leave here as LinkError.
+"""
+
+import asyncio
+import itertools
+import threading
+import time
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import zenoh
+from zenoh.ext import HistoryConfig, declare_advanced_subscriber
+from zenoh.handlers import Callback
+
+from app.errors import LinkError, SettingsError
+from app.keys import TOKENS
+from app.robot import Sample
+
+Config = zenoh.Config
+
+ASK_TIMEOUT_S = 2.0
+
+
+@dataclass(slots=True)
+class Token:
+    """What became of a liveliness token since the last drain; `lost_seq` is 0 if it was never lost."""
+
+    alive: bool
+    lost_seq: int
+
+
+@dataclass(slots=True)
+class Changes:
+    """All that came since the last drain."""
+
+    samples: dict[str, Sample]
+    tokens: dict[str, Token]
+    link_up: bool
+
+
+def config_from(path: Path) -> zenoh.Config:
+    """A Zenoh configuration file, read; SettingsError says what is wrong with it."""
+    try:
+        return zenoh.Config.from_file(path)
+    except zenoh.ZError as error:
+        raise SettingsError(f"{path} is not a usable Zenoh configuration: {error}") from error
+
+
+def config_to(endpoint: str) -> zenoh.Config:
+    """A session that connects to one endpoint and to nothing else."""
+    config = zenoh.Config()
+    for place, value in {
+        "mode": '"peer"',
+        "connect/endpoints": f'["{endpoint}"]',
+        "listen/endpoints": "[]",
+        "scouting/multicast/enabled": "false",
+        "scouting/gossip/enabled": "false",
+        "open/return_conditions/connect_scouted": "false",
+    }.items():
+        config.insert_json5(place, value)
+    return config
+
+
+@contextmanager
+def _translated(doing: str) -> Iterator[None]:
+    try:
+        yield
+    except zenoh.ZError as error:
+        raise LinkError(f"{doing}: {error}") from error
+
+
+class Link:
+    """A session with its subscribers, publishers and tokens."""
+
+    def __init__(self, config: zenoh.Config, wake: Callable[[], None]) -> None:
+        """Opens at once, whether or not anybody is there; `wake` is called on Zenoh's threads."""
+        self._wake_loop = wake
+        self._lock = threading.Lock()
+        self._seq = itertools.count(1)
+        self._woken = False
+        self._samples: dict[str, Sample] = {}
+        self._stamps: dict[str, zenoh.Timestamp] = {}
+        self._tokens: dict[str, Token] = {}
+        self._transports: set[str] = set()
+        self._subscribers: dict[str, Any] = {}
+        self._publishers: dict[str, zenoh.Publisher] = {}
+        self._held: dict[str, zenoh.LivelinessToken] = {}
+        with _translated("the Zenoh session can't be opened"):
+            self._session = zenoh.open(config)
+        self.zid = str(self._session.zid())
+
+    def start(self, subscribe: Iterable[str], publish: Iterable[str]) -> None:
+        """Declares everything, once."""
+        with _translated("the Zenoh session can't be used"):
+            self._listeners = (
+                self._session.info.declare_transport_events_listener(
+                    _direct(self._on_transport), history=True
+                ),
+                self._session.liveliness().declare_subscriber(
+                    TOKENS, _direct(self._on_token), history=True
+                ),
+            )
+            for key in publish:
+                self._publishers[key] = self._session.declare_publisher(
+                    key,
+                    congestion_control=zenoh.CongestionControl.DROP,
+                    express=True,
+                    reliability=zenoh.Reliability.RELIABLE,
+                    allowed_destination=zenoh.Locality.REMOTE,
+                )
+            for key in subscribe:
+                self._subscribers[key] = self._subscriber(key)
+
+    def resubscribe(self) -> None:
+        """Subscribes anew, so that the last value of each TRANSIENT_LOCAL publisher comes again.
+
+        A subscriber drops what it has seen before, also when what it saw was cut off in between.
+        The new one is there before the old one goes: the bridge's reader stays as it is.
+        """
+        with self._lock:
+            self._stamps.clear()
+        with _translated("can't subscribe"):
+            for key, old in list(self._subscribers.items()):
+                self._subscribers[key] = self._subscriber(key)
+                old.undeclare()
+
+    def _subscriber(self, key: str) -> Any:
+        return declare_advanced_subscriber(
+            self._session,
+            key,
+            _direct(lambda sample: self._on_sample(key, sample)),
+            history=HistoryConfig(detect_late_publishers=True, max_samples=1),
+        )
+
+    def hold(self, tokens: Iterable[str]) -> None:
+        """Holds exactly these liveliness tokens from now on."""
+        wanted = set(tokens)
+        with _translated("can't join the ROS graph"):
+            for token in self._held.keys() - wanted:
+                self._held.pop(token).undeclare()
+            for token in wanted - self._held.keys():
+                self._held[token] = self._session.liveliness().declare_token(token)
+
+    def put(self, key: str, payload: bytes) -> None:
+        """Sends at once or not at all: nothing is kept for later. LinkError if Zenoh refuses."""
+        with _translated(f"can't send on {key}"):
+            self._publishers[key].put(payload)
+
+    def heard(self, key: str) -> bool:
+        """Whether somebody is known to listen; not whether they act on it."""
+        with _translated(f"can't ask who listens on {key}"):
+            status: Any = self._publishers[key].matching_status  # an object, whatever the stub says
+            return bool(status.matching)
+
+    async def ask(self, selector: str) -> list[tuple[str, bytes]]:
+        """(key, payload) of each answer to a query; at most `ASK_TIMEOUT_S` long."""
+        loop = asyncio.get_running_loop()
+        done: asyncio.Future[None] = loop.create_future()
+        answers: list[tuple[str, bytes]] = []
+
+        def on_reply(reply: zenoh.Reply) -> None:
+            if reply.ok is not None:
+                answers.append((str(reply.ok.key_expr), reply.ok.payload.to_bytes()))
+
+        def finish() -> None:
+            if not done.done():
+                done.set_result(None)
+
+        def on_end() -> None:
+            try:
+                loop.call_soon_threadsafe(finish)
+            except RuntimeError:  # the loop is closed: nobody waits any more
+                pass
+
+        with _translated(f"can't ask {selector}"):
+            self._session.get(
+                selector, Callback(on_reply, on_end, indirect=False), timeout=ASK_TIMEOUT_S
+            )
+        with suppress(TimeoutError):
+            await asyncio.wait_for(done, ASK_TIMEOUT_S + 1)
+        return answers
+
+    def drain(self) -> Changes:
+        """Takes all that came since the last call."""
+        with self._lock:
+            self._woken = False
+            changes = Changes(self._samples, self._tokens, bool(self._transports))
+            self._samples, self._tokens = {}, {}
+        return changes
+
+    def close(self) -> None:
+        """Takes everything down; blocks for up to some tenths of a second."""
+        with _translated("the Zenoh session did not close cleanly"):
+            self._session.close()
+
+    # Below: on Zenoh's threads. No work here, and nothing may raise.
+
+    def _on_sample(self, key: str, sample: zenoh.Sample) -> None:
+        stamp = sample.timestamp
+        source = None if stamp is None else str(stamp.get_id())
+        with self._lock:
+            last = self._stamps.get(key)
+            if stamp is not None:
+                if last is not None and last.get_id() == stamp.get_id() and not stamp >= last:
+                    return  # history that came after what is newer
+                self._stamps[key] = stamp
+            self._samples[key] = Sample(
+                sample.payload, next(self._seq), time.monotonic(), time.time(), source
+            )
+            self._wake()
+
+    def _on_token(self, sample: zenoh.Sample) -> None:
+        key = str(sample.key_expr)
+        with self._lock:
+            seq = next(self._seq)
+            token = self._tokens.setdefault(key, Token(False, 0))
+            token.alive = sample.kind == zenoh.SampleKind.PUT
+            if not token.alive:
+                token.lost_seq = seq
+            self._wake()
+
+    def _on_transport(self, event: zenoh.TransportEvent) -> None:
+        zid = str(event.transport.zid)
+        with self._lock:
+            if event.kind == zenoh.SampleKind.PUT:
+                self._transports.add(zid)
+            else:
+                self._transports.discard(zid)
+            self._wake()
+
+    def _wake(self) -> None:
+        if not self._woken:
+            self._woken = True
+            self._wake_loop()
+
+
+def _direct(function: Callable[[Any], None]) -> "Callback[Any]":
+    """A handler that runs on the receiving thread, with no thread of its own per declaration."""
+    return Callback(function, indirect=False)

@@ -1,0 +1,101 @@
+"""Logs as ROS 2 writes them: `[INFO] [1704573791.462327908] [web_ui]: message`.
+
+Format and level numbers are rcutils' (rcl_interfaces/msg/Log has the same numbers).
+"""
+
+import logging
+import sys
+from collections.abc import Callable, Mapping
+
+NODE_NAME = "web_ui"
+
+# Python level → (ROS severity name, its number in rcl_interfaces/msg/Log)
+SEVERITIES: Mapping[int, tuple[str, int]] = {
+    logging.DEBUG: ("DEBUG", 10),
+    logging.INFO: ("INFO", 20),
+    logging.WARNING: ("WARN", 30),
+    logging.ERROR: ("ERROR", 40),
+    logging.CRITICAL: ("FATAL", 50),
+}
+LEVELS: Mapping[str, int] = {name.lower(): level for level, (name, _) in SEVERITIES.items()}
+
+# Printable as they are; every other control character is escaped, so that one record is one line.
+_CONTROLS = {code: f"\\x{code:02x}" for code in [*range(32), 127] if code not in (9, 10)}
+
+log = logging.getLogger("kiosk")
+
+
+def severity(record: logging.LogRecord) -> tuple[str, int]:
+    """The nearest ROS severity at or below the record's level."""
+    return SEVERITIES[max((at for at in SEVERITIES if at <= record.levelno), default=logging.DEBUG)]
+
+
+def stamp(record: logging.LogRecord) -> tuple[int, int]:
+    """Seconds and nanoseconds since the epoch."""
+    return divmod(int(record.created * 1e9), 1_000_000_000)
+
+
+class RosFormatter(logging.Formatter):
+    """One record, one line; a traceback follows indented, so that no text can pose as a record."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        name, _ = severity(record)
+        seconds, nanoseconds = stamp(record)
+        lines = super().format(record).translate(_CONTROLS).replace("\n", "\n  ")
+        return f"[{name}] [{seconds}.{nanoseconds:09}] [{NODE_NAME}]: {lines}"
+
+
+class RosoutHandler(logging.Handler):
+    """Hands each record on as the fields of `rcl_interfaces/msg/Log`.
+
+    The callback runs on whatever thread logs; what it raises is dropped, for a log that can't be
+    sent must not become a log record of its own.
+    """
+
+    def __init__(self, publish: Callable[[Mapping[str, object]], None]) -> None:
+        super().__init__()
+        self._publish = publish
+
+    def emit(self, record: logging.LogRecord) -> None:
+        try:
+            self._publish(log_fields(record))
+        except Exception:
+            self.handleError(record)
+
+    def handleError(self, record: logging.LogRecord) -> None:
+        pass
+
+
+def log_fields(record: logging.LogRecord) -> dict[str, object]:
+    """A record as the fields of `rcl_interfaces/msg/Log`."""
+    seconds, nanoseconds = stamp(record)
+    return {
+        "stamp": {"sec": seconds, "nanosec": nanoseconds},
+        "level": severity(record)[1],
+        "name": NODE_NAME,
+        "msg": record.getMessage().replace("\0", "\\x00"),
+        "file": record.filename,
+        "function": record.funcName or "",
+        "line": record.lineno,
+    }
+
+
+def configure(level: str) -> None:
+    """Send every logger of the process to stderr in ROS's format, at `level` and above.
+
+    uvicorn has set up its own loggers before the application is imported: they join in. A line
+    per request is of use only to who looks for it, so it comes with `debug`.
+    """
+    handler = logging.StreamHandler(sys.stderr)
+    handler.setFormatter(RosFormatter())
+    root = logging.getLogger()
+    root.handlers = [handler]
+    root.setLevel(logging.WARNING)
+    log.setLevel(LEVELS[level])
+    for name in ("uvicorn", "uvicorn.error", "uvicorn.access"):
+        logger = logging.getLogger(name)
+        logger.handlers = []
+        logger.propagate = True
+        logger.setLevel(LEVELS[level])
+    if level != "debug":
+        logging.getLogger("uvicorn.access").setLevel(logging.WARNING)

@@ -1,0 +1,152 @@
+"""`uvicorn app.main:app`: the only wiring."""
+
+import asyncio
+import logging
+import secrets
+import signal
+import sys
+import threading
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import AsyncExitStack, ExitStack, asynccontextmanager, contextmanager
+from types import FrameType
+
+from fastapi import FastAPI
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from starlette.exceptions import HTTPException
+from starlette.middleware.gzip import GZipMiddleware
+
+from app import development, logs, simulator
+from app.assets import Assets, load_assets
+from app.doors import Doors
+from app.errors import KioskError, PanelError
+from app.kiosk import Kiosk
+from app.link import config_from, config_to
+from app.metrics import Metrics
+from app.panel import Panel, load_panel
+from app.routes import events, health, pages, presses
+from app.routes.site import Site, on_http_error, on_kiosk_error
+from app.settings import Settings, shipped
+
+log = logging.getLogger("kiosk")
+
+LONGEST_BODY = 64 * 1024
+
+
+def create_app(settings: Settings | None = None) -> FastAPI:
+    """The application; raises KioskError where its settings or its panel are unusable."""
+    settings = settings or Settings.from_environment()
+    logs.configure(settings.log_level)
+    panel, fault = _first_panel(settings)
+
+    @asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        async with AsyncExitStack() as opened:
+            kiosk, assets = await opened.enter_async_context(_running(settings, panel, fault))
+            site = Site(kiosk, assets, _templates(settings.dev), Metrics(), settings.dev)
+            site.metrics.follow(kiosk)
+            app.state.site = site
+            loop = asyncio.get_running_loop()
+            with _on_end(lambda: loop.call_soon_threadsafe(lambda: site.kiosk.board.close())):
+                if settings.dev:
+                    await opened.enter_async_context(
+                        development.reloading(site, settings, _running, opened.pop_all())
+                    )
+                yield
+
+    app = FastAPI(
+        title="Operator panel",
+        summary="The HTTP interface of a robot cell's touch panel.",
+        lifespan=lifespan,
+        docs_url=None,  # they load scripts from elsewhere
+        redoc_url=None,
+        max_body_size=LONGEST_BODY,
+        exception_handlers={KioskError: on_kiosk_error, HTTPException: on_http_error},
+    )
+    app.add_middleware(GZipMiddleware, minimum_size=500)
+    app.add_middleware(Doors, hosts=settings.hosts)
+    for routes in (pages, events, presses, health):
+        app.include_router(routes.router)
+    return app
+
+
+def _first_panel(settings: Settings) -> tuple[Panel, str]:
+    """The panel, or in development an empty one that shows what is wrong with the file."""
+    try:
+        return load_panel(settings.panel), ""
+    except PanelError as error:
+        if not settings.dev:
+            raise
+        return development.EMPTY_PANEL, str(error)
+
+
+@asynccontextmanager
+async def _running(
+    settings: Settings, panel: Panel, fault: str = ""
+) -> AsyncIterator[tuple[Kiosk, Assets]]:
+    """A kiosk on the robot that the panel is for: the real one, or a demo robot of its own."""
+    demo = (settings.mode or panel.mode) == "demo"
+    assets = load_assets(shipped("static"), shipped("templates"), panel.mm_per_px)
+    revision = f"{panel.revision}-{assets.revision}"
+    if settings.dev:
+        revision += f"-{secrets.token_hex(4)}"  # whatever was changed, pages load anew
+    with ExitStack() as stack:
+        if demo:
+            robot = simulator.in_process(panel.namespace, panel.distro)
+            config = config_to(stack.enter_context(robot))
+        else:
+            config = config_from(settings.zenoh)
+        kiosk = Kiosk(panel, config, revision, simulated=demo, fault=fault)
+        await kiosk.start()
+        log.info('panel "%s", %s robot', panel.title, "simulated" if demo else "live")
+        try:
+            yield kiosk, assets
+        finally:
+            await kiosk.stop()
+
+
+def _templates(dev: bool) -> Environment:
+    return Environment(
+        loader=FileSystemLoader(shipped("templates")),
+        autoescape=True,
+        undefined=StrictUndefined,
+        auto_reload=dev,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+
+
+@contextmanager
+def _on_end(end: Callable[[], object]) -> Iterator[None]:
+    """Calls `end` as soon as the process is told to end, before whoever listened for that.
+
+    uvicorn waits for open streams before it runs the lifespan's end: they must end first.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    previous = {n: signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM)}
+
+    def on_signal(number: int, frame: FrameType | None) -> None:
+        end()
+        then = previous[signal.Signals(number)]
+        if callable(then):
+            then(number, frame)
+
+    for number in previous:
+        signal.signal(number, on_signal)
+    try:
+        yield
+    finally:
+        for number, handler in previous.items():
+            signal.signal(number, handler)
+
+
+def _app_or_exit() -> FastAPI:
+    """The application for uvicorn; what is wrong is said in words, without a traceback."""
+    try:
+        return create_app()
+    except KioskError as error:
+        sys.exit(str(error))
+
+
+app = _app_or_exit()

@@ -1,0 +1,49 @@
+"""Message templates: `{ data = "{message}" }` with the values of the inputs it names."""
+
+from collections.abc import Iterator, Mapping
+from string import Formatter
+from typing import Any
+
+from app.errors import FieldError
+
+
+def filled(template: Any, inputs: Mapping[str, Any], where: str = "") -> Any:
+    """The template with each `{id}` replaced by that input's value.
+
+    A string that is nothing but `{id}` becomes the value itself, with its type; `{{` and `}}`
+    stand for braces. Values are put in once: braces in them are only text.
+    """
+    if isinstance(template, Mapping):
+        return {k: filled(v, inputs, f"{where}.{k}".strip(".")) for k, v in template.items()}
+    if isinstance(template, list | tuple):
+        return [filled(item, inputs, f"{where}[{i}]") for i, item in enumerate(template)]
+    if not isinstance(template, str):
+        return template
+    parts = _parts(template, where)
+    if len(parts) == 1 and parts[0][0] == "" and parts[0][1] is not None:
+        return inputs[parts[0][1]]
+    return "".join(text + ("" if name is None else str(inputs[name])) for text, name in parts)
+
+
+def named(template: Any, where: str = "") -> Iterator[tuple[str, str]]:
+    """(place, input id) for each placeholder; FieldError where braces don't match."""
+    if isinstance(template, Mapping):
+        for key, value in template.items():
+            yield from named(value, f"{where}.{key}".strip("."))
+    elif isinstance(template, list | tuple):
+        for i, item in enumerate(template):
+            yield from named(item, f"{where}[{i}]")
+    elif isinstance(template, str):
+        yield from ((where, name) for _, name in _parts(template, where) if name is not None)
+
+
+def _parts(text: str, where: str) -> list[tuple[str, str | None]]:
+    """[(literal text, input id after it or None), …]"""
+    try:
+        parsed = list(Formatter().parse(text))
+    except ValueError as error:
+        raise FieldError(where, f'"{text}": {error}; write {{{{ and }}}} for braces') from None
+    for _, name, format_spec, conversion in parsed:
+        if name is not None and (not name.isidentifier() or format_spec or conversion):
+            raise FieldError(where, f'"{text}": between braces stands the id of an input, alone')
+    return [(literal, name) for literal, name, _, _ in parsed]

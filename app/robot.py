@@ -1,0 +1,120 @@
+"""What the kiosk knows of the robot at this moment; changed on the event loop only.
+
+One latest sample per topic, as raw bytes, decoded when it is first asked for.
+"""
+
+import logging
+import math
+from collections import Counter
+from dataclasses import dataclass
+from typing import Any, Literal, Protocol
+
+from app.errors import DecodeError
+from app.graph import Graph
+from app.interfaces import Interfaces
+from app.keys import key_of
+from app.panel.model import Panel
+
+log = logging.getLogger("kiosk.robot")
+
+UNREADABLE_LOG_S = 60.0  # one line per topic in this time, at most
+
+
+class Buffer(Protocol):
+    """Bytes, or what becomes bytes when asked (Zenoh's buffers: no copy until then)."""
+
+    def __bytes__(self) -> bytes: ...
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """One message as it came: `at` monotonic seconds, `wall` seconds since the epoch.
+
+    `source` is the zid of the bridge that sent it (from its timestamp), None if it did not say;
+    `seq` orders samples and losses of bridges as this session saw them.
+    """
+
+    payload: Buffer
+    seq: int
+    at: float
+    wall: float
+    source: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """The latest of a topic: not seen yet, seen before a cut, not readable, or a message."""
+
+    status: Literal["waiting", "cut", "unreadable", "message"]
+    message: Any = None
+    at: float = -math.inf
+    wall: float = 0.0
+
+
+WAITING = Reading("waiting")
+
+
+class Robot:
+    """Latest samples, the graph, and the state of the link."""
+
+    def __init__(self, panel: Panel, interfaces: Interfaces, own_zid: str = "") -> None:
+        self.link_up = False
+        self.settled_at = math.inf  # monotonic: when a bridge that came has set up its routes
+        self.graph = Graph(own_zid)
+        self.undecodable: Counter[str] = Counter()
+        self._interfaces = interfaces
+        self._namespace = panel.namespace
+        self._types = {key_of(t, panel.namespace): n for t, n in panel.subscriptions().items()}
+        self._samples: dict[str, Sample] = {}
+        self._readings: dict[str, Reading] = {}
+        self._logged_at: dict[str, float] = {}
+
+    def key(self, topic: str) -> str:
+        """The key expression of a topic of this robot."""
+        return key_of(topic, self._namespace)
+
+    def take(self, key: str, sample: Sample) -> None:
+        """A newer sample of a topic."""
+        self._samples[key] = sample
+        self._readings.pop(key, None)
+
+    def cut(self, bridge: str, seq: int) -> None:
+        """A bridge went away at `seq`: what came by it before no longer says what is so."""
+        for key, sample in self._samples.items():
+            if sample.seq < seq and sample.source in (bridge, None):
+                old = self._reading(key, sample)
+                if old.status != "waiting":
+                    self._readings[key] = Reading("cut", old.message, old.at, old.wall)
+
+    def reading(self, topic: str) -> Reading:
+        """The latest of a topic that the panel listens to."""
+        key = self.key(topic)
+        sample = self._samples.get(key)
+        return WAITING if sample is None else self._reading(key, sample)
+
+    def _reading(self, key: str, sample: Sample) -> Reading:
+        known = self._readings.get(key)
+        if known is None:
+            known = self._readings[key] = self._decoded(key, sample)
+        return known
+
+    def _decoded(self, key: str, sample: Sample) -> Reading:
+        try:
+            message = self._interfaces.decode(self._types[key], bytes(sample.payload))
+        except DecodeError as error:
+            self._count_unreadable(key, sample, error)
+            return Reading("unreadable", None, sample.at, sample.wall)
+        return Reading("message", message, sample.at, sample.wall)
+
+    def _count_unreadable(self, key: str, sample: Sample, error: DecodeError) -> None:
+        self.undecodable[key] += 1
+        if sample.at - self._logged_at.get(key, -math.inf) >= UNREADABLE_LOG_S:
+            self._logged_at[key] = sample.at
+            log.error("/%s: %s (%d so far)", key, error, self.undecodable[key])
+
+
+def value_of(message: Any, path: str) -> Any:
+    """The field at a dotted path of a decoded message."""
+    for name in path.split("."):
+        message = getattr(message, name)
+    return message

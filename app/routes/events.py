@@ -1,0 +1,56 @@
+"""The event stream: a snapshot first, then changes, and a heartbeat that never stops."""
+
+import time
+from collections.abc import AsyncIterator
+from typing import Final
+
+from fastapi import APIRouter
+from fastapi.responses import Response
+from fastapi.sse import EventSourceResponse
+
+from app.board import Board, beat
+from app.routes.site import CurrentSite, Site
+from app.views import clock
+
+router = APIRouter()
+
+BEAT_S: Final = 0.5  # a page locks itself after 1.75 s without any event
+RECONNECT_MS: Final = 500
+
+HEADERS: Final = {"cache-control": "no-store", "x-accel-buffering": "no"}
+
+
+@router.get(
+    "/events",
+    response_class=Response,
+    responses={200: {"content": {"text/event-stream": {}}}},
+    summary="Server-sent events: snapshot, <interlock>-enabled-updated, update, link, beat",
+)
+async def events(site: CurrentSite, once: bool = False) -> Response:
+    """`once`: the snapshot alone, for a browser that has no stream to spare."""
+    board = site.kiosk.board
+    if once:
+        return Response(board.snapshot(), media_type="text/event-stream", headers=HEADERS)
+    return EventSourceResponse(_counted(site, board), headers=HEADERS)
+
+
+async def _counted(site: Site, board: Board) -> AsyncIterator[bytes]:
+    with site.metrics.streams.track_inprogress():
+        async for chunk in stream(board):
+            yield chunk
+
+
+async def stream(board: Board) -> AsyncIterator[bytes]:
+    """What one browser gets. It waits while the browser does not read, and then skips to now."""
+    version, view = board.version, board.view
+    yield f"retry: {RECONNECT_MS}\n\n".encode() + board.snapshot()
+    next_beat = time.monotonic() + BEAT_S
+    while not board.closed:
+        await board.newer(version, next_beat - time.monotonic())
+        if board.version > version:
+            chunk = board.since(version, view)
+            version, view = board.version, board.view
+            yield chunk
+        if not board.closed and time.monotonic() >= next_beat:
+            next_beat = time.monotonic() + BEAT_S
+            yield beat(clock(time.time()))

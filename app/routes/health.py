@@ -1,0 +1,28 @@
+"""For who watches the kiosk: is it up, can commands reach the robot, how much of what."""
+
+from fastapi import APIRouter
+from fastapi.responses import JSONResponse, Response
+from prometheus_client import CONTENT_TYPE_LATEST
+
+from app.routes.site import CurrentSite
+
+router = APIRouter()
+
+
+@router.get("/healthz", summary="200 while the process serves")
+async def healthz() -> dict[str, str]:
+    return {"status": "ok"}
+
+
+@router.get("/readyz", summary="200 while commands can reach the robot, else 503 with the reason")
+async def readyz(site: CurrentSite) -> Response:
+    way = site.kiosk.way
+    if way.permitted:
+        return JSONResponse({"status": "ready"})
+    body = {"status": "not ready", "code": way.code, "reason": way.reason}
+    return JSONResponse(body, status_code=503)
+
+
+@router.get("/metrics", summary="Prometheus text format")
+async def metrics(site: CurrentSite) -> Response:
+    return Response(site.metrics.text(), media_type=CONTENT_TYPE_LATEST)

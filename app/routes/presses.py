@@ -1,0 +1,123 @@
+"""A press: JSON for the panel's scripts, a form for a browser without them; one module behind."""
+
+import json
+import re
+import secrets
+from collections.abc import Mapping
+from typing import Annotated, Final
+from urllib.parse import parse_qsl, quote
+
+from fastapi import APIRouter, Request
+from fastapi.responses import JSONResponse, RedirectResponse, Response
+from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, JsonValue, ValidationError
+
+from app.errors import InputError
+from app.presses import Receipt
+from app.routes.site import CurrentSite, Site
+
+router = APIRouter()
+
+PRESS_ID: Final = r"^[A-Za-z0-9_.:-]{1,64}$"
+STATUS: Final[Mapping[str, int]] = {"": 200, "interlock": 409, "input": 422, "link": 503}
+
+
+class Press(BaseModel):
+    """What a client posts as JSON; only `inputs` is needed."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    inputs: dict[str, JsonValue]
+    id: Annotated[str, Field(pattern=PRESS_ID)] | None = None
+    seen: Annotated[str, Field(pattern=r"^[0-9a-f]{1,32}-[0-9]{1,18}$")] | None = None
+    at: AwareDatetime | None = None
+
+
+class ReceiptAnswer(BaseModel):
+    """What came of a press."""
+
+    id: str
+    widget: str
+    outcome: str
+    reason: str
+    at: AwareDatetime
+
+
+@router.post(
+    "/widgets/{widget}",
+    response_model=ReceiptAnswer,
+    summary="Press a widget",
+    responses={
+        303: {"description": "a form post: back to the page, with the receipt on it"},
+        409: {"model": ReceiptAnswer, "description": "refused by an interlock"},
+        422: {"model": ReceiptAnswer, "description": "bad input"},
+        503: {"model": ReceiptAnswer, "description": "no way to the robot"},
+    },
+    openapi_extra={
+        "requestBody": {
+            "required": True,
+            "content": {"application/json": {"schema": Press.model_json_schema()}},
+        }
+    },
+)
+async def press(widget: str, request: Request, site: CurrentSite) -> Response:
+    site.kiosk.presses.widget(widget)
+    who = request.client.host if request.client else "unknown"
+    body = await request.body()
+    kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
+    if kind == "application/json":
+        given = _json(body)
+        press_id = given.id or secrets.token_hex(8)
+        receipt = site.kiosk.presses.press(widget, given.inputs, press_id, who)
+        _count(site, receipt)
+        return JSONResponse(receipt.as_json(), status_code=STATUS[receipt.cause])
+    if kind == "application/x-www-form-urlencoded":
+        inputs = _form(body)
+        # One rendered page has one id for all its buttons, and each button is a press of its own.
+        page_id = inputs.pop("_id", secrets.token_hex(8))
+        if not re.fullmatch(PRESS_ID, page_id):
+            raise InputError(f'_id: "{page_id:.40}" is not the id of a press')
+        press_id = f"{page_id}.{widget}"
+        receipt = site.kiosk.presses.press(widget, inputs, press_id, who)
+        _count(site, receipt)
+        return RedirectResponse(_page_with(site, receipt), status_code=303)
+    raise InputError(
+        f'a press is "application/json" or "application/x-www-form-urlencoded", not "{kind}"'
+    )
+
+
+def _count(site: Site, receipt: Receipt) -> None:
+    site.metrics.presses.labels(receipt.outcome).inc()
+
+
+def _json(body: bytes) -> Press:
+    try:
+        return Press.model_validate(json.loads(body, parse_constant=_no_constant))
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        place = ".".join(str(step) for step in first["loc"])
+        raise InputError(f"{place or 'the body'}: {first['msg']}") from None
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"the body is not JSON: {error}") from None
+
+
+def _no_constant(name: str) -> float:
+    raise ValueError(f"{name} is not a number of JSON")
+
+
+def _form(body: bytes) -> dict[str, str]:
+    try:
+        pairs = parse_qsl(
+            body.decode("ascii"), keep_blank_values=True, errors="strict", max_num_fields=200
+        )
+    except ValueError as error:
+        raise InputError(f"the body is not a form: {error}") from None
+    if len({name for name, _ in pairs}) < len(pairs):
+        raise InputError("a field is in the form twice")
+    return dict(pairs)
+
+
+def _page_with(site: Site, receipt: Receipt) -> str:
+    """Where the receipt is shown: on the page of its widget."""
+    pages = site.kiosk.panel.pages
+    page = next(p for p in pages if any(w.id == receipt.widget for w in p.widgets))
+    return f"/pages/{page.id}?receipt={quote(receipt.id)}"

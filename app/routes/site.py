@@ -1,0 +1,57 @@
+"""What the routes share: the application's state, typed, and answers for errors."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from fastapi import Depends, Request
+from fastapi.responses import HTMLResponse, JSONResponse, Response
+from jinja2 import Environment
+from starlette.exceptions import HTTPException
+
+from app.assets import Assets
+from app.errors import KioskError
+from app.kiosk import Kiosk
+from app.metrics import Metrics
+
+
+@dataclass(slots=True)
+class Site:
+    """All that a request needs; in development `kiosk` and `assets` are replaced together."""
+
+    kiosk: Kiosk
+    assets: Assets
+    templates: Environment
+    metrics: Metrics
+    dev: bool
+
+
+def site_of(request: Request) -> Site:
+    site: Site = request.app.state.site
+    return site
+
+
+CurrentSite = Annotated[Site, Depends(site_of)]
+
+
+def error_answer(request: Request, status: int, message: str) -> Response:
+    """An error for whom it is: a page for who reads pages, JSON for programs."""
+    site = site_of(request)
+    if "text/html" not in request.headers.get("accept", ""):
+        return JSONResponse({"error": message}, status_code=status)
+    context = {"site": site, "panel": site.kiosk.panel, "status": status, "message": message}
+    html = site.templates.get_template("error.html").render(**context)
+    return HTMLResponse(html, status_code=status, headers={"cache-control": "no-store"})
+
+
+async def on_kiosk_error(request: Request, error: Exception) -> Response:
+    status = error.status if isinstance(error, KioskError) else 500
+    return error_answer(request, status, str(error))
+
+
+async def on_http_error(request: Request, error: Exception) -> Response:
+    """Starlette's own: no such path, wrong method, body too large."""
+    if not isinstance(error, HTTPException):
+        raise error
+    answer = error_answer(request, error.status_code, f"{error.detail}: {request.url.path}")
+    answer.headers.update(error.headers or {})
+    return answer

@@ -1,0 +1,62 @@
+"""Every sentence that an operator reads, by its code: the one place to translate.
+
+Codes are stable names for tests and logs; `say` fills in what the sentence is about.
+"""
+
+from collections.abc import Mapping
+from typing import Final
+
+ENGLISH: Final[Mapping[str, str]] = {
+    # Why a control is locked.
+    "no_link": "No connection to the robot: its bridge can't be reached.",
+    "no_bridge": "No connection to the robot: Zenoh answers, but no ROS 2 bridge is there.",
+    "joining": "Joining the robot's topics: a moment.",
+    "bridge_silent": "The ROS 2 bridge is connected but does not answer: restart the bridge.",
+    "wrong_type": "{topic} is {found} on the robot, but this panel is made for {wanted}.",
+    "waiting": "Locked: waiting for {topic} from the robot.",
+    "cut": "Locked: the connection was cut since the last {topic}; waiting for {topic}.",
+    "stale": "Locked: the last {topic} is older than {limit} s.",
+    "no_publisher": "Locked: no node of the robot publishes {topic}.",
+    "unreadable": "Locked: {topic} can't be read: what arrives is not {wanted}.",
+    "forbidden": "The robot does not permit {name} ({topic} is false).",
+    "server_lost": "There is no connection to the panel's server.",
+    "server_unsure": "No answer from the panel's server: it is not known whether this was sent.",
+    # What a readout shows beside or instead of a value.
+    "readout_waiting": "waiting for {topic}",
+    "readout_cut": "from before the connection was cut, received {time}",
+    "readout_old": "{age} old",
+    "readout_unreadable": "{topic} can't be read: what arrives is not {wanted}",
+    "readout_time": "received {time}",
+    # What came of a press.
+    "published": "Sent on {topic} at {time}.",
+    "sent_to_nobody": "Sent on {topic} at {time}, but no node is known to listen to it.",
+    "refused": "Not sent: {why}",
+    "not_encoded": "Not sent: {why}.",
+    "press_reused": "Not sent: the press id {id} was already used for another press.",
+    "bad_request": "Not sent: {why}.",
+    # The way to the robot.
+    "server": "Server",
+    "bridge": "Bridge",
+    "robot": "Robot",
+    "simulated": "SIMULATED ROBOT",
+    "ok": "ok",
+    "lost": "no connection",
+    "absent": "not there",
+    "silent": "no answer",
+    "no_node": "no node seen",
+    "pending": "joining",
+}
+
+
+def say(code: str, **about: object) -> str:
+    """The sentence for `code`, filled in; a KeyError is a mistake of the programmer's."""
+    return ENGLISH[code].format(**about)
+
+
+def age(seconds: float) -> str:
+    """An age as an operator says it: "4 s", "12 min", "3 h"."""
+    if seconds < 60:
+        return f"{int(seconds)} s"
+    if seconds < 3600:
+        return f"{int(seconds // 60)} min"
+    return f"{int(seconds // 3600)} h"

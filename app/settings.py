@@ -1,0 +1,63 @@
+"""The environment, read once and frozen."""
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from app.errors import SettingsError
+
+Mode = Literal["demo", "live"]
+
+PACKAGE = Path(__file__).resolve().parent
+LOOPBACK_HOSTS = ("127.0.0.1", "localhost", "[::1]")
+LOG_LEVELS = ("debug", "info", "warn", "error", "fatal")
+
+
+def shipped(name: str) -> Path:
+    """A file or folder of the project: in the package when installed, beside it in a checkout."""
+    inside = PACKAGE / name
+    return inside if inside.exists() else PACKAGE.parent / name
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Settings:
+    """What `KIOSK_…` variables say; see the README's table."""
+
+    panel: Path
+    zenoh: Path
+    mode: Mode | None = None
+    hosts: tuple[str, ...] = LOOPBACK_HOSTS
+    log_level: str = "info"
+    dev: bool = False
+
+    @classmethod
+    def from_environment(cls, env: Mapping[str, str] = os.environ) -> "Settings":
+        """Raises SettingsError that names the variable and what would be right."""
+        level = env.get("KIOSK_LOG_LEVEL", "info").lower()
+        if level not in LOG_LEVELS:
+            raise SettingsError(f'KIOSK_LOG_LEVEL is "{level}": one of {", ".join(LOG_LEVELS)}')
+        extra = [host.strip().lower() for host in env.get("KIOSK_HOSTS", "").split(",")]
+        return cls(
+            panel=_path(env, "KIOSK_PANEL", PACKAGE / "panel.toml"),
+            zenoh=_path(env, "KIOSK_ZENOH", shipped("zenoh.json5")),
+            mode=_mode(env.get("KIOSK_MODE", "")),
+            hosts=(*LOOPBACK_HOSTS, *(host for host in extra if host)),
+            log_level=level,
+            dev=env.get("KIOSK_DEV", "") not in ("", "0"),
+        )
+
+
+def _mode(given: str) -> Mode | None:
+    match given:
+        case "":
+            return None
+        case "demo" | "live":
+            return given
+    raise SettingsError(f'KIOSK_MODE is "{given}": it must be "demo" or "live"')
+
+
+def _path(env: Mapping[str, str], name: str, default: Path) -> Path:
+    given = env.get(name)
+    return Path(given).expanduser().resolve() if given else default

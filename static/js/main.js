@@ -1,0 +1,81 @@
+// Puts what the server says onto the page: texts and attributes, in place. It composes no sentence.
+import { Source } from "./source.js";
+import { Presser } from "./press.js";
+
+const body = document.body;
+const widgets = new Map(
+  [...document.querySelectorAll("[data-widget]")].map((root) => [root.dataset.widget, root]),
+);
+
+function setText(element, text) {
+  if (element && element.textContent !== text) element.textContent = text;
+}
+
+function showWidget(id, attributes) {
+  const root = widgets.get(id);
+  if (!root) return;
+  for (const [name, value] of Object.entries(attributes)) {
+    if (name === "enabled") root.querySelector("button").disabled = !value;
+    else if (name === "state") root.dataset.state = value;
+    else setText(root.querySelector(`[data-text="${name}"]`), value ?? "");
+  }
+}
+
+function showWidgets(changes) {
+  for (const [id, attributes] of Object.entries(changes)) showWidget(id, attributes);
+}
+
+function showLink(lamps) {
+  for (const [name, lamp] of Object.entries(lamps)) {
+    const item = document.querySelector(`[data-lamp="${name}"]`);
+    item.dataset.state = lamp.state;
+    setText(item.querySelector("b"), lamp.text);
+  }
+}
+
+function showNotice(notice) {
+  for (const [id, text] of Object.entries(notice)) {
+    const element = document.getElementById(id);
+    setText(element, text);
+    element.hidden = !text;
+  }
+}
+
+// The server is gone: what was permitted is no longer known to be.
+function lockAll() {
+  body.dataset.cut = "";
+  const server = document.querySelector('[data-lamp="server"]');
+  server.dataset.state = "bad";
+  setText(server.querySelector("b"), body.dataset.lostShort);
+  for (const root of widgets.values()) {
+    const button = root.querySelector("button");
+    if (button) {
+      button.disabled = true;
+      setText(root.querySelector('[data-text="reason"]'), body.dataset.lost);
+    } else if (root.dataset.state) {
+      root.dataset.state = "old";
+      setText(root.querySelector('[data-text="note"]'), body.dataset.lost);
+    }
+  }
+}
+
+const source = new Source({
+  snapshot(all) {
+    if (all.revision !== body.dataset.revision) {
+      location.reload();
+      return;
+    }
+    delete body.dataset.cut;
+    showWidgets(all.widgets);
+    showLink(all.link);
+    showNotice(all.notice);
+  },
+  update: showWidgets,
+  link: showLink,
+  notice: showNotice,
+  beat: ({ clock }) => setText(document.getElementById("clock"), clock),
+  lost: lockAll,
+});
+
+new Presser(widgets, source, { unsure: body.dataset.unsure, lost: body.dataset.lost });
+source.start();

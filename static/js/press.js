@@ -1,0 +1,75 @@
+// A press: on release, once, with an id of its own; its receipt is shown where it was pressed.
+const ANSWER_WITHIN_MS = 5000;
+
+function newId() {
+  const bytes = crypto.getRandomValues(new Uint8Array(16));
+  return [...bytes].map((byte) => byte.toString(16).padStart(2, "0")).join("");
+}
+
+export class Presser {
+  #widgets;
+  #source;
+  #sentences;
+  #underWay = new Set();
+
+  constructor(widgets, source, sentences) {
+    this.#widgets = widgets;
+    this.#source = source;
+    this.#sentences = sentences;
+    for (const form of document.forms) {
+      form.addEventListener("submit", (event) => {
+        event.preventDefault();
+        const root = event.submitter?.closest("[data-widget]");
+        if (root && !event.submitter.disabled) this.#press(root, event.submitter, form);
+      });
+    }
+  }
+
+  // A second tap while the first is under way is the same press: it sends nothing.
+  async #press(root, button, form) {
+    const id = root.dataset.widget;
+    if (this.#underWay.has(id)) return;
+    this.#underWay.add(id);
+    button.setAttribute("aria-busy", "true");
+    try {
+      this.#show(root, await this.#send(id, form));
+    } finally {
+      this.#underWay.delete(id);
+      button.removeAttribute("aria-busy");
+    }
+  }
+
+  // Sent once and never again: when no answer comes, it is not known what became of it.
+  async #send(widget, form) {
+    const inputs = {};
+    for (const input of form.elements) {
+      if (input.closest("[data-widget]") && input.matches("input")) inputs[input.name] = input.value;
+    }
+    const press = { inputs, id: newId(), seen: this.#source.seen, at: new Date().toISOString() };
+    try {
+      const answer = await fetch(`/widgets/${widget}`, {
+        method: "POST",
+        headers: { "Content-Type": "application/json" },
+        body: JSON.stringify(press),
+        signal: AbortSignal.timeout(ANSWER_WITHIN_MS),
+      });
+      const receipt = await answer.json();
+      return receipt.outcome ? receipt : { outcome: "refused", reason: receipt.error };
+    } catch {
+      return { outcome: "unknown", reason: this.#sentences.unsure };
+    }
+  }
+
+  #show(root, { outcome, reason }) {
+    for (const other of this.#widgets.values()) {
+      const old = other.querySelector(".receipt");
+      if (old && other !== root) {
+        old.textContent = "";
+        delete old.dataset.outcome;
+      }
+    }
+    const receipt = root.querySelector(".receipt");
+    receipt.dataset.outcome = outcome;
+    receipt.textContent = reason;
+  }
+}

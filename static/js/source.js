@@ -1,0 +1,132 @@
+// Where the page's state comes from: the event stream, or snapshots one by one when this browser
+// has no connection to spare. Whatever happens, `lost` is called within 2 s of the last sign of life.
+const SILENCE_MS = 1750;
+const CHECK_MS = 125;
+const POLL_MS = 700;
+// A browser opens six connections to one server; pages and presses need some of them.
+const STREAMS_PER_BROWSER = 3;
+const EVENTS = ["snapshot", "update", "link", "notice", "beat"];
+
+export class Source {
+  #on;
+  #stream = null;
+  #poll = 0;
+  #giveBack = null;
+  #aliveAt = performance.now();
+  #fresh = true; // the page itself is a snapshot, until its time is up
+  #seen = document.body.dataset.seen;
+
+  // `handlers` has a function for each event, and `lost`.
+  constructor(handlers) {
+    this.#on = handlers;
+  }
+
+  // The id of the last event: what the operator has seen.
+  get seen() {
+    return this.#seen;
+  }
+
+  start() {
+    document.addEventListener("visibilitychange", () => (document.hidden ? this.#rest() : this.#open()));
+    addEventListener("pagehide", () => this.#rest());
+    addEventListener("pageshow", (event) => event.persisted && this.#open());
+    setInterval(() => this.#watch(), CHECK_MS);
+    if (!document.hidden) this.#open();
+  }
+
+  // A hidden page gives its stream back. It is locked when it shows again, until a fresh snapshot.
+  #rest() {
+    this.#close();
+    this.#lose();
+  }
+
+  #open() {
+    this.#close();
+    this.#aliveAt = performance.now();
+    this.#take().then((slot) => {
+      if (document.hidden || this.#stream || this.#poll) return slot?.();
+      this.#giveBack = slot;
+      if (slot) this.#listen();
+      else this.#ask();
+    });
+  }
+
+  #close() {
+    this.#stream?.close();
+    this.#stream = null;
+    clearTimeout(this.#poll);
+    this.#poll = 0;
+    this.#giveBack?.();
+    this.#giveBack = null;
+  }
+
+  // One of the browser's few places for a stream, as a function that gives it back; null if all are
+  // taken. Browsers keep locks from pages without HTTPS or localhost: those take no turns.
+  async #take() {
+    if (!navigator.locks) return () => {};
+    for (let place = 0; place < STREAMS_PER_BROWSER; place++) {
+      const slot = await new Promise((resolve) => {
+        navigator.locks.request(`stream-${place}`, { ifAvailable: true }, (lock) =>
+          lock ? new Promise((release) => resolve(release)) : resolve(null),
+        );
+      });
+      if (slot) return slot;
+    }
+    return null;
+  }
+
+  #listen() {
+    this.#stream = new EventSource("/events");
+    for (const name of EVENTS) {
+      this.#stream.addEventListener(name, (event) => this.#got(name, event.data, event.lastEventId));
+    }
+    // Permissions come under the names of their interlocks too; the widgets' own state is in `update`.
+    this.#stream.onerror = () => {
+      this.#lose();
+      if (this.#stream?.readyState === EventSource.CLOSED) this.#again();
+    };
+  }
+
+  // The browser gave up for good (an answer that is no stream): it is asked to try again.
+  #again() {
+    this.#close();
+    this.#poll = setTimeout(() => this.#open(), POLL_MS);
+  }
+
+  async #ask() {
+    const asked = performance.now();
+    this.#poll = -1;
+    try {
+      const answer = await fetch("/events?once=1", { cache: "no-store", signal: AbortSignal.timeout(SILENCE_MS) });
+      const text = await answer.text();
+      const data = /^data: (.*)$/m.exec(text)?.[1];
+      if (answer.ok && data) {
+        this.#aliveAt = asked;
+        this.#got("snapshot", data, /^id: (.*)$/m.exec(text)?.[1], asked);
+      }
+    } catch {
+      this.#lose();
+    }
+    if (this.#poll === -1) this.#poll = setTimeout(() => this.#open(), POLL_MS);
+  }
+
+  #got(name, text, id, at = performance.now()) {
+    this.#aliveAt = at;
+    const data = JSON.parse(text);
+    if (name === "snapshot") this.#fresh = true;
+    if (!this.#fresh) return; // after a loss only a snapshot says what is so
+    if (id) this.#seen = id;
+    this.#on[name](data);
+  }
+
+  #watch() {
+    if (document.hidden || !this.#fresh) return;
+    if (performance.now() - this.#aliveAt > SILENCE_MS) this.#lose();
+  }
+
+  #lose() {
+    if (!this.#fresh) return;
+    this.#fresh = false;
+    this.#on.lost();
+  }
+}

@@ -1,0 +1,138 @@
+"""A ROS 2 node (rclpy) for the tests, driven by JSON lines: one command in, one answer out.
+
+It runs in an environment of its own, with rclpy and nothing of the kiosk.
+Answers are `{"ok": …}` or `{"error": …}`; what a subscription hears is kept until `heard` asks.
+"""
+
+import contextlib
+import json
+import sys
+import threading
+import time
+from importlib import import_module
+from typing import Any
+
+import rclpy
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+
+
+def type_named(name: str) -> Any:
+    package, kind, message = name.split("/")
+    return getattr(import_module(f"{package}.{kind}"), message)
+
+
+def fields_of(value: Any) -> Any:
+    """A message as plain JSON values."""
+    if hasattr(value, "get_fields_and_field_types"):
+        return {name: fields_of(getattr(value, name)) for name in value.get_fields_and_field_types()}
+    if isinstance(value, (str, bool, int, float)):
+        return value
+    return [fields_of(item) for item in value]
+
+
+def filled(message: Any, fields: dict[str, Any]) -> Any:
+    for name, value in fields.items():
+        inner = getattr(message, name)
+        setattr(message, name, filled(inner, value) if isinstance(value, dict) else value)
+    return message
+
+
+def qos_of(given: dict[str, Any]) -> QoSProfile:
+    return QoSProfile(
+        depth=given.get("depth", 10),
+        durability=DurabilityPolicy[given.get("durability", "volatile").upper()],
+        reliability=ReliabilityPolicy[given.get("reliability", "reliable").upper()],
+    )
+
+
+class Commands:
+    def __init__(self, name: str) -> None:
+        self.node = rclpy.create_node(name)
+        self.heard_on: dict[str, list[dict[str, Any]]] = {}
+        self.publishers: dict[str, Any] = {}
+        self.timers: dict[str, Any] = {}
+
+    def subscribe(self, topic: str, type: str, **qos: Any) -> None:
+        heard = self.heard_on.setdefault(topic, [])
+        self.node.create_subscription(
+            type_named(type), topic, lambda m: heard.append(fields_of(m)), qos_of(qos)
+        )
+
+    def heard(self, topic: str) -> list[dict[str, Any]]:
+        return self.heard_on[topic]
+
+    def advertise(self, topic: str, type: str, **qos: Any) -> None:
+        self.publishers[topic] = self.node.create_publisher(type_named(type), topic, qos_of(qos))
+
+    def publish(self, topic: str, fields: dict[str, Any]) -> None:
+        publisher = self.publishers[topic]
+        publisher.publish(filled(publisher.msg_type(), fields))
+
+    def every(self, topic: str, fields: dict[str, Any], period_s: float) -> None:
+        self.timers[topic] = self.node.create_timer(period_s, lambda: self.publish(topic, fields))
+
+    def once(self, topic: str, type: str, fields: dict[str, Any], timeout_s: float = 15) -> None:
+        """`ros2 topic pub --once`: advertise, wait for a subscriber, publish, go away."""
+        self.advertise(topic, type)
+        publisher = self.publishers[topic]
+        end = time.monotonic() + timeout_s
+        while publisher.get_subscription_count() == 0:
+            if time.monotonic() > end:
+                raise TimeoutError(f"nobody subscribes to {topic}")
+            time.sleep(0.01)
+        self.publish(topic, fields)
+        time.sleep(0.1)
+        self.withdraw(topic)
+
+    def withdraw(self, topic: str) -> None:
+        timer = self.timers.pop(topic, None)
+        if timer is not None:
+            self.node.destroy_timer(timer)
+        self.node.destroy_publisher(self.publishers.pop(topic))
+
+    def subscribers(self, topic: str) -> int:
+        return int(self.publishers[topic].get_subscription_count())
+
+    def nodes(self) -> list[str]:
+        return [f"{ns.rstrip('/')}/{name}" for name, ns in self.node.get_node_names_and_namespaces()]
+
+    def topics(self) -> dict[str, list[str]]:
+        return dict(self.node.get_topic_names_and_types())
+
+    def endpoints(self, topic: str) -> list[dict[str, Any]]:
+        return [
+            {
+                "node": info.node_name,
+                "type": info.topic_type,
+                "hash": str(info.topic_type_hash),
+                "reliability": info.qos_profile.reliability.name.lower(),
+                "durability": info.qos_profile.durability.name.lower(),
+            }
+            for info in self.node.get_publishers_info_by_topic(topic)
+        ]
+
+
+def main() -> None:
+    rclpy.init()
+    commands = Commands(sys.argv[1])
+    executor = SingleThreadedExecutor()
+    executor.add_node(commands.node)
+
+    def spin() -> None:
+        with contextlib.suppress(ExternalShutdownException):
+            executor.spin()
+
+    threading.Thread(target=spin, daemon=True).start()
+    print(json.dumps({"ok": "ready"}), flush=True)
+    for line in sys.stdin:
+        request = json.loads(line)
+        try:
+            answer: Any = {"ok": getattr(commands, request.pop("do"))(**request)}
+        except Exception as error:  # whatever went wrong is the answer
+            answer = {"error": f"{type(error).__name__}: {error}"}
+        print(json.dumps(answer), flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,31 @@
+#!/bin/sh
+# What the tests need besides Python, Rust and git: installed on Debian as root, named elsewhere.
+set -eu
+
+missing=""
+need() { # need PACKAGE COMMAND…: the package, unless the command succeeds
+    package=$1
+    shift
+    "$@" >/dev/null 2>&1 || missing="$missing $package"
+}
+
+has_libclang() {
+    ls /usr/lib/llvm-*/lib/libclang*.so* /usr/lib/*/libclang*.so* /usr/lib*/libclang*.so* 2>/dev/null | grep -q .
+}
+
+need build-essential cc --version
+need cmake cmake --version
+need chromium chromium --version
+need libclang-dev has_libclang
+need python3-venv "${PYTHON:-python3}" -c "import ensurepip"
+command -v cargo >/dev/null || { echo "missing: Rust 1.85 or later (cargo), see rustup.rs" >&2; exit 1; }
+
+[ -n "$missing" ] || exit 0
+if [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
+    apt-get update -qq
+    # shellcheck disable=SC2086  # a list of packages
+    DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $missing >/dev/null
+else
+    echo "missing:$missing (Debian's names): install them, then run this again" >&2
+    exit 1
+fi
