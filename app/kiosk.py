@@ -10,6 +10,7 @@ import logging
 import math
 import time
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import Any, Final
 
 from app.board import Board
@@ -101,10 +102,8 @@ class Kiosk:
 
     def _wake(self) -> None:
         """On a thread of Zenoh's."""
-        try:
+        with suppress(RuntimeError):  # the loop is closed: the process ends
             self._loop.call_soon_threadsafe(self._take)
-        except RuntimeError:
-            pass  # the loop is closed: the process ends
 
     def _take(self) -> None:
         if self._stopped:
