@@ -28,7 +28,10 @@ class Assets:
 
 
 def load_assets(static: Path, templates: Path, mm_per_px: float) -> Assets:
-    """Reads `static`, and `templates` for the revision only; `mm_per_px` (millimetres per CSS pixel) gives the sizes of buttons."""
+    """Reads `static`, and `templates` for the revision only.
+
+    `mm_per_px` (millimetres per CSS pixel) gives the sizes of buttons.
+    """
     layers = [(static / "css" / f"{name}.css").read_bytes() for name in LAYERS]
     millimetre = f":root{{--mm:{1 / mm_per_px:.4f}px}}\n".encode()
     files = {"kiosk.css": Asset(b"".join([*layers, millimetre]), MEDIA_TYPES[".css"])}

@@ -5,7 +5,6 @@ Permissions and the link are shown at once, values at most `FRAMES_PER_S` times 
 """
 
 import asyncio
-import contextlib
 import logging
 import math
 import time
@@ -95,7 +94,7 @@ class Kiosk:
         """The first use of a type compiles its codec: now, not at the first press."""
         for type_name in {*self.panel.subscriptions().values(), *self.panel.publications().values()}:
             self.interfaces.type_hash(type_name)
-            with contextlib.suppress(KioskError):
+            with suppress(KioskError):
                 self.interfaces.decode(type_name, b"\0\1\0\0")
 
     # Down.

@@ -174,10 +174,8 @@ class Link:
                 done.set_result(None)
 
         def on_end() -> None:
-            try:
+            with suppress(RuntimeError):  # the loop is closed: nobody waits any more
                 loop.call_soon_threadsafe(finish)
-            except RuntimeError:  # the loop is closed: nobody waits any more
-                pass
 
         with _translated(f"can't ask {selector}"):
             self._session.get(
