@@ -63,6 +63,14 @@ class Graph:
         bridges = self.bridges
         return any(e.role == role and e.key == key and e.zid in bridges for e in self._tokens.values())
 
+    def latched(self, key: str) -> bool | None:
+        """Whether the robot's publisher is TRANSIENT_LOCAL; None if it has none now."""
+        bridges = self.bridges
+        for e in self._tokens.values():
+            if e.role == "MP" and e.key == key and e.zid in bridges:
+                return e.transient_local
+        return None
+
     def wrong_type(self, role: Role, key: str, type_name: str) -> str | None:
         """The other type that this topic has, if it is not what the panel needs for `role`."""
         theirs, others, direction = _COUNTERPARTS[role]

@@ -1,9 +1,12 @@
 """Joining the ROS graph of a bridge: with liveliness tokens, after asking what is there already.
 
-A token makes the bridge create the DDS reader or writer, so that a topic is known before its first
-message and no first message is lost. Who creates a route first fixes its type and QoS for all: so
-a bridge that has just come gets time to discover the robot's nodes, and a topic whose type differs
-gets no token.
+A token makes the bridge create the DDS reader or writer. Those of what the panel publishes are held
+as soon as a bridge is there, so that a topic is known before its first message and none is lost.
+Who creates a route first fixes its type and QoS for all: so a bridge that has just come gets time to
+discover the robot's nodes, a topic whose type differs gets no token, and what the panel listens to
+gets one when its publisher is first seen, with that publisher's durability. Held from the start, it
+would make a VOLATILE reader, which misses what a TRANSIENT_LOCAL publisher said before they met. It
+stays when the publisher goes: a route that ends and begins again delivers each sample twice (#700).
 """
 
 import asyncio
@@ -48,6 +51,9 @@ class Joining:
         self._started_at = time.monotonic()
         self._joining: asyncio.Task[None] | None = None
         self._asking: asyncio.Task[None] | None = None
+        self._wrongly_held: set[str] = set()
+        self._told: set[tuple[str, str]] = set()
+        self._held_as: dict[str, bool] = {}  # key → whether its token is TRANSIENT_LOCAL
 
     def start(self) -> None:
         self._asking = self._task(self._ask_regularly())
@@ -65,8 +71,21 @@ class Joining:
             self._leave()
         if came:
             self._joining = self._task(self._join())
+        if self._joined:
+            self._hold()
+
+    @property
+    def _joined(self) -> bool:
+        return self._robot.settled_at < math.inf
+
+    def _hold(self) -> None:
+        try:
+            self._link.hold(self._tokens())
+        except LinkError as error:
+            log.warning("%s", error)
 
     def _leave(self) -> None:
+        self._held_as.clear()
         self._robot.settled_at = math.inf
         if self._joining is not None:
             self._joining.cancel()
@@ -84,7 +103,7 @@ class Joining:
         await self._ask_routes()
         if not found:
             self._link.resubscribe()
-        self._link.hold(self._tokens())
+        self._hold()
         await asyncio.sleep(SETTLE_S)
         self._robot.settled_at = time.monotonic()
         log.info("joined the robot's topics")
@@ -94,18 +113,38 @@ class Joining:
         """The tokens of all topics, but for those whose type is another one on the robot."""
         wanted: list[tuple[Role, str, str, Qos]] = [
             *(("MP", t, n, Qos()) for t, n in self._panel.publications().items()),
-            *(("MS", t, n, Qos()) for t, n in self._panel.subscriptions().items()),
+            *(
+                ("MS", topic, name, Qos(transient_local=latched))
+                for topic, name in self._panel.subscriptions().items()
+                if (latched := self._latched(self._robot.key(topic))) is not None
+            ),
             ("MP", "/rosout", LOG_TYPE, keys.ROSOUT),
         ]
         tokens = []
         for role, topic, type_name, qos in wanted:
             key = self._robot.key(topic)
             if found := self._robot.graph.wrong_type(role, key, type_name):
-                log.error("%s is %s on the robot, %s in the panel", topic, found, type_name)
+                if (topic, found) not in self._told:
+                    self._told.add((topic, found))
+                    log.error("%s is %s on the robot, %s in the panel", topic, found, type_name)
                 continue
             type_hash = self._interfaces.type_hash(type_name)
             tokens.append(keys.token(self._link.zid, role, key, type_name, qos, type_hash))
         return tokens
+
+    def _latched(self, key: str) -> bool | None:
+        """The durability that the token of a subscription is to have; None for no token yet.
+
+        If a publisher came with another one, its route is the wrong one for as long as that
+        publisher lives: the token goes with it, and the next publisher decides.
+        """
+        now = self._robot.graph.latched(key)
+        if now is None and key in self._wrongly_held:
+            self._wrongly_held.discard(key)
+            self._held_as.pop(key, None)
+        elif now is not None and self._held_as.setdefault(key, now) != now:
+            self._wrongly_held.add(key)
+        return self._held_as.get(key)
 
     async def _ask_regularly(self) -> None:
         missed = 0
@@ -120,8 +159,8 @@ class Joining:
                 continue
             self._robot.graph.answered(versions)
             await self._ask_routes()
-            if self._robot.settled_at < math.inf:
-                self._link.hold(self._tokens())
+            if self._joined:
+                self._hold()
             self._show()
 
     async def _ask_versions(self) -> dict[str, str]:

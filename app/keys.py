@@ -25,7 +25,7 @@ MESSAGE_TYPE: Final = re.compile(r"[a-z][a-z0-9_]*/msg/[A-Z][A-Za-z0-9]*")
 
 _TOKEN = re.compile(
     r"@/(?P<zid>[^/]+)/@ros2_lv"
-    r"(?:/(?P<role>MP|MS)/(?P<key>[^/]+)/(?P<type>[^/]+)/(?P<qos>[^/]+))?"
+    r"(?:/(?P<role>MP|MS)/(?P<key>[^/]+)/(?P<type>[^/]+)/K?:[01]?:(?P<durability>[01]?):[^/]*)?"
 )
 _ROUTE = re.compile(r"@/(?P<zid>[^/]+)/ros2/route/topic/(?P<direction>pub|sub)/(?P<key>.+)")
 
@@ -50,6 +50,7 @@ class Endpoint:
     role: Role | None = None
     key: str = ""
     type: str = ""
+    transient_local: bool = False
 
 
 def key_of(topic: str, namespace: str = "") -> str:
@@ -83,7 +84,8 @@ def parsed(token_key: str) -> Endpoint | None:
     if found["role"] is None:
         return Endpoint(found["zid"])
     role: Role = "MP" if found["role"] == "MP" else "MS"
-    return Endpoint(found["zid"], role, _unescaped(found["key"]), _unescaped(found["type"]))
+    key, type_name = _unescaped(found["key"]), _unescaped(found["type"])
+    return Endpoint(found["zid"], role, key, type_name, found["durability"] == "1")
 
 
 def version(zid: str) -> str:

@@ -125,7 +125,8 @@ class Kiosk:
             if token.alive and (zid := self.robot.graph.apply(token_key, True)):
                 log.info("bridge %s found", zid)
                 came = True
-        self._joining.follow(came and not had_bridge)
+        if changes.tokens:
+            self._joining.follow(came and not had_bridge)
         if urgent:
             self._show()
         else:

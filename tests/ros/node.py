@@ -73,7 +73,11 @@ class Commands:
         self.timers[topic] = self.node.create_timer(period_s, lambda: self.publish(topic, fields))
 
     def once(self, topic: str, type: str, fields: dict[str, Any], timeout_s: float = 15) -> None:
-        """`ros2 topic pub --once`: advertise, wait for a subscriber, publish, go away."""
+        """`ros2 topic pub --once`: advertise, wait for a subscriber, publish, go away.
+
+        Like that tool, it lets some time pass between the match and the message: a reader that
+        has not discovered this writer yet would miss it, whoever reads.
+        """
         self.advertise(topic, type)
         publisher = self.publishers[topic]
         end = time.monotonic() + timeout_s
@@ -81,6 +85,7 @@ class Commands:
             if time.monotonic() > end:
                 raise TimeoutError(f"nobody subscribes to {topic}")
             time.sleep(0.01)
+        time.sleep(0.3)
         self.publish(topic, fields)
         time.sleep(0.1)
         self.withdraw(topic)

@@ -1,0 +1,114 @@
+"""Fixtures: real parts, started once where they can be shared and ended whatever happens."""
+
+import os
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, Page, sync_playwright
+
+from tests.parts import BRIDGE, CHROMIUM, ROS_PYTHON, Bridge, RosNode, Server, live
+
+# Of this run alone: ROS 2's domains 0 to 101 work on every system.
+FIRST_DOMAIN = 2 + os.getpid() % 40
+
+CHROMIUM_FLAGS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+
+
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Nothing is skipped: where a part is missing, nothing is tested."""
+    missing = [str(p) for p in (BRIDGE, ROS_PYTHON, Path(CHROMIUM)) if not Path(p).exists()]
+    if missing and not session.config.option.collectonly:
+        pytest.exit(f"missing: {', '.join(missing)}; `make test` installs them", returncode=3)
+
+
+@pytest.fixture(scope="session")
+def domain() -> int:
+    return FIRST_DOMAIN
+
+
+@pytest.fixture(scope="session")
+def bridge(domain: int) -> Iterator[Bridge]:
+    """The bridge that tests share; who ends a bridge takes `own_bridge`."""
+    shared = Bridge(domain)
+    shared.start()
+    yield shared
+    shared.end()
+
+
+@pytest.fixture(scope="session")
+def node(domain: int, bridge: Bridge) -> Iterator[RosNode]:
+    """The robot's system_controller: listens to the panel's topics."""
+    shared = RosNode(domain)
+    for topic in ("/operation", "/operation1", "/operation2"):
+        shared.subscribe(topic, "std_msgs/msg/String")
+    shared.subscribe("/rosout", "rcl_interfaces/msg/Log", depth=1000)
+    yield shared
+    shared.end()
+
+
+@pytest.fixture
+def own_bridge(domain: int) -> Iterator[Bridge]:
+    """A bridge on a domain of its own, to be ended, frozen and started at will."""
+    mine = Bridge(domain + 50)
+    mine.start()
+    yield mine
+    mine.end()
+
+
+@pytest.fixture
+def own_node(own_bridge: Bridge) -> Iterator[RosNode]:
+    """A node behind `own_bridge`."""
+    mine = RosNode(own_bridge.domain)
+    yield mine
+    mine.end()
+
+
+@pytest.fixture
+def servers() -> Iterator[Callable[[Server], Server]]:
+    """Ends what is given to it, when the test is over."""
+    with ExitStack() as stack:
+
+        def kept(server: Server) -> Server:
+            stack.callback(server.end)
+            return server
+
+        yield kept
+
+
+@pytest.fixture
+def server(bridge: Bridge, node: RosNode, tmp_path: Path) -> Iterator[Server]:
+    """A kiosk of the test's own on the shared bridge."""
+    mine = live(bridge.endpoint, tmp_path)
+    yield mine
+    mine.end()
+
+
+@pytest.fixture(scope="session")
+def chromium() -> Iterator[Browser]:
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=CHROMIUM_FLAGS)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def page(chromium: Browser) -> Iterator[Page]:
+    """A page in a browser context of its own; an error on its console fails the test."""
+    context = chromium.new_context(viewport={"width": 1280, "height": 800})
+    context.set_default_timeout(10_000)
+    page = context.new_page()
+    errors: list[str] = []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    yield page
+    context.close()
+    assert errors == []

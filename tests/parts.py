@@ -1,0 +1,308 @@
+"""The real parts that tests are made of: bridge, ROS 2 nodes, kiosk servers. Each is a process of
+its own, on loopback, and each is ended by who started it."""
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import httpx
+
+ROOT = Path(__file__).resolve().parent.parent
+TESTS = ROOT / "tests"
+BRIDGE = Path(
+    os.environ.get("TEST_BRIDGE") or Path.home() / ".cache/operator-panel/bridge/release/test-bridge"
+)
+ROS_PYTHON = Path(os.environ.get("TEST_ROS_PYTHON") or ROOT / ".venv-ros/bin/python")
+CHROMIUM = "/usr/bin/chromium"
+
+# Bridge and nodes find each other on loopback only, whatever else is on this machine's network.
+CYCLONE_ON_LOOPBACK = (
+    "<CycloneDDS><Domain><General><Interfaces>"
+    '<NetworkInterface name="lo"/>'
+    "</Interfaces></General></Domain></CycloneDDS>"
+)
+
+
+def until(what: Callable[[], Any], why: str, within_s: float = 10.0, every_s: float = 0.01) -> Any:
+    """Waits for a condition and returns its value; fails with `why` when time is up."""
+    end = time.monotonic() + within_s
+    while True:
+        if found := what():
+            return found
+        if time.monotonic() > end:
+            raise AssertionError(f"not within {within_s} s: {why}")
+        time.sleep(every_s)
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+class Process:
+    """A child process whose stderr is kept as lines."""
+
+    def __init__(self, command: Sequence[str], env: Mapping[str, str], **options: Any) -> None:
+        self._process = subprocess.Popen(
+            command, env={**os.environ, **env}, stderr=subprocess.PIPE, text=True, **options
+        )
+        self.lines: list[str] = []
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def _read(self) -> None:
+        assert self._process.stderr is not None
+        for line in self._process.stderr:
+            self.lines.append(line.rstrip("\n"))
+
+    @property
+    def text(self) -> str:
+        return "\n".join(self.lines)
+
+    @property
+    def pid(self) -> int:
+        return self._process.pid
+
+    @property
+    def running(self) -> bool:
+        return self._process.poll() is None
+
+    def send(self, number: signal.Signals) -> None:
+        self._process.send_signal(number)
+
+    def wait(self, timeout_s: float) -> int:
+        return self._process.wait(timeout_s)
+
+    def kill(self) -> None:
+        self.end(signal.SIGKILL)
+
+    def end(self, number: signal.Signals = signal.SIGTERM, timeout_s: float = 15) -> int:
+        """Ends it and waits; it is killed if it does not end in time."""
+        if self.running:
+            self.send(number)
+        try:
+            status = self._process.wait(timeout_s)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+            raise AssertionError(f"{self._process.args} did not end:\n{self.text}") from None
+        self._reader.join(5)
+        for pipe in (self._process.stdin, self._process.stdout, self._process.stderr):
+            if pipe is not None:
+                pipe.close()
+        return status
+
+
+class Bridge:
+    """The real bridge, with the shipped configuration; ports and domain are of this test alone."""
+
+    def __init__(self, domain: int, namespace: str = "/") -> None:
+        self.domain = domain
+        self.port = free_port()
+        self.endpoint = f"tcp/127.0.0.1:{self.port}"
+        self._namespace = namespace
+        self._process: Process | None = None
+
+    def start(self) -> None:
+        self._process = Process(
+            [
+                str(BRIDGE),
+                str(ROOT / "deploy/bridge.json5"),
+                f'listen/endpoints=["{self.endpoint}"]',
+                f"plugins/ros2dds/domain={self.domain}",
+                f'plugins/ros2dds/namespace="{self._namespace}"',
+                'plugins/ros2dds/ros_automatic_discovery_range="LOCALHOST"',
+            ],
+            {"CYCLONEDDS_URI": CYCLONE_ON_LOOPBACK, "ROS_DISTRO": "jazzy"},
+        )
+        process = self._process
+        until(lambda: "running" in process.text or not process.running, "the bridge runs")
+        assert process.running, process.text
+
+    @property
+    def process(self) -> Process:
+        assert self._process is not None
+        return self._process
+
+    def kill(self) -> None:
+        self.process.kill()
+
+    def freeze(self) -> None:
+        self.process.send(signal.SIGSTOP)
+
+    def thaw(self) -> None:
+        self.process.send(signal.SIGCONT)
+
+    def end(self) -> None:
+        if self._process is not None and self._process.running:
+            self.thaw()
+            self._process.end()
+
+
+class RosNode:
+    """A real rclpy node in its own environment; see `tests/ros/node.py` for what it can do."""
+
+    def __init__(self, domain: int, name: str = "system_controller") -> None:
+        self._lock = threading.Lock()
+        self._process = subprocess.Popen(
+            [str(ROS_PYTHON), str(TESTS / "ros/node.py"), name],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            env={
+                **{k: v for k, v in os.environ.items() if k != "PYTHONPATH"},
+                "ROS_DOMAIN_ID": str(domain),
+                "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+                "RMW_IMPLEMENTATION": "rmw_fastrtps_cpp",
+                "RCUTILS_LOGGING_USE_STDOUT": "0",
+            },
+        )
+        assert self._answer() == "ready"
+
+    def __getattr__(self, name: str) -> Callable[..., Any]:
+        def do(*arguments: Any, **named: Any) -> Any:
+            names = ORDERS[name]
+            with self._lock:
+                assert self._process.stdin is not None
+                request = {"do": name, **dict(zip(names, arguments, strict=False)), **named}
+                self._process.stdin.write(json.dumps(request) + "\n")
+                self._process.stdin.flush()
+                return self._answer()
+
+        return do
+
+    def _answer(self) -> Any:
+        assert self._process.stdout is not None
+        line = self._process.stdout.readline()
+        assert line, "the ROS node died"
+        answer = json.loads(line)
+        assert "error" not in answer, answer["error"]
+        return answer["ok"]
+
+    def heard_data(self, topic: str) -> list[Any]:
+        """The `data` field of all that a subscription heard."""
+        return [message["data"] for message in self.heard(topic)]
+
+    def kill(self) -> None:
+        self._process.kill()
+        self._process.wait()
+
+    def end(self) -> None:
+        for pipe in (self._process.stdin, self._process.stdout):
+            if pipe is not None:
+                pipe.close()
+        try:
+            self._process.wait(10)
+        except subprocess.TimeoutExpired:
+            self.kill()
+
+
+ORDERS: Mapping[str, tuple[str, ...]] = {
+    "subscribe": ("topic", "type"),
+    "heard": ("topic",),
+    "advertise": ("topic", "type"),
+    "publish": ("topic", "fields"),
+    "every": ("topic", "fields", "period_s"),
+    "once": ("topic", "type", "fields"),
+    "withdraw": ("topic",),
+    "subscribers": ("topic",),
+    "nodes": (),
+    "topics": (),
+    "endpoints": ("topic",),
+}
+
+
+class Server:
+    """The kiosk under uvicorn, as users start it."""
+
+    def __init__(self, folder: Path, **environment: str) -> None:
+        self.port = free_port()
+        self.url = f"http://127.0.0.1:{self.port}"
+        self.http = httpx.Client(base_url=self.url, timeout=10, trust_env=False)
+        command = [sys.executable, "-m", "uvicorn", "app.main:app", "--port", str(self.port)]
+        self.process = Process(command, {**environment, "PYTHONPATH": ""}, cwd=folder)
+        until(self.answers, "the server answers", within_s=20)
+
+    def answers(self) -> bool:
+        assert self.process.running, self.process.text
+        try:
+            return self.http.get("/healthz").status_code == 200
+        except httpx.TransportError:
+            return False
+
+    def ready(self) -> bool:
+        return self.http.get("/readyz").status_code == 200
+
+    def snapshot(self) -> dict[str, Any]:
+        text = self.http.get("/events?once=1").text
+        found: dict[str, Any] = json.loads(events_in(text)[0][1])
+        return found
+
+    def widget(self, name: str) -> dict[str, Any]:
+        found: dict[str, Any] = self.snapshot()["widgets"][name]
+        return found
+
+    def press(self, widget: str, message: str = "", **more: Any) -> httpx.Response:
+        return self.http.post(f"/widgets/{widget}", json={"inputs": {"message": message}, **more})
+
+    @contextmanager
+    def stream(self) -> Iterator["Stream"]:
+        with self.http.stream("GET", "/events", timeout=5) as response:
+            yield Stream(response)
+
+    def end(self, number: signal.Signals = signal.SIGTERM, timeout_s: float = 15) -> int:
+        self.http.close()
+        return self.process.end(number, timeout_s)
+
+
+class Stream:
+    """The events of one open stream, as (name, data, id)."""
+
+    def __init__(self, response: httpx.Response) -> None:
+        self._chunks = response.iter_text()
+        self._text = ""
+
+    def next(self, *names: str) -> tuple[str, Any, str]:
+        """The next event with one of these names; beats and others are passed over."""
+        while True:
+            while "\n\n" not in self._text:
+                self._text += next(self._chunks)
+            block, self._text = self._text.split("\n\n", 1)
+            for name, data, event_id in events_in(block + "\n\n"):
+                if name in names:
+                    return name, json.loads(data), event_id
+
+
+def events_in(text: str) -> list[tuple[str, str, str]]:
+    """(event, data, id) of each whole event in a text."""
+    events = []
+    for block in text.split("\n\n"):
+        fields = dict(line.split(": ", 1) for line in block.split("\n") if ": " in line)
+        if "data" in fields:
+            events.append((fields.get("event", ""), fields["data"], fields.get("id", "")))
+    return events
+
+
+def zenoh_file(folder: Path, endpoint: str) -> Path:
+    """The shipped zenoh.json5, connecting to another place."""
+    shipped = (ROOT / "zenoh.json5").read_text()
+    path = folder / "zenoh.json5"
+    path.write_text(shipped.replace("tcp/127.0.0.1:7447", endpoint))
+    assert endpoint in path.read_text()
+    return path
+
+
+def live(endpoint: str, folder: Path, **environment: str) -> Server:
+    """A kiosk with the shipped panel, on the robot behind a bridge."""
+    zenoh = str(zenoh_file(folder, endpoint))
+    return Server(ROOT, KIOSK_MODE="live", KIOSK_ZENOH=zenoh, **environment)

@@ -1,0 +1,160 @@
+"""What happens when the real bridge or node breaks: locked in time, opened by what the robot says."""
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from tests.parts import Bridge, RosNode, Server, Stream, live, until
+
+ENABLED = "operation-enabled-updated"
+
+
+def speaking(node: RosNode, value: bool = True) -> None:
+    """The robot tells its permission once, so that it is kept for who comes later."""
+    node.advertise("/operation_enabled", "std_msgs/msg/Bool", durability="transient_local", depth=1)
+    node.publish("/operation_enabled", {"data": value})
+
+
+def permitted(kiosk: Server) -> bool:
+    return bool(kiosk.widget("operation1")["enabled"])
+
+
+def opened(kiosk: Server) -> None:
+    until(lambda: permitted(kiosk), "permitted", within_s=15)
+
+
+def next_lock(stream: Stream) -> tuple[float, str]:
+    """When (monotonic seconds) the stream said that the interlock is locked, and why."""
+    while True:
+        _, data, _ = stream.next(ENABLED)
+        if not data["enabled"]:
+            return time.monotonic(), data["reason"]
+
+
+def test_a_killed_bridge_locks_within_a_second_and_its_return_opens(
+    own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    speaking(own_node)
+    kiosk = servers(live(own_bridge.endpoint, tmp_path))
+    opened(kiosk)
+    with kiosk.stream() as stream:
+        stream.next("snapshot")
+        killed_at = time.monotonic()
+        own_bridge.kill()
+        locked_at, reason = next_lock(stream)
+    assert locked_at - killed_at < 1.0
+    assert "No connection to the robot" in reason
+    assert not any(kiosk.widget(w)["enabled"] for w in ("operation", "operation1", "operation2"))
+    refused = kiosk.press("operation", "into the void")
+    assert (refused.status_code, refused.json()["outcome"]) == (503, "refused")
+    assert kiosk.http.get("/readyz").status_code == 503
+    own_bridge.start()
+    opened(kiosk)
+    assert kiosk.ready()
+
+
+def test_after_a_return_an_old_permission_does_not_count(
+    own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    kiosk = servers(live(own_bridge.endpoint, tmp_path))
+    until(kiosk.ready, "ready")
+    own_node.once("/operation_enabled", "std_msgs/msg/Bool", {"data": True})
+    opened(kiosk)
+    own_bridge.kill()
+    until(lambda: not permitted(kiosk), "locked")
+    own_bridge.start()
+    until(kiosk.ready, "the bridge is back")
+    assert "cut since the last /operation_enabled" in kiosk.widget("operation1")["reason"]
+    own_node.once("/operation_enabled", "std_msgs/msg/Bool", {"data": True})
+    opened(kiosk)
+
+
+def test_a_frozen_bridge_locks_within_three_seconds_and_opens_when_it_thaws(
+    own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    speaking(own_node)
+    kiosk = servers(live(own_bridge.endpoint, tmp_path))
+    opened(kiosk)
+    with kiosk.stream() as stream:
+        stream.next("snapshot")
+        frozen_at = time.monotonic()
+        own_bridge.freeze()
+        locked_at, reason = next_lock(stream)
+    assert locked_at - frozen_at < 3.0
+    assert "No connection to the robot" in reason
+    own_bridge.thaw()
+    opened(kiosk)
+
+
+def test_what_changed_while_the_bridge_was_frozen_is_what_counts(
+    own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    speaking(own_node)
+    kiosk = servers(live(own_bridge.endpoint, tmp_path))
+    opened(kiosk)
+    own_bridge.freeze()
+    until(lambda: not permitted(kiosk), "locked")
+    own_node.publish("/operation_enabled", {"data": False})
+    with kiosk.stream() as stream:
+        stream.next("snapshot")
+        own_bridge.thaw()
+        until(
+            lambda: "does not permit" in (kiosk.widget("operation1")["reason"] or ""),
+            "what the robot said meanwhile",
+        )
+        # On the way there it was never open.
+        while True:
+            _, data, _ = stream.next(ENABLED)
+            assert data["enabled"] is False
+            if "does not permit" in data["reason"]:
+                break
+
+
+def test_it_starts_without_a_bridge_and_keeps_trying(
+    domain: int, tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    late = Bridge(domain + 52)
+    kiosk = servers(live(late.endpoint, tmp_path))
+    assert "No connection to the robot" in kiosk.widget("operation")["reason"]
+    assert "bridge" in kiosk.http.get("/readyz").json()["reason"]
+    late.start()
+    try:
+        until(kiosk.ready, "ready once the bridge is there", within_s=15)
+        assert kiosk.widget("operation")["enabled"]
+    finally:
+        late.end()
+
+
+def test_a_required_publisher_that_goes_away_locks(
+    own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    panel = tmp_path / "panel.toml"
+    shipped = Path("app/panel.toml").read_text()
+    panel.write_text(shipped.replace('field = "data"', 'field = "data"\nrequire_publisher = true', 1))
+    kiosk = servers(live(own_bridge.endpoint, tmp_path, KIOSK_PANEL=str(panel)))
+    speaking(own_node)
+    opened(kiosk)
+    own_node.withdraw("/operation_enabled")
+    until(lambda: not permitted(kiosk), "locked")
+    assert "no node of the robot publishes /operation_enabled" in kiosk.widget("operation1")["reason"]
+
+
+def test_a_value_that_grows_old_locks_and_a_fresh_one_opens(
+    own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    panel = tmp_path / "panel.toml"
+    shipped = Path("app/panel.toml").read_text()
+    panel.write_text(shipped.replace('field = "data"', 'field = "data"\nmax_age_s = 0.5', 1))
+    kiosk = servers(live(own_bridge.endpoint, tmp_path, KIOSK_PANEL=str(panel)))
+    own_node.advertise("/operation_enabled", "std_msgs/msg/Bool")
+    own_node.every("/operation_enabled", {"data": True}, 0.1)
+    opened(kiosk)
+    with kiosk.stream() as stream:
+        stream.next("snapshot")
+        own_node.kill()  # the graph shows it for up to 20 s; the age of its topic tells sooner
+        killed_at = time.monotonic()
+        locked_at, reason = next_lock(stream)
+    assert locked_at - killed_at < 1.0
+    assert "older than 0.5 s" in reason
+    refused = kiosk.press("operation1", "too late")
+    assert (refused.status_code, refused.json()["outcome"]) == (409, "refused")

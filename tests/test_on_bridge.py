@@ -1,0 +1,238 @@
+"""The reference system on the real parts: bridge, rclpy nodes, the server as users start it."""
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tests.parts import ROOT, Bridge, RosNode, Server, live, until
+
+TEXTS = [
+    "",
+    "hello",
+    "日本語",
+    "🤖👩‍🏭",
+    "\"quotes\" 'and' `ticks`",
+    "<script>alert(1)</script>",
+    "{braces} {{double}} {message}",
+    "x" * 80,
+    "\\ % \t ~ $HOME",
+]
+STRING_HASH = "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"
+
+
+def permit(node: RosNode, value: bool = True) -> None:
+    node.once("/operation_enabled", "std_msgs/msg/Bool", {"data": value})
+
+
+def test_an_rclpy_node_sees_web_ui(node: RosNode) -> None:
+    until(lambda: "/web_ui" in node.nodes(), "/web_ui in the list of nodes")
+
+
+@pytest.mark.parametrize("text", TEXTS)
+def test_a_press_reaches_the_robot_with_its_text_intact(
+    shared_server: Server, node: RosNode, text: str
+) -> None:
+    before = len(node.heard("/operation"))
+    answer = shared_server.press("operation", text)
+    assert (answer.status_code, answer.json()["outcome"]) == (200, "published")
+    until(lambda: len(node.heard("/operation")) > before, "the robot heard it")
+    assert node.heard_data("/operation")[before:] == [text]
+
+
+@pytest.fixture(scope="module")
+def shared_server(bridge: Bridge, node: RosNode, tmp_path_factory: pytest.TempPathFactory) -> object:
+    mine = live(bridge.endpoint, tmp_path_factory.mktemp("shared"))
+    until(mine.ready, "ready")
+    yield mine
+    mine.end()
+
+
+def test_the_graph_has_the_topic_before_the_first_press(server: Server, node: RosNode) -> None:
+    until(server.ready, "ready")
+    until(lambda: node.endpoints("/operation1"), "a publisher of /operation1")
+    assert node.topics()["/operation1"] == ["std_msgs/msg/String"]
+    (endpoint,) = node.endpoints("/operation1")
+    assert endpoint["type"] == "std_msgs/msg/String"
+    assert endpoint["reliability"] == "reliable"
+    assert STRING_HASH.removeprefix("RIHS01_") in endpoint["hash"].lower()
+
+
+def test_two_publishers_of_one_type_have_a_topic_each(server: Server, node: RosNode) -> None:
+    until(server.ready, "ready")
+    permit(node)
+    until(lambda: server.widget("operation1")["enabled"], "permitted")
+    one, two = len(node.heard("/operation1")), len(node.heard("/operation2"))
+    assert server.press("operation1", "to one").json()["outcome"] == "published"
+    assert server.press("operation2", "to two").json()["outcome"] == "published"
+    until(lambda: len(node.heard("/operation2")) > two, "heard on /operation2")
+    until(lambda: len(node.heard("/operation1")) > one, "heard on /operation1")
+    assert node.heard_data("/operation1")[one:] == ["to one"]
+    assert node.heard_data("/operation2")[two:] == ["to two"]
+
+
+def test_nothing_known_is_locked_and_says_what_it_waits_for(server: Server) -> None:
+    until(server.ready, "ready")
+    shown = server.widget("operation1")
+    assert shown["enabled"] is False
+    assert "waiting for /operation_enabled" in shown["reason"]
+    assert server.widget("operation")["enabled"] is True  # it has no interlock
+    refused = server.press("operation1", "too soon")
+    assert refused.status_code == 409
+    assert refused.json()["outcome"] == "refused"
+    assert "waiting for /operation_enabled" in refused.json()["reason"]
+
+
+def test_a_value_published_once_counts_after_its_publisher_is_gone(
+    server: Server, node: RosNode
+) -> None:
+    until(server.ready, "ready")
+    with server.stream() as stream:
+        stream.next("snapshot")
+        permit(node, True)
+        name, data, _ = stream.next("operation-enabled-updated")
+        assert (name, data) == ("operation-enabled-updated", {"enabled": True, "reason": None})
+        permit(node, False)
+        _, data, _ = stream.next("operation-enabled-updated")
+        assert data["enabled"] is False
+        assert "does not permit" in data["reason"]
+    refused = server.press("operation2", "forged")
+    assert refused.status_code == 409
+    assert "does not permit" in refused.json()["reason"]
+    permit(node, True)
+    until(lambda: server.widget("operation2")["enabled"], "permitted again")
+    until(lambda: not node.endpoints("/operation_enabled"), "its publisher is gone")
+    assert server.widget("operation2")["enabled"] is True
+    assert server.press("operation2", "still").json()["outcome"] == "published"
+
+
+def test_a_page_loaded_later_shows_the_true_state_in_its_html(server: Server, node: RosNode) -> None:
+    until(server.ready, "ready")
+    locked = re.compile(r'formaction="/widgets/operation1"[^>]* disabled')
+    assert locked.search(server.http.get("/").text)
+    permit(node, True)
+    until(lambda: server.widget("operation1")["enabled"], "permitted")
+    assert not locked.search(server.http.get("/").text)
+    permit(node, False)
+    until(lambda: not server.widget("operation1")["enabled"], "forbidden")
+    html = server.http.get("/pages/operation").text
+    assert locked.search(html)
+    assert "The robot does not permit operation" in html
+
+
+@pytest.mark.parametrize("robot_first", [True, False])
+def test_a_transient_local_value_arrives_whoever_starts_first(
+    own_bridge: Bridge,
+    own_node: RosNode,
+    tmp_path: Path,
+    servers: Callable[[Server], Server],
+    robot_first: bool,
+) -> None:
+    def robot_speaks() -> None:
+        latched = {"durability": "transient_local", "depth": 1}
+        own_node.advertise("/operation_enabled", "std_msgs/msg/Bool", **latched)
+        own_node.publish("/operation_enabled", {"data": True})
+
+    if robot_first:
+        robot_speaks()
+    kiosk = servers(live(own_bridge.endpoint, tmp_path))
+    until(kiosk.ready, "ready")
+    if not robot_first:
+        robot_speaks()
+    until(lambda: kiosk.widget("operation1")["enabled"], "the last value came")
+
+
+def test_fifty_starts_fifty_first_presses_received(
+    bridge: Bridge, node: RosNode, tmp_path: Path
+) -> None:
+    before = len(node.heard("/operation"))
+    for number in range(50):
+        kiosk = live(bridge.endpoint, tmp_path)
+        try:
+            until(kiosk.ready, "ready", every_s=0.001)
+            assert kiosk.press("operation", f"first {number}").json()["outcome"] == "published"
+            heard = before + number + 1
+            until(lambda heard=heard: len(node.heard("/operation")) >= heard, "heard", 5)
+        finally:
+            kiosk.end()
+    assert node.heard_data("/operation")[before:] == [f"first {n}" for n in range(50)]
+
+
+def test_what_nobody_hears_is_unknown_and_says_so(
+    own_bridge: Bridge, tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    kiosk = servers(live(own_bridge.endpoint, tmp_path))
+    until(kiosk.ready, "ready")
+    answer = kiosk.press("operation", "anybody?")
+    assert answer.status_code == 200
+    assert answer.json()["outcome"] == "unknown"
+    assert "no node is known to listen" in answer.json()["reason"]
+
+
+def test_logs_are_in_ros_format_and_on_rosout(server: Server, node: RosNode) -> None:
+    until(server.ready, "ready")
+    until(lambda: node.endpoints("/rosout"), "a publisher of /rosout")
+    line = re.compile(r"\[(INFO|WARN|ERROR|FATAL)\] \[\d{10}\.\d{9}\] \[web_ui\]: .+|  .*")
+    assert all(line.fullmatch(text) for text in server.process.lines)
+    server.press("operation", "for the log")
+
+    def on_rosout() -> list[dict[str, object]]:
+        return [m for m in node.heard("/rosout") if "for the log" in str(m["msg"])]
+
+    until(on_rosout, "the press on /rosout")
+    entry = on_rosout()[0]
+    assert (entry["name"], entry["level"]) == ("web_ui", 20)
+    assert any("for the log" in text for text in server.process.lines)
+
+
+def test_debug_is_hidden_unless_asked_for(
+    bridge: Bridge, node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    quiet = servers(live(bridge.endpoint, tmp_path))
+    loud = servers(live(bridge.endpoint, tmp_path, KIOSK_LOG_LEVEL="debug"))
+    for kiosk in (quiet, loud):
+        kiosk.http.get("/")
+    until(lambda: '"GET / HTTP/1.1"' in loud.process.text, "the request is logged")
+    assert '"GET / HTTP/1.1"' not in quiet.process.text
+
+
+def test_another_type_on_the_robot_locks_and_says_which(
+    own_bridge: Bridge,
+    own_node: RosNode,
+    tmp_path: Path,
+    servers: Callable[[Server], Server],
+) -> None:
+    own_node.subscribe("/operation", "std_msgs/msg/Bool")
+    own_node.advertise("/operation_enabled", "std_msgs/msg/String")
+    kiosk = servers(live(own_bridge.endpoint, tmp_path))
+
+    def wrong(widget: str) -> bool:
+        return "is std_msgs/msg/" in (kiosk.widget(widget)["reason"] or "")
+
+    until(lambda: wrong("operation") and wrong("operation1"), "both mismatches are told")
+    assert "std_msgs/msg/Bool on the robot" in kiosk.widget("operation")["reason"]
+    assert "std_msgs/msg/String on the robot" in kiosk.widget("operation1")["reason"]
+    assert kiosk.press("operation", "x").status_code == 409
+    assert not kiosk.widget("operation2")["enabled"]
+
+
+def test_a_namespaced_robot(domain: int, tmp_path: Path, servers: Callable[[Server], Server]) -> None:
+    named = Bridge(domain + 51, namespace="/robot1")
+    named.start()
+    robot = RosNode(named.domain)
+    try:
+        robot.subscribe("/operation", "std_msgs/msg/String")
+        panel = tmp_path / "panel.toml"
+        shipped = (ROOT / "app/panel.toml").read_text()
+        panel.write_text(shipped.replace('namespace = ""', 'namespace = "/robot1"'))
+        kiosk = servers(live(named.endpoint, tmp_path, KIOSK_PANEL=str(panel)))
+        until(kiosk.ready, "ready")
+        until(
+            lambda: kiosk.press("operation", "to robot1").json()["outcome"] == "published",
+            "the robot listens",
+        )
+        until(lambda: "to robot1" in robot.heard_data("/operation"), "robot1 heard it")
+    finally:
+        robot.end()
+        named.end()
