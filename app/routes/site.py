@@ -30,7 +30,11 @@ def site_of(request: Request) -> Site:
     return site
 
 
-CurrentSite = Annotated[Site, Depends(site_of)]
+async def _current(request: Request) -> Site:
+    return site_of(request)  # not itself the dependency: plain functions run on a thread
+
+
+CurrentSite = Annotated[Site, Depends(_current)]
 
 
 def error_answer(request: Request, status: int, message: str) -> Response:

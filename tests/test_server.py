@@ -1,0 +1,342 @@
+"""The contract over HTTP, with the demo robot: the server as users start it."""
+
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from urllib.parse import urlencode
+
+import httpx
+import pytest
+import zenoh
+
+from tests.parts import ROOT, Bridge, Process, RosNode, Server, free_port, live, until
+
+FORM = {"content-type": "application/x-www-form-urlencoded"}
+
+
+def client_of(bridge: Bridge) -> zenoh.Config:
+    config = zenoh.Config()
+    config.insert_json5("mode", '"client"')
+    config.insert_json5("connect/endpoints", f'["{bridge.endpoint}"]')
+    return config
+
+
+@pytest.fixture(scope="module")
+def demo() -> Iterator[Server]:
+    mine = Server(ROOT)
+    until(mine.ready, "ready")
+    until(lambda: mine.widget("operation1")["enabled"], "the demo robot permits", within_s=40)
+    yield mine
+    mine.end()
+
+
+def test_demo_mode_shows_its_banner_on_every_page(demo: Server) -> None:
+    for path in ("/", "/pages/operation"):
+        assert "SIMULATED ROBOT" in demo.http.get(path).text
+    assert demo.snapshot()["notice"]["banner"] == "SIMULATED ROBOT"
+
+
+def test_the_demo_robot_answers_with_what_it_heard(demo: Server) -> None:
+    assert demo.press("operation", "hello <b>").json()["outcome"] == "published"
+    until(lambda: "hello <b>" in demo.widget("last_heard")["text"], "it is shown")
+    html = demo.http.get("/").text
+    assert "hello &lt;b&gt;" in html
+    assert "hello <b>" not in html
+
+
+def test_every_connection_starts_with_a_snapshot_and_then_beats(demo: Server) -> None:
+    with demo.stream() as stream:
+        name, data, event_id = stream.next("snapshot", "update", "link", "beat")
+        assert name == "snapshot"
+        assert set(data["widgets"]) == {
+            "message",
+            "operation",
+            "operation1",
+            "operation2",
+            "last_heard",
+        }
+        assert re.fullmatch(r"[0-9a-f]+-\d+", event_id)
+        assert data["id"] == event_id
+        first = time.monotonic()
+        stream.next("beat")
+        stream.next("beat")
+        assert time.monotonic() - first < 1.75
+
+
+def test_the_stream_is_not_stored(demo: Server) -> None:
+    with demo.http.stream("GET", "/events") as response:
+        assert response.headers["content-type"].startswith("text/event-stream")
+        assert response.headers["cache-control"] == "no-store"
+        assert "content-encoding" not in response.headers
+
+
+def test_a_change_comes_as_an_update(demo: Server) -> None:
+    with demo.stream() as stream:
+        _, _, before = stream.next("snapshot")
+        demo.press("operation", "for the update")
+        _, data, after = stream.next("update")
+        while "for the update" not in data.get("last_heard", {}).get("text", ""):
+            _, data, after = stream.next("update")
+        boot, version = before.split("-")
+        assert after.split("-")[0] == boot
+        assert int(after.split("-")[1]) > int(version)
+
+
+def test_a_press_without_an_id_gets_one(demo: Server) -> None:
+    receipt = demo.press("operation", "x").json()
+    assert set(receipt) == {"id", "widget", "outcome", "reason", "at"}
+    assert receipt["id"]
+    assert receipt["widget"] == "operation"
+
+
+def test_the_same_id_is_the_same_press(demo: Server) -> None:
+    presses = [demo.press("operation", "once only", id="one-press").json() for _ in range(3)]
+    assert presses[0] == presses[1] == presses[2]
+    assert demo.process.text.count("press one-press of") == 1
+
+
+@pytest.mark.parametrize(
+    ("body", "names"),
+    [
+        (b"", "not JSON"),
+        (b"[1]", "body"),
+        (b'{"inputs": {"message": NaN}}', "NaN"),
+        (b'{"inputs": {"message": "x"}, "extra": 1}', "extra"),
+        (b'{"inputs": {"message": "x"}, "id": "a b"}', "id"),
+        (b'{"inputs": {"message": "x"}, "seen": "later"}', "seen"),
+        (b'{"inputs": {"message": "x"}, "at": "yesterday"}', "at"),
+        (b"\xff\xfe", "not JSON"),
+        (b"[" * 5000, "not JSON"),
+        (b'{"inputs": {}}', "message"),
+        (b'{"inputs": {"message": 5}}', "Message"),
+        (b'{"inputs": {"message": "\\ud800"}}', "Unicode"),
+        (b'{"inputs": {"message": "a\\u0000b"}}', "NUL"),
+        (b'{"inputs": {"message": "x", "nothing": "y"}}', "nothing"),
+        (b'{"inputs": {"message": "' + b"x" * 81 + b'"}}', "81 characters"),
+    ],
+)
+def test_bad_input_is_refused_and_named(demo: Server, body: bytes, names: str) -> None:
+    headers = {"content-type": "application/json"}
+    answer = demo.http.post("/widgets/operation", content=body, headers=headers)
+    assert answer.status_code == 422, answer.text
+    assert names in answer.text
+
+
+def test_only_what_can_be_pressed_can_be_pressed(demo: Server) -> None:
+    for widget in ("nothing", "message", "last_heard"):
+        assert demo.press(widget).status_code == 404
+    assert demo.http.get("/pages/nothing").status_code == 404
+    assert demo.http.get("/nothing").status_code == 404
+    assert demo.http.get("/widgets/operation").status_code == 405
+
+
+def test_a_form_post_goes_back_to_the_page_with_its_receipt(demo: Server) -> None:
+    form = urlencode({"message": "from a form 日本語", "_id": "f00d"})
+    answer = demo.http.post("/widgets/operation", content=form, headers=FORM)
+    assert answer.status_code == 303
+    html = demo.http.get(answer.headers["location"]).text
+    assert "Sent on /operation at" in html
+    assert 'value="from a form 日本語"' in html
+    again = demo.http.post("/widgets/operation", content=form, headers=FORM)
+    assert again.headers["location"] == answer.headers["location"]
+    assert demo.process.text.count("press f00d.operation of") == 1
+
+
+def test_other_kinds_of_body_are_named(demo: Server) -> None:
+    answer = demo.http.post("/widgets/operation", content=b"x", headers={"content-type": "text/plain"})
+    assert answer.status_code == 422
+    assert "application/json" in answer.json()["error"]
+
+
+def test_a_large_body_is_refused(demo: Server) -> None:
+    body = b'{"inputs": {"message": "' + b"x" * 70_000 + b'"}}'
+    headers = {"content-type": "application/json"}
+    assert demo.http.post("/widgets/operation", content=body, headers=headers).status_code == 413
+
+    def chunks() -> Iterator[bytes]:
+        for _ in range(70):
+            yield b"x" * 1000
+
+    answer = demo.http.post("/widgets/operation", content=chunks(), headers=headers)
+    assert answer.status_code == 413
+
+
+@pytest.mark.parametrize("path", ["/widgets/operation", "/events"])
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {"host": "evil.example"},
+        {"origin": "https://evil.example"},
+        {"origin": "null"},
+        {"sec-fetch-site": "cross-site"},
+        {"sec-fetch-site": "same-site"},
+    ],
+)
+def test_other_sites_are_shut_out(demo: Server, path: str, headers: dict[str, str]) -> None:
+    if path == "/events":
+        answer = demo.http.get("/events?once=1", headers=headers)
+    else:
+        answer = demo.http.post(path, json={"inputs": {"message": "x"}}, headers=headers)
+    assert answer.status_code == 403
+
+
+def test_pages_have_a_policy_without_inline_script_or_style(demo: Server) -> None:
+    answer = demo.http.get("/")
+    policy = answer.headers["content-security-policy"]
+    assert "unsafe-inline" not in policy
+    assert "default-src 'none'" in policy
+    assert "<style" not in answer.text
+    assert " style=" not in answer.text
+    assert not re.search(r"<script(?![^>]*\bsrc=)", answer.text)
+    assert not re.search(r"\bon\w+=", answer.text)
+    assert answer.headers["cache-control"] == "no-store"
+
+
+def test_static_files_are_kept_for_ever_under_their_revision(demo: Server) -> None:
+    sheet = re.search(r'href="(/static/[^"]+\.css)"', demo.http.get("/").text)
+    assert sheet
+    answer = demo.http.get(sheet[1])
+    assert answer.status_code == 200
+    assert "immutable" in answer.headers["cache-control"]
+    assert answer.headers["content-encoding"] == "gzip"
+    assert demo.http.get("/static/x/../../pyproject.toml").status_code == 404
+
+
+def test_health_and_metrics(demo: Server) -> None:
+    assert demo.http.get("/healthz").json() == {"status": "ok"}
+    assert demo.http.get("/readyz").json() == {"status": "ready"}
+    text = demo.http.get("/metrics").text
+    assert "kiosk_link_up 1.0" in text
+    assert 'kiosk_presses_total{outcome="published"}' in text
+
+
+def test_openapi_describes_the_paths(demo: Server) -> None:
+    paths = demo.http.get("/openapi.json").json()["paths"]
+    assert {"/", "/pages/{page}", "/events", "/widgets/{widget}", "/healthz"} <= set(paths)
+    assert "409" in paths["/widgets/{widget}"]["post"]["responses"]
+
+
+def test_it_ends_within_a_second_with_fifty_streams_open() -> None:
+    mine = Server(ROOT)
+    limits = httpx.Limits(max_connections=60)
+    with httpx.Client(base_url=mine.url, timeout=10, trust_env=False, limits=limits) as many:
+        streams = [many.send(many.build_request("GET", "/events"), stream=True) for _ in range(50)]
+        until(lambda: "kiosk_streams 50.0" in mine.http.get("/metrics").text, "50 streams")
+        told_at = time.monotonic()
+        mine.end(signal.SIGTERM)
+        assert time.monotonic() - told_at < 1.0
+        for stream in streams:
+            stream.close()
+    assert "Traceback" not in mine.process.text
+
+
+def test_a_client_that_reads_nothing_holds_up_nobody(demo: Server) -> None:
+    with demo.http.stream("GET", "/events", timeout=30) as stalled:
+        assert stalled.status_code == 200
+        with demo.stream() as stream:
+            stream.next("snapshot")
+            for number in range(200):
+                demo.press("operation", f"number {number}")
+            while "number 199" not in demo.widget("last_heard")["text"]:
+                pass
+            _, data, _ = stream.next("update")
+            while "number 199" not in data.get("last_heard", {}).get("text", ""):
+                _, data, _ = stream.next("update")
+
+
+def test_a_faulty_panel_stops_the_start_with_its_places(tmp_path: Path) -> None:
+    panel = tmp_path / "bad.toml"
+    panel.write_text((ROOT / "app/panel.toml").read_text().replace('kind = "text"', 'kind = "txt"'))
+    done = subprocess.run(
+        [sys.executable, "-m", "uvicorn", "app.main:app", "--port", str(free_port())],
+        cwd=ROOT,
+        env={"KIOSK_PANEL": str(panel), "PATH": "/usr/bin:/bin"},
+        capture_output=True,
+        text=True,
+        timeout=30,
+        check=False,
+    )
+    assert done.returncode != 0
+    assert 'page[0].widget[0]: unknown kind "txt"' in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_a_wrong_setting_is_named() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "uvicorn", "app.main:app"],
+        cwd=ROOT,
+        env={"KIOSK_MODE": "simulated", "PATH": "/usr/bin:/bin"},
+        capture_output=True,
+        text=True,
+        timeout=30,
+        check=False,
+    )
+    assert done.returncode != 0
+    assert 'KIOSK_MODE is "simulated"' in done.stderr
+
+
+def test_the_demo_robot_as_a_program_of_its_own_can_not_be_mistaken(
+    tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    robot = Process([sys.executable, "-m", "app.simulator", endpoint], {}, cwd=ROOT)
+    try:
+        kiosk = servers(live(endpoint, tmp_path))
+        until(lambda: kiosk.widget("operation1")["enabled"], "the demo robot permits", within_s=15)
+        assert kiosk.snapshot()["notice"]["banner"] == "SIMULATED ROBOT"
+        assert kiosk.press("operation1", "apart").json()["outcome"] == "published"
+        until(lambda: "apart" in kiosk.widget("last_heard")["text"], "heard")
+        robot.end()
+        until(lambda: not kiosk.widget("operation1")["enabled"], "locked", within_s=2)
+    finally:
+        robot.end()
+
+
+def test_bytes_that_are_no_message_lock_and_are_counted(
+    own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    kiosk = servers(live(own_bridge.endpoint, tmp_path))
+    until(kiosk.ready, "ready")
+    own_node.once("/operation_enabled", "std_msgs/msg/Bool", {"data": True})
+    until(lambda: kiosk.widget("operation1")["enabled"], "permitted")
+    with zenoh.open(client_of(own_bridge)) as peer:
+
+        def locked() -> bool:
+            for bad in (b"", b"\0", b"\0\1\0\0", b"\xff" * 100, b"\0\1\0\0" + b"\1" * 100):
+                peer.put("operation_enabled", bad)
+                peer.put("last_heard", bad)
+            return "can't be read" in (kiosk.widget("operation1")["reason"] or "")
+
+        until(locked, "locked once the peer is connected")
+        until(lambda: kiosk.widget("last_heard")["state"] == "unreadable", "shown")
+        for _ in range(1000):
+            peer.put("operation_enabled", b"\xff" * 50)
+    assert kiosk.widget("operation1")["enabled"] is False
+    assert 'kiosk_undecodable_total{key="operation_enabled"}' in kiosk.http.get("/metrics").text
+    assert kiosk.process.text.count("[ERROR]") <= 2  # a line per topic and minute
+    own_node.once("/operation_enabled", "std_msgs/msg/Bool", {"data": True})
+    until(lambda: kiosk.widget("operation1")["enabled"], "a message opens again")
+
+
+def test_no_thread_or_task_is_left_behind_by_a_hundred_streams(demo: Server) -> None:
+    def threads() -> int:
+        return len(list(Path(f"/proc/{demo.process.pid}/task").iterdir()))
+
+    before = threads()
+
+    def one() -> None:
+        with demo.http.stream("GET", "/events") as response:
+            next(response.iter_text())
+
+    workers = [threading.Thread(target=one) for _ in range(100)]
+    for worker in workers:
+        worker.start()
+    for worker in workers:
+        worker.join()
+    until(lambda: "kiosk_streams 0.0" in demo.http.get("/metrics").text, "all streams are gone")
+    assert threads() <= before + 1
