@@ -53,7 +53,7 @@ def interlock_verdict(interlock: Interlock, robot: Robot, now: float) -> Verdict
     if interlock.require_publisher and not robot.graph.on_robot("MP", key):
         return locked("no_publisher", topic=topic)
     if value_of(reading.message, interlock.field) is not True:
-        return locked("forbidden", name=interlock.name, topic=topic)
+        return locked("forbidden", name=interlock.name)
     if interlock.max_age_s is None:
         return PERMITTED
     stale_at = reading.at + interlock.max_age_s

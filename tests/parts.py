@@ -225,8 +225,8 @@ ORDERS: Mapping[str, tuple[str, ...]] = {
 class Server:
     """The kiosk under uvicorn, as users start it."""
 
-    def __init__(self, folder: Path, **environment: str) -> None:
-        self.port = free_port()
+    def __init__(self, folder: Path, port: int = 0, **environment: str) -> None:
+        self.port = port or free_port()
         self.url = f"http://127.0.0.1:{self.port}"
         self.http = httpx.Client(base_url=self.url, timeout=10, trust_env=False)
         command = [sys.executable, "-m", "uvicorn", "app.main:app", "--port", str(self.port)]
@@ -302,7 +302,7 @@ def zenoh_file(folder: Path, endpoint: str) -> Path:
     return path
 
 
-def live(endpoint: str, folder: Path, **environment: str) -> Server:
+def live(endpoint: str, folder: Path, port: int = 0, **environment: str) -> Server:
     """A kiosk with the shipped panel, on the robot behind a bridge."""
     zenoh = str(zenoh_file(folder, endpoint))
-    return Server(ROOT, KIOSK_MODE="live", KIOSK_ZENOH=zenoh, **environment)
+    return Server(ROOT, port, KIOSK_MODE="live", KIOSK_ZENOH=zenoh, **environment)

@@ -64,7 +64,7 @@ def test_after_a_return_an_old_permission_does_not_count(
     until(lambda: not permitted(kiosk), "locked")
     own_bridge.start()
     until(kiosk.ready, "the bridge is back")
-    assert "cut since the last /operation_enabled" in kiosk.widget("operation1")["reason"]
+    assert "waiting for a new /operation_enabled" in kiosk.widget("operation1")["reason"]
     own_node.once("/operation_enabled", "std_msgs/msg/Bool", {"data": True})
     opened(kiosk)
 

@@ -3,6 +3,8 @@
 const SILENCE_MS = 1750;
 const CHECK_MS = 125;
 const POLL_MS = 700;
+// A connection that hangs is given up after this time: the next one may find the way.
+const OPEN_AGAIN_MS = 3000;
 // A browser opens six connections to one server; pages and presses need some of them.
 const STREAMS_PER_BROWSER = 3;
 const EVENTS = ["snapshot", "update", "link", "notice", "beat"];
@@ -13,6 +15,7 @@ export class Source {
   #poll = 0;
   #giveBack = null;
   #aliveAt = performance.now();
+  #openedAt = 0;
   #fresh = true; // the page itself is a snapshot, until its time is up
   #seen = document.body.dataset.seen;
 
@@ -42,7 +45,8 @@ export class Source {
 
   #open() {
     this.#close();
-    this.#aliveAt = performance.now();
+    this.#openedAt = performance.now();
+    if (this.#fresh) this.#aliveAt = this.#openedAt;
     this.#take().then((slot) => {
       if (document.hidden || this.#stream || this.#poll) return slot?.();
       this.#giveBack = slot;
@@ -111,17 +115,21 @@ export class Source {
   }
 
   #got(name, text, id, at = performance.now()) {
-    this.#aliveAt = at;
-    const data = JSON.parse(text);
     if (name === "snapshot") this.#fresh = true;
     if (!this.#fresh) return; // after a loss only a snapshot says what is so
+    this.#aliveAt = at;
+    const data = JSON.parse(text);
     if (id) this.#seen = id;
     this.#on[name](data);
   }
 
+  // After a silence only a new stream brings a new snapshot, even if the old one speaks again.
   #watch() {
-    if (document.hidden || !this.#fresh) return;
-    if (performance.now() - this.#aliveAt > SILENCE_MS) this.#lose();
+    const now = performance.now();
+    if (document.hidden || now - this.#aliveAt <= SILENCE_MS) return;
+    const fresh = this.#fresh;
+    this.#lose();
+    if (fresh || now - this.#openedAt > OPEN_AGAIN_MS) this.#open();
   }
 
   #lose() {
