@@ -225,11 +225,19 @@ ORDERS: Mapping[str, tuple[str, ...]] = {
 class Server:
     """The kiosk under uvicorn, as users start it."""
 
-    def __init__(self, folder: Path, port: int = 0, **environment: str) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        port: int = 0,
+        *,
+        python: str = sys.executable,
+        options: Sequence[str] = (),
+        **environment: str,
+    ) -> None:
         self.port = port or free_port()
         self.url = f"http://127.0.0.1:{self.port}"
         self.http = httpx.Client(base_url=self.url, timeout=10, trust_env=False)
-        command = [sys.executable, "-m", "uvicorn", "app.main:app", "--port", str(self.port)]
+        command = [python, "-m", "uvicorn", "app.main:app", "--port", str(self.port), *options]
         self.process = Process(command, {**environment, "PYTHONPATH": ""}, cwd=folder)
         until(self.answers, "the server answers", within_s=20)
 

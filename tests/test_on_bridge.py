@@ -5,6 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+import zenoh
 
 from tests.parts import ROOT, Bridge, RosNode, Server, live, until
 
@@ -236,3 +237,24 @@ def test_a_namespaced_robot(domain: int, tmp_path: Path, servers: Callable[[Serv
     finally:
         robot.end()
         named.end()
+
+
+def test_a_route_that_another_program_made_with_a_wrong_type_locks(
+    own_bridge: Bridge, tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    config = zenoh.Config()
+    config.insert_json5("mode", '"client"')
+    config.insert_json5("connect/endpoints", f'["{own_bridge.endpoint}"]')
+    with zenoh.open(config) as other:
+        key = f"@/{other.zid()}/@ros2_lv/MP/operation/std_msgs§msg§Bool/:::"
+        token = other.liveliness().declare_token(key)
+        routes = "@/*/ros2/route/topic/sub/operation"
+        until(lambda: list(other.get(routes, timeout=1)), "the wrong route is there")
+        kiosk = servers(live(own_bridge.endpoint, tmp_path))
+        until(
+            lambda: "std_msgs/msg/Bool on the robot" in (kiosk.widget("operation")["reason"] or ""),
+            "locked for the route's type",
+        )
+        assert kiosk.press("operation", "x").status_code == 409
+        token.undeclare()
+        until(lambda: kiosk.widget("operation")["enabled"], "open again", within_s=15)

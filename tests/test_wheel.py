@@ -1,0 +1,39 @@
+"""The built wheel, installed where nothing of the checkout is."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+from tests.parts import ROOT, Server, until
+
+
+def test_an_installed_wheel_serves_from_any_folder(tmp_path: Path) -> None:
+    build = [sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", str(tmp_path)]
+    subprocess.run(build, cwd=ROOT, check=True, capture_output=True, timeout=120)
+    (wheel,) = tmp_path.glob("*.whl")
+    venv = tmp_path / "venv"
+    subprocess.run([sys.executable, "-m", "venv", str(venv)], check=True, timeout=120)
+    python = venv / "bin/python"
+    lock = ROOT / "deploy/requirements.lock"
+    pip = [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
+    subprocess.run([*pip, "--require-hashes", "-r", str(lock)], check=True, timeout=600)
+    subprocess.run([*pip, "--no-deps", str(wheel)], check=True, timeout=120)
+
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    mine = Server(elsewhere, python=str(python))
+    try:
+        until(mine.ready, "ready")
+        html = mine.http.get("/").text
+        assert "Publish1" in html
+        (sheet,) = [part for part in html.split('"') if part.endswith("kiosk.css")]
+        assert mine.http.get(sheet).status_code == 200
+        assert mine.press("operation", "from a wheel").json()["outcome"] == "published"
+    finally:
+        mine.end()
+    check = subprocess.run(
+        [str(python), "-m", "app.check"], cwd=elsewhere, capture_output=True, text=True, check=False
+    )
+    assert check.returncode == 0, check.stderr
+    # Installed, it needs no file of the checkout: these are its own.
+    assert str(ROOT) not in check.stdout
