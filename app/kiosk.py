@@ -20,7 +20,7 @@ from app.joining import LOG_TYPE, Joining
 from app.link import Config, Link
 from app.logs import RosoutHandler
 from app.panel.model import Panel
-from app.presses import Presses
+from app.presses import Presses, Receipt
 from app.robot import Robot
 from app.views import Sight, sight
 
@@ -84,6 +84,11 @@ class Kiosk:
     def way(self) -> Verdict:
         """Whether commands can reach the robot now."""
         return way(self.robot, time.monotonic())
+
+    def press(self, widget: str, inputs: Mapping[str, Any], press_id: str, who: str) -> Receipt:
+        """A press, judged by all that has come from the robot until now."""
+        self._take()
+        return self.presses.press(widget, inputs, press_id, who)
 
     def show_fault(self, text: str) -> None:
         """A fault of the panel file, shown on every page; "" takes it away."""

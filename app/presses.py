@@ -26,7 +26,8 @@ log = logging.getLogger("kiosk.presses")
 Outcome = Literal["published", "refused", "unknown"]
 Cause = Literal["", "interlock", "input", "link"]
 
-RECEIPTS_KEPT: Final = 2000
+RECEIPTS_KEPT: Final = 1000
+LONGEST_LOGGED: Final = 300
 NO_WAY: Final = frozenset({"no_link", "no_bridge", "bridge_silent", "joining"})
 
 
@@ -104,8 +105,8 @@ class Presses:
             while len(self._receipts) > RECEIPTS_KEPT:
                 self._receipts.popitem(last=False)
             level = logging.INFO if receipt.outcome == "published" else logging.WARNING
-            log.log(level, "press %s of %s by %s with %r: %s: %s", press_id, widget_id, who,
-                    dict(inputs), receipt.outcome, receipt.reason)  # fmt: skip
+            log.log(level, "press %s of %s by %s with %.*s: %s: %s", press_id, widget_id, who,
+                    LONGEST_LOGGED, inputs, receipt.outcome, receipt.reason)  # fmt: skip
             return receipt
         if (known.widget, known.inputs) != (widget_id, inputs):
             reused = say("press_reused", id=press_id)

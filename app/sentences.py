@@ -41,6 +41,7 @@ ENGLISH: Final[Mapping[str, str]] = {
     "simulated": "SIMULATED ROBOT",
     "ok": "ok",
     "lost": "no connection",
+    "unknown": "not known",
     "absent": "not there",
     "silent": "no answer",
     "no_node": "no node seen",

@@ -35,6 +35,7 @@ class PageContext(TypedDict):
     inputs: dict[str, Any]
     lost: str
     lost_short: str
+    unknown: str
     unsure: str
     refresh_s: int
 
@@ -68,6 +69,7 @@ def _render(request: Request, site: Site, page: Page) -> Response:
         inputs=dict(receipt.inputs) if receipt else {},
         lost=say("server_lost"),
         lost_short=say("lost"),
+        unknown=say("unknown"),
         unsure=say("server_unsure"),
         refresh_s=REFRESH_S,
     )

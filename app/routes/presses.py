@@ -67,7 +67,7 @@ async def press(widget: str, request: Request, site: CurrentSite) -> Response:
     if kind == "application/json":
         given = _json(body)
         press_id = given.id or secrets.token_hex(8)
-        receipt = site.kiosk.presses.press(widget, given.inputs, press_id, who)
+        receipt = site.kiosk.press(widget, given.inputs, press_id, who)
         _count(site, receipt)
         return JSONResponse(receipt.as_json(), status_code=STATUS[receipt.cause])
     if kind == "application/x-www-form-urlencoded":
@@ -77,7 +77,7 @@ async def press(widget: str, request: Request, site: CurrentSite) -> Response:
         if not re.fullmatch(PRESS_ID, page_id):
             raise InputError(f'_id: "{page_id:.40}" is not the id of a press')
         press_id = f"{page_id}.{widget}"
-        receipt = site.kiosk.presses.press(widget, inputs, press_id, who)
+        receipt = site.kiosk.press(widget, inputs, press_id, who)
         _count(site, receipt)
         return RedirectResponse(_page_with(site, receipt), status_code=303)
     raise InputError(

@@ -44,9 +44,11 @@ function showNotice(notice) {
 // The server is gone: what was permitted is no longer known to be.
 function lockAll() {
   body.dataset.cut = "";
-  const server = document.querySelector('[data-lamp="server"]');
-  server.dataset.state = "bad";
-  setText(server.querySelector("b"), body.dataset.lostShort);
+  for (const lamp of document.querySelectorAll("[data-lamp]")) {
+    const server = lamp.dataset.lamp === "server";
+    lamp.dataset.state = server ? "bad" : "wait";
+    setText(lamp.querySelector("b"), server ? body.dataset.lostShort : body.dataset.unknown);
+  }
   for (const root of widgets.values()) {
     const button = root.querySelector("button");
     if (button) {
