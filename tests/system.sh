@@ -18,7 +18,7 @@ need cmake cmake --version
 need chromium chromium --version
 need libclang-dev has_libclang
 need python3-venv "${PYTHON:-python3}" -c "import ensurepip"
-command -v cargo >/dev/null || { echo "missing: Rust 1.85 or later (cargo), see rustup.rs" >&2; exit 1; }
+command -v cargo >/dev/null || { echo "missing: Rust 1.85 or later (cargo)" >&2; exit 1; }
 
 [ -n "$missing" ] || exit 0
 if [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
