@@ -5,6 +5,7 @@ what browsers send with every request: Host (DNS rebinding), Origin and Sec-Fetc
 made by other sites' pages).
 """
 
+import re
 from collections.abc import Iterable
 from typing import Final
 from urllib.parse import urlsplit
@@ -15,6 +16,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 GUARDED_PATHS: Final = frozenset({"/events"})
 READING: Final = frozenset({"GET", "HEAD"})
+HOST: Final = re.compile(r"(?P<name>\[[0-9a-f:.]+\]|[a-z0-9._-]+)(:\d{1,5})?")
 OWN_SITE: Final = frozenset({"same-origin", "none"})
 
 SECURITY_HEADERS: Final = {
@@ -64,13 +66,19 @@ class Doors:
         if site not in OWN_SITE:
             return f"a page of another site ({site}) asked for this"
         origin = headers.get("origin")
-        if origin is not None and urlsplit(origin).netloc.lower() != host:
+        if origin is not None and _host_of(origin) != host:
             return f'a page of "{origin}" asked for this'
         return None
 
 
-def _without_port(host: str) -> str:
-    """ "localhost:8000" → "localhost"; an IPv6 address keeps its brackets."""
-    if host.startswith("["):
-        return host.partition("]")[0] + "]"
-    return host.partition(":")[0]
+def _host_of(origin: str) -> str | None:
+    try:
+        return urlsplit(origin).netloc.lower()
+    except ValueError:
+        return None
+
+
+def _without_port(host: str) -> str | None:
+    """`localhost:8000` → `localhost`; an IPv6 address keeps its brackets; None if it is no host."""
+    found = HOST.fullmatch(host)
+    return found["name"] if found else None

@@ -25,7 +25,7 @@ MESSAGE_TYPE: Final = re.compile(r"[a-z][a-z0-9_]*/msg/[A-Z][A-Za-z0-9]*")
 
 _TOKEN = re.compile(
     r"@/(?P<zid>[^/]+)/@ros2_lv"
-    r"(?:/(?P<role>MP|MS)/(?P<key>[^/]+)/(?P<type>[^/]+)/K?:[01]?:(?P<durability>[01]?):[^/]*)?"
+    r"(?:/(?P<role>MP|MS)/(?P<key>[^/]+)/(?P<type>[^/]+)/K?:[^:/]*:(?P<durability>[^:/]*):.*)?"
 )
 _ROUTE = re.compile(r"@/(?P<zid>[^/]+)/ros2/route/topic/(?P<direction>pub|sub)/(?P<key>.+)")
 

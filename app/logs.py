@@ -20,7 +20,11 @@ SEVERITIES: Mapping[int, tuple[str, int]] = {
 LEVELS: Mapping[str, int] = {name.lower(): level for level, (name, _) in SEVERITIES.items()}
 
 # Printable as they are; every other control character is escaped, so that one record is one line.
-_CONTROLS = {code: f"\\x{code:02x}" for code in [*range(32), 127] if code not in (9, 10)}
+_CONTROLS = {
+    code: f"\\x{code:02x}"
+    for code in [*range(32), *range(127, 160), 0x2028, 0x2029]
+    if code not in (9, 10)
+}
 
 log = logging.getLogger("kiosk")
 
@@ -69,11 +73,14 @@ class RosoutHandler(logging.Handler):
 def log_fields(record: logging.LogRecord) -> dict[str, object]:
     """A record as the fields of `rcl_interfaces/msg/Log`."""
     seconds, nanoseconds = stamp(record)
+    text = record.getMessage()
+    if record.exc_info:
+        text += "\n" + logging.Formatter().formatException(record.exc_info)
     return {
         "stamp": {"sec": seconds, "nanosec": nanoseconds},
         "level": severity(record)[1],
         "name": NODE_NAME,
-        "msg": record.getMessage().replace("\0", "\\x00"),
+        "msg": text.replace("\0", "\\x00").encode(errors="replace").decode(),
         "file": record.filename,
         "function": record.funcName or "",
         "line": record.lineno,
@@ -90,7 +97,7 @@ def configure(level: str) -> None:
     handler.setFormatter(RosFormatter())
     root = logging.getLogger()
     root.handlers = [handler]
-    root.setLevel(logging.WARNING)
+    root.setLevel(max(logging.WARNING, LEVELS[level]))
     log.setLevel(LEVELS[level])
     for name in ("uvicorn", "uvicorn.error", "uvicorn.access"):
         logger = logging.getLogger(name)
@@ -98,4 +105,4 @@ def configure(level: str) -> None:
         logger.propagate = True
         logger.setLevel(LEVELS[level])
     if level != "debug":
-        logging.getLogger("uvicorn.access").setLevel(logging.WARNING)
+        logging.getLogger("uvicorn.access").setLevel(root.level)

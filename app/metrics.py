@@ -43,7 +43,7 @@ class _OfKiosk(Collector):
             "kiosk_ready", "1 while commands can reach the robot", int(self._kiosk.way.permitted)
         )
         unreadable = CounterMetricFamily(
-            "kiosk_undecodable", "Samples that were not their type", labels=["key"]
+            "kiosk_undecodable", "Samples looked at that were not their type", labels=["key"]
         )
         for key, count in robot.undecodable.items():
             unreadable.add_metric([key], count)

@@ -110,6 +110,7 @@ class Presses:
             return receipt
         if (known.widget, known.inputs) != (widget_id, inputs):
             reused = say("press_reused", id=press_id)
+            log.warning("press %s of %s by %s: %s", press_id, widget_id, who, reused)
             return self._receipt(widget, inputs, press_id, "refused", reused, "input")
         return known
 
@@ -142,7 +143,7 @@ class Presses:
         """The values of the inputs that the widget's message names."""
         for name in inputs:
             if not isinstance(self._widgets.get(name), TextInput):
-                raise InputError(f'there is no input "{name}" on this panel')
+                raise InputError(f'there is no input "{name:.60}" on this panel')
         values: dict[str, Any] = {}
         for _, name in named(widget.message):
             field = self._widgets[name]

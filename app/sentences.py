@@ -33,7 +33,6 @@ ENGLISH: Final[Mapping[str, str]] = {
     "refused": "Not sent: {why}",
     "not_encoded": "Not sent: {why}.",
     "press_reused": "Not sent: the press id {id} was already used for another press.",
-    "bad_request": "Not sent: {why}.",
     # The way to the robot.
     "server": "Server",
     "bridge": "Bridge",

@@ -1,7 +1,8 @@
 """The environment, read once and frozen."""
 
 import os
-from collections.abc import Mapping
+import re
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -12,6 +13,7 @@ Mode = Literal["demo", "live"]
 
 PACKAGE = Path(__file__).resolve().parent
 LOOPBACK_HOSTS = ("127.0.0.1", "localhost", "[::1]")
+HOST_NAME = re.compile(r"\[[0-9a-f:.]+\]|[a-z0-9._-]+")
 LOG_LEVELS = ("debug", "info", "warn", "error", "fatal")
 
 
@@ -35,15 +37,14 @@ class Settings:
     @classmethod
     def from_environment(cls, env: Mapping[str, str] = os.environ) -> "Settings":
         """Raises SettingsError that names the variable and what would be right."""
-        level = env.get("KIOSK_LOG_LEVEL", "info").lower()
+        level = (env.get("KIOSK_LOG_LEVEL") or "info").lower()
         if level not in LOG_LEVELS:
             raise SettingsError(f'KIOSK_LOG_LEVEL is "{level}": one of {", ".join(LOG_LEVELS)}')
-        extra = [host.strip().lower() for host in env.get("KIOSK_HOSTS", "").split(",")]
         return cls(
             panel=_path(env, "KIOSK_PANEL", PACKAGE / "panel.toml"),
             zenoh=_path(env, "KIOSK_ZENOH", shipped("zenoh.json5")),
             mode=_mode(env.get("KIOSK_MODE", "")),
-            hosts=(*LOOPBACK_HOSTS, *(host for host in extra if host)),
+            hosts=(*LOOPBACK_HOSTS, *_hosts(env.get("KIOSK_HOSTS", ""))),
             log_level=level,
             dev=env.get("KIOSK_DEV", "") not in ("", "0"),
         )
@@ -56,6 +57,16 @@ def _mode(given: str) -> Mode | None:
         case "demo" | "live":
             return given
     raise SettingsError(f'KIOSK_MODE is "{given}": it must be "demo" or "live"')
+
+
+def _hosts(given: str) -> Iterator[str]:
+    for host in filter(None, (part.strip().lower() for part in given.split(","))):
+        if not HOST_NAME.fullmatch(host):
+            raise SettingsError(
+                f'KIOSK_HOSTS has "{host}": names or addresses with commas between, without port '
+                "and without http://, an IPv6 address in brackets"
+            )
+        yield host
 
 
 def _path(env: Mapping[str, str], name: str, default: Path) -> Path:

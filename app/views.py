@@ -125,8 +125,13 @@ def written(value: Any) -> str:
     """A field's value as text, cut to what a readout can show."""
     if isinstance(value, bool):
         return "true" if value else "false"
-    text = str(value)
+    text = _number(value) if isinstance(value, float) else str(value)
     return text if len(text) <= LONGEST_TEXT else text[: LONGEST_TEXT - 1] + "…"
+
+
+def _number(value: float) -> str:
+    """Six digits where they are enough: a float32's 0.1 is not 0.10000000149011612."""
+    return f"{value:.6g}" if 1e-4 <= abs(value) < 1e6 else repr(value)
 
 
 def clock(wall: float) -> str:

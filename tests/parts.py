@@ -95,7 +95,7 @@ class Process:
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
-            raise AssertionError(f"{self._process.args} did not end:\n{self.text}") from None
+            raise AssertionError(f"{self._process.args!r} did not end:\n{self.text}") from None
         self._reader.join(5)
         for pipe in (self._process.stdin, self._process.stdout, self._process.stderr):
             if pipe is not None:
@@ -205,6 +205,10 @@ class RosNode:
             self._process.wait(10)
         except subprocess.TimeoutExpired:
             self.kill()
+
+
+def has_heard(node: RosNode, topic: str, count: int) -> bool:
+    return len(node.heard(topic)) >= count
 
 
 ORDERS: Mapping[str, tuple[str, ...]] = {

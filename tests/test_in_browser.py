@@ -4,14 +4,15 @@ import re
 import signal
 import time
 from collections.abc import Iterator
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Page, Request, expect
+from playwright.sync_api import Browser, Page, Request, Route, expect
 
-from tests.parts import ROOT, Bridge, RosNode, Server, live, until
+from tests.parts import ROOT, Bridge, RosNode, Server, has_heard, live, until
 
 TEXTS = [
     "",
@@ -81,7 +82,7 @@ def test_every_text_arrives_intact(server: Server, node: RosNode, page: Page) ->
         page.get_by_label("Message").fill(text)
         button(page, "Publish").click()
         heard = before + number + 1
-        until(lambda heard=heard: len(node.heard("/operation")) == heard, f"heard {text!r}")
+        until(partial(has_heard, node, "/operation", heard), f"heard {text!r}")
     assert node.heard_data("/operation")[before:] == TEXTS
 
 
@@ -202,7 +203,12 @@ def test_a_press_that_gets_no_answer_is_not_known_and_not_repeated(
     page.goto(server.url)
     expect(button(page, "Publish")).to_be_enabled()
     posts: list[Request] = []
-    page.route("**/widgets/**", lambda route: (posts.append(route.request), route.abort())[1])
+
+    def lose(route: Route) -> None:
+        posts.append(route.request)
+        route.abort()
+
+    page.route("**/widgets/**", lose)
     button(page, "Publish").click()
     expect(page.locator("#receipt-operation")).to_contain_text("not known whether this was sent")
     page.wait_for_timeout(1500)  # long enough for a retry to show, were there one

@@ -2,12 +2,13 @@
 
 import re
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pytest
 import zenoh
 
-from tests.parts import ROOT, Bridge, RosNode, Server, live, until
+from tests.parts import ROOT, Bridge, RosNode, Server, has_heard, live, until
 
 TEXTS = [
     "",
@@ -154,7 +155,7 @@ def test_fifty_starts_fifty_first_presses_received(
             until(kiosk.ready, "ready", every_s=0.001)
             assert kiosk.press("operation", f"first {number}").json()["outcome"] == "published"
             heard = before + number + 1
-            until(lambda heard=heard: len(node.heard("/operation")) >= heard, "heard", 5)
+            until(partial(has_heard, node, "/operation", heard), "heard", 5)
         finally:
             kiosk.end()
     assert node.heard_data("/operation")[before:] == [f"first {n}" for n in range(50)]

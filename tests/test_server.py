@@ -116,6 +116,7 @@ def test_the_same_id_is_the_same_press(demo: Server) -> None:
         (b'{"inputs": {"message": 5}}', "Message"),
         (b'{"inputs": {"message": "\\ud800"}}', "Unicode"),
         (b'{"inputs": {"message": "a\\u0000b"}}', "NUL"),
+        (b'{"inputs": {"\\ud800": "x"}}', "Unicode"),
         (b'{"inputs": {"message": "x", "nothing": "y"}}', "nothing"),
         (b'{"inputs": {"message": "' + b"x" * 81 + b'"}}', "81 characters"),
     ],

@@ -1,5 +1,6 @@
 """What can be wrong in a panel file whose shape is right: names, types and templates."""
 
+import re
 from collections import Counter
 from collections.abc import Iterable, Iterator
 
@@ -8,9 +9,11 @@ from app.interfaces import Interfaces
 from app.panel.model import Interlock, Panel, Publish, Readout, TextInput
 from app.panel.template import filled, named
 
+ELSEWHERE = " on this page: an input is read from the page it is on"
+
 
 def faults_in(panel: Panel, interfaces: Interfaces) -> Iterator[Fault]:
-    """Every fault, in the order of the file."""
+    """Every fault of names, types and templates; of each message the first that its type has."""
     yield from _repeated("interlock", [i.id for i in panel.interlocks])
     for i, interlock in enumerate(panel.interlocks):
         yield from _interlock(f"interlock[{i}]", interlock, interfaces)
@@ -26,7 +29,7 @@ def faults_in(panel: Panel, interfaces: Interfaces) -> Iterator[Fault]:
                 case TextInput():
                     yield from _text(place, widget)
                 case Readout():
-                    yield from _field(place, widget, interfaces)
+                    yield from _readout(place, widget, interfaces)
                 case Publish():
                     on_page = {i.id for i in page.widgets} & inputs.keys()
                     yield from _publish(place, widget, panel, on_page, inputs.keys(), interfaces)
@@ -54,6 +57,15 @@ def _interlock(place: str, interlock: Interlock, interfaces: Interfaces) -> Iter
     yield from fault
     if not fault and (found := interfaces.field_type(interlock.type, interlock.field)) != "bool":
         yield Fault(f"{place}.field", f'"{interlock.field}" is {found}: an interlock needs a bool')
+
+
+def _readout(place: str, readout: Readout, interfaces: Interfaces) -> Iterator[Fault]:
+    fault = list(_field(place, readout, interfaces))
+    yield from fault
+    if not fault and re.search(r"[/\]]", found := interfaces.field_type(readout.type, readout.field)):
+        yield Fault(
+            f"{place}.field", f'"{readout.field}" is {found}: a readout shows one value of it, not all'
+        )
 
 
 def _field(place: str, of: Interlock | Readout, interfaces: Interfaces) -> Iterator[Fault]:
@@ -89,13 +101,16 @@ def _publish(
     except InterfaceError as error:
         yield Fault(f"{place}.type", str(error))
         return
+    unknown = False
     try:
         for where, name in named(publish.message):
             if name not in on_page:
-                other = " on this page; an input is read from the page it is on"
-                what = other if name in anywhere else f"; there is {', '.join(on_page) or 'none'}"
-                raise FieldError(where, f'no input "{name}"{what}')
-        interfaces.encode(publish.type, filled(publish.message, dict.fromkeys(on_page, "")))
+                unknown = True
+                there = ", ".join(sorted(on_page)) or "none"
+                what = f"; there is {there}" if name not in anywhere else ELSEWHERE
+                yield Fault(f"{place}.message.{where}", f'no input "{name}"{what}')
+        if not unknown:
+            interfaces.encode(publish.type, filled(publish.message, dict.fromkeys(on_page, "text")))
     except FieldError as error:
         yield Fault(f"{place}.message.{error.field}".rstrip("."), error.message)
 

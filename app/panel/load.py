@@ -1,6 +1,8 @@
 """Reading a panel file, and every fault in it with its place."""
 
+import copy
 import hashlib
+import re
 import tomllib
 from collections.abc import Iterator
 from difflib import get_close_matches
@@ -12,7 +14,7 @@ from pydantic import BaseModel, ValidationError
 from app.errors import Fault, PanelError
 from app.interfaces import interfaces_of
 from app.panel.check import faults_in
-from app.panel.model import KINDS, Panel
+from app.panel.model import ID, KINDS, Panel
 
 
 def load_panel(path: Path) -> Panel:
@@ -20,19 +22,52 @@ def load_panel(path: Path) -> Panel:
     try:
         data = path.read_bytes()
         tables = tomllib.loads(data.decode())
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         raise PanelError(str(path), (Fault("", reason),), unreadable=True) from error
+    revision = hashlib.sha256(data).hexdigest()[:12]
+    faults = [Fault("revision", "unknown key")] if tables.pop("revision", None) is not None else []
     try:
-        panel = Panel.model_validate(tables | {"revision": hashlib.sha256(data).hexdigest()[:12]})
+        panel = Panel.model_validate(tables | {"revision": revision})
     except ValidationError as error:
-        raise PanelError(str(path), tuple(map(_fault, error.errors()))) from None
-    faults = tuple(faults_in(panel, interfaces_of(panel.distro)))
-    if "revision" in tables:
-        faults = (*faults, Fault("revision", "unknown key"))
+        faults += map(_fault, error.errors())
+        faults += _faults_of_the_rest(tables, error)
+    else:
+        faults += faults_in(panel, interfaces_of(panel.distro))
     if faults:
-        raise PanelError(str(path), faults)
+        raise PanelError(str(path), tuple(faults))
     return panel
+
+
+def _faults_of_the_rest(tables: dict[str, Any], error: ValidationError) -> Iterator[Fault]:
+    """What else is wrong: the file is checked with harmless stand-ins for what has no right shape."""
+    mended = copy.deepcopy(tables)
+    for fault in error.errors():
+        match fault["loc"]:
+            case ("page", int(p), "widget", int(w), *_):
+                old = tables["page"][p]["widget"][w]
+                mended["page"][p]["widget"][w] = _stand_in(old, f"{p}_{w}") | {"kind": "text"}
+            case ("interlock", int(i), *_):
+                topic = {"topic": f"/faulty_{i}"}
+                mended["interlock"][i] = _stand_in(tables["interlock"][i], str(i)) | topic
+            case ("page", int(p), str(key)):
+                mended["page"][p].pop(key, None)
+                mended["page"][p] = {"id": f"faulty_{p}", "title": "?"} | mended["page"][p]
+            case (str(key),):
+                mended.pop(key, None)
+                mended.setdefault("title", "?")
+    try:
+        panel = Panel.model_validate(mended)
+    except ValidationError:
+        return  # too much is wrong: what was found already comes first
+    yield from faults_in(panel, interfaces_of(panel.distro))
+
+
+def _stand_in(old: Any, number: str) -> dict[str, Any]:
+    """Has the id of what it stands for, so that nobody misses it."""
+    known = old.get("id") if isinstance(old, dict) else None
+    named = isinstance(known, str) and re.fullmatch(ID, known)
+    return {"id": known if named else f"faulty_{number}", "label": "?"}
 
 
 def _fault(error: Any) -> Fault:
@@ -51,13 +86,17 @@ def _walk(location: tuple[str | int, ...]) -> tuple[type[BaseModel], list[str | 
     steps: list[str | int] = []
     previous: str | int = ""
     for step in location:
-        if isinstance(previous, int) and step in KINDS:
+        if steps[-2:-1] == ["widget"] and isinstance(previous, int) and step in KINDS:
             model = KINDS[str(step)]
         else:
             steps.append(step)
             model = _inner(model, step) or model
         previous = step
     return model, steps
+
+
+def _names(location: tuple[str | int, ...]) -> list[str]:
+    return [step for step in location if isinstance(step, str)]
 
 
 def _inner(model: type[BaseModel], key: str | int) -> type[BaseModel] | None:
@@ -82,6 +121,8 @@ def _message(error: Any, model: type[BaseModel], location: tuple[str | int, ...]
             near = get_close_matches(str(location[-1]), known, n=1)
             hint = f'did you mean "{near[0]}"?' if near else f"known here: {', '.join(known)}"
             return f"unknown key; {hint}"
+        case "tuple_type":
+            return f"must be a list of tables: write [[{'.'.join(map(str, _names(location)))}]]"
         case "missing":
             return "is missing"
         case "union_tag_not_found":

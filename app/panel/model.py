@@ -25,12 +25,13 @@ def _type(given: str) -> str:
 
 def _namespace(given: str) -> str:
     whole = f"/{given.strip('/')}" if given.strip("/") else ""
-    if not NAMESPACE.fullmatch(whole):
+    if not NAMESPACE.fullmatch(whole) or "__" in whole:
         raise ValueError(f'"{given}" is not a ROS 2 namespace: it must be like /robot1')
     return whole
 
 
-Id = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*$", max_length=64)]
+ID: Final = r"^[a-z][a-z0-9_]{0,63}$"
+Id = Annotated[str, Field(pattern=ID)]
 Label = Annotated[str, Field(min_length=1, max_length=120)]
 Topic = Annotated[str, AfterValidator(_topic), Field(max_length=255)]
 Type = Annotated[str, AfterValidator(_type)]
@@ -68,8 +69,8 @@ class Placed(Description):
 
 class TextInput(Placed):
     kind: Literal["text"]
-    max_length: Annotated[int, Field(ge=1, le=10_000)] = 80
-    default: str = ""
+    max_length: Annotated[int, Field(ge=1, le=1000)] = 80
+    default: Annotated[str, Field(pattern=r"^[^\x00]*$")] = ""
 
 
 class Publish(Placed):

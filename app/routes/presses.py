@@ -91,7 +91,11 @@ def _count(site: Site, receipt: Receipt) -> None:
 
 def _json(body: bytes) -> Press:
     try:
-        return Press.model_validate(json.loads(body, parse_constant=_no_constant))
+        given = json.loads(body, parse_constant=_no_constant)
+        json.dumps(given, ensure_ascii=False).encode()  # half a surrogate pair is no text
+        return Press.model_validate(given)
+    except UnicodeEncodeError:
+        raise InputError("the body has half of a surrogate pair, which is not Unicode text") from None
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         place = ".".join(str(step) for step in first["loc"])

@@ -1,0 +1,100 @@
+"""The static files in memory: the stylesheet in its order, and a name that changes with any of them."""
+
+from pathlib import Path
+
+import pytest
+
+from app.assets import LAYERS, Assets, load_assets
+from app.settings import shipped
+
+
+@pytest.fixture
+def static(tmp_path: Path) -> Path:
+    folder = tmp_path / "static"
+    for part in ("css", "js"):
+        (folder / part).mkdir(parents=True)
+    for layer in LAYERS:
+        (folder / "css" / f"{layer}.css").write_text(f"/* {layer} */\n")
+    (folder / "js/main.js").write_text("main();\n")
+    (folder / "js/press.js").write_text("press();\n")
+    (folder / "js/notes.txt").write_text("no script\n")
+    return folder
+
+
+@pytest.fixture
+def templates(tmp_path: Path) -> Path:
+    folder = tmp_path / "templates"
+    folder.mkdir()
+    (folder / "screen.html").write_text("<p>")
+    return folder
+
+
+def loaded(static: Path, templates: Path, mm_per_px: float = 0.25) -> Assets:
+    return load_assets(static, templates, mm_per_px)
+
+
+def test_the_stylesheet_is_its_layers_in_order_with_the_millimetre(
+    static: Path, templates: Path
+) -> None:
+    assert loaded(static, templates).files["kiosk.css"].content.decode().splitlines() == [
+        "/* tokens */",
+        "/* base */",
+        "/* layout */",
+        "/* widgets */",
+        ":root{--mm:4.0000px}",
+    ]
+
+
+def test_scripts_keep_their_names(static: Path, templates: Path) -> None:
+    files = loaded(static, templates).files
+    assert set(files) == {"kiosk.css", "main.js", "press.js"}
+    assert files["main.js"].content == b"main();\n"
+
+
+def test_browsers_are_told_what_a_file_is(static: Path, templates: Path) -> None:
+    files = loaded(static, templates).files
+    assert (files["kiosk.css"].media_type, files["main.js"].media_type) == (
+        "text/css",
+        "text/javascript",
+    )
+
+
+def test_the_same_files_have_the_same_revision(static: Path, templates: Path) -> None:
+    assert loaded(static, templates).revision == loaded(static, templates).revision
+
+
+@pytest.mark.parametrize("name", ["static/css/base.css", "static/js/press.js", "templates/screen.html"])
+def test_every_change_of_a_file_is_a_new_revision(
+    static: Path, templates: Path, tmp_path: Path, name: str
+) -> None:
+    before = loaded(static, templates).revision
+    (tmp_path / name).write_text("changed")
+    assert loaded(static, templates).revision != before
+
+
+@pytest.mark.parametrize("name", ["static/js/more.js", "templates/more.html"])
+def test_a_new_file_is_a_new_revision(static: Path, templates: Path, tmp_path: Path, name: str) -> None:
+    before = loaded(static, templates).revision
+    (tmp_path / name).write_text("")
+    assert loaded(static, templates).revision != before
+
+
+def test_another_screen_is_a_new_revision(static: Path, templates: Path) -> None:
+    assert loaded(static, templates, 0.25).revision != loaded(static, templates, 0.3).revision
+
+
+def test_the_shipped_files_are_complete() -> None:
+    assets = load_assets(shipped("static"), shipped("templates"), 0.22)
+    assert "main.js" in assets.files
+    style = assets.files["kiosk.css"].content.decode()
+    assert (
+        style.index("@layer tokens {") < style.index("@layer base {") < style.index("@layer widgets {")
+    )
+
+
+def test_no_shipped_file_loads_anything_from_elsewhere() -> None:
+    assets = load_assets(shipped("static"), shipped("templates"), 0.22)
+    for name, asset in assets.files.items():
+        assert b"http:" not in asset.content, name
+        assert b"https:" not in asset.content, name
+        assert b"@import" not in asset.content, name

@@ -1,0 +1,192 @@
+"""The newest view for everybody: snapshots, differences, shared bytes, no queue."""
+
+import asyncio
+import json
+from collections.abc import Coroutine
+from typing import Any
+
+import pytest
+
+from app.board import Board, beat
+from app.robot import Robot
+from app.views import View, sight
+from tests.builders import NOW, permits, robot_there, says, small_panel
+from tests.parts import events_in
+
+PANEL = small_panel()
+
+
+@pytest.fixture
+def robot() -> Robot:
+    return robot_there(PANEL)
+
+
+@pytest.fixture
+def board(robot: Robot) -> Board:
+    return Board(view_of(robot), "r1")
+
+
+def view_of(robot: Robot, **more: Any) -> View:
+    return sight(PANEL, robot, NOW, **more).view
+
+
+def events(chunk: bytes) -> dict[str, Any]:
+    """Event name → data; the events of one chunk have different names."""
+    found = events_in(chunk.decode())
+    assert len({name for name, _, _ in found}) == len(found)
+    return {name: json.loads(data) for name, data, _ in found}
+
+
+def run(work: Coroutine[Any, Any, bool]) -> bool:
+    return asyncio.run(work)
+
+
+def test_a_snapshot_is_everything_that_the_page_shows(board: Board) -> None:
+    assert events(board.snapshot()) == {"snapshot": {"id": board.id, "revision": "r1", **board.view}}
+
+
+def test_every_event_has_the_id_of_the_version_it_leads_to(board: Board, robot: Robot) -> None:
+    old = board.view
+    permits(robot)
+    board.post(view_of(robot, fault="x"))
+    ids = {event_id for _, _, event_id in events_in(board.since(1, old).decode())}
+    assert ids == {f"{board.boot}-2"}
+
+
+def test_each_start_has_its_own_boot(board: Board) -> None:
+    assert Board(board.view, "r1").boot != board.boot
+
+
+def test_a_changed_permission_is_sent_by_its_name_and_at_its_widgets(
+    board: Board, robot: Robot
+) -> None:
+    old = board.view
+    permits(robot)
+    board.post(view_of(robot))
+    assert events(board.since(1, old)) == {
+        "operation-enabled-updated": {"enabled": True, "reason": None},
+        "update": {"guarded": {"enabled": True, "reason": None}},
+    }
+
+
+def test_of_a_widget_only_what_changed_is_sent(board: Board, robot: Robot) -> None:
+    says(robot, "/heard", "one")
+    board.post(view_of(robot))
+    old = board.view
+    says(robot, "/heard", "two")
+    board.post(view_of(robot))
+    assert events(board.since(2, old)) == {"update": {"heard": {"text": "two"}}}
+
+
+def test_a_changed_light_is_sent_with_all_lights(board: Board, robot: Robot) -> None:
+    old = board.view
+    robot.graph.answered({})
+    board.post(view_of(robot))
+    sent = events(board.since(1, old))
+    assert sent["link"] == board.view["link"]
+    assert sent["link"]["bridge"]["text"] == "no answer"
+
+
+def test_a_changed_notice_is_sent(board: Board, robot: Robot) -> None:
+    old = board.view
+    board.post(view_of(robot, fault="cell.toml can't be used"))
+    assert events(board.since(1, old)) == {"notice": {"banner": "", "fault": "cell.toml can't be used"}}
+
+
+def test_the_same_view_again_is_no_new_version(board: Board, robot: Robot) -> None:
+    board.post(view_of(robot))
+    assert board.version == 1
+
+
+def test_a_slow_reader_skips_to_the_newest(board: Board, robot: Robot) -> None:
+    old = board.view
+    for word in ("one", "two", "three"):
+        says(robot, "/heard", word)
+        board.post(view_of(robot))
+    assert events(board.since(1, old))["update"]["heard"]["text"] == "three"
+    assert b"two" not in board.since(1, old)
+
+
+def test_what_changed_and_changed_back_is_not_sent(board: Board, robot: Robot) -> None:
+    old = board.view
+    board.post(view_of(robot, fault="x"))
+    board.post(view_of(robot))
+    assert (board.version, board.since(1, old)) == (3, b"")
+
+
+def test_streams_that_are_equally_far_share_the_same_bytes(board: Board, robot: Robot) -> None:
+    old = board.view
+    permits(robot)
+    board.post(view_of(robot))
+    assert board.since(1, old) is board.since(1, old)
+    assert board.snapshot() is board.snapshot()
+
+
+def test_prepared_bytes_are_never_of_an_older_view(board: Board, robot: Robot) -> None:
+    old = board.view
+    for word in ("one", "two"):
+        says(robot, "/heard", word)
+        board.post(view_of(robot))
+        assert events(board.since(1, old))["update"]["heard"]["text"] == word
+        assert events(board.snapshot())["snapshot"]["widgets"]["heard"]["text"] == word
+
+
+@pytest.mark.parametrize("text", ["two\nlines", "event: x\n\n", "\u2028 \x85 \r", '"}', "漢 🤖"])
+def test_no_text_of_the_robots_breaks_the_stream(board: Board, robot: Robot, text: str) -> None:
+    old = board.view
+    says(robot, "/heard", text)
+    board.post(view_of(robot))
+    assert list(events(board.since(1, old))) == ["update"]
+    assert events(board.since(1, old))["update"]["heard"]["text"] == text
+
+
+def test_who_is_behind_does_not_wait(board: Board, robot: Robot) -> None:
+    permits(robot)
+    board.post(view_of(robot))
+    assert run(board.newer(1, 60))
+
+
+def test_who_waits_is_woken_by_a_new_view(board: Board, robot: Robot) -> None:
+    permits(robot)
+    new = view_of(robot)
+
+    async def woken() -> bool:
+        asyncio.get_running_loop().call_soon(board.post, new)
+        return await board.newer(1, 60)
+
+    assert run(woken())
+    assert board.version == 2
+
+
+def test_all_who_wait_are_woken(board: Board, robot: Robot) -> None:
+    permits(robot)
+    new = view_of(robot)
+
+    async def woken() -> bool:
+        asyncio.get_running_loop().call_soon(board.post, new)
+        return all(await asyncio.gather(*(board.newer(1, 60) for _ in range(5))))
+
+    assert run(woken())
+
+
+@pytest.mark.parametrize("timeout_s", [0.0, -1.0])
+def test_who_waits_is_told_when_nothing_came(board: Board, timeout_s: float) -> None:
+    assert not run(board.newer(1, timeout_s))
+
+
+def test_the_end_wakes_who_waits(board: Board) -> None:
+    async def woken() -> bool:
+        asyncio.get_running_loop().call_soon(board.close)
+        return await board.newer(1, 60)
+
+    assert run(woken())
+    assert board.closed
+
+
+def test_after_the_end_nobody_waits(board: Board) -> None:
+    board.close()
+    assert run(board.newer(1, 60))
+
+
+def test_the_heartbeat_tells_the_time_and_has_no_id() -> None:
+    assert events_in(beat("12:00:00").decode()) == [("beat", '{"clock": "12:00:00"}', "")]

@@ -1,0 +1,83 @@
+"""`python -m app.check`: what it prints, and its exit status."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from app.check import main
+from app.settings import PACKAGE
+
+SHIPPED = PACKAGE / "panel.toml"
+NO_TITLE = SHIPPED.read_text().replace('title = "Robot cell 1"\n', "")
+
+
+@pytest.fixture
+def faulty(tmp_path: Path) -> Path:
+    path = tmp_path / "cell.toml"
+    path.write_text(NO_TITLE.replace('"/last_heard"', '"last heard"'))
+    return path
+
+
+def test_a_good_panel_is_summed_up(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([str(SHIPPED)]) == 0
+    said = capsys.readouterr()
+    assert said.out == f'{SHIPPED}: good: "Robot cell 1", 1 page(s), 5 widget(s)\n'
+    assert said.err == ""
+
+
+def test_every_fault_is_printed_with_its_place(
+    faulty: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([str(faulty)]) == 1
+    said = capsys.readouterr()
+    assert said.out == ""
+    first, *lines = said.err.splitlines()
+    assert first == f"{faulty} can't be used:"
+    assert [line.split(": ")[0] for line in lines] == ["  title", "  page[0].widget[4].topic"]
+
+
+def test_a_file_that_is_not_there_can_not_be_read(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([str(tmp_path / "none.toml")]) == 2
+    assert "No such file or directory" in capsys.readouterr().err
+
+
+def test_what_is_no_toml_can_not_be_read(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "cell.toml"
+    path.write_text("title =")
+    assert main([str(path)]) == 2
+    assert "Invalid value" in capsys.readouterr().err
+
+
+def test_without_a_name_the_panel_of_the_environment_is_checked(
+    faulty: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("KIOSK_PANEL", str(faulty))
+    assert main([]) == 1
+    assert str(faulty) in capsys.readouterr().err
+
+
+def test_a_wrong_environment_is_told_without_a_traceback(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("KIOSK_MODE", "maybe")
+    assert main([]) == 2
+    assert capsys.readouterr().err == 'KIOSK_MODE is "maybe": it must be "demo" or "live"\n'
+
+
+def test_more_than_one_panel_is_a_misuse(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["a.toml", "b.toml"]) == 2
+    assert capsys.readouterr().err == "usage: python -m app.check [PANEL]\n"
+
+
+@pytest.mark.parametrize(("text", "status"), [(SHIPPED.read_text(), 0), (NO_TITLE, 1), ("title =", 2)])
+def test_the_exit_status_says_good_faulty_or_unreadable(tmp_path: Path, text: str, status: int) -> None:
+    path = tmp_path / "cell.toml"
+    path.write_text(text)
+    command = [sys.executable, "-m", "app.check", str(path)]
+    ended = subprocess.run(command, cwd=PACKAGE.parent, capture_output=True, text=True, check=False)
+    assert ended.returncode == status
+    assert "Traceback" not in ended.stderr

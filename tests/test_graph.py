@@ -1,0 +1,200 @@
+"""What the tokens say: who is there, whether it answers, and of which type each topic is."""
+
+import pytest
+
+from app.graph import Graph
+from app.keys import DEMO_VERSION, Qos, Role, bridge_token, token
+from tests.builders import BOOL, BRIDGE, KIOSK, TEXT
+
+OTHER_KIOSK = "c2"
+
+
+def topic_token(zid: str, role: Role, key: str, type_name: str, qos: Qos | None = None) -> str:
+    return token(zid, role, key, type_name, qos or Qos(), "RIHS01_0")
+
+
+@pytest.fixture
+def graph() -> Graph:
+    """A graph with one bridge."""
+    made = Graph(KIOSK)
+    made.apply(bridge_token(BRIDGE), True)
+    return made
+
+
+def test_a_bridge_comes_and_goes() -> None:
+    graph = Graph(KIOSK)
+    assert graph.apply(bridge_token(BRIDGE), True) == BRIDGE
+    assert graph.bridges == {BRIDGE}
+    assert graph.apply(bridge_token(BRIDGE), False) == BRIDGE
+    assert graph.bridges == frozenset()
+
+
+def test_a_topics_token_is_no_bridge(graph: Graph) -> None:
+    assert graph.apply(topic_token("x", "MP", "a", BOOL), True) is None
+    assert graph.bridges == {BRIDGE}
+
+
+def test_the_kiosks_own_tokens_do_not_count() -> None:
+    graph = Graph(KIOSK)
+    assert graph.apply(bridge_token(KIOSK), True) is None
+    graph.apply(topic_token(KIOSK, "MP", "a", BOOL), True)
+    assert graph.bridges == frozenset()
+    assert graph.wrong_type("MP", "a", TEXT) is None
+
+
+def test_what_is_no_token_changes_nothing(graph: Graph) -> None:
+    assert graph.apply("@/b1/@ros2_lv/SS/add/x", True) is None
+    assert graph.bridges == {BRIDGE}
+
+
+@pytest.mark.parametrize("role", ["MP", "MS"])
+def test_a_node_behind_a_bridge_is_on_the_robot(graph: Graph, role: Role) -> None:
+    graph.apply(topic_token(BRIDGE, role, "a", BOOL), True)
+    assert graph.on_robot(role, "a")
+    assert not graph.on_robot(role, "b")
+    assert not graph.on_robot("MS" if role == "MP" else "MP", "a")
+
+
+def test_a_node_that_ended_is_not_on_the_robot(graph: Graph) -> None:
+    graph.apply(topic_token(BRIDGE, "MP", "a", BOOL), True)
+    graph.apply(topic_token(BRIDGE, "MP", "a", BOOL), False)
+    assert not graph.on_robot("MP", "a")
+
+
+def test_another_kiosk_is_not_the_robot(graph: Graph) -> None:
+    graph.apply(topic_token(OTHER_KIOSK, "MP", "a", BOOL), True)
+    assert not graph.on_robot("MP", "a")
+
+
+def test_nodes_go_with_their_bridge(graph: Graph) -> None:
+    graph.apply(topic_token(BRIDGE, "MP", "a", BOOL), True)
+    graph.apply(bridge_token(BRIDGE), False)
+    assert not graph.on_robot("MP", "a")
+
+
+@pytest.mark.parametrize(
+    ("panel_role", "zid", "role"),
+    [
+        ("MS", BRIDGE, "MP"),  # the panel listens to a publisher of the robot's
+        ("MS", OTHER_KIOSK, "MS"),  # another panel listens too, and fixed the route
+        ("MP", BRIDGE, "MS"),  # the panel publishes to a subscriber of the robot's
+        ("MP", OTHER_KIOSK, "MP"),
+    ],
+)
+def test_a_counterpart_of_another_type_is_told(
+    graph: Graph, panel_role: Role, zid: str, role: Role
+) -> None:
+    graph.apply(topic_token(zid, role, "a", TEXT), True)
+    assert graph.wrong_type(panel_role, "a", BOOL) == TEXT
+    assert graph.wrong_type(panel_role, "a", TEXT) is None
+    assert graph.wrong_type(panel_role, "b", BOOL) is None
+
+
+@pytest.mark.parametrize(
+    ("panel_role", "zid", "role"),
+    [
+        ("MS", BRIDGE, "MS"),
+        ("MP", BRIDGE, "MP"),
+        ("MS", OTHER_KIOSK, "MP"),
+        ("MP", OTHER_KIOSK, "MS"),
+    ],
+)
+def test_who_shares_no_route_with_the_panel_may_have_another_type(
+    graph: Graph, panel_role: Role, zid: str, role: Role
+) -> None:
+    graph.apply(topic_token(zid, role, "a", TEXT), True)
+    assert graph.wrong_type(panel_role, "a", BOOL) is None
+
+
+def test_one_of_several_publishers_with_another_type_is_enough(graph: Graph) -> None:
+    graph.apply(topic_token(BRIDGE, "MP", "a", BOOL), True)
+    graph.apply(topic_token(BRIDGE, "MP", "a", TEXT), True)
+    assert graph.wrong_type("MS", "a", BOOL) == TEXT
+
+
+def test_a_type_is_right_again_when_the_wrong_one_ends(graph: Graph) -> None:
+    graph.apply(topic_token(BRIDGE, "MP", "a", TEXT), True)
+    graph.apply(topic_token(BRIDGE, "MP", "a", TEXT), False)
+    assert graph.wrong_type("MS", "a", BOOL) is None
+
+
+@pytest.mark.parametrize(("role", "direction"), [("MS", "pub"), ("MP", "sub")])
+def test_a_bridges_route_of_another_type_is_told(graph: Graph, role: Role, direction: str) -> None:
+    graph.learn({(BRIDGE, "pub" if direction == "pub" else "sub", "a"): TEXT})
+    assert graph.wrong_type(role, "a", BOOL) == TEXT
+    assert graph.wrong_type(role, "a", TEXT) is None
+    assert graph.wrong_type("MP" if role == "MS" else "MS", "a", BOOL) is None
+
+
+def test_routes_of_a_bridge_that_went_do_not_count(graph: Graph) -> None:
+    graph.learn({(BRIDGE, "pub", "a"): TEXT})
+    graph.apply(bridge_token(BRIDGE), False)
+    assert graph.wrong_type("MS", "a", BOOL) is None
+
+
+def test_a_bridge_that_was_not_asked_is_not_silent(graph: Graph) -> None:
+    assert not graph.silent
+
+
+def test_a_bridge_that_does_not_answer_is_silent(graph: Graph) -> None:
+    graph.answered({})
+    assert graph.silent
+
+
+def test_a_bridge_that_answers_is_not_silent(graph: Graph) -> None:
+    graph.answered({BRIDGE: '"1.10.0"', "router": '"1.10.0"'})
+    assert not graph.silent
+
+
+def test_one_of_two_bridges_answering_is_enough(graph: Graph) -> None:
+    graph.apply(bridge_token("b2"), True)
+    graph.answered({"b2": '"1.10.0"'})
+    assert not graph.silent
+
+
+def test_an_answer_of_who_is_no_bridge_does_not_help(graph: Graph) -> None:
+    graph.answered({"router": '"1.10.0"'})
+    assert graph.silent
+
+
+def test_without_a_bridge_nothing_is_silent() -> None:
+    graph = Graph()
+    graph.answered({})
+    assert not graph.silent
+
+
+def test_a_bridge_that_comes_back_is_asked_anew(graph: Graph) -> None:
+    graph.answered({})
+    graph.apply(bridge_token(BRIDGE), False)
+    graph.apply(bridge_token(BRIDGE), True)
+    assert not graph.silent
+
+
+@pytest.mark.parametrize(("version", "simulated"), [(DEMO_VERSION, True), ('"1.10.0"', False)])
+def test_a_demo_robot_is_known_by_its_version(graph: Graph, version: str, simulated: bool) -> None:
+    graph.answered({BRIDGE: version})
+    assert graph.simulated is simulated
+
+
+def test_a_bridge_that_did_not_answer_is_not_taken_for_a_demo(graph: Graph) -> None:
+    assert not graph.simulated
+
+
+def test_a_demo_robot_that_went_leaves_no_banner(graph: Graph) -> None:
+    graph.answered({BRIDGE: DEMO_VERSION})
+    graph.apply(bridge_token(BRIDGE), False)
+    assert not graph.simulated
+
+
+@pytest.mark.parametrize("latched", [True, False])
+def test_a_publishers_durability_is_known(graph: Graph, latched: bool) -> None:
+    graph.apply(topic_token(BRIDGE, "MP", "a", BOOL, Qos(transient_local=latched)), True)
+    assert graph.latched("a") is latched
+
+
+@pytest.mark.parametrize(("zid", "role"), [(BRIDGE, "MS"), (OTHER_KIOSK, "MP")])
+def test_who_is_no_publisher_of_the_robots_has_no_durability(
+    graph: Graph, zid: str, role: Role
+) -> None:
+    graph.apply(topic_token(zid, role, "a", BOOL, Qos(transient_local=True)), True)
+    assert graph.latched("a") is None

@@ -1,0 +1,107 @@
+"""Imports go one way, from what knows nothing to what wires all; Zenoh has two doors."""
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from app.settings import PACKAGE
+
+# A module imports only from those that stand before it.
+ORDER = (
+    "app.errors",
+    "app.settings",
+    "app.sentences",
+    "app.logs",
+    "app.keys",
+    "app.interfaces",
+    "app.panel.template",
+    "app.panel.model",
+    "app.panel.check",
+    "app.panel.load",
+    "app.panel",
+    "app.check",
+    "app.graph",
+    "app.robot",
+    "app.interlocks",
+    "app.views",
+    "app.board",
+    "app.presses",
+    "app.link",
+    "app.joining",
+    "app.kiosk",
+    "app.metrics",
+    "app.assets",
+    "app.doors",
+    "app.routes.site",
+    "app.routes.pages",
+    "app.routes.events",
+    "app.routes.presses",
+    "app.routes.health",
+    "app.routes",
+    "app.development",
+    "app.simulator",
+    "app.main",
+)
+SPEAK_ZENOH = {"app.link", "app.simulator"}
+KNOWN_TO_THE_SIMULATOR = {"app.errors", "app.interfaces", "app.keys"}
+
+
+def name_of(path: Path) -> str:
+    parts = path.relative_to(PACKAGE.parent).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+MODULES = {name_of(path): path for path in sorted(PACKAGE.rglob("*.py"))}
+
+
+def imported(module: str) -> Iterator[str]:
+    """Every module that a module names in an `import`, wherever it stands."""
+    for node in ast.walk(ast.parse(MODULES[module].read_text())):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{module} imports relatively, in line {node.lineno}"
+            for alias in node.names:
+                inner = f"{node.module}.{alias.name}"
+                yield inner if inner in MODULES else str(node.module)
+
+
+def of_project(module: str) -> set[str]:
+    return {name for name in imported(module) if name.partition(".")[0] == "app"}
+
+
+def of_zenoh(module: str) -> bool:
+    return any(name.partition(".")[0] == "zenoh" for name in imported(module))
+
+
+def test_every_module_has_its_place_in_the_order() -> None:
+    assert set(MODULES) - {"app"} == set(ORDER)
+
+
+@pytest.mark.parametrize("module", [name for name in ORDER if name in MODULES])
+def test_a_module_imports_only_what_stands_before_it(module: str) -> None:
+    before = set(ORDER[: ORDER.index(module)])
+    back = sorted(of_project(module) - before)
+    assert back == [], f"{module} imports {', '.join(back)}: that goes back"
+
+
+def test_only_the_link_and_the_simulator_speak_zenoh() -> None:
+    assert {module for module in MODULES if of_zenoh(module)} == SPEAK_ZENOH
+
+
+def test_the_simulator_knows_nothing_of_the_server() -> None:
+    assert of_project("app.simulator") <= KNOWN_TO_THE_SIMULATOR
+
+
+def test_the_link_knows_no_view_and_no_panel() -> None:
+    assert of_project("app.link") <= {"app.errors", "app.keys", "app.robot"}
+
+
+@pytest.mark.parametrize(
+    "module", ["app.interlocks", "app.views", "app.presses", "app.board", "app.kiosk"]
+)
+def test_what_decides_knows_no_http(module: str) -> None:
+    frameworks = {"starlette", "uvicorn", "jinja2", "app.routes"}
+    assert {name for name in imported(module) if name.startswith(tuple(frameworks))} == set()

@@ -1,0 +1,450 @@
+"""The panel file: right ones are taken; each fault is named with its place and what would be right."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pydantic import ValidationError
+
+from app.errors import PanelError
+from app.panel import Panel, Publish, Readout, TextInput, load_panel
+from app.settings import PACKAGE
+from tests.builders import FREE, GUARDED, HEARD, INTERLOCK, MESSAGE, TEXT, Table, small_panel
+
+Load = Callable[[dict[str, Any]], Panel]
+
+BUTTON = "page[0].widget[1]"
+READOUT = "page[0].widget[3]"
+
+
+def tables(**changes: Any) -> dict[str, Any]:
+    """A good panel file: an input, a free and a guarded button, a readout."""
+    page = {"id": "one", "title": "One", "widget": [MESSAGE, FREE, GUARDED, HEARD]}
+    return {"title": "Cell", "interlock": [INTERLOCK], "page": [page], **changes}
+
+
+def with_widget(place: int, **changes: Any) -> dict[str, Any]:
+    made = tables()
+    made["page"][0]["widget"][place] = {**made["page"][0]["widget"][place], **changes}
+    return made
+
+
+def without(table: Table, key: str) -> dict[str, Any]:
+    return {name: value for name, value in table.items() if name != key}
+
+
+def toml(value: Any) -> str:
+    """A value as TOML writes it inline."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{json.dumps(k)} = {toml(v)}" for k, v in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(toml, value)) + "]"
+    return json.dumps(value)
+
+
+@pytest.fixture
+def load(tmp_path: Path) -> Load:
+    """Writes tables to a file and loads it."""
+
+    def loaded(given: dict[str, Any]) -> Panel:
+        path = tmp_path / "cell.toml"
+        path.write_text("".join(f"{name} = {toml(value)}\n" for name, value in given.items()))
+        return load_panel(path)
+
+    return loaded
+
+
+def faults(load: Load, given: dict[str, Any]) -> dict[str, str]:
+    """Place → message of every fault."""
+    with pytest.raises(PanelError) as caught:
+        load(given)
+    assert not caught.value.unreadable
+    assert len({fault.place for fault in caught.value.faults}) == len(caught.value.faults)
+    return {fault.place: fault.message for fault in caught.value.faults}
+
+
+def test_the_shipped_panel_is_good_and_a_demo() -> None:
+    panel = load_panel(PACKAGE / "panel.toml")
+    assert panel.mode == "demo"
+    assert [w.id for w in panel.widgets()] == [
+        "message", "operation", "operation1", "operation2", "last_heard",
+    ]  # fmt: skip
+    assert [i.id for i in panel.interlocks] == ["operation"]
+
+
+def test_a_file_becomes_descriptions(load: Load) -> None:
+    panel = load(tables())
+    kinds = [type(widget) for widget in panel.widgets()]
+    assert kinds == [TextInput, Publish, Publish, Readout]
+    guarded = list(panel.widgets())[2]
+    assert isinstance(guarded, Publish)
+    assert (guarded.topic, guarded.type, guarded.interlock) == ("/guarded", TEXT, "operation")
+    assert guarded.message == {"data": "{message}"}
+
+
+def test_a_file_that_does_not_say_means_a_live_robot(load: Load) -> None:
+    assert load(tables()).mode == "live"
+
+
+def test_an_interlock_is_a_bools_data_unless_it_says_otherwise(load: Load) -> None:
+    (interlock,) = load(tables()).interlocks
+    assert (interlock.type, interlock.field) == ("std_msgs/msg/Bool", "data")
+    assert (interlock.max_age_s, interlock.require_publisher) == (None, False)
+
+
+@pytest.mark.parametrize(("label", "name"), [(None, "operation"), ("The cell", "The cell")])
+def test_an_interlock_is_called_by_its_label(label: str | None, name: str) -> None:
+    assert small_panel({"label": label}).interlocks[0].name == name
+
+
+def test_what_is_loaded_can_not_be_changed(load: Load) -> None:
+    panel = load(tables())
+    with pytest.raises(ValidationError, match="frozen"):
+        panel.title = "Other"
+
+
+@pytest.mark.parametrize(
+    ("given", "namespace"),
+    [("", ""), ("/", ""), ("robot1", "/robot1"), ("/robot1", "/robot1"), ("/a/b/", "/a/b")],
+)
+def test_a_namespace_is_written_one_way(load: Load, given: str, namespace: str) -> None:
+    assert load(tables(namespace=given)).namespace == namespace
+
+
+def test_what_the_panel_listens_to_and_publishes(load: Load) -> None:
+    panel = load(tables())
+    assert panel.subscriptions() == {"/operation_enabled": "std_msgs/msg/Bool", "/heard": TEXT}
+    assert panel.publications() == {"/free": TEXT, "/guarded": TEXT}
+
+
+def test_pages_and_interlocks_are_found_by_id(load: Load) -> None:
+    panel = load(tables())
+    assert panel.page("one") is panel.pages[0]
+    assert panel.page("two") is None
+    assert panel.interlock("operation") is panel.interlocks[0]
+    assert panel.interlock(None) is None
+
+
+def test_the_revision_changes_with_the_file(load: Load) -> None:
+    one, same, other = load(tables()), load(tables()), load(tables(title="Other"))
+    assert one.revision == same.revision
+    assert one.revision != other.revision
+
+
+def test_a_default_may_be_as_long_as_its_input(load: Load) -> None:
+    (text, *_) = load(with_widget(0, default="12345678")).widgets()
+    assert isinstance(text, TextInput)
+    assert len(text.default) == text.max_length
+
+
+def test_an_interlock_and_a_widget_may_have_one_id(load: Load) -> None:
+    assert load(with_widget(1, id="operation")).interlock("operation")
+
+
+@pytest.mark.parametrize(
+    ("given", "place", "message"),
+    [
+        (without(tables(), "title"), "title", "is missing"),
+        (without(tables(), "page"), "page", "is missing"),
+        (tables(page=[]), "page", "is missing: a panel has one page at least"),
+        (tables(title=3), "title", "input should be a valid string, not 3"),
+        (tables(title=""), "title", "at least 1 character"),
+        (tables(titel="x"), "titel", 'unknown key; did you mean "title"?'),
+        (tables(interlocks=[]), "interlocks", 'unknown key; did you mean "interlock"?'),
+        (tables(zzz=1), "zzz", "unknown key; known here: title, mode, language"),
+        (tables(revision="x"), "revision", "unknown key"),
+        (tables(mode="DEMO"), "mode", "'demo' or 'live', not 'DEMO'"),
+        (tables(language="de"), "language", "'en', not 'de'"),
+        (tables(distro="foxy"), "distro", "'humble', 'iron', 'jazzy' or 'kilted', not 'foxy'"),
+        (
+            tables(namespace="a b"),
+            "namespace",
+            '"a b" is not a ROS 2 namespace: it must be like /robot1',
+        ),
+        (tables(namespace="/a//b"), "namespace", "is not a ROS 2 namespace"),
+        (tables(mm_per_px=0), "mm_per_px", "greater than 0.02"),
+        (tables(mm_per_px="0.2"), "mm_per_px", "valid number"),
+        (
+            tables(interlock=[INTERLOCK, {**INTERLOCK, "id": "Op"}]),
+            "interlock[1].id",
+            '"Op" is not an id: a-z, 0-9',
+        ),
+        (tables(interlock=[INTERLOCK, INTERLOCK]), "interlock[1].id", "already the id of interlock[0]"),
+        (tables(interlock=[INTERLOCK, {"id": "x"}]), "interlock[1].topic", "is missing"),
+        (
+            tables(interlock=[{**INTERLOCK, "topic": "enabled"}]),
+            "interlock[0].topic",
+            '"enabled" is not an absolute ROS 2 topic name: it starts with "/"',
+        ),
+        (
+            tables(interlock=[{**INTERLOCK, "type": "std_msgs/msg/Boll"}]),
+            "interlock[0].type",
+            "is not an interface of ROS 2 jazzy; did you mean std_msgs/msg/Bool",
+        ),
+        (
+            tables(interlock=[{**INTERLOCK, "type": TEXT}]),
+            "interlock[0].field",
+            '"data" is string: an interlock needs a bool',
+        ),
+        (
+            tables(interlock=[{**INTERLOCK, "field": "value"}]),
+            "interlock[0].field",
+            'there is no "value"',
+        ),
+        (tables(interlock=[{**INTERLOCK, "max_age_s": 0}]), "interlock[0].max_age_s", "greater than 0"),
+        (
+            tables(interlock=[{**INTERLOCK, "require_publisher": 1}]),
+            "interlock[0].require_publisher",
+            "valid boolean, not 1",
+        ),
+        (
+            tables(interlock=[{**INTERLOCK, "maxage": 1}]),
+            "interlock[0].maxage",
+            'did you mean "max_age_s"?',
+        ),
+        (tables(page=[{"id": "one"}]), "page[0].title", "is missing"),
+        (
+            tables(page=[{"id": "one", "title": "One"}, {"id": "one", "title": "Two"}]),
+            "page[1].id",
+            '"one" is already the id of page[0]',
+        ),
+        (with_widget(1, kind="knob"), BUTTON, 'unknown kind "knob"; one of text, publish, readout'),
+        (
+            tables(page=[{"id": "one", "title": "One", "widget": [without(FREE, "kind")]}]),
+            "page[0].widget[0]",
+            '"kind" is missing; one of text, publish, readout',
+        ),
+        (with_widget(1, colour="red"), f"{BUTTON}.colour", "unknown key; known here: id, label, span"),
+        (with_widget(1, lable="x"), f"{BUTTON}.lable", 'did you mean "label"?'),
+        (with_widget(1, max_length=3), f"{BUTTON}.max_length", "unknown key"),
+        (with_widget(1, label=""), f"{BUTTON}.label", "at least 1 character"),
+        (
+            with_widget(1, id="1st"),
+            f"{BUTTON}.id",
+            '"1st" is not an id: a-z, 0-9 and "_", a letter first',
+        ),
+        (with_widget(1, id="message"), f"{BUTTON}.id", "is already the id of page[0].widget[0]"),
+        (with_widget(1, span=13), f"{BUTTON}.span", "less than or equal to 12, not 13"),
+        (with_widget(1, span=True), f"{BUTTON}.span", "valid integer, not True"),
+        (with_widget(1, topic="/a b"), f"{BUTTON}.topic", "is not an absolute ROS 2 topic name"),
+        (with_widget(1, topic="/a/"), f"{BUTTON}.topic", "is not an absolute ROS 2 topic name"),
+        (with_widget(1, topic="/a__b"), f"{BUTTON}.topic", "is not an absolute ROS 2 topic name"),
+        (with_widget(1, topic="/**"), f"{BUTTON}.topic", "is not an absolute ROS 2 topic name"),
+        (with_widget(1, topic="/" + "t" * 255), f"{BUTTON}.topic", "at most 255"),
+        (
+            with_widget(1, type="std_msgs/String"),
+            f"{BUTTON}.type",
+            '"std_msgs/String" is not a ROS 2 message type: it must be like std_msgs/msg/Bool',
+        ),
+        (
+            with_widget(1, type="std_msgs/msg/Strng"),
+            f"{BUTTON}.type",
+            "is not an interface of ROS 2 jazzy; did you mean std_msgs/msg/String",
+        ),
+        (
+            with_widget(1, interlock="other"),
+            f"{BUTTON}.interlock",
+            'no interlock "other"; there is operation',
+        ),
+        (with_widget(1, interlock="Other"), f"{BUTTON}.interlock", '"Other" is not an id'),
+        (with_widget(1, message="hello"), f"{BUTTON}.message", "valid dictionary"),
+        (
+            with_widget(1, message={}),
+            f"{BUTTON}.message.data",
+            "is missing; std_msgs/msg/String has it",
+        ),
+        (
+            with_widget(1, message={"data": "", "dat": 1}),
+            f"{BUTTON}.message.dat",
+            "unknown field; std_msgs/msg/String has data",
+        ),
+        (with_widget(1, message={"data": 5}), f"{BUTTON}.message.data", "must be text (string), not 5"),
+        (
+            with_widget(1, message={"data": "{massage}"}),
+            f"{BUTTON}.message.data",
+            'no input "massage"; there is message',
+        ),
+        (
+            with_widget(1, message={"data": "{message"}),
+            f"{BUTTON}.message.data",
+            "write {{ and }} for braces",
+        ),
+        (with_widget(1, message={"data": "{free}"}), f"{BUTTON}.message.data", 'no input "free"'),
+        (
+            with_widget(1, type="std_msgs/msg/Int8", message={"data": 200}),
+            f"{BUTTON}.message.data",
+            "200 is out of range: int8 goes from -128 to 127",
+        ),
+        (
+            with_widget(1, type="std_msgs/msg/Int8", message={"data": "{message}"}),
+            f"{BUTTON}.message.data",
+            "must be a whole number (int8)",
+        ),
+        (
+            with_widget(1, type="geometry_msgs/msg/Polygon", message={"points": [{"x": 1.5, "y": 0}]}),
+            f"{BUTTON}.message.points[0].z",
+            "is missing",
+        ),
+        (with_widget(0, max_length=0), "page[0].widget[0].max_length", "greater than or equal to 1"),
+        (
+            with_widget(0, default="123456789"),
+            "page[0].widget[0].default",
+            "longer than max_length (8)",
+        ),
+        (
+            with_widget(3, field="value"),
+            f"{READOUT}.field",
+            'there is no "value" (in "value"): std_msgs/msg/String has data',
+        ),
+        (with_widget(3, field="data.x"), f"{READOUT}.field", "string has no fields of its own"),
+        (with_widget(3, type="std_msgs/msg/Strng"), f"{READOUT}.type", "did you mean"),
+        (with_widget(3, max_age_s=-1), f"{READOUT}.max_age_s", "greater than 0, not -1"),
+        (
+            with_widget(3, topic="/free", type="std_msgs/msg/Bool"),
+            f"{READOUT}.type",
+            "/free is std_msgs/msg/Bool here but std_msgs/msg/String above",
+        ),
+        (
+            with_widget(3, topic="/operation_enabled"),
+            f"{READOUT}.type",
+            "/operation_enabled is std_msgs/msg/String here but std_msgs/msg/Bool above",
+        ),
+    ],
+)
+def test_a_fault_is_named_with_its_place(
+    load: Load, given: dict[str, Any], place: str, message: str
+) -> None:
+    found = faults(load, given)
+    assert list(found) == [place]
+    assert message in found[place]
+
+
+def test_an_input_of_another_page_is_no_input_of_this_one(load: Load) -> None:
+    pages = [
+        {"id": "one", "title": "One", "widget": [MESSAGE]},
+        {"id": "two", "title": "Two", "widget": [FREE]},
+    ]
+    assert faults(load, tables(page=pages)) == {
+        "page[1].widget[0].message.data": (
+            'no input "message" on this page: an input is read from the page it is on'
+        )
+    }
+
+
+def test_a_widget_id_is_unique_over_all_pages(load: Load) -> None:
+    pages = [{"id": name, "title": name, "widget": [HEARD]} for name in ("one", "two")]
+    assert faults(load, tables(page=pages)) == {
+        "page[1].widget[0].id": '"heard" is already the id of page[0].widget[0]'
+    }
+
+
+def test_all_faults_of_the_shape_are_told_at_once(load: Load) -> None:
+    given = with_widget(1, topic="free", span=0)
+    del given["title"]
+    assert list(faults(load, given)) == ["title", f"{BUTTON}.span", f"{BUTTON}.topic"]
+
+
+def test_all_faults_of_names_and_messages_are_told_at_once(load: Load) -> None:
+    given = with_widget(1, interlock="other", message={"data": 5})
+    given["interlock"] = [{**INTERLOCK, "field": "value"}, {**INTERLOCK, "topic": "/b"}]
+    assert sorted(faults(load, given)) == [
+        "interlock[0].field",
+        "interlock[1].id",
+        f"{BUTTON}.interlock",
+        f"{BUTTON}.message.data",
+    ]
+
+
+def test_a_message_may_be_of_any_depth(load: Load) -> None:
+    panel = load(
+        with_widget(
+            1,
+            type="geometry_msgs/msg/PolygonStamped",
+            message={
+                "header": {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": "{message}"},
+                "polygon": {"points": [{"x": 1, "y": -2.5, "z": 0}]},
+            },
+        )
+    )
+    assert panel.publications()["/free"] == "geometry_msgs/msg/PolygonStamped"
+
+
+def test_a_message_without_fields_can_be_sent(load: Load) -> None:
+    assert load(with_widget(1, type="std_msgs/msg/Empty", message={}))
+
+
+@pytest.mark.parametrize("distro", ["humble", "iron", "jazzy", "kilted"])
+def test_types_are_those_of_the_robots_distribution(load: Load, distro: str) -> None:
+    assert load(tables(distro=distro)).distro == distro
+
+
+@pytest.mark.parametrize(
+    ("data", "reason"),
+    [
+        (b"title = ", "at end of document"),
+        (b"[[page]\n", "line 1"),
+        (b"title = 'a'\ntitle = 'b'\n", "overwrite"),
+        (b"\xff\xfe", "utf-8"),
+    ],
+)
+def test_what_is_no_toml_is_unreadable(tmp_path: Path, data: bytes, reason: str) -> None:
+    path = tmp_path / "cell.toml"
+    path.write_bytes(data)
+    with pytest.raises(PanelError, match=reason) as caught:
+        load_panel(path)
+    assert caught.value.unreadable
+    assert [fault.place for fault in caught.value.faults] == [""]
+
+
+@pytest.mark.parametrize(("name", "reason"), [("none.toml", "No such file"), (".", "Is a directory")])
+def test_a_file_that_is_not_there_is_unreadable(tmp_path: Path, name: str, reason: str) -> None:
+    with pytest.raises(PanelError, match=reason) as caught:
+        load_panel(tmp_path / name)
+    assert caught.value.unreadable
+    assert str(tmp_path / name) in str(caught.value)
+
+
+def test_a_fault_of_shape_hides_no_fault_of_meaning(load: Load) -> None:
+    given = with_widget(1, message={"dat": "x"}) | {"titel": "x"}
+    given["page"][0]["widget"][3] = {**HEARD, "kind": "redaout"}
+    given["interlock"] = [{**INTERLOCK, "max_age": 1}]
+    assert set(faults(load, given)) == {
+        "titel",
+        "interlock[0].max_age",
+        "page[0].widget[3]",
+        "page[0].widget[1].message.dat",
+    }
+
+
+@pytest.mark.parametrize(
+    ("given", "place"),
+    [
+        (tables(page=[{"id": "one", "title": "One", "text": "x"}]), "page[0].text"),
+        (tables(interlock=[{**INTERLOCK, "publish": 1}]), "interlock[0].publish"),
+        (tables(revision="x"), "revision"),
+        (tables(page={"id": "one", "title": "One"}), "page"),
+    ],
+)
+def test_keys_named_like_something_else_keep_their_place(
+    load: Load, given: dict[str, Any], place: str
+) -> None:
+    assert list(faults(load, given)) == [place]
+
+
+@pytest.mark.parametrize("content", ["[" * 5000, "9" * 5000])
+def test_what_breaks_the_reader_is_unreadable(tmp_path: Path, content: str) -> None:
+    path = tmp_path / "panel.toml"
+    path.write_text(f"a = {content}")
+    with pytest.raises(PanelError) as error:
+        load_panel(path)
+    assert error.value.unreadable
+
+
+@pytest.mark.parametrize("field", ["header", "ranges"])
+def test_a_readout_is_of_one_value(load: Load, field: str) -> None:
+    given = with_widget(3, topic="/scan", type="sensor_msgs/msg/LaserScan", field=field)
+    found = faults(load, given)
+    assert list(found) == [f"{READOUT}.field"]
+    assert "a readout shows one value" in found[f"{READOUT}.field"]

@@ -1,0 +1,333 @@
+"""A press: judged by the server, sent once, answered with a receipt."""
+
+import logging
+import math
+from collections.abc import Callable, Mapping
+from datetime import datetime, timedelta
+from typing import Any
+
+import pytest
+
+from app.errors import LinkError, NotFound
+from app.panel.model import Panel
+from app.presses import RECEIPTS_KEPT, Presses, Receipt
+from app.robot import Robot, Sample
+from tests.builders import (
+    BOOL,
+    BRIDGE,
+    ENABLED,
+    FREE,
+    GUARDED,
+    HEARD,
+    INTERFACES,
+    MESSAGE,
+    NOW,
+    TEXT,
+    Table,
+    endpoint,
+    panel_of,
+    permits,
+    robot_there,
+    small_panel,
+)
+
+
+class Way:
+    """The way to the robot, as a press needs it: it keeps what was put."""
+
+    def __init__(self) -> None:
+        self.sent: list[tuple[str, bytes]] = []
+        self.listened_to = True
+        self.fails: str | None = None
+
+    def put(self, key: str, payload: bytes) -> None:
+        if self.fails:
+            raise LinkError(self.fails)
+        self.sent.append((key, payload))
+
+    def heard(self, key: str) -> bool:
+        return self.listened_to
+
+    @property
+    def texts(self) -> list[str]:
+        return [INTERFACES.decode(TEXT, payload).data for _, payload in self.sent]
+
+
+class Bench:
+    """Presses on a robot that is there and permits, at a time that is set."""
+
+    def __init__(self, panel: Panel | None = None) -> None:
+        panel = panel or small_panel()
+        self.now = NOW
+        self.way = Way()
+        self.robot = robot_there(panel)
+        permits(self.robot)
+        self._presses = Presses(panel, INTERFACES, self.robot, self.way, lambda: self.now)
+        self.receipt = self._presses.receipt
+
+    def press(
+        self, widget: str = "free", inputs: Mapping[str, Any] | None = None, press_id: str = "p1"
+    ) -> Receipt:
+        given = {"message": "hello"} if inputs is None else inputs
+        return self._presses.press(widget, given, press_id, "127.0.0.1")
+
+
+@pytest.fixture
+def bench() -> Bench:
+    return Bench()
+
+
+def refused(bench: Bench, receipt: Receipt) -> tuple[str, str]:
+    """Cause and reason of a press that sent nothing."""
+    assert receipt.outcome == "refused"
+    assert bench.way.sent == []
+    return receipt.cause, receipt.reason
+
+
+def test_a_press_sends_its_message_once(bench: Bench) -> None:
+    receipt = bench.press()
+    assert (receipt.outcome, receipt.cause) == ("published", "")
+    assert bench.way.sent == [("free", b"\0\1\0\0\6\0\0\0hello\0")]
+
+
+def test_a_receipt_has_what_the_contract_says(bench: Bench) -> None:
+    answer = bench.press(press_id="p7").as_json()
+    assert list(answer) == ["id", "widget", "outcome", "reason", "at"]
+    assert (answer["id"], answer["widget"], answer["outcome"]) == ("p7", "free", "published")
+    assert answer["reason"].startswith("Sent on /free at ")
+    assert datetime.fromisoformat(answer["at"]).utcoffset() == timedelta(0)
+
+
+def test_the_robots_namespace_stands_before_the_key() -> None:
+    bench = Bench(small_panel(namespace="/robot1"))
+    bench.press()
+    assert [key for key, _ in bench.way.sent] == ["robot1/free"]
+
+
+def test_a_press_that_nobody_listens_to_is_sent_but_unknown(bench: Bench) -> None:
+    bench.way.listened_to = False
+    receipt = bench.press()
+    assert (receipt.outcome, receipt.cause) == ("unknown", "")
+    assert receipt.reason.endswith("but no node is known to listen to it.")
+    assert bench.way.texts == ["hello"]
+
+
+def test_a_permitted_press_behind_an_interlock_is_sent(bench: Bench) -> None:
+    assert bench.press("guarded").outcome == "published"
+    assert [key for key, _ in bench.way.sent] == ["guarded"]
+
+
+def forbids(bench: Bench) -> None:
+    permits(bench.robot, False)
+
+
+def cuts(bench: Bench) -> None:
+    bench.robot.cut(BRIDGE, 2)
+
+
+def garbles(bench: Bench) -> None:
+    bench.robot.take("operation_enabled", Sample(b"true!", 2, NOW, NOW, BRIDGE))
+
+
+def takes_another_type(bench: Bench) -> None:
+    endpoint(bench.robot, "MP", ENABLED, TEXT)
+
+
+def listens_with_another_type(bench: Bench) -> None:
+    endpoint(bench.robot, "MS", "/guarded", BOOL)
+
+
+@pytest.mark.parametrize(
+    ("happens", "why"),
+    [
+        (forbids, "The robot does not permit operation"),
+        (cuts, "Locked: the connection was cut"),
+        (garbles, "Locked: /operation_enabled can't be read"),
+        (takes_another_type, "/operation_enabled is std_msgs/msg/String on the robot"),
+        (listens_with_another_type, "/guarded is std_msgs/msg/Bool on the robot"),
+    ],
+)
+def test_a_forged_press_is_refused_with_its_reason(
+    bench: Bench, happens: Callable[[Bench], None], why: str
+) -> None:
+    happens(bench)
+    cause, reason = refused(bench, bench.press("guarded"))
+    assert cause == "interlock"
+    assert reason.startswith(f"Not sent: {why}")
+
+
+def test_a_press_before_the_robot_permitted_is_refused() -> None:
+    bench = Bench(panel_of(MESSAGE, GUARDED, interlock={"topic": "/estop_ok"}))
+    cause, reason = refused(bench, bench.press("guarded"))
+    assert (cause, reason) == ("interlock", "Not sent: Locked: waiting for /estop_ok.")
+
+
+def test_a_permission_is_judged_at_the_time_of_the_press() -> None:
+    bench = Bench(small_panel({"max_age_s": 2}))
+    bench.now = NOW + 1.9
+    assert bench.press("guarded", press_id="p1").outcome == "published"
+    bench.now = NOW + 2
+    late = bench.press("guarded", press_id="p2")
+    assert (late.outcome, late.cause) == ("refused", "interlock")
+    assert len(bench.way.sent) == 1
+
+
+def loses_link(robot: Robot) -> None:
+    robot.link_up = False
+
+
+def loses_bridge(robot: Robot) -> None:
+    robot.graph.apply(f"@/{BRIDGE}/@ros2_lv", False)
+
+
+def goes_silent(robot: Robot) -> None:
+    robot.graph.answered({})
+
+
+def joins(robot: Robot) -> None:
+    robot.settled_at = math.inf
+
+
+@pytest.mark.parametrize("happens", [loses_link, loses_bridge, goes_silent, joins])
+@pytest.mark.parametrize("widget", ["free", "guarded"])
+def test_without_a_way_to_the_robot_nothing_is_sent(
+    bench: Bench, happens: Callable[[Robot], None], widget: str
+) -> None:
+    happens(bench.robot)
+    cause, reason = refused(bench, bench.press(widget))
+    assert cause == "link"
+    assert reason.startswith("Not sent: ")
+
+
+def test_what_zenoh_refuses_was_not_sent(bench: Bench) -> None:
+    bench.way.fails = "can't send on free: closed"
+    cause, reason = refused(bench, bench.press())
+    assert (cause, reason) == ("link", "Not sent: can't send on free: closed.")
+
+
+@pytest.mark.parametrize(
+    ("inputs", "why"),
+    [
+        ({}, 'the input "message" is missing'),
+        ({"massage": "x"}, 'there is no input "massage" on this panel'),
+        ({"message": "x", "heard": "y"}, 'there is no input "heard" on this panel'),
+        ({"message": "x", "guarded": "y"}, 'there is no input "guarded" on this panel'),
+        ({"message": None}, 'Message ("message") must be text, not None'),
+        ({"message": 5}, "must be text, not 5"),
+        ({"message": True}, "must be text, not True"),
+        ({"message": math.nan}, "must be text, not nan"),
+        ({"message": ["x"]}, "must be text, not ['x']"),
+        ({"message": {"data": "x"}}, "must be text"),
+        ({"message": "123456789"}, "Message is 9 characters long; 8 are allowed"),
+        ({"message": "a\0b"}, "has a NUL character"),
+        ({"message": "\ud800"}, "is not valid Unicode text"),
+    ],
+)
+def test_a_bad_input_is_refused_with_its_reason(
+    bench: Bench, inputs: Mapping[str, Any], why: str
+) -> None:
+    cause, reason = refused(bench, bench.press(inputs=inputs))
+    assert cause == "input"
+    assert why in reason
+
+
+def test_a_huge_value_makes_no_huge_reason(bench: Bench) -> None:
+    _, reason = refused(bench, bench.press(inputs={"message": ["x" * 10_000]}))
+    assert len(reason) < 200
+
+
+@pytest.mark.parametrize(
+    "text", ["", "12345678", "漢字漢字漢字漢字", "🤖" * 8, "{x}", "{{}}", "a\nb", "<b>"]
+)
+def test_a_text_arrives_as_it_was_typed(bench: Bench, text: str) -> None:
+    assert bench.press(inputs={"message": text}).outcome == "published"
+    assert bench.way.texts == [text]
+
+
+def test_an_input_that_the_message_does_not_name_may_come_along() -> None:
+    other = {**MESSAGE, "id": "other"}
+    bench = Bench(panel_of(MESSAGE, other, FREE))
+    assert bench.press(inputs={"message": "hello", "other": "x"}).outcome == "published"
+    assert bench.way.texts == ["hello"]
+
+
+def test_a_message_may_need_no_input() -> None:
+    bench = Bench(panel_of({**FREE, "message": {"data": "start"}}))
+    assert bench.press(inputs={}).outcome == "published"
+    assert bench.way.texts == ["start"]
+
+
+@pytest.mark.parametrize("widget", ["none", "message", "heard", "operation", ""])
+def test_what_can_not_be_pressed_is_not_found(bench: Bench, widget: str) -> None:
+    with pytest.raises(NotFound, match=f'there is no widget "{widget}" that can be pressed'):
+        bench.press(widget)
+    assert bench.receipt("p1") is None
+
+
+def test_the_same_id_again_is_the_same_press(bench: Bench) -> None:
+    first = bench.press()
+    assert bench.press() is first
+    assert bench.receipt("p1") is first
+    assert len(bench.way.sent) == 1
+
+
+def test_another_id_is_another_press(bench: Bench) -> None:
+    bench.press(press_id="p1")
+    bench.press(press_id="p2")
+    assert len(bench.way.sent) == 2
+
+
+def test_a_refused_press_stays_refused(bench: Bench) -> None:
+    permits(bench.robot, False)
+    first = bench.press("guarded")
+    permits(bench.robot)
+    assert bench.press("guarded") is first
+    assert bench.way.sent == []
+
+
+@pytest.mark.parametrize(
+    ("widget", "inputs"),
+    [("free", {"message": "other"}), ("free", {}), ("guarded", {"message": "hello"})],
+)
+def test_an_id_that_was_used_for_another_press_is_refused(
+    bench: Bench, widget: str, inputs: Table
+) -> None:
+    first = bench.press()
+    again = bench.press(widget, inputs)
+    assert (again.outcome, again.cause) == ("refused", "input")
+    assert again.reason == "Not sent: the press id p1 was already used for another press."
+    assert (again.widget, len(bench.way.sent)) == (widget, 1)
+    assert bench.receipt("p1") is first
+
+
+def test_a_receipt_keeps_the_inputs_that_it_came_with(bench: Bench) -> None:
+    inputs = {"message": "hello"}
+    receipt = bench.press(inputs=inputs)
+    inputs["message"] = "other"
+    assert receipt.inputs == {"message": "hello"}
+
+
+def test_an_unknown_id_has_no_receipt(bench: Bench) -> None:
+    assert bench.receipt("p1") is None
+
+
+def test_the_oldest_receipts_are_forgotten() -> None:
+    bench = Bench(panel_of(MESSAGE, HEARD, FREE))
+    for number in range(RECEIPTS_KEPT + 1):
+        bench.press(press_id=f"p{number}")
+    assert bench.receipt("p0") is None
+    assert bench.receipt("p1") is not None
+    assert bench.receipt(f"p{RECEIPTS_KEPT}") is not None
+
+
+@pytest.mark.parametrize(("permitted", "level"), [(True, logging.INFO), (False, logging.WARNING)])
+def test_the_log_tells_who_pressed_what_and_what_came_of_it(
+    bench: Bench, caplog: pytest.LogCaptureFixture, permitted: bool, level: int
+) -> None:
+    permits(bench.robot, permitted)
+    with caplog.at_level(logging.INFO, "kiosk.presses"):
+        receipt = bench.press("guarded")
+    (record,) = caplog.records
+    assert record.levelno == level
+    for part in ("p1", "guarded", "127.0.0.1", "'hello'", receipt.outcome, receipt.reason):
+        assert part in record.getMessage()

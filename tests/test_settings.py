@@ -1,0 +1,89 @@
+"""What the `KIOSK_…` variables do, and what is said of a wrong one."""
+
+from pathlib import Path
+
+import pytest
+
+from app.errors import SettingsError
+from app.settings import PACKAGE, Settings, shipped
+
+
+def test_without_variables_the_shipped_files_are_used() -> None:
+    settings = Settings.from_environment({})
+    assert settings.panel == PACKAGE / "panel.toml"
+    assert settings.zenoh.name == "zenoh.json5"
+    assert settings.panel.is_file()
+    assert settings.zenoh.is_file()
+
+
+def test_without_variables_the_panel_file_says_which_robot() -> None:
+    assert Settings.from_environment({}).mode is None
+
+
+@pytest.mark.parametrize("mode", ["demo", "live"])
+def test_kiosk_mode_overrides_the_panel_file(mode: str) -> None:
+    assert Settings.from_environment({"KIOSK_MODE": mode}).mode == mode
+
+
+@pytest.mark.parametrize("mode", ["Demo", "simulated", " live", "0"])
+def test_an_unknown_mode_is_refused_with_what_would_be_right(mode: str) -> None:
+    with pytest.raises(SettingsError, match=f'KIOSK_MODE is "{mode}": it must be "demo" or "live"'):
+        Settings.from_environment({"KIOSK_MODE": mode})
+
+
+@pytest.mark.parametrize("name", ["KIOSK_PANEL", "KIOSK_ZENOH"])
+def test_a_file_is_taken_from_where_the_variable_points(name: str, tmp_path: Path) -> None:
+    settings = Settings.from_environment({name: str(tmp_path / "mine")})
+    assert tmp_path / "mine" in (settings.panel, settings.zenoh)
+
+
+def test_a_path_may_be_relative_or_start_at_home(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.chdir(tmp_path)
+    settings = Settings.from_environment({"KIOSK_PANEL": "~/cell.toml", "KIOSK_ZENOH": "z.json5"})
+    assert (settings.panel, settings.zenoh) == (tmp_path / "cell.toml", tmp_path / "z.json5")
+
+
+@pytest.mark.parametrize(
+    "name", ["KIOSK_PANEL", "KIOSK_ZENOH", "KIOSK_MODE", "KIOSK_HOSTS", "KIOSK_DEV"]
+)
+def test_an_empty_variable_is_as_if_it_were_not_there(name: str) -> None:
+    assert Settings.from_environment({name: ""}) == Settings.from_environment({})
+
+
+def test_the_panel_answers_to_loopback_names_only_unless_told() -> None:
+    assert Settings.from_environment({}).hosts == ("127.0.0.1", "localhost", "[::1]")
+
+
+def test_kiosk_hosts_adds_names_in_lower_case() -> None:
+    settings = Settings.from_environment({"KIOSK_HOSTS": " Cell1.local, ,10.0.0.7,"})
+    assert settings.hosts == ("127.0.0.1", "localhost", "[::1]", "cell1.local", "10.0.0.7")
+
+
+@pytest.mark.parametrize(("given", "level"), [("debug", "debug"), ("WARN", "warn"), ("Fatal", "fatal")])
+def test_the_log_level_is_one_of_ros_in_any_case(given: str, level: str) -> None:
+    assert Settings.from_environment({"KIOSK_LOG_LEVEL": given}).log_level == level
+
+
+@pytest.mark.parametrize("given", ["warning", "trace", "10"])
+def test_an_unknown_log_level_is_refused_with_those_that_there_are(given: str) -> None:
+    with pytest.raises(SettingsError, match=r"KIOSK_LOG_LEVEL .*debug, info, warn, error, fatal"):
+        Settings.from_environment({"KIOSK_LOG_LEVEL": given})
+
+
+@pytest.mark.parametrize(("given", "dev"), [("1", True), ("yes", True), ("0", False)])
+def test_kiosk_dev_is_for_development(given: str, dev: bool) -> None:
+    assert Settings.from_environment({"KIOSK_DEV": given}).dev is dev
+
+
+@pytest.mark.parametrize("name", ["templates", "static", "zenoh.json5", "panel.toml"])
+def test_what_the_project_ships_is_found(name: str) -> None:
+    assert shipped(name).exists()
+
+
+@pytest.mark.parametrize("hosts", ["panel.local:8000", "::1", "http://panel", "panel/", "a b"])
+def test_a_host_that_could_never_match_is_refused(hosts: str) -> None:
+    with pytest.raises(SettingsError, match="KIOSK_HOSTS"):
+        Settings.from_environment({"KIOSK_HOSTS": hosts})

@@ -1,0 +1,78 @@
+"""Message templates: values of inputs put in once, with their type, and braces checked."""
+
+from typing import Any
+
+import pytest
+
+from app.errors import FieldError
+from app.panel.template import filled, named
+
+
+@pytest.mark.parametrize(
+    ("template", "made"),
+    [
+        ("{a}", "one"),
+        ("{n}", 7),
+        ("{on}", True),
+        ("n = {n}", "n = 7"),
+        ("{a}{a}", "oneone"),
+        ("", ""),
+        ("plain", "plain"),
+        ("{{a}}", "{a}"),
+        ("{{{a}}}", "{one}"),
+        ("{{", "{"),
+        (5, 5),
+        (False, False),
+        ({"x": {"y": "{n}"}}, {"x": {"y": 7}}),
+        ({"x": ["{a}", 2, "{n}!"]}, {"x": ["one", 2, "7!"]}),
+        ({}, {}),
+    ],
+)
+def test_inputs_are_put_where_their_ids_stand(template: Any, made: Any) -> None:
+    assert filled(template, {"a": "one", "n": 7, "on": True}) == made
+
+
+@pytest.mark.parametrize("value", ["{b}", "{{", "}", "{0.__class__}", "{a!r}"])
+def test_braces_in_a_value_are_only_text(value: str) -> None:
+    assert filled("<{a}>", {"a": value, "b": "secret"}) == f"<{value}>"
+    assert filled("{a}", {"a": value, "b": "secret"}) == value
+
+
+def test_keys_are_not_templates() -> None:
+    assert filled({"{a}": 1}, {"a": "x"}) == {"{a}": 1}
+    assert list(named({"{a}": 1})) == []
+
+
+def test_the_template_itself_stays_as_it_is() -> None:
+    template = {"x": ["{a}"]}
+    filled(template, {"a": "one"})
+    assert template == {"x": ["{a}"]}
+
+
+def test_each_placeholder_is_named_with_its_place() -> None:
+    template = {"x": {"y": "{a} and {b}"}, "z": [1, "{a}", {"w": "{{no}}{c}"}]}
+    assert list(named(template)) == [("x.y", "a"), ("x.y", "b"), ("z[1]", "a"), ("z[2].w", "c")]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "{",
+        "}",
+        "{a",
+        "a}",
+        "{}",
+        "{0}",
+        "{a.b}",
+        "{a[0]}",
+        "{a!r}",
+        "{a:>5}",
+        "{ a }",
+        "{a-b}",
+        "{a{b}}",
+    ],
+)
+def test_what_is_no_placeholder_is_refused_with_its_place(text: str) -> None:
+    with pytest.raises(FieldError, match="brace") as caught:
+        list(named({"x": ["", text]}))
+    assert caught.value.field == "x[1]"
