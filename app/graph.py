@@ -19,6 +19,7 @@ class Graph:
         self._own = own_zid
         self._tokens: dict[str, Endpoint] = {}
         self._routes: Mapping[tuple[str, Direction, str], str] = {}
+        self._nodes: frozenset[Endpoint] = frozenset()
         self._answered: Mapping[str, str] | None = None
 
     def apply(self, token_key: str, alive: bool) -> str | None:
@@ -34,9 +35,16 @@ class Graph:
             self._tokens.pop(token_key, None)
         return endpoint.zid if endpoint.role is None else None
 
-    def learn(self, routes: Mapping[tuple[str, Direction, str], str]) -> None:
-        """Takes what the bridges said of their routes: (bridge, direction, key) → type."""
+    def learn(
+        self,
+        routes: Mapping[tuple[str, Direction, str], str],
+        nodes: frozenset[Endpoint] = frozenset(),
+    ) -> None:
+        """Takes what the bridges said of their routes, (bridge, direction, key) → type, and of the
+        publishers and subscribers of the nodes behind them: a route has one type, whatever they
+        have."""
         self._routes = routes
+        self._nodes = nodes
 
     def answered(self, versions: Mapping[str, str]) -> None:
         """Takes which bridges answered when they were asked, and with which version."""
@@ -75,7 +83,7 @@ class Graph:
         """The other type that this topic has, if it is not what the panel needs for `role`."""
         theirs, others, direction = _COUNTERPARTS[role]
         bridges = self.bridges
-        for endpoint in self._tokens.values():
+        for endpoint in (*self._tokens.values(), *self._nodes):
             counts = endpoint.role == (theirs if endpoint.zid in bridges else others)
             if counts and endpoint.key == key and endpoint.type != type_name:
                 return endpoint.type

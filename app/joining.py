@@ -15,12 +15,13 @@ import logging
 import math
 import time
 from collections.abc import Callable, Coroutine
+from contextlib import suppress
 from typing import Any, Final
 
 from app import keys
 from app.errors import LinkError
 from app.interfaces import Interfaces
-from app.keys import Direction, Qos, Role
+from app.keys import Direction, Endpoint, Qos, Role
 from app.link import Link
 from app.panel.model import Panel
 from app.robot import Robot
@@ -51,6 +52,7 @@ class Joining:
         self._started_at = time.monotonic()
         self._joining: asyncio.Task[None] | None = None
         self._asking: asyncio.Task[None] | None = None
+        self._changed = asyncio.Event()
         self._wrongly_held: set[str] = set()
         self._told: set[tuple[str, str]] = set()
         self._held_as: dict[str, bool] = {}  # key → whether its token is TRANSIENT_LOCAL
@@ -73,6 +75,7 @@ class Joining:
             self._joining = self._task(self._join())
         if self._joined:
             self._hold()
+            self._changed.set()
 
     @property
     def _joined(self) -> bool:
@@ -149,7 +152,7 @@ class Joining:
     async def _ask_regularly(self) -> None:
         missed = 0
         while True:
-            await asyncio.sleep(ASK_AGAIN_S if missed else ASK_EVERY_S)
+            await self._pause(ASK_AGAIN_S if missed else ASK_EVERY_S)
             if not self._robot.graph.bridges:
                 missed = 0
                 continue
@@ -163,19 +166,34 @@ class Joining:
                 self._hold()
             self._show()
 
+    async def _pause(self, longest_s: float) -> None:
+        """Until it is time to ask, or a moment after the graph has changed."""
+        with suppress(TimeoutError):
+            async with asyncio.timeout(longest_s):
+                await self._changed.wait()
+                await asyncio.sleep(ASK_AGAIN_S)
+        self._changed.clear()
+
     async def _ask_versions(self) -> dict[str, str]:
         answers = await self._link.ask(keys.VERSION)
         return {keys.zid_of(key): payload.decode(errors="replace") for key, payload in answers}
 
     async def _ask_routes(self) -> None:
         routes: dict[tuple[str, Direction, str], str] = {}
-        for key, payload in await self._link.ask(keys.ROUTES):
+        for key, told in await self._ask_json(keys.ROUTES):
             if route := keys.route_of(key):
-                try:
-                    routes[route] = json.loads(payload)["ros2_type"]
-                except (ValueError, KeyError, TypeError):
-                    log.warning("%s: the bridge tells of it in a way this kiosk does not know", key)
-        self._robot.graph.learn(routes)
+                routes[route] = told["ros2_type"]
+        nodes: set[Endpoint] = set()
+        for key, told in await self._ask_json(keys.NODES):
+            nodes.update(keys.endpoints_of(key, told, self._panel.namespace))
+        self._robot.graph.learn(routes, frozenset(nodes))
+
+    async def _ask_json(self, selector: str) -> list[tuple[str, Any]]:
+        try:
+            return [(key, json.loads(told)) for key, told in await self._link.ask(selector)]
+        except ValueError:
+            log.warning("%s: the bridge answers in a way this kiosk does not know", selector)
+            return []
 
     def _task(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
         """A task whose failure is logged, not lost."""

@@ -5,13 +5,15 @@ second dialect (rmw_zenoh) can stand beside it. Source: zenoh-plugin-ros2dds 1.1
 """
 
 import re
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 TOKENS: Final = "@/*/@ros2_lv/**"  # every liveliness token of every bridge and kiosk
 VERSION: Final = "@/*/ros2/version"  # answered by a bridge whose main loop runs
 ROUTES: Final = "@/*/ros2/route/topic/**"  # a bridge's routes: JSON with `ros2_type`
 
+NODES: Final = "@/*/ros2/node/**"  # the nodes behind a bridge: JSON with their topics and types
 DEMO_VERSION: Final = '"demo robot"'  # how the demo robot answers for its version
 
 Role = Literal["MP", "MS"]  # a publisher, a subscriber
@@ -91,6 +93,16 @@ def parsed(token_key: str) -> Endpoint | None:
 def version(zid: str) -> str:
     """Where one bridge answers for `VERSION`."""
     return f"@/{zid}/ros2/version"
+
+
+def endpoints_of(admin_key: str, node: Mapping[str, Any], namespace: str) -> Iterator[Endpoint]:
+    """The publishers and subscribers of one node, from what its bridge says of it (see `NODES`)."""
+    roles: tuple[tuple[Role, str], ...] = (("MP", "publishers"), ("MS", "subscribers"))
+    for role, name in roles:
+        for topic in node[name]:
+            if TOPIC.fullmatch(namespace + topic["name"]):
+                key = key_of(topic["name"], namespace)
+                yield Endpoint(zid_of(admin_key), role, key, topic["type"])
 
 
 def zid_of(admin_key: str) -> str:

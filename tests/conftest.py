@@ -93,7 +93,8 @@ def server(bridge: Bridge, node: RosNode, tmp_path: Path) -> Iterator[Server]:
     mine.end()
 
 
-@pytest.fixture(scope="session")
+# Of one module: while Playwright runs, so does an event loop of its own in this thread.
+@pytest.fixture(scope="module")
 def chromium() -> Iterator[Browser]:
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=CHROMIUM_FLAGS)

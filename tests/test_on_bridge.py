@@ -199,15 +199,25 @@ def test_debug_is_hidden_unless_asked_for(
     assert '"GET / HTTP/1.1"' not in quiet.process.text
 
 
+@pytest.mark.parametrize("robot_first", [True, False])
 def test_another_type_on_the_robot_locks_and_says_which(
     own_bridge: Bridge,
     own_node: RosNode,
     tmp_path: Path,
     servers: Callable[[Server], Server],
+    robot_first: bool,
 ) -> None:
-    own_node.subscribe("/operation", "std_msgs/msg/Bool")
-    own_node.advertise("/operation_enabled", "std_msgs/msg/String")
+    def robot_joins() -> None:
+        own_node.subscribe("/operation", "std_msgs/msg/Bool")
+        own_node.advertise("/operation_enabled", "std_msgs/msg/String")
+
+    if robot_first:
+        robot_joins()
     kiosk = servers(live(own_bridge.endpoint, tmp_path))
+    until(kiosk.answers, "answers")
+    if not robot_first:
+        until(kiosk.ready, "ready: the bridge's routes have the kiosk's types")
+        robot_joins()
 
     def wrong(widget: str) -> bool:
         return "is std_msgs/msg/" in (kiosk.widget(widget)["reason"] or "")
