@@ -10,7 +10,7 @@ PIP_INSTALL := -m pip install --disable-pip-version-check --quiet --require-hash
 export TEST_BRIDGE := $(CACHE)/bridge/release/test-bridge
 export TEST_ROS_PYTHON := $(CURDIR)/.venv-ros/bin/python
 
-.PHONY: run test check dev test-parts bridge clean
+.PHONY: run test check dev wheel test-parts bridge lock clean
 .DELETE_ON_ERROR:
 
 run: .venv/run
@@ -26,6 +26,9 @@ check: .venv/test
 	.venv/bin/ruff check app tests
 	.venv/bin/ruff format --check app tests
 	.venv/bin/mypy
+
+wheel: .venv/test
+	.venv/bin/python -m build --wheel --no-isolation --outdir dist
 
 test-parts: system .venv/test .venv-ros/ready bridge
 
