@@ -1,0 +1,151 @@
+"""The parameters of the robot's node: their values, ranges, refusals, services and events."""
+
+import time
+from dataclasses import dataclass, replace
+from typing import Any
+
+from cyclone_node import Answer, Node, qos_of
+from cyclone_types import (
+    DescribeParameters_Request,
+    DescribeParameters_Response,
+    FloatingPointRange,
+    GetParameters_Request,
+    GetParameters_Response,
+    GetParameterTypes_Request,
+    GetParameterTypes_Response,
+    IntegerRange,
+    ListParameters_Request,
+    ListParameters_Response,
+    ListParametersResult,
+    Parameter,
+    ParameterDescriptor,
+    ParameterEvent,
+    ParameterValue,
+    SetParameters_Request,
+    SetParameters_Response,
+    SetParametersResult,
+    Time,
+)
+
+NAMES = ("not set", "bool", "integer", "double", "string")
+FIELDS = ("", "bool_value", "integer_value", "double_value", "string_value")
+_, BOOL, INTEGER, DOUBLE, STRING = range(5)
+
+EVENT_HASH = "RIHS01_043e627780fcad87a22d225bc2a037361dba713fca6a6b9f4b869a5aa0393204"
+
+
+@dataclass
+class Declared:
+    descriptor: ParameterDescriptor
+    value: Any
+
+    @property
+    def wire(self) -> ParameterValue:
+        return ParameterValue(type=self.descriptor.type, **{FIELDS[self.descriptor.type]: self.value})
+
+    @property
+    def parameter(self) -> Parameter:
+        return Parameter(self.descriptor.name, self.wire)
+
+    def refusal(self, type_: int, value: Any) -> str:
+        """Why a value is not taken; empty if it is."""
+        d = self.descriptor
+        if d.read_only:
+            return f"parameter '{d.name}' is read-only"
+        if type_ != d.type:
+            given = NAMES[type_] if type_ < len(NAMES) else "array"
+            return f"parameter '{d.name}' is of type {NAMES[d.type]}, not {given}"
+        for limits in (*d.floating_point_range, *d.integer_range):
+            if not limits.from_value <= value <= limits.to_value:
+                return f"parameter '{d.name}' is out of range {limits.from_value} to {limits.to_value}"
+            steps = (value - limits.from_value) / limits.step if limits.step else 0
+            if value != limits.to_value and abs(steps - round(steps)) > 1e-6:
+                return f"parameter '{d.name}' is not on a step of {limits.step}"
+        return ""
+
+
+def robot_parameters() -> list[Declared]:
+    describe = ParameterDescriptor
+    speed = describe("speed", DOUBLE, "m/s", floating_point_range=[FloatingPointRange(0.0, 2.0, 0.1)])
+    limit = describe("limit", INTEGER, "kg", integer_range=[IntegerRange(0, 100, 0)])
+    return [
+        Declared(speed, 0.5),
+        Declared(describe("name", STRING), "cyclone"),
+        Declared(describe("enabled", BOOL), True),
+        Declared(limit, 10),
+        Declared(describe("serial", STRING, "from the factory", read_only=True), "CR-0001"),
+    ]
+
+
+class Parameters:
+    def __init__(self, node: Node) -> None:
+        self._node_name = f"/{node.name}"
+        self._declared = {p.descriptor.name: p for p in robot_parameters()}
+        self._events = node.advertise(
+            "/parameter_events", ParameterEvent, qos_of(1000, user_data=f"typehash={EVENT_HASH};")
+        )
+        for service, request, response, handler in (
+            ("get_parameters", GetParameters_Request, GetParameters_Response, self._get),
+            ("get_parameter_types", GetParameterTypes_Request, GetParameterTypes_Response, self._types),
+            ("set_parameters", SetParameters_Request, SetParameters_Response, self._set),
+            ("list_parameters", ListParameters_Request, ListParameters_Response, self._list),
+            (
+                "describe_parameters",
+                DescribeParameters_Request,
+                DescribeParameters_Response,
+                self._describe,
+            ),
+        ):
+            node.serve(f"{self._node_name}/{service}", request, response, handler)
+
+    def values(self) -> dict[str, Any]:
+        return {name: p.value for name, p in self._declared.items()}
+
+    def take(self, name: str, value: Any) -> None:
+        """The robot itself changes a parameter, whatever its descriptor says, and tells of it."""
+        self._declared[name].value = value
+        self._tell([self._declared[name]])
+
+    def _get(self, request: GetParameters_Request, answer: Answer) -> None:
+        answer(GetParameters_Response([p.wire for p in self._named(request.names)]))
+
+    def _types(self, request: GetParameterTypes_Request, answer: Answer) -> None:
+        answer(GetParameterTypes_Response([p.descriptor.type for p in self._named(request.names)]))
+
+    def _describe(self, request: DescribeParameters_Request, answer: Answer) -> None:
+        found = [replace(p.descriptor) for p in self._named(request.names)]
+        answer(DescribeParameters_Response(found))
+
+    def _list(self, request: ListParameters_Request, answer: Answer) -> None:
+        """None of the names has a prefix, so whoever asks for one gets nothing."""
+        names = [n for n in self._declared if not request.prefixes or n in request.prefixes]
+        answer(ListParameters_Response(ListParametersResult(names, [])))
+
+    def _set(self, request: SetParameters_Request, answer: Answer) -> None:
+        results = []
+        for parameter in request.parameters:
+            reason = self._set_one(parameter)
+            results.append(SetParametersResult(not reason, reason))
+        answer(SetParameters_Response(results))
+
+    def _set_one(self, parameter: Parameter) -> str:
+        declared, type_ = self._declared.get(parameter.name), parameter.value.type
+        if declared is None:
+            return f"parameter '{parameter.name}' was not declared"
+        value = getattr(parameter.value, FIELDS[type_]) if 0 < type_ < len(FIELDS) else None
+        reason = declared.refusal(type_, value)
+        if not reason:
+            declared.value = value
+            self._tell([declared])
+        return reason
+
+    def _named(self, names: list[str]) -> list[Declared]:
+        """As in rclcpp: one undeclared name, and there is no answer for any of them."""
+        if not all(name in self._declared for name in names):
+            return []
+        return [self._declared[name] for name in names]
+
+    def _tell(self, changed: list[Declared]) -> None:
+        stamp = Time.at(time.time_ns())
+        parameters = [p.parameter for p in changed]
+        self._events.write(ParameterEvent(stamp, self._node_name, [], parameters, []))
