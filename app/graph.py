@@ -1,12 +1,13 @@
 """What the liveliness tokens and the bridges' admin space say: who is there, with which types."""
 
 from collections.abc import Mapping
+from typing import Literal
 
 from app.keys import DEMO_VERSION, Direction, Endpoint, Role, parsed
 
 # Whose type must equal the panel's, for what the panel does with a topic. A route of the bridge
 # has one type for all: who created it first has fixed it, be it the robot or another panel.
-_COUNTERPARTS: Mapping[Role, tuple[Role, Role, Direction]] = {
+_COUNTERPARTS: Mapping[Literal["MP", "MS"], tuple[Role, Role, Direction]] = {
     "MS": ("MP", "MS", "pub"),  # the panel listens: the robot's publisher, other panels' readers
     "MP": ("MS", "MP", "sub"),  # the panel publishes: the robot's subscriber, other panels' writers
 }
@@ -71,6 +72,14 @@ class Graph:
         bridges = self.bridges
         return any(e.role == role and e.key == key and e.zid in bridges for e in self._tokens.values())
 
+    def server_type(self, role: Literal["SS", "AS"], key: str) -> str | None:
+        """The type of the robot's service or action; None if it offers none of this name now."""
+        bridges = self.bridges
+        for e in self._tokens.values():
+            if e.role == role and e.key == key and e.zid in bridges:
+                return e.type
+        return None
+
     def latched(self, key: str) -> bool | None:
         """Whether the robot's publisher is TRANSIENT_LOCAL; None if it has none now."""
         bridges = self.bridges
@@ -79,7 +88,7 @@ class Graph:
                 return e.transient_local
         return None
 
-    def wrong_type(self, role: Role, key: str, type_name: str) -> str | None:
+    def wrong_type(self, role: Literal["MP", "MS"], key: str, type_name: str) -> str | None:
         """The other type that this topic has, if it is not what the panel needs for `role`."""
         theirs, others, direction = _COUNTERPARTS[role]
         bridges = self.bridges

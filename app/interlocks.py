@@ -7,7 +7,8 @@ reason an operator reads.
 import math
 from dataclasses import dataclass
 
-from app.panel.model import Interlock, Publish
+from app.panel.model import Action, Call, Interlock, Pressed, Publish
+from app.progress import IDLE
 from app.robot import Robot, value_of
 from app.sentences import say
 
@@ -71,6 +72,32 @@ def publish_verdict(publish: Publish, interlock: Interlock | None, robot: Robot,
     if found := robot.graph.wrong_type("MP", robot.key(topic), publish.type):
         return locked("wrong_type", topic=topic, found=found, wanted=publish.type)
     return PERMITTED if interlock is None else interlock_verdict(interlock, robot, now)
+
+
+def call_verdict(call: Call | Action, interlock: Interlock | None, robot: Robot, now: float) -> Verdict:
+    """Whether a service may be called or a goal be sent: the server is there with its type, no
+    answer is awaited, and the interlock permits."""
+    passable = way(robot, now)
+    if not passable.permitted:
+        return passable
+    if isinstance(call, Call):
+        name, found = call.service, robot.graph.server_type("SS", robot.key(call.service))
+    else:
+        name, found = call.action, robot.graph.server_type("AS", robot.key(call.action))
+    if found is None:
+        return locked("no_service", name=name)
+    if found != call.type:
+        return locked("wrong_type", topic=name, found=found, wanted=call.type)
+    if robot.progress.get(call.id, IDLE).busy:
+        return locked("busy")
+    return PERMITTED if interlock is None else interlock_verdict(interlock, robot, now)
+
+
+def press_verdict(widget: Pressed, interlock: Interlock | None, robot: Robot, now: float) -> Verdict:
+    """Whether a widget may be pressed."""
+    if isinstance(widget, Publish):
+        return publish_verdict(widget, interlock, robot, now)
+    return call_verdict(widget, interlock, robot, now)
 
 
 def locked(code: str, **about: object) -> Verdict:

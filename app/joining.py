@@ -16,12 +16,12 @@ import math
 import time
 from collections.abc import Callable, Coroutine
 from contextlib import suppress
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 from app import keys
 from app.errors import LinkError
 from app.interfaces import Interfaces
-from app.keys import Direction, Endpoint, Qos, Role
+from app.keys import Direction, Endpoint, Qos
 from app.link import Link
 from app.panel.model import Panel
 from app.robot import Robot
@@ -114,7 +114,7 @@ class Joining:
 
     def _tokens(self) -> list[str]:
         """The tokens of all topics, but for those whose type is another one on the robot."""
-        wanted: list[tuple[Role, str, str, Qos]] = [
+        wanted: list[tuple[Literal["MP", "MS"], str, str, Qos]] = [
             *(("MP", t, n, Qos()) for t, n in self._panel.publications().items()),
             *(
                 ("MS", topic, name, Qos(transient_local=latched))
@@ -133,6 +133,9 @@ class Joining:
                 continue
             type_hash = self._interfaces.type_hash(type_name)
             tokens.append(keys.token(self._link.zid, role, key, type_name, qos, type_hash))
+        for action, type_name in self._panel.actions().items():
+            key = self._robot.key(action)
+            tokens.append(keys.action_client_token(self._link.zid, key, type_name))
         return tokens
 
     def _latched(self, key: str) -> bool | None:

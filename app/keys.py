@@ -16,18 +16,21 @@ ROUTES: Final = "@/*/ros2/route/topic/**"  # a bridge's routes: JSON with `ros2_
 NODES: Final = "@/*/ros2/node/**"  # the nodes behind a bridge: JSON with their topics and types
 DEMO_VERSION: Final = '"demo robot"'  # how the demo robot answers for its version
 
-Role = Literal["MP", "MS"]  # a publisher, a subscriber
+Role = Literal["MP", "MS", "SS", "AS"]  # publisher, subscriber, service server, action server
 Direction = Literal["pub", "sub"]  # of a bridge's route: from ROS to Zenoh, from Zenoh to ROS
 
 # A token that the bridge can't parse ends its main loop while its process stays up: what does not
 # match these must never become a token.
 TOPIC: Final = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
 NAMESPACE: Final = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)*")
+SERVICE_TYPE: Final = re.compile(r"[a-z][a-z0-9_]*/srv/[A-Z][A-Za-z0-9]*")
+ACTION_TYPE: Final = re.compile(r"[a-z][a-z0-9_]*/action/[A-Z][A-Za-z0-9]*")
 MESSAGE_TYPE: Final = re.compile(r"[a-z][a-z0-9_]*/msg/[A-Z][A-Za-z0-9]*")
 
 _TOKEN = re.compile(
     r"@/(?P<zid>[^/]+)/@ros2_lv"
-    r"(?:/(?P<role>MP|MS)/(?P<key>[^/]+)/(?P<type>[^/]+)/K?:[^:/]*:(?P<durability>[^:/]*):.*)?"
+    r"(?:/(?P<role>MP|MS)/(?P<key>[^/]+)/(?P<type>[^/]+)/K?:[^:/]*:(?P<durability>[^:/]*):.*"
+    r"|/(?P<server>SS|AS)/(?P<name>[^/]+)/(?P<server_type>[^/]+))?"
 )
 _ROUTE = re.compile(r"@/(?P<zid>[^/]+)/ros2/route/topic/(?P<direction>pub|sub)/(?P<key>.+)")
 
@@ -46,7 +49,7 @@ ROSOUT: Final = Qos(transient_local=True, depth=1000)  # rmw_qos_profile_rosout_
 
 @dataclass(frozen=True, slots=True)
 class Endpoint:
-    """A publisher or subscriber that a token shows; `role` is None for the bridge's own token."""
+    """A publisher, subscriber or server that a token shows; `role` is None for the bridge's own token."""
 
     zid: str
     role: Role | None = None
@@ -73,16 +76,37 @@ def token(zid: str, role: Role, key: str, type_name: str, qos: Qos, type_hash: s
     )
 
 
+def server_token(zid: str, role: Literal["SS", "AS"], key: str, type_name: str) -> str:
+    """The token of a service or action server."""
+    return f"@/{zid}/@ros2_lv/{role}/{_escaped(key)}/{_escaped(type_name)}"
+
+
+def action_client_token(zid: str, key: str, type_name: str) -> str:
+    """Keeps the bridge's route of an action for as long as it is held: feedback comes once."""
+    if not TOPIC.fullmatch("/" + key) or not ACTION_TYPE.fullmatch(type_name):
+        raise ValueError(f'"{key}" with type "{type_name}" can not be a token')
+    return f"@/{zid}/@ros2_lv/AC/{_escaped(key)}/{_escaped(type_name)}"
+
+
+def feedback(action_key: str) -> str:
+    """Where an action's feedback comes."""
+    return f"{action_key}/_action/feedback"
+
+
 def bridge_token(zid: str) -> str:
     """The token by which a bridge says that it is there."""
     return f"@/{zid}/@ros2_lv"
 
 
 def parsed(token_key: str) -> Endpoint | None:
-    """What a token shows; None for services, actions and what is not a token."""
+    """What a token shows; None for clients and for what is not a token."""
     found = _TOKEN.fullmatch(token_key)
     if found is None:
         return None
+    if found["server"] is not None:
+        server: Role = "SS" if found["server"] == "SS" else "AS"
+        key, type_name = _unescaped(found["name"]), _unescaped(found["server_type"])
+        return Endpoint(found["zid"], server, key, type_name)
     if found["role"] is None:
         return Endpoint(found["zid"])
     role: Role = "MP" if found["role"] == "MP" else "MS"

@@ -12,14 +12,17 @@ from collections.abc import Mapping
 from contextlib import suppress
 from typing import Any, Final
 
+from app import keys
+from app.actions import Actions
 from app.board import Board
+from app.calls import Calls
 from app.errors import KioskError, LinkError
 from app.interfaces import interfaces_of
 from app.interlocks import Verdict, way
 from app.joining import LOG_TYPE, Joining
 from app.link import Config, Link
 from app.logs import RosoutHandler
-from app.panel.model import Panel
+from app.panel.model import Action, Panel
 from app.presses import Presses, Receipt
 from app.robot import Robot
 from app.views import Sight, sight
@@ -50,7 +53,14 @@ class Kiosk:
         self.link = Link(config, self._wake)
         self.robot = Robot(panel, self.interfaces, self.link.zid)
         self.board = Board(self._sight().view, revision)
-        self.presses = Presses(panel, self.interfaces, self.robot, self.link)
+        self._calls = Calls(self.interfaces, self.robot, self.link, self._show)
+        self._actions = Actions(self.interfaces, self.robot, self.link, self._show)
+        self.presses = Presses(
+            panel, self.interfaces, self.robot, self.link, self._calls, self._actions
+        )
+        self._feedback = {
+            keys.feedback(self.robot.key(w.action)): w for w in panel.widgets() if isinstance(w, Action)
+        }
         self._joining = Joining(panel, self.interfaces, self.robot, self.link, self._show)
         self._urgent = {self.robot.key(i.topic) for i in panel.interlocks}
         self._shown_at = 0.0
@@ -63,7 +73,7 @@ class Kiosk:
         self._warm_up()
         subscribe = [self.robot.key(topic) for topic in self.panel.subscriptions()]
         publish = [self.robot.key(topic) for topic in (*self.panel.publications(), "/rosout")]
-        self.link.start(subscribe, publish)
+        self.link.start([*subscribe, *self._feedback], publish)
         logging.getLogger().addHandler(self._rosout)
         self._joining.start()
 
@@ -75,6 +85,7 @@ class Kiosk:
         if self._timer is not None:
             self._timer.cancel()
         await self._joining.stop()
+        await self._actions.stop()
         try:
             await asyncio.to_thread(self.link.close)
         except LinkError as error:
@@ -85,10 +96,10 @@ class Kiosk:
         """Whether commands can reach the robot now."""
         return way(self.robot, time.monotonic())
 
-    def press(self, widget: str, inputs: Mapping[str, Any], press_id: str, who: str) -> Receipt:
+    async def press(self, widget: str, inputs: Mapping[str, Any], press_id: str, who: str) -> Receipt:
         """A press, judged by all that has come from the robot until now."""
         self._take()
-        return self.presses.press(widget, inputs, press_id, who)
+        return await self.presses.press(widget, inputs, press_id, who)
 
     def show_fault(self, text: str) -> None:
         """A fault of the panel file, shown on every page; "" takes it away."""
@@ -119,6 +130,9 @@ class Kiosk:
             log.info("Zenoh link %s", "up" if changes.link_up else "lost")
         had_bridge = bool(self.robot.graph.bridges)
         for key, sample in changes.samples.items():
+            if key in self._feedback:
+                self._actions.hear_feedback(self._feedback[key], sample)
+                continue
             self.robot.take(key, sample)
             urgent = urgent or key in self._urgent
         came = False
@@ -131,6 +145,8 @@ class Kiosk:
                 log.info("bridge %s found", zid)
                 came = True
         if changes.tokens:
+            self._calls.follow()
+            self._actions.follow()
             self._joining.follow(came and not had_bridge)
         if urgent:
             self._show()

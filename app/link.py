@@ -159,6 +159,33 @@ class Link:
             status: Any = self._publishers[key].matching_status  # an object, whatever the stub says
             return bool(status.matching)
 
+    def query(self, key: str, payload: bytes, timeout_s: float) -> "asyncio.Future[bytes | None]":
+        """Asks once; the future gets the first answer, or None when there is none (any more)."""
+        loop = asyncio.get_running_loop()
+        answered: asyncio.Future[bytes | None] = loop.create_future()
+
+        def finish(answer: bytes | None) -> None:
+            if not answered.done():
+                answered.set_result(answer)
+
+        def hand_over(answer: bytes | None) -> None:
+            with suppress(RuntimeError):  # the loop is closed: nobody waits any more
+                loop.call_soon_threadsafe(finish, answer)
+
+        def on_reply(reply: zenoh.Reply) -> None:
+            if reply.ok is not None:
+                hand_over(reply.ok.payload.to_bytes())
+
+        with _translated(f"can't ask {key}"):
+            self._session.get(
+                key,
+                Callback(on_reply, lambda: hand_over(None), indirect=False),
+                payload=payload,
+                timeout=timeout_s,
+                consolidation=zenoh.ConsolidationMode.NONE,
+            )
+        return answered
+
     async def ask(self, selector: str) -> list[tuple[str, bytes]]:
         """(key, payload) of each answer to a query; at most `ASK_TIMEOUT_S` long."""
         loop = asyncio.get_running_loop()

@@ -4,31 +4,35 @@ The permission is judged here, at the press, by what the server knows then; what
 showed does not count.
 """
 
+import asyncio
 import logging
 import time
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from typing import Any, Final, Literal, Protocol
 
+from app.actions import Actions
+from app.calls import Calls
 from app.errors import FieldError, InputError, LinkError, NotFound
 from app.interfaces import Interfaces
-from app.interlocks import publish_verdict
-from app.panel.model import Panel, Publish, TextInput
+from app.interlocks import press_verdict
+from app.panel.model import Action, Call, Panel, Pressed, Publish, TextInput
 from app.panel.template import filled, named
+from app.progress import Answer, Outcome
 from app.robot import Robot
 from app.sentences import say
 from app.views import clock
 
 log = logging.getLogger("kiosk.presses")
 
-Outcome = Literal["published", "refused", "unknown"]
-Cause = Literal["", "interlock", "input", "link"]
+Cause = Literal["", "interlock", "input", "link", "time"]
 
 RECEIPTS_KEPT: Final = 1000
 LONGEST_LOGGED: Final = 300
-NO_WAY: Final = frozenset({"no_link", "no_bridge", "bridge_silent", "joining"})
+NO_WAY: Final = frozenset({"no_link", "no_bridge", "bridge_silent", "joining", "no_service"})
+FINE: Final = frozenset({"published", "accepted", "succeeded"})
 
 
 class Way(Protocol):
@@ -63,6 +67,15 @@ class Receipt:
         }
 
 
+@dataclass(frozen=True, slots=True)
+class _UnderWay:
+    """A press whose receipt is not there yet."""
+
+    widget: str
+    inputs: Mapping[str, Any]
+    receipt: "asyncio.Future[Receipt]"
+
+
 class Presses:
     """Presses of one panel, with their receipts by press id."""
 
@@ -72,6 +85,8 @@ class Presses:
         interfaces: Interfaces,
         robot: Robot,
         way: Way,
+        calls: Calls,
+        actions: Actions,
         monotonic: Callable[[], float] = time.monotonic,
     ) -> None:
         self._widgets = {w.id: w for w in panel.widgets()}
@@ -79,73 +94,134 @@ class Presses:
         self._interfaces = interfaces
         self._robot = robot
         self._way = way
+        self._calls = calls
+        self._actions = actions
+        self._under_way: dict[str, _UnderWay] = {}
         self._monotonic = monotonic
         self._receipts: OrderedDict[str, Receipt] = OrderedDict()
 
-    def widget(self, widget_id: str) -> Publish:
+    def widget(self, widget_id: str) -> Pressed:
         """What can be pressed; NotFound for everything else."""
         widget = self._widgets.get(widget_id)
-        if not isinstance(widget, Publish):
+        if not isinstance(widget, Pressed):
             raise NotFound(f'there is no widget "{widget_id}" that can be pressed')
         return widget
 
     def receipt(self, press_id: str) -> Receipt | None:
+        """The receipt of a press, as it is known now."""
         return self._receipts.get(press_id)
 
-    def press(self, widget_id: str, inputs: Mapping[str, Any], press_id: str, who: str) -> Receipt:
-        """Sends the widget's message, or refuses. The same id again is the same press.
+    async def press(
+        self, widget_id: str, inputs: Mapping[str, Any], press_id: str, who: str
+    ) -> Receipt:
+        """Sends what the widget is for, or refuses. The same id again is the same press.
 
-        `who` is whom the log names. Nothing here waits, so that no second press comes between.
+        `who` is whom the log names. Until something is sent nothing here waits, so that no second
+        press comes between.
         """
         widget = self.widget(widget_id)
-        known = self._receipts.get(press_id)
+        known = self._under_way.get(press_id) or self._receipts.get(press_id)
         if known is None:
-            receipt = self._pressed(widget, inputs, press_id)
-            self._receipts[press_id] = receipt
-            while len(self._receipts) > RECEIPTS_KEPT:
-                self._receipts.popitem(last=False)
-            level = logging.INFO if receipt.outcome == "published" else logging.WARNING
-            log.log(level, "press %s of %s by %s with %.*s: %s: %s", press_id, widget_id, who,
-                    LONGEST_LOGGED, inputs, receipt.outcome, receipt.reason)  # fmt: skip
-            return receipt
+            return await self._first(widget, inputs, press_id, who)
         if (known.widget, known.inputs) != (widget_id, inputs):
             reused = say("press_reused", id=press_id)
             log.warning("press %s of %s by %s: %s", press_id, widget_id, who, reused)
             return self._receipt(widget, inputs, press_id, "refused", reused, "input")
+        if isinstance(known, _UnderWay):
+            return await asyncio.shield(known.receipt)
         return known
 
-    def _pressed(self, widget: Publish, inputs: Mapping[str, Any], press_id: str) -> Receipt:
+    async def cancel(self, widget_id: str, who: str) -> Receipt:
+        """Asks the robot to cancel the goal of an action widget."""
+        widget = self.widget(widget_id)
+        if not isinstance(widget, Action):
+            raise NotFound(f'"{widget_id}" is not an action: there is nothing to cancel')
+        answer = await self._actions.cancel(widget)
+        log.info("cancel of %s by %s: %s: %s", widget_id, who, answer.outcome, answer.text)
+        cause: Cause = "interlock" if answer.outcome == "refused" else ""
+        return self._receipt(widget, {}, "", answer.outcome, answer.text, cause)
+
+    async def _first(
+        self, widget: Pressed, inputs: Mapping[str, Any], press_id: str, who: str
+    ) -> Receipt:
+        loop = asyncio.get_running_loop()
+        under_way = _UnderWay(widget.id, dict(inputs), loop.create_future())
+        self._under_way[press_id] = under_way
+        try:
+            receipt = await self._pressed(widget, inputs, press_id)
+        except BaseException as error:
+            under_way.receipt.set_exception(error)
+            under_way.receipt.exception()  # who else waited is told; nobody needs to have
+            raise
+        finally:
+            del self._under_way[press_id]
+        self._keep(receipt)
+        under_way.receipt.set_result(receipt)
+        level = logging.INFO if receipt.outcome in FINE else logging.WARNING
+        log.log(level, "press %s of %s by %s with %.*s: %s: %s", press_id, widget.id, who,
+                LONGEST_LOGGED, inputs, receipt.outcome, receipt.reason)  # fmt: skip
+        return receipt
+
+    def _keep(self, receipt: Receipt) -> None:
+        self._receipts[receipt.id] = receipt
+        while len(self._receipts) > RECEIPTS_KEPT:
+            self._receipts.popitem(last=False)
+
+    def _correct(self, press_id: str, answer: Answer) -> None:
+        """What is known of a press now is another thing than its receipt said."""
+        if old := self._receipts.get(press_id):
+            self._receipts[press_id] = replace(old, outcome=answer.outcome, reason=answer.text)
+
+    async def _pressed(self, widget: Pressed, inputs: Mapping[str, Any], press_id: str) -> Receipt:
+        def receipt(answer: Answer, cause: Cause = "") -> Receipt:
+            return self._receipt(widget, inputs, press_id, answer.outcome, answer.text, cause)
+
         def refused(sentence: str, why: str, cause: Cause) -> Receipt:
-            text = say(sentence, why=why)
-            return self._receipt(widget, inputs, press_id, "refused", text, cause)
+            return receipt(Answer("refused", say(sentence, why=why)), cause)
 
         interlock = self._panel.interlock(widget.interlock)
-        verdict = publish_verdict(widget, interlock, self._robot, self._monotonic())
+        verdict = press_verdict(widget, interlock, self._robot, self._monotonic())
         if not verdict.permitted:
             cause: Cause = "link" if verdict.code in NO_WAY else "interlock"
             return refused("refused", verdict.reason or "", cause)
         try:
             values = self._checked(widget, inputs)
-            payload = self._interfaces.encode(widget.type, filled(widget.message, values))
+            answer = await self._sent(widget, filled(widget.template, values), press_id)
         except (FieldError, InputError) as error:
             return refused("not_encoded", str(error), "input")
-        key = self._robot.key(widget.topic)
-        try:
-            heard = self._way.heard(key)
-            self._way.put(key, payload)
         except LinkError as error:
             return refused("not_encoded", str(error), "link")
+        if answer.outcome == "refused":
+            return refused("not_encoded", answer.text, "interlock")
+        return receipt(answer, "time" if answer.outcome == "timed_out" else "")
+
+    async def _sent(self, widget: Pressed, fields: dict[str, Any], press_id: str) -> Answer:
+        match widget:
+            case Publish():
+                return self._published(widget, fields)
+            case Call():
+                request, _ = self._interfaces.service(widget.type)
+                payload = self._interfaces.encode(request, fields)
+                return await self._calls.call(widget, payload, press_id, self._correct)
+            case Action():
+                return await self._actions.start(widget, fields, press_id, self._correct)
+
+    def _published(self, widget: Publish, fields: dict[str, Any]) -> Answer:
+        payload = self._interfaces.encode(widget.type, fields)
+        key = self._robot.key(widget.topic)
+        heard = self._way.heard(key)
+        self._way.put(key, payload)
         sentence = "published" if heard else "sent_to_nobody"
         text = say(sentence, topic=widget.topic, time=clock(time.time()))
-        return self._receipt(widget, inputs, press_id, "published" if heard else "unknown", text)
+        return Answer("published" if heard else "unknown", text)
 
-    def _checked(self, widget: Publish, inputs: Mapping[str, Any]) -> dict[str, Any]:
+    def _checked(self, widget: Pressed, inputs: Mapping[str, Any]) -> dict[str, Any]:
         """The values of the inputs that the widget's message names."""
         for name in inputs:
             if not isinstance(self._widgets.get(name), TextInput):
                 raise InputError(f'there is no input "{name:.60}" on this panel')
         values: dict[str, Any] = {}
-        for _, name in named(widget.message):
+        for _, name in named(widget.template):
             field = self._widgets[name]
             if name not in inputs:
                 raise InputError(f'the input "{name}" is missing')
@@ -155,7 +231,7 @@ class Presses:
 
     def _receipt(
         self,
-        widget: Publish,
+        widget: Pressed,
         inputs: Mapping[str, Any],
         press_id: str,
         outcome: Outcome,

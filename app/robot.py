@@ -14,6 +14,7 @@ from app.graph import Graph
 from app.interfaces import Interfaces, value_at
 from app.keys import key_of
 from app.panel.model import Panel
+from app.progress import Progress
 
 log = logging.getLogger("kiosk.robot")
 
@@ -61,6 +62,7 @@ class Robot:
         self.link_up = False
         self.settled_at = math.inf  # monotonic: when a bridge that came has set up its routes
         self.graph = Graph(own_zid)
+        self.progress: dict[str, Progress] = {}  # of what widgets have asked, by their ids
         self.undecodable: Counter[str] = Counter()
         self._interfaces = interfaces
         self._namespace = panel.namespace

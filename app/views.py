@@ -9,8 +9,9 @@ import time
 from dataclasses import dataclass
 from typing import Any, Final, Literal, TypedDict
 
-from app.interlocks import Verdict, interlock_verdict, publish_verdict, way
-from app.panel.model import Panel, Publish, Readout, TextInput
+from app.interlocks import Verdict, interlock_verdict, press_verdict, way
+from app.panel.model import Action, Call, Panel, Publish, Readout, TextInput
+from app.progress import IDLE, Progress
 from app.robot import Robot, value_of
 from app.sentences import age, say
 
@@ -69,9 +70,12 @@ def sight(panel: Panel, robot: Robot, now: float, *, simulated: bool = False, fa
         match widget:
             case TextInput():
                 widgets[widget.id] = {}
-            case Publish():
-                verdict = noted(publish_verdict(widget, panel.interlock(widget.interlock), robot, now))
+            case Publish() | Call() | Action():
+                interlock = panel.interlock(widget.interlock)
+                verdict = noted(press_verdict(widget, interlock, robot, now))
                 widgets[widget.id] = {**enabled(verdict)}
+                if not isinstance(widget, Publish):
+                    widgets[widget.id] |= progress(robot.progress.get(widget.id, IDLE))
             case Readout():
                 widgets[widget.id], until = readout(widget, robot, now)
                 untils.append(until)
@@ -88,6 +92,17 @@ def sight(panel: Panel, robot: Robot, now: float, *, simulated: bool = False, fa
 
 def enabled(verdict: Verdict) -> Enabled:
     return {"enabled": verdict.permitted, "reason": verdict.reason}
+
+
+def progress(of: Progress) -> dict[str, Any]:
+    """Attributes of a call or an action: `progress` from 0 to 1, None where it is not known."""
+    return {
+        "busy": of.busy,
+        "outcome": of.outcome,
+        "result": of.text,
+        "progress": of.fraction,
+        "stoppable": of.stoppable,
+    }
 
 
 def readout(widget: Readout, robot: Robot, now: float) -> tuple[dict[str, Any], float]:

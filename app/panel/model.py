@@ -6,7 +6,7 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo
 
-from app.keys import MESSAGE_TYPE, NAMESPACE, TOPIC
+from app.keys import ACTION_TYPE, MESSAGE_TYPE, NAMESPACE, SERVICE_TYPE, TOPIC
 
 
 def _topic(given: str) -> str:
@@ -21,6 +21,20 @@ def _topic(given: str) -> str:
 def _type(given: str) -> str:
     if not MESSAGE_TYPE.fullmatch(given):
         raise ValueError(f'"{given}" is not a ROS 2 message type: it must be like std_msgs/msg/Bool')
+    return given
+
+
+def _service(given: str) -> str:
+    if not SERVICE_TYPE.fullmatch(given):
+        raise ValueError(f'"{given}" is not a ROS 2 service type: it must be like std_srvs/srv/SetBool')
+    return given
+
+
+def _action(given: str) -> str:
+    if not ACTION_TYPE.fullmatch(given):
+        raise ValueError(
+            f'"{given}" is not a ROS 2 action type: it must be like nav2_msgs/action/NavigateToPose'
+        )
     return given
 
 
@@ -46,6 +60,8 @@ Id = Annotated[str, Field(pattern=ID)]
 Label = Annotated[str, Field(min_length=1, max_length=120)]
 Topic = Annotated[str, AfterValidator(_topic), Field(max_length=255)]
 Type = Annotated[str, AfterValidator(_type)]
+ServiceType = Annotated[str, AfterValidator(_service)]
+ActionType = Annotated[str, AfterValidator(_action)]
 _STEP: Final = r"[a-z][a-z0-9_]*(\[[0-9]{1,9}\])*"
 FieldPath = Annotated[str, Field(pattern=rf"^{_STEP}(\.{_STEP})*$")]
 Folder = Annotated[Path, BeforeValidator(_folder)]
@@ -94,6 +110,51 @@ class Publish(Placed):
     interlock: Id | None = None
     span: Annotated[int, Field(ge=1, le=12)] = 4
 
+    @property
+    def template(self) -> dict[str, Any]:
+        return self.message
+
+
+class Call(Placed):
+    """A service call; `success` and `message` are fields of the response, found by themselves
+    where it has a bool and a string of these names; `answer` is shown with `{field}` filled in."""
+
+    kind: Literal["call"]
+    service: Topic
+    type: ServiceType
+    request: dict[str, Any] = {}
+    interlock: Id | None = None
+    timeout_s: Seconds = 5.0
+    success: FieldPath | None = None
+    message: FieldPath | None = None
+    answer: str = ""
+    span: Annotated[int, Field(ge=1, le=12)] = 4
+
+    @property
+    def template(self) -> dict[str, Any]:
+        return self.request
+
+
+class Action(Placed):
+    """An action's goal with a cancel button; `progress` is a field of the feedback that goes from
+    0 to `progress_max`; `feedback` and `result` are shown with `{field}` filled in."""
+
+    kind: Literal["action"]
+    action: Topic
+    type: ActionType
+    goal: dict[str, Any] = {}
+    interlock: Id | None = None
+    timeout_s: Seconds = 5.0
+    progress: FieldPath | None = None
+    progress_max: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 100.0
+    feedback: str = ""
+    result: str = ""
+    span: Annotated[int, Field(ge=1, le=12)] = 6
+
+    @property
+    def template(self) -> dict[str, Any]:
+        return self.goal
+
 
 class Readout(Placed):
     kind: Literal["readout"]
@@ -103,8 +164,15 @@ class Readout(Placed):
     max_age_s: Seconds | None = None
 
 
-Widget = Annotated[TextInput | Publish | Readout, Field(discriminator="kind")]
-KINDS: Final[Mapping[str, type[Placed]]] = {"text": TextInput, "publish": Publish, "readout": Readout}
+Pressed = Publish | Call | Action
+Widget = Annotated[TextInput | Publish | Call | Action | Readout, Field(discriminator="kind")]
+KINDS: Final[Mapping[str, type[Placed]]] = {
+    "text": TextInput,
+    "publish": Publish,
+    "call": Call,
+    "action": Action,
+    "readout": Readout,
+}
 
 
 class Page(Description):
@@ -126,7 +194,7 @@ class Panel(Description):
     # Of the file, not in it: changes when what a browser has loaded is out of date.
     revision: Annotated[str, Field(exclude=True)] = ""
 
-    def widgets(self) -> Iterator[TextInput | Publish | Readout]:
+    def widgets(self) -> Iterator[TextInput | Publish | Call | Action | Readout]:
         for page in self.pages:
             yield from page.widgets
 
@@ -140,6 +208,10 @@ class Panel(Description):
         """Topic → type of all that the panel listens to."""
         listened = {i.topic: i.type for i in self.interlocks}
         return listened | {w.topic: w.type for w in self.widgets() if isinstance(w, Readout)}
+
+    def actions(self) -> dict[str, str]:
+        """Action → type of all that the panel may send goals to."""
+        return {w.action: w.type for w in self.widgets() if isinstance(w, Action)}
 
     def publications(self) -> dict[str, str]:
         """Topic → type of all that the panel publishes."""

@@ -18,7 +18,7 @@ from app.routes.site import CurrentSite, Site
 router = APIRouter()
 
 PRESS_ID: Final = r"^[A-Za-z0-9_.:-]{1,64}$"
-STATUS: Final[Mapping[str, int]] = {"": 200, "interlock": 409, "input": 422, "link": 503}
+STATUS: Final[Mapping[str, int]] = {"": 200, "interlock": 409, "input": 422, "link": 503, "time": 504}
 
 
 class Press(BaseModel):
@@ -51,6 +51,7 @@ class ReceiptAnswer(BaseModel):
         409: {"model": ReceiptAnswer, "description": "refused by an interlock"},
         422: {"model": ReceiptAnswer, "description": "bad input"},
         503: {"model": ReceiptAnswer, "description": "no way to the robot"},
+        504: {"model": ReceiptAnswer, "description": "no answer in time"},
     },
     openapi_extra={
         "requestBody": {
@@ -67,7 +68,7 @@ async def press(widget: str, request: Request, site: CurrentSite) -> Response:
     if kind == "application/json":
         given = _json(body)
         press_id = given.id or secrets.token_hex(8)
-        receipt = site.kiosk.press(widget, given.inputs, press_id, who)
+        receipt = await site.kiosk.press(widget, given.inputs, press_id, who)
         _count(site, receipt)
         return JSONResponse(receipt.as_json(), status_code=STATUS[receipt.cause])
     if kind == "application/x-www-form-urlencoded":
@@ -77,12 +78,27 @@ async def press(widget: str, request: Request, site: CurrentSite) -> Response:
         if not re.fullmatch(PRESS_ID, page_id):
             raise InputError(f'_id: "{page_id:.40}" is not the id of a press')
         press_id = f"{page_id}.{widget}"
-        receipt = site.kiosk.press(widget, inputs, press_id, who)
+        receipt = await site.kiosk.press(widget, inputs, press_id, who)
         _count(site, receipt)
         return RedirectResponse(_page_with(site, receipt), status_code=303)
     raise InputError(
         f'a press is "application/json" or "application/x-www-form-urlencoded", not "{kind}"'
     )
+
+
+@router.post(
+    "/widgets/{widget}/cancel",
+    response_model=ReceiptAnswer,
+    summary="Ask the robot to cancel an action's goal",
+    responses={303: {"description": "a form post"}, 409: {"model": ReceiptAnswer}},
+)
+async def cancel(widget: str, request: Request, site: CurrentSite) -> Response:
+    who = request.client.host if request.client else "unknown"
+    receipt = await site.kiosk.presses.cancel(widget, who)
+    _count(site, receipt)
+    if request.headers.get("content-type", "").startswith("application/x-www-form-urlencoded"):
+        return RedirectResponse(_page_with(site, receipt), status_code=303)
+    return JSONResponse(receipt.as_json(), status_code=STATUS[receipt.cause])
 
 
 def _count(site: Site, receipt: Receipt) -> None:

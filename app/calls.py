@@ -1,0 +1,158 @@
+"""Service calls: each gets one answer within its time, and each way of getting none has its words.
+
+A call that timed out is not over: the robot may still do it. Its answer, when it comes late, is
+logged and corrects the receipt.
+"""
+
+import asyncio
+import logging
+import re
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final, Protocol
+
+from app.errors import DecodeError
+from app.interfaces import Interfaces, to_plain, value_at
+from app.panel.model import Call
+from app.progress import Answer, Progress
+from app.robot import Robot
+from app.sentences import say
+from app.views import clock
+
+log = logging.getLogger("kiosk.calls")
+
+LATE_S: Final = 60.0  # how long after its time an answer is still waited for
+MOST_UNANSWERED: Final = 8  # the bridge keeps ten requests of a service
+
+Corrected = Callable[[str, Answer], None]
+
+
+class Asker(Protocol):
+    """What a call needs of the link: one query, answered with bytes or with None."""
+
+    def query(self, key: str, payload: bytes, timeout_s: float) -> "asyncio.Future[bytes | None]": ...
+
+
+@dataclass(slots=True)
+class _Waiting:
+    """A call whose query is not over; `cut` is done when the bridge went away meanwhile."""
+
+    widget: Call
+    press_id: str
+    answered: "asyncio.Future[bytes | None]"
+    cut: "asyncio.Future[None]"
+
+
+class Calls:
+    """The calls of one robot; used on the event loop only."""
+
+    def __init__(
+        self, interfaces: Interfaces, robot: Robot, link: Asker, changed: Callable[[], None]
+    ) -> None:
+        """`changed` is called when what the widgets show has changed."""
+        self._interfaces = interfaces
+        self._robot = robot
+        self._link = link
+        self._changed = changed
+        self._open: dict[int, _Waiting] = {}
+        self._ever_answered: set[str] = set()
+        self._latest: dict[str, str] = {}
+
+    def unanswered(self, key: str) -> int:
+        """How many requests of a service the bridge may still hold."""
+        return sum(self._robot.key(w.widget.service) == key for w in self._open.values())
+
+    def follow(self) -> None:
+        """After every change of the graph: without a bridge no answer will come."""
+        if not self._robot.graph.bridges:
+            for waiting in self._open.values():
+                if not waiting.cut.done():
+                    waiting.cut.set_result(None)
+
+    async def call(self, widget: Call, payload: bytes, press_id: str, corrected: Corrected) -> Answer:
+        """Sends the request and waits; `corrected` gets the answer that comes after the time."""
+        key = self._robot.key(widget.service)
+        if self.unanswered(key) >= MOST_UNANSWERED:
+            return Answer("refused", say("too_many", service=widget.service))
+        loop = asyncio.get_running_loop()
+        query = self._link.query(key, payload, widget.timeout_s + LATE_S)
+        waiting = _Waiting(widget, press_id, query, loop.create_future())
+        number = id(waiting)
+        self._open[number] = waiting
+        query.add_done_callback(lambda _: self._open.pop(number, None))
+        self._latest[widget.id] = press_id
+        self._show(widget, Progress(busy=True, text=say("waiting_for_answer")))
+        answer = await self._awaited(waiting, corrected)
+        self._show(widget, Progress(outcome=answer.outcome, text=answer.text))
+        return answer
+
+    async def _awaited(self, waiting: _Waiting, corrected: Corrected) -> Answer:
+        widget = waiting.widget
+        await asyncio.wait(
+            {waiting.answered, waiting.cut},
+            timeout=widget.timeout_s,
+            return_when=asyncio.FIRST_COMPLETED,
+        )
+        if waiting.answered.done() and (reply := waiting.answered.result()) is not None:
+            return self._read(widget, reply)
+        if not waiting.answered.done():
+            waiting.answered.add_done_callback(lambda done: self._late(waiting, done, corrected))
+        if waiting.cut.done() or not self._robot.graph.bridges:
+            return Answer("unknown", say("call_cut"))
+        if waiting.answered.done():
+            return Answer("unknown", say("call_dropped", service=widget.service))
+        hint = "" if widget.service in self._ever_answered else say("cyclone_hint")
+        return Answer("timed_out", say("timed_out", seconds=f"{widget.timeout_s:g}") + hint)
+
+    def _late(
+        self, waiting: _Waiting, done: "asyncio.Future[bytes | None]", corrected: Corrected
+    ) -> None:
+        if done.cancelled() or (reply := done.result()) is None:
+            return
+        answer = self._read(waiting.widget, reply)
+        log.warning("press %s: a late answer: %s: %s", waiting.press_id, answer.outcome, answer.text)
+        corrected(waiting.press_id, answer)
+        if self._latest.get(waiting.widget.id) == waiting.press_id:
+            self._show(waiting.widget, Progress(outcome=answer.outcome, text=answer.text))
+
+    def _read(self, widget: Call, reply: bytes) -> Answer:
+        self._ever_answered.add(widget.service)
+        _, response_type = self._interfaces.service(widget.type)
+        try:
+            response = self._interfaces.decode(response_type, reply)
+        except DecodeError as error:
+            log.error("%s: %s", widget.service, error)
+            return Answer("unknown", say("answer_unreadable", wanted=widget.type))
+        success = field_of(self._interfaces, response_type, widget.success, "success", "bool")
+        message = field_of(self._interfaces, response_type, widget.message, "message", "string")
+        words = [str(value_at(response, message))] if message else []
+        words += [with_fields(widget.answer, response)] if widget.answer else []
+        said = " – ".join(word for word in words if word)
+        said = f": {said}" if said else "."
+        now = clock(time.time())
+        if success is None or value_at(response, success):
+            return Answer("succeeded", say("answered", time=now) + said)
+        return Answer("rejected", say("said_no", time=now) + said)
+
+    def _show(self, widget: Call, progress: Progress) -> None:
+        self._robot.progress[widget.id] = progress
+        self._changed()
+
+
+def field_of(
+    interfaces: Interfaces, type_name: str, given: str | None, usual: str, kind: str
+) -> str | None:
+    """The field that the panel names, or the usual one where the type has it with the right kind."""
+    if given is not None:
+        return given
+    own = {field.name: str(field.type) for field in interfaces.structures[type_name].fields}
+    return usual if own.get(usual) == kind else None
+
+
+PLACE: Final = re.compile(r"\{([^{}]*)\}")
+
+
+def with_fields(template: str, message: Any) -> str:
+    """The template with each `{path}` replaced by that field's value."""
+    return PLACE.sub(lambda found: str(to_plain(value_at(message, found[1]))), template)

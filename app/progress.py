@@ -1,0 +1,42 @@
+"""How far it is with what was asked of the robot: one state per widget that waits for an answer."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+Outcome = Literal[
+    "published",
+    "accepted",
+    "succeeded",
+    "rejected",
+    "canceled",
+    "aborted",
+    "timed_out",
+    "refused",
+    "unknown",
+]
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """`busy` while an answer is awaited; then `outcome` and `text` say what came of it.
+
+    `fraction` (0 to 1) is how far an action is, None where it does not say; `stoppable` while a
+    cancel makes sense.
+    """
+
+    busy: bool = False
+    outcome: Outcome | Literal[""] = ""
+    text: str = ""
+    fraction: float | None = None
+    stoppable: bool = False
+
+
+IDLE = Progress()
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What came of a call or a goal; `text` is a sentence for the operator."""
+
+    outcome: Outcome
+    text: str
