@@ -14,6 +14,7 @@ One handler (`routes.on_kiosk_error`) maps them to HTTP; "–" never reaches a c
 """
 
 from dataclasses import dataclass
+from pathlib import Path
 
 
 class KioskError(Exception):
@@ -46,7 +47,11 @@ class PanelError(KioskError):
 
 
 class InterfaceError(KioskError):
-    pass
+    """`source` is the interface file or folder at fault, if it is one of those."""
+
+    def __init__(self, message: str, source: Path | None = None) -> None:
+        super().__init__(message)
+        self.source = source
 
 
 class FieldError(KioskError):

@@ -1,0 +1,126 @@
+"""What interfaces are made of: structures of typed fields with constants and defaults. No I/O."""
+
+import keyword
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Final, Literal
+
+from rosbags.interfaces import Nodetype
+
+INTEGERS: Final[Mapping[str, tuple[int, int]]] = {
+    **{f"int{bits}": (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) for bits in (8, 16, 32, 64)},
+    **{f"uint{bits}": (0, 2**bits - 1) for bits in (8, 16, 32, 64)},
+    **dict.fromkeys(("byte", "char", "octet"), (0, 255)),
+}
+FLOATS: Final = ("float32", "float64")
+TEXTS: Final = ("string", "wstring")
+BASE_TYPES: Final = frozenset(("bool", *INTEGERS, *FLOATS, *TEXTS))
+
+# What ROS puts into a message without fields, so that it has one byte.
+PLACEHOLDER: Final = "structure_needs_at_least_one_member"
+
+
+@dataclass(frozen=True, slots=True)
+class Type:
+    """A field's type; `str` writes it as a .msg file does ("float64", "string<=8[]", "int8[<=3]").
+
+    `name` is a base type or like "std_msgs/msg/Header". `bound` is of a string's bytes (of a
+    wstring's UTF-16 units), `size` of an array's or a sequence's elements; 0 is no bound.
+    """
+
+    name: str
+    bound: int = 0
+    many: Literal["one", "array", "sequence"] = "one"
+    size: int = 0
+
+    @property
+    def nested(self) -> bool:
+        return "/" in self.name
+
+    @property
+    def element(self) -> "Type":
+        """The type of one element of an array or a sequence."""
+        return replace(self, many="one", size=0)
+
+    def __str__(self) -> str:
+        one = f"{self.name}<={self.bound}" if self.bound else self.name
+        match self.many:
+            case "one":
+                return one
+            case "array":
+                return f"{one}[{self.size}]"
+        return f"{one}[<={self.size}]" if self.size else f"{one}[]"
+
+
+def attribute(name: str) -> str:
+    """A field's name in a message object: a keyword of Python's gets a "_" after it."""
+    return f"{name}_" if keyword.iskeyword(name) else name
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """`default` is None where the definition has none."""
+
+    name: str
+    type: Type
+    default: Any = None
+
+    @property
+    def attribute(self) -> str:
+        """The field's name in a message object."""
+        return attribute(self.name)
+
+
+@dataclass(frozen=True, slots=True)
+class Structure:
+    """A message, or a part of a service or an action; `source` is the file it was read from."""
+
+    name: str
+    fields: tuple[Field, ...]
+    constants: Mapping[str, Any] = field(default_factory=dict)
+    source: Path | None = field(default=None, compare=False)
+
+    def needs(self) -> Iterator[tuple[Field, str]]:
+        """Each field whose type is another structure, with that one's name."""
+        return ((one, one.type.name) for one in self.fields if one.type.nested)
+
+
+@dataclass(frozen=True, slots=True)
+class Definitions:
+    """Structures by name. `wholes` are services and actions as REP 2016 describes them: nothing
+    that is ever sent, but what their type hashes are of."""
+
+    structures: dict[str, Structure] = field(default_factory=dict)
+    wholes: dict[str, Structure] = field(default_factory=dict)
+
+    def __or__(self, over: "Definitions") -> "Definitions":
+        """Both; where both have a name, it is as in `over`."""
+        return Definitions(self.structures | over.structures, self.wholes | over.wholes)
+
+    def described(self, name: str) -> Structure | None:
+        return self.structures.get(name) or self.wholes.get(name)
+
+    def described_names(self) -> set[str]:
+        return {*self.structures, *self.wholes}
+
+
+def from_store(name: str, definition: Any) -> Structure:
+    """A structure out of rosbags' nested tuples: ([(name, type, value)…], [(field, type)…])."""
+    constants, fields = definition
+    return Structure(
+        name,
+        tuple(Field(each, _type(described)) for each, described in fields if each != PLACEHOLDER),
+        {each: value for each, _, value in constants},
+    )
+
+
+def _type(described: Any) -> Type:
+    kind, detail = described
+    if kind == Nodetype.NAME:
+        return Type(detail)
+    if kind == Nodetype.BASE:
+        return Type(*detail)
+    inner, size = detail
+    many: Literal["array", "sequence"] = "array" if kind == Nodetype.ARRAY else "sequence"
+    return replace(_type(inner), many=many, size=size)

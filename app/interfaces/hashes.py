@@ -1,0 +1,76 @@
+"""Type hashes as ROS computes them (REP 2016, version 1): the SHA-256 of a description in JSON."""
+
+import json
+from collections.abc import Callable, Mapping
+from hashlib import sha256
+from typing import Any, Final
+
+from app.interfaces.definitions import PLACEHOLDER, Field, Structure, Type
+
+# Numbers of type_description_interfaces/msg/FieldType. `char` of a .msg file is uint8 there.
+NESTED: Final = 1
+BASE_IDS: Final[Mapping[str, int]] = {
+    "int8": 2,
+    "uint8": 3,
+    "char": 3,
+    "int16": 4,
+    "uint16": 5,
+    "int32": 6,
+    "uint32": 7,
+    "int64": 8,
+    "uint64": 9,
+    "float32": 10,
+    "float64": 11,
+    "bool": 15,
+    "byte": 16,
+    "octet": 16,
+    "string": 17,
+    "wstring": 18,
+}
+BOUNDED_TEXT: Final = 4  # is added to a text's number, and the next three to any
+ARRAY: Final = 48
+BOUNDED_SEQUENCE: Final = 96
+SEQUENCE: Final = 144
+
+
+def type_hash(of: Structure, find: Callable[[str], Structure]) -> str:
+    """`RIHS01_` and 64 hexadecimal digits; `find` gives the structures that it is made of."""
+    inner: dict[str, Structure] = {}
+    _gather(of, find, inner)
+    whole = {
+        "type_description": _described(of),
+        "referenced_type_descriptions": [_described(inner[name]) for name in sorted(inner)],
+    }
+    return f"RIHS01_{sha256(json.dumps(whole).encode()).hexdigest()}"
+
+
+def _gather(of: Structure, find: Callable[[str], Structure], inner: dict[str, Structure]) -> None:
+    for _, name in of.needs():
+        if name not in inner:
+            inner[name] = find(name)
+            _gather(inner[name], find, inner)
+
+
+def _described(of: Structure) -> dict[str, Any]:
+    fields = of.fields or (Field(PLACEHOLDER, Type("uint8")),)
+    return {"type_name": of.name, "fields": [_field(one) for one in fields]}
+
+
+def _field(one: Field) -> dict[str, Any]:
+    described = {
+        "type_id": _type_id(one.type),
+        "capacity": one.type.size,
+        "string_capacity": one.type.bound,
+        "nested_type_name": one.type.name if one.type.nested else "",
+    }
+    return {"name": one.name, "type": described}
+
+
+def _type_id(of: Type) -> int:
+    one = NESTED if of.nested else BASE_IDS[of.name] + (BOUNDED_TEXT if of.bound else 0)
+    match of.many:
+        case "one":
+            return one
+        case "array":
+            return one + ARRAY
+    return one + (BOUNDED_SEQUENCE if of.size else SEQUENCE)

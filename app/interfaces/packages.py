@@ -1,0 +1,134 @@
+"""Folders of interface packages → definitions. The only module here that reads files."""
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Final
+
+from app.errors import InterfaceError
+from app.interfaces.composition import EVENT_INFO
+from app.interfaces.definitions import Definitions, Structure
+from app.interfaces.parsing import KINDS, parsed
+
+_PACKAGE_NAME: Final = re.compile(r"<name>\s*([^<\s]+)\s*</name>")
+# Where packages are in a folder: itself, side by side, in `share` of an install folder, and in
+# those of an install folder that has one for each package.
+_PLACES: Final = (".", "*", "share/*", "*/share/*")
+
+
+def read_folders(folders: Sequence[Path]) -> Definitions:
+    """All interfaces in folders laid out like ROS packages, workspaces' `share` too.
+
+    InterfaceError where a folder has none, a file can't be read (it names file and line), or two
+    folders differ in a type. Whether all that they need is there, `complete` says.
+    """
+    found = Definitions()
+    for folder in folders:
+        packages = list(_packages(folder))
+        if not packages:
+            why = "has no interfaces: they must be in <package>/msg/*.msg, srv/*.srv, action/*.action"
+            raise InterfaceError(f"{folder} {why}", folder)
+        for package in packages:
+            for file in _files(package):
+                _add(found, _read(file, _name(package)))
+    return found
+
+
+def stamp(folders: Sequence[Path]) -> tuple[tuple[Path, int, int], ...]:
+    """Changes when a file of the folders does: each with its time and size."""
+    files = [file for folder in folders for package in _packages(folder) for file in _files(package)]
+    return tuple((file, (about := file.stat()).st_mtime_ns, about.st_size) for file in files)
+
+
+def _packages(folder: Path) -> Iterator[Path]:
+    for place in _PLACES:
+        for package in [folder] if place == "." else sorted(folder.glob(place)):
+            if any((package / kind).is_dir() for kind in KINDS) and any(_files(package)):
+                yield package
+
+
+def _files(package: Path) -> Iterator[Path]:
+    for kind in KINDS:
+        yield from sorted((package / kind).glob(f"*.{kind}"))
+
+
+def _name(package: Path) -> str:
+    """The package's name as its package.xml has it; without one, its folder's."""
+    try:
+        match = _PACKAGE_NAME.search((package / "package.xml").read_text())
+    except (OSError, UnicodeDecodeError):
+        match = None
+    return match[1] if match else package.resolve().name
+
+
+def _read(file: Path, package: str) -> Definitions:
+    try:
+        text = file.read_text("utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InterfaceError(f"{file} can't be read: {error}", file) from error
+    return parsed(text, package, file.suffix[1:], file.stem, file)
+
+
+def _add(found: Definitions, read: Definitions) -> None:
+    for name, structure in read.structures.items():
+        known = found.structures.setdefault(name, structure)
+        if known != structure:
+            why = f"{name} is defined here and, differently, in {known.source}"
+            raise InterfaceError(f"{structure.source}: {why}", structure.source)
+    found.wholes.update(read.wholes)
+
+
+def complete(found: Definitions, known: Definitions) -> Definitions:
+    """What can be used of `found`, with `known` beside it.
+
+    Events, and so the hashes of services and actions, are left out where the distribution has none
+    (humble). InterfaceError where a structure needs one that is in neither, or needs itself.
+    """
+    every = known.structures | found.structures
+    if EVENT_INFO not in every:
+        kept = {
+            n: s for n, s in found.structures.items() if EVENT_INFO not in (t for _, t in s.needs())
+        }
+        found, every = Definitions(kept), known.structures | kept
+    for structure in found.structures.values():
+        _require_needed(structure, every)
+    done: set[str] = set()
+    for structure in found.structures.values():
+        _require_end(structure, every, done, ())
+    return found
+
+
+def available(found: Definitions, known: Definitions) -> Definitions:
+    """The part of `found` whose every need is there, in itself or in `known`."""
+    while True:
+        every = known.described_names() | found.described_names()
+        kept = Definitions(_fulfilled(found.structures, every), _fulfilled(found.wholes, every))
+        if kept == found:
+            return kept
+        found = kept
+
+
+def _fulfilled(structures: Mapping[str, Structure], every: set[str]) -> dict[str, Structure]:
+    return {n: s for n, s in structures.items() if all(need in every for _, need in s.needs())}
+
+
+def _require_needed(structure: Structure, every: Mapping[str, Structure]) -> None:
+    for field, need in structure.needs():
+        if need not in every:
+            near = get_close_matches(need, every, n=1)
+            hint = f"; did you mean {near[0]}?" if near else ": its package must be in a folder too"
+            why = f'field "{field.name}" is of type {need}, which is not there{hint}'
+            raise InterfaceError(f"{structure.source}: {why}", structure.source)
+
+
+def _require_end(
+    structure: Structure, every: Mapping[str, Structure], done: set[str], above: tuple[str, ...]
+) -> None:
+    if structure.name in above:
+        why = f"{structure.name} contains itself ({' → '.join((*above, structure.name))})"
+        raise InterfaceError(f"{structure.source}: {why}", structure.source)
+    if structure.name not in done:
+        for _, need in structure.needs():
+            _require_end(every[need], every, done, (*above, structure.name))
+        done.add(structure.name)

@@ -1,0 +1,133 @@
+"""The text of .msg, .srv and .action files → structures. No I/O.
+
+Source: the ROS 2 interface definition language (design.ros2.org, "legacy_interface_definition").
+"""
+
+import re
+from pathlib import Path
+from typing import Any, Final, NoReturn
+
+from app.errors import InterfaceError
+from app.interfaces.composition import composed_action, composed_service
+from app.interfaces.definitions import BASE_TYPES, TEXTS, Definitions, Field, Structure, Type
+from app.interfaces.literals import literal
+
+PACKAGE: Final = re.compile(r"[a-z](?:_?[a-z0-9])*")
+MESSAGE: Final = re.compile(r"[A-Z][A-Za-z0-9]*")
+FIELD: Final = re.compile(r"[a-z](?:_?[a-z0-9])*")
+CONSTANT: Final = re.compile(r"[A-Z](?:_?[A-Z0-9])*")
+
+_LINE: Final = re.compile(r"(?P<type>\S+)\s+(?P<name>\w+)(?:\s*(?P<is>=)\s*|\s+|(?=#)|$)(?P<value>.*)")
+_TYPE: Final = re.compile(
+    r"(?P<name>[A-Za-z][\w/]*)(?:<=(?P<bound>[0-9]+))?(?:\[(?P<most><=)?(?P<size>[0-9]*)\])?"
+)
+_OLD_NAMES: Final = {
+    "time": "builtin_interfaces/msg/Time",
+    "duration": "builtin_interfaces/msg/Duration",
+}
+SEPARATOR: Final = "---"
+KINDS: Final = ("msg", "srv", "action")
+
+Line = tuple[int, str]
+
+
+def parsed(text: str, package: str, kind: str, name: str, source: Path) -> Definitions:
+    """What one file defines; `kind` is its suffix: "msg", "srv" or "action".
+
+    A service and an action become all the structures that ROS makes of them. InterfaceError names
+    file and line.
+    """
+    if not PACKAGE.fullmatch(package):
+        raise InterfaceError(f'{source}: "{package}" is not a package name: a-z, 0-9 and "_"', source)
+    if not MESSAGE.fullmatch(name):
+        why = "is not an interface name: letters and digits, a capital first"
+        raise InterfaceError(f'{source}: "{name}" {why}', source)
+    whole = f"{package}/{kind}/{name}"
+    sections = _sections(text)
+    wanted = KINDS.index(kind) + 1
+    if len(sections) != wanted:
+        why = f'has {len(sections) - 1} "{SEPARATOR}" lines; a .{kind} file has {wanted - 1}'
+        raise InterfaceError(f"{source}: {why}", source)
+    if kind == "msg":
+        return Definitions({whole: _structure(whole, sections[0], source)})
+    endings = ("Request", "Response") if kind == "srv" else ("Goal", "Result", "Feedback")
+    parts = [
+        _structure(f"{whole}_{ending}", lines, source)
+        for ending, lines in zip(endings, sections, strict=True)
+    ]
+    return composed_service(whole, *parts) if kind == "srv" else composed_action(whole, *parts)
+
+
+def _sections(text: str) -> list[list[Line]]:
+    """Numbered lines with something in them, parted at the separators."""
+    sections: list[list[Line]] = [[]]
+    for number, line in enumerate(text.removeprefix("\ufeff").splitlines(), 1):
+        line = line.strip()
+        if line == SEPARATOR:
+            sections.append([])
+        elif line and not line.startswith("#"):
+            sections[-1].append((number, line))
+    return sections
+
+
+def _structure(name: str, lines: list[Line], source: Path) -> Structure:
+    fields: dict[str, Field] = {}
+    constants: dict[str, Any] = {}
+    for number, line in lines:
+        try:
+            match = _LINE.fullmatch(line) or _fail(f'"{line}" is not "type name"')
+            kind = _type(match["type"], name.split("/")[0])
+            each, value = match["name"], match["value"]
+            if each in fields or each in constants:
+                _fail(f'"{each}" is there twice')
+            if match["is"]:
+                constants[each] = _constant(kind, each, value)
+            else:
+                fields[each] = _field(kind, each, value)
+        except ValueError as error:
+            raise InterfaceError(f"{source}:{number}: {error}", source) from None
+    return Structure(name, tuple(fields.values()), constants, source)
+
+
+def _constant(kind: Type, name: str, value: str) -> Any:
+    if kind.nested or kind.many != "one":
+        _fail(f"a constant is of a base type, not {kind}")
+    if not CONSTANT.fullmatch(name):
+        _fail(f'"{name}" is not a constant\'s name: A-Z, 0-9 and single "_"')
+    return literal(kind, value)
+
+
+def _field(kind: Type, name: str, value: str) -> Field:
+    if not FIELD.fullmatch(name):
+        _fail(f'"{name}" is not a field\'s name: a-z, 0-9 and single "_", a letter first')
+    default = value if value and not value.startswith("#") else None
+    return Field(name, kind, None if default is None else literal(kind, default))
+
+
+def _type(text: str, package: str) -> Type:
+    match = _TYPE.fullmatch(text) or _fail(f'"{text}" is not a type')
+    name, bound, size = match["name"], match["bound"], match["size"]
+    if name not in BASE_TYPES or name == "octet":
+        name = _OLD_NAMES.get(name) or _full_name(name, package)
+    if bound is not None and (name not in TEXTS or not int(bound)):
+        _fail(f'"{text}": only a string has a bound, of 1 at least')
+    if size and not int(size):
+        _fail(f'"{text}": a list has 1 element at least')
+    if match["most"] and not size:
+        _fail(f'"{text}": after "<=" stands how many at most')
+    many = "one" if size is None else "array" if size and not match["most"] else "sequence"
+    return Type(name, int(bound or 0), many, int(size or 0))  # type: ignore[arg-type]
+
+
+def _full_name(name: str, package: str) -> str:
+    """ "Pose" and "geometry_msgs/Pose" in a definition → "geometry_msgs/msg/Pose"."""
+    *before, last = name.split("/")
+    named = MESSAGE.fullmatch(last.partition("_")[0]) and all(map(PACKAGE.fullmatch, before))
+    if named and len(before) < 3:
+        where = before if len(before) == 2 else [*(before or [package]), "msg"]
+        return "/".join([*where, last])
+    return _fail(f'"{name}" is not a type: a base type, Name, or package/Name')
+
+
+def _fail(why: str) -> NoReturn:
+    raise ValueError(why)

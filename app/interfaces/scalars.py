@@ -1,0 +1,108 @@
+"""One value of a base type: what fits, and what is wrong with what does not."""
+
+import math
+import reprlib
+from collections.abc import Callable, Mapping
+from typing import Any, Final
+
+import numpy
+
+from app.errors import FieldError
+from app.interfaces.definitions import INTEGERS, Type
+
+Check = Callable[[Any], Any]  # what came → what is sent; FieldError with "" or "[3]" as its field
+
+FLOAT_MAX: Final[Mapping[str, float]] = {
+    "float32": float(numpy.finfo(numpy.float32).max),
+    "float64": math.inf,
+}
+
+_short = reprlib.Repr()
+_short.maxstring = _short.maxother = 60
+
+
+def shown(given: Any) -> str:
+    """A value as an error message shows it: never longer than a line."""
+    return _short.repr(given)
+
+
+def scalar_check(kind: Type) -> Check:
+    """The check of one value of a base type."""
+    if kind.name == "bool":
+        return _bool
+    if kind.name in INTEGERS:
+        return _integer(kind.name)
+    if kind.name in FLOAT_MAX:
+        return _float(kind.name)
+    return _text(kind)
+
+
+def _plain(given: Any) -> Any:
+    """A NumPy scalar as Python's own."""
+    return given.item() if isinstance(given, numpy.generic) else given
+
+
+def _bool(given: Any) -> bool:
+    if given is True or given is False:
+        return bool(given)
+    if isinstance(given, numpy.bool_):
+        return bool(given)
+    raise FieldError("", f"must be true or false, not {shown(given)}")
+
+
+def _integer(name: str) -> Check:
+    low, high = INTEGERS[name]
+
+    def check(given: Any) -> int:
+        if type(given) is not int:
+            given = _plain(given)
+            if type(given) is not int:
+                raise FieldError("", f"must be a whole number ({name}), not {shown(given)}")
+        if low <= given <= high:
+            return given
+        raise FieldError("", f"{given} is out of range: {name} goes from {low} to {high}")
+
+    return check
+
+
+def _float(name: str) -> Check:
+    highest = FLOAT_MAX[name]
+
+    def check(given: Any) -> float:
+        given = _plain(given)
+        if type(given) not in (int, float):
+            raise FieldError("", f"must be a number ({name}), not {shown(given)}")
+        try:
+            value = float(given)
+        except OverflowError:
+            raise FieldError("", f"{shown(given)} is out of range for {name}") from None
+        if abs(value) > highest and not math.isinf(value):
+            raise FieldError("", f"{given} is out of range: {name} goes to {highest:g}")
+        return value
+
+    return check
+
+
+def _text(kind: Type) -> Check:
+    name, bound = kind.name, kind.bound
+    encoding, unit, units = (
+        ("utf-8", 1, "bytes") if name == "string" else ("utf-16-le", 2, "UTF-16 units")
+    )
+
+    def check(given: Any) -> str:
+        if not isinstance(given, str):
+            raise FieldError("", f"must be text ({name}), not {shown(given)}")
+        if "\0" in given:
+            raise FieldError("", "has a NUL character, at which a ROS string ends")
+        size = len(given)
+        if not given.isascii():
+            try:
+                size = len(given.encode(encoding)) // unit
+            except UnicodeEncodeError:
+                why = "is not valid Unicode text (it has half of a surrogate pair)"
+                raise FieldError("", why) from None
+        if bound and size > bound:
+            raise FieldError("", f"is {size} {units} long; {kind} takes {bound} at most")
+        return given
+
+    return check

@@ -1,0 +1,195 @@
+"""The ROS 2 interfaces that a panel may name, and their values to and from CDR bytes."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from difflib import get_close_matches
+from functools import cache, lru_cache
+from pathlib import Path
+from typing import Any, Final
+
+from rosbags.typesys import Stores, get_typestore
+
+from app.errors import DecodeError, InterfaceError
+from app.interfaces.codec import Codec, widened
+from app.interfaces.composition import ActionTypes, action_types
+from app.interfaces.definitions import Definitions, Structure, Type, from_store
+from app.interfaces.hashes import type_hash
+from app.interfaces.packages import available, complete, read_folders, stamp
+from app.interfaces.paths import steps
+from app.interfaces.scalars import Check
+from app.interfaces.values import field_check, message_check
+
+DISTROS: Final[Mapping[str, Stores]] = {
+    "humble": Stores.ROS2_HUMBLE,
+    "iron": Stores.ROS2_IRON,
+    "jazzy": Stores.ROS2_JAZZY,
+    "kilted": Stores.ROS2_KILTED,
+}
+
+# Definitions beside rosbags' messages: services, actions, and packages that it lacks.
+BUILTIN: Final = Path(__file__).parent / "builtin"
+
+# rosbags drops the defaults of its messages; these are all that they have in ROS.
+DEFAULTS: Final[Mapping[str, Mapping[str, Any]]] = {
+    "geometry_msgs/msg/Quaternion": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0},
+    "rcl_interfaces/msg/ParameterDescriptor": {"read_only": False, "dynamic_typing": False},
+    "sensor_msgs/msg/NavSatStatus": {"status": -2},
+    "type_description_interfaces/msg/FieldType": {"type_id": 0},
+}
+NO_DEFAULTS: Final = {"humble": "sensor_msgs/msg/NavSatStatus", "iron": "sensor_msgs/msg/NavSatStatus"}
+
+
+class Interfaces:
+    """Message, service and action types of one distribution and of folders of packages.
+
+    A message type is "package/msg/Name"; a part of a service or an action is one too, named as ROS
+    names it: "std_srvs/srv/SetBool_Request", "example_interfaces/action/Fibonacci_Feedback".
+    """
+
+    def __init__(self, distro: str = "jazzy", folders: Sequence[Path] = ()) -> None:
+        """`folders` are packages, or have packages in them (a workspace's `share`); what they
+        define goes before the distribution's. InterfaceError names the file that can't be used."""
+        known = _distribution(distro)
+        self._distro = distro
+        self._definitions = known | complete(read_folders(folders), known)
+        self._structures = self._definitions.structures
+        self._codec = Codec(get_typestore(DISTROS[distro]), self._structures)
+        self._checks: dict[str, Check] = {}
+        self._hashes: dict[str, str] = {}
+
+    @property
+    def types(self) -> tuple[str, ...]:
+        """Every type that can be encoded, parts of services and actions too."""
+        return tuple(self._structures)
+
+    def require(self, type_name: str) -> None:
+        """Raises InterfaceError, with the nearest known names, if there is no such type."""
+        if type_name not in self._structures:
+            raise self._unknown(type_name, self._structures)
+
+    def service(self, type_name: str) -> tuple[str, str]:
+        """(request type, response type) of a service like "std_srvs/srv/SetBool"."""
+        request, response = f"{type_name}_Request", f"{type_name}_Response"
+        if request not in self._structures or response not in self._structures:
+            raise self._unknown(type_name, self._wholes("/srv/"), "a service")
+        return request, response
+
+    def action(self, type_name: str) -> ActionTypes:
+        """The types of an action like "example_interfaces/action/Fibonacci"."""
+        types = action_types(type_name)
+        if types.feedback_message not in self._structures:
+            raise self._unknown(type_name, self._wholes("/action/"), "an action")
+        return types
+
+    def constants(self, type_name: str) -> Mapping[str, Any]:
+        """Name → value (bool, int, float or str) of the constants in a type's definition."""
+        self.require(type_name)
+        return self._structures[type_name].constants
+
+    def field_type(self, type_name: str, path: str) -> str:
+        """The type at a path ("pose.position.x", "poses[0]"), as in a .msg file ("float64[36]")."""
+        self.require(type_name)
+        at = Type(type_name)
+        for step in steps(path):
+            at = self._named(at, step, path) if isinstance(step, str) else _indexed(at, step, path)
+        return str(at)
+
+    def type_hash(self, type_name: str) -> str:
+        """The REP 2016 type hash, `RIHS01_…`, as the robot's own nodes compute it.
+
+        Of a message, a part, a service or an action. InterfaceError where the distribution has no
+        such hash: before iron, services and actions.
+        """
+        if type_name not in self._hashes:
+            self._hashes[type_name] = type_hash(self._described(type_name), self._described)
+        return self._hashes[type_name]
+
+    def encode(self, type_name: str, fields: Mapping[str, Any]) -> bytes:
+        """The message as XCDR1 bytes with their encapsulation header (00 01 00 00).
+
+        Every field without a default must be there, and each must fit its definition: else
+        FieldError, which names it. Numeric lists may be NumPy arrays, 8-bit unsigned ones `bytes`.
+        """
+        check = self._checks.get(type_name) or self._check(type_name)
+        return self._codec.serialize(check(fields), type_name)
+
+    def decode(self, type_name: str, data: bytes) -> Any:
+        """The message object (fields as attributes); DecodeError if these bytes are not one."""
+        try:
+            return self._codec.deserialize(data, type_name)
+        except Exception as error:  # whatever arrived, it must not stop the panel
+            raise DecodeError(f"{len(data)} bytes are not a {type_name}: {error}") from error
+
+    def _check(self, type_name: str) -> Check:
+        if type_name not in self._checks:
+            self.require(type_name)
+            structure = self._structures[type_name]
+            checks = [self._field_check(one.type) for one in structure.fields]
+            make = self._codec.prepare(type_name)
+            self._checks[type_name] = message_check(structure, make, checks)
+        return self._checks[type_name]
+
+    def _field_check(self, kind: Type) -> Check:
+        return field_check(kind, self._check, widened)
+
+    def _named(self, at: Type, name: str, path: str) -> Type:
+        inner = self._structures[at.name].fields if at.nested and at.many == "one" else ()
+        for one in inner:
+            if one.name == name:
+                return one.type
+        has = f"has {', '.join(one.name for one in inner)}" if inner else "has no fields of its own"
+        raise InterfaceError(f'there is no "{name}" (in "{path}"): {at} {has}')
+
+    def _described(self, type_name: str) -> Structure:
+        found = self._definitions.described(type_name)
+        if found is None:
+            raise self._unknown(type_name, self._definitions.described_names(), "described")
+        return found
+
+    def _wholes(self, kind: str) -> list[str]:
+        """Services or actions that are there, with or without hashes."""
+        ending = "_Response" if kind == "/srv/" else "_FeedbackMessage"
+        return [n.removesuffix(ending) for n in self._structures if kind in n and n.endswith(ending)]
+
+    def _unknown(self, name: str, known: Any, what: str = "an interface") -> InterfaceError:
+        near = get_close_matches(name, known, n=3)
+        hint = f"; did you mean {' or '.join(near)}?" if near else ""
+        return InterfaceError(f'"{name}" is not {what} of ROS 2 {self._distro}{hint}')
+
+
+def _indexed(at: Type, index: int, path: str) -> Type:
+    if at.many == "one":
+        raise InterfaceError(f'there is no [{index}] (in "{path}"): {at} is not a list')
+    if at.size and index >= at.size:
+        raise InterfaceError(f'there is no [{index}] (in "{path}"): {at} ends with [{at.size - 1}]')
+    return at.element
+
+
+@cache
+def _builtin() -> Definitions:
+    return read_folders([BUILTIN])
+
+
+@cache
+def _distribution(distro: str) -> Definitions:
+    """What every robot of a distribution has."""
+    stock = Definitions()
+    for name, definition in get_typestore(DISTROS[distro]).fielddefs.items():
+        defaults = {} if NO_DEFAULTS.get(distro) == name else DEFAULTS.get(name, {})
+        structure = from_store(name, definition)
+        fields = (replace(one, default=defaults.get(one.name)) for one in structure.fields)
+        stock.structures[name] = replace(structure, fields=tuple(fields))
+    return available(_builtin(), stock) | stock
+
+
+def interfaces_of(distro: str, folders: Sequence[Path] = ()) -> Interfaces:
+    """The one instance for a distribution and folders, read anew only when a file has changed.
+
+    Reading all definitions of a distribution takes a tenth of a second.
+    """
+    return _made(distro, tuple(folders), stamp(folders))
+
+
+@lru_cache(8)
+def _made(distro: str, folders: tuple[Path, ...], _stamp: object) -> Interfaces:
+    return Interfaces(distro, folders)
