@@ -6,7 +6,7 @@ the field.
 """
 
 from app.interfaces.composition import ActionTypes
-from app.interfaces.definitions import INTEGERS, PLACEHOLDER
+from app.interfaces.definitions import INTEGERS, PLACEHOLDER, Field, Structure, Type
 from app.interfaces.paths import value_at
 from app.interfaces.plain import to_plain
 from app.interfaces.store import DISTROS, Interfaces, interfaces_of
@@ -16,7 +16,10 @@ __all__ = [
     "INTEGERS",
     "PLACEHOLDER",
     "ActionTypes",
+    "Field",
     "Interfaces",
+    "Structure",
+    "Type",
     "interfaces_of",
     "to_plain",
     "value_at",

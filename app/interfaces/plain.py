@@ -53,5 +53,5 @@ def _array(values: "numpy.ndarray[Any, Any]") -> list[Any]:
 @lru_cache(4096)
 def _names(of: type[Any]) -> tuple[tuple[str, str], ...]:
     """(attribute, field name) of a message class; no ROS name ends with "_" by itself."""
-    own = [one.name for one in fields(of) if one.name not in (PLACEHOLDER, "__msgtype__")]
+    own = [one.name for one in fields(of) if one.name != PLACEHOLDER]
     return tuple((name, name.removesuffix("_")) for name in own)

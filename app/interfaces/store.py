@@ -53,14 +53,14 @@ class Interfaces:
         self._distro = distro
         self._definitions = known | complete(read_folders(folders), known)
         self._structures = self._definitions.structures
-        self._codec = Codec(get_typestore(DISTROS[distro]), self._structures)
+        self._codec = Codec(self._structures)
         self._checks: dict[str, Check] = {}
         self._hashes: dict[str, str] = {}
 
     @property
-    def types(self) -> tuple[str, ...]:
-        """Every type that can be encoded, parts of services and actions too."""
-        return tuple(self._structures)
+    def structures(self) -> Mapping[str, Structure]:
+        """The definition of every type that can be encoded, parts of services and actions too."""
+        return self._structures
 
     def require(self, type_name: str) -> None:
         """Raises InterfaceError, with the nearest known names, if there is no such type."""

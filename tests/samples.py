@@ -1,0 +1,71 @@
+"""Values for any interface: random ones, and those at the edges of what a definition takes."""
+
+import math
+import random
+from collections.abc import Mapping
+from typing import Any, Final, Literal
+
+import numpy
+
+from app.interfaces.definitions import INTEGERS, Structure, Type
+
+Edge = Literal["random", "least", "most"]
+
+LETTERS: Final = "aZ09 _\n\"'\\éß漢字🤖𝄞"
+LONGEST: Final = 5  # elements of an unbounded list
+FLOATS: Final = (0.0, -0.0, 1.5, -1e-40, 1e30, math.inf, -math.inf, math.nan)
+LARGEST: Final[Mapping[str, float]] = {
+    "float32": float(numpy.finfo(numpy.float32).max),
+    "float64": float(numpy.finfo(numpy.float64).max),
+}
+
+
+class Samples:
+    """Fields for any structure; the same seed gives the same ones.
+
+    "least" has the lowest values and the shortest lists and texts, "most" the highest and longest.
+    """
+
+    def __init__(self, structures: Mapping[str, Structure], seed: int = 0) -> None:
+        self._structures = structures
+        self._chance = random.Random(seed)
+
+    def fields(self, type_name: str, edge: Edge = "random") -> dict[str, Any]:
+        fields = self._structures[type_name].fields
+        return {one.name: self._value(one.type, edge) for one in fields}
+
+    def _value(self, kind: Type, edge: Edge) -> Any:
+        if kind.many != "one":
+            return [self._value(kind.element, edge) for _ in range(self._length(kind, edge))]
+        if kind.nested:
+            return self.fields(kind.name, edge)
+        if kind.name == "bool":
+            return edge == "most" or (edge == "random" and self._chance.random() < 0.5)
+        if kind.name in INTEGERS:
+            return self._integer(*INTEGERS[kind.name], edge)
+        return self._float(kind.name, edge) if kind.name in LARGEST else self._text(kind, edge)
+
+    def _length(self, kind: Type, edge: Edge) -> int:
+        if kind.many == "array":
+            return kind.size
+        most = min(kind.size or LONGEST, LONGEST)
+        return {"least": 0, "most": most}.get(edge, self._chance.randint(0, min(most, 3)))
+
+    def _integer(self, low: int, high: int, edge: Edge) -> int:
+        if edge != "random":
+            return low if edge == "least" else high
+        return self._chance.choice((low, high, 0, 1, self._chance.randint(low, high)))
+
+    def _float(self, name: str, edge: Edge) -> float:
+        if edge != "random":
+            return -LARGEST[name] if edge == "least" else LARGEST[name]
+        value = self._chance.choice((*FLOATS, self._chance.gauss(0, 1000)))
+        return float(numpy.float32(value)) if name == "float32" else value
+
+    def _text(self, kind: Type, edge: Edge) -> str:
+        if edge == "least":
+            return ""
+        if edge == "most":
+            return "x" * (kind.bound or 300)
+        text = "".join(self._chance.choices(LETTERS, k=self._chance.randint(0, 9)))
+        return text[: kind.bound // 4] if kind.bound else text
