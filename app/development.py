@@ -1,4 +1,5 @@
-"""`make dev`: the panel file, templates and static files take effect when they are saved.
+"""`make dev`: what is saved takes effect: the panel file, interface files beside it, templates and
+static files.
 
 Python files are uvicorn's to watch (`--reload`). A panel file with a fault keeps the old panel on
 the screen, with the fault above it.
@@ -22,6 +23,8 @@ log = logging.getLogger("kiosk.development")
 EMPTY_PANEL = Panel.model_validate(
     {"title": "No panel", "mode": "demo", "page": [{"id": "none", "title": "No page"}]}
 )
+
+SUFFIXES = (".html", ".css", ".js", ".msg", ".srv", ".action")
 
 Running = Callable[[Settings, Panel], AbstractAsyncContextManager[tuple[Kiosk, Assets]]]
 
@@ -58,7 +61,7 @@ class _Reloader:
         watched = (panel.parent, shipped("templates"), shipped("static"))
         async for changes in awatch(*watched, recursive=True):
             touched = {Path(path) for _, path in changes}
-            files = {path for path in touched if path.suffix in (".html", ".css", ".js")}
+            files = {path for path in touched if path.suffix in SUFFIXES}
             if panel in touched or files:
                 await self._reload()
 

@@ -45,7 +45,7 @@ class Kiosk:
         self.panel = panel
         self._simulated = simulated
         self.fault = fault
-        self.interfaces = interfaces_of(panel.distro)
+        self.interfaces = interfaces_of(panel.distro, panel.interfaces)
         self._loop = asyncio.get_running_loop()
         self.link = Link(config, self._wake)
         self.robot = Robot(panel, self.interfaces, self.link.zid)

@@ -9,9 +9,9 @@ from collections import Counter
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
-from app.errors import DecodeError
+from app.errors import DecodeError, FieldError
 from app.graph import Graph
-from app.interfaces import Interfaces
+from app.interfaces import Interfaces, value_at
 from app.keys import key_of
 from app.panel.model import Panel
 
@@ -114,7 +114,8 @@ class Robot:
 
 
 def value_of(message: Any, path: str) -> Any:
-    """The field at a dotted path of a decoded message."""
-    for name in path.split("."):
-        message = getattr(message, name)
-    return message
+    """The field at a path of a decoded message; None where a list in it is too short."""
+    try:
+        return value_at(message, path)
+    except FieldError:
+        return None

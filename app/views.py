@@ -122,7 +122,9 @@ def shown(state: str, text: str, note: str, until: float = math.inf) -> tuple[di
 
 
 def written(value: Any) -> str:
-    """A field's value as text, cut to what a readout can show."""
+    """A field's value as text, cut to what a readout can show; None is a value that is not there."""
+    if value is None:
+        return "—"
     if isinstance(value, bool):
         return "true" if value else "false"
     text = _number(value) if isinstance(value, float) else str(value)

@@ -15,6 +15,18 @@ ORDER = (
     "app.sentences",
     "app.logs",
     "app.keys",
+    "app.interfaces.definitions",
+    "app.interfaces.scalars",
+    "app.interfaces.literals",
+    "app.interfaces.composition",
+    "app.interfaces.parsing",
+    "app.interfaces.packages",
+    "app.interfaces.paths",
+    "app.interfaces.plain",
+    "app.interfaces.hashes",
+    "app.interfaces.values",
+    "app.interfaces.codec",
+    "app.interfaces.store",
     "app.interfaces",
     "app.panel.template",
     "app.panel.model",
@@ -93,6 +105,11 @@ def test_only_the_link_and_the_simulator_speak_zenoh() -> None:
 
 def test_the_simulator_knows_nothing_of_the_server() -> None:
     assert of_project("app.simulator") <= KNOWN_TO_THE_SIMULATOR
+
+
+def test_the_interfaces_know_nothing_of_the_panel() -> None:
+    own = {module for module in MODULES if module.startswith("app.interfaces")}
+    assert {name for module in own for name in of_project(module)} - own <= {"app.errors"}
 
 
 def test_the_link_knows_no_view_and_no_panel() -> None:

@@ -38,7 +38,15 @@ def read_folders(folders: Sequence[Path]) -> Definitions:
 def stamp(folders: Sequence[Path]) -> tuple[tuple[Path, int, int], ...]:
     """Changes when a file of the folders does: each with its time and size."""
     files = [file for folder in folders for package in _packages(folder) for file in _files(package)]
-    return tuple((file, (about := file.stat()).st_mtime_ns, about.st_size) for file in files)
+    return tuple((file, *_age_and_size(file)) for file in files)
+
+
+def _age_and_size(file: Path) -> tuple[int, int]:
+    try:
+        about = file.stat()
+    except OSError:  # reading it will say why
+        return 0, 0
+    return about.st_mtime_ns, about.st_size
 
 
 def _packages(folder: Path) -> Iterator[Path]:

@@ -11,7 +11,7 @@ from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
 
-from app.errors import Fault, PanelError
+from app.errors import Fault, InterfaceError, PanelError
 from app.interfaces import interfaces_of
 from app.panel.check import faults_in
 from app.panel.model import ID, KINDS, Panel
@@ -28,18 +28,31 @@ def load_panel(path: Path) -> Panel:
     revision = hashlib.sha256(data).hexdigest()[:12]
     faults = [Fault("revision", "unknown key")] if tables.pop("revision", None) is not None else []
     try:
-        panel = Panel.model_validate(tables | {"revision": revision})
+        panel = Panel.model_validate(tables | {"revision": revision}, context=path.parent)
     except ValidationError as error:
         faults += map(_fault, error.errors())
-        faults += _faults_of_the_rest(tables, error)
+        faults += _faults_of_the_rest(tables, error, path.parent)
     else:
-        faults += faults_in(panel, interfaces_of(panel.distro))
+        faults += _faults_with_types(panel)
     if faults:
         raise PanelError(str(path), tuple(faults))
     return panel
 
 
-def _faults_of_the_rest(tables: dict[str, Any], error: ValidationError) -> Iterator[Fault]:
+def _faults_with_types(panel: Panel) -> Iterator[Fault]:
+    try:
+        interfaces = interfaces_of(panel.distro, panel.interfaces)
+    except InterfaceError as error:
+        source = error.source or Path()
+        at = next((i for i, one in enumerate(panel.interfaces) if source.is_relative_to(one)), 0)
+        yield Fault(f"interfaces[{at}]", str(error))
+        return
+    yield from faults_in(panel, interfaces)
+
+
+def _faults_of_the_rest(
+    tables: dict[str, Any], error: ValidationError, folder: Path
+) -> Iterator[Fault]:
     """What else is wrong: the file is checked with harmless stand-ins for what has no right shape."""
     mended = copy.deepcopy(tables)
     for fault in error.errors():
@@ -47,6 +60,8 @@ def _faults_of_the_rest(tables: dict[str, Any], error: ValidationError) -> Itera
             case ("page", int(p), "widget", int(w), *_):
                 old = tables["page"][p]["widget"][w]
                 mended["page"][p]["widget"][w] = _stand_in(old, f"{p}_{w}") | {"kind": "text"}
+            case ("interfaces", *_):
+                return  # without its types nothing can be said of the rest
             case ("interlock", int(i), *_):
                 topic = {"topic": f"/faulty_{i}"}
                 mended["interlock"][i] = _stand_in(tables["interlock"][i], str(i)) | topic
@@ -57,10 +72,10 @@ def _faults_of_the_rest(tables: dict[str, Any], error: ValidationError) -> Itera
                 mended.pop(key, None)
                 mended.setdefault("title", "?")
     try:
-        panel = Panel.model_validate(mended)
+        panel = Panel.model_validate(mended, context=folder)
     except ValidationError:
         return  # too much is wrong: what was found already comes first
-    yield from faults_in(panel, interfaces_of(panel.distro))
+    yield from _faults_with_types(panel)
 
 
 def _stand_in(old: Any, number: str) -> dict[str, Any]:
@@ -121,6 +136,8 @@ def _message(error: Any, model: type[BaseModel], location: tuple[str | int, ...]
             near = get_close_matches(str(location[-1]), known, n=1)
             hint = f'did you mean "{near[0]}"?' if near else f"known here: {', '.join(known)}"
             return f"unknown key; {hint}"
+        case "tuple_type" if location == ("interfaces",):
+            return 'must be a list of folders: write ["folder"]'
         case "tuple_type":
             return f"must be a list of tables: write [[{'.'.join(map(str, _names(location)))}]]"
         case "missing":

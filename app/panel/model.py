@@ -1,9 +1,10 @@
 """The descriptions that a panel file becomes. What a key means is in the README."""
 
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo
 
 from app.keys import MESSAGE_TYPE, NAMESPACE, TOPIC
 
@@ -30,12 +31,24 @@ def _namespace(given: str) -> str:
     return whole
 
 
+def _folder(given: Any, info: ValidationInfo) -> Path:
+    """Relative to the panel file's folder, which is the context of the validation."""
+    if not isinstance(given, str) or not given:
+        raise ValueError(f"must be the path of a folder, not {given!r}")
+    folder = Path(info.context or "") / given
+    if not folder.is_dir():
+        raise ValueError(f"{folder} is not a folder: it must be a ROS package or have some in it")
+    return folder
+
+
 ID: Final = r"^[a-z][a-z0-9_]{0,63}$"
 Id = Annotated[str, Field(pattern=ID)]
 Label = Annotated[str, Field(min_length=1, max_length=120)]
 Topic = Annotated[str, AfterValidator(_topic), Field(max_length=255)]
 Type = Annotated[str, AfterValidator(_type)]
-FieldPath = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*(\.[a-z][a-z0-9_]*)*$")]
+_STEP: Final = r"[a-z][a-z0-9_]*(\[[0-9]{1,9}\])*"
+FieldPath = Annotated[str, Field(pattern=rf"^{_STEP}(\.{_STEP})*$")]
+Folder = Annotated[Path, BeforeValidator(_folder)]
 Seconds = Annotated[float, Field(gt=0, le=86400, allow_inf_nan=False)]
 
 
@@ -105,6 +118,7 @@ class Panel(Description):
     mode: Literal["demo", "live"] = "live"
     language: Literal["en"] = "en"
     distro: Literal["humble", "iron", "jazzy", "kilted"] = "jazzy"
+    interfaces: Annotated[tuple[Folder, ...], Field(strict=False)] = ()
     namespace: Annotated[str, AfterValidator(_namespace)] = ""
     mm_per_px: Annotated[float, Field(gt=0.02, lt=1)] = 0.22
     interlocks: Annotated[tuple[Interlock, ...], Field(strict=False)] = Field((), alias="interlock")
