@@ -194,7 +194,8 @@ class Actions:
         """The reply; None when there is none in time, or the bridge went away."""
         key = f"{self._robot.key(goal.widget.action)}/_action/{what}"
         query = self._link.query(key, payload, timeout_s)
-        await asyncio.wait({query, goal.cut}, return_when=asyncio.FIRST_COMPLETED)
+        ends: set[asyncio.Future[Any]] = {query, goal.cut}
+        await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
         return query.result() if query.done() else None
 
     def _decoded(self, type_name: str, reply: bytes, name: str) -> Any:

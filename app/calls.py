@@ -89,10 +89,9 @@ class Calls:
 
     async def _awaited(self, waiting: _Waiting, corrected: Corrected) -> Answer:
         widget = waiting.widget
+        ends: set[asyncio.Future[Any]] = {waiting.answered, waiting.cut}
         await asyncio.wait(
-            {waiting.answered, waiting.cut},
-            timeout=widget.timeout_s,
-            return_when=asyncio.FIRST_COMPLETED,
+            ends, timeout=widget.timeout_s, return_when=asyncio.FIRST_COMPLETED
         )
         if waiting.answered.done() and (reply := waiting.answered.result()) is not None:
             return self._read(widget, reply)

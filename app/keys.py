@@ -49,7 +49,7 @@ ROSOUT: Final = Qos(transient_local=True, depth=1000)  # rmw_qos_profile_rosout_
 
 @dataclass(frozen=True, slots=True)
 class Endpoint:
-    """A publisher, subscriber or server that a token shows; `role` is None for the bridge's own token."""
+    """A publisher, subscriber or server that a token shows; `role` is None for the bridge's own."""
 
     zid: str
     role: Role | None = None

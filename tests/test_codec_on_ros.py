@@ -139,6 +139,18 @@ def test_ros_reads_and_writes_what_the_codec_does(ros: RosCodec, type_name: str)
         assert same(to_plain(OF_ROBOT.decode(type_name, theirs)), plain(fields))
 
 
+def test_ros_reads_and_writes_long_lists_and_texts_too(ros: RosCodec) -> None:
+    name = "test_msgs/msg/UnboundedSequences"
+    fields = Samples(OF_ROBOT.structures).fields(name, "most")
+    long = {n: v * 2000 for n, v in fields.items() if isinstance(v, list)}
+    long["uint8_values"] = [n % 256 for n in range(300_001)]
+    long["string_values"] = ["", "é" * 1_000_000]
+    data = OF_ROBOT.encode(name, {**fields, **long})
+    assert same(ros.decode(name, data), {**fields, **long})
+    theirs = cut(ros.encode(name, {**fields, **long}), data)
+    assert same(to_plain(OF_ROBOT.decode(name, theirs)), plain({**fields, **long}))
+
+
 @pytest.mark.parametrize("type_name", sorted(BUILT_IN.structures.keys() & set(TYPES)))
 def test_what_is_built_in_is_what_the_robot_has(type_name: str) -> None:
     mine, robots = BUILT_IN.structures[type_name], OF_ROBOT.structures[type_name]

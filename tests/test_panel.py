@@ -448,3 +448,56 @@ def test_a_readout_is_of_one_value(load: Load, field: str) -> None:
     found = faults(load, given)
     assert list(found) == [f"{READOUT}.field"]
     assert "a readout shows one value" in found[f"{READOUT}.field"]
+
+
+def interface(tmp_path: Path, text: str = "bool[2] closed\nfloat32 kelvin\n") -> None:
+    folder = tmp_path / "msgs/cell_msgs/msg"
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "Doors.msg").write_text(text)
+
+
+def with_doors(field: str) -> dict[str, Any]:
+    made = with_widget(3, type="cell_msgs/msg/Doors", field=field)
+    return {"interfaces": ["msgs"], **made}
+
+
+def test_a_panel_may_bring_interfaces_beside_it(load: Load, tmp_path: Path) -> None:
+    interface(tmp_path)
+    panel = load(with_doors("closed[1]"))
+    assert panel.interfaces == (tmp_path / "msgs",)
+    assert faults(load, with_doors("closed[2]")) == {
+        f"{READOUT}.field": 'there is no [2] (in "closed[2]"): bool[2] ends with [1]'
+    }
+
+
+def test_an_interface_file_with_a_fault_is_named(load: Load, tmp_path: Path) -> None:
+    interface(tmp_path, "bool closed\nfloat31 kelvin\n")
+    found = faults(load, with_doors("closed"))
+    assert list(found) == ["interfaces[0]"]
+    assert "msgs/cell_msgs/msg/Doors.msg:2: " in found["interfaces[0]"]
+
+
+def test_the_folder_with_the_fault_is_named(load: Load, tmp_path: Path) -> None:
+    interface(tmp_path)
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    found = faults(load, {**with_doors("closed"), "interfaces": ["msgs", "empty"]})
+    assert found == {
+        "interfaces[1]": f"{empty} has no interfaces: "
+        "they must be in <package>/msg/*.msg, srv/*.srv, action/*.action"
+    }
+
+
+@pytest.mark.parametrize(
+    ("given", "place", "why"),
+    [
+        (["none"], "interfaces[0]", "is not a folder: it must be a ROS package or have some in it"),
+        ([5], "interfaces[0]", "must be the path of a folder, not 5"),
+        ([""], "interfaces[0]", "must be the path of a folder, not ''"),
+        ("msgs", "interfaces", 'must be a list of folders: write ["folder"]'),
+    ],
+)
+def test_interfaces_are_folders(load: Load, given: Any, place: str, why: str) -> None:
+    found = faults(load, {"interfaces": given, **tables()})
+    assert list(found) == [place]
+    assert why in found[place]

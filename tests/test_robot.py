@@ -156,3 +156,10 @@ def test_a_value_is_read_at_its_path() -> None:
     )
     message = INTERFACES.decode("std_msgs/msg/Header", payload)
     assert (value_of(message, "stamp.sec"), value_of(message, "frame_id")) == (5, "base")
+
+
+def test_a_value_beyond_the_end_of_a_list_is_none() -> None:
+    payload = INTERFACES.encode("geometry_msgs/msg/Polygon", {"points": [{"x": 1, "y": 2, "z": 3}]})
+    message = INTERFACES.decode("geometry_msgs/msg/Polygon", payload)
+    assert value_of(message, "points[0].y") == 2.0
+    assert value_of(message, "points[1].y") is None

@@ -253,6 +253,7 @@ def test_a_readout_shows_a_field_inside() -> None:
         (-7, "-7"),
         (0.5, "0.5"),
         (math.nan, "nan"),
+        (None, "—"),
         ("", ""),
         ("<b>\n", "<b>\n"),
         ("x" * LONGEST_TEXT, "x" * LONGEST_TEXT),

@@ -35,5 +35,9 @@ def test_an_installed_wheel_serves_from_any_folder(tmp_path: Path) -> None:
         [str(python), "-m", "app.check"], cwd=elsewhere, capture_output=True, text=True, check=False
     )
     assert check.returncode == 0, check.stderr
+    services = (
+        "from app.interfaces import interfaces_of as of; of('jazzy').service('std_srvs/srv/SetBool')"
+    )
+    subprocess.run([str(python), "-c", services], cwd=elsewhere, check=True, timeout=60)
     # Installed, it needs no file of the checkout: these are its own.
     assert str(ROOT) not in check.stdout

@@ -101,9 +101,6 @@ class Definitions:
     def described(self, name: str) -> Structure | None:
         return self.structures.get(name) or self.wholes.get(name)
 
-    def described_names(self) -> set[str]:
-        return {*self.structures, *self.wholes}
-
 
 def from_store(name: str, definition: Any) -> Structure:
     """A structure out of rosbags' nested tuples: ([(name, type, value)…], [(field, type)…])."""

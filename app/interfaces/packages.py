@@ -93,12 +93,8 @@ def complete(found: Definitions, known: Definitions) -> Definitions:
     Events, and so the hashes of services and actions, are left out where the distribution has none
     (humble). InterfaceError where a structure needs one that is in neither, or needs itself.
     """
+    found = _with_events_or_none(found, known)
     every = known.structures | found.structures
-    if EVENT_INFO not in every:
-        kept = {
-            n: s for n, s in found.structures.items() if EVENT_INFO not in (t for _, t in s.needs())
-        }
-        found, every = Definitions(kept), known.structures | kept
     for structure in found.structures.values():
         _require_needed(structure, every)
     done: set[str] = set()
@@ -108,17 +104,29 @@ def complete(found: Definitions, known: Definitions) -> Definitions:
 
 
 def available(found: Definitions, known: Definitions) -> Definitions:
-    """The part of `found` whose every need is there, in itself or in `known`."""
-    while True:
-        every = known.described_names() | found.described_names()
-        kept = Definitions(_fulfilled(found.structures, every), _fulfilled(found.wholes, every))
-        if kept == found:
-            return kept
-        found = kept
+    """The files of `found` whose every need is there, in others of them or in `known`."""
+    found = _with_events_or_none(found, known)
+    while lacking := _lacking(found, known):
+        found = Definitions(_except(found.structures, lacking), _except(found.wholes, lacking))
+    return found
 
 
-def _fulfilled(structures: Mapping[str, Structure], every: set[str]) -> dict[str, Structure]:
-    return {n: s for n, s in structures.items() if all(need in every for _, need in s.needs())}
+def _with_events_or_none(found: Definitions, known: Definitions) -> Definitions:
+    """Without what can't be described: events, and so services and actions as wholes."""
+    if EVENT_INFO in known.structures or EVENT_INFO in found.structures:
+        return found
+    return Definitions(
+        {n: s for n, s in found.structures.items() if EVENT_INFO not in {need for _, need in s.needs()}}
+    )
+
+
+def _lacking(found: Definitions, known: Definitions) -> set[Path | None]:
+    every = known.structures.keys() | found.structures.keys()
+    return {s.source for s in found.structures.values() if any(n not in every for _, n in s.needs())}
+
+
+def _except(structures: Mapping[str, Structure], files: set[Path | None]) -> dict[str, Structure]:
+    return {name: one for name, one in structures.items() if one.source not in files}
 
 
 def _require_needed(structure: Structure, every: Mapping[str, Structure]) -> None:

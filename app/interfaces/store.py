@@ -143,7 +143,8 @@ class Interfaces:
     def _described(self, type_name: str) -> Structure:
         found = self._definitions.described(type_name)
         if found is None:
-            raise self._unknown(type_name, self._definitions.described_names(), "described")
+            names = {*self._structures, *self._definitions.wholes}
+            raise self._unknown(type_name, names, "a type with a hash")
         return found
 
     def _wholes(self, kind: str) -> list[str]:

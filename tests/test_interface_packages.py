@@ -1,0 +1,336 @@
+"""Interfaces from files: what is taken, and what is refused with its file, line and field."""
+
+import os
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from app.errors import FieldError, InterfaceError
+from app.interfaces import DISTROS, Interfaces, interfaces_of
+from app.interfaces.definitions import Type
+from app.interfaces.packages import read_folders
+from app.interfaces.store import BUILTIN
+
+Make = Callable[[Mapping[str, str]], Path]
+
+CELL = {
+    "cell_msgs/msg/Tool.msg": """
+        # What is in the gripper's place.
+        uint8 GRIPPER=0
+        uint8 CAMERA = 1   # with a lamp
+        string MAKER="A & B # C"
+        string PLAIN=not quoted  # and why
+        float64 HALF=.5
+        byte MASK=0x7f
+        bool FITTED=True
+        string<=8 name
+        uint8 kind 1       # a camera
+        float32[3] offset [0.5, -1, 1e3]
+        string[<=2] tags ["a, b", 'it\\'s']
+        Wear[] wear
+        geometry_msgs/Pose at
+    """,
+    "cell_msgs/msg/Wear.msg": "builtin_interfaces/Time since\nint64 count 0\n",
+    "cell_msgs/srv/Change.srv": "Tool tool\n---\nbool ok\nstring why\n",
+    "cell_msgs/action/Weld.action": "Tool tool\n---\nint32 spots\n---\nfloat32 progress\n",
+}
+AT = {"position": {"x": 0, "y": 0, "z": 0}, "orientation": {}}
+
+
+@pytest.fixture
+def make(tmp_path: Path) -> Make:
+    """Writes files of packages into a folder."""
+
+    def made(files: Mapping[str, str]) -> Path:
+        for name, text in files.items():
+            path = tmp_path / "share" / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text("\n".join(line.strip() for line in text.splitlines()))
+        return tmp_path / "share"
+
+    return made
+
+
+def test_a_package_brings_messages_services_and_actions(make: Make) -> None:
+    cell = Interfaces("jazzy", [make(CELL)])
+    assert [str(one.type) for one in cell.structures["cell_msgs/msg/Tool"].fields] == [
+        "string<=8",
+        "uint8",
+        "float32[3]",
+        "string[<=2]",
+        "cell_msgs/msg/Wear[]",
+        "geometry_msgs/msg/Pose",
+    ]
+    assert cell.service("cell_msgs/srv/Change") == (
+        "cell_msgs/srv/Change_Request",
+        "cell_msgs/srv/Change_Response",
+    )
+    weld = cell.action("cell_msgs/action/Weld")
+    assert cell.field_type(weld.send_goal_request, "goal_id.uuid[15]") == "uint8"
+    assert cell.field_type(weld.send_goal_request, "goal.tool.offset[2]") == "float32"
+    assert cell.field_type(weld.send_goal_response, "stamp.nanosec") == "uint32"
+    assert cell.field_type(weld.get_result_request, "goal_id") == "unique_identifier_msgs/msg/UUID"
+    assert cell.field_type(weld.get_result_response, "status") == "int8"
+    assert cell.field_type(weld.get_result_response, "result.spots") == "int32"
+    assert cell.field_type(weld.feedback_message, "feedback.progress") == "float32"
+    assert cell.service(weld.send_goal) == (weld.send_goal_request, weld.send_goal_response)
+    assert cell.service(weld.cancel_goal) == (
+        f"{weld.cancel_goal}_Request",
+        f"{weld.cancel_goal}_Response",
+    )
+    cell.require(weld.status)
+
+
+def test_constants_are_there_with_their_values(make: Make) -> None:
+    assert Interfaces("jazzy", [make(CELL)]).constants("cell_msgs/msg/Tool") == {
+        "GRIPPER": 0,
+        "CAMERA": 1,
+        "MAKER": "A & B # C",
+        "PLAIN": "not quoted",
+        "HALF": 0.5,
+        "MASK": 127,
+        "FITTED": True,
+    }
+
+
+def test_a_default_stands_for_what_is_not_said(make: Make) -> None:
+    cell = Interfaces("jazzy", [make(CELL)])
+    tool = "cell_msgs/msg/Tool"
+    decoded = cell.decode(tool, cell.encode(tool, {"name": "gun", "wear": [], "at": AT}))
+    assert (decoded.kind, decoded.offset.tolist()) == (1, [0.5, -1.0, 1000.0])
+    assert decoded.tags == ["a, b", "it's"]
+    assert decoded.at.orientation.w == 1.0
+    with pytest.raises(FieldError, match=r"wear\[0\].since: is missing"):
+        cell.encode(tool, {"name": "gun", "wear": [{}], "at": AT})
+
+
+@pytest.mark.parametrize(
+    "place", ["", "cell_msgs", "..", "../install"], ids=["share", "package", "above", "colcon"]
+)
+def test_a_folder_may_be_a_package_or_have_packages(make: Make, tmp_path: Path, place: str) -> None:
+    folder = make(CELL)
+    if place == "../install":
+        (tmp_path / "install/cell_msgs").mkdir(parents=True)
+        os.symlink(folder, tmp_path / "install/cell_msgs/share")
+    Interfaces("jazzy", [folder / place]).require("cell_msgs/msg/Tool")
+
+
+def test_a_package_is_named_by_its_package_xml(make: Make) -> None:
+    folder = make({"cell/msg/Lamp.msg": "bool on", "cell/package.xml": "<name> cell_msgs </name>"})
+    Interfaces("jazzy", [folder]).require("cell_msgs/msg/Lamp")
+
+
+def test_packages_may_need_each_other_in_any_order(make: Make) -> None:
+    folder = make({"a/msg/A.msg": "b/B b", "b/msg/B.msg": "c/msg/C[2] c", "c/msg/C.msg": "wstring c"})
+    both = Interfaces("jazzy", [folder / "a", folder / "c", folder / "b"])
+    fields = {"b": {"c": [{"c": "ä🤖"}, {"c": ""}]}}
+    decoded = both.decode("a/msg/A", both.encode("a/msg/A", fields))
+    assert [one.c for one in decoded.b.c] == ["ä🤖", ""]
+
+
+def test_what_the_robot_has_goes_before_what_is_built_in(make: Make) -> None:
+    folder = make({"std_msgs/msg/Bool.msg": "bool data\nbool sure"})
+    assert Interfaces("jazzy", [folder]).field_type("std_msgs/msg/Bool", "sure") == "bool"
+    assert interfaces_of("jazzy").encode("std_msgs/msg/Bool", {"data": True}) == b"\0\1\0\0\1"
+
+
+def test_a_field_may_have_a_name_that_python_keeps_for_itself(make: Make) -> None:
+    name = "cell_msgs/msg/Step"
+    step = Interfaces("jazzy", [make({f"{name}.msg": "int8 from\nint8 lambda\nint8 self\nint8 cls"})])
+    fields = {"from": 1, "lambda": 2, "self": 3, "cls": 4}
+    payload = step.encode(name, fields)
+    assert payload == b"\0\1\0\0\1\2\3\4"
+    assert step.decode(name, payload).from_ == 1
+
+
+@pytest.mark.parametrize(
+    ("line", "why"),
+    [
+        ("int32", "is not"),
+        ("int32 = 5", "is not"),
+        ("int33 x", '"int33" is not a type'),
+        ("octet x", '"octet" is not a type'),
+        ("a/b/c/D x", "is not a type"),
+        ("int32[0] x", "1 element at least"),
+        ("int32[<=] x", "how many at most"),
+        ("int32[-1] x", "is not a type"),
+        ("int32<=5 x", "only a string has a bound"),
+        ("string<=0 x", "of 1 at least"),
+        ("int32 X", "is not a field's name"),
+        ("int32 x_", "is not a field's name"),
+        ("int32 x__y", "is not a field's name"),
+        ("int32 1x", "is not a field's name"),
+        ("int32 x=5", "is not a constant's name"),
+        ("int32 X=", "nothing is not a value of int32"),
+        ("int32 X=five", "five is not a value of int32"),
+        ("uint8 X=256", "256: 256 is out of range: uint8 goes from 0 to 255"),
+        ("int8 x -129", "out of range"),
+        ("bool x yes", "yes is not a value of bool"),
+        ("float32 x 1e39", "out of range"),
+        ("float64 x 1,5", "is not a value"),
+        ("string<=2 x 'abc'", "is 3 bytes long"),
+        ("int32[2] x [1]", "needs 2 elements, not 1"),
+        ("int32[<=2] x [1,2,3]", "takes 2 elements at most, not 3"),
+        ("int32[2] x 1, 2", "is not a list"),
+        ("int32[] x [1,,2]", "commas"),
+        ("Wear x 5", "takes no default"),
+        ("Wear X=5", "a constant is of a base type"),
+        ("int32[2] X=[1,2]", "a constant is of a base type"),
+        ("int32 kind", '"kind" is there twice'),
+    ],
+)
+def test_a_line_that_is_wrong_is_named(make: Make, line: str, why: str) -> None:
+    files = {
+        "cell_msgs/msg/Wear.msg": "int8 a",
+        "cell_msgs/msg/Bad.msg": f"# Bad\nuint8 kind\n{line}\n",
+    }
+    with pytest.raises(InterfaceError, match=why) as caught:
+        Interfaces("jazzy", [make(files)])
+    assert f"{Path('cell_msgs/msg/Bad.msg')}:3: " in str(caught.value)
+    assert caught.value.source is not None
+    assert caught.value.source.name == "Bad.msg"
+
+
+@pytest.mark.parametrize(
+    ("files", "why"),
+    [
+        ({"m/srv/S.srv": "int8 a"}, 'S.srv: has 0 "---" lines; a .srv file has 1'),
+        ({"m/action/S.action": "---"}, "a .action file has 2"),
+        ({"m/msg/S.msg": "int8 a\n---\nint8 b"}, "a .msg file has 0"),
+        ({"m/msg/small.msg": ""}, "is not an interface name"),
+        ({"M/msg/Small.msg": ""}, "is not a package name"),
+        ({"m/msg/A.msg": "Lost x"}, 'A.msg: field "x" is of type m/msg/Lost, which is not there'),
+        ({"m/msg/A.msg": "std_msgs/Strin x"}, "did you mean std_msgs/msg/String"),
+        ({"m/srv/A.srv": "---\nlost_msgs/B x"}, 'field "x" is of type lost_msgs/msg/B'),
+        ({"m/msg/A.msg": "B b", "m/msg/B.msg": "A[] a"}, "contains itself"),
+        ({"m/msg/A.msg": "A[] a"}, "contains itself"),
+    ],
+)
+def test_files_that_do_not_fit_together_are_named(
+    make: Make, files: Mapping[str, str], why: str
+) -> None:
+    with pytest.raises(InterfaceError) as caught:
+        Interfaces("jazzy", [make(files)])
+    assert why in str(caught.value)
+
+
+def test_a_folder_without_interfaces_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InterfaceError, match="has no interfaces: they must be in"):
+        Interfaces("jazzy", [tmp_path])
+
+
+def test_a_file_that_is_no_text_is_refused(make: Make) -> None:
+    folder = make(CELL)
+    (folder / "cell_msgs/msg/Bad.msg").write_bytes(b"int8 \xff")
+    with pytest.raises(InterfaceError, match=r"Bad\.msg can't be read"):
+        Interfaces("jazzy", [folder])
+
+
+def test_two_folders_must_not_differ_in_a_type(make: Make, tmp_path: Path) -> None:
+    other = tmp_path / "other/cell_msgs/msg"
+    other.mkdir(parents=True)
+    (other / "Wear.msg").write_text("builtin_interfaces/Time since\nint64 count 0")
+    folders = [make(CELL), tmp_path / "other"]
+    Interfaces("jazzy", folders)
+    (other / "Wear.msg").write_text("int64 count")
+    with pytest.raises(
+        InterfaceError, match=r"cell_msgs/msg/Wear is defined here and, differently, in"
+    ):
+        Interfaces("jazzy", folders)
+
+
+def test_a_changed_file_is_read_again(make: Make) -> None:
+    folder = make(CELL)
+    before = interfaces_of("jazzy", (folder,))
+    assert interfaces_of("jazzy", [folder]) is before
+    (folder / "cell_msgs/msg/Wear.msg").write_text("int64 count 0\nint8 hours")
+    assert interfaces_of("jazzy", (folder,)).field_type("cell_msgs/msg/Wear", "hours") == "int8"
+
+
+@pytest.mark.parametrize("distro", list(DISTROS))
+def test_what_robots_are_commanded_with_is_built_in(distro: str) -> None:
+    here = interfaces_of(distro)
+    for service in (
+        "std_srvs/srv/SetBool",
+        "std_srvs/srv/Trigger",
+        "rcl_interfaces/srv/SetParameters",
+        "lifecycle_msgs/srv/ChangeState",
+        "action_msgs/srv/CancelGoal",
+        "example_interfaces/srv/AddTwoInts",
+        "example_interfaces/action/Fibonacci_SendGoal",
+    ):
+        assert here.service(service) == (f"{service}_Request", f"{service}_Response")
+    assert here.action("example_interfaces/action/Fibonacci").status in here.structures
+    assert here.constants("action_msgs/srv/CancelGoal_Response")["ERROR_REJECTED"] == 1
+
+
+def test_each_distribution_has_all_of_the_built_in_that_it_can() -> None:
+    """Only what needs messages of a later one is left out, and before iron there are no events."""
+    every = set(read_folders([BUILTIN]).structures)
+    missing = {distro: every - set(interfaces_of(distro).structures) for distro in DISTROS}
+    assert {name.rpartition("_")[0] for name in missing["humble"] if "_Event" not in name} == {
+        "rcl_interfaces/srv/GetLoggerLevels",
+        "rcl_interfaces/srv/SetLoggerLevels",
+        "type_description_interfaces/srv/GetTypeDescription",
+    }
+    assert missing["iron"] == missing["jazzy"] == missing["kilted"] == set()
+
+
+def test_humble_has_services_without_hashes() -> None:
+    humble = interfaces_of("humble")
+    assert humble.type_hash("std_srvs/srv/SetBool_Request").startswith("RIHS01_")
+    for name in ("std_srvs/srv/SetBool", "example_interfaces/action/Fibonacci"):
+        with pytest.raises(InterfaceError, match=f'"{name}" is not a type with a hash'):
+            humble.type_hash(name)
+
+
+@pytest.mark.parametrize(
+    ("ask", "name", "why"),
+    [
+        (
+            "service",
+            "std_srvs/srv/SetBol",
+            "is not a service of ROS 2 jazzy; did you mean std_srvs/srv/SetBool",
+        ),
+        ("service", "std_msgs/msg/Bool", "is not a service"),
+        (
+            "action",
+            "example_interfaces/action/Fibonaci",
+            "did you mean example_interfaces/action/Fibonacci",
+        ),
+        ("action", "std_srvs/srv/SetBool", "is not an action"),
+        ("constants", "std_msgs/msg/Bol", "is not an interface"),
+        ("type_hash", "std_msgs/msg/Bol", "is not"),
+    ],
+)
+def test_an_unknown_name_is_refused_with_the_nearest(ask: str, name: str, why: str) -> None:
+    with pytest.raises(InterfaceError) as caught:
+        getattr(interfaces_of("jazzy"), ask)(name)
+    assert why in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "digest"),
+    [
+        ("std_srvs/srv/SetBool", "abe9e4bb6b41b40e6789712c00ec8871923e089af3f667a79992a428cff2da0a"),
+        (
+            "action_msgs/srv/CancelGoal",
+            "573d8b0a534451d7bc2ac8c5ffde8ac14b8593b7001175d0cd6516dcbeb8689a",
+        ),
+        ("std_msgs/msg/Char", "3ad2d04dd29ba19d04b16659afa3ccaedd691914b02a64e82e252f2fa6a586a9"),
+    ],
+)
+def test_type_hashes_are_those_of_the_packages_descriptions(name: str, digest: str) -> None:
+    assert interfaces_of("jazzy").type_hash(name) == f"RIHS01_{digest}"
+
+
+def test_a_type_is_written_as_in_a_file() -> None:
+    kinds: list[tuple[Any, str]] = [
+        (Type("string", bound=8, many="sequence"), "string<=8[]"),
+        (Type("int8", many="sequence", size=3), "int8[<=3]"),
+        (Type("std_msgs/msg/Header", many="array", size=2), "std_msgs/msg/Header[2]"),
+    ]
+    for kind, written in kinds:
+        assert str(kind) == written
