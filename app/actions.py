@@ -118,11 +118,15 @@ class Actions:
             self._show(goal, self._under_way(goal, say("goal_canceling")))
         return Answer("accepted", say("cancel_sent", time=now))
 
-    def hear_feedback(self, widget: Action, sample: Sample) -> None:
+    def hear_feedback(self, action: str, sample: Sample) -> None:
         """The latest feedback of an action; of another program's goal it is passed over."""
-        goal = self._goals.get(widget.id)
-        if goal is None or not self._robot.progress[widget.id].stoppable:
-            return
+        for goal in self._goals.values():
+            widget = goal.widget
+            if widget.action == action and self._robot.progress[widget.id].stoppable:
+                self._take_feedback(goal, sample)
+
+    def _take_feedback(self, goal: _Goal, sample: Sample) -> None:
+        widget = goal.widget
         types = self._interfaces.action(widget.type)
         try:
             message = self._interfaces.decode(types.feedback_message, bytes(sample.payload))

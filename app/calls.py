@@ -6,7 +6,6 @@ logged and corrects the receipt.
 
 import asyncio
 import logging
-import re
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,6 +14,7 @@ from typing import Any, Final, Protocol
 from app.errors import DecodeError
 from app.interfaces import Interfaces, to_plain, value_at
 from app.panel.model import Call
+from app.panel.template import PLACE
 from app.progress import Answer, Progress
 from app.robot import Robot
 from app.sentences import say
@@ -22,6 +22,7 @@ from app.views import clock
 
 log = logging.getLogger("kiosk.calls")
 
+CUT_NEWS_S: Final = 0.3
 LATE_S: Final = 60.0  # how long after its time an answer is still waited for
 MOST_UNANSWERED: Final = 8  # the bridge keeps ten requests of a service
 
@@ -90,12 +91,12 @@ class Calls:
     async def _awaited(self, waiting: _Waiting, corrected: Corrected) -> Answer:
         widget = waiting.widget
         ends: set[asyncio.Future[Any]] = {waiting.answered, waiting.cut}
-        await asyncio.wait(
-            ends, timeout=widget.timeout_s, return_when=asyncio.FIRST_COMPLETED
-        )
+        await asyncio.wait(ends, timeout=widget.timeout_s, return_when=asyncio.FIRST_COMPLETED)
         if waiting.answered.done() and (reply := waiting.answered.result()) is not None:
             return self._read(widget, reply)
-        if not waiting.answered.done():
+        if waiting.answered.done():  # without an answer: the news that the bridge is gone may follow
+            await asyncio.wait({waiting.cut}, timeout=CUT_NEWS_S)
+        else:
             waiting.answered.add_done_callback(lambda done: self._late(waiting, done, corrected))
         if waiting.cut.done() or not self._robot.graph.bridges:
             return Answer("unknown", say("call_cut"))
@@ -147,9 +148,6 @@ def field_of(
         return given
     own = {field.name: str(field.type) for field in interfaces.structures[type_name].fields}
     return usual if own.get(usual) == kind else None
-
-
-PLACE: Final = re.compile(r"\{([^{}]*)\}")
 
 
 def with_fields(template: str, message: Any) -> str:

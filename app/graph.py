@@ -1,13 +1,12 @@
 """What the liveliness tokens and the bridges' admin space say: who is there, with which types."""
 
 from collections.abc import Mapping
-from typing import Literal
 
-from app.keys import DEMO_VERSION, Direction, Endpoint, Role, parsed
+from app.keys import DEMO_VERSION, Direction, Endpoint, Role, ServerRole, TopicRole, parsed
 
 # Whose type must equal the panel's, for what the panel does with a topic. A route of the bridge
 # has one type for all: who created it first has fixed it, be it the robot or another panel.
-_COUNTERPARTS: Mapping[Literal["MP", "MS"], tuple[Role, Role, Direction]] = {
+_COUNTERPARTS: Mapping[TopicRole, tuple[Role, Role, Direction]] = {
     "MS": ("MP", "MS", "pub"),  # the panel listens: the robot's publisher, other panels' readers
     "MP": ("MS", "MP", "sub"),  # the panel publishes: the robot's subscriber, other panels' writers
 }
@@ -72,7 +71,7 @@ class Graph:
         bridges = self.bridges
         return any(e.role == role and e.key == key and e.zid in bridges for e in self._tokens.values())
 
-    def server_type(self, role: Literal["SS", "AS"], key: str) -> str | None:
+    def server_type(self, role: ServerRole, key: str) -> str | None:
         """The type of the robot's service or action; None if it offers none of this name now."""
         bridges = self.bridges
         for e in self._tokens.values():
@@ -88,7 +87,7 @@ class Graph:
                 return e.transient_local
         return None
 
-    def wrong_type(self, role: Literal["MP", "MS"], key: str, type_name: str) -> str | None:
+    def wrong_type(self, role: TopicRole, key: str, type_name: str) -> str | None:
         """The other type that this topic has, if it is not what the panel needs for `role`."""
         theirs, others, direction = _COUNTERPARTS[role]
         bridges = self.bridges

@@ -16,12 +16,12 @@ import math
 import time
 from collections.abc import Callable, Coroutine
 from contextlib import suppress
-from typing import Any, Final, Literal
+from typing import Any, Final
 
 from app import keys
 from app.errors import LinkError
 from app.interfaces import Interfaces
-from app.keys import Direction, Endpoint, Qos
+from app.keys import Direction, Endpoint, Qos, TopicRole
 from app.link import Link
 from app.panel.model import Panel
 from app.robot import Robot
@@ -114,7 +114,7 @@ class Joining:
 
     def _tokens(self) -> list[str]:
         """The tokens of all topics, but for those whose type is another one on the robot."""
-        wanted: list[tuple[Literal["MP", "MS"], str, str, Qos]] = [
+        wanted: list[tuple[TopicRole, str, str, Qos]] = [
             *(("MP", t, n, Qos()) for t, n in self._panel.publications().items()),
             *(
                 ("MS", topic, name, Qos(transient_local=latched))

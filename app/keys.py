@@ -16,7 +16,9 @@ ROUTES: Final = "@/*/ros2/route/topic/**"  # a bridge's routes: JSON with `ros2_
 NODES: Final = "@/*/ros2/node/**"  # the nodes behind a bridge: JSON with their topics and types
 DEMO_VERSION: Final = '"demo robot"'  # how the demo robot answers for its version
 
-Role = Literal["MP", "MS", "SS", "AS"]  # publisher, subscriber, service server, action server
+TopicRole = Literal["MP", "MS"]  # a publisher, a subscriber
+ServerRole = Literal["SS", "AS"]  # a service's server, an action's
+Role = TopicRole | ServerRole
 Direction = Literal["pub", "sub"]  # of a bridge's route: from ROS to Zenoh, from Zenoh to ROS
 
 # A token that the bridge can't parse ends its main loop while its process stays up: what does not
@@ -66,7 +68,7 @@ def key_of(topic: str, namespace: str = "") -> str:
     return whole[1:]
 
 
-def token(zid: str, role: Role, key: str, type_name: str, qos: Qos, type_hash: str) -> str:
+def token(zid: str, role: TopicRole, key: str, type_name: str, qos: Qos, type_hash: str) -> str:
     """The liveliness token that makes the bridge create the DDS reader or writer."""
     if not TOPIC.fullmatch("/" + key) or not MESSAGE_TYPE.fullmatch(type_name):
         raise ValueError(f'"{key}" with type "{type_name}" can not be a token')
@@ -76,7 +78,7 @@ def token(zid: str, role: Role, key: str, type_name: str, qos: Qos, type_hash: s
     )
 
 
-def server_token(zid: str, role: Literal["SS", "AS"], key: str, type_name: str) -> str:
+def server_token(zid: str, role: ServerRole, key: str, type_name: str) -> str:
     """The token of a service or action server."""
     return f"@/{zid}/@ros2_lv/{role}/{_escaped(key)}/{_escaped(type_name)}"
 
@@ -104,12 +106,12 @@ def parsed(token_key: str) -> Endpoint | None:
     if found is None:
         return None
     if found["server"] is not None:
-        server: Role = "SS" if found["server"] == "SS" else "AS"
+        server: ServerRole = "SS" if found["server"] == "SS" else "AS"
         key, type_name = _unescaped(found["name"]), _unescaped(found["server_type"])
         return Endpoint(found["zid"], server, key, type_name)
     if found["role"] is None:
         return Endpoint(found["zid"])
-    role: Role = "MP" if found["role"] == "MP" else "MS"
+    role: TopicRole = "MP" if found["role"] == "MP" else "MS"
     key, type_name = _unescaped(found["key"]), _unescaped(found["type"])
     return Endpoint(found["zid"], role, key, type_name, found["durability"] == "1")
 
@@ -121,7 +123,7 @@ def version(zid: str) -> str:
 
 def endpoints_of(admin_key: str, node: Mapping[str, Any], namespace: str) -> Iterator[Endpoint]:
     """The publishers and subscribers of one node, from what its bridge says of it (see `NODES`)."""
-    roles: tuple[tuple[Role, str], ...] = (("MP", "publishers"), ("MS", "subscribers"))
+    roles: tuple[tuple[TopicRole, str], ...] = (("MP", "publishers"), ("MS", "subscribers"))
     for role, name in roles:
         for topic in node[name]:
             if TOPIC.fullmatch(namespace + topic["name"]):

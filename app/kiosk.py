@@ -22,7 +22,7 @@ from app.interlocks import Verdict, way
 from app.joining import LOG_TYPE, Joining
 from app.link import Config, Link
 from app.logs import RosoutHandler
-from app.panel.model import Action, Panel
+from app.panel.model import Panel
 from app.presses import Presses, Receipt
 from app.robot import Robot
 from app.views import Sight, sight
@@ -58,9 +58,7 @@ class Kiosk:
         self.presses = Presses(
             panel, self.interfaces, self.robot, self.link, self._calls, self._actions
         )
-        self._feedback = {
-            keys.feedback(self.robot.key(w.action)): w for w in panel.widgets() if isinstance(w, Action)
-        }
+        self._feedback = {keys.feedback(self.robot.key(one)): one for one in panel.actions()}
         self._joining = Joining(panel, self.interfaces, self.robot, self.link, self._show)
         self._urgent = {self.robot.key(i.topic) for i in panel.interlocks}
         self._shown_at = 0.0

@@ -170,7 +170,9 @@ class Presses:
     def _correct(self, press_id: str, answer: Answer) -> None:
         """What is known of a press now is another thing than its receipt said."""
         if old := self._receipts.get(press_id):
-            self._receipts[press_id] = replace(old, outcome=answer.outcome, reason=answer.text)
+            self._receipts[press_id] = replace(
+                old, outcome=answer.outcome, reason=answer.text, cause=""
+            )
 
     async def _pressed(self, widget: Pressed, inputs: Mapping[str, Any], press_id: str) -> Receipt:
         def receipt(answer: Answer, cause: Cause = "") -> Receipt:

@@ -122,7 +122,7 @@ class Simulator:
             keys.version(zid), Callback(on_query, indirect=False), complete=True
         )
         liveliness = self._session.liveliness()
-        ends: list[tuple[keys.Role, Mapping[str, str], Qos]] = [
+        ends: list[tuple[keys.TopicRole, Mapping[str, str], Qos]] = [
             ("MS", LISTENS, Qos()),
             ("MP", SPEAKS, LATCHED),
         ]

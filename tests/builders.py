@@ -5,7 +5,7 @@ from typing import Any, Final
 
 from app import keys
 from app.interfaces import interfaces_of
-from app.keys import Qos, Role
+from app.keys import Qos, TopicRole
 from app.panel.model import Panel
 from app.robot import Robot, Sample
 
@@ -62,7 +62,7 @@ def robot_there(panel: Panel) -> Robot:
 
 
 def endpoint(
-    robot: Robot, role: Role, topic: str, type_name: str, zid: str = BRIDGE, alive: bool = True
+    robot: Robot, role: TopicRole, topic: str, type_name: str, zid: str = BRIDGE, alive: bool = True
 ) -> None:
     """A publisher ("MP") or subscriber ("MS") appears behind a bridge, or ends."""
     token = keys.token(zid, role, robot.key(topic), type_name, Qos(), INTERFACES.type_hash(type_name))

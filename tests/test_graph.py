@@ -3,13 +3,13 @@
 import pytest
 
 from app.graph import Graph
-from app.keys import DEMO_VERSION, Qos, Role, bridge_token, token
+from app.keys import DEMO_VERSION, Qos, TopicRole, bridge_token, token
 from tests.builders import BOOL, BRIDGE, KIOSK, TEXT
 
 OTHER_KIOSK = "c2"
 
 
-def topic_token(zid: str, role: Role, key: str, type_name: str, qos: Qos | None = None) -> str:
+def topic_token(zid: str, role: TopicRole, key: str, type_name: str, qos: Qos | None = None) -> str:
     return token(zid, role, key, type_name, qos or Qos(), "RIHS01_0")
 
 
@@ -48,7 +48,7 @@ def test_what_is_no_token_changes_nothing(graph: Graph) -> None:
 
 
 @pytest.mark.parametrize("role", ["MP", "MS"])
-def test_a_node_behind_a_bridge_is_on_the_robot(graph: Graph, role: Role) -> None:
+def test_a_node_behind_a_bridge_is_on_the_robot(graph: Graph, role: TopicRole) -> None:
     graph.apply(topic_token(BRIDGE, role, "a", BOOL), True)
     assert graph.on_robot(role, "a")
     assert not graph.on_robot(role, "b")
@@ -82,7 +82,7 @@ def test_nodes_go_with_their_bridge(graph: Graph) -> None:
     ],
 )
 def test_a_counterpart_of_another_type_is_told(
-    graph: Graph, panel_role: Role, zid: str, role: Role
+    graph: Graph, panel_role: TopicRole, zid: str, role: TopicRole
 ) -> None:
     graph.apply(topic_token(zid, role, "a", TEXT), True)
     assert graph.wrong_type(panel_role, "a", BOOL) == TEXT
@@ -100,7 +100,7 @@ def test_a_counterpart_of_another_type_is_told(
     ],
 )
 def test_who_shares_no_route_with_the_panel_may_have_another_type(
-    graph: Graph, panel_role: Role, zid: str, role: Role
+    graph: Graph, panel_role: TopicRole, zid: str, role: TopicRole
 ) -> None:
     graph.apply(topic_token(zid, role, "a", TEXT), True)
     assert graph.wrong_type(panel_role, "a", BOOL) is None
@@ -119,7 +119,7 @@ def test_a_type_is_right_again_when_the_wrong_one_ends(graph: Graph) -> None:
 
 
 @pytest.mark.parametrize(("role", "direction"), [("MS", "pub"), ("MP", "sub")])
-def test_a_bridges_route_of_another_type_is_told(graph: Graph, role: Role, direction: str) -> None:
+def test_a_bridges_route_of_another_type_is_told(graph: Graph, role: TopicRole, direction: str) -> None:
     graph.learn({(BRIDGE, "pub" if direction == "pub" else "sub", "a"): TEXT})
     assert graph.wrong_type(role, "a", BOOL) == TEXT
     assert graph.wrong_type(role, "a", TEXT) is None
@@ -194,7 +194,7 @@ def test_a_publishers_durability_is_known(graph: Graph, latched: bool) -> None:
 
 @pytest.mark.parametrize(("zid", "role"), [(BRIDGE, "MS"), (OTHER_KIOSK, "MP")])
 def test_who_is_no_publisher_of_the_robots_has_no_durability(
-    graph: Graph, zid: str, role: Role
+    graph: Graph, zid: str, role: TopicRole
 ) -> None:
     graph.apply(topic_token(zid, role, "a", BOOL, Qos(transient_local=True)), True)
     assert graph.latched("a") is None

@@ -3,7 +3,7 @@
 import pytest
 
 from app import keys
-from app.keys import MESSAGE_TYPE, NAMESPACE, TOPIC, Endpoint, Qos, Role, key_of, parsed, token
+from app.keys import MESSAGE_TYPE, NAMESPACE, TOPIC, Endpoint, Qos, TopicRole, key_of, parsed, token
 from tests.builders import BOOL, TEXT
 
 HASH = "RIHS01_0"
@@ -48,7 +48,7 @@ HOSTILE_TYPES = [
 @pytest.mark.parametrize("role", ["MP", "MS"])
 @pytest.mark.parametrize("key", ["chatter", "robot1/arm/_state", "A/b_C3"])
 @pytest.mark.parametrize("latched", [True, False])
-def test_a_token_shows_what_it_was_made_from(role: Role, key: str, latched: bool) -> None:
+def test_a_token_shows_what_it_was_made_from(role: TopicRole, key: str, latched: bool) -> None:
     made = token("b1", role, key, BOOL, Qos(transient_local=latched), HASH)
     seen = parsed(made)
     assert seen is not None

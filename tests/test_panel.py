@@ -210,11 +210,11 @@ def test_an_interlock_and_a_widget_may_have_one_id(load: Load) -> None:
             "page[1].id",
             '"one" is already the id of page[0]',
         ),
-        (with_widget(1, kind="knob"), BUTTON, 'unknown kind "knob"; one of text, publish, readout'),
+        (with_widget(1, kind="knob"), BUTTON, 'unknown kind "knob"; one of text, publish, call, action, readout'),
         (
             tables(page=[{"id": "one", "title": "One", "widget": [without(FREE, "kind")]}]),
             "page[0].widget[0]",
-            '"kind" is missing; one of text, publish, readout',
+            '"kind" is missing; one of text, publish, call, action, readout',
         ),
         (with_widget(1, colour="red"), f"{BUTTON}.colour", "unknown key; known here: id, label, span"),
         (with_widget(1, lable="x"), f"{BUTTON}.lable", 'did you mean "label"?'),

@@ -1,5 +1,6 @@
 """A press: judged by the server, sent once, answered with a receipt."""
 
+import asyncio
 import logging
 import math
 from collections.abc import Callable, Mapping
@@ -8,6 +9,8 @@ from typing import Any
 
 import pytest
 
+from app.actions import Actions
+from app.calls import Calls
 from app.errors import LinkError, NotFound
 from app.panel.model import Panel
 from app.presses import RECEIPTS_KEPT, Presses, Receipt
@@ -53,6 +56,16 @@ class Way:
         return [INTERFACES.decode(TEXT, payload).data for _, payload in self.sent]
 
 
+class Nobody:
+    """A link on which no service is ever asked."""
+
+    def query(self, key: str, payload: bytes, timeout_s: float) -> "asyncio.Future[bytes | None]":
+        raise AssertionError(f"{key} was asked")
+
+
+NOBODY = Nobody()
+
+
 class Bench:
     """Presses on a robot that is there and permits, at a time that is set."""
 
@@ -62,14 +75,18 @@ class Bench:
         self.way = Way()
         self.robot = robot_there(panel)
         permits(self.robot)
-        self._presses = Presses(panel, INTERFACES, self.robot, self.way, lambda: self.now)
+        calls = Calls(INTERFACES, self.robot, NOBODY, lambda: None)
+        actions = Actions(INTERFACES, self.robot, NOBODY, lambda: None)
+        self._presses = Presses(
+            panel, INTERFACES, self.robot, self.way, calls, actions, lambda: self.now
+        )
         self.receipt = self._presses.receipt
 
     def press(
         self, widget: str = "free", inputs: Mapping[str, Any] | None = None, press_id: str = "p1"
     ) -> Receipt:
         given = {"message": "hello"} if inputs is None else inputs
-        return self._presses.press(widget, given, press_id, "127.0.0.1")
+        return asyncio.run(self._presses.press(widget, given, press_id, "127.0.0.1"))
 
 
 @pytest.fixture

@@ -6,9 +6,11 @@ from collections.abc import Iterable, Iterator
 
 from app.errors import Fault, FieldError, InterfaceError
 from app.interfaces import Interfaces
-from app.panel.model import Interlock, Panel, Publish, Readout, TextInput
-from app.panel.template import filled, named
+from app.panel.model import Action, Call, Interlock, Panel, Pressed, Publish, Readout, TextInput
+from app.panel.template import PLACE, filled, named
 
+NUMBER = r"u?int(8|16|32|64)|float(32|64)|byte|char"
+WORDS = {NUMBER: "a number"}
 ELSEWHERE = " on this page: an input is read from the page it is on"
 
 
@@ -30,9 +32,9 @@ def faults_in(panel: Panel, interfaces: Interfaces) -> Iterator[Fault]:
                     yield from _text(place, widget)
                 case Readout():
                     yield from _readout(place, widget, interfaces)
-                case Publish():
+                case Publish() | Call() | Action():
                     on_page = {i.id for i in page.widgets} & inputs.keys()
-                    yield from _publish(place, widget, panel, on_page, inputs.keys(), interfaces)
+                    yield from _pressed(place, widget, panel, on_page, inputs.keys(), interfaces)
     yield from _topics_of_two_types(panel)
 
 
@@ -85,41 +87,100 @@ def _text(place: str, text: TextInput) -> Iterator[Fault]:
         yield Fault(f"{place}.default", f"is longer than max_length ({text.max_length})")
 
 
-def _publish(
+def _pressed(
     place: str,
-    publish: Publish,
+    widget: Pressed,
     panel: Panel,
     on_page: set[str],
     anywhere: Iterable[str],
     interfaces: Interfaces,
 ) -> Iterator[Fault]:
-    if publish.interlock is not None and panel.interlock(publish.interlock) is None:
+    if widget.interlock is not None and panel.interlock(widget.interlock) is None:
         known = ", ".join(i.id for i in panel.interlocks) or "none"
-        yield Fault(f"{place}.interlock", f'no interlock "{publish.interlock}"; there is {known}')
+        yield Fault(f"{place}.interlock", f'no interlock "{widget.interlock}"; there is {known}')
     try:
-        interfaces.require(publish.type)
+        part, type_name = _sent(widget, interfaces)
     except InterfaceError as error:
         yield Fault(f"{place}.type", str(error))
         return
+    yield from _template(f"{place}.{part}", widget, type_name, on_page, anywhere, interfaces)
+    if isinstance(widget, Call):
+        yield from _response(place, widget, interfaces)
+    elif isinstance(widget, Action):
+        yield from _outcome(place, widget, interfaces)
+
+
+def _sent(widget: Pressed, interfaces: Interfaces) -> tuple[str, str]:
+    """The key that holds what is sent, and its type."""
+    match widget:
+        case Publish():
+            interfaces.require(widget.type)
+            return "message", widget.type
+        case Call():
+            return "request", interfaces.service(widget.type)[0]
+        case Action():
+            return "goal", interfaces.action(widget.type).goal
+
+
+def _template(
+    place: str,
+    widget: Pressed,
+    type_name: str,
+    on_page: set[str],
+    anywhere: Iterable[str],
+    interfaces: Interfaces,
+) -> Iterator[Fault]:
     unknown = False
     try:
-        for where, name in named(publish.message):
+        for where, name in named(widget.template):
             if name not in on_page:
                 unknown = True
                 there = ", ".join(sorted(on_page)) or "none"
                 what = f"; there is {there}" if name not in anywhere else ELSEWHERE
-                yield Fault(f"{place}.message.{where}", f'no input "{name}"{what}')
+                yield Fault(f"{place}.{where}", f'no input "{name}"{what}')
         if not unknown:
-            interfaces.encode(publish.type, filled(publish.message, dict.fromkeys(on_page, "text")))
+            interfaces.encode(type_name, filled(widget.template, dict.fromkeys(on_page, "text")))
     except FieldError as error:
-        yield Fault(f"{place}.message.{error.field}".rstrip("."), error.message)
+        yield Fault(f"{place}.{error.field}".rstrip("."), error.message)
+
+
+def _response(place: str, call: Call, interfaces: Interfaces) -> Iterator[Fault]:
+    _, response = interfaces.service(call.type)
+    for key, path, kind in (("success", call.success, "bool"), ("message", call.message, "string")):
+        if path is not None:
+            yield from _path(f"{place}.{key}", response, path, kind, interfaces)
+    yield from _shown(f"{place}.answer", response, call.answer, interfaces)
+
+
+def _outcome(place: str, action: Action, interfaces: Interfaces) -> Iterator[Fault]:
+    types = interfaces.action(action.type)
+    if action.progress is not None:
+        yield from _path(f"{place}.progress", types.feedback, action.progress, NUMBER, interfaces)
+    yield from _shown(f"{place}.feedback", types.feedback, action.feedback, interfaces)
+    yield from _shown(f"{place}.result", types.result, action.result, interfaces)
+
+
+def _shown(place: str, type_name: str, template: str, interfaces: Interfaces) -> Iterator[Fault]:
+    for path in PLACE.findall(template):
+        yield from _path(place, type_name, path, ".*", interfaces)
+
+
+def _path(place: str, type_name: str, path: str, kind: str, interfaces: Interfaces) -> Iterator[Fault]:
+    """A fault if there is no such field, or not of this kind (a regular expression)."""
+    try:
+        found = interfaces.field_type(type_name, path)
+    except InterfaceError as error:
+        yield Fault(place, str(error))
+        return
+    if not re.fullmatch(kind, found):
+        yield Fault(place, f'"{path}" is {found}: it must be {WORDS.get(kind, kind)}')
 
 
 def _topics_of_two_types(panel: Panel) -> Iterator[Fault]:
     places = [(f"interlock[{i}]", x.topic, x.type) for i, x in enumerate(panel.interlocks)]
     for p, page in enumerate(panel.pages):
         for w, widget in enumerate(page.widgets):
-            if not isinstance(widget, TextInput):
+            if isinstance(widget, Publish | Readout):
                 places.append((f"page[{p}].widget[{w}]", widget.topic, widget.type))
     wanted: dict[str, Counter[str]] = {}
     for place, topic, type_name in places:

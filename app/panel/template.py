@@ -1,10 +1,14 @@
 """Message templates: `{ data = "{message}" }` with the values of the inputs it names."""
 
+import re
 from collections.abc import Iterator, Mapping
 from string import Formatter
-from typing import Any
+from typing import Any, Final
 
 from app.errors import FieldError
+
+# In what is shown of an answer: a path in its type. (In what is sent: the id of an input.)
+PLACE: Final = re.compile(r"\{([^{}]*)\}")
 
 
 def filled(template: Any, inputs: Mapping[str, Any], where: str = "") -> Any:

@@ -33,6 +33,7 @@ class PageContext(TypedDict):
     press_id: str
     receipt: Receipt | None
     inputs: dict[str, Any]
+    words: dict[str, str]
     lost: str
     lost_short: str
     unknown: str
@@ -67,6 +68,7 @@ def _render(request: Request, site: Site, page: Page) -> Response:
         press_id=secrets.token_hex(8),
         receipt=receipt,
         inputs=dict(receipt.inputs) if receipt else {},
+        words={"cancel": say("cancel")},
         lost=say("server_lost"),
         lost_short=say("lost"),
         unknown=say("unknown"),

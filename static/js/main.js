@@ -11,12 +11,31 @@ function setText(element, text) {
   if (element && element.textContent !== text) element.textContent = text;
 }
 
+// How each attribute of a widget is shown; what is not here is a text with its own place.
+const SHOW = {
+  enabled: (root, value) => (root.querySelector("button").disabled = !value),
+  stoppable: (root, value) => {
+    const cancel = root.querySelector(".cancel");
+    if (cancel) cancel.disabled = !value;
+  },
+  state: (root, value) => (root.dataset.state = value),
+  outcome: (root, value) => (root.querySelector(".result").dataset.outcome = value),
+  busy: (root, value) => {
+    const bar = root.querySelector("progress");
+    if (bar) bar.hidden = !value;
+  },
+  progress: (root, value) => {
+    const bar = root.querySelector("progress");
+    if (value === null) bar?.removeAttribute("value");
+    else if (bar) bar.value = value;
+  },
+};
+
 function showWidget(id, attributes) {
   const root = widgets.get(id);
   if (!root) return;
   for (const [name, value] of Object.entries(attributes)) {
-    if (name === "enabled") root.querySelector("button").disabled = !value;
-    else if (name === "state") root.dataset.state = value;
+    if (name in SHOW) SHOW[name](root, value);
     else setText(root.querySelector(`[data-text="${name}"]`), value ?? "");
   }
 }
@@ -50,9 +69,9 @@ function lockAll() {
     setText(lamp.querySelector("b"), server ? body.dataset.lostShort : body.dataset.unknown);
   }
   for (const root of widgets.values()) {
-    const button = root.querySelector("button");
-    if (button) {
-      button.disabled = true;
+    const buttons = root.querySelectorAll("button");
+    for (const button of buttons) button.disabled = true;
+    if (buttons.length) {
       setText(root.querySelector('[data-text="reason"]'), body.dataset.lost);
     } else if (root.dataset.state) {
       root.dataset.state = "old";

@@ -27,31 +27,32 @@ export class Presser {
 
   // A second tap while the first is under way is the same press: it sends nothing.
   async #press(root, button, form) {
-    const id = root.dataset.widget;
-    if (this.#underWay.has(id)) return;
-    this.#underWay.add(id);
+    const url = button.getAttribute("formaction");
+    if (this.#underWay.has(url)) return;
+    this.#underWay.add(url);
     button.setAttribute("aria-busy", "true");
     try {
-      this.#show(root, await this.#send(id, form));
+      const answerMs = ANSWER_WITHIN_MS + 1000 * (root.dataset.answerS ?? 0);
+      this.#show(root, await this.#send(url, form, answerMs));
     } finally {
-      this.#underWay.delete(id);
+      this.#underWay.delete(url);
       button.removeAttribute("aria-busy");
     }
   }
 
   // Sent once and never again: when no answer comes, it is not known what became of it.
-  async #send(widget, form) {
+  async #send(url, form, answerMs) {
     const inputs = {};
     for (const input of form.elements) {
       if (input.closest("[data-widget]") && input.matches("input")) inputs[input.name] = input.value;
     }
     const press = { inputs, id: newId(), seen: this.#source.seen, at: new Date().toISOString() };
     try {
-      const answer = await fetch(`/widgets/${widget}`, {
+      const answer = await fetch(url, {
         method: "POST",
         headers: { "Content-Type": "application/json" },
         body: JSON.stringify(press),
-        signal: AbortSignal.timeout(ANSWER_WITHIN_MS),
+        signal: AbortSignal.timeout(answerMs),
       });
       const receipt = await answer.json();
       return receipt.outcome ? receipt : { outcome: "refused", reason: receipt.error };
@@ -68,6 +69,8 @@ export class Presser {
         delete old.dataset.outcome;
       }
     }
+    // What came of a call is shown to every browser, with the widget's other texts.
+    if (root.querySelector(".result") && outcome !== "refused" && outcome !== "unknown") return;
     const receipt = root.querySelector(".receipt");
     receipt.dataset.outcome = outcome;
     receipt.textContent = reason;

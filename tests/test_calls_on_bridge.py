@@ -1,0 +1,273 @@
+"""Services and actions of a robot on Cyclone DDS, from the panel, through the real bridge."""
+
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests import cyclone
+from tests.cyclone import Client, CycloneRobot, served
+from tests.parts import Bridge, Server, live, until
+
+cyclone_bridge = cyclone.cyclone_bridge
+own_cyclone_bridge = cyclone.own_cyclone_bridge
+client = cyclone.client
+own_client = cyclone.own_client
+robots = cyclone.robots
+robot = cyclone.robot
+
+PANEL = """
+title = "Cyclone cell"
+mode = "live"
+
+[[page]]
+id = "calls"
+title = "Calls"
+
+[[page.widget]]
+id = "words"
+kind = "text"
+label = "Words"
+
+[[page.widget]]
+id = "say"
+kind = "publish"
+label = "Say"
+topic = "/said"
+type = "std_msgs/msg/String"
+message = { data = "{words}" }
+
+[[page.widget]]
+id = "enable"
+kind = "call"
+label = "Enable"
+service = "/set_enabled"
+type = "std_srvs/srv/SetBool"
+request = { data = true }
+
+[[page.widget]]
+id = "add"
+kind = "call"
+label = "Add"
+service = "/add_two_ints"
+type = "example_interfaces/srv/AddTwoInts"
+request = { a = 40, b = 2 }
+answer = "the sum is {sum}"
+
+[[page.widget]]
+id = "slow"
+kind = "call"
+label = "Slow"
+service = "/slow"
+type = "std_srvs/srv/Trigger"
+timeout_s = 1.0
+
+[[page.widget]]
+id = "nowhere"
+kind = "call"
+label = "Nowhere"
+service = "/nowhere"
+type = "std_srvs/srv/Trigger"
+
+[[page.widget]]
+id = "other"
+kind = "call"
+label = "Other type"
+service = "/reset"
+type = "std_srvs/srv/Empty"
+
+[[page.widget]]
+id = "count"
+kind = "action"
+label = "Count"
+action = "/fibonacci"
+type = "example_interfaces/action/Fibonacci"
+goal = { order = 6 }
+feedback = "so far {sequence}"
+result = "{sequence}"
+
+[[page.widget]]
+id = "refused"
+kind = "action"
+label = "Count backwards"
+action = "/fibonacci"
+type = "example_interfaces/action/Fibonacci"
+goal = { order = -1 }
+"""
+
+
+def panel_file(folder: Path) -> str:
+    path = folder / "calls.toml"
+    path.write_text(PANEL)
+    return str(path)
+
+
+@pytest.fixture
+def kiosk(cyclone_bridge: Bridge, robot: CycloneRobot, tmp_path: Path) -> Iterator[Server]:
+    mine = live(cyclone_bridge.endpoint, tmp_path, KIOSK_PANEL=panel_file(tmp_path))
+    until(lambda: mine.widget("enable")["enabled"], "the service is offered")
+    yield mine
+    mine.end()
+
+
+def press(kiosk: Server, widget: str, **more: Any) -> httpx.Response:
+    return kiosk.http.post(f"/widgets/{widget}", json={"inputs": {}, **more})
+
+
+def test_a_call_that_succeeds_shows_the_answer(kiosk: Server, robot: CycloneRobot) -> None:
+    receipt = press(kiosk, "add")
+    assert (receipt.status_code, receipt.json()["outcome"]) == (200, "succeeded")
+    assert "the sum is 42" in receipt.json()["reason"]
+    assert robot.requests("/add_two_ints") == [{"a": 40, "b": 2}]
+    assert "the sum is 42" in kiosk.widget("add")["result"]  # for every browser, and after a reload
+    assert "the sum is 42" in kiosk.http.get("/").text
+
+
+def test_the_robot_says_no_with_its_words(kiosk: Server, robot: CycloneRobot) -> None:
+    robot.answer_set_enabled(success=False, message="the door is open")
+    receipt = press(kiosk, "enable")
+    assert (receipt.status_code, receipt.json()["outcome"]) == (200, "rejected")
+    assert receipt.json()["reason"].endswith(": the door is open")
+    robot.answer_set_enabled(success=True, message="")
+    assert press(kiosk, "enable").json()["outcome"] == "succeeded"
+    assert robot.requests("/set_enabled") == [{"data": True}] * 2
+
+
+def test_no_such_service_is_told_at_once(kiosk: Server) -> None:
+    assert "does not offer /nowhere" in kiosk.widget("nowhere")["reason"]
+    began = time.monotonic()
+    receipt = press(kiosk, "nowhere")
+    assert time.monotonic() - began < 1
+    assert (receipt.status_code, receipt.json()["outcome"]) == (503, "refused")
+
+
+def test_a_service_of_another_type_is_never_called(kiosk: Server, robot: CycloneRobot) -> None:
+    assert "/reset is std_srvs/srv/Trigger on the robot" in kiosk.widget("other")["reason"]
+    assert press(kiosk, "other").status_code == 409
+    assert robot.requests("/reset") == []
+
+
+def test_a_late_answer_corrects_the_receipt(kiosk: Server, robot: CycloneRobot) -> None:
+    robot.answer_slow(seconds=2)
+    receipt = press(kiosk, "slow", id="slow-1")
+    assert (receipt.status_code, receipt.json()["outcome"]) == (504, "timed_out")
+    assert "not known whether the robot did it" in receipt.json()["reason"]
+    until(lambda: kiosk.widget("slow")["outcome"] == "succeeded", "the late answer is shown")
+    again = press(kiosk, "slow", id="slow-1")
+    assert (again.status_code, again.json()["outcome"]) == (200, "succeeded")
+    assert len(robot.requests("/slow")) == 1
+    assert "a late answer" in kiosk.process.text
+
+
+def test_while_a_call_waits_its_button_is_locked_and_others_go_on(
+    kiosk: Server, robot: CycloneRobot
+) -> None:
+    robot.answer_slow(seconds=0.8)
+    with ThreadPoolExecutor(2) as pool:
+        slow = pool.submit(press, kiosk, "slow", id="one")
+        until(lambda: kiosk.widget("slow")["busy"], "under way")
+        same = pool.submit(press, kiosk, "slow", id="one")
+        second = press(kiosk, "slow", id="two")
+        assert second.status_code == 409
+        assert "waiting for the robot" in second.json()["reason"]
+        began = time.monotonic()
+        assert press(kiosk, "add").json()["outcome"] == "succeeded"
+        assert time.monotonic() - began < 0.5
+        assert slow.result().json() == same.result().json()
+    assert len(robot.requests("/slow")) == 1
+    assert kiosk.widget("slow")["enabled"]
+
+
+def test_a_bridge_lost_while_waiting_leaves_it_unknown(
+    own_cyclone_bridge: Bridge,
+    own_client: Client,
+    robots: Callable[..., CycloneRobot],
+    tmp_path: Path,
+    servers: Callable[[Server], Server],
+) -> None:
+    robot = robots(own_cyclone_bridge.domain)
+    served(robot, own_client)
+    kiosk = servers(live(own_cyclone_bridge.endpoint, tmp_path, KIOSK_PANEL=panel_file(tmp_path)))
+    until(lambda: kiosk.widget("slow")["enabled"], "offered")
+    robot.answer_slow(seconds=None)
+    with ThreadPoolExecutor(1) as pool:
+        waiting = pool.submit(press, kiosk, "slow")
+        until(lambda: robot.requests("/slow"), "the robot is at it")
+        own_cyclone_bridge.kill()
+        receipt = waiting.result()
+    assert (receipt.status_code, receipt.json()["outcome"]) == (200, "unknown")
+    assert "the robot may have done it" in receipt.json()["reason"]
+
+
+def test_a_goal_runs_to_its_result_and_shows_in_every_browser(
+    kiosk: Server, robot: CycloneRobot
+) -> None:
+    robot.fibonacci(step_s=0.1)
+    receipt = press(kiosk, "count", id="goal-1")
+    assert (receipt.status_code, receipt.json()["outcome"]) == (200, "accepted")
+    assert "waiting for the robot" in kiosk.widget("count")["reason"]
+    until(lambda: "so far [0, 1, 1" in kiosk.widget("count")["result"], "its feedback is shown")
+    until(lambda: kiosk.widget("count")["outcome"] == "succeeded", "its result is there")
+    assert "[0, 1, 1, 2, 3, 5, 8]" in kiosk.widget("count")["result"]
+    assert kiosk.widget("count")["enabled"]
+    assert press(kiosk, "count", id="goal-1").json()["outcome"] == "succeeded"
+    assert len(robot.goals()) == 1
+
+
+def test_a_goal_is_canceled_from_the_panel(kiosk: Server, robot: CycloneRobot) -> None:
+    robot.fibonacci(step_s=30)
+    assert press(kiosk, "count").json()["outcome"] == "accepted"
+    until(lambda: kiosk.widget("count")["stoppable"], "it can be canceled")
+    canceled = kiosk.http.post("/widgets/count/cancel")
+    assert (canceled.status_code, canceled.json()["outcome"]) == (200, "accepted")
+    until(lambda: kiosk.widget("count")["outcome"] == "canceled", "it was canceled")
+    nothing = kiosk.http.post("/widgets/count/cancel")
+    assert (nothing.status_code, nothing.json()["outcome"]) == (409, "refused")
+
+
+@pytest.mark.parametrize(("end", "outcome"), [("abort", "aborted"), ("cancel", "canceled")])
+def test_a_goal_that_the_robot_ends_itself(
+    kiosk: Server, robot: CycloneRobot, end: str, outcome: str
+) -> None:
+    robot.fibonacci(step_s=30)
+    assert press(kiosk, "count").json()["outcome"] == "accepted"
+    getattr(robot, end)()
+    until(lambda: kiosk.widget("count")["outcome"] == outcome, outcome)
+
+
+def test_a_goal_that_the_robot_rejects(kiosk: Server) -> None:
+    receipt = press(kiosk, "refused")
+    assert (receipt.status_code, receipt.json()["outcome"]) == (200, "rejected")
+    assert kiosk.widget("refused")["enabled"]
+
+
+def test_a_goal_of_more_than_five_seconds_survives_a_reload(
+    kiosk: Server, robot: CycloneRobot, page: Page
+) -> None:
+    robot.fibonacci(step_s=1.0)
+    page.goto(kiosk.url)
+    count = page.locator('[data-widget="count"]')
+    count.get_by_role("button", name="Count", exact=True).click()
+    expect(count.locator(".result")).to_contain_text("Under way")
+    page.reload()
+    expect(count.locator(".result")).to_contain_text("so far [0, 1")
+    expect(count.get_by_role("button", name="Cancel")).to_be_enabled()
+    expect(count.locator(".result")).to_contain_text("Succeeded", timeout=20_000)
+    expect(count.get_by_role("button", name="Cancel")).to_be_disabled()
+    expect(count.get_by_role("button", name="Count", exact=True)).to_be_enabled()
+
+
+def test_calls_and_cancels_work_without_scripts(kiosk: Server, robot: CycloneRobot) -> None:
+    form = {"content-type": "application/x-www-form-urlencoded"}
+    added = kiosk.http.post("/widgets/add", content="_id=f1&words=", headers=form)
+    assert added.status_code == 303
+    assert "the sum is 42" in kiosk.http.get(added.headers["location"]).text
+    robot.fibonacci(step_s=30)
+    kiosk.http.post("/widgets/count", content="_id=f2&words=", headers=form)
+    assert kiosk.http.post("/widgets/count/cancel", content="_id=f2", headers=form).status_code == 303
+    until(lambda: kiosk.widget("count")["outcome"] == "canceled", "canceled")
