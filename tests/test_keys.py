@@ -105,7 +105,7 @@ def test_a_bridges_own_token_shows_the_bridge() -> None:
         "chatter",
         "@/b1",
         "@/b1/@ros2_lv/",
-        "@/b1/@ros2_lv/SS/add/example§srv§Add",  # a service server
+        "@/b1/@ros2_lv/SC/add/example§srv§Add",  # a service client
         "@/b1/@ros2_lv/AC/move/example§action§Move",  # an action client
         "@/b1/@ros2_lv/MP/a",
         "@/b1/@ros2_lv/MP/a/b/c/d/e",
@@ -170,3 +170,16 @@ def test_a_token_of_a_native_dds_program_is_read(qos: str) -> None:
     found = parsed(f"@/b1/@ros2_lv/MP/enabled/std_msgs§msg§Bool/{qos}")
     assert found is not None
     assert (found.key, found.type) == ("enabled", "std_msgs/msg/Bool")
+
+
+@pytest.mark.parametrize("role", ["SS", "AS"])
+def test_a_server_is_read_from_its_token(role: keys.ServerRole) -> None:
+    kind = "srv" if role == "SS" else "action"
+    made = keys.server_token("b1", role, "arm/move", f"pkg/{kind}/Move")
+    assert parsed(made) == Endpoint("b1", role, "arm/move", f"pkg/{kind}/Move")
+
+
+def test_a_hostile_action_never_becomes_a_token() -> None:
+    for key, kind in (("a§b", "pkg/action/Move"), ("a", "pkg/srv/Move"), ("", "pkg/action/Move")):
+        with pytest.raises(ValueError, match="can not be a token"):
+            keys.action_client_token("b1", key, kind)

@@ -210,7 +210,11 @@ def test_an_interlock_and_a_widget_may_have_one_id(load: Load) -> None:
             "page[1].id",
             '"one" is already the id of page[0]',
         ),
-        (with_widget(1, kind="knob"), BUTTON, 'unknown kind "knob"; one of text, publish, call, action, readout'),
+        (
+            with_widget(1, kind="knob"),
+            BUTTON,
+            'unknown kind "knob"; one of text, publish, call, action, readout',
+        ),
         (
             tables(page=[{"id": "one", "title": "One", "widget": [without(FREE, "kind")]}]),
             "page[0].widget[0]",
@@ -501,3 +505,54 @@ def test_interfaces_are_folders(load: Load, given: Any, place: str, why: str) ->
     found = faults(load, {"interfaces": given, **tables()})
     assert list(found) == [place]
     assert why in found[place]
+
+
+CALL = {
+    "id": "call",
+    "kind": "call",
+    "label": "Call",
+    "service": "/add",
+    "type": "example_interfaces/srv/AddTwoInts",
+    "request": {"a": 1, "b": 2},
+}
+ACTION = {
+    "id": "act",
+    "kind": "action",
+    "label": "Act",
+    "action": "/count",
+    "type": "example_interfaces/action/Fibonacci",
+    "goal": {"order": 3},
+}
+
+
+@pytest.mark.parametrize(
+    ("widget", "key", "message"),
+    [
+        ({**CALL, "type": "example_interfaces/srv/AddTwo"}, "type", "did you mean"),
+        ({**CALL, "type": "std_msgs/msg/Bool"}, "type", "is not a ROS 2 service type"),
+        ({**CALL, "request": {"a": 1}}, "request.b", "is missing"),
+        ({**CALL, "request": {"a": 1, "b": 2.5}}, "request.b", "must be a whole number (int64)"),
+        ({**CALL, "answer": "{total}"}, "answer", 'there is no "total"'),
+        ({**CALL, "success": "sum"}, "success", '"sum" is int64: it must be bool'),
+        ({**CALL, "interlock": "nothing"}, "interlock", 'no interlock "nothing"'),
+        ({**CALL, "timeout_s": 0}, "timeout_s", "greater than 0"),
+        ({**ACTION, "type": "example_interfaces/action/Fibo"}, "type", "did you mean"),
+        ({**ACTION, "goal": {"order": "{message}"}}, "goal.order", "must be a whole number (int32)"),
+        ({**ACTION, "progress": "sequence"}, "progress", "is int32[]: it must be a number"),
+        ({**ACTION, "feedback": "{done}"}, "feedback", 'there is no "done"'),
+        ({**ACTION, "result": "{sequenze}"}, "result", 'there is no "sequenze"'),
+    ],
+)
+def test_a_fault_of_a_call_or_an_action_is_named(
+    load: Load, widget: dict[str, Any], key: str, message: str
+) -> None:
+    page = {"id": "one", "title": "One", "widget": [MESSAGE, widget]}
+    found = faults(load, tables(page=[page]))
+    assert list(found) == [f"page[0].widget[1].{key}"]
+    assert message in found[f"page[0].widget[1].{key}"]
+
+
+def test_a_call_and_an_action_are_taken(load: Load) -> None:
+    page = {"id": "one", "title": "One", "widget": [MESSAGE, CALL, ACTION]}
+    panel = load(tables(page=[page]))
+    assert panel.actions() == {"/count": "example_interfaces/action/Fibonacci"}

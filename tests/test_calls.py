@@ -1,0 +1,210 @@
+"""Calls and goals whose robot answers late, wrongly or not at all: without a bridge, at set times."""
+
+import asyncio
+from collections.abc import Callable, Coroutine
+from typing import Any
+
+import pytest
+
+from app import keys
+from app.actions import Actions
+from app.calls import MOST_UNANSWERED, Calls
+from app.panel.model import Action, Call, Panel
+from app.progress import Answer
+from app.robot import Robot, Sample
+from tests.builders import BRIDGE, INTERFACES, panel_of, robot_there
+
+TRIGGER = "std_srvs/srv/Trigger"
+COUNT = "example_interfaces/action/Fibonacci"
+CALL = {"id": "reset", "kind": "call", "label": "Reset", "service": "/reset", "type": TRIGGER}
+GOAL = {"id": "count", "kind": "action", "label": "Count", "action": "/count", "type": COUNT}
+
+
+class Line:
+    """A link whose queries are answered by hand."""
+
+    def __init__(self) -> None:
+        self.asked: list[tuple[str, bytes, asyncio.Future[bytes | None]]] = []
+
+    def query(self, key: str, payload: bytes, timeout_s: float) -> "asyncio.Future[bytes | None]":
+        future: asyncio.Future[bytes | None] = asyncio.get_running_loop().create_future()
+        self.asked.append((key, payload, future))
+        return future
+
+    def answer(self, type_name: str, number: int = -1, **fields: Any) -> None:
+        self.asked[number][2].set_result(INTERFACES.encode(type_name, fields))
+
+
+class Bench:
+    """A robot that offers a service and an action."""
+
+    def __init__(self) -> None:
+        self.panel: Panel = panel_of(
+            {**CALL, "timeout_s": 0.05}, {**GOAL, "goal": {"order": 3}, "timeout_s": 0.05}
+        )
+        self.robot: Robot = robot_there(self.panel)
+        self.robot.graph.apply(keys.server_token(BRIDGE, "SS", "reset", TRIGGER), True)
+        self.robot.graph.apply(keys.server_token(BRIDGE, "AS", "count", COUNT), True)
+        self.line = Line()
+        self.corrected: list[tuple[str, Answer]] = []
+        self.calls = Calls(INTERFACES, self.robot, self.line, lambda: None)
+        self.actions = Actions(INTERFACES, self.robot, self.line, lambda: None)
+        call, goal = self.panel.widgets()
+        assert isinstance(call, Call)
+        assert isinstance(goal, Action)
+        self.reset, self.count = call, goal
+
+    def correct(self, press_id: str, answer: Answer) -> None:
+        self.corrected.append((press_id, answer))
+
+    def call(self, press_id: str = "p1") -> "asyncio.Task[Answer]":
+        request = INTERFACES.encode(f"{TRIGGER}_Request", {})
+        return asyncio.create_task(self.calls.call(self.reset, request, press_id, self.correct))
+
+    def send_goal(self) -> "asyncio.Task[Answer]":
+        return asyncio.create_task(self.actions.start(self.count, {"order": 3}, "g1", self.correct))
+
+    def lose_the_bridge(self) -> None:
+        self.robot.graph.apply(keys.bridge_token(BRIDGE), False)
+        self.calls.follow()
+        self.actions.follow()
+
+
+Test = Callable[[Bench], Coroutine[Any, Any, None]]
+
+
+def run(test: Test) -> None:
+    asyncio.run(test(Bench()))
+
+
+async def asked(bench: Bench, count: int) -> None:
+    while len(bench.line.asked) < count:
+        await asyncio.sleep(0)
+
+
+def test_an_answer_that_can_not_be_read_is_unknown() -> None:
+    async def test(bench: Bench) -> None:
+        call = bench.call()
+        await asked(bench, 1)
+        bench.line.asked[0][2].set_result(b"\0\1\0\0")
+        answer = await call
+        assert answer.outcome == "unknown"
+        assert "the robot may have done it" in answer.text
+
+    run(test)
+
+
+def test_a_first_timeout_hints_at_cyclone_and_a_later_one_does_not() -> None:
+    async def test(bench: Bench) -> None:
+        first = await bench.call()
+        assert first.outcome == "timed_out"
+        assert "Cyclone DDS" in first.text
+        call = bench.call("p2")
+        await asked(bench, 2)
+        bench.line.answer(f"{TRIGGER}_Response", success=True, message="")
+        assert (await call).outcome == "succeeded"
+        assert "Cyclone DDS" not in (await bench.call("p3")).text
+
+    run(test)
+
+
+def test_a_query_that_ends_without_an_answer_is_unknown() -> None:
+    async def test(bench: Bench) -> None:
+        call = bench.call()
+        await asked(bench, 1)
+        bench.line.asked[0][2].set_result(None)
+        answer = await call
+        assert answer.outcome == "unknown"
+        assert "/reset" in answer.text
+
+    run(test)
+
+
+def test_calls_that_nobody_answers_are_bounded_and_forgotten() -> None:
+    async def test(bench: Bench) -> None:
+        for number in range(MOST_UNANSWERED):
+            assert (await bench.call(f"p{number}")).outcome == "timed_out"
+        one_more = await bench.call("too many")
+        assert one_more.outcome == "refused"
+        assert len(bench.line.asked) == MOST_UNANSWERED
+        for _, _, future in bench.line.asked:
+            future.set_result(None)
+        await asyncio.sleep(0)
+        assert bench.calls.unanswered("reset") == 0
+
+    run(test)
+
+
+def test_a_late_answer_corrects_its_own_press_and_not_what_came_after() -> None:
+    async def test(bench: Bench) -> None:
+        await bench.call("p1")
+        second = bench.call("p2")
+        await asked(bench, 2)
+        bench.line.answer(f"{TRIGGER}_Response", 1, success=True, message="second")
+        await second
+        bench.line.answer(f"{TRIGGER}_Response", 0, success=False, message="first")
+        await asyncio.sleep(0)
+        ((press_id, answer),) = bench.corrected
+        assert (press_id, answer.outcome) == ("p1", "rejected")
+        assert "second" in bench.robot.progress["reset"].text
+
+    run(test)
+
+
+@pytest.mark.parametrize("what", ["call", "send_goal"])
+def test_a_bridge_that_goes_away_ends_the_waiting_at_once(what: str) -> None:
+    async def test(bench: Bench) -> None:
+        waiting = getattr(bench, what)()
+        await asked(bench, 1)
+        bench.lose_the_bridge()
+        answer = await waiting
+        assert answer.outcome == "unknown"
+        assert "the robot may have done it" in answer.text
+
+    run(test)
+
+
+def test_a_goal_cut_off_is_unknown_until_the_robot_tells_its_result() -> None:
+    async def test(bench: Bench) -> None:
+        types = INTERFACES.action(COUNT)
+        start = bench.send_goal()
+        await asked(bench, 1)
+        bench.line.answer(types.send_goal_response, accepted=True, stamp={"sec": 0, "nanosec": 0})
+        assert (await start).outcome == "accepted"
+        await asked(bench, 2)
+        bench.lose_the_bridge()
+        while bench.robot.progress["count"].busy:
+            await asyncio.sleep(0)
+        outcomes = [bench.robot.progress["count"].outcome]
+        bench.robot.graph.apply(keys.bridge_token(BRIDGE), True)
+        await asked(bench, 3)
+        bench.line.answer(types.get_result_response, status=4, result={"sequence": [0, 1]})
+        while not bench.robot.progress["count"].text.startswith("Succeeded"):
+            await asyncio.sleep(0)
+        outcomes.append(bench.robot.progress["count"].outcome)
+        assert outcomes == ["unknown", "succeeded"]
+        assert [answer.outcome for _, answer in bench.corrected] == ["unknown", "succeeded"]
+        await bench.actions.stop()
+
+    run(test)
+
+
+def test_feedback_of_another_programs_goal_is_passed_over() -> None:
+    async def test(bench: Bench) -> None:
+        types = INTERFACES.action(COUNT)
+        start = bench.send_goal()
+        await asked(bench, 1)
+        bench.line.answer(types.send_goal_response, accepted=True, stamp={"sec": 0, "nanosec": 0})
+        await start
+        before = bench.robot.progress["count"]
+        other = {"goal_id": {"uuid": [7] * 16}, "feedback": {"sequence": [1]}}
+        for payload in (INTERFACES.encode(types.feedback_message, other), b"\xff" * 9):
+            bench.actions.hear_feedback("/count", sample_of(payload))
+        assert bench.robot.progress["count"] == before
+        await bench.actions.stop()
+
+    run(test)
+
+
+def sample_of(payload: bytes) -> Sample:
+    return Sample(payload, 1, 0.0, 0.0, BRIDGE)
