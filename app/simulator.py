@@ -10,7 +10,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
@@ -20,46 +20,14 @@ from zenoh.ext import CacheConfig, declare_advanced_publisher
 from zenoh.handlers import Callback
 
 from app import keys
+from app.demo import COUNT, COUNT_TYPE, LISTENS, SERVES, SPEAKS, DemoRobot
 from app.errors import DecodeError
 from app.interfaces import Interfaces, interfaces_of
 from app.keys import Qos
 
 ENDPOINT: Final = "tcp/127.0.0.1:7447"
 STEP_S: Final = 0.1
-PERMITTED_S: Final = 20.0
-FORBIDDEN_S: Final = 8.0
-REPEAT_S: Final = 1.0
-
-TEXT: Final = "std_msgs/msg/String"
-FLAG: Final = "std_msgs/msg/Bool"
-LISTENS: Final = {"/operation": TEXT, "/operation1": TEXT, "/operation2": TEXT}
-SPEAKS: Final = {"/operation_enabled": FLAG, "/last_heard": TEXT}
 LATCHED: Final = Qos(transient_local=True, depth=1)
-
-Message = tuple[str, Mapping[str, Any]]
-
-
-class DemoRobot:
-    """What the robot does, with the time given: it permits, forbids, and tells what it heard."""
-
-    def __init__(self) -> None:
-        self._began: float | None = None
-        self._told: tuple[bool, float] | None = None
-        self._heard: list[Message] = []
-
-    def hear(self, topic: str, text: str) -> None:
-        self._heard.append(("/last_heard", {"data": f"{text} ({topic})"}))
-
-    def step(self, now: float) -> list[Message]:
-        """What the robot says at `now` (seconds, monotonic), as (topic, fields)."""
-        if self._began is None:
-            self._began = now
-        permitted = (now - self._began) % (PERMITTED_S + FORBIDDEN_S) < PERMITTED_S
-        said, self._heard = self._heard, []
-        if self._told is None or self._told[0] != permitted or now - self._told[1] >= REPEAT_S:
-            self._told = (permitted, now)
-            said.append(("/operation_enabled", {"data": permitted}))
-        return said
 
 
 class Simulator:
@@ -73,7 +41,14 @@ class Simulator:
         self._ends = threading.Event()
         self._session = zenoh.open(_listening(endpoint))
         self._publishers = {topic: self._publisher(topic) for topic in SPEAKS}
-        self._declared = [*self._subscribers(), *self._graph()]
+        self._results: list[tuple[bytes, zenoh.Query]] = []
+        self._types = self._interfaces.action(COUNT_TYPE)
+        self._declared = [
+            *self._subscribers(),
+            *(self._served(self._key(one), kind, self._server(one)) for one, kind in SERVES.items()),
+            *self._action(),
+            *self._graph(),
+        ]
         self._thread = threading.Thread(target=self._run, name="demo-robot", daemon=True)
 
     def __enter__(self) -> "Simulator":
@@ -111,6 +86,51 @@ class Simulator:
                 self._key(topic), Callback(on_sample, indirect=False)
             )
 
+    def _served(self, key: str, type_name: str, serve: Callable[[Any], Mapping[str, Any]]) -> Any:
+        """A queryable that answers as a service server behind a bridge does."""
+        request_type, response_type = self._interfaces.service(type_name)
+
+        def on_query(query: zenoh.Query) -> None:
+            with query:
+                try:
+                    request = self._interfaces.decode(request_type, _payload(query))
+                except DecodeError:
+                    return
+                with self._lock:
+                    fields = serve(request)
+                query.reply(key, self._interfaces.encode(response_type, fields))
+
+        return self._session.declare_queryable(key, Callback(on_query, indirect=False), complete=True)
+
+    def _server(self, service: str) -> Callable[[Any], Mapping[str, Any]]:
+        return lambda request: self._robot.serve(service, request)
+
+    def _action(self) -> Iterator[Any]:
+        key = f"{self._key(COUNT)}/_action"
+
+        def begin(request: Any) -> Mapping[str, Any]:
+            accepted = self._robot.begin(bytes(request.goal_id.uuid), request.goal.order)
+            return {"accepted": accepted, "stamp": {"sec": 0, "nanosec": 0}}
+
+        def cancel(request: Any) -> Mapping[str, Any]:
+            code = self._robot.cancel(bytes(request.goal_info.goal_id.uuid))
+            return {"return_code": code, "goals_canceling": []}
+
+        def on_result(query: zenoh.Query) -> None:
+            try:
+                request = self._interfaces.decode(self._types.get_result_request, _payload(query))
+            except DecodeError:
+                query.drop()
+                return
+            with self._lock:
+                self._results.append((bytes(request.goal_id.uuid), query))
+
+        yield self._served(f"{key}/send_goal", self._types.send_goal, begin)
+        yield self._served(f"{key}/cancel_goal", self._types.cancel_goal, cancel)
+        yield self._session.declare_queryable(
+            f"{key}/get_result", Callback(on_result, indirect=False), complete=True
+        )
+
     def _graph(self) -> Iterator[Any]:
         zid = str(self._session.zid())
 
@@ -132,14 +152,38 @@ class Simulator:
                 yield liveliness.declare_token(
                     keys.token(zid, role, self._key(topic), name, qos, type_hash)
                 )
+        for service, name in SERVES.items():
+            yield liveliness.declare_token(keys.server_token(zid, "SS", self._key(service), name))
+        yield liveliness.declare_token(keys.server_token(zid, "AS", self._key(COUNT), COUNT_TYPE))
         yield liveliness.declare_token(keys.bridge_token(zid))
 
     def _run(self) -> None:
         while not self._ends.wait(STEP_S):
             with self._lock:
                 said = self._robot.step(time.monotonic())
+                counted = self._robot.count()
+                ended = [(q, end) for goal, q in self._results if (end := self._robot.result(goal))]
+                answered = {id(query) for query, _ in ended}
+                self._results = [one for one in self._results if id(one[1]) not in answered]
             for topic, fields in said:
                 self._publishers[topic].put(self._interfaces.encode(SPEAKS[topic], fields))
+            for goal_id, sequence in counted:
+                self._tell(goal_id, sequence)
+            for query, (status, sequence) in ended:
+                self._answer(query, status, sequence)
+
+    def _tell(self, goal_id: bytes, sequence: list[int]) -> None:
+        fields = {"goal_id": {"uuid": goal_id}, "feedback": {"sequence": sequence}}
+        payload = self._interfaces.encode(self._types.feedback_message, fields)
+        self._session.put(keys.feedback(self._key(COUNT)), payload)
+
+    def _answer(self, query: zenoh.Query, status: int, sequence: list[int]) -> None:
+        fields = {"status": status, "result": {"sequence": sequence}}
+        with query:
+            query.reply(
+                f"{self._key(COUNT)}/_action/get_result",
+                self._interfaces.encode(self._types.get_result_response, fields),
+            )
 
 
 def _listening(endpoint: str) -> zenoh.Config:
@@ -153,6 +197,10 @@ def _listening(endpoint: str) -> zenoh.Config:
     }.items():
         config.insert_json5(place, value)
     return config
+
+
+def _payload(query: zenoh.Query) -> bytes:
+    return b"" if query.payload is None else query.payload.to_bytes()
 
 
 @contextmanager

@@ -56,11 +56,12 @@ ORDER = (
     "app.routes.health",
     "app.routes",
     "app.development",
+    "app.demo",
     "app.simulator",
     "app.main",
 )
 SPEAK_ZENOH = {"app.link", "app.simulator"}
-KNOWN_TO_THE_SIMULATOR = {"app.errors", "app.interfaces", "app.keys"}
+KNOWN_TO_THE_SIMULATOR = {"app.demo", "app.errors", "app.interfaces", "app.keys"}
 
 
 def name_of(path: Path) -> str:
