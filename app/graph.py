@@ -1,8 +1,22 @@
-"""What the liveliness tokens and the bridges' admin space say: who is there, with which types."""
+"""What the liveliness tokens and the bridges' admin space say: who is there, with which types.
 
-from collections.abc import Mapping
+Kept by topic key, so that asking costs the same however large the robot's graph is.
+"""
 
-from app.keys import DEMO_VERSION, Direction, Endpoint, Role, ServerRole, TopicRole, parsed
+from collections import defaultdict
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from itertools import chain
+
+from app.keys import (
+    DEMO_VERSION,
+    Direction,
+    Endpoint,
+    Role,
+    ServerRole,
+    TopicRole,
+    parsed,
+)
 
 # Whose type must equal the panel's, for what the panel does with a topic. A route of the bridge
 # has one type for all: who created it first has fixed it, be it the robot or another panel.
@@ -12,39 +26,59 @@ _COUNTERPARTS: Mapping[TopicRole, tuple[Role, Role, Direction]] = {
 }
 
 
+@dataclass(frozen=True, slots=True)
+class Route:
+    """A bridge's route for a topic; `whole` is False where its DDS reader is missing."""
+
+    zid: str
+    direction: Direction
+    key: str
+    type: str
+    whole: bool = True
+
+
 class Graph:
-    """The ROS graph behind all bridges; changed by `apply` only, on the event loop."""
+    """The ROS graph behind all bridges; changed by `apply`, `learn` and `answered` only, on the
+    event loop."""
 
     def __init__(self, own_zid: str = "") -> None:
-        self._own = own_zid
-        self._tokens: dict[str, Endpoint] = {}
-        self._routes: Mapping[tuple[str, Direction, str], str] = {}
-        self._nodes: frozenset[Endpoint] = frozenset()
+        self.own_zid = own_zid  # whose tokens are not the robot's
+        self._bridges: set[str] = set()
+        self._tokens: defaultdict[str, dict[str, Endpoint]] = defaultdict(dict)
+        self._routes: defaultdict[str, list[Route]] = defaultdict(list)
+        self._nodes: defaultdict[str, list[Endpoint]] = defaultdict(list)
         self._answered: Mapping[str, str] | None = None
 
     def apply(self, token_key: str, alive: bool) -> str | None:
         """Takes one token's appearance or end; returns the zid of a bridge that came or went."""
         endpoint = parsed(token_key)
-        if endpoint is None or endpoint.zid == self._own:
+        if endpoint is None or endpoint.zid == self.own_zid:
             return None
+        if endpoint.role is None:
+            return self._bridge(endpoint.zid, alive)
         if alive:
-            self._tokens[token_key] = endpoint
-            if endpoint.role is None:
-                self._answered = None  # it was not asked yet
+            self._tokens[endpoint.key][token_key] = endpoint
         else:
-            self._tokens.pop(token_key, None)
-        return endpoint.zid if endpoint.role is None else None
+            self._tokens[endpoint.key].pop(token_key, None)
+        return None
 
-    def learn(
-        self,
-        routes: Mapping[tuple[str, Direction, str], str],
-        nodes: frozenset[Endpoint] = frozenset(),
-    ) -> None:
-        """Takes what the bridges said of their routes, (bridge, direction, key) → type, and of the
-        publishers and subscribers of the nodes behind them: a route has one type, whatever they
-        have."""
-        self._routes = routes
-        self._nodes = nodes
+    def _bridge(self, zid: str, alive: bool) -> str:
+        if alive:
+            self._bridges.add(zid)
+            self._answered = None  # it was not asked yet
+        else:
+            self._bridges.discard(zid)
+        return zid
+
+    def learn(self, routes: Iterable[Route], nodes: Iterable[Endpoint] = ()) -> None:
+        """Takes what the bridges said of their routes, and of the publishers and subscribers of
+        the nodes behind them: a route has one type, whatever they have."""
+        self._routes.clear()
+        self._nodes.clear()
+        for route in routes:
+            self._routes[route.key].append(route)
+        for node in nodes:
+            self._nodes[node.key].append(node)
 
     def answered(self, versions: Mapping[str, str]) -> None:
         """Takes which bridges answered when they were asked, and with which version."""
@@ -52,50 +86,53 @@ class Graph:
 
     @property
     def bridges(self) -> frozenset[str]:
-        return frozenset(e.zid for e in self._tokens.values() if e.role is None)
+        return frozenset(self._bridges)
 
     @property
     def silent(self) -> bool:
-        """A bridge is there by its token, but not one answered when asked."""
+        """A bridge is there by its token, but did not answer when all were asked."""
         asked = self._answered
-        return asked is not None and bool(self.bridges) and not self.bridges & asked.keys()
+        return asked is not None and bool(self._bridges - asked.keys())
 
     @property
     def simulated(self) -> bool:
         """A bridge that answered is a demo robot's."""
         asked = self._answered or {}
-        return any(asked.get(zid) == DEMO_VERSION for zid in self.bridges)
+        return any(asked.get(zid) == DEMO_VERSION for zid in self._bridges)
+
+    def _on_robot(self, role: Role, key: str) -> list[Endpoint]:
+        tokens = self._tokens.get(key, {}).values()
+        return [e for e in tokens if e.role == role and e.zid in self._bridges]
 
     def on_robot(self, role: Role, key: str) -> bool:
-        """Whether a node behind a bridge publishes ("MP") or subscribes ("MS")."""
-        bridges = self.bridges
-        return any(e.role == role and e.key == key and e.zid in bridges for e in self._tokens.values())
+        """Whether a node behind a bridge publishes, subscribes or serves."""
+        return bool(self._on_robot(role, key))
 
     def server_type(self, role: ServerRole, key: str) -> str | None:
         """The type of the robot's service or action; None if it offers none of this name now."""
-        bridges = self.bridges
-        for e in self._tokens.values():
-            if e.role == role and e.key == key and e.zid in bridges:
-                return e.type
-        return None
+        return next((e.type for e in self._on_robot(role, key)), None)
 
     def latched(self, key: str) -> bool | None:
         """Whether the robot's publisher is TRANSIENT_LOCAL; None if it has none now."""
-        bridges = self.bridges
-        for e in self._tokens.values():
-            if e.role == "MP" and e.key == key and e.zid in bridges:
-                return e.transient_local
-        return None
+        return next((e.transient_local for e in self._on_robot("MP", key)), None)
+
+    def unheard(self, key: str) -> bool:
+        """Whether the robot publishes a topic that its bridge does not read for the panel."""
+        publishing = {e.zid for e in self._on_robot("MP", key)}
+        return any(
+            r.direction == "pub" and not r.whole and r.zid in publishing
+            for r in self._routes.get(key, [])
+        )
 
     def wrong_type(self, role: TopicRole, key: str, type_name: str) -> str | None:
         """The other type that this topic has, if it is not what the panel needs for `role`."""
         theirs, others, direction = _COUNTERPARTS[role]
-        bridges = self.bridges
-        for endpoint in (*self._tokens.values(), *self._nodes):
-            counts = endpoint.role == (theirs if endpoint.zid in bridges else others)
-            if counts and endpoint.key == key and endpoint.type != type_name:
+        for endpoint in chain(self._tokens.get(key, {}).values(), self._nodes.get(key, [])):
+            counts = endpoint.role == (theirs if endpoint.zid in self._bridges else others)
+            if counts and endpoint.type != type_name:
                 return endpoint.type
-        for (zid, way, route_key), found in self._routes.items():
-            if zid in bridges and way == direction and route_key == key and found != type_name:
-                return found
+        for route in self._routes.get(key, []):
+            there = route.zid in self._bridges and route.direction == direction
+            if there and route.type != type_name:
+                return route.type
         return None

@@ -6,6 +6,7 @@ reason an operator reads.
 
 import math
 from dataclasses import dataclass
+from typing import Final
 
 from app.panel.model import Action, Call, Interlock, Pressed, Publish
 from app.progress import IDLE
@@ -25,6 +26,9 @@ class Verdict:
 
 
 PERMITTED = Verdict(True)
+
+# What comes so soon after joining may be a latched value of any age, sent again.
+HISTORY_S: Final = 1.0
 
 
 def way(robot: Robot, now: float) -> Verdict:
@@ -48,15 +52,19 @@ def interlock_verdict(interlock: Interlock, robot: Robot, now: float) -> Verdict
     topic, key = interlock.topic, robot.key(interlock.topic)
     if found := robot.graph.wrong_type("MS", key, interlock.type):
         return locked("wrong_type", topic=topic, found=found, wanted=interlock.type)
+    if robot.graph.unheard(key):
+        return locked("unheard", topic=topic)
+    if interlock.require_publisher and not robot.graph.on_robot("MP", key):
+        return locked("no_publisher", topic=topic)
     reading = robot.reading(topic)
     if reading.status != "message":
         return locked(reading.status, topic=topic, wanted=interlock.type)
-    if interlock.require_publisher and not robot.graph.on_robot("MP", key):
-        return locked("no_publisher", topic=topic)
     if value_of(reading.message, interlock.field) is not True:
         return locked("forbidden", name=interlock.name)
     if interlock.max_age_s is None:
         return PERMITTED
+    if reading.at < robot.settled_at + HISTORY_S:
+        return locked("waiting", topic=topic)
     stale_at = reading.at + interlock.max_age_s
     if now >= stale_at:
         return locked("stale", topic=topic, limit=f"{interlock.max_age_s:g}")

@@ -20,8 +20,9 @@ from typing import Any, Final
 
 from app import keys
 from app.errors import LinkError
+from app.graph import Route
 from app.interfaces import Interfaces
-from app.keys import Direction, Endpoint, Qos, TopicRole
+from app.keys import Endpoint, Qos, TopicRole
 from app.link import Link
 from app.panel.model import Panel
 from app.robot import Robot
@@ -36,19 +37,30 @@ SETTLE_S: Final = 0.2  # from the tokens to routes that carry the first message
 ASK_EVERY_S: Final = 5.0
 ASK_AGAIN_S: Final = 0.5
 MISSES_ALLOWED: Final = 1
+UNHEARD_ALLOWED: Final = 3  # askings that find a topic without its reader
 
 
 class Joining:
     """Holds the panel's tokens while a bridge is there, and asks the bridges how they are."""
 
     def __init__(
-        self, panel: Panel, interfaces: Interfaces, robot: Robot, link: Link, show: Callable[[], None]
+        self,
+        panel: Panel,
+        interfaces: Interfaces,
+        robot: Robot,
+        link: Link,
+        show: Callable[[], None],
+        renew: Callable[[], None],
     ) -> None:
+        """`show` is called when what is known has changed; `renew` opens a new session."""
         self._panel = panel
         self._interfaces = interfaces
         self._robot = robot
         self._link = link
         self._show = show
+        self._renew = renew
+        self._missed = 0
+        self._unheard = 0
         self._started_at = time.monotonic()
         self._joining: asyncio.Task[None] | None = None
         self._asking: asyncio.Task[None] | None = None
@@ -101,13 +113,18 @@ class Joining:
     async def _join(self) -> None:
         found = time.monotonic() - self._started_at < FOUND_WITHIN_S
         await asyncio.sleep(FOUND_S if found else FRESH_S)
-        if versions := await self._ask_versions():
-            self._robot.graph.answered(versions)
-        await self._ask_routes()
-        if not found:
-            self._link.resubscribe()
+        while True:
+            try:
+                await self._ask()
+                if self._missed == 0:
+                    break
+            except LinkError as error:
+                log.warning("%s", error)
+            self._show()
+            await asyncio.sleep(ASK_AGAIN_S)
         self._hold()
         await asyncio.sleep(SETTLE_S)
+        await self._ask()
         self._robot.settled_at = time.monotonic()
         log.info("joined the robot's topics")
         self._show()
@@ -153,21 +170,42 @@ class Joining:
         return self._held_as.get(key)
 
     async def _ask_regularly(self) -> None:
-        missed = 0
+        """Asks as long as it runs: whatever an answer is, the next one is asked for."""
         while True:
-            await self._pause(ASK_AGAIN_S if missed else ASK_EVERY_S)
-            if not self._robot.graph.bridges:
-                missed = 0
-                continue
-            versions = await self._ask_versions()
-            missed = 0 if versions.keys() & self._robot.graph.bridges else missed + 1
-            if missed in range(1, MISSES_ALLOWED + 1):
-                continue
-            self._robot.graph.answered(versions)
-            await self._ask_routes()
+            await self._pause(ASK_AGAIN_S if self._missed or self._unheard else ASK_EVERY_S)
             if self._joined:
-                self._hold()
-            self._show()
+                try:
+                    await self._ask()
+                    self._hold()
+                    self._heal()
+                except LinkError as error:
+                    log.warning("%s", error)
+                self._show()
+
+    async def _ask(self) -> None:
+        """Asks the bridges how they are, and of their routes and nodes."""
+        graph = self._robot.graph
+        answers = await self._link.ask(keys.VERSION)
+        versions = {keys.zid_of(key): told.decode(errors="replace") for key, told in answers}
+        self._missed = 0 if graph.bridges <= versions.keys() else self._missed + 1
+        if self._missed == 0 or self._missed > MISSES_ALLOWED:
+            graph.answered(versions)
+        routes = [r for key, told in await self._ask_json(keys.ROUTES) if (r := _route(key, told))]
+        nodes: set[Endpoint] = set()
+        for key, told in await self._ask_json(keys.NODES):
+            with suppress(KeyError, TypeError):  # an answer that is no node's
+                nodes.update(keys.endpoints_of(key, told, self._panel.namespace))
+        graph.learn(routes, nodes)
+
+    def _heal(self) -> None:
+        """A bridge that does not read a topic for this session does so for a new one."""
+        listened = (self._robot.key(topic) for topic in self._panel.subscriptions())
+        lost = [key for key in listened if self._robot.graph.unheard(key)]
+        self._unheard = self._unheard + 1 if lost else 0
+        if self._unheard >= UNHEARD_ALLOWED:
+            self._unheard = 0
+            log.error("the bridge does not pass on %s: a new session", ", ".join(lost))
+            self._renew()
 
     async def _pause(self, longest_s: float) -> None:
         """Until it is time to ask, or a moment after the graph has changed."""
@@ -177,32 +215,29 @@ class Joining:
                 await asyncio.sleep(ASK_AGAIN_S)
         self._changed.clear()
 
-    async def _ask_versions(self) -> dict[str, str]:
-        answers = await self._link.ask(keys.VERSION)
-        return {keys.zid_of(key): payload.decode(errors="replace") for key, payload in answers}
-
-    async def _ask_routes(self) -> None:
-        routes: dict[tuple[str, Direction, str], str] = {}
-        for key, told in await self._ask_json(keys.ROUTES):
-            if route := keys.route_of(key):
-                routes[route] = told["ros2_type"]
-        nodes: set[Endpoint] = set()
-        for key, told in await self._ask_json(keys.NODES):
-            nodes.update(keys.endpoints_of(key, told, self._panel.namespace))
-        self._robot.graph.learn(routes, frozenset(nodes))
-
     async def _ask_json(self, selector: str) -> list[tuple[str, Any]]:
-        try:
-            return [(key, json.loads(told)) for key, told in await self._link.ask(selector)]
-        except ValueError:
-            log.warning("%s: the bridge answers in a way this kiosk does not know", selector)
-            return []
+        """(key, answer) of each answer that is JSON; others are passed over."""
+        found = []
+        for key, told in await self._link.ask(selector):
+            with suppress(ValueError):
+                found.append((key, json.loads(told)))
+        return found
 
     def _task(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
         """A task whose failure is logged, not lost."""
         task = asyncio.get_running_loop().create_task(work)
         task.add_done_callback(_told)
         return task
+
+
+def _route(key: str, told: Any) -> Route | None:
+    """What a bridge says of a route; None for what is none."""
+    place = keys.route_of(key)
+    if place is None or not isinstance(told, dict) or not isinstance(told.get("ros2_type"), str):
+        return None
+    zid, direction, topic_key = place
+    whole = direction == "sub" or told.get("dds_reader") != ""
+    return Route(zid, direction, topic_key, told["ros2_type"], whole)
 
 
 def _told(task: asyncio.Task[None]) -> None:

@@ -30,6 +30,7 @@ from app.views import Sight, sight
 log = logging.getLogger("kiosk")
 
 FRAMES_PER_S: Final = 20.0
+RENEW_AGAIN_S: Final = 1.0
 
 
 class Kiosk:
@@ -59,11 +60,12 @@ class Kiosk:
             panel, self.interfaces, self.robot, self.link, self._calls, self._actions
         )
         self._feedback = {keys.feedback(self.robot.key(one)): one for one in panel.actions()}
-        self._joining = Joining(panel, self.interfaces, self.robot, self.link, self._show)
+        self._joining = Joining(panel, self.interfaces, self.robot, self.link, self._show, self.renew)
         self._urgent = {self.robot.key(i.topic) for i in panel.interlocks}
         self._shown_at = 0.0
         self._timer: asyncio.TimerHandle | None = None
         self._rosout = RosoutHandler(self._publish_log)
+        self._renewing: asyncio.Task[None] | None = None
         self._stopped = False
 
     async def start(self) -> None:
@@ -82,6 +84,8 @@ class Kiosk:
         logging.getLogger().removeHandler(self._rosout)
         if self._timer is not None:
             self._timer.cancel()
+        if self._renewing is not None:
+            await asyncio.gather(self._renewing, return_exceptions=True)
         await self._joining.stop()
         await self._actions.stop()
         try:
@@ -98,6 +102,25 @@ class Kiosk:
         """A press, judged by all that has come from the robot until now."""
         self._take()
         return await self.presses.press(widget, inputs, press_id, who)
+
+    def renew(self) -> None:
+        """A new Zenoh session: until it is joined, nobody is known to be there."""
+        self.robot.lose()
+        self._follow(came=False)
+        self._show()
+        if self._renewing is None:
+            self._renewing = self._loop.create_task(self._renew())
+
+    async def _renew(self) -> None:
+        while not self._stopped:
+            try:
+                await asyncio.to_thread(self.link.renew)
+                break
+            except LinkError as error:
+                log.error("%s", error)
+                await asyncio.sleep(RENEW_AGAIN_S)
+        self.robot.graph.own_zid = self.link.zid
+        self._renewing = None
 
     def show_fault(self, text: str) -> None:
         """A fault of the panel file, shown on every page; "" takes it away."""
@@ -122,10 +145,14 @@ class Kiosk:
         if self._stopped:
             return
         changes = self.link.drain()
+        if self.robot.link_up and not changes.link_up:
+            log.warning("Zenoh link lost")
+            self.renew()
+            return
         urgent = self.robot.link_up != changes.link_up or bool(changes.tokens)
         if self.robot.link_up != changes.link_up:
-            self.robot.link_up = changes.link_up
-            log.info("Zenoh link %s", "up" if changes.link_up else "lost")
+            self.robot.link_up = True
+            log.info("Zenoh link up")
         had_bridge = bool(self.robot.graph.bridges)
         for key, sample in changes.samples.items():
             if key in self._feedback:
@@ -143,13 +170,18 @@ class Kiosk:
                 log.info("bridge %s found", zid)
                 came = True
         if changes.tokens:
-            self._calls.follow()
-            self._actions.follow()
-            self._joining.follow(came and not had_bridge)
+            self._follow(came and not had_bridge)
         if urgent:
             self._show()
         else:
             self._show_at(self._shown_at + 1 / FRAMES_PER_S)
+
+    def _follow(self, came: bool) -> None:
+        """After every change of the graph; `came`: there is a bridge where there was none."""
+        self.robot.follow_publishers()
+        self._calls.follow()
+        self._actions.follow()
+        self._joining.follow(came)
 
     # Showing.
 

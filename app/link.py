@@ -81,63 +81,90 @@ class Link:
 
     def __init__(self, config: zenoh.Config, wake: Callable[[], None]) -> None:
         """Opens at once, whether or not anybody is there; `wake` is called on Zenoh's threads."""
+        self._config = config
         self._wake_loop = wake
         self._lock = threading.Lock()
         self._seq = itertools.count(1)
+        self._session_number = 0
+        self._subscribe: tuple[str, ...] = ()
+        self._publish: tuple[str, ...] = ()
+        self._forget()
+        self._open()
+
+    def _forget(self) -> None:
         self._woken = False
         self._samples: dict[str, Sample] = {}
         self._stamps: dict[str, zenoh.Timestamp] = {}
         self._tokens: dict[str, Token] = {}
         self._transports: set[str] = set()
-        self._subscribers: dict[str, Any] = {}
-        self._publishers: dict[str, zenoh.Publisher] = {}
         self._held: dict[str, zenoh.LivelinessToken] = {}
+
+    def _open(self) -> None:
         with _translated("the Zenoh session can't be opened"):
-            self._session = zenoh.open(config)
+            self._session = zenoh.open(self._config)
         self.zid = str(self._session.zid())
 
     def start(self, subscribe: Iterable[str], publish: Iterable[str]) -> None:
-        """Declares everything, once."""
+        """Declares everything, once in a session."""
+        self._subscribe, self._publish = tuple(subscribe), tuple(publish)
+        self._declare()
+
+    def renew(self) -> None:
+        """A new session with everything declared; blocks for up to some tenths of a second.
+
+        Zenoh would take up the old one by itself. But then the bridge may end for this session
+        what it had just begun again, when it notices late that the old connection is lost: it
+        would show the kiosk as a subscriber and read nothing for it. And a subscriber drops what
+        it has seen before, also when what it saw was cut off in between.
+        """
+        with self._lock:
+            self._session_number += 1
+            self._forget()
+        with suppress(LinkError):
+            self.close()
+        self._open()
+        self._declare()
+
+    def _declare(self) -> None:
         with _translated("the Zenoh session can't be used"):
             self._listeners = (
                 self._session.info.declare_transport_events_listener(
-                    _direct(self._on_transport), history=True
+                    self._direct(self._on_transport), history=True
                 ),
                 self._session.liveliness().declare_subscriber(
-                    TOKENS, _direct(self._on_token), history=True
+                    TOKENS, self._direct(self._on_token), history=True
                 ),
             )
-            for key in publish:
-                self._publishers[key] = self._session.declare_publisher(
-                    key,
-                    congestion_control=zenoh.CongestionControl.DROP,
-                    express=True,
-                    reliability=zenoh.Reliability.RELIABLE,
-                    allowed_destination=zenoh.Locality.REMOTE,
-                )
-            for key in subscribe:
-                self._subscribers[key] = self._subscriber(key)
+            self._publishers = {key: self._publisher(key) for key in self._publish}
+            self._subscribers = [self._subscriber(key) for key in self._subscribe]
 
-    def resubscribe(self) -> None:
-        """Subscribes anew, so that the last value of each TRANSIENT_LOCAL publisher comes again.
-
-        A subscriber drops what it has seen before, also when what it saw was cut off in between.
-        The new one is there before the old one goes: the bridge's reader stays as it is.
-        """
-        with self._lock:
-            self._stamps.clear()
-        with _translated("can't subscribe"):
-            for key, old in list(self._subscribers.items()):
-                self._subscribers[key] = self._subscriber(key)
-                old.undeclare()
+    def _publisher(self, key: str) -> zenoh.Publisher:
+        return self._session.declare_publisher(
+            key,
+            congestion_control=zenoh.CongestionControl.DROP,
+            express=True,
+            reliability=zenoh.Reliability.RELIABLE,
+            allowed_destination=zenoh.Locality.REMOTE,
+        )
 
     def _subscriber(self, key: str) -> Any:
         return declare_advanced_subscriber(
             self._session,
             key,
-            _direct(lambda sample: self._on_sample(key, sample)),
+            self._direct(lambda sample: self._on_sample(key, sample)),
             history=HistoryConfig(detect_late_publishers=True, max_samples=1),
         )
+
+    def _direct(self, function: Callable[[Any], None]) -> "Callback[Any]":
+        """A handler on the receiving thread, with no thread of its own; deaf once renewed."""
+        number = self._session_number
+
+        def handle(what: Any) -> None:
+            with self._lock:
+                if number == self._session_number:
+                    function(what)
+
+        return Callback(handle, indirect=False)
 
     def hold(self, tokens: Iterable[str]) -> None:
         """Holds exactly these liveliness tokens from now on."""
@@ -225,47 +252,38 @@ class Link:
         with _translated("the Zenoh session did not close cleanly"):
             self._session.close()
 
-    # Below: on Zenoh's threads. No work here, and nothing may raise.
+    # Below: on Zenoh's threads, under the lock. No work here, and nothing may raise.
 
     def _on_sample(self, key: str, sample: zenoh.Sample) -> None:
         stamp = sample.timestamp
         source = None if stamp is None else str(stamp.get_id())
-        with self._lock:
+        if stamp is not None:
             last = self._stamps.get(key)
-            if stamp is not None:
-                if last is not None and last.get_id() == stamp.get_id() and not stamp >= last:
-                    return  # history that came after what is newer
-                self._stamps[key] = stamp
-            self._samples[key] = Sample(
-                sample.payload, next(self._seq), time.monotonic(), time.time(), source
-            )
-            self._wake()
+            if last is not None and last.get_id() == stamp.get_id() and not stamp >= last:
+                return  # history that came after what is newer
+            self._stamps[key] = stamp
+        self._samples[key] = Sample(
+            sample.payload, next(self._seq), time.monotonic(), time.time(), source
+        )
+        self._wake()
 
     def _on_token(self, sample: zenoh.Sample) -> None:
-        key = str(sample.key_expr)
-        with self._lock:
-            seq = next(self._seq)
-            token = self._tokens.setdefault(key, Token(False, 0))
-            token.alive = sample.kind == zenoh.SampleKind.PUT
-            if not token.alive:
-                token.lost_seq = seq
-            self._wake()
+        seq = next(self._seq)
+        token = self._tokens.setdefault(str(sample.key_expr), Token(False, 0))
+        token.alive = sample.kind == zenoh.SampleKind.PUT
+        if not token.alive:
+            token.lost_seq = seq
+        self._wake()
 
     def _on_transport(self, event: zenoh.TransportEvent) -> None:
         zid = str(event.transport.zid)
-        with self._lock:
-            if event.kind == zenoh.SampleKind.PUT:
-                self._transports.add(zid)
-            else:
-                self._transports.discard(zid)
-            self._wake()
+        if event.kind == zenoh.SampleKind.PUT:
+            self._transports.add(zid)
+        else:
+            self._transports.discard(zid)
+        self._wake()
 
     def _wake(self) -> None:
         if not self._woken:
             self._woken = True
             self._wake_loop()
-
-
-def _direct(function: Callable[[Any], None]) -> "Callback[Any]":
-    """A handler that runs on the receiving thread, with no thread of its own per declaration."""
-    return Callback(function, indirect=False)

@@ -37,6 +37,8 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     settings = settings or Settings.from_environment()
     logs.configure(settings.log_level)
     panel, fault = _first_panel(settings)
+    if (settings.mode or panel.mode) == "live":
+        config_from(settings.zenoh)  # a file that can't be used is told before anything starts
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
@@ -96,9 +98,9 @@ async def _running(
         else:
             config = config_from(settings.zenoh)
         kiosk = Kiosk(panel, config, revision, simulated=demo, fault=fault)
-        await kiosk.start()
-        log.info('panel "%s", %s robot', panel.title, "simulated" if demo else "live")
         try:
+            await kiosk.start()
+            log.info('panel "%s", %s robot', panel.title, "simulated" if demo else "live")
             yield kiosk, assets
         finally:
             await kiosk.stop()

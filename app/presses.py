@@ -6,6 +6,7 @@ showed does not count.
 
 import asyncio
 import logging
+import secrets
 import time
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
@@ -126,7 +127,10 @@ class Presses:
         if (known.widget, known.inputs) != (widget_id, inputs):
             reused = say("press_reused", id=press_id)
             log.warning("press %s of %s by %s: %s", press_id, widget_id, who, reused)
-            return self._receipt(widget, inputs, press_id, "refused", reused, "input")
+            own_id = f"{press_id:.40}.{secrets.token_hex(4)}"
+            refusal = self._receipt(widget, inputs, own_id, "refused", reused, "input")
+            self._keep(refusal)
+            return refusal
         if isinstance(known, _UnderWay):
             return await asyncio.shield(known.receipt)
         return known
@@ -179,7 +183,8 @@ class Presses:
             return self._receipt(widget, inputs, press_id, answer.outcome, answer.text, cause)
 
         def refused(sentence: str, why: str, cause: Cause) -> Receipt:
-            return receipt(Answer("refused", say(sentence, why=why)), cause)
+            now = clock(time.time())
+            return receipt(Answer("refused", say(sentence, why=why, time=now)), cause)
 
         interlock = self._panel.interlock(widget.interlock)
         verdict = press_verdict(widget, interlock, self._robot, self._monotonic())

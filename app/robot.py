@@ -67,6 +67,10 @@ class Robot:
         self._interfaces = interfaces
         self._namespace = panel.namespace
         self._types = {key_of(t, panel.namespace): n for t, n in panel.subscriptions().items()}
+        self._required = [
+            key_of(i.topic, panel.namespace) for i in panel.interlocks if i.require_publisher
+        ]
+        self._published: set[str] = set()
         self._samples: dict[str, Sample] = {}
         self._readings: dict[str, Reading] = {}
         self._logged_at: dict[str, float] = {}
@@ -84,15 +88,42 @@ class Robot:
         """A bridge went away at `seq`: what came by it before no longer says what is so."""
         for key, sample in self._samples.items():
             if sample.seq < seq and sample.source in (bridge, None):
-                old = self._reading(key, sample)
-                if old.status != "waiting":
-                    self._readings[key] = Reading("cut", old.message, old.at, old.wall)
+                self._cut(key, sample)
+
+    def follow_publishers(self) -> None:
+        """After every change of the graph: where a publisher is required, what it said goes with
+        it, and its successor has to say it again."""
+        for key in self._required:
+            if self.graph.on_robot("MP", key):
+                self._published.add(key)
+            elif key in self._published:
+                self._published.discard(key)
+                if sample := self._samples.get(key):
+                    self._cut(key, sample)
+
+    def lose(self) -> None:
+        """The link is lost: nobody is known to be there, and nothing that came says what is so."""
+        self.link_up = False
+        self.settled_at = math.inf
+        self.graph = Graph()
+        for key, sample in self._samples.items():
+            self._cut(key, sample)
+
+    def _cut(self, key: str, sample: Sample) -> None:
+        old = self._reading(key, sample)
+        if old.status != "waiting":
+            self._readings[key] = Reading("cut", old.message, old.at, old.wall)
 
     def reading(self, topic: str) -> Reading:
         """The latest of a topic that the panel listens to."""
         key = self.key(topic)
         sample = self._samples.get(key)
-        return WAITING if sample is None else self._reading(key, sample)
+        if sample is None:
+            return WAITING
+        found = self._reading(key, sample)
+        if sample.source is not None and sample.source not in self.graph.bridges:
+            return Reading("cut", found.message, found.at, found.wall)
+        return found
 
     def _reading(self, key: str, sample: Sample) -> Reading:
         known = self._readings.get(key)

@@ -13,6 +13,7 @@ ENGLISH: Final[Mapping[str, str]] = {
     "joining": "Joining the robot's topics: a moment.",
     "bridge_silent": "The ROS 2 bridge is connected but does not answer: restart the bridge.",
     "wrong_type": "{topic} is {found} on the robot, but this panel is made for {wanted}.",
+    "unheard": "Locked: the bridge does not pass on {topic}. If this stays, restart the bridge.",
     "waiting": "Locked: waiting for {topic}.",
     "cut": "Locked: the connection was cut; waiting for a new {topic}.",
     "stale": "Locked: the last {topic} is older than {limit} s.",
@@ -55,8 +56,8 @@ ENGLISH: Final[Mapping[str, str]] = {
     # What came of a press.
     "published": "Sent on {topic} at {time}.",
     "sent_to_nobody": "Sent on {topic} at {time}, but no node is known to listen to it.",
-    "refused": "Not sent: {why}",
-    "not_encoded": "Not sent: {why}.",
+    "refused": "Not sent at {time}: {why}",
+    "not_encoded": "Not sent at {time}: {why}.",
     "press_reused": "Not sent: the press id {id} was already used for another press.",
     # The way to the robot.
     "server": "Server",

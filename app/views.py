@@ -112,6 +112,8 @@ def readout(widget: Readout, robot: Robot, now: float) -> tuple[dict[str, Any], 
     if found:
         note = say("wrong_type", topic=topic, found=found, wanted=widget.type)
         return shown("unreadable", "—", note)
+    if robot.graph.unheard(robot.key(topic)):
+        return shown("unreadable", "—", say("unheard", topic=topic))
     reading = robot.reading(topic)
     if reading.status == "waiting":
         return shown("waiting", "—", say("readout_waiting", topic=topic))

@@ -7,6 +7,7 @@ from pathlib import Path
 from tests.parts import Bridge, RosNode, Server, Stream, live, until
 
 ENABLED = "operation-enabled-updated"
+FREEZES = 5
 
 
 def speaking(node: RosNode, value: bool = True) -> None:
@@ -17,6 +18,10 @@ def speaking(node: RosNode, value: bool = True) -> None:
 
 def permitted(kiosk: Server) -> bool:
     return bool(kiosk.widget("operation1")["enabled"])
+
+
+def forbidden(kiosk: Server) -> bool:
+    return "does not permit" in (kiosk.widget("operation1")["reason"] or "")
 
 
 def opened(kiosk: Server) -> None:
@@ -158,3 +163,57 @@ def test_a_value_that_grows_old_locks_and_a_fresh_one_opens(
     assert "older than 0.5 s" in reason
     refused = kiosk.press("operation1", "too late")
     assert (refused.status_code, refused.json()["outcome"]) == (409, "refused")
+
+
+def test_what_the_robot_says_counts_after_each_of_many_freezes(
+    own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    """A session that Zenoh took up again by itself went deaf here after some of these."""
+    speaking(own_node)
+    kiosk = servers(live(own_bridge.endpoint, tmp_path))
+    for _ in range(FREEZES):
+        own_node.publish("/operation_enabled", {"data": True})
+        opened(kiosk)
+        own_bridge.freeze()
+        until(lambda: not permitted(kiosk), "locked")
+        own_bridge.thaw()
+        own_node.publish("/operation_enabled", {"data": False})
+        until(
+            lambda: "does not permit" in (kiosk.widget("operation1")["reason"] or ""), "forbidden", 15
+        )
+        assert kiosk.press("operation1", "no").status_code == 409
+
+
+def test_a_successor_of_a_required_publisher_has_to_say_it_again(
+    own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    panel = tmp_path / "panel.toml"
+    shipped = Path("app/panel.toml").read_text()
+    panel.write_text(shipped.replace('field = "data"', 'field = "data"\nrequire_publisher = true', 1))
+    kiosk = servers(live(own_bridge.endpoint, tmp_path, KIOSK_PANEL=str(panel)))
+    own_node.advertise("/operation_enabled", "std_msgs/msg/Bool")
+    until(lambda: "waiting for /operation" in kiosk.widget("operation1")["reason"], "its token is seen")
+    until(lambda: own_node.subscribers("/operation_enabled"), "the bridge listens")
+    until(lambda: (own_node.publish("/operation_enabled", {"data": True}), permitted(kiosk))[1], "open")
+    own_node.withdraw("/operation_enabled")
+    until(lambda: not permitted(kiosk), "locked")
+    own_node.advertise("/operation_enabled", "std_msgs/msg/Bool")
+    until(lambda: "no node" not in kiosk.widget("operation1")["reason"], "the successor is seen")
+    assert not permitted(kiosk)
+
+
+def test_an_old_latched_value_is_no_fresh_one(
+    own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    panel = tmp_path / "panel.toml"
+    shipped = Path("app/panel.toml").read_text()
+    panel.write_text(shipped.replace('field = "data"', 'field = "data"\nmax_age_s = 30', 1))
+    speaking(own_node)
+    kiosk = servers(live(own_bridge.endpoint, tmp_path, KIOSK_PANEL=str(panel)))
+    until(kiosk.ready, "ready")
+    with kiosk.stream() as stream:
+        for _ in range(4):  # two seconds of beats: the latched value has come, and does not count
+            stream.next("beat")
+    assert "waiting for /operation_enabled" in kiosk.widget("operation1")["reason"]
+    own_node.publish("/operation_enabled", {"data": True})
+    opened(kiosk)

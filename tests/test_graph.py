@@ -2,7 +2,7 @@
 
 import pytest
 
-from app.graph import Graph
+from app.graph import Graph, Route
 from app.keys import DEMO_VERSION, Qos, TopicRole, bridge_token, token
 from tests.builders import BOOL, BRIDGE, KIOSK, TEXT
 
@@ -120,14 +120,14 @@ def test_a_type_is_right_again_when_the_wrong_one_ends(graph: Graph) -> None:
 
 @pytest.mark.parametrize(("role", "direction"), [("MS", "pub"), ("MP", "sub")])
 def test_a_bridges_route_of_another_type_is_told(graph: Graph, role: TopicRole, direction: str) -> None:
-    graph.learn({(BRIDGE, "pub" if direction == "pub" else "sub", "a"): TEXT})
+    graph.learn([Route(BRIDGE, "pub" if direction == "pub" else "sub", "a", TEXT)])
     assert graph.wrong_type(role, "a", BOOL) == TEXT
     assert graph.wrong_type(role, "a", TEXT) is None
     assert graph.wrong_type("MP" if role == "MS" else "MS", "a", BOOL) is None
 
 
 def test_routes_of_a_bridge_that_went_do_not_count(graph: Graph) -> None:
-    graph.learn({(BRIDGE, "pub", "a"): TEXT})
+    graph.learn([Route(BRIDGE, "pub", "a", TEXT)])
     graph.apply(bridge_token(BRIDGE), False)
     assert graph.wrong_type("MS", "a", BOOL) is None
 
@@ -146,10 +146,19 @@ def test_a_bridge_that_answers_is_not_silent(graph: Graph) -> None:
     assert not graph.silent
 
 
-def test_one_of_two_bridges_answering_is_enough(graph: Graph) -> None:
+def test_one_of_two_bridges_that_does_not_answer_is_a_doubt(graph: Graph) -> None:
     graph.apply(bridge_token("b2"), True)
-    graph.answered({"b2": '"1.10.0"'})
-    assert not graph.silent
+    graph.answered({"b2": '"v1"'})
+    assert graph.silent
+
+
+def test_a_route_without_its_reader_is_unheard_while_the_robot_publishes(graph: Graph) -> None:
+    graph.learn([Route(BRIDGE, "pub", "a", TEXT, whole=False)])
+    assert not graph.unheard("a")
+    graph.apply(token(BRIDGE, "MP", "a", TEXT, Qos(), "RIHS01_0"), True)
+    assert graph.unheard("a")
+    graph.learn([Route(BRIDGE, "pub", "a", TEXT)])
+    assert not graph.unheard("a")
 
 
 def test_an_answer_of_who_is_no_bridge_does_not_help(graph: Graph) -> None:

@@ -80,6 +80,7 @@ def test_every_text_arrives_intact(server: Server, node: RosNode, page: Page) ->
     before = len(node.heard("/operation"))
     for number, text in enumerate(TEXTS):
         page.get_by_label("Message").fill(text)
+        expect(button(page, "Publish")).not_to_have_attribute("aria-busy", "true")
         button(page, "Publish").click()
         heard = before + number + 1
         until(partial(has_heard, node, "/operation", heard), f"heard {text!r}")
@@ -120,7 +121,7 @@ def test_without_scripts_a_press_is_a_form(server: Server, node: RosNode, chromi
     page.reload()
     # The page reloads itself: a lock shows without a touch.
     permit(node, True)
-    expect(button(page, "Publish1")).to_be_enabled(timeout=15_000)
+    expect(button(page, "Publish1")).to_be_enabled(timeout=40_000)
     assert node.heard_data("/operation")[before:] == ["no script 日本語"]
     context.close()
 
@@ -140,20 +141,19 @@ def test_enter_in_an_input_presses_nothing(server: Server, node: RosNode, chromi
     until(lambda: len(node.heard("/operation")) == before + 2, "the two presses, and no more")
 
 
-def test_a_double_tap_is_one_press(server: Server, node: RosNode, page: Page) -> None:
+def test_two_taps_of_a_finger_are_one_press(server: Server, node: RosNode, page: Page) -> None:
     page.goto(server.url)
-    expect(button(page, "Publish")).to_be_enabled()
+    publish = button(page, "Publish")
+    expect(publish).to_be_enabled()
     before = len(node.heard("/operation"))
     page.get_by_label("Message").fill("once")
-    page.evaluate(
-        "() => { const b = document.querySelector('[data-widget=operation] button');"
-        " b.click(); b.click(); b.click(); }"
-    )
+    publish.dblclick(delay=20)
     expect(page.locator("#receipt-operation")).to_contain_text("Sent")
-    button(page, "Publish").click()
-    until(lambda: len(node.heard("/operation")) >= before + 2, "two presses")
-    page.wait_for_load_state("networkidle")
-    assert len(node.heard("/operation")) == before + 2
+    publish.click()
+    expect(publish).not_to_have_attribute("aria-busy", "true")
+    assert len(node.heard("/operation")) == before + 1
+    publish.click()
+    until(lambda: len(node.heard("/operation")) == before + 2, "a press after that is another one")
 
 
 @pytest.mark.parametrize("fault", ["killed", "frozen"])
@@ -174,7 +174,7 @@ def test_a_lost_server_locks_every_control_within_two_seconds(
         expect(page.locator('[data-lamp="server"]')).to_have_attribute("data-state", "bad")
         if fault == "frozen":
             mine.process.send(signal.SIGCONT)
-            expect(button(page, "Publish")).to_be_enabled()
+            expect(button(page, "Publish")).to_be_enabled(timeout=15_000)
     finally:
         mine.process.send(signal.SIGCONT)
         mine.end(signal.SIGKILL)

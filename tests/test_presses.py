@@ -3,6 +3,7 @@
 import asyncio
 import logging
 import math
+import re
 from collections.abc import Callable, Mapping
 from datetime import datetime, timedelta
 from typing import Any
@@ -98,7 +99,7 @@ def refused(bench: Bench, receipt: Receipt) -> tuple[str, str]:
     """Cause and reason of a press that sent nothing."""
     assert receipt.outcome == "refused"
     assert bench.way.sent == []
-    return receipt.cause, receipt.reason
+    return receipt.cause, re.sub(r"^Not sent at \d\d:\d\d:\d\d: ", "Not sent: ", receipt.reason)
 
 
 def test_a_press_sends_its_message_once(bench: Bench) -> None:

@@ -4,6 +4,7 @@ import logging
 
 import pytest
 
+from app import keys
 from app.robot import UNREADABLE_LOG_S, Robot, Sample, value_of
 from tests.builders import (
     BOOL,
@@ -114,6 +115,7 @@ def test_a_sample_from_before_its_bridge_was_lost_is_cut(robot: Robot, source: s
 
 
 def test_a_sample_of_another_bridge_is_not_cut(robot: Robot) -> None:
+    robot.graph.apply(keys.bridge_token("b2"), True)
     says(robot, "/heard", "fresh", source="b2")
     robot.cut(BRIDGE, 2)
     assert robot.reading("/heard").status == "message"

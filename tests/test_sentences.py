@@ -35,8 +35,10 @@ def test_every_code_that_the_program_says_has_a_sentence() -> None:
 
 
 def test_every_sentence_gets_all_that_it_is_about() -> None:
-    # `refused(code, why)` fills in `why` itself.
-    lacking = [(where, code) for where, code, names in spoken() if not needed(code) <= names | {"why"}]
+    # `refused(code, why)` fills in `why` and `time` itself.
+    lacking = [
+        (where, code) for where, code, names in spoken() if not needed(code) <= names | {"why", "time"}
+    ]
     assert lacking == []
 
 
@@ -45,7 +47,7 @@ def test_a_sentence_is_filled_in() -> None:
 
 
 def test_braces_in_what_is_filled_in_are_only_text() -> None:
-    assert say("refused", why="{topic}") == "Not sent: {topic}"
+    assert say("refused", why="{topic}", time="now") == "Not sent at now: {topic}"
 
 
 def test_an_unknown_code_is_a_mistake_of_the_programmers() -> None:

@@ -95,6 +95,8 @@ def _pressed(
     anywhere: Iterable[str],
     interfaces: Interfaces,
 ) -> Iterator[Fault]:
+    if isinstance(widget, Publish) and widget.topic == "/rosout":
+        yield Fault(f"{place}.topic", "/rosout is where the kiosk's own log goes: choose another")
     if widget.interlock is not None and panel.interlock(widget.interlock) is None:
         known = ", ".join(i.id for i in panel.interlocks) or "none"
         yield Fault(f"{place}.interlock", f'no interlock "{widget.interlock}"; there is {known}')

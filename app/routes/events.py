@@ -30,7 +30,8 @@ async def events(site: CurrentSite, once: bool = False) -> Response:
     """`once`: the snapshot alone, for a browser that has no stream to spare."""
     board = site.kiosk.board
     if once:
-        return Response(board.snapshot(), media_type="text/event-stream", headers=HEADERS)
+        both = board.snapshot() + beat(clock(time.time()))
+        return Response(both, media_type="text/event-stream", headers=HEADERS)
     return EventSourceResponse(_counted(site, board), headers=HEADERS)
 
 

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse, Response
 
 from app.errors import NotFound
-from app.panel.model import Page, Panel
+from app.panel.model import Page, Panel, TextInput
 from app.presses import Receipt
 from app.routes.site import CurrentSite, Site
 from app.sentences import say
@@ -16,8 +16,10 @@ from app.views import View, clock
 
 router = APIRouter(include_in_schema=True)
 
-# A page without scripts reloads itself: often enough to be of use, rarely enough to type in.
+# A page without scripts reloads itself, and loses what was typed and not sent: where there is an
+# input, rarely enough to type in.
 REFRESH_S = 5
+REFRESH_WITH_INPUTS_S = 30
 
 
 class PageContext(TypedDict):
@@ -56,6 +58,7 @@ async def named_page(page: str, request: Request, site: CurrentSite) -> Response
 
 def _render(request: Request, site: Site, page: Page) -> Response:
     board = site.kiosk.board
+    typed = any(isinstance(widget, TextInput) for widget in page.widgets)
     receipt = site.kiosk.presses.receipt(request.query_params.get("receipt", ""))
     context = PageContext(
         site=site,
@@ -73,7 +76,7 @@ def _render(request: Request, site: Site, page: Page) -> Response:
         lost_short=say("lost"),
         unknown=say("unknown"),
         unsure=say("server_unsure"),
-        refresh_s=REFRESH_S,
+        refresh_s=REFRESH_WITH_INPUTS_S if typed else REFRESH_S,
     )
     html = site.templates.get_template("screen.html").render(**context)
     return HTMLResponse(html, headers={"cache-control": "no-store"})

@@ -74,8 +74,7 @@ function lockAll() {
     if (buttons.length) {
       setText(root.querySelector('[data-text="reason"]'), body.dataset.lost);
     } else if (root.dataset.state) {
-      root.dataset.state = "old";
-      setText(root.querySelector('[data-text="note"]'), body.dataset.lost);
+      root.dataset.state = "old"; // its note still says from when it is
     }
   }
 }
@@ -83,6 +82,8 @@ function lockAll() {
 const source = new Source({
   snapshot(all) {
     if (all.revision !== body.dataset.revision) {
+      lockAll();
+      source.stop();
       location.reload();
       return;
     }

@@ -1,5 +1,7 @@
 // A press: on release, once, with an id of its own; its receipt is shown where it was pressed.
 const ANSWER_WITHIN_MS = 5000;
+// Two taps of a finger come within this time: the second one is the same press.
+const TAP_AGAIN_MS = 700;
 
 function newId() {
   const bytes = crypto.getRandomValues(new Uint8Array(16));
@@ -11,12 +13,19 @@ export class Presser {
   #source;
   #sentences;
   #underWay = new Set();
+  #down = null; // the button that was open when the pointer went down on it
 
   constructor(widgets, source, sentences) {
     this.#widgets = widgets;
     this.#source = source;
     this.#sentences = sentences;
+    addEventListener("pointerdown", ({ target }) => (this.#down = target.closest?.("button:enabled")), true);
     for (const form of document.forms) {
+      // A button that opened under a resting finger was not pressed.
+      form.addEventListener("click", (event) => {
+        const button = event.target.closest("button");
+        if (button && event.detail > 0 && button !== this.#down) event.preventDefault();
+      });
       form.addEventListener("submit", (event) => {
         event.preventDefault();
         const root = event.submitter?.closest("[data-widget]");
@@ -31,9 +40,11 @@ export class Presser {
     if (this.#underWay.has(url)) return;
     this.#underWay.add(url);
     button.setAttribute("aria-busy", "true");
+    const pause = new Promise((resolve) => setTimeout(resolve, TAP_AGAIN_MS));
     try {
       const answerMs = ANSWER_WITHIN_MS + 1000 * (root.dataset.answerS ?? 0);
       this.#show(root, await this.#send(url, form, answerMs));
+      await pause;
     } finally {
       this.#underWay.delete(url);
       button.removeAttribute("aria-busy");

@@ -14,8 +14,10 @@ export class Source {
   #stream = null;
   #poll = 0;
   #giveBack = null;
-  #aliveAt = performance.now();
+  // The page is as old as its answer from the server, not as its script.
+  #aliveAt = performance.getEntriesByType("navigation")[0]?.responseStart ?? 0;
   #openedAt = 0;
+  #turn = 0; // counts openings and closings: what was asked for before the last one is void
   #fresh = true; // the page itself is a snapshot, until its time is up
   #seen = document.body.dataset.seen;
 
@@ -34,7 +36,15 @@ export class Source {
     addEventListener("pagehide", () => this.#rest());
     addEventListener("pageshow", (event) => event.persisted && this.#open());
     setInterval(() => this.#watch(), CHECK_MS);
-    if (!document.hidden) this.#open();
+    if (document.hidden) this.#rest();
+    else this.#open();
+  }
+
+  // For good: the page is about to go.
+  stop() {
+    this.#close();
+    this.#on = Object.fromEntries(EVENTS.map((name) => [name, () => {}]));
+    this.#on.lost = () => {};
   }
 
   // A hidden page gives its stream back. It is locked when it shows again, until a fresh snapshot.
@@ -46,9 +56,9 @@ export class Source {
   #open() {
     this.#close();
     this.#openedAt = performance.now();
-    if (this.#fresh) this.#aliveAt = this.#openedAt;
+    const turn = this.#turn;
     this.#take().then((slot) => {
-      if (document.hidden || this.#stream || this.#poll) return slot?.();
+      if (turn !== this.#turn) return slot?.();
       this.#giveBack = slot;
       if (slot) this.#listen();
       else this.#ask();
@@ -56,6 +66,7 @@ export class Source {
   }
 
   #close() {
+    this.#turn += 1;
     this.#stream?.close();
     this.#stream = null;
     clearTimeout(this.#poll);
@@ -99,19 +110,18 @@ export class Source {
 
   async #ask() {
     const asked = performance.now();
-    this.#poll = -1;
+    const turn = this.#turn;
     try {
       const answer = await fetch("/events?once=1", { cache: "no-store", signal: AbortSignal.timeout(SILENCE_MS) });
       const text = await answer.text();
-      const data = /^data: (.*)$/m.exec(text)?.[1];
-      if (answer.ok && data) {
-        this.#aliveAt = asked;
-        this.#got("snapshot", data, /^id: (.*)$/m.exec(text)?.[1], asked);
+      if (turn !== this.#turn) return;
+      for (const [, name, data, id] of text.matchAll(/^event: (.*)\ndata: (.*)\n(?:id: (.*)\n)?/gm)) {
+        this.#got(name, data, id, asked);
       }
     } catch {
-      this.#lose();
+      if (turn === this.#turn) this.#lose();
     }
-    if (this.#poll === -1) this.#poll = setTimeout(() => this.#open(), POLL_MS);
+    if (turn === this.#turn) this.#poll = setTimeout(() => this.#open(), POLL_MS);
   }
 
   #got(name, text, id, at = performance.now()) {
