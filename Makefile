@@ -40,7 +40,7 @@ bridge: system
 	cargo build --quiet --release --locked --manifest-path tests/bridge/Cargo.toml --target-dir $(CACHE)/bridge
 
 .venv/bin/python:
-	$(PYTHON) -m venv .venv
+	$(PYTHON) -m venv .venv || { sh tests/system.sh python3-venv && $(PYTHON) -m venv .venv; }
 
 .venv/run: deploy/requirements.lock | .venv/bin/python
 	.venv/bin/python $(PIP_INSTALL) $<
@@ -50,7 +50,8 @@ bridge: system
 	.venv/bin/python $(PIP_INSTALL) $<
 	touch $@ .venv/run
 
-.venv-ros/ready: tests/ros/requirements.lock
+.venv-ros/ready: tests/ros/requirements.lock | system
+	@$(PYTHON) -c 'import sys; sys.exit(None if sys.version_info[:2] == (3, 11) else "the ROS 2 wheels of the tests are for Python 3.11: make test PYTHON=python3.11")'
 	$(PYTHON) -m venv .venv-ros
 	.venv-ros/bin/python $(PIP_INSTALL) $<
 	touch $@

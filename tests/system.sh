@@ -1,11 +1,14 @@
 #!/bin/sh
 # What the tests need besides Python, Rust and git: installed on Debian as root, named elsewhere.
+# `system.sh PACKAGE` looks for that one alone.
 set -eu
+only=${1:-}
 
 missing=""
 need() { # need PACKAGE COMMAND…: the package, unless the command succeeds
     package=$1
     shift
+    [ -z "$only" ] || [ "$only" = "$package" ] || return 0
     "$@" >/dev/null 2>&1 || missing="$missing $package"
 }
 
@@ -18,7 +21,7 @@ need cmake cmake --version
 need chromium chromium --version
 need libclang-dev has_libclang
 need python3-venv "${PYTHON:-python3}" -c "import ensurepip"
-command -v cargo >/dev/null || { echo "missing: Rust 1.85 or later (cargo)" >&2; exit 1; }
+[ -n "$only" ] || command -v cargo >/dev/null || { echo "missing: Rust 1.85 or later (cargo)" >&2; exit 1; }
 
 [ -n "$missing" ] || exit 0
 if [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
