@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from app.keys import DEMO_VERSION, Direction, Endpoint, Role, parsed
+from app.keys import DEMO_VERSION, Direction, Endpoint, Qos, Role, parsed
 
 # Whose type must equal the panel's, for what the panel does with a topic. A route of the bridge
 # has one type for all: who created it first has fixed it, be it the robot or another panel.
@@ -91,3 +91,37 @@ class Graph:
             if zid in bridges and way == direction and route_key == key and found != type_name:
                 return found
         return None
+
+    def wrong_qos(self, role: Role, key: str, qos: Qos) -> str | None:
+        """The code of the sentence that says what DDS would not match, for what the panel does.
+
+        Of several publishers each counts: one that is not heard may say something else. Of several
+        subscribers one that hears is enough.
+        """
+        bridges, theirs = self.bridges, _COUNTERPARTS[role][0]
+        doubts = [
+            _unheard(e, qos) if role == "MS" else _unheard_by(e, qos)
+            for e in self._tokens.values()
+            if e.role == theirs and e.key == key and e.zid in bridges
+        ]
+        if role == "MP" and None in doubts:
+            return None
+        return next(filter(None, doubts), None)
+
+
+def _unheard(publisher: Endpoint, qos: Qos) -> str | None:
+    """Why a reader of this QoS would not hear a publisher."""
+    if qos.reliable and publisher.reliable is False:
+        return "publishes_best_effort"
+    if qos.transient_local and not publisher.transient_local:
+        return "publishes_volatile"
+    return None
+
+
+def _unheard_by(subscriber: Endpoint, qos: Qos) -> str | None:
+    """Why a subscriber would not hear a writer of this QoS."""
+    if not qos.reliable and subscriber.reliable:
+        return "asks_for_reliable"
+    if not qos.transient_local and subscriber.transient_local:
+        return "asks_for_transient_local"
+    return None

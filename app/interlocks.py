@@ -7,7 +7,8 @@ reason an operator reads.
 import math
 from dataclasses import dataclass
 
-from app.panel.model import Interlock, Publish
+from app.keys import Role
+from app.panel.model import Display, Interlock, Publish
 from app.robot import Robot, value_of
 from app.sentences import say
 
@@ -45,8 +46,8 @@ def interlock_verdict(interlock: Interlock, robot: Robot, now: float) -> Verdict
     if not passable.permitted:
         return passable
     topic, key = interlock.topic, robot.key(interlock.topic)
-    if found := robot.graph.wrong_type("MS", key, interlock.type):
-        return locked("wrong_type", topic=topic, found=found, wanted=interlock.type)
+    if doubt := misfit("MS", interlock, robot):
+        return doubt
     reading = robot.reading(topic)
     if reading.status != "message":
         return locked(reading.status, topic=topic, wanted=interlock.type)
@@ -67,10 +68,20 @@ def publish_verdict(publish: Publish, interlock: Interlock | None, robot: Robot,
     passable = way(robot, now)
     if not passable.permitted:
         return passable
-    topic = publish.topic
-    if found := robot.graph.wrong_type("MP", robot.key(topic), publish.type):
-        return locked("wrong_type", topic=topic, found=found, wanted=publish.type)
+    if doubt := misfit("MP", publish, robot):
+        return doubt
     return PERMITTED if interlock is None else interlock_verdict(interlock, robot, now)
+
+
+def misfit(role: Role, of: Interlock | Publish | Display, robot: Robot) -> Verdict | None:
+    """Why a topic can't be trusted, by what the graph shows: another type, a QoS that DDS would
+    not match. `role` is what the panel does with it: publish ("MP") or listen ("MS")."""
+    key = robot.key(of.topic)
+    if found := robot.graph.wrong_type(role, key, of.type):
+        return locked("wrong_type", topic=of.topic, found=found, wanted=of.type)
+    if code := robot.graph.wrong_qos(role, key, of.qos.on_wire):
+        return locked(code, topic=of.topic)
+    return None
 
 
 def locked(code: str, **about: object) -> Verdict:

@@ -5,7 +5,8 @@ as soon as a bridge is there, so that a topic is known before its first message 
 Who creates a route first fixes its type and QoS for all: so a bridge that has just come gets time to
 discover the robot's nodes, a topic whose type differs gets no token, and what the panel listens to
 gets one when its publisher is first seen, with that publisher's durability. Held from the start, it
-would make a VOLATILE reader, which misses what a TRANSIENT_LOCAL publisher said before they met. It
+would make a VOLATILE reader, which misses what a TRANSIENT_LOCAL publisher said before they met.
+Where the panel gives a durability, the token has it and is held from the start. It
 stays when the publisher goes: a route that ends and begins again delivers each sample twice (#700).
 """
 
@@ -16,6 +17,7 @@ import math
 import time
 from collections.abc import Callable, Coroutine
 from contextlib import suppress
+from dataclasses import replace
 from typing import Any, Final
 
 from app import keys
@@ -115,11 +117,11 @@ class Joining:
     def _tokens(self) -> list[str]:
         """The tokens of all topics, but for those whose type is another one on the robot."""
         wanted: list[tuple[Role, str, str, Qos]] = [
-            *(("MP", t, n, Qos()) for t, n in self._panel.publications().items()),
+            *(("MP", t, n, self._qos(t)) for t, n in self._panel.publications().items()),
             *(
-                ("MS", topic, name, Qos(transient_local=latched))
+                ("MS", topic, name, qos)
                 for topic, name in self._panel.subscriptions().items()
-                if (latched := self._latched(self._robot.key(topic))) is not None
+                if (qos := self._listening(topic)) is not None
             ),
             ("MP", "/rosout", LOG_TYPE, keys.ROSOUT),
         ]
@@ -134,6 +136,17 @@ class Joining:
             type_hash = self._interfaces.type_hash(type_name)
             tokens.append(keys.token(self._link.zid, role, key, type_name, qos, type_hash))
         return tokens
+
+    def _qos(self, topic: str) -> Qos:
+        return self._panel.qos(topic).on_wire
+
+    def _listening(self, topic: str) -> Qos | None:
+        """The QoS of a subscription's token: the panel's, with the publisher's durability where the
+        panel gives none; None for no token yet."""
+        if self._panel.qos(topic).durability is not None:
+            return self._qos(topic)
+        latched = self._latched(self._robot.key(topic))
+        return None if latched is None else replace(self._qos(topic), transient_local=latched)
 
     def _latched(self, key: str) -> bool | None:
         """The durability that the token of a subscription is to have; None for no token yet.

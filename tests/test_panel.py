@@ -210,11 +210,15 @@ def test_an_interlock_and_a_widget_may_have_one_id(load: Load) -> None:
             "page[1].id",
             '"one" is already the id of page[0]',
         ),
-        (with_widget(1, kind="knob"), BUTTON, 'unknown kind "knob"; one of text, publish, readout'),
+        (
+            with_widget(1, kind="knob"),
+            BUTTON,
+            'unknown kind "knob"; one of text, number, slider, select, toggle, publish',
+        ),
         (
             tables(page=[{"id": "one", "title": "One", "widget": [without(FREE, "kind")]}]),
             "page[0].widget[0]",
-            '"kind" is missing; one of text, publish, readout',
+            '"kind" is missing; one of text, number, slider, select, toggle, publish',
         ),
         (with_widget(1, colour="red"), f"{BUTTON}.colour", "unknown key; known here: id, label, span"),
         (with_widget(1, lable="x"), f"{BUTTON}.lable", 'did you mean "label"?'),
@@ -280,7 +284,7 @@ def test_an_interlock_and_a_widget_may_have_one_id(load: Load) -> None:
         (
             with_widget(1, type="std_msgs/msg/Int8", message={"data": "{message}"}),
             f"{BUTTON}.message.data",
-            "must be a whole number (int8)",
+            'input "message" gives text; the field is int8',
         ),
         (
             with_widget(1, type="geometry_msgs/msg/Polygon", message={"points": [{"x": 1.5, "y": 0}]}),

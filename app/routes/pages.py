@@ -11,8 +11,8 @@ from app.errors import NotFound
 from app.panel.model import Page, Panel
 from app.presses import Receipt
 from app.routes.site import CurrentSite, Site
-from app.sentences import say
-from app.views import View, clock
+from app.sentences import clock, say
+from app.views import View
 
 router = APIRouter(include_in_schema=True)
 

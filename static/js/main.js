@@ -16,7 +16,7 @@ function showWidget(id, attributes) {
   if (!root) return;
   for (const [name, value] of Object.entries(attributes)) {
     if (name === "enabled") root.querySelector("button").disabled = !value;
-    else if (name === "state") root.dataset.state = value;
+    else if (name === "state" || name === "shape" || name === "colour") root.dataset[name] = value;
     else setText(root.querySelector(`[data-text="${name}"]`), value ?? "");
   }
 }
@@ -50,12 +50,16 @@ function lockAll() {
     setText(lamp.querySelector("b"), server ? body.dataset.lostShort : body.dataset.unknown);
   }
   for (const root of widgets.values()) {
-    const button = root.querySelector("button");
+    const button = root.querySelector("button[type=submit]");
     if (button) {
       button.disabled = true;
       setText(root.querySelector('[data-text="reason"]'), body.dataset.lost);
     } else if (root.dataset.state) {
       root.dataset.state = "old";
+      if (root.dataset.shape) {
+        Object.assign(root.dataset, { shape: "old", colour: "none" });
+        setText(root.querySelector('[data-text="text"]'), body.dataset.unknown);
+      }
       setText(root.querySelector('[data-text="note"]'), body.dataset.lost);
     }
   }
@@ -79,5 +83,6 @@ const source = new Source({
   lost: lockAll,
 });
 
+if (document.querySelector("[data-step]")) import("./inputs.js");
 new Presser(widgets, source, { unsure: body.dataset.unsure, lost: body.dataset.lost });
 source.start();

@@ -1,9 +1,17 @@
 // A press: on release, once, with an id of its own; its receipt is shown where it was pressed.
 const ANSWER_WITHIN_MS = 5000;
+const ENTRIES = "input:not([type=hidden]), select";
 
 function newId() {
   const bytes = crypto.getRandomValues(new Uint8Array(16));
   return [...bytes].map((byte) => byte.toString(16).padStart(2, "0")).join("");
+}
+
+// With its type. What is no number (an empty field) goes as it is: the server says what is wrong.
+function valueOf(input) {
+  if (input.type === "checkbox") return input.checked;
+  const number = input.type === "number" || input.type === "range";
+  return number && input.value !== "" ? Number(input.value) : input.value;
 }
 
 export class Presser {
@@ -43,7 +51,7 @@ export class Presser {
   async #send(widget, form) {
     const inputs = {};
     for (const input of form.elements) {
-      if (input.closest("[data-widget]") && input.matches("input")) inputs[input.name] = input.value;
+      if (input.matches(ENTRIES) && input.closest("[data-widget]")) inputs[input.name] = valueOf(input);
     }
     const press = { inputs, id: newId(), seen: this.#source.seen, at: new Date().toISOString() };
     try {
