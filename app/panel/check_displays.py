@@ -33,8 +33,8 @@ def display_faults(place: str, of: Display, interfaces: Interfaces) -> Iterator[
         return
     kind = interfaces.field_type(of.type, of.field)
     if re.search(r"[/\]]", kind):
-        what = f'"{of.field}" is {kind}: a readout shows one value of it, not all'
-        yield Fault(f"{place}.field", what.replace("readout", of.kind))
+        who = "a readout" if isinstance(of, Readout) else "an indicator"
+        yield Fault(f"{place}.field", f'"{of.field}" is {kind}: {who} shows one value of it, not all')
     elif isinstance(of, Readout):
         yield from _number(place, of, kind)
         yield from _constants(place, of, interfaces)

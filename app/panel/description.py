@@ -40,6 +40,13 @@ def _folder(given: Any, info: ValidationInfo) -> Path:
     return folder
 
 
+def some(given: tuple[Any, ...]) -> tuple[Any, ...]:
+    """A list of tables that can't be empty."""
+    if not given:
+        raise ValueError("is empty: it must have one table at least")
+    return given
+
+
 ID: Final = r"^[a-z][a-z0-9_]{0,63}$"
 Id = Annotated[str, Field(pattern=ID)]
 Label = Annotated[str, Field(min_length=1, max_length=120)]

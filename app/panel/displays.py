@@ -2,9 +2,19 @@
 
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field
 
-from app.panel.description import Description, FieldPath, Label, Placed, Seconds, Topic, TopicQos, Type
+from app.panel.description import (
+    Description,
+    FieldPath,
+    Label,
+    Placed,
+    Seconds,
+    Topic,
+    TopicQos,
+    Type,
+    some,
+)
 from app.panel.inputs import Unit
 
 # [+] [,] [.digits] [f, e, g, % or d]: a part of Python's, in which nothing can go wrong.
@@ -51,7 +61,7 @@ class Indicator(Placed):
     topic: Topic
     type: Type
     field: FieldPath = "data"
-    states: Annotated[tuple[LampState, ...], Field(strict=False, min_length=1)]
+    states: Annotated[tuple[LampState, ...], Field(strict=False), AfterValidator(some)]
     max_age_s: Seconds | None = None
     qos: TopicQos = TopicQos()
     span: Annotated[int, Field(ge=1, le=12)] = 4

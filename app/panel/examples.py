@@ -92,7 +92,7 @@ def _message(
     except InterfaceError:
         return f'input "{names[0]}" gives {values[names[0]]!r}: {error.message}'
     if written != f"{{{names[0]}}}":
-        return f'"{written}" makes text; the field is {field}{_why(error)}'
+        return error.message if _why(error) else f'"{written}" makes text; the field is {field}'
     one = inputs[names[0]]
     gives = repr(values[one.id]) if isinstance(one, SelectInput) or _why(error) else one.gives
     if isinstance(one, TextInput):

@@ -5,7 +5,7 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, Field
 
-from app.panel.description import Description, Label, Placed
+from app.panel.description import Description, Label, Placed, some
 from app.sentences import say
 
 MOST: Final = 2.0**53  # beyond this a browser's numbers are not exact
@@ -97,7 +97,7 @@ class Option(Description):
 
 class SelectInput(Placed):
     kind: Literal["select"]
-    options: Annotated[tuple[Option, ...], Field(strict=False, min_length=1)]
+    options: Annotated[tuple[Option, ...], Field(strict=False), AfterValidator(some)]
     default: Any = None
 
     @property

@@ -147,8 +147,8 @@ def _message(error: Any, model: type[BaseModel], location: tuple[str | int, ...]
             return f"unknown key; {hint}"
         case "tuple_type" if location == ("interfaces",):
             return 'must be a list of folders: write ["folder"]'
-        case "tuple_type" | "too_short" if location[-1] in INLINE:
-            return f"must be a list with one table at least, like {INLINE[location[-1]]}"
+        case "tuple_type" if location[-1] in INLINE:
+            return f"must be a list of tables, like {INLINE[location[-1]]}"
         case "string_pattern_mismatch" if location[-1] == "format":
             return f'"{error["input"]}" is not a format: it must be like ".1f", "+.2e" or ",d"'
         case "string_pattern_mismatch" if location[-1] == "constants":
