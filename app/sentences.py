@@ -39,7 +39,7 @@ ENGLISH: Final[Mapping[str, str]] = {
     # What a lamp shows when no state of its own does.
     "lamp_waiting": "No value yet",
     "lamp_unknown": "Unknown: {value}",
-    "lamp_old": "Not known now",
+    "lamp_old": "Not known",
     "lamp_unreadable": "Not readable",
     "lamp_missing": "Not there",
     "lamp_was": "was {text}: {note}",

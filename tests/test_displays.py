@@ -134,14 +134,14 @@ def test_a_lamp_of_a_bool_or_a_text() -> None:
         (
             {"now": NOW + 6, "max_age_s": 5.0},
             "old",
-            "Not known now",
+            "Not known",
             "old",
             "was Fault: 6 s old",
         ),
         (
             {"cut": True},
             "old",
-            "Not known now",
+            "Not known",
             "old",
             f"was Fault: from before the connection was cut, {AT}",
         ),

@@ -189,6 +189,8 @@ def test_a_number_out_of_limits_is_refused_but_locks_nothing_else(
     is_ready(page)
     before = len(robot.heard("/test_mode"))
     page.get_by_label("Turn (°/s)").fill(entry)
+    marked = page.get_by_label("Turn (°/s)").evaluate("(input) => input.matches(':invalid')")
+    assert marked is (entry != "")
     press(page, "Drive")
     receipt = page.locator("#receipt-drive")
     expect(receipt).to_have_text(f"Not sent: {said}: it must be -90 to 90 °/s, in steps of 5.")
