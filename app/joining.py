@@ -6,8 +6,8 @@ Who creates a route first fixes its type and QoS for all: so a bridge that has j
 discover the robot's nodes, a topic whose type differs gets no token, and what the panel listens to
 gets one when its publisher is first seen, with that publisher's durability. Held from the start, it
 would make a VOLATILE reader, which misses what a TRANSIENT_LOCAL publisher said before they met.
-Where the panel gives a durability, the token has it and is held from the start. It
-stays when the publisher goes: a route that ends and begins again delivers each sample twice (#700).
+Where the panel gives a durability, the token has it and is held from the start. It stays when the
+publisher goes: a route that ends and begins again delivers each sample twice (#700).
 """
 
 import asyncio
@@ -57,6 +57,7 @@ class Joining:
         self._changed = asyncio.Event()
         self._wrongly_held: set[str] = set()
         self._told: set[tuple[str, str]] = set()
+        self._listened: set[str] = set()  # keys of subscriptions whose token was held
         self._held_as: dict[str, bool] = {}  # key → whether its token is TRANSIENT_LOCAL
 
     def start(self) -> None:
@@ -91,6 +92,7 @@ class Joining:
 
     def _leave(self) -> None:
         self._held_as.clear()
+        self._listened.clear()
         self._robot.settled_at = math.inf
         if self._joining is not None:
             self._joining.cancel()
@@ -142,11 +144,21 @@ class Joining:
 
     def _listening(self, topic: str) -> Qos | None:
         """The QoS of a subscription's token: the panel's, with the publisher's durability where the
-        panel gives none; None for no token yet."""
-        if self._panel.qos(topic).durability is not None:
-            return self._qos(topic)
-        latched = self._latched(self._robot.key(topic))
-        return None if latched is None else replace(self._qos(topic), transient_local=latched)
+        panel gives none; None for no token yet.
+
+        A route that a publisher made with a QoS that is not the panel's ends with that publisher, if
+        no token keeps it: so one that is not held yet waits for that.
+        """
+        key, qos = self._robot.key(topic), self._qos(topic)
+        if self._panel.qos(topic).durability is None:
+            latched = self._latched(key)
+            if latched is None:
+                return None
+            qos = replace(qos, transient_local=latched)
+        if key not in self._listened and self._robot.graph.wrong_qos("MS", key, qos):
+            return None
+        self._listened.add(key)
+        return qos
 
     def _latched(self, key: str) -> bool | None:
         """The durability that the token of a subscription is to have; None for no token yet.

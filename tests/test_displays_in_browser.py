@@ -1,6 +1,7 @@
 """Inputs and lamps as an operator uses them: Chromium, the real bridge, an rclpy node."""
 
 from collections.abc import Iterator
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -132,6 +133,9 @@ def cell(bridge: Bridge, robot: RosNode, tmp_path_factory: pytest.TempPathFactor
     panel.write_text(PANEL)
     mine = live(bridge.endpoint, folder, KIOSK_PANEL=str(panel))
     until(mine.ready, "ready")
+    for topic in TOPICS:
+        until(partial(robot.endpoints, topic), f"the robot sees who publishes {topic}")
+    until(lambda: mine.snapshot()["link"]["node"]["state"] == "ok", "the robot is seen")
     yield mine
     mine.end()
 
@@ -305,6 +309,22 @@ def test_a_durability_that_the_robot_does_not_publish_is_told(
     finally:
         mine.end()
         robot.withdraw("/test_current")
+
+
+def test_a_subscriber_that_would_not_hear_a_best_effort_press_locks_it(
+    bridge: Bridge, robot: RosNode, tmp_path: Path
+) -> None:
+    panel = tmp_path / "cell.toml"
+    message = 'message = { data = "{mode}" }'
+    panel.write_text(PANEL.replace(message, f'{message}\nqos = {{ reliability = "best_effort" }}'))
+    mine = live(bridge.endpoint, tmp_path, KIOSK_PANEL=str(panel))
+    said = "The robot asks for /test_mode reliable; this panel publishes it best effort."
+    try:
+        until(lambda: mine.widget("choose")["reason"] == said, "the mismatch is told")
+        answer = mine.http.post("/widgets/choose", json={"inputs": {"mode": 1}})
+        assert (answer.status_code, answer.json()["reason"]) == (409, f"Not sent: {said}")
+    finally:
+        mine.end()
 
 
 @pytest.mark.parametrize(("width", "height"), [(1280, 800), (1024, 600)])
