@@ -18,8 +18,7 @@ from app.interfaces import Interfaces, value_at
 from app.panel.model import Action
 from app.progress import Answer, Outcome, Progress
 from app.robot import Robot, Sample
-from app.sentences import say
-from app.views import clock
+from app.sentences import clock, say
 
 log = logging.getLogger("kiosk.actions")
 

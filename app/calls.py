@@ -17,8 +17,7 @@ from app.panel.model import Call
 from app.panel.template import PLACE
 from app.progress import Answer, Progress
 from app.robot import Robot
-from app.sentences import say
-from app.views import clock
+from app.sentences import clock, say
 
 log = logging.getLogger("kiosk.calls")
 

@@ -8,15 +8,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from itertools import chain
 
-from app.keys import (
-    DEMO_VERSION,
-    Direction,
-    Endpoint,
-    Role,
-    ServerRole,
-    TopicRole,
-    parsed,
-)
+from app.keys import DEMO_VERSION, Direction, Endpoint, Qos, Role, ServerRole, TopicRole, parsed
 
 # Whose type must equal the panel's, for what the panel does with a topic. A route of the bridge
 # has one type for all: who created it first has fixed it, be it the robot or another panel.
@@ -136,3 +128,33 @@ class Graph:
             if there and route.type != type_name:
                 return route.type
         return None
+
+    def wrong_qos(self, role: TopicRole, key: str, qos: Qos) -> str | None:
+        """The code of the sentence that says what DDS would not match, for what the panel does.
+
+        Of several publishers each counts: one that is not heard may say something else. Of several
+        subscribers one that hears is enough.
+        """
+        theirs = self._on_robot(_COUNTERPARTS[role][0], key)
+        doubts = [_unheard(e, qos) if role == "MS" else _unheard_by(e, qos) for e in theirs]
+        if role == "MP" and None in doubts:
+            return None
+        return next(filter(None, doubts), None)
+
+
+def _unheard(publisher: Endpoint, qos: Qos) -> str | None:
+    """Why a reader of this QoS would not hear a publisher."""
+    if qos.reliable and publisher.reliable is False:
+        return "publishes_best_effort"
+    if qos.transient_local and not publisher.transient_local:
+        return "publishes_volatile"
+    return None
+
+
+def _unheard_by(subscriber: Endpoint, qos: Qos) -> str | None:
+    """Why a subscriber would not hear a writer of this QoS."""
+    if not qos.reliable and subscriber.reliable:
+        return "asks_for_reliable"
+    if not qos.transient_local and subscriber.transient_local:
+        return "asks_for_transient_local"
+    return None

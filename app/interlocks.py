@@ -8,7 +8,8 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
-from app.panel.model import Action, Call, Interlock, Pressed, Publish
+from app.keys import TopicRole
+from app.panel.model import Action, Call, Display, Interlock, Pressed, Publish
 from app.progress import IDLE
 from app.robot import Robot, value_of
 from app.sentences import say
@@ -50,8 +51,8 @@ def interlock_verdict(interlock: Interlock, robot: Robot, now: float) -> Verdict
     if not passable.permitted:
         return passable
     topic, key = interlock.topic, robot.key(interlock.topic)
-    if found := robot.graph.wrong_type("MS", key, interlock.type):
-        return locked("wrong_type", topic=topic, found=found, wanted=interlock.type)
+    if doubt := misfit("MS", interlock, robot):
+        return doubt
     if robot.graph.unheard(key):
         return locked("unheard", topic=topic)
     if interlock.require_publisher and not robot.graph.on_robot("MP", key):
@@ -76,9 +77,8 @@ def publish_verdict(publish: Publish, interlock: Interlock | None, robot: Robot,
     passable = way(robot, now)
     if not passable.permitted:
         return passable
-    topic = publish.topic
-    if found := robot.graph.wrong_type("MP", robot.key(topic), publish.type):
-        return locked("wrong_type", topic=topic, found=found, wanted=publish.type)
+    if doubt := misfit("MP", publish, robot):
+        return doubt
     return PERMITTED if interlock is None else interlock_verdict(interlock, robot, now)
 
 
@@ -106,6 +106,17 @@ def press_verdict(widget: Pressed, interlock: Interlock | None, robot: Robot, no
     if isinstance(widget, Publish):
         return publish_verdict(widget, interlock, robot, now)
     return call_verdict(widget, interlock, robot, now)
+
+
+def misfit(role: TopicRole, of: Interlock | Publish | Display, robot: Robot) -> Verdict | None:
+    """Why a topic can't be trusted, by what the graph shows: another type, a QoS that DDS would
+    not match. `role` is what the panel does with it: publish ("MP") or listen ("MS")."""
+    key = robot.key(of.topic)
+    if found := robot.graph.wrong_type(role, key, of.type):
+        return locked("wrong_type", topic=of.topic, found=found, wanted=of.type)
+    if code := robot.graph.wrong_qos(role, key, of.qos.on_wire):
+        return locked(code, topic=of.topic)
+    return None
 
 
 def locked(code: str, **about: object) -> Verdict:

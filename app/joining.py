@@ -5,8 +5,9 @@ as soon as a bridge is there, so that a topic is known before its first message 
 Who creates a route first fixes its type and QoS for all: so a bridge that has just come gets time to
 discover the robot's nodes, a topic whose type differs gets no token, and what the panel listens to
 gets one when its publisher is first seen, with that publisher's durability. Held from the start, it
-would make a VOLATILE reader, which misses what a TRANSIENT_LOCAL publisher said before they met. It
-stays when the publisher goes: a route that ends and begins again delivers each sample twice (#700).
+would make a VOLATILE reader, which misses what a TRANSIENT_LOCAL publisher said before they met.
+Where the panel gives a durability, the token has it and is held from the start. It stays when the
+publisher goes: a route that ends and begins again delivers each sample twice (#700).
 """
 
 import asyncio
@@ -16,6 +17,7 @@ import math
 import time
 from collections.abc import Callable, Coroutine
 from contextlib import suppress
+from dataclasses import replace
 from typing import Any, Final
 
 from app import keys
@@ -67,6 +69,7 @@ class Joining:
         self._changed = asyncio.Event()
         self._wrongly_held: set[str] = set()
         self._told: set[tuple[str, str]] = set()
+        self._listened: set[str] = set()  # keys of subscriptions whose token was held
         self._held_as: dict[str, bool] = {}  # key → whether its token is TRANSIENT_LOCAL
 
     def start(self) -> None:
@@ -101,6 +104,7 @@ class Joining:
 
     def _leave(self) -> None:
         self._held_as.clear()
+        self._listened.clear()
         self._robot.settled_at = math.inf
         if self._joining is not None:
             self._joining.cancel()
@@ -132,11 +136,11 @@ class Joining:
     def _tokens(self) -> list[str]:
         """The tokens of all topics, but for those whose type is another one on the robot."""
         wanted: list[tuple[TopicRole, str, str, Qos]] = [
-            *(("MP", t, n, Qos()) for t, n in self._panel.publications().items()),
+            *(("MP", t, n, self._qos(t)) for t, n in self._panel.publications().items()),
             *(
-                ("MS", topic, name, Qos(transient_local=latched))
+                ("MS", topic, name, qos)
                 for topic, name in self._panel.subscriptions().items()
-                if (latched := self._latched(self._robot.key(topic))) is not None
+                if (qos := self._listening(topic)) is not None
             ),
             ("MP", "/rosout", LOG_TYPE, keys.ROSOUT),
         ]
@@ -154,6 +158,27 @@ class Joining:
             key = self._robot.key(action)
             tokens.append(keys.action_client_token(self._link.zid, key, type_name))
         return tokens
+
+    def _qos(self, topic: str) -> Qos:
+        return self._panel.qos(topic).on_wire
+
+    def _listening(self, topic: str) -> Qos | None:
+        """The QoS of a subscription's token: the panel's, with the publisher's durability where the
+        panel gives none; None for no token yet.
+
+        A route that a publisher made with a QoS that is not the panel's ends with that publisher, if
+        no token keeps it: so one that is not held yet waits for that.
+        """
+        key, qos = self._robot.key(topic), self._qos(topic)
+        if self._panel.qos(topic).durability is None:
+            latched = self._latched(key)
+            if latched is None:
+                return None
+            qos = replace(qos, transient_local=latched)
+        if key not in self._listened and self._robot.graph.wrong_qos("MS", key, qos):
+            return None
+        self._listened.add(key)
+        return qos
 
     def _latched(self, key: str) -> bool | None:
         """The durability that the token of a subscription is to have; None for no token yet.

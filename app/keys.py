@@ -31,7 +31,8 @@ MESSAGE_TYPE: Final = re.compile(r"[a-z][a-z0-9_]*/msg/[A-Z][A-Za-z0-9]*")
 
 _TOKEN = re.compile(
     r"@/(?P<zid>[^/]+)/@ros2_lv"
-    r"(?:/(?P<role>MP|MS)/(?P<key>[^/]+)/(?P<type>[^/]+)/K?:[^:/]*:(?P<durability>[^:/]*):.*"
+    r"(?:/(?P<role>MP|MS)/(?P<key>[^/]+)/(?P<type>[^/]+)/"
+    r"K?:(?P<reliability>[^:/]*):(?P<durability>[^:/]*):.*"
     r"|/(?P<server>SS|AS)/(?P<name>[^/]+)/(?P<server_type>[^/]+))?"
 )
 _ROUTE = re.compile(r"@/(?P<zid>[^/]+)/ros2/route/topic/(?P<direction>pub|sub)/(?P<key>.+)")
@@ -51,13 +52,15 @@ ROSOUT: Final = Qos(transient_local=True, depth=1000)  # rmw_qos_profile_rosout_
 
 @dataclass(frozen=True, slots=True)
 class Endpoint:
-    """A publisher, subscriber or server that a token shows; `role` is None for the bridge's own."""
+    """A publisher, subscriber or server that a token shows; `role` is None for the bridge's own
+    token, and `reliable` where the token does not say."""
 
     zid: str
     role: Role | None = None
     key: str = ""
     type: str = ""
     transient_local: bool = False
+    reliable: bool | None = None
 
 
 def key_of(topic: str, namespace: str = "") -> str:
@@ -113,7 +116,8 @@ def parsed(token_key: str) -> Endpoint | None:
         return Endpoint(found["zid"])
     role: TopicRole = "MP" if found["role"] == "MP" else "MS"
     key, type_name = _unescaped(found["key"]), _unescaped(found["type"])
-    return Endpoint(found["zid"], role, key, type_name, found["durability"] == "1")
+    reliable = {"0": False, "1": True}.get(found["reliability"])
+    return Endpoint(found["zid"], role, key, type_name, found["durability"] == "1", reliable)
 
 
 def version(zid: str) -> str:

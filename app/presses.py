@@ -17,14 +17,14 @@ from typing import Any, Final, Literal, Protocol
 from app.actions import Actions
 from app.calls import Calls
 from app.errors import FieldError, InputError, LinkError, NotFound
+from app.inputs import checked, typed
 from app.interfaces import Interfaces
 from app.interlocks import press_verdict
-from app.panel.model import Action, Call, Panel, Pressed, Publish, TextInput
+from app.panel.model import Action, Call, Input, Panel, Pressed, Publish
 from app.panel.template import filled, named
 from app.progress import Answer, Outcome
 from app.robot import Robot
-from app.sentences import say
-from app.views import clock
+from app.sentences import clock, say
 
 log = logging.getLogger("kiosk.presses")
 
@@ -107,6 +107,14 @@ class Presses:
         if not isinstance(widget, Pressed):
             raise NotFound(f'there is no widget "{widget_id}" that can be pressed')
         return widget
+
+    def typed(self, form: Mapping[str, str]) -> dict[str, Any]:
+        """A form's texts as values of the inputs that they are named by."""
+        fields = {name: self._widgets.get(name) for name in form}
+        return {
+            name: typed(field, form[name]) if isinstance(field, Input) else form[name]
+            for name, field in fields.items()
+        }
 
     def receipt(self, press_id: str) -> Receipt | None:
         """The receipt of a press, as it is known now."""
@@ -225,15 +233,15 @@ class Presses:
     def _checked(self, widget: Pressed, inputs: Mapping[str, Any]) -> dict[str, Any]:
         """The values of the inputs that the widget's message names."""
         for name in inputs:
-            if not isinstance(self._widgets.get(name), TextInput):
+            if not isinstance(self._widgets.get(name), Input):
                 raise InputError(f'there is no input "{name:.60}" on this panel')
         values: dict[str, Any] = {}
         for _, name in named(widget.template):
             field = self._widgets[name]
             if name not in inputs:
                 raise InputError(f'the input "{name}" is missing')
-            if isinstance(field, TextInput):
-                values[name] = _text(field, inputs[name])
+            if isinstance(field, Input):
+                values[name] = checked(field, inputs[name])
         return values
 
     def _receipt(
@@ -247,14 +255,3 @@ class Presses:
     ) -> Receipt:
         at = datetime.now(UTC).isoformat(timespec="milliseconds")
         return Receipt(press_id, widget.id, outcome, reason, at, cause, dict(inputs))
-
-
-def _text(field: TextInput, given: Any) -> str:
-    """`given` as the text of an input; lengths count characters, as an operator does."""
-    if not isinstance(given, str):
-        raise InputError(f'{field.label} ("{field.id}") must be text, not {given!r:.60}')
-    if len(given) > field.max_length:
-        raise InputError(
-            f"{field.label} is {len(given)} characters long; {field.max_length} are allowed"
-        )
-    return given

@@ -3,6 +3,7 @@
 Codes are stable names for tests and logs; `say` fills in what the sentence is about.
 """
 
+import time
 from collections.abc import Mapping
 from typing import Final
 
@@ -20,6 +21,13 @@ ENGLISH: Final[Mapping[str, str]] = {
     "no_publisher": "Locked: no node of the robot publishes {topic}.",
     "unreadable": "Locked: {topic} can't be read: what arrives is not {wanted}.",
     "forbidden": "The robot does not permit {name}.",
+    # QoS that DDS would not match: the robot's and the panel's.
+    "publishes_best_effort": "The robot publishes {topic} best effort; this panel asks for reliable.",
+    "publishes_volatile": "The robot publishes {topic} volatile; this panel asks for transient local.",
+    "asks_for_reliable": "The robot asks for {topic} reliable; this panel publishes it best effort.",
+    "asks_for_transient_local": (
+        "The robot asks for {topic} transient local; this panel publishes it volatile."
+    ),
     "server_lost": "There is no connection to the panel's server.",
     "server_unsure": "No answer from the panel's server: it is not known whether this was sent.",
     "no_service": "Locked: the robot does not offer {name} now.",
@@ -53,6 +61,25 @@ ENGLISH: Final[Mapping[str, str]] = {
     "readout_old": "{age} old",
     "readout_unreadable": "{topic} can't be read: what arrives is not {wanted}",
     "readout_time": "received {time}",
+    "readout_missing": "there is no {field} in what was received {time}",
+    # What a lamp shows when no state of its own does.
+    "lamp_waiting": "No value yet",
+    "lamp_unknown": "Unknown: {value}",
+    "lamp_old": "Not known",
+    "lamp_unreadable": "Not readable",
+    "lamp_missing": "Not there",
+    "lamp_was": "was {text}: {note}",
+    # Inputs: what they take, and why a value is refused.
+    "on": "On",
+    "off": "Off",
+    "less": "{label}: less",
+    "more": "{label}: more",
+    "limits": "{low} to {high}{unit}, in steps of {step}",
+    "number_empty": "{label} has no number: it must be {limits}",
+    "no_number": "{label} must be a number, {limits}, not {given}",
+    "off_limits": "{label} is {given}: it must be {limits}",
+    "no_option": "{label} must be one of {options}, not {given}",
+    "no_toggle": "{label} must be true ({on}) or false ({off}), not {given}",
     # What came of a press.
     "published": "Sent on {topic} at {time}.",
     "sent_to_nobody": "Sent on {topic} at {time}, but no node is known to listen to it.",
@@ -86,3 +113,8 @@ def age(seconds: float) -> str:
     if seconds < 3600:
         return f"{int(seconds // 60)} min"
     return f"{int(seconds // 3600)} h"
+
+
+def clock(wall: float) -> str:
+    """The time of day in the server's zone, of seconds since the epoch."""
+    return time.strftime("%H:%M:%S", time.localtime(wall))

@@ -5,17 +5,18 @@ nothing.
 """
 
 import math
-import time
 from dataclasses import dataclass
-from typing import Any, Final, Literal, TypedDict
+from typing import Any, Literal, TypedDict
 
+from app.displays import indicator, readout
+from app.inputs import limits
 from app.interlocks import Verdict, interlock_verdict, press_verdict, way
-from app.panel.model import Action, Call, Panel, Publish, Readout, TextInput
+from app.panel.displays import Indicator, Readout
+from app.panel.inputs import Numeric, SelectInput, TextInput, ToggleInput
+from app.panel.model import Action, Call, Panel, Publish
 from app.progress import IDLE, Progress
-from app.robot import Robot, value_of
-from app.sentences import age, say
-
-LONGEST_TEXT: Final = 200  # characters of a value that a readout shows
+from app.robot import Robot
+from app.sentences import say
 
 
 class Lamp(TypedDict):
@@ -68,8 +69,10 @@ def sight(panel: Panel, robot: Robot, now: float, *, simulated: bool = False, fa
     widgets: dict[str, dict[str, Any]] = {}
     for widget in panel.widgets():
         match widget:
-            case TextInput():
+            case TextInput() | SelectInput() | ToggleInput():
                 widgets[widget.id] = {}
+            case Numeric():
+                widgets[widget.id] = {"limits": limits(widget)}
             case Publish() | Call() | Action():
                 interlock = panel.interlock(widget.interlock)
                 verdict = noted(press_verdict(widget, interlock, robot, now))
@@ -78,6 +81,9 @@ def sight(panel: Panel, robot: Robot, now: float, *, simulated: bool = False, fa
                     widgets[widget.id] |= progress(robot.progress.get(widget.id, IDLE))
             case Readout():
                 widgets[widget.id], until = readout(widget, robot, now)
+                untils.append(until)
+            case Indicator():
+                widgets[widget.id], until = indicator(widget, robot, now)
                 untils.append(until)
     view = View(
         link=lamps(panel, robot, passable),
@@ -103,59 +109,6 @@ def progress(of: Progress) -> dict[str, Any]:
         "progress": of.fraction,
         "stoppable": of.stoppable,
     }
-
-
-def readout(widget: Readout, robot: Robot, now: float) -> tuple[dict[str, Any], float]:
-    """Attributes of a readout: `state` is "waiting", "live", "old" or "unreadable"."""
-    topic = widget.topic
-    found = robot.graph.wrong_type("MS", robot.key(topic), widget.type)
-    if found:
-        note = say("wrong_type", topic=topic, found=found, wanted=widget.type)
-        return shown("unreadable", "—", note)
-    if robot.graph.unheard(robot.key(topic)):
-        return shown("unreadable", "—", say("unheard", topic=topic))
-    reading = robot.reading(topic)
-    if reading.status == "waiting":
-        return shown("waiting", "—", say("readout_waiting", topic=topic))
-    if reading.status == "unreadable":
-        return shown("unreadable", "—", say("readout_unreadable", topic=topic, wanted=widget.type))
-    if reading.message is None:
-        return shown("waiting", "—", say("readout_waiting", topic=topic))
-    text = written(value_of(reading.message, widget.field))
-    if reading.status == "cut":
-        return shown("old", text, say("readout_cut", time=clock(reading.wall)))
-    if widget.max_age_s is None:
-        return shown("live", text, say("readout_time", time=clock(reading.wall)))
-    old = now - reading.at
-    if old < widget.max_age_s:
-        note = say("readout_time", time=clock(reading.wall))
-        return shown("live", text, note, reading.at + widget.max_age_s)
-    step = 1 if old < 60 else 60
-    return shown("old", text, say("readout_old", age=age(old)), reading.at + (old // step + 1) * step)
-
-
-def shown(state: str, text: str, note: str, until: float = math.inf) -> tuple[dict[str, Any], float]:
-    return {"state": state, "text": text, "note": note}, until
-
-
-def written(value: Any) -> str:
-    """A field's value as text, cut to what a readout can show; None is a value that is not there."""
-    if value is None:
-        return "—"
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    text = _number(value) if isinstance(value, float) else str(value)
-    return text if len(text) <= LONGEST_TEXT else text[: LONGEST_TEXT - 1] + "…"
-
-
-def _number(value: float) -> str:
-    """Six digits where they are enough: a float32's 0.1 is not 0.10000000149011612."""
-    return f"{value:.6g}" if 1e-4 <= abs(value) < 1e6 else repr(value)
-
-
-def clock(wall: float) -> str:
-    """The time of day in the server's zone."""
-    return time.strftime("%H:%M:%S", time.localtime(wall))
 
 
 def lamps(panel: Panel, robot: Robot, passable: Verdict) -> dict[str, Lamp]:

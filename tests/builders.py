@@ -62,10 +62,17 @@ def robot_there(panel: Panel) -> Robot:
 
 
 def endpoint(
-    robot: Robot, role: TopicRole, topic: str, type_name: str, zid: str = BRIDGE, alive: bool = True
+    robot: Robot,
+    role: TopicRole,
+    topic: str,
+    type_name: str,
+    zid: str = BRIDGE,
+    alive: bool = True,
+    qos: Qos | None = None,
 ) -> None:
     """A publisher ("MP") or subscriber ("MS") appears behind a bridge, or ends."""
-    token = keys.token(zid, role, robot.key(topic), type_name, Qos(), INTERFACES.type_hash(type_name))
+    type_hash = INTERFACES.type_hash(type_name)
+    token = keys.token(zid, role, robot.key(topic), type_name, qos or Qos(), type_hash)
     robot.graph.apply(token, alive)
 
 

@@ -207,3 +207,56 @@ def test_who_is_no_publisher_of_the_robots_has_no_durability(
 ) -> None:
     graph.apply(topic_token(zid, role, "a", BOOL, Qos(transient_local=True)), True)
     assert graph.latched("a") is None
+
+
+BEST_EFFORT = Qos(reliable=False)
+LATCHED = Qos(transient_local=True)
+
+
+@pytest.mark.parametrize(
+    ("role", "robots", "panels", "code"),
+    [
+        ("MS", Qos(), Qos(), None),
+        ("MS", BEST_EFFORT, Qos(), "publishes_best_effort"),
+        ("MS", Qos(), BEST_EFFORT, None),
+        ("MS", BEST_EFFORT, BEST_EFFORT, None),
+        ("MS", Qos(), LATCHED, "publishes_volatile"),
+        ("MS", LATCHED, Qos(), None),
+        ("MS", LATCHED, LATCHED, None),
+        ("MP", Qos(), Qos(), None),
+        ("MP", Qos(), BEST_EFFORT, "asks_for_reliable"),
+        ("MP", BEST_EFFORT, Qos(), None),
+        ("MP", LATCHED, Qos(), "asks_for_transient_local"),
+        ("MP", LATCHED, LATCHED, None),
+        ("MP", Qos(), LATCHED, None),
+        ("MP", Qos(depth=1), Qos(depth=5), None),
+    ],
+)
+def test_a_qos_that_dds_would_not_match_is_told(
+    graph: Graph, role: TopicRole, robots: Qos, panels: Qos, code: str | None
+) -> None:
+    theirs: TopicRole = "MP" if role == "MS" else "MS"
+    graph.apply(topic_token(BRIDGE, theirs, "a", BOOL, robots), True)
+    assert graph.wrong_qos(role, "a", panels) == code
+    assert graph.wrong_qos(role, "b", panels) is None
+    graph.apply(topic_token(BRIDGE, theirs, "a", BOOL, robots), False)
+    assert graph.wrong_qos(role, "a", panels) is None
+
+
+def test_each_publisher_must_be_heard_but_one_hearing_subscriber_is_enough(graph: Graph) -> None:
+    for role in ("MP", "MS"):
+        graph.apply(topic_token(BRIDGE, role, "a", BOOL), True)
+    graph.apply(topic_token(BRIDGE, "MP", "a", BOOL, BEST_EFFORT), True)
+    graph.apply(topic_token(BRIDGE, "MS", "a", BOOL, LATCHED), True)
+    assert graph.wrong_qos("MS", "a", Qos()) == "publishes_best_effort"
+    assert graph.wrong_qos("MP", "a", Qos()) is None
+
+
+def test_another_kiosks_qos_does_not_count(graph: Graph) -> None:
+    graph.apply(topic_token(OTHER_KIOSK, "MP", "a", BOOL, BEST_EFFORT), True)
+    assert graph.wrong_qos("MS", "a", Qos()) is None
+
+
+def test_a_token_that_does_not_say_is_no_mismatch(graph: Graph) -> None:
+    graph.apply(f"@/{BRIDGE}/@ros2_lv/MP/a/std_msgs§msg§Bool/:::,:", True)
+    assert graph.wrong_qos("MS", "a", Qos()) is None

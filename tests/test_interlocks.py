@@ -6,7 +6,7 @@ from collections.abc import Callable
 import pytest
 
 from app.interlocks import Verdict, interlock_verdict, publish_verdict, way
-from app.keys import bridge_token
+from app.keys import Qos, bridge_token
 from app.panel.model import Interlock, Publish
 from app.robot import Robot, Sample
 from tests.builders import (
@@ -217,3 +217,27 @@ def test_a_bool_of_a_larger_message_can_permit(permitted: bool) -> None:
     payload = INTERFACES.encode(interlock["type"], {**sizes, "do_rectify": permitted})
     robot.take(robot.key(ENABLED), Sample(payload, 1, NOW, NOW, BRIDGE))
     assert verdict_of(robot, interlock).permitted is permitted
+
+
+def test_a_permission_that_is_published_best_effort_locks_a_panel_that_asks_for_reliable() -> None:
+    best_effort = Qos(reliable=False)
+    robot = robot_there(small_panel())
+    permits(robot)
+    endpoint(robot, "MP", ENABLED, BOOL, qos=best_effort)
+    verdict = interlock_verdict(small_panel().interlocks[0], robot, NOW)
+    assert (verdict.permitted, verdict.code) == (False, "publishes_best_effort")
+    assert verdict.reason == (
+        "The robot publishes /operation_enabled best effort; this panel asks for reliable."
+    )
+    asks_less = small_panel({"qos": {"reliability": "best_effort"}}).interlocks[0]
+    assert interlock_verdict(asks_less, robot, NOW).permitted
+
+
+def test_a_subscriber_that_would_not_hear_locks_a_press() -> None:
+    robot = robot_there(small_panel())
+    endpoint(robot, "MS", "/free", TEXT, qos=Qos(transient_local=True))
+    verdict = publish_verdict(free(), None, robot, NOW)
+    assert (
+        verdict.reason == "The robot asks for /free transient local; this panel publishes it volatile."
+    )
+    assert not verdict.permitted

@@ -52,7 +52,7 @@ def test_a_token_shows_what_it_was_made_from(role: TopicRole, key: str, latched:
     made = token("b1", role, key, BOOL, Qos(transient_local=latched), HASH)
     seen = parsed(made)
     assert seen is not None
-    assert seen == Endpoint("b1", role, key, BOOL, latched)
+    assert seen == Endpoint("b1", role, key, BOOL, latched, True)
 
 
 def test_a_token_is_one_key_expression_of_the_bridges_form() -> None:
@@ -86,12 +86,20 @@ def test_a_hostile_type_never_becomes_a_token(type_name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("qos", "latched"),
-    [("::1:0,1:", True), (":1:0:0,10:", False), ("K:::,:", False), (":1:1:0,1:x;", True)],
+    ("qos", "latched", "reliable"),
+    [
+        ("::1:0,1:", True, None),
+        (":1:0:0,10:", False, True),
+        (":0:0:0,10:", False, False),
+        ("K:::,:", False, None),
+        (":1:1:0,1:x;", True, True),
+    ],
 )
-def test_a_bridges_token_of_a_topic_is_read_in_its_short_forms(qos: str, latched: bool) -> None:
+def test_a_bridges_token_of_a_topic_is_read_in_its_short_forms(
+    qos: str, latched: bool, reliable: bool | None
+) -> None:
     seen = parsed(f"@/b1/@ros2_lv/MP/arm§state/std_msgs§msg§Bool/{qos}")
-    assert seen == Endpoint("b1", "MP", "arm/state", BOOL, latched)
+    assert seen == Endpoint("b1", "MP", "arm/state", BOOL, latched, reliable)
 
 
 def test_a_bridges_own_token_shows_the_bridge() -> None:

@@ -213,12 +213,12 @@ def test_an_interlock_and_a_widget_may_have_one_id(load: Load) -> None:
         (
             with_widget(1, kind="knob"),
             BUTTON,
-            'unknown kind "knob"; one of text, publish, call, action, readout',
+            'unknown kind "knob"; one of text, number, slider, select, toggle, publish',
         ),
         (
             tables(page=[{"id": "one", "title": "One", "widget": [without(FREE, "kind")]}]),
             "page[0].widget[0]",
-            '"kind" is missing; one of text, publish, call, action, readout',
+            '"kind" is missing; one of text, number, slider, select, toggle, publish',
         ),
         (with_widget(1, colour="red"), f"{BUTTON}.colour", "unknown key; known here: id, label, span"),
         (with_widget(1, lable="x"), f"{BUTTON}.lable", 'did you mean "label"?'),
@@ -284,7 +284,7 @@ def test_an_interlock_and_a_widget_may_have_one_id(load: Load) -> None:
         (
             with_widget(1, type="std_msgs/msg/Int8", message={"data": "{message}"}),
             f"{BUTTON}.message.data",
-            "must be a whole number (int8)",
+            'input "message" gives text; the field is int8',
         ),
         (
             with_widget(1, type="geometry_msgs/msg/Polygon", message={"points": [{"x": 1.5, "y": 0}]}),
@@ -323,6 +323,72 @@ def test_a_fault_is_named_with_its_place(
     found = faults(load, given)
     assert list(found) == [place]
     assert message in found[place]
+
+
+NUMBER = {"id": "n", "kind": "number", "label": "N", "min": 0, "max": 1}
+LAMP = {**HEARD, "kind": "indicator", "states": [{"value": "a", "text": "A", "shape": "circle"}]}
+
+
+@pytest.mark.parametrize(
+    ("widget", "place", "message"),
+    [
+        (without(NUMBER, "max"), "max", "is missing"),
+        ({**NUMBER, "min": "0"}, "min", "valid number"),
+        ({**NUMBER, "max": 2**53 + 2}, "max", "less than or equal to"),
+        ({**NUMBER, "step": 0}, "step", "greater than 0"),
+        ({**NUMBER, "kind": "slider", "units": "m"}, "units", 'did you mean "unit"?'),
+        ({"id": "s", "kind": "select", "label": "S"}, "options", "is missing"),
+        (
+            {"id": "s", "kind": "select", "label": "S", "options": []},
+            "options",
+            "is empty: it must have one table at least",
+        ),
+        (
+            {"id": "s", "kind": "select", "label": "S", "options": [{"value": 1}]},
+            "options[0].label",
+            "is missing",
+        ),
+        ({"id": "t", "kind": "toggle", "label": "T", "default": 1}, "default", "valid boolean"),
+        (
+            {**HEARD, "format": "{0.__class__}"},
+            "format",
+            '"{0.__class__}" is not a format: it must be like ".1f"',
+        ),
+        ({**HEARD, "constants": "status"}, "constants", "it must be like STATUS_"),
+        ({**HEARD, "qos": {"depth": 0}}, "qos.depth", "greater than or equal to 1"),
+        ({**HEARD, "qos": {"reliability": "best"}}, "qos.reliability", "'reliable' or 'best_effort'"),
+        ({**HEARD, "qos": {"reliable": True}}, "qos.reliable", 'did you mean "reliability"?'),
+        ({**LAMP, "states": 5}, "states", "must be a list of tables, like [{ value = 0"),
+        (
+            {**LAMP, "states": [{"value": 1.5, "text": "A", "shape": "circle"}]},
+            "states[0].value",
+            "must be a whole number, true or false, or text, not 1.5",
+        ),
+        (
+            {**LAMP, "states": [{"value": "a", "text": "A", "shape": "star"}]},
+            "states[0].shape",
+            "'circle', 'square'",
+        ),
+        (
+            {**LAMP, "states": [{"value": "a", "text": "A", "shape": "bar", "colour": "green"}]},
+            "states[0].colour",
+            "'grey', 'white'",
+        ),
+    ],
+)
+def test_a_fault_of_an_input_or_a_display_is_named_with_its_place(
+    load: Load, widget: dict[str, Any], place: str, message: str
+) -> None:
+    page = {"id": "one", "title": "One", "widget": [widget]}
+    found = faults(load, tables(page=[page]))
+    assert list(found) == [f"page[0].widget[0].{place}"]
+    assert message in found[f"page[0].widget[0].{place}"]
+
+
+def test_a_faulty_input_makes_no_fault_where_it_is_used(load: Load) -> None:
+    used = {**FREE, "type": "std_msgs/msg/Int8", "message": {"data": "{n}"}}
+    page = {"id": "one", "title": "One", "widget": [without(NUMBER, "max"), used]}
+    assert list(faults(load, tables(page=[page]))) == ["page[0].widget[0].max"]
 
 
 def test_an_input_of_another_page_is_no_input_of_this_one(load: Load) -> None:
@@ -537,7 +603,7 @@ ACTION = {
         ({**CALL, "interlock": "nothing"}, "interlock", 'no interlock "nothing"'),
         ({**CALL, "timeout_s": 0}, "timeout_s", "greater than 0"),
         ({**ACTION, "type": "example_interfaces/action/Fibo"}, "type", "did you mean"),
-        ({**ACTION, "goal": {"order": "{message}"}}, "goal.order", "must be a whole number (int32)"),
+        ({**ACTION, "goal": {"order": "{message}"}}, "goal.order", "gives text; the field is int32"),
         ({**ACTION, "progress": "sequence"}, "progress", "is int32[]: it must be a number"),
         ({**ACTION, "feedback": "{done}"}, "feedback", 'there is no "done"'),
         ({**ACTION, "result": "{sequenze}"}, "result", 'there is no "sequenze"'),

@@ -82,6 +82,7 @@ class Bench:
             panel, INTERFACES, self.robot, self.way, calls, actions, lambda: self.now
         )
         self.receipt = self._presses.receipt
+        self.typed = self._presses.typed
 
     def press(
         self, widget: str = "free", inputs: Mapping[str, Any] | None = None, press_id: str = "p1"
@@ -349,3 +350,32 @@ def test_the_log_tells_who_pressed_what_and_what_came_of_it(
     assert record.levelno == level
     for part in ("p1", "guarded", "127.0.0.1", "'hello'", receipt.outcome, receipt.reason):
         assert part in record.getMessage()
+
+
+SPEED = {
+    "id": "speed", "kind": "slider", "label": "Speed", "min": -1, "max": 1, "step": 0.5, "unit": "m/s",
+}  # fmt: skip
+LIGHT = {"id": "light", "kind": "toggle", "label": "Light"}
+MOVE = {**FREE, "type": "geometry_msgs/msg/Point", "message": {"x": "{speed}", "y": 0, "z": 0}}
+
+
+def test_a_number_arrives_as_a_number() -> None:
+    bench = Bench(panel_of(SPEED, MOVE))
+    assert bench.press(inputs={"speed": -0.5}).outcome == "published"
+    ((_, payload),) = bench.way.sent
+    assert INTERFACES.decode("geometry_msgs/msg/Point", payload).x == -0.5
+
+
+@pytest.mark.parametrize("given", [1.5, 0.3, math.nan, "0.5", True])
+def test_a_number_out_of_its_limits_is_refused_with_them(given: Any) -> None:
+    bench = Bench(panel_of(SPEED, MOVE))
+    cause, reason = refused(bench, bench.press(inputs={"speed": given}))
+    assert cause == "input"
+    assert reason.startswith("Not sent: Speed ")
+    assert "-1 to 1 m/s, in steps of 0.5" in reason
+
+
+def test_a_forms_texts_are_typed_by_their_inputs() -> None:
+    panel = panel_of(SPEED, LIGHT, MESSAGE, MOVE)
+    form = {"speed": "0.5", "light": "false", "message": "1", "other": "x"}
+    assert Bench(panel).typed(form) == {"speed": 0.5, "light": False, "message": "1", "other": "x"}

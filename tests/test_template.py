@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from app.errors import FieldError
-from app.panel.template import filled, named
+from app.panel.template import at, filled, named
 
 
 @pytest.mark.parametrize(
@@ -15,6 +15,7 @@ from app.panel.template import filled, named
         ("{n}", 7),
         ("{on}", True),
         ("n = {n}", "n = 7"),
+        ("on = {on}", "on = true"),
         ("{a}{a}", "oneone"),
         ("", ""),
         ("plain", "plain"),
@@ -76,3 +77,18 @@ def test_what_is_no_placeholder_is_refused_with_its_place(text: str) -> None:
     with pytest.raises(FieldError, match="brace") as caught:
         list(named({"x": ["", text]}))
     assert caught.value.field == "x[1]"
+
+
+def test_a_list_can_not_stand_in_a_text() -> None:
+    with pytest.raises(FieldError, match="write the input's id alone") as caught:
+        filled({"x": "a {a}"}, {"a": [1]})
+    assert caught.value.field == "x"
+
+
+@pytest.mark.parametrize(
+    ("where", "found"),
+    [("x", "{a}"), ("x.y", "{a}"), ("z[1].w", "{b}"), ("z[7]", [1, {"w": "{b}"}]), ("", None)],
+)
+def test_what_stands_at_a_field_is_found(where: str, found: Any) -> None:
+    template = {"x": "{a}", "z": [1, {"w": "{b}"}]}
+    assert at(template, where) == (template if found is None else found)

@@ -7,10 +7,12 @@ from typing import Any
 
 import pytest
 
+from app.displays import LONGEST_TEXT, readout, written
 from app.interlocks import way
 from app.keys import DEMO_VERSION, bridge_token
 from app.robot import Robot, Sample
-from app.views import LONGEST_TEXT, View, clock, lamps, readout, sight, written
+from app.sentences import clock
+from app.views import View, lamps, sight
 from tests.builders import (
     BOOL,
     BRIDGE,
@@ -252,7 +254,11 @@ def test_a_readout_shows_a_field_inside() -> None:
         (False, "false"),
         (-7, "-7"),
         (0.5, "0.5"),
-        (math.nan, "nan"),
+        (math.nan, "NaN"),
+        (math.inf, "Infinity"),
+        (-math.inf, "-Infinity"),
+        (2**64 - 1, "18446744073709551615"),
+        (-(2**63), "-9223372036854775808"),
         (None, "—"),
         ("", ""),
         ("<b>\n", "<b>\n"),

@@ -1,6 +1,24 @@
 """The panel file: TOML in, frozen and checked descriptions out."""
 
+from app.panel.displays import Indicator, LampState, Readout
+from app.panel.inputs import NumberInput, SelectInput, SliderInput, TextInput, ToggleInput
 from app.panel.load import load_panel
-from app.panel.model import Interlock, Page, Panel, Publish, Readout, TextInput, Widget
+from app.panel.model import Display, Input, Interlock, Page, Panel, Publish
 
-__all__ = ["Interlock", "Page", "Panel", "Publish", "Readout", "TextInput", "Widget", "load_panel"]
+__all__ = [
+    "Display",
+    "Indicator",
+    "Input",
+    "Interlock",
+    "LampState",
+    "NumberInput",
+    "Page",
+    "Panel",
+    "Publish",
+    "Readout",
+    "SelectInput",
+    "SliderInput",
+    "TextInput",
+    "ToggleInput",
+    "load_panel",
+]

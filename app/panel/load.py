@@ -4,17 +4,23 @@ import copy
 import hashlib
 import re
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Mapping
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, Final, get_args
 
 from pydantic import BaseModel, ValidationError
 
 from app.errors import Fault, InterfaceError, PanelError
 from app.interfaces import interfaces_of
 from app.panel.check import faults_in
-from app.panel.model import ID, KINDS, Panel
+from app.panel.description import ID
+from app.panel.model import KINDS, Panel
+
+INLINE: Final[Mapping[str | int, str]] = {
+    "options": '[{ value = 1, label = "One" }]',
+    "states": '[{ value = 0, text = "Idle", shape = "circle" }]',
+}
 
 
 def load_panel(path: Path) -> Panel:
@@ -39,7 +45,7 @@ def load_panel(path: Path) -> Panel:
     return panel
 
 
-def _faults_with_types(panel: Panel) -> Iterator[Fault]:
+def _faults_with_types(panel: Panel, faulty: Collection[str] = ()) -> Iterator[Fault]:
     try:
         interfaces = interfaces_of(panel.distro, panel.interfaces)
     except InterfaceError as error:
@@ -47,7 +53,7 @@ def _faults_with_types(panel: Panel) -> Iterator[Fault]:
         at = next((i for i, one in enumerate(panel.interfaces) if source.is_relative_to(one)), 0)
         yield Fault(f"interfaces[{at}]", str(error))
         return
-    yield from faults_in(panel, interfaces)
+    yield from faults_in(panel, interfaces, faulty)
 
 
 def _faults_of_the_rest(
@@ -55,11 +61,14 @@ def _faults_of_the_rest(
 ) -> Iterator[Fault]:
     """What else is wrong: the file is checked with harmless stand-ins for what has no right shape."""
     mended = copy.deepcopy(tables)
+    faulty: set[str] = set()
     for fault in error.errors():
         match fault["loc"]:
             case ("page", int(p), "widget", int(w), *_):
                 old = tables["page"][p]["widget"][w]
-                mended["page"][p]["widget"][w] = _stand_in(old, f"{p}_{w}") | {"kind": "text"}
+                stand_in = _stand_in(old, f"{p}_{w}")
+                mended["page"][p]["widget"][w] = stand_in | {"kind": "text"}
+                faulty.add(stand_in["id"])
             case ("interfaces", *_):
                 return  # without its types nothing can be said of the rest
             case ("interlock", int(i), *_):
@@ -75,7 +84,7 @@ def _faults_of_the_rest(
         panel = Panel.model_validate(mended, context=folder)
     except ValidationError:
         return  # too much is wrong: what was found already comes first
-    yield from _faults_with_types(panel)
+    yield from _faults_with_types(panel, faulty)
 
 
 def _stand_in(old: Any, number: str) -> dict[str, Any]:
@@ -138,6 +147,12 @@ def _message(error: Any, model: type[BaseModel], location: tuple[str | int, ...]
             return f"unknown key; {hint}"
         case "tuple_type" if location == ("interfaces",):
             return 'must be a list of folders: write ["folder"]'
+        case "tuple_type" if location[-1] in INLINE:
+            return f"must be a list of tables, like {INLINE[location[-1]]}"
+        case "string_pattern_mismatch" if location[-1] == "format":
+            return f'"{error["input"]}" is not a format: it must be like ".1f", "+.2e" or ",d"'
+        case "string_pattern_mismatch" if location[-1] == "constants":
+            return f'"{error["input"]}" is not how names of constants start: it must be like STATUS_'
         case "tuple_type":
             return f"must be a list of tables: write [[{'.'.join(map(str, _names(location)))}]]"
         case "missing":

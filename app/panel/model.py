@@ -1,75 +1,27 @@
 """The descriptions that a panel file becomes. What a key means is in the README."""
 
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo
+from pydantic import AfterValidator, Field
 
-from app.keys import ACTION_TYPE, MESSAGE_TYPE, NAMESPACE, SERVICE_TYPE, TOPIC
-
-
-def _topic(given: str) -> str:
-    if not TOPIC.fullmatch(given) or "__" in given:
-        raise ValueError(
-            f'"{given}" is not an absolute ROS 2 topic name: it starts with "/", and each part is '
-            'letters, digits and single "_", and starts with no digit'
-        )
-    return given
-
-
-def _type(given: str) -> str:
-    if not MESSAGE_TYPE.fullmatch(given):
-        raise ValueError(f'"{given}" is not a ROS 2 message type: it must be like std_msgs/msg/Bool')
-    return given
-
-
-def _service(given: str) -> str:
-    if not SERVICE_TYPE.fullmatch(given):
-        raise ValueError(f'"{given}" is not a ROS 2 service type: it must be like std_srvs/srv/SetBool')
-    return given
-
-
-def _action(given: str) -> str:
-    if not ACTION_TYPE.fullmatch(given):
-        raise ValueError(
-            f'"{given}" is not a ROS 2 action type: it must be like nav2_msgs/action/NavigateToPose'
-        )
-    return given
-
-
-def _namespace(given: str) -> str:
-    whole = f"/{given.strip('/')}" if given.strip("/") else ""
-    if not NAMESPACE.fullmatch(whole) or "__" in whole:
-        raise ValueError(f'"{given}" is not a ROS 2 namespace: it must be like /robot1')
-    return whole
-
-
-def _folder(given: Any, info: ValidationInfo) -> Path:
-    """Relative to the panel file's folder, which is the context of the validation."""
-    if not isinstance(given, str) or not given:
-        raise ValueError(f"must be the path of a folder, not {given!r}")
-    folder = Path(info.context or "") / given
-    if not folder.is_dir():
-        raise ValueError(f"{folder} is not a folder: it must be a ROS package or have some in it")
-    return folder
-
-
-ID: Final = r"^[a-z][a-z0-9_]{0,63}$"
-Id = Annotated[str, Field(pattern=ID)]
-Label = Annotated[str, Field(min_length=1, max_length=120)]
-Topic = Annotated[str, AfterValidator(_topic), Field(max_length=255)]
-Type = Annotated[str, AfterValidator(_type)]
-ServiceType = Annotated[str, AfterValidator(_service)]
-ActionType = Annotated[str, AfterValidator(_action)]
-_STEP: Final = r"[a-z][a-z0-9_]*(\[[0-9]{1,9}\])*"
-FieldPath = Annotated[str, Field(pattern=rf"^{_STEP}(\.{_STEP})*$")]
-Folder = Annotated[Path, BeforeValidator(_folder)]
-Seconds = Annotated[float, Field(gt=0, le=86400, allow_inf_nan=False)]
-
-
-class Description(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+from app.panel.description import (
+    ActionType,
+    Description,
+    FieldPath,
+    Folder,
+    Id,
+    Label,
+    Placed,
+    Seconds,
+    ServiceType,
+    Topic,
+    TopicQos,
+    Type,
+    namespace_of,
+)
+from app.panel.displays import Indicator, Readout
+from app.panel.inputs import NumberInput, SelectInput, SliderInput, TextInput, ToggleInput
 
 
 class Interlock(Description):
@@ -82,24 +34,11 @@ class Interlock(Description):
     field: FieldPath = "data"
     max_age_s: Seconds | None = None
     require_publisher: bool = False
+    qos: TopicQos = TopicQos()
 
     @property
     def name(self) -> str:
         return self.label or self.id
-
-
-class Placed(Description):
-    """What every widget has; `span` is its width in twelfths of the page."""
-
-    id: Id
-    label: Label
-    span: Annotated[int, Field(ge=1, le=12)] = 12
-
-
-class TextInput(Placed):
-    kind: Literal["text"]
-    max_length: Annotated[int, Field(ge=1, le=1000)] = 80
-    default: Annotated[str, Field(pattern=r"^[^\x00]*$")] = ""
 
 
 class Publish(Placed):
@@ -108,6 +47,7 @@ class Publish(Placed):
     type: Type
     message: dict[str, Any]
     interlock: Id | None = None
+    qos: TopicQos = TopicQos()
     span: Annotated[int, Field(ge=1, le=12)] = 4
 
     @property
@@ -122,7 +62,7 @@ class Call(Placed):
     kind: Literal["call"]
     service: Topic
     type: ServiceType
-    request: dict[str, Any] = {}
+    request: dict[str, Any] = Field(default_factory=dict)
     interlock: Id | None = None
     timeout_s: Seconds = 5.0
     success: FieldPath | None = None
@@ -142,7 +82,7 @@ class Action(Placed):
     kind: Literal["action"]
     action: Topic
     type: ActionType
-    goal: dict[str, Any] = {}
+    goal: dict[str, Any] = Field(default_factory=dict)
     interlock: Id | None = None
     timeout_s: Seconds = 5.0
     progress: FieldPath | None = None
@@ -156,22 +96,21 @@ class Action(Placed):
         return self.goal
 
 
-class Readout(Placed):
-    kind: Literal["readout"]
-    topic: Topic
-    type: Type
-    field: FieldPath = "data"
-    max_age_s: Seconds | None = None
-
-
+Input = TextInput | NumberInput | SliderInput | SelectInput | ToggleInput
 Pressed = Publish | Call | Action
-Widget = Annotated[TextInput | Publish | Call | Action | Readout, Field(discriminator="kind")]
+Display = Readout | Indicator
+Widget = Annotated[Input | Publish | Call | Action | Display, Field(discriminator="kind")]
 KINDS: Final[Mapping[str, type[Placed]]] = {
     "text": TextInput,
+    "number": NumberInput,
+    "slider": SliderInput,
+    "select": SelectInput,
+    "toggle": ToggleInput,
     "publish": Publish,
     "call": Call,
     "action": Action,
     "readout": Readout,
+    "indicator": Indicator,
 }
 
 
@@ -187,14 +126,14 @@ class Panel(Description):
     language: Literal["en"] = "en"
     distro: Literal["humble", "iron", "jazzy", "kilted"] = "jazzy"
     interfaces: Annotated[tuple[Folder, ...], Field(strict=False)] = ()
-    namespace: Annotated[str, AfterValidator(_namespace)] = ""
+    namespace: Annotated[str, AfterValidator(namespace_of)] = ""
     mm_per_px: Annotated[float, Field(gt=0.02, lt=1)] = 0.22
     interlocks: Annotated[tuple[Interlock, ...], Field(strict=False)] = Field((), alias="interlock")
     pages: Annotated[tuple[Page, ...], Field(strict=False)] = Field(alias="page")
     # Of the file, not in it: changes when what a browser has loaded is out of date.
     revision: Annotated[str, Field(exclude=True)] = ""
 
-    def widgets(self) -> Iterator[TextInput | Publish | Call | Action | Readout]:
+    def widgets(self) -> Iterator[Input | Publish | Call | Action | Display]:
         for page in self.pages:
             yield from page.widgets
 
@@ -206,8 +145,12 @@ class Panel(Description):
 
     def subscriptions(self) -> dict[str, str]:
         """Topic → type of all that the panel listens to."""
-        listened = {i.topic: i.type for i in self.interlocks}
-        return listened | {w.topic: w.type for w in self.widgets() if isinstance(w, Readout)}
+        return {of.topic: of.type for of in self.listening()}
+
+    def listening(self) -> Iterator[Interlock | Display]:
+        """All that shows or judges what a topic says."""
+        yield from self.interlocks
+        yield from (w for w in self.widgets() if isinstance(w, Display))
 
     def actions(self) -> dict[str, str]:
         """Action → type of all that the panel may send goals to."""
@@ -216,3 +159,8 @@ class Panel(Description):
     def publications(self) -> dict[str, str]:
         """Topic → type of all that the panel publishes."""
         return {w.topic: w.type for w in self.widgets() if isinstance(w, Publish)}
+
+    def qos(self, topic: str) -> TopicQos:
+        """A topic's QoS, which is the same wherever the panel names it."""
+        speaking = (w for w in self.widgets() if isinstance(w, Publish))
+        return next(of.qos for of in (*self.listening(), *speaking) if of.topic == topic)

@@ -26,7 +26,29 @@ def filled(template: Any, inputs: Mapping[str, Any], where: str = "") -> Any:
     parts = _parts(template, where)
     if len(parts) == 1 and parts[0][0] == "" and parts[0][1] is not None:
         return inputs[parts[0][1]]
-    return "".join(text + ("" if name is None else str(inputs[name])) for text, name in parts)
+    return "".join(text + ("" if name is None else _text(inputs[name], where)) for text, name in parts)
+
+
+def at(template: Any, where: str) -> Any:
+    """What stands in a template at a field like "poses[0].x", or at the nearest one around it."""
+    found = template
+    for name, index in re.findall(r"([^.\[\]]+)|\[([0-9]+)\]", where):
+        if isinstance(found, Mapping) and name in found:
+            found = found[name]
+        elif isinstance(found, list) and index and int(index) < len(found):
+            found = found[int(index)]
+        else:
+            break
+    return found
+
+
+def _text(value: Any, where: str) -> str:
+    """A value among other text, as TOML writes it."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str | int | float):
+        return str(value)
+    raise FieldError(where, "a list or a table can't stand in a text: write the input's id alone")
 
 
 def named(template: Any, where: str = "") -> Iterator[tuple[str, str]]:

@@ -10,7 +10,7 @@ from fastapi.sse import EventSourceResponse
 
 from app.board import Board, beat
 from app.routes.site import CurrentSite, Site
-from app.views import clock
+from app.sentences import clock
 
 router = APIRouter()
 

@@ -8,11 +8,11 @@ from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse, Response
 
 from app.errors import NotFound
-from app.panel.model import Page, Panel, TextInput
+from app.panel.model import Input, Page, Panel
 from app.presses import Receipt
 from app.routes.site import CurrentSite, Site
-from app.sentences import say
-from app.views import View, clock
+from app.sentences import clock, say
+from app.views import View
 
 router = APIRouter(include_in_schema=True)
 
@@ -58,7 +58,7 @@ async def named_page(page: str, request: Request, site: CurrentSite) -> Response
 
 def _render(request: Request, site: Site, page: Page) -> Response:
     board = site.kiosk.board
-    typed = any(isinstance(widget, TextInput) for widget in page.widgets)
+    typed = any(isinstance(widget, Input) for widget in page.widgets)
     receipt = site.kiosk.presses.receipt(request.query_params.get("receipt", ""))
     context = PageContext(
         site=site,

@@ -78,7 +78,8 @@ async def press(widget: str, request: Request, site: CurrentSite) -> Response:
         if not re.fullmatch(PRESS_ID, page_id):
             raise InputError(f'_id: "{page_id:.40}" is not the id of a press')
         press_id = f"{page_id}.{widget}"
-        receipt = await site.kiosk.press(widget, inputs, press_id, who)
+        values = site.kiosk.presses.typed(inputs)
+        receipt = await site.kiosk.press(widget, values, press_id, who)
         _count(site, receipt)
         return RedirectResponse(_page_with(site, receipt), status_code=303)
     raise InputError(
@@ -131,9 +132,13 @@ def _form(body: bytes) -> dict[str, str]:
         )
     except ValueError as error:
         raise InputError(f"the body is not a form: {error}") from None
-    if len({name for name, _ in pairs}) < len(pairs):
-        raise InputError("a field is in the form twice")
-    return dict(pairs)
+    inputs: dict[str, str] = {}
+    for name, text in pairs:
+        # A toggle that is on comes after the hidden field that is there when it is off.
+        if name in inputs and (inputs[name], text) != ("false", "true"):
+            raise InputError("a field is in the form twice")
+        inputs[name] = text
+    return inputs
 
 
 def _page_with(site: Site, receipt: Receipt) -> str:

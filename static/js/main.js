@@ -19,6 +19,8 @@ const SHOW = {
     if (cancel) cancel.disabled = !value;
   },
   state: (root, value) => (root.dataset.state = value),
+  shape: (root, value) => (root.dataset.shape = value),
+  colour: (root, value) => (root.dataset.colour = value),
   outcome: (root, value) => (root.querySelector(".result").dataset.outcome = value),
   busy: (root, value) => {
     const bar = root.querySelector("progress");
@@ -69,12 +71,16 @@ function lockAll() {
     setText(lamp.querySelector("b"), server ? body.dataset.lostShort : body.dataset.unknown);
   }
   for (const root of widgets.values()) {
-    const buttons = root.querySelectorAll("button");
+    const buttons = root.querySelectorAll("button[type=submit]");
     for (const button of buttons) button.disabled = true;
     if (buttons.length) {
       setText(root.querySelector('[data-text="reason"]'), body.dataset.lost);
     } else if (root.dataset.state) {
       root.dataset.state = "old"; // its note still says from when it is
+      if (root.dataset.shape) {
+        Object.assign(root.dataset, { shape: "old", colour: "none" });
+        setText(root.querySelector('[data-text="text"]'), body.dataset.unknown);
+      }
     }
   }
 }
@@ -99,5 +105,6 @@ const source = new Source({
   lost: lockAll,
 });
 
+if (document.querySelector("[data-step]")) import("./inputs.js");
 new Presser(widgets, source, { unsure: body.dataset.unsure, lost: body.dataset.lost });
 source.start();

@@ -2,10 +2,18 @@
 const ANSWER_WITHIN_MS = 5000;
 // Two taps of a finger come within this time: the second one is the same press.
 const TAP_AGAIN_MS = 700;
+const ENTRIES = "input:not([type=hidden]), select";
 
 function newId() {
   const bytes = crypto.getRandomValues(new Uint8Array(16));
   return [...bytes].map((byte) => byte.toString(16).padStart(2, "0")).join("");
+}
+
+// With its type. What is no number (an empty field) goes as it is: the server says what is wrong.
+function valueOf(input) {
+  if (input.type === "checkbox") return input.checked;
+  const number = input.type === "number" || input.type === "range";
+  return number && input.value !== "" ? Number(input.value) : input.value;
 }
 
 export class Presser {
@@ -55,7 +63,7 @@ export class Presser {
   async #send(url, form, answerMs) {
     const inputs = {};
     for (const input of form.elements) {
-      if (input.closest("[data-widget]") && input.matches("input")) inputs[input.name] = input.value;
+      if (input.matches(ENTRIES) && input.closest("[data-widget]")) inputs[input.name] = valueOf(input);
     }
     const press = { inputs, id: newId(), seen: this.#source.seen, at: new Date().toISOString() };
     try {

@@ -1,0 +1,129 @@
+"""What readouts and lamps show: pure, from (widget, robot, time)."""
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any, Final, Literal
+
+from app.interlocks import misfit
+from app.panel.displays import Indicator, Readout
+from app.panel.inputs import same
+from app.robot import Robot, value_of
+from app.sentences import age, clock, say
+
+LONGEST_TEXT: Final = 200  # characters of a value that a readout shows
+NOTHING: Final = "—"
+
+State = Literal["waiting", "live", "old", "unreadable", "missing"]
+SHAPES: Final = {"waiting": "waiting", "old": "old", "unreadable": "unreadable", "missing": "waiting"}
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """What is known of a field: `value` and the `message` it is in, if there is one; `until`
+    (monotonic seconds) is when time alone changes it."""
+
+    state: State
+    note: str
+    message: Any = None
+    value: Any = None
+    until: float = math.inf
+
+
+def look(widget: Readout | Indicator, robot: Robot, now: float) -> Look:
+    """What is known of a widget's field at `now`."""
+    topic = widget.topic
+    if doubt := misfit("MS", widget, robot):
+        return Look("unreadable", doubt.reason or "")
+    if robot.graph.unheard(robot.key(topic)):
+        return Look("unreadable", say("unheard", topic=topic))
+    reading = robot.reading(topic)
+    if reading.status == "unreadable":
+        return Look("unreadable", say("readout_unreadable", topic=topic, wanted=widget.type))
+    if reading.message is None:
+        return Look("waiting", say("readout_waiting", topic=topic))
+    time = clock(reading.wall)
+    value = value_of(reading.message, widget.field)
+    if value is None:
+        return Look("missing", say("readout_missing", field=widget.field, time=time))
+    seen = Look("live", say("readout_time", time=time), reading.message, value)
+    if reading.status == "cut":
+        return replace(seen, state="old", note=say("readout_cut", time=time))
+    if widget.max_age_s is None:
+        return seen
+    old = now - reading.at
+    if old < widget.max_age_s:
+        return replace(seen, until=reading.at + widget.max_age_s)
+    step = 1 if old < 60 else 60
+    until = reading.at + (old // step + 1) * step
+    return replace(seen, state="old", note=say("readout_old", age=age(old)), until=until)
+
+
+def readout(widget: Readout, robot: Robot, now: float) -> tuple[dict[str, Any], float]:
+    """Attributes of a readout: `state`, `text` and `note`; and when they change."""
+    seen = look(widget, robot, now)
+    text = NOTHING if seen.value is None else _value(widget, seen)
+    return {"state": seen.state, "text": text, "note": seen.note}, seen.until
+
+
+def indicator(widget: Indicator, robot: Robot, now: float) -> tuple[dict[str, Any], float]:
+    """Attributes of a lamp: `state`, `text`, `shape`, `colour` and `note`; and when they change.
+
+    What is not known now has a shape and a text of its own, and never a colour.
+    """
+    seen = look(widget, robot, now)
+    text, shape, colour = _lamp(widget, seen.value)
+    note = seen.note
+    if seen.state != "live":
+        if seen.state == "old":
+            note = say("lamp_was", text=text, note=note)
+        text, shape, colour = say(f"lamp_{seen.state}"), SHAPES[seen.state], "none"
+    shown = {"state": seen.state, "text": text, "shape": shape, "colour": colour, "note": note}
+    return shown, seen.until
+
+
+def _lamp(widget: Indicator, value: Any) -> tuple[str, str, str]:
+    for state in widget.states:
+        if same(state.value, value):
+            return state.text, state.shape, state.colour
+    return say("lamp_unknown", value=written(value)), "unknown", "none"
+
+
+def _value(widget: Readout, seen: Look) -> str:
+    if widget.constants is not None:
+        return _constant(widget.field, widget.constants, seen)
+    value = seen.value
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return written(value)
+    if (widget.scale, widget.offset) != (1.0, 0.0):
+        value = value * widget.scale + widget.offset
+    text = written(value)
+    if widget.format is not None and math.isfinite(value):
+        text = format(value, widget.format)
+    return f"{text} {widget.unit}" if widget.unit else text
+
+
+def _constant(field: str, prefix: str, seen: Look) -> str:
+    """The name of the constant that a value is; a message's constants are on its class."""
+    around, _, _ = field.rpartition(".")
+    holder = type(value_of(seen.message, around) if around else seen.message)
+    for name, value in vars(holder).items():
+        if name.startswith(prefix) and same(value, seen.value):
+            return str(name)
+    return written(seen.value)
+
+
+def written(value: Any) -> str:
+    """A field's value as text, cut to what a readout can show; None is a value that is not there."""
+    if value is None:
+        return NOTHING
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    text = _number(value) if isinstance(value, float) else str(value)
+    return text if len(text) <= LONGEST_TEXT else text[: LONGEST_TEXT - 1] + "…"
+
+
+def _number(value: float) -> str:
+    """Six digits where they are enough: a float32's 0.1 is not 0.10000000149011612."""
+    if not math.isfinite(value):
+        return "NaN" if math.isnan(value) else "Infinity" if value > 0 else "-Infinity"
+    return f"{value:.6g}" if 1e-4 <= abs(value) < 1e6 else repr(value)

@@ -1,0 +1,105 @@
+"""What can be wrong in a readout or an indicator: its field, its format, its states."""
+
+import re
+from collections.abc import Iterator
+from typing import Final
+
+from app.errors import Fault, InterfaceError
+from app.interfaces import INTEGERS, Interfaces
+from app.panel.displays import Indicator, Readout
+from app.panel.model import Display, Interlock
+
+NUMBERS: Final = frozenset({*INTEGERS, "float32", "float64"})
+SHAPE_AND_TEXT: Final = "only the colour would tell them apart"
+
+
+def field_faults(place: str, of: Interlock | Display, interfaces: Interfaces) -> Iterator[Fault]:
+    """A type that is not there, a field that it does not have."""
+    try:
+        interfaces.require(of.type)
+    except InterfaceError as error:
+        yield Fault(f"{place}.type", str(error))
+        return
+    try:
+        interfaces.field_type(of.type, of.field)
+    except InterfaceError as error:
+        yield Fault(f"{place}.field", str(error))
+
+
+def display_faults(place: str, of: Display, interfaces: Interfaces) -> Iterator[Fault]:
+    faults = list(field_faults(place, of, interfaces))
+    yield from faults
+    if faults:
+        return
+    kind = interfaces.field_type(of.type, of.field)
+    if re.search(r"[/\]]", kind):
+        who = "a readout" if isinstance(of, Readout) else "an indicator"
+        yield Fault(f"{place}.field", f'"{of.field}" is {kind}: {who} shows one value of it, not all')
+    elif isinstance(of, Readout):
+        yield from _number(place, of, kind)
+        yield from _constants(place, of, interfaces)
+    else:
+        yield from _states(place, of, kind)
+
+
+def _number(place: str, of: Readout, kind: str) -> Iterator[Fault]:
+    scaled = (of.scale, of.offset) != (1.0, 0.0)
+    for key, given in (("format", of.format), ("scale", scaled), ("unit", of.unit)):
+        if given and kind not in NUMBERS:
+            yield Fault(f"{place}.{key}", f'is for numbers; "{of.field}" is {kind}')
+        elif given and of.constants is not None:
+            yield Fault(f"{place}.{key}", "is for numbers; constants are shown by their names")
+    if of.format and of.format.endswith("d") and kind in NUMBERS and (scaled or kind not in INTEGERS):
+        what = "a scaled number" if scaled else kind
+        yield Fault(f"{place}.format", f'"{of.format}" is for whole numbers; this is {what}')
+
+
+def _constants(place: str, of: Readout, interfaces: Interfaces) -> Iterator[Fault]:
+    if of.constants is None:
+        return
+    around, _, _ = of.field.rpartition(".")
+    type_name = interfaces.field_type(of.type, around) if around else of.type
+    names = interfaces.constants(type_name)
+    found = {name: value for name, value in names.items() if name.startswith(of.constants)}
+    if not found:
+        has = ", ".join(names) or "none"
+        yield Fault(f"{place}.constants", f"no constant of {type_name} starts so; it has {has}")
+    for name, value in found.items():
+        first = next(other for other, its in found.items() if its == value)
+        if first != name:
+            what = f"{first} and {name} are both {value}: a longer prefix tells them apart"
+            yield Fault(f"{place}.constants", what)
+            return
+
+
+def _states(place: str, of: Indicator, kind: str) -> Iterator[Fault]:
+    if kind in ("float32", "float64"):
+        what = "an indicator is for whole numbers, bools and texts"
+        yield Fault(f"{place}.field", f'"{of.field}" is {kind}: {what}')
+        return
+    looks = [(state.shape, state.text) for state in of.states]
+    values = [(type(state.value), state.value) for state in of.states]
+    for i, state in enumerate(of.states):
+        at = f"{place}.states[{i}]"
+        if fault := _misfit(state.value, kind):
+            yield Fault(f"{at}.value", fault)
+            continue
+        if values[i] in values[:i]:
+            first = values.index(values[i])
+            yield Fault(f"{at}.value", f"{state.value!r} is already the value of states[{first}]")
+        if looks[i] in looks[:i]:
+            first = looks.index(looks[i])
+            yield Fault(at, f"has the shape and text of states[{first}]: {SHAPE_AND_TEXT}")
+
+
+def _misfit(value: bool | int | str, kind: str) -> str | None:
+    """Why a field of this type never has this value."""
+    if kind == "bool":
+        return None if isinstance(value, bool) else f"must be true or false (bool), not {value!r}"
+    if kind in INTEGERS:
+        low, high = INTEGERS[kind]
+        if isinstance(value, bool) or not isinstance(value, int):
+            return f"must be a whole number ({kind}), not {value!r}"
+        inside = low <= value <= high
+        return None if inside else f"{value} is out of range: {kind} goes from {low} to {high}"
+    return None if isinstance(value, str) else f"must be text ({kind}), not {value!r}"

@@ -1,0 +1,98 @@
+"""What descriptions are made of: checked names, what every widget has, a topic's QoS."""
+
+from pathlib import Path
+from typing import Annotated, Any, Final, Literal
+
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo
+
+from app.keys import ACTION_TYPE, MESSAGE_TYPE, NAMESPACE, SERVICE_TYPE, TOPIC, Qos
+
+
+def _topic(given: str) -> str:
+    if not TOPIC.fullmatch(given) or "__" in given:
+        raise ValueError(
+            f'"{given}" is not an absolute ROS 2 topic name: it starts with "/", and each part is '
+            'letters, digits and single "_", and starts with no digit'
+        )
+    return given
+
+
+def _type(given: str) -> str:
+    if not MESSAGE_TYPE.fullmatch(given):
+        raise ValueError(f'"{given}" is not a ROS 2 message type: it must be like std_msgs/msg/Bool')
+    return given
+
+
+def _service(given: str) -> str:
+    if not SERVICE_TYPE.fullmatch(given):
+        raise ValueError(f'"{given}" is not a ROS 2 service type: it must be like std_srvs/srv/SetBool')
+    return given
+
+
+def _action(given: str) -> str:
+    if not ACTION_TYPE.fullmatch(given):
+        raise ValueError(
+            f'"{given}" is not a ROS 2 action type: it must be like nav2_msgs/action/NavigateToPose'
+        )
+    return given
+
+
+def namespace_of(given: str) -> str:
+    whole = f"/{given.strip('/')}" if given.strip("/") else ""
+    if not NAMESPACE.fullmatch(whole) or "__" in whole:
+        raise ValueError(f'"{given}" is not a ROS 2 namespace: it must be like /robot1')
+    return whole
+
+
+def _folder(given: Any, info: ValidationInfo) -> Path:
+    """Relative to the panel file's folder, which is the context of the validation."""
+    if not isinstance(given, str) or not given:
+        raise ValueError(f"must be the path of a folder, not {given!r}")
+    folder = Path(info.context or "") / given
+    if not folder.is_dir():
+        raise ValueError(f"{folder} is not a folder: it must be a ROS package or have some in it")
+    return folder
+
+
+def some(given: tuple[Any, ...]) -> tuple[Any, ...]:
+    """A list of tables that can't be empty."""
+    if not given:
+        raise ValueError("is empty: it must have one table at least")
+    return given
+
+
+ID: Final = r"^[a-z][a-z0-9_]{0,63}$"
+Id = Annotated[str, Field(pattern=ID)]
+Label = Annotated[str, Field(min_length=1, max_length=120)]
+Topic = Annotated[str, AfterValidator(_topic), Field(max_length=255)]
+Type = Annotated[str, AfterValidator(_type)]
+ServiceType = Annotated[str, AfterValidator(_service)]
+ActionType = Annotated[str, AfterValidator(_action)]
+_STEP: Final = r"[a-z][a-z0-9_]*(\[[0-9]{1,9}\])*"
+FieldPath = Annotated[str, Field(pattern=rf"^{_STEP}(\.{_STEP})*$")]
+Folder = Annotated[Path, BeforeValidator(_folder)]
+Seconds = Annotated[float, Field(gt=0, le=86400, allow_inf_nan=False)]
+
+
+class Description(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+class Placed(Description):
+    """What every widget has; `span` is its width in twelfths of the page."""
+
+    id: Id
+    label: Label
+    span: Annotated[int, Field(ge=1, le=12)] = 12
+
+
+class TopicQos(Description):
+    """A topic's QoS; no durability means volatile to publish, and the publisher's to listen."""
+
+    reliability: Literal["reliable", "best_effort"] = "reliable"
+    durability: Literal["volatile", "transient_local"] | None = None
+    depth: Annotated[int, Field(ge=1, le=10_000)] = 10
+
+    @property
+    def on_wire(self) -> Qos:
+        return Qos(self.reliability == "reliable", self.durability == "transient_local", self.depth)

@@ -1,0 +1,132 @@
+"""Descriptions of inputs: what an operator enters, and what a message takes by an input's id."""
+
+import json
+from typing import Annotated, Any, Final, Literal
+
+from pydantic import AfterValidator, Field
+
+from app.panel.description import Description, Label, Placed, some
+from app.sentences import say
+
+MOST: Final = 2.0**53  # beyond this a browser's numbers are not exact
+
+Number = Annotated[float, Field(ge=-MOST, le=MOST)]
+Unit = Annotated[str, Field(max_length=20)]
+
+
+class TextInput(Placed):
+    kind: Literal["text"]
+    max_length: Annotated[int, Field(ge=1, le=1000)] = 80
+    default: Annotated[str, Field(pattern=r"^[^\x00]*$")] = ""
+
+    @property
+    def gives(self) -> str:
+        return "text"
+
+
+class Numeric(Placed):
+    """A number with limits; whole numbers, if its lowest and its step are whole."""
+
+    min: Number
+    max: Number
+    step: Annotated[Number, Field(gt=0)] = 1.0
+    unit: Unit = ""
+    default: Number | None = None
+
+    @property
+    def whole(self) -> bool:
+        return self.min.is_integer() and self.step.is_integer()
+
+    @property
+    def gives(self) -> str:
+        return "whole numbers" if self.whole else "numbers"
+
+    @property
+    def attributes(self) -> dict[str, str]:
+        """Limits and step as HTML has them."""
+        return {"min": digits(self.min), "max": digits(self.max), "step": digits(self.step)}
+
+    @property
+    def less(self) -> str:
+        return say("less", label=self.label)
+
+    @property
+    def more(self) -> str:
+        return say("more", label=self.label)
+
+    def typed(self, value: float) -> int | float:
+        """A value of this input, as a message takes it."""
+        return int(value) if self.whole else value
+
+
+class NumberInput(Numeric):
+    kind: Literal["number"]
+
+    @property
+    def start(self) -> str:
+        return "" if self.default is None else digits(self.default)
+
+
+class SliderInput(Numeric):
+    kind: Literal["slider"]
+
+    @property
+    def start(self) -> str:
+        return digits(self.min if self.default is None else self.default)
+
+
+def _plain(given: Any) -> Any:
+    """An option's value; what it has inside is as TOML has it, but no dates."""
+    try:
+        json.dumps(given)
+    except TypeError:
+        raise ValueError("must be text, a number, true or false, a list or a table") from None
+    return given
+
+
+class Option(Description):
+    """What can be chosen; `key` is its value as a form posts it."""
+
+    value: Annotated[Any, AfterValidator(_plain)]
+    label: Label
+
+    @property
+    def key(self) -> str:
+        return self.value if isinstance(self.value, str) else json.dumps(self.value)
+
+
+class SelectInput(Placed):
+    kind: Literal["select"]
+    options: Annotated[tuple[Option, ...], Field(strict=False), AfterValidator(some)]
+    default: Any = None
+
+    @property
+    def start(self) -> str:
+        """The key of the option that is chosen at first."""
+        first = (option for option in self.options if same(option.value, self.default))
+        return next(first, self.options[0]).key
+
+    @property
+    def gives(self) -> str:
+        return "the values of its options"
+
+
+class ToggleInput(Placed):
+    kind: Literal["toggle"]
+    on: Label = say("on")
+    off: Label = say("off")
+    default: bool = False
+
+    @property
+    def gives(self) -> str:
+        return "true or false"
+
+
+def digits(number: float) -> str:
+    """A number as it is written and as HTML has it: "5", "0.25", "1e-07"."""
+    return str(int(number)) if number.is_integer() else repr(number)
+
+
+def same(one: Any, other: Any) -> bool:
+    """Whether two values are one, as TOML and JSON see it: 1 is 1.0, but not true."""
+    return one == other and isinstance(one, bool) == isinstance(other, bool)
