@@ -143,6 +143,14 @@ class Presses:
             return await asyncio.shield(known.receipt)
         return known
 
+    def refuse(self, widget_id: str, inputs: Mapping[str, Any], press_id: str, code: str) -> Receipt:
+        """A press that can't be judged by what its browser had seen, for the reason of this code."""
+        text = say("refused", why=say(code), time=clock(time.time()))
+        receipt = self._receipt(self.widget(widget_id), inputs, press_id, "refused", text, "interlock")
+        self._keep(receipt)
+        log.warning("press %s of %s: %s", press_id, widget_id, text)
+        return receipt
+
     async def cancel(self, widget_id: str, who: str) -> Receipt:
         """Asks the robot to cancel the goal of an action widget."""
         widget = self.widget(widget_id)

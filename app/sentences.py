@@ -55,6 +55,7 @@ ENGLISH: Final[Mapping[str, str]] = {
     "cancel_sent": "The robot was asked to cancel at {time}.",
     "cancel_refused": "The robot did not cancel it at {time}.",
     "nothing_to_cancel": "there is nothing under way to cancel",
+    "seen_before_restart": "the panel's server was started anew since the page showed this.",
     # What a readout shows beside or instead of a value.
     "readout_waiting": "waiting for {topic}",
     "readout_cut": "from before the connection was cut, received {time}",

@@ -68,7 +68,11 @@ async def press(widget: str, request: Request, site: CurrentSite) -> Response:
     if kind == "application/json":
         given = _json(body)
         press_id = given.id or secrets.token_hex(8)
-        receipt = await site.kiosk.press(widget, given.inputs, press_id, who)
+        if given.seen and given.seen.partition("-")[0] != site.kiosk.board.boot:
+            code = "seen_before_restart"
+            receipt = site.kiosk.presses.refuse(widget, given.inputs, press_id, code)
+        else:
+            receipt = await site.kiosk.press(widget, given.inputs, press_id, who)
         _count(site, receipt)
         return JSONResponse(receipt.as_json(), status_code=STATUS[receipt.cause])
     if kind == "application/x-www-form-urlencoded":
