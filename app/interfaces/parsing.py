@@ -5,7 +5,7 @@ Source: the ROS 2 interface definition language (design.ros2.org, "legacy_interf
 
 import re
 from pathlib import Path
-from typing import Any, Final, NoReturn
+from typing import Any, Final, Literal, NoReturn
 
 from app.errors import InterfaceError
 from app.interfaces.composition import composed_action, composed_service
@@ -115,8 +115,10 @@ def _type(text: str, package: str) -> Type:
         _fail(f'"{text}": a list has 1 element at least')
     if match["most"] and not size:
         _fail(f'"{text}": after "<=" stands how many at most')
-    many = "one" if size is None else "array" if size and not match["most"] else "sequence"
-    return Type(name, int(bound or 0), many, int(size or 0))  # type: ignore[arg-type]
+    many: Literal["one", "array", "sequence"] = "sequence"
+    if size is None or (size and not match["most"]):
+        many = "one" if size is None else "array"
+    return Type(name, int(bound or 0), many, int(size or 0))
 
 
 def _full_name(name: str, package: str) -> str:
