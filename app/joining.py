@@ -117,21 +117,25 @@ class Joining:
     async def _join(self) -> None:
         found = time.monotonic() - self._started_at < FOUND_WITHIN_S
         await asyncio.sleep(FOUND_S if found else FRESH_S)
+        await self._ask_until_answered()
+        self._hold()
+        await asyncio.sleep(SETTLE_S)
+        await self._ask_until_answered()
+        self._robot.settled_at = time.monotonic()
+        log.info("joined the robot's topics")
+        self._show()
+
+    async def _ask_until_answered(self) -> None:
+        """What the bridges do not tell is a doubt: nothing is joined on it."""
         while True:
             try:
                 await self._ask()
                 if self._missed == 0:
-                    break
+                    return
             except LinkError as error:
                 log.warning("%s", error)
             self._show()
             await asyncio.sleep(ASK_AGAIN_S)
-        self._hold()
-        await asyncio.sleep(SETTLE_S)
-        await self._ask()
-        self._robot.settled_at = time.monotonic()
-        log.info("joined the robot's topics")
-        self._show()
 
     def _tokens(self) -> list[str]:
         """The tokens of all topics, but for those whose type is another one on the robot."""

@@ -145,6 +145,8 @@ class Presses:
 
     def refuse(self, widget_id: str, inputs: Mapping[str, Any], press_id: str, code: str) -> Receipt:
         """A press that can't be judged by what its browser had seen, for the reason of this code."""
+        if known := self._receipts.get(press_id):
+            return known
         text = say("refused", why=say(code), time=clock(time.time()))
         receipt = self._receipt(self.widget(widget_id), inputs, press_id, "refused", text, "interlock")
         self._keep(receipt)

@@ -4,7 +4,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from tests.parts import Bridge, RosNode, Server, Stream, live, until
+from tests.parts import ROOT, Bridge, RosNode, Server, Stream, live, until
 
 ENABLED = "operation-enabled-updated"
 FREEZES = 5
@@ -14,6 +14,14 @@ def speaking(node: RosNode, value: bool = True) -> None:
     """The robot tells its permission once, so that it is kept for who comes later."""
     node.advertise("/operation_enabled", "std_msgs/msg/Bool", durability="transient_local", depth=1)
     node.publish("/operation_enabled", {"data": value})
+
+
+def strict(bridge: Bridge, folder: Path, condition: str) -> Server:
+    """A kiosk whose interlock has one more condition."""
+    panel = folder / "panel.toml"
+    shipped = (ROOT / "app/panel.toml").read_text()
+    panel.write_text(shipped.replace('field = "data"', f'field = "data"\n{condition}', 1))
+    return live(bridge.endpoint, folder, KIOSK_PANEL=str(panel))
 
 
 def permitted(kiosk: Server) -> bool:
@@ -135,10 +143,7 @@ def test_it_starts_without_a_bridge_and_keeps_trying(
 def test_a_required_publisher_that_goes_away_locks(
     own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:
-    panel = tmp_path / "panel.toml"
-    shipped = Path("app/panel.toml").read_text()
-    panel.write_text(shipped.replace('field = "data"', 'field = "data"\nrequire_publisher = true', 1))
-    kiosk = servers(live(own_bridge.endpoint, tmp_path, KIOSK_PANEL=str(panel)))
+    kiosk = servers(strict(own_bridge, tmp_path, "require_publisher = true"))
     speaking(own_node)
     opened(kiosk)
     own_node.withdraw("/operation_enabled")
@@ -149,10 +154,7 @@ def test_a_required_publisher_that_goes_away_locks(
 def test_a_value_that_grows_old_locks_and_a_fresh_one_opens(
     own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:
-    panel = tmp_path / "panel.toml"
-    shipped = Path("app/panel.toml").read_text()
-    panel.write_text(shipped.replace('field = "data"', 'field = "data"\nmax_age_s = 0.5', 1))
-    kiosk = servers(live(own_bridge.endpoint, tmp_path, KIOSK_PANEL=str(panel)))
+    kiosk = servers(strict(own_bridge, tmp_path, "max_age_s = 0.5"))
     own_node.advertise("/operation_enabled", "std_msgs/msg/Bool")
     own_node.every("/operation_enabled", {"data": True}, 0.1)
     opened(kiosk)
@@ -189,10 +191,7 @@ def test_what_the_robot_says_counts_after_each_of_many_freezes(
 def test_a_successor_of_a_required_publisher_has_to_say_it_again(
     own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:
-    panel = tmp_path / "panel.toml"
-    shipped = Path("app/panel.toml").read_text()
-    panel.write_text(shipped.replace('field = "data"', 'field = "data"\nrequire_publisher = true', 1))
-    kiosk = servers(live(own_bridge.endpoint, tmp_path, KIOSK_PANEL=str(panel)))
+    kiosk = servers(strict(own_bridge, tmp_path, "require_publisher = true"))
     own_node.advertise("/operation_enabled", "std_msgs/msg/Bool")
     until(lambda: "waiting for /operation" in kiosk.widget("operation1")["reason"], "its token is seen")
     until(lambda: own_node.subscribers("/operation_enabled"), "the bridge listens")
@@ -207,11 +206,8 @@ def test_a_successor_of_a_required_publisher_has_to_say_it_again(
 def test_an_old_latched_value_is_no_fresh_one(
     own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:
-    panel = tmp_path / "panel.toml"
-    shipped = Path("app/panel.toml").read_text()
-    panel.write_text(shipped.replace('field = "data"', 'field = "data"\nmax_age_s = 30', 1))
     speaking(own_node)
-    kiosk = servers(live(own_bridge.endpoint, tmp_path, KIOSK_PANEL=str(panel)))
+    kiosk = servers(strict(own_bridge, tmp_path, "max_age_s = 30"))
     until(kiosk.ready, "ready")
     with kiosk.stream() as stream:
         for _ in range(4):  # two seconds of beats: the latched value has come, and does not count

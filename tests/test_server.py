@@ -101,7 +101,9 @@ def test_the_same_id_is_the_same_press(demo: Server) -> None:
 
 
 def test_what_was_seen_before_a_restart_does_not_count(demo: Server) -> None:
-    refused = demo.press("operation", "from an old page", seen="deadbeef-7")
+    refused = demo.press("operation", "from an old page", seen="deadbeef-7", id="old-page")
+    again = demo.press("operation", "from an old page", seen="deadbeef-7", id="old-page")
+    assert again.json() == refused.json()
     assert (refused.status_code, refused.json()["outcome"]) == (409, "refused")
     assert "started anew" in refused.json()["reason"]
     assert demo.press("operation", "x", seen=demo.snapshot()["id"]).status_code == 200
