@@ -205,8 +205,9 @@ class Joining:
             if self._joined:
                 try:
                     await self._ask()
-                    self._hold()
-                    self._heal()
+                    if self._joined:  # still
+                        self._hold()
+                        self._heal()
                 except LinkError as error:
                     log.warning("%s", error)
                 self._show()

@@ -88,6 +88,7 @@ class Link:
         self._session_number = 0
         self._subscribe: tuple[str, ...] = ()
         self._publish: tuple[str, ...] = ()
+        self._held: dict[str, zenoh.LivelinessToken] | None = {}  # None: between two sessions
         self._forget()
         self._open()
 
@@ -97,7 +98,6 @@ class Link:
         self._stamps: dict[str, zenoh.Timestamp] = {}
         self._tokens: dict[str, Token] = {}
         self._transports: set[str] = set()
-        self._held: dict[str, zenoh.LivelinessToken] = {}
 
     def _open(self) -> None:
         with _translated("the Zenoh session can't be opened"):
@@ -117,13 +117,16 @@ class Link:
         would show the kiosk as a subscriber and read nothing for it. And a subscriber drops what
         it has seen before, also when what it saw was cut off in between.
         """
+        held, self._held = self._held, None
         with self._lock:
             self._session_number += 1
             self._forget()
         with suppress(LinkError):
             self.close()
+        del held  # a token ends with its object: never under the lock, where Zenoh may call back
         self._open()
         self._declare()
+        self._held = {}
 
     def _declare(self) -> None:
         with _translated("the Zenoh session can't be used"):
@@ -168,12 +171,14 @@ class Link:
 
     def hold(self, tokens: Iterable[str]) -> None:
         """Holds exactly these liveliness tokens from now on."""
-        wanted = set(tokens)
+        wanted, held = set(tokens), self._held
+        if held is None:
+            return  # the new session is not joined yet
         with _translated("can't join the ROS graph"):
-            for token in self._held.keys() - wanted:
-                self._held.pop(token).undeclare()
-            for token in wanted - self._held.keys():
-                self._held[token] = self._session.liveliness().declare_token(token)
+            for token in held.keys() - wanted:
+                held.pop(token).undeclare()
+            for token in wanted - held.keys():
+                held[token] = self._session.liveliness().declare_token(token)
 
     def put(self, key: str, payload: bytes) -> None:
         """Sends at once or not at all: nothing is kept for later. LinkError if Zenoh refuses."""

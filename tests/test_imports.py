@@ -78,12 +78,13 @@ def name_of(path: Path) -> str:
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
-MODULES = {name_of(path): path for path in sorted(PACKAGE.rglob("*.py"))}
+# Parsed before any test has threads: with threads Python 3.11.7 may fail to (gh-106905).
+MODULES = {name_of(path): ast.parse(path.read_text()) for path in sorted(PACKAGE.rglob("*.py"))}
 
 
 def imported(module: str) -> Iterator[str]:
     """Every module that a module names in an `import`, wherever it stands."""
-    for node in ast.walk(ast.parse(MODULES[module].read_text())):
+    for node in ast.walk(MODULES[module]):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):

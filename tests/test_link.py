@@ -1,0 +1,83 @@
+"""The link alone, between two Zenoh sessions of this process."""
+
+import threading
+from collections.abc import Iterator
+
+import pytest
+import zenoh
+
+from app import keys
+from app.keys import Qos
+from app.link import Link, config_to
+from tests.parts import free_port, until
+
+RENEWALS = 30
+
+
+@pytest.fixture
+def peer() -> Iterator[tuple[str, zenoh.Session]]:
+    """An endpoint and the session that listens there."""
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    config = zenoh.Config()
+    config.insert_json5("listen/endpoints", f'["{endpoint}"]')
+    config.insert_json5("scouting/multicast/enabled", "false")
+    with zenoh.open(config) as session:
+        yield endpoint, session
+
+
+def tokens(zid: str, count: int) -> list[str]:
+    return [
+        keys.token(zid, "MP", f"topic{n}", "std_msgs/msg/String", Qos(), "") for n in range(count)
+    ]
+
+
+def test_a_session_is_renewed_in_the_middle_of_what_comes_in(
+    peer: tuple[str, zenoh.Session],
+) -> None:
+    """A token that ended under the link's lock, while Zenoh called back, stopped the process."""
+    endpoint, session = peer
+    over = threading.Event()
+
+    def flood() -> None:
+        while not over.is_set():
+            held = [session.liveliness().declare_token(t) for t in tokens(str(session.zid()), 20)]
+            for token in held:
+                token.undeclare()
+
+    link = Link(config_to(endpoint), lambda: None)
+    link.start(["a"], ["b"])
+
+    def renew() -> None:
+        for _ in range(RENEWALS):
+            link.hold(tokens(link.zid, 10))
+            link.renew()
+            link.drain()
+
+    threads = [threading.Thread(target=work, daemon=True) for work in (flood, renew)]
+    for thread in threads:
+        thread.start()
+    threads[1].join(30)
+    stuck = threads[1].is_alive()
+    over.set()
+    assert not stuck, "renewing the session stands still"
+    threads[0].join(5)
+    link.close()
+
+
+def test_tokens_are_held_by_the_new_session_when_they_are_wanted_again(
+    peer: tuple[str, zenoh.Session],
+) -> None:
+    endpoint, session = peer
+    link = Link(config_to(endpoint), lambda: None)
+    link.start([], [])
+    link.hold(tokens(link.zid, 1))
+    link.renew()
+    wanted = tokens(link.zid, 2)
+    link.hold(wanted)
+
+    def found() -> set[str]:
+        replies = session.liveliness().get(keys.TOKENS, timeout=1)
+        return {str(reply.ok.key_expr) for reply in replies if reply.ok is not None}
+
+    until(lambda: found() == set(wanted), "the tokens of the new session are there")
+    link.close()
