@@ -96,6 +96,8 @@ class Board:
             events.append(self._event("link", new["link"]))
         if old["notice"] != new["notice"]:
             events.append(self._event("notice", new["notice"]))
+        if old["robots"] != new["robots"]:
+            events.append(self._event("robots", new["robots"]))
         return b"".join(events)
 
     def _event(self, name: str, data: Mapping[str, Any]) -> bytes:

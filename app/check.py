@@ -25,7 +25,8 @@ def main(arguments: list[str]) -> int:
         print(error, file=sys.stderr)
         return 2
     count = sum(1 for _ in panel.widgets())
-    print(f'{path}: good: "{panel.title}", {len(panel.pages)} page(s), {count} widget(s)')
+    robots = f"{len(panel.robots)} robot(s), " if panel.robots else ""
+    print(f'{path}: good: "{panel.title}", {robots}{len(panel.pages)} page(s), {count} widget(s)')
     return 0
 
 

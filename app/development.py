@@ -13,7 +13,7 @@ from pathlib import Path
 
 from app.assets import Assets
 from app.errors import KioskError, PanelError
-from app.kiosk import Kiosk
+from app.fleet import Fleet
 from app.panel import Panel, load_panel
 from app.routes.site import Site
 from app.settings import Settings, shipped
@@ -26,7 +26,7 @@ EMPTY_PANEL = Panel.model_validate(
 
 SUFFIXES = (".html", ".css", ".js", ".msg", ".srv", ".action")
 
-Running = Callable[[Settings, Panel], AbstractAsyncContextManager[tuple[Kiosk, Assets]]]
+Running = Callable[[Settings, Panel], AbstractAsyncContextManager[tuple[Fleet, Assets]]]
 
 
 @asynccontextmanager
@@ -69,16 +69,16 @@ class _Reloader:
         try:
             panel = load_panel(self._settings.panel)
             opened = AsyncExitStack()
-            kiosk, assets = await opened.enter_async_context(self._running(self._settings, panel))
+            fleet, assets = await opened.enter_async_context(self._running(self._settings, panel))
         except PanelError as error:
             log.error("%s", error)
-            self._site.kiosk.show_fault(str(error))
+            self._site.fleet.show_fault(str(error))
         except (KioskError, OSError) as error:
             log.error("the change was not taken: %s", error)
-            self._site.kiosk.show_fault(str(error))
+            self._site.fleet.show_fault(str(error))
         else:
             old, self.opened = self.opened, opened
-            self._site.kiosk, self._site.assets = kiosk, assets
-            self._site.metrics.follow(kiosk)
+            self._site.fleet, self._site.assets = fleet, assets
+            self._site.metrics.follow(fleet)
             await old.aclose()
             log.info("took the change")

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from itertools import chain
 
-from app.keys import DEMO_VERSION, Direction, Endpoint, Qos, Role, ServerRole, TopicRole, parsed
+from app.keys import DEMO_VERSION, Direction, Endpoint, Qos, Role, ServerRole, TopicRole, parsed, within
 
 # Whose type must equal the panel's, for what the panel does with a topic. A route of the bridge
 # has one type for all: who created it first has fixed it, be it the robot or another panel.
@@ -33,9 +33,12 @@ class Graph:
     """The ROS graph behind all bridges; changed by `apply`, `learn` and `answered` only, on the
     event loop."""
 
-    def __init__(self, own_zid: str = "") -> None:
+    def __init__(self, own_zid: str = "", namespace: str | None = None) -> None:
+        """`namespace` tells this robot's bridges from those of others; None: all are its."""
         self.own_zid = own_zid  # whose tokens are not the robot's
+        self._namespace = namespace
         self._bridges: set[str] = set()
+        self._fits: dict[str, bool] = {}  # whether a bridge's namespace is the robot's
         self._tokens: defaultdict[str, dict[str, Endpoint]] = defaultdict(dict)
         self._routes: defaultdict[str, list[Route]] = defaultdict(list)
         self._nodes: defaultdict[str, list[Endpoint]] = defaultdict(list)
@@ -60,6 +63,7 @@ class Graph:
             self._answered = None  # it was not asked yet
         else:
             self._bridges.discard(zid)
+            self._fits.pop(zid, None)
         return zid
 
     def learn(self, routes: Iterable[Route], nodes: Iterable[Endpoint] = ()) -> None:
@@ -76,21 +80,28 @@ class Graph:
         """Takes which bridges answered when they were asked, and with which version."""
         self._answered = versions
 
+    def configured(self, namespaces: Mapping[str, str]) -> None:
+        """Takes the namespace of each bridge that told it ("" for none)."""
+        for zid, namespace in namespaces.items():
+            self._fits[zid] = self._namespace is None or within(self._namespace, namespace)
+
     @property
     def bridges(self) -> frozenset[str]:
-        return frozenset(self._bridges)
+        """Those of this robot; one that has not told its namespace may be, if no other is."""
+        told = {zid for zid in self._bridges if self._fits.get(zid)}
+        return frozenset(told or self._bridges - self._fits.keys())
 
     @property
     def silent(self) -> bool:
         """A bridge is there by its token, but did not answer when all were asked."""
         asked = self._answered
-        return asked is not None and bool(self._bridges - asked.keys())
+        return asked is not None and bool(self.bridges - asked.keys())
 
     @property
     def simulated(self) -> bool:
         """A bridge that answered is a demo robot's."""
         asked = self._answered or {}
-        return any(asked.get(zid) == DEMO_VERSION for zid in self._bridges)
+        return any(asked.get(zid) == DEMO_VERSION for zid in self.bridges)
 
     def _on_robot(self, role: Role, key: str) -> list[Endpoint]:
         tokens = self._tokens.get(key, {}).values()

@@ -37,7 +37,7 @@ def way(robot: Robot, now: float) -> Verdict:
     if not robot.link_up:
         return locked("no_link")
     if not robot.graph.bridges:
-        return locked("no_bridge")
+        return locked("no_bridge_of" if robot.name else "no_bridge", name=robot.name)
     if robot.graph.silent:
         return locked("bridge_silent")
     if now < robot.settled_at:

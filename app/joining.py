@@ -26,6 +26,7 @@ from app.graph import Route
 from app.interfaces import Interfaces
 from app.keys import Endpoint, Qos, TopicRole
 from app.link import Link
+from app.logs import RobotLog
 from app.panel.model import Panel
 from app.robot import Robot
 
@@ -36,6 +37,7 @@ FRESH_S: Final = 1.0  # waited for a bridge that came while the kiosk ran
 FOUND_S: Final = 0.05  # waited for a bridge that was there when the kiosk started
 FOUND_WITHIN_S: Final = 1.0
 SETTLE_S: Final = 0.2  # from the tokens to routes that carry the first message
+SETTLE_MOST_S: Final = 2.0  # where a listener is not reached by then, a press tells so
 ASK_EVERY_S: Final = 5.0
 ASK_AGAIN_S: Final = 0.5
 MISSES_ALLOWED: Final = 1
@@ -58,6 +60,7 @@ class Joining:
         self._panel = panel
         self._interfaces = interfaces
         self._robot = robot
+        self._log = RobotLog(log, robot.name)
         self._link = link
         self._show = show
         self._renew = renew
@@ -100,7 +103,7 @@ class Joining:
         try:
             self._link.hold(self._tokens())
         except LinkError as error:
-            log.warning("%s", error)
+            self._log.warning("%s", error)
 
     def _leave(self) -> None:
         self._held_as.clear()
@@ -112,18 +115,37 @@ class Joining:
         try:
             self._link.hold(())
         except LinkError as error:
-            log.warning("%s", error)
+            self._log.warning("%s", error)
 
     async def _join(self) -> None:
         found = time.monotonic() - self._started_at < FOUND_WITHIN_S
         await asyncio.sleep(FOUND_S if found else FRESH_S)
         await self._ask_until_answered()
+        if not self._robot.graph.bridges:
+            return  # those that answered are other robots'
         self._hold()
-        await asyncio.sleep(SETTLE_S)
+        await self._settle()
         await self._ask_until_answered()
         self._robot.settled_at = time.monotonic()
-        log.info("joined the robot's topics")
+        self._log.info("joined the robot's topics")
         self._show()
+
+    async def _settle(self) -> None:
+        """Until the routes carry the first message: whom the graph shows as a listener is heard of."""
+        graph = self._robot.graph
+        listened = [
+            key for key in map(self._robot.key, self._panel.publications()) if graph.on_robot("MS", key)
+        ]
+        end = time.monotonic() + SETTLE_MOST_S
+        await asyncio.sleep(SETTLE_S)
+        while time.monotonic() < end and not all(map(self._heard, listened)):
+            await asyncio.sleep(SETTLE_S)
+
+    def _heard(self, key: str) -> bool:
+        try:
+            return self._link.heard(key)
+        except LinkError:
+            return False
 
     async def _ask_until_answered(self) -> None:
         """What the bridges do not tell is a doubt: nothing is joined on it."""
@@ -133,7 +155,7 @@ class Joining:
                 if self._missed == 0:
                     return
             except LinkError as error:
-                log.warning("%s", error)
+                self._log.warning("%s", error)
             self._show()
             await asyncio.sleep(ASK_AGAIN_S)
 
@@ -154,7 +176,7 @@ class Joining:
             if found := self._robot.graph.wrong_type(role, key, type_name):
                 if (topic, found) not in self._told:
                     self._told.add((topic, found))
-                    log.error("%s is %s on the robot, %s in the panel", topic, found, type_name)
+                    self._log.error("%s is %s on the robot, %s in the panel", topic, found, type_name)
                 continue
             type_hash = self._interfaces.type_hash(type_name)
             tokens.append(keys.token(self._link.zid, role, key, type_name, qos, type_hash))
@@ -205,11 +227,13 @@ class Joining:
             if self._joined:
                 try:
                     await self._ask()
-                    if self._joined:  # still
+                    if not self._robot.graph.bridges:
+                        self._leave()
+                    elif self._joined:  # still
                         self._hold()
                         self._heal()
                 except LinkError as error:
-                    log.warning("%s", error)
+                    self._log.warning("%s", error)
                 self._show()
 
     async def _ask(self) -> None:
@@ -217,6 +241,8 @@ class Joining:
         graph = self._robot.graph
         answers = await self._link.ask(keys.VERSION)
         versions = {keys.zid_of(key): told.decode(errors="replace") for key, told in answers}
+        namespaces = await self._namespaces()
+        graph.configured(namespaces)
         self._missed = 0 if graph.bridges <= versions.keys() else self._missed + 1
         if self._missed == 0 or self._missed > MISSES_ALLOWED:
             graph.answered(versions)
@@ -224,8 +250,17 @@ class Joining:
         nodes: set[Endpoint] = set()
         for key, told in await self._ask_json(keys.NODES):
             with suppress(KeyError, TypeError):  # an answer that is no node's
-                nodes.update(keys.endpoints_of(key, told, self._panel.namespace))
+                namespace = namespaces.get(keys.zid_of(key), self._robot.namespace)
+                nodes.update(keys.endpoints_of(key, told, namespace))
         graph.learn(routes, nodes)
+
+    async def _namespaces(self) -> dict[str, str]:
+        """The namespace of each bridge that says it, "" for none."""
+        return {
+            keys.zid_of(key): told["namespace"].rstrip("/")
+            for key, told in await self._ask_json(keys.CONFIG)
+            if isinstance(told, dict) and isinstance(told.get("namespace"), str)
+        }
 
     def _heal(self) -> None:
         """A bridge that does not read a topic for this session does so for a new one."""
@@ -234,7 +269,7 @@ class Joining:
         self._unheard = self._unheard + 1 if lost else 0
         if self._unheard >= UNHEARD_ALLOWED:
             self._unheard = 0
-            log.error("the bridge does not pass on %s: a new session", ", ".join(lost))
+            self._log.error("the bridge does not pass on %s: a new session", ", ".join(lost))
             self._renew()
 
     async def _pause(self, longest_s: float) -> None:
@@ -256,8 +291,12 @@ class Joining:
     def _task(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
         """A task whose failure is logged, not lost."""
         task = asyncio.get_running_loop().create_task(work)
-        task.add_done_callback(_told)
+        task.add_done_callback(self._tell)
         return task
+
+    def _tell(self, task: asyncio.Task[None]) -> None:
+        if not task.cancelled() and (error := task.exception()):
+            self._log.error("joining the robot's topics failed", exc_info=error)
 
 
 def _route(key: str, told: Any) -> Route | None:
@@ -268,8 +307,3 @@ def _route(key: str, told: Any) -> Route | None:
     zid, direction, topic_key = place
     whole = direction == "sub" or told.get("dds_reader") != ""
     return Route(zid, direction, topic_key, told["ros2_type"], whole)
-
-
-def _told(task: asyncio.Task[None]) -> None:
-    if not task.cancelled() and (error := task.exception()):
-        log.error("joining the robot's topics failed", exc_info=error)

@@ -13,6 +13,7 @@ TOKENS: Final = "@/*/@ros2_lv/**"  # every liveliness token of every bridge and 
 VERSION: Final = "@/*/ros2/version"  # answered by a bridge whose main loop runs
 ROUTES: Final = "@/*/ros2/route/topic/**"  # a bridge's routes: JSON with `ros2_type`
 
+CONFIG: Final = "@/*/ros2/config"  # a bridge's configuration: JSON with its `namespace`
 NODES: Final = "@/*/ros2/node/**"  # the nodes behind a bridge: JSON with their topics and types
 DEMO_VERSION: Final = '"demo robot"'  # how the demo robot answers for its version
 
@@ -123,6 +124,16 @@ def parsed(token_key: str) -> Endpoint | None:
 def version(zid: str) -> str:
     """Where one bridge answers for `VERSION`."""
     return f"@/{zid}/ros2/version"
+
+
+def config(zid: str) -> str:
+    """Where one bridge answers for `CONFIG`."""
+    return f"@/{zid}/ros2/config"
+
+
+def within(namespace: str, outer: str) -> bool:
+    """Whether a bridge with the namespace `outer` can have topics of `namespace`."""
+    return f"{namespace}/".startswith(f"{outer}/")
 
 
 def endpoints_of(admin_key: str, node: Mapping[str, Any], namespace: str) -> Iterator[Endpoint]:

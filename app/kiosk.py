@@ -1,6 +1,6 @@
-"""The running kiosk: one panel, one link, one robot, one board, and how they are wired.
+"""A running kiosk: one robot with its link, board and presses, and how they are wired.
 
-Down: a callback of the link wakes the loop → `_take` → robot → `_show` → views → board → streams.
+Down: a callback of the link wakes the loop → `_take` → robot → `show` → views → board → streams.
 Permissions and the link are shown at once, values at most `FRAMES_PER_S` times a second.
 """
 
@@ -8,7 +8,7 @@ import asyncio
 import logging
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from typing import Any, Final
 
@@ -21,11 +21,11 @@ from app.interfaces import interfaces_of
 from app.interlocks import Verdict, way
 from app.joining import LOG_TYPE, Joining
 from app.link import Config, Link
-from app.logs import RosoutHandler
-from app.panel.model import Panel
+from app.logs import RobotLog, RosoutHandler
+from app.panel.model import Panel, RobotEntry
 from app.presses import Presses, Receipt
 from app.robot import Robot
-from app.views import Sight, sight
+from app.views import Lamp, Sight, sight
 
 log = logging.getLogger("kiosk")
 
@@ -42,29 +42,41 @@ class Kiosk:
         config: Config,
         revision: str,
         *,
+        entry: RobotEntry | None = None,
+        robots: Callable[[], Mapping[str, Lamp]] = dict,
+        told: Callable[["Kiosk"], None] = lambda _: None,
         simulated: bool = False,
         fault: str = "",
     ) -> None:
-        """`revision` is of all that a page loads; `fault` stands above it until there is none."""
+        """`entry` is which of the panel's robots this is for, where it has several: `robots` are
+        then the lamps of all, and `told` is called when this one's has changed. `revision` is of
+        all that a page loads; `fault` stands above it until there is none."""
         self.panel = panel
+        self.entry = entry
+        self.base = f"/robots/{entry.id}" if entry else ""
+        self._robots = robots
+        self._told = told
         self._simulated = simulated
         self.fault = fault
         self.interfaces = interfaces_of(panel.distro, panel.interfaces)
         self._loop = asyncio.get_running_loop()
         self.link = Link(config, self._wake)
-        self.robot = Robot(panel, self.interfaces, self.link.zid)
-        self.board = Board(self._sight().view, revision)
-        self._calls = Calls(self.interfaces, self.robot, self.link, self._show)
-        self._actions = Actions(self.interfaces, self.robot, self.link, self._show)
+        self.robot = Robot(panel, self.interfaces, self.link.zid, entry)
+        self._log = RobotLog(log, self.robot.name)
+        first = self._sight()
+        self.lamp = first.robot
+        self.board = Board(first.view, revision)
+        self._calls = Calls(self.interfaces, self.robot, self.link, self.show)
+        self._actions = Actions(self.interfaces, self.robot, self.link, self.show)
         self.presses = Presses(
             panel, self.interfaces, self.robot, self.link, self._calls, self._actions
         )
         self._feedback = {keys.feedback(self.robot.key(one)): one for one in panel.actions()}
-        self._joining = Joining(panel, self.interfaces, self.robot, self.link, self._show, self.renew)
+        self._joining = Joining(panel, self.interfaces, self.robot, self.link, self.show, self.renew)
         self._urgent = {self.robot.key(i.topic) for i in panel.interlocks}
         self._shown_at = 0.0
         self._timer: asyncio.TimerHandle | None = None
-        self._rosout = RosoutHandler(self._publish_log)
+        self._rosout = RosoutHandler(self._publish_log, self.robot.name)
         self._renewing: asyncio.Task[None] | None = None
         self._stopped = False
 
@@ -91,7 +103,7 @@ class Kiosk:
         try:
             await asyncio.to_thread(self.link.close)
         except LinkError as error:
-            log.warning("%s", error)
+            self._log.warning("%s", error)
 
     @property
     def way(self) -> Verdict:
@@ -107,7 +119,7 @@ class Kiosk:
         """A new Zenoh session: until it is joined, nobody is known to be there."""
         self.robot.lose()
         self._follow(came=False)
-        self._show()
+        self.show()
         if self._renewing is None:
             self._renewing = self._loop.create_task(self._renew())
 
@@ -117,7 +129,7 @@ class Kiosk:
                 await asyncio.to_thread(self.link.renew)
                 break
             except LinkError as error:
-                log.error("%s", error)
+                self._log.error("%s", error)
                 await asyncio.sleep(RENEW_AGAIN_S)
         self.robot.graph.own_zid = self.link.zid
         self._renewing = None
@@ -125,7 +137,7 @@ class Kiosk:
     def show_fault(self, text: str) -> None:
         """A fault of the panel file, shown on every page; "" takes it away."""
         self.fault = text
-        self._show()
+        self.show()
 
     def _warm_up(self) -> None:
         """The first use of a type compiles its codec: now, not at the first press."""
@@ -146,13 +158,13 @@ class Kiosk:
             return
         changes = self.link.drain()
         if self.robot.link_up and not changes.link_up:
-            log.warning("Zenoh link lost")
+            self._log.warning("Zenoh link lost")
             self.renew()
             return
         urgent = self.robot.link_up != changes.link_up or bool(changes.tokens)
         if self.robot.link_up != changes.link_up:
             self.robot.link_up = True
-            log.info("Zenoh link up")
+            self._log.info("Zenoh link up")
         had_bridge = bool(self.robot.graph.bridges)
         for key, sample in changes.samples.items():
             if key in self._feedback:
@@ -164,15 +176,15 @@ class Kiosk:
         for token_key, token in changes.tokens.items():
             if token.lost_seq and (zid := self.robot.graph.apply(token_key, False)):
                 self.robot.cut(zid, token.lost_seq)
-                log.warning("bridge %s lost", zid)
+                self._log.warning("bridge %s lost", zid)
                 had_bridge = had_bridge and bool(self.robot.graph.bridges)
             if token.alive and (zid := self.robot.graph.apply(token_key, True)):
-                log.info("bridge %s found", zid)
+                self._log.info("bridge %s found", zid)
                 came = True
         if changes.tokens:
             self._follow(came and not had_bridge)
         if urgent:
-            self._show()
+            self.show()
         else:
             self._show_at(self._shown_at + 1 / FRAMES_PER_S)
 
@@ -190,11 +202,13 @@ class Kiosk:
             self.panel,
             self.robot,
             time.monotonic(),
+            robots=self._robots(),
             simulated=self._simulated,
             fault=self.fault,
         )
 
-    def _show(self) -> None:
+    def show(self) -> None:
+        """Posts the state as of now to the board."""
         if self._stopped:
             return
         if self._timer is not None:
@@ -202,6 +216,10 @@ class Kiosk:
             self._timer = None
         self._shown_at = time.monotonic()
         seen = self._sight()
+        if seen.robot != self.lamp:
+            self.lamp = seen.robot
+            self._told(self)
+            seen = self._sight()
         self.board.post(seen.view)
         self._show_at(seen.until)
 
@@ -211,7 +229,7 @@ class Kiosk:
             if self._timer.when() <= when:
                 return
             self._timer.cancel()
-        self._timer = None if when == math.inf else self._loop.call_at(when, self._show)
+        self._timer = None if when == math.inf else self._loop.call_at(when, self.show)
 
     # Beside.
 

@@ -7,9 +7,10 @@ import zenoh; its errors leave here as LinkError.
 
 import asyncio
 import itertools
+import json
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -45,12 +46,22 @@ class Changes:
     link_up: bool
 
 
-def config_from(path: Path) -> zenoh.Config:
-    """A Zenoh configuration file, read; SettingsError says what is wrong with it."""
+def config_from(path: Path, connect: Sequence[str] = ()) -> zenoh.Config:
+    """A Zenoh configuration file, with other endpoints to connect to if there are any; SettingsError
+    says what is wrong with it."""
     try:
-        return zenoh.Config.from_file(path)
+        config = zenoh.Config.from_file(path)
     except zenoh.ZError as error:
         raise SettingsError(f"{path} is not a usable Zenoh configuration: {error}") from error
+    if connect:
+        try:
+            config.insert_json5("connect/endpoints", json.dumps(list(connect)))
+        except zenoh.ZError as error:
+            endpoints = ", ".join(connect)
+            raise SettingsError(
+                f"{endpoints}: can't connect there, a Zenoh endpoint is like tcp/robot1:7447: {error}"
+            ) from error
+    return config
 
 
 def config_to(endpoint: str) -> zenoh.Config:

@@ -5,7 +5,8 @@ Format and level numbers are rcutils' (rcl_interfaces/msg/Log has the same numbe
 
 import logging
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, MutableMapping
+from typing import Any
 
 NODE_NAME = "web_ui"
 
@@ -39,6 +40,20 @@ def stamp(record: logging.LogRecord) -> tuple[int, int]:
     return divmod(int(record.created * 1e9), 1_000_000_000)
 
 
+class RobotLog(logging.LoggerAdapter[logging.Logger]):
+    """What is logged of one of several robots begins with its name, and is on its /rosout alone."""
+
+    def __init__(self, logger: logging.Logger, robot: str) -> None:
+        """`robot` is "" where there is only one."""
+        super().__init__(logger, {"robot": robot})
+        self._prefix = f"{robot}: ".replace("%", "%%") if robot else ""
+
+    def process(
+        self, msg: Any, kwargs: MutableMapping[str, Any]
+    ) -> tuple[Any, MutableMapping[str, Any]]:
+        return f"{self._prefix}{msg}", {**kwargs, "extra": self.extra}
+
+
 class RosFormatter(logging.Formatter):
     """One record, one line; a traceback follows indented, so that no text can pose as a record."""
 
@@ -56,11 +71,14 @@ class RosoutHandler(logging.Handler):
     sent must not become a log record of its own.
     """
 
-    def __init__(self, publish: Callable[[Mapping[str, object]], None]) -> None:
+    def __init__(self, publish: Callable[[Mapping[str, object]], None], robot: str = "") -> None:
         super().__init__()
         self._publish = publish
+        self._robot = robot
 
     def emit(self, record: logging.LogRecord) -> None:
+        if getattr(record, "robot", self._robot) != self._robot:
+            return
         try:
             self._publish(log_fields(record))
         except Exception:

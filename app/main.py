@@ -10,7 +10,7 @@ from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import AsyncExitStack, ExitStack, asynccontextmanager, contextmanager
 from types import FrameType
 
-from fastapi import FastAPI
+from fastapi import Depends, FastAPI
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from starlette.exceptions import HTTPException
 from starlette.middleware.gzip import GZipMiddleware
@@ -19,12 +19,13 @@ from app import development, logs, simulator
 from app.assets import Assets, load_assets
 from app.doors import Doors
 from app.errors import KioskError, PanelError
-from app.kiosk import Kiosk
-from app.link import config_from, config_to
+from app.fleet import Fleet
+from app.link import Config, config_from, config_to
 from app.metrics import Metrics
 from app.panel import Panel, load_panel
-from app.routes import events, health, pages, presses
-from app.routes.site import Site, on_http_error, on_kiosk_error
+from app.panel.model import RobotEntry
+from app.routes import events, health, pages, presses, static
+from app.routes.site import Site, named_robot, on_http_error, on_kiosk_error
 from app.settings import Settings, shipped
 
 log = logging.getLogger("kiosk")
@@ -38,17 +39,18 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     logs.configure(settings.log_level)
     panel, fault = _first_panel(settings)
     if (settings.mode or panel.mode) == "live":
-        config_from(settings.zenoh)  # a file that can't be used is told before anything starts
+        for entry in panel.robots or (None,):  # what can't be used is told before anything starts
+            config_from(settings.zenoh, entry.connect if entry else ())
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         async with AsyncExitStack() as opened:
-            kiosk, assets = await opened.enter_async_context(_running(settings, panel, fault))
-            site = Site(kiosk, assets, _templates(settings.dev), Metrics(), settings.dev)
-            site.metrics.follow(kiosk)
+            fleet, assets = await opened.enter_async_context(_running(settings, panel, fault))
+            site = Site(fleet, assets, _templates(settings.dev), Metrics(), settings.dev)
+            site.metrics.follow(fleet)
             app.state.site = site
             loop = asyncio.get_running_loop()
-            with _on_end(lambda: loop.call_soon_threadsafe(lambda: site.kiosk.board.close())):
+            with _on_end(lambda: loop.call_soon_threadsafe(lambda: site.fleet.close_streams())):
                 if settings.dev:
                     await opened.enter_async_context(
                         development.reloading(site, settings, _running, opened.pop_all())
@@ -66,8 +68,11 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     )
     app.add_middleware(GZipMiddleware, minimum_size=500)
     app.add_middleware(Doors, hosts=settings.hosts)
-    for routes in (pages, events, presses, health):
+    for routes in (pages, events, presses):
         app.include_router(routes.router)
+        app.include_router(routes.router, prefix="/robots/{robot}", dependencies=[Depends(named_robot)])
+    for common in (static, health):
+        app.include_router(common.router)
     return app
 
 
@@ -84,26 +89,28 @@ def _first_panel(settings: Settings) -> tuple[Panel, str]:
 @asynccontextmanager
 async def _running(
     settings: Settings, panel: Panel, fault: str = ""
-) -> AsyncIterator[tuple[Kiosk, Assets]]:
-    """A kiosk on the robot that the panel is for: the real one, or a demo robot of its own."""
+) -> AsyncIterator[tuple[Fleet, Assets]]:
+    """The robots that the panel is for: the real ones, or demo robots of its own."""
     demo = (settings.mode or panel.mode) == "demo"
     assets = load_assets(shipped("static"), shipped("templates"), panel.mm_per_px)
     revision = f"{panel.revision}-{assets.revision}"
     if settings.dev:
         revision += f"-{secrets.token_hex(4)}"  # whatever was changed, pages load anew
     with ExitStack() as stack:
-        if demo:
-            robot = simulator.in_process(panel.namespace, panel.distro)
-            config = config_to(stack.enter_context(robot))
-        else:
-            config = config_from(settings.zenoh)
-        kiosk = Kiosk(panel, config, revision, simulated=demo, fault=fault)
+
+        def config_of(entry: RobotEntry | None) -> Config:
+            if not demo:
+                return config_from(settings.zenoh, entry.connect if entry else ())
+            namespace = entry.namespace if entry else panel.namespace
+            return config_to(stack.enter_context(simulator.in_process(namespace, panel.distro)))
+
+        fleet = Fleet(panel, config_of, revision, simulated=demo, fault=fault)
         try:
-            await kiosk.start()
+            await fleet.start()
             log.info('panel "%s", %s robot', panel.title, "simulated" if demo else "live")
-            yield kiosk, assets
+            yield fleet, assets
         finally:
-            await kiosk.stop()
+            await fleet.stop()
 
 
 def _templates(dev: bool) -> Environment:

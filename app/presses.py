@@ -20,6 +20,7 @@ from app.errors import FieldError, InputError, LinkError, NotFound
 from app.inputs import checked, typed
 from app.interfaces import Interfaces
 from app.interlocks import press_verdict
+from app.logs import RobotLog
 from app.panel.model import Action, Call, Input, Panel, Pressed, Publish
 from app.panel.template import filled, named
 from app.progress import Answer, Outcome
@@ -32,7 +33,9 @@ Cause = Literal["", "interlock", "input", "link", "time"]
 
 RECEIPTS_KEPT: Final = 1000
 LONGEST_LOGGED: Final = 300
-NO_WAY: Final = frozenset({"no_link", "no_bridge", "bridge_silent", "joining", "no_service"})
+NO_WAY: Final = frozenset(
+    {"no_link", "no_bridge", "no_bridge_of", "bridge_silent", "joining", "no_service"}
+)
 FINE: Final = frozenset({"published", "accepted", "succeeded"})
 
 
@@ -94,6 +97,7 @@ class Presses:
         self._panel = panel
         self._interfaces = interfaces
         self._robot = robot
+        self._log = RobotLog(log, robot.name)
         self._way = way
         self._calls = calls
         self._actions = actions
@@ -134,7 +138,7 @@ class Presses:
             return await self._first(widget, inputs, press_id, who)
         if (known.widget, known.inputs) != (widget_id, inputs):
             reused = say("press_reused", id=press_id)
-            log.warning("press %s of %s by %s: %s", press_id, widget_id, who, reused)
+            self._log.warning("press %s of %s by %s: %s", press_id, widget_id, who, reused)
             own_id = f"{press_id:.40}.{secrets.token_hex(4)}"
             refusal = self._receipt(widget, inputs, own_id, "refused", reused, "input")
             self._keep(refusal)
@@ -150,7 +154,7 @@ class Presses:
         text = say("refused", why=say(code), time=clock(time.time()))
         receipt = self._receipt(self.widget(widget_id), inputs, press_id, "refused", text, "interlock")
         self._keep(receipt)
-        log.warning("press %s of %s: %s", press_id, widget_id, text)
+        self._log.warning("press %s of %s: %s", press_id, widget_id, text)
         return receipt
 
     async def cancel(self, widget_id: str, who: str) -> Receipt:
@@ -159,7 +163,7 @@ class Presses:
         if not isinstance(widget, Action):
             raise NotFound(f'"{widget_id}" is not an action: there is nothing to cancel')
         answer = await self._actions.cancel(widget)
-        log.info("cancel of %s by %s: %s: %s", widget_id, who, answer.outcome, answer.text)
+        self._log.info("cancel of %s by %s: %s: %s", widget_id, who, answer.outcome, answer.text)
         cause: Cause = "interlock" if answer.outcome == "refused" else ""
         return self._receipt(widget, {}, "", answer.outcome, answer.text, cause)
 
@@ -180,7 +184,7 @@ class Presses:
         self._keep(receipt)
         under_way.receipt.set_result(receipt)
         level = logging.INFO if receipt.outcome in FINE else logging.WARNING
-        log.log(level, "press %s of %s by %s with %.*s: %s: %s", press_id, widget.id, who,
+        self._log.log(level, "press %s of %s by %s with %.*s: %s: %s", press_id, widget.id, who,
                 LONGEST_LOGGED, inputs, receipt.outcome, receipt.reason)  # fmt: skip
         return receipt
 

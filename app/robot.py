@@ -13,7 +13,7 @@ from app.errors import DecodeError, FieldError
 from app.graph import Graph
 from app.interfaces import Interfaces, value_at
 from app.keys import key_of
-from app.panel.model import Panel
+from app.panel.model import Panel, RobotEntry
 from app.progress import Progress
 
 log = logging.getLogger("kiosk.robot")
@@ -58,18 +58,25 @@ WAITING = Reading("waiting")
 class Robot:
     """Latest samples, the graph, and the state of the link."""
 
-    def __init__(self, panel: Panel, interfaces: Interfaces, own_zid: str = "") -> None:
+    def __init__(
+        self,
+        panel: Panel,
+        interfaces: Interfaces,
+        own_zid: str = "",
+        entry: RobotEntry | None = None,
+    ) -> None:
+        """`entry` is which of the panel's robots this is, where it has several."""
+        self.name = entry.name if entry else ""
+        self.namespace = entry.namespace if entry else panel.namespace
         self.link_up = False
         self.settled_at = math.inf  # monotonic: when a bridge that came has set up its routes
-        self.graph = Graph(own_zid)
+        self._told_apart = entry.namespace if entry else None
+        self.graph = Graph(own_zid, self._told_apart)
         self.progress: dict[str, Progress] = {}  # of what widgets have asked, by their ids
         self.undecodable: Counter[str] = Counter()
         self._interfaces = interfaces
-        self._namespace = panel.namespace
-        self._types = {key_of(t, panel.namespace): n for t, n in panel.subscriptions().items()}
-        self._required = [
-            key_of(i.topic, panel.namespace) for i in panel.interlocks if i.require_publisher
-        ]
+        self._types = {self.key(topic): name for topic, name in panel.subscriptions().items()}
+        self._required = [self.key(i.topic) for i in panel.interlocks if i.require_publisher]
         self._published: set[str] = set()
         self._samples: dict[str, Sample] = {}
         self._readings: dict[str, Reading] = {}
@@ -77,7 +84,7 @@ class Robot:
 
     def key(self, topic: str) -> str:
         """The key expression of a topic of this robot."""
-        return key_of(topic, self._namespace)
+        return key_of(topic, self.namespace)
 
     def take(self, key: str, sample: Sample) -> None:
         """A newer sample of a topic."""
@@ -105,7 +112,7 @@ class Robot:
         """The link is lost: nobody is known to be there, and nothing that came says what is so."""
         self.link_up = False
         self.settled_at = math.inf
-        self.graph = Graph()
+        self.graph = Graph("", self._told_apart)
         for key, sample in self._samples.items():
             self._cut(key, sample)
 

@@ -11,6 +11,7 @@ ENGLISH: Final[Mapping[str, str]] = {
     # Why a control is locked.
     "no_link": "No connection to the robot: its bridge can't be reached.",
     "no_bridge": "No connection to the robot: Zenoh answers, but no ROS 2 bridge is there.",
+    "no_bridge_of": "No connection to {name}: Zenoh answers, but no ROS 2 bridge of its namespace.",
     "joining": "Joining the robot's topics: a moment.",
     "bridge_silent": "The ROS 2 bridge is connected but does not answer: restart the bridge.",
     "wrong_type": "{topic} is {found} on the robot, but this panel is made for {wanted}.",
@@ -52,9 +53,11 @@ ENGLISH: Final[Mapping[str, str]] = {
     "goal_lost": "The robot no longer knows this goal: what came of it is not known.",
     "goal_cut": "The connection was cut: the robot may still be doing it.",
     "cancel": "Cancel",
+    "robots": "Robots",
     "cancel_sent": "The robot was asked to cancel at {time}.",
     "cancel_refused": "The robot did not cancel it at {time}.",
     "nothing_to_cancel": "there is nothing under way to cancel",
+    "seen_on_another": "the page showed another robot.",
     "seen_before_restart": "the panel's server was started anew since the page showed this.",
     # What a readout shows beside or instead of a value.
     "readout_waiting": "waiting for {topic}",

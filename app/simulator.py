@@ -2,9 +2,11 @@
 
 It has the keys, CDR bytes, liveliness tokens and admin space that a real robot has behind
 zenoh-bridge-ros2dds, so that the kiosk can't tell the difference; it knows nothing of the server.
-`python -m app.simulator [ENDPOINT]` runs it alone, where the shipped zenoh.json5 connects.
+`python -m app.simulator [ENDPOINT [NAMESPACE]]` runs it alone, where the shipped zenoh.json5
+connects.
 """
 
+import json
 import signal
 import sys
 import tempfile
@@ -134,13 +136,9 @@ class Simulator:
     def _graph(self) -> Iterator[Any]:
         zid = str(self._session.zid())
 
-        def on_query(query: zenoh.Query) -> None:
-            with query:
-                query.reply(keys.version(zid), keys.DEMO_VERSION.encode())
-
-        yield self._session.declare_queryable(
-            keys.version(zid), Callback(on_query, indirect=False), complete=True
-        )
+        config = json.dumps({"namespace": self._namespace or "/"})
+        yield self._told(keys.version(zid), keys.DEMO_VERSION)
+        yield self._told(keys.config(zid), config)
         liveliness = self._session.liveliness()
         ends: list[tuple[keys.TopicRole, Mapping[str, str], Qos]] = [
             ("MS", LISTENS, Qos()),
@@ -156,6 +154,15 @@ class Simulator:
             yield liveliness.declare_token(keys.server_token(zid, "SS", self._key(service), name))
         yield liveliness.declare_token(keys.server_token(zid, "AS", self._key(COUNT), COUNT_TYPE))
         yield liveliness.declare_token(keys.bridge_token(zid))
+
+    def _told(self, key: str, text: str) -> Any:
+        """A part of the admin space, which always says the same."""
+
+        def on_query(query: zenoh.Query) -> None:
+            with query:
+                query.reply(key, text.encode())
+
+        return self._session.declare_queryable(key, Callback(on_query, indirect=False), complete=True)
 
     def _run(self) -> None:
         while not self._ends.wait(STEP_S):
@@ -214,11 +221,15 @@ def in_process(namespace: str, distro: str) -> Iterator[str]:
 
 def main(arguments: list[str]) -> int:
     endpoint = arguments[0] if arguments else ENDPOINT
+    namespace = arguments[1].rstrip("/") if len(arguments) > 1 else ""
+    if not keys.NAMESPACE.fullmatch(namespace):
+        print(f'demo robot: "{namespace}" is not a ROS 2 namespace, like /robot1', file=sys.stderr)
+        return 2
     ends = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: ends.set())
     try:
-        with Simulator(endpoint):
+        with Simulator(endpoint, namespace):
             print(f"demo robot: listening at {endpoint}", file=sys.stderr)
             ends.wait()
     except zenoh.ZError as error:

@@ -5,8 +5,9 @@ nothing.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, TypedDict
+from typing import Any, Final, Literal, TypedDict
 
 from app.displays import indicator, readout
 from app.inputs import limits
@@ -40,23 +41,38 @@ class Notice(TypedDict):
 
 
 class View(TypedDict):
-    """Everything that can change on a page; `widgets` has the attributes of each by its id."""
+    """Everything that can change on a page; `widgets` has the attributes of each by its id, `robots`
+    the lamp of each where there are several."""
 
     link: dict[str, Lamp]
     interlocks: dict[str, Enabled]
     widgets: dict[str, dict[str, Any]]
     notice: Notice
+    robots: dict[str, Lamp]
+
+
+NO_OTHERS: Final[Mapping[str, Lamp]] = {}
 
 
 @dataclass(frozen=True, slots=True)
 class Sight:
-    """A view, and when (monotonic seconds) time alone would change it."""
+    """A view, the robot's lamp on the pages of others, and when (monotonic seconds) time alone would
+    change it."""
 
     view: View
+    robot: Lamp
     until: float
 
 
-def sight(panel: Panel, robot: Robot, now: float, *, simulated: bool = False, fault: str = "") -> Sight:
+def sight(
+    panel: Panel,
+    robot: Robot,
+    now: float,
+    *,
+    robots: Mapping[str, Lamp] = NO_OTHERS,
+    simulated: bool = False,
+    fault: str = "",
+) -> Sight:
     """The view at `now` (monotonic seconds); `fault` is of a panel file that could not be loaded."""
     untils = [math.inf]
 
@@ -85,15 +101,17 @@ def sight(panel: Panel, robot: Robot, now: float, *, simulated: bool = False, fa
             case Indicator():
                 widgets[widget.id], until = indicator(widget, robot, now)
                 untils.append(until)
+    link = lamps(panel, robot, passable)
     view = View(
-        link=lamps(panel, robot, passable),
+        link=link,
         interlocks={i: enabled(verdict) for i, verdict in interlocks.items()},
         widgets=widgets,
         notice=Notice(
             banner=say("simulated") if simulated or robot.graph.simulated else "", fault=fault
         ),
+        robots=dict(robots),
     )
-    return Sight(view, min(untils))
+    return Sight(view, summary(robot.name, link), min(untils))
 
 
 def enabled(verdict: Verdict) -> Enabled:
@@ -111,11 +129,18 @@ def progress(of: Progress) -> dict[str, Any]:
     }
 
 
+def summary(name: str, link: Mapping[str, Lamp]) -> Lamp:
+    """One light for a robot: what is wrong on the way to it, or how its nodes are."""
+    shown = link["node"] if link["bridge"]["state"] == "ok" else link["bridge"]
+    return Lamp(name=name, state=shown["state"], text=shown["text"])
+
+
 def lamps(panel: Panel, robot: Robot, passable: Verdict) -> dict[str, Lamp]:
     """The three lights: the server is "ok" wherever it says so itself."""
     bridge: dict[str, tuple[Literal["ok", "wait", "bad"], str]] = {
         "no_link": ("bad", "lost"),
         "no_bridge": ("bad", "absent"),
+        "no_bridge_of": ("bad", "absent"),
         "bridge_silent": ("bad", "silent"),
         "joining": ("wait", "pending"),
         "permitted": ("ok", "ok"),

@@ -11,6 +11,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from copy import copy
 from pathlib import Path
 from typing import Any
 
@@ -238,12 +239,19 @@ class Server:
         options: Sequence[str] = (),
         **environment: str,
     ) -> None:
+        self.base = ""
         self.port = port or free_port()
         self.url = f"http://127.0.0.1:{self.port}"
         self.http = httpx.Client(base_url=self.url, timeout=10, trust_env=False)
         command = [python, "-m", "uvicorn", "app.main:app", "--port", str(self.port), *options]
         self.process = Process(command, {**environment, "PYTHONPATH": ""}, cwd=folder)
         until(self.answers, "the server answers", within_s=20)
+
+    def robot(self, name: str) -> "Server":
+        """The same server, asked for one of its robots."""
+        one = copy(self)
+        one.base = f"/robots/{name}"
+        return one
 
     def answers(self) -> bool:
         assert self.process.running, self.process.text
@@ -256,7 +264,7 @@ class Server:
         return self.http.get("/readyz").status_code == 200
 
     def snapshot(self) -> dict[str, Any]:
-        text = self.http.get("/events?once=1").text
+        text = self.http.get(f"{self.base}/events?once=1").text
         found: dict[str, Any] = json.loads(events_in(text)[0][1])
         return found
 
@@ -265,11 +273,13 @@ class Server:
         return found
 
     def press(self, widget: str, message: str = "", **more: Any) -> httpx.Response:
-        return self.http.post(f"/widgets/{widget}", json={"inputs": {"message": message}, **more})
+        return self.http.post(
+            f"{self.base}/widgets/{widget}", json={"inputs": {"message": message}, **more}
+        )
 
     @contextmanager
     def stream(self) -> Iterator["Stream"]:
-        with self.http.stream("GET", "/events", timeout=5) as response:
+        with self.http.stream("GET", f"{self.base}/events", timeout=5) as response:
             yield Stream(response)
 
     def end(self, number: signal.Signals = signal.SIGTERM, timeout_s: float = 15) -> int:

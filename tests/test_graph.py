@@ -260,3 +260,34 @@ def test_another_kiosks_qos_does_not_count(graph: Graph) -> None:
 def test_a_token_that_does_not_say_is_no_mismatch(graph: Graph) -> None:
     graph.apply(f"@/{BRIDGE}/@ros2_lv/MP/a/std_msgs§msg§Bool/:::,:", True)
     assert graph.wrong_qos("MS", "a", Qos()) is None
+
+
+def test_a_robots_bridges_are_those_of_its_namespace() -> None:
+    graph = Graph(KIOSK, "/robot1")
+    for zid in ("b1", "b2", "b3"):
+        graph.apply(bridge_token(zid), True)
+    assert graph.bridges == {"b1", "b2", "b3"}  # nobody has told yet
+    graph.configured({"b1": "/robot1", "b2": "/robot10"})
+    assert graph.bridges == {"b1"}
+    graph.apply(bridge_token("b1"), False)
+    assert graph.bridges == {"b3"}  # it may be the robot's: it has not told
+    graph.configured({"b3": ""})
+    assert graph.bridges == {"b3"}  # robots with namespaces of their own are behind it
+    graph.configured({"b3": "/robot2"})
+    assert graph.bridges == frozenset()
+
+
+def test_another_robots_silent_bridge_is_not_this_ones_doubt() -> None:
+    graph = Graph(KIOSK, "/robot1")
+    graph.apply(bridge_token("b1"), True)
+    graph.configured({"b1": "/robot1"})
+    graph.apply(bridge_token("b2"), True)
+    graph.answered({"b1": "v1"})
+    assert not graph.silent
+    graph.answered({})
+    assert graph.silent
+
+
+def test_without_a_namespace_to_tell_robots_apart_every_bridge_counts(graph: Graph) -> None:
+    graph.configured({BRIDGE: "/robot7"})
+    assert graph.bridges == {BRIDGE}

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 import pytest
 
 from app.interfaces import interfaces_of
-from app.logs import LEVELS, RosFormatter, RosoutHandler, configure, log_fields
+from app.logs import LEVELS, RobotLog, RosFormatter, RosoutHandler, configure, log_fields
 
 LINE = re.compile(r"\[(DEBUG|INFO|WARN|ERROR|FATAL)\] \[\d+\.\d{9}\] \[web_ui\]: ")
 
@@ -174,3 +174,16 @@ def test_rosout_gets_the_exception_and_half_a_surrogate_as_text() -> None:
     text = str(log_fields(record)["msg"])
     assert "it failed ?" in text
     assert "ValueError: the cause" in text
+
+
+def test_one_of_several_robots_is_named_and_has_its_log_to_itself() -> None:
+    first: list[Mapping[str, object]] = []
+    second: list[Mapping[str, object]] = []
+    logger = logging.getLogger("test.robots")
+    logger.propagate = False
+    logger.handlers = [RosoutHandler(first.append, "Robot 1"), RosoutHandler(second.append, "100 %")]
+    RobotLog(logger, "Robot 1").warning("bridge %s lost", "b1")
+    RobotLog(logger, "100 %").warning("bridge %s lost", "b2")
+    logger.warning("of all")
+    assert [fields["msg"] for fields in first] == ["Robot 1: bridge b1 lost", "of all"]
+    assert [fields["msg"] for fields in second] == ["100 %: bridge b2 lost", "of all"]

@@ -5,6 +5,7 @@ from collections.abc import Callable
 
 from prometheus_client.parser import text_string_to_metric_families
 
+from app.fleet import Fleet
 from app.keys import bridge_token
 from app.kiosk import Kiosk
 from app.link import config_to
@@ -18,7 +19,7 @@ NOWHERE = "tcp/127.0.0.1:1"
 
 
 def read(metrics: Metrics) -> Samples:
-    """(name, values of its labels) → value."""
+    """(name, values of its labels) → value; the one robot of these panels has no name."""
     families = text_string_to_metric_families(metrics.text().decode())
     samples = [sample for family in families for sample in family.samples]
     found = {(s.name, tuple(s.labels.values())): s.value for s in samples}
@@ -26,27 +27,31 @@ def read(metrics: Metrics) -> Samples:
     return found
 
 
+def nowhere() -> Fleet:
+    return Fleet(small_panel(), lambda _: config_to(NOWHERE), "r1")
+
+
 def of_kiosk(change: Callable[[Kiosk], None]) -> Samples:
     """What is read of a kiosk after a change."""
 
     async def followed() -> Samples:
-        kiosk = Kiosk(small_panel(), config_to(NOWHERE), "r1")
+        fleet = nowhere()
         try:
             metrics = Metrics()
-            metrics.follow(kiosk)
-            change(kiosk)
+            metrics.follow(fleet)
+            change(fleet.first)
             return read(metrics)
         finally:
-            await kiosk.stop()
+            await fleet.stop()
 
     return asyncio.run(followed())
 
 
 def test_a_kiosk_without_a_link_is_not_ready() -> None:
     samples = of_kiosk(lambda kiosk: None)
-    assert samples["kiosk_link_up", ()] == 0
-    assert samples["kiosk_bridges", ()] == 0
-    assert samples["kiosk_ready", ()] == 0
+    assert samples["kiosk_link_up", ("",)] == 0
+    assert samples["kiosk_bridges", ("",)] == 0
+    assert samples["kiosk_ready", ("",)] == 0
 
 
 def test_a_kiosk_that_can_send_is_ready() -> None:
@@ -56,9 +61,9 @@ def test_a_kiosk_that_can_send_is_ready() -> None:
         kiosk.robot.graph.apply(bridge_token(BRIDGE), True)
 
     samples = of_kiosk(connect)
-    assert samples["kiosk_link_up", ()] == 1
-    assert samples["kiosk_bridges", ()] == 1
-    assert samples["kiosk_ready", ()] == 1
+    assert samples["kiosk_link_up", ("",)] == 1
+    assert samples["kiosk_bridges", ("",)] == 1
+    assert samples["kiosk_ready", ("",)] == 1
 
 
 def test_samples_that_were_not_their_type_are_counted_by_key() -> None:
@@ -67,7 +72,7 @@ def test_samples_that_were_not_their_type_are_counted_by_key() -> None:
             kiosk.robot.take("heard", Sample(b"broken", seq, 0.0, 0.0, BRIDGE))
             kiosk.robot.reading("/heard")
 
-    assert of_kiosk(hear)["kiosk_undecodable_total", ("heard",)] == 2
+    assert of_kiosk(hear)["kiosk_undecodable_total", ("", "heard")] == 2
 
 
 def test_presses_are_counted_by_outcome() -> None:
@@ -90,16 +95,16 @@ def test_counts_go_on_when_the_panel_is_loaded_anew() -> None:
     async def followed() -> Samples:
         metrics = Metrics()
         for _ in range(2):
-            kiosk = Kiosk(small_panel(), config_to(NOWHERE), "r1")
-            metrics.follow(kiosk)
+            fleet = nowhere()
+            metrics.follow(fleet)
             metrics.presses.labels("published").inc()
-            await kiosk.stop()
-        kiosk.robot.link_up = True
+            await fleet.stop()
+        fleet.first.robot.link_up = True
         return read(metrics)
 
     samples = asyncio.run(followed())
     assert samples["kiosk_presses_total", ("published",)] == 2
-    assert samples["kiosk_link_up", ()] == 1
+    assert samples["kiosk_link_up", ("",)] == 1
 
 
 def test_two_applications_count_for_themselves() -> None:

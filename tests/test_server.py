@@ -221,7 +221,7 @@ def test_health_and_metrics(demo: Server) -> None:
     assert demo.http.get("/healthz").json() == {"status": "ok"}
     assert demo.http.get("/readyz").json() == {"status": "ready"}
     text = demo.http.get("/metrics").text
-    assert "kiosk_link_up 1.0" in text
+    assert 'kiosk_link_up{robot=""} 1.0' in text
     assert 'kiosk_presses_total{outcome="published"}' in text
 
 
@@ -327,7 +327,9 @@ def test_bytes_that_are_no_message_lock_and_are_counted(
         for _ in range(1000):
             peer.put("operation_enabled", b"\xff" * 50)
     assert kiosk.widget("operation1")["enabled"] is False
-    assert 'kiosk_undecodable_total{key="operation_enabled"}' in kiosk.http.get("/metrics").text
+    assert (
+        'kiosk_undecodable_total{key="operation_enabled",robot=""}' in kiosk.http.get("/metrics").text
+    )
     assert kiosk.process.text.count("[ERROR]") <= 2  # a line per topic and minute
     own_node.once("/operation_enabled", "std_msgs/msg/Bool", {"data": True})
     until(lambda: kiosk.widget("operation1")["enabled"], "a message opens again")

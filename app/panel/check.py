@@ -17,6 +17,7 @@ def faults_in(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = ()
 
     `faulty` are ids of widgets whose faults are told already: what depends on them is not judged.
     """
+    yield from _robots(panel)
     yield from _repeated("interlock", [i.id for i in panel.interlocks])
     for i, interlock in enumerate(panel.interlocks):
         yield from _interlock(f"interlock[{i}]", interlock, interfaces)
@@ -52,6 +53,20 @@ def faults_in(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = ()
                 case _:
                     yield from input_faults(place, widget)
     yield from _topics_of_two_kinds(panel)
+
+
+def _robots(panel: Panel) -> Iterator[Fault]:
+    """Several robots are told apart by id, by name and by where their topics are."""
+    yield from _repeated("robot", [robot.id for robot in panel.robots])
+    if panel.robots and panel.namespace:
+        yield Fault("namespace", "is of the one robot: with [[robot]] each has its own")
+    for r, robot in enumerate(panel.robots):
+        for a, above in enumerate(panel.robots[:r]):
+            if robot.name == above.name:
+                yield Fault(f"robot[{r}].name", f'"{robot.name}" is already the name of robot[{a}]')
+            if (robot.namespace, robot.connect) == (above.namespace, above.connect):
+                same = f"robot[{a}] has the same namespace and endpoints: it would be the same robot"
+                yield Fault(f"robot[{r}].namespace", same)
 
 
 def _repeated(table: str, ids: list[str]) -> Iterator[Fault]:

@@ -71,6 +71,9 @@ def _faults_of_the_rest(
                 faulty.add(stand_in["id"])
             case ("interfaces", *_):
                 return  # without its types nothing can be said of the rest
+            case ("robot", int(r), *_):
+                names = {"name": f"?{r}", "namespace": f"/faulty_{r}"}
+                mended["robot"][r] = {"id": _stand_in(tables["robot"][r], str(r))["id"], **names}
             case ("interlock", int(i), *_):
                 topic = {"topic": f"/faulty_{i}"}
                 mended["interlock"][i] = _stand_in(tables["interlock"][i], str(i)) | topic

@@ -114,6 +114,16 @@ KINDS: Final[Mapping[str, type[Placed]]] = {
 }
 
 
+class RobotEntry(Description):
+    """One of several robots that the panel is for; `connect` are the Zenoh endpoints where it is
+    reached, those of the Zenoh configuration where there are none."""
+
+    id: Id
+    name: Label
+    namespace: Annotated[str, AfterValidator(namespace_of)] = ""
+    connect: Annotated[tuple[Label, ...], Field(strict=False)] = ()
+
+
 class Page(Description):
     id: Id
     title: Label
@@ -128,6 +138,7 @@ class Panel(Description):
     interfaces: Annotated[tuple[Folder, ...], Field(strict=False)] = ()
     namespace: Annotated[str, AfterValidator(namespace_of)] = ""
     mm_per_px: Annotated[float, Field(gt=0.02, lt=1)] = 0.22
+    robots: Annotated[tuple[RobotEntry, ...], Field(strict=False)] = Field((), alias="robot")
     interlocks: Annotated[tuple[Interlock, ...], Field(strict=False)] = Field((), alias="interlock")
     pages: Annotated[tuple[Page, ...], Field(strict=False)] = Field(alias="page")
     # Of the file, not in it: changes when what a browser has loaded is out of date.

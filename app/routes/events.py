@@ -9,7 +9,7 @@ from fastapi.responses import Response
 from fastapi.sse import EventSourceResponse
 
 from app.board import Board, beat
-from app.routes.site import CurrentSite, Site
+from app.routes.site import CurrentKiosk, CurrentSite, Site
 from app.sentences import clock
 
 router = APIRouter()
@@ -26,9 +26,9 @@ HEADERS: Final = {"cache-control": "no-store", "x-accel-buffering": "no"}
     responses={200: {"content": {"text/event-stream": {}}}},
     summary="Server-sent events: snapshot, <interlock>-enabled-updated, update, link, beat",
 )
-async def events(site: CurrentSite, once: bool = False) -> Response:
+async def events(site: CurrentSite, kiosk: CurrentKiosk, once: bool = False) -> Response:
     """`once`: the snapshot alone, for a browser that has no stream to spare."""
-    board = site.kiosk.board
+    board = kiosk.board
     if once:
         both = board.snapshot() + beat(clock(time.time()))
         return Response(both, media_type="text/event-stream", headers=HEADERS)

@@ -14,13 +14,15 @@ async def healthz() -> dict[str, str]:
     return {"status": "ok"}
 
 
-@router.get("/readyz", summary="200 while commands can reach the robot, else 503 with the reason")
+@router.get("/readyz", summary="200 while commands can reach every robot, else 503 with the reason")
 async def readyz(site: CurrentSite) -> Response:
-    way = site.kiosk.way
-    if way.permitted:
+    bad = [kiosk for kiosk in site.fleet.kiosks if not kiosk.way.permitted]
+    if not bad:
         return JSONResponse({"status": "ready"})
-    body = {"status": "not ready", "code": way.code, "reason": way.reason}
-    return JSONResponse(body, status_code=503)
+    way = bad[0].way
+    body: dict[str, object] = {"status": "not ready", "code": way.code, "reason": way.reason}
+    robots = {kiosk.entry.id: kiosk.way.code for kiosk in site.fleet.kiosks if kiosk.entry}
+    return JSONResponse(body | ({"robots": robots} if robots else {}), status_code=503)
 
 
 @router.get("/metrics", summary="Prometheus text format")

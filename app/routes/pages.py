@@ -5,7 +5,7 @@ import time
 from typing import Any, TypedDict
 
 from fastapi import APIRouter, Request
-from fastapi.responses import HTMLResponse, Response
+from fastapi.responses import HTMLResponse, RedirectResponse, Response
 
 from app.errors import NotFound
 from app.panel.model import Input, Page, Panel
@@ -28,6 +28,8 @@ class PageContext(TypedDict):
     site: Site
     panel: Panel
     page: Page
+    base: str
+    robot: str
     view: View
     event_id: str
     revision: str
@@ -45,25 +47,40 @@ class PageContext(TypedDict):
 
 @router.get("/", response_class=HTMLResponse, summary="The first page of the panel")
 async def first_page(request: Request, site: CurrentSite) -> Response:
-    return _render(request, site, site.kiosk.panel.pages[0])
+    if away := _to_a_robot(request, site, "/"):
+        return away
+    return _render(request, site, site.fleet.panel.pages[0])
 
 
 @router.get("/pages/{page}", response_class=HTMLResponse, summary="A page of the panel")
 async def named_page(page: str, request: Request, site: CurrentSite) -> Response:
-    found = site.kiosk.panel.page(page)
+    if away := _to_a_robot(request, site, f"/pages/{page}"):
+        return away
+    found = site.fleet.panel.page(page)
     if found is None:
         raise NotFound(f'there is no page "{page}"')
     return _render(request, site, found)
 
 
+def _to_a_robot(request: Request, site: Site, path: str) -> Response | None:
+    """Where there are several robots each page is of one: without a name, of the first."""
+    first = site.fleet.first.base
+    if not first or "robot" in request.path_params:
+        return None
+    return RedirectResponse(first + path, status_code=303)
+
+
 def _render(request: Request, site: Site, page: Page) -> Response:
-    board = site.kiosk.board
+    kiosk = site.fleet.kiosk(request.path_params.get("robot"))
+    board = kiosk.board
     typed = any(isinstance(widget, Input) for widget in page.widgets)
-    receipt = site.kiosk.presses.receipt(request.query_params.get("receipt", ""))
+    receipt = kiosk.presses.receipt(request.query_params.get("receipt", ""))
     context = PageContext(
         site=site,
-        panel=site.kiosk.panel,
+        panel=site.fleet.panel,
         page=page,
+        base=kiosk.base,
+        robot=kiosk.entry.id if kiosk.entry else "",
         view=board.view,
         event_id=board.id,
         revision=board.revision,
@@ -71,7 +88,7 @@ def _render(request: Request, site: Site, page: Page) -> Response:
         press_id=secrets.token_hex(8),
         receipt=receipt,
         inputs=dict(receipt.inputs) if receipt else {},
-        words={"cancel": say("cancel")},
+        words={"cancel": say("cancel"), "robots": say("robots"), "base": kiosk.base},
         lost=say("server_lost"),
         lost_short=say("lost"),
         unknown=say("unknown"),
@@ -80,13 +97,3 @@ def _render(request: Request, site: Site, page: Page) -> Response:
     )
     html = site.templates.get_template("screen.html").render(**context)
     return HTMLResponse(html, headers={"cache-control": "no-store"})
-
-
-@router.get("/static/{revision}/{name}", include_in_schema=False)
-async def static(revision: str, name: str, site: CurrentSite) -> Response:
-    asset = site.assets.files.get(name)
-    if asset is None:
-        raise NotFound(f'there is no file "{name}"')
-    fits = revision == site.assets.revision
-    caching = "public, max-age=31536000, immutable" if fits else "no-store"
-    return Response(asset.content, media_type=asset.media_type, headers={"cache-control": caching})

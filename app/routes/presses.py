@@ -12,8 +12,9 @@ from fastapi.responses import JSONResponse, RedirectResponse, Response
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, JsonValue, ValidationError
 
 from app.errors import InputError
+from app.kiosk import Kiosk
 from app.presses import Receipt
-from app.routes.site import CurrentSite, Site
+from app.routes.site import CurrentKiosk, CurrentSite, Site
 
 router = APIRouter()
 
@@ -60,19 +61,18 @@ class ReceiptAnswer(BaseModel):
         }
     },
 )
-async def press(widget: str, request: Request, site: CurrentSite) -> Response:
-    site.kiosk.presses.widget(widget)
+async def press(widget: str, request: Request, site: CurrentSite, kiosk: CurrentKiosk) -> Response:
+    kiosk.presses.widget(widget)
     who = request.client.host if request.client else "unknown"
     body = await request.body()
     kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
     if kind == "application/json":
         given = _json(body)
         press_id = given.id or secrets.token_hex(8)
-        if given.seen and given.seen.partition("-")[0] != site.kiosk.board.boot:
-            code = "seen_before_restart"
-            receipt = site.kiosk.presses.refuse(widget, given.inputs, press_id, code)
+        if code := _doubt(site, kiosk, given.seen):
+            receipt = kiosk.presses.refuse(widget, given.inputs, press_id, code)
         else:
-            receipt = await site.kiosk.press(widget, given.inputs, press_id, who)
+            receipt = await kiosk.press(widget, given.inputs, press_id, who)
         _count(site, receipt)
         return JSONResponse(receipt.as_json(), status_code=STATUS[receipt.cause])
     if kind == "application/x-www-form-urlencoded":
@@ -82,10 +82,10 @@ async def press(widget: str, request: Request, site: CurrentSite) -> Response:
         if not re.fullmatch(PRESS_ID, page_id):
             raise InputError(f'_id: "{page_id:.40}" is not the id of a press')
         press_id = f"{page_id}.{widget}"
-        values = site.kiosk.presses.typed(inputs)
-        receipt = await site.kiosk.press(widget, values, press_id, who)
+        values = kiosk.presses.typed(inputs)
+        receipt = await kiosk.press(widget, values, press_id, who)
         _count(site, receipt)
-        return RedirectResponse(_page_with(site, receipt), status_code=303)
+        return RedirectResponse(_page_with(kiosk, receipt), status_code=303)
     raise InputError(
         f'a press is "application/json" or "application/x-www-form-urlencoded", not "{kind}"'
     )
@@ -97,13 +97,22 @@ async def press(widget: str, request: Request, site: CurrentSite) -> Response:
     summary="Ask the robot to cancel an action's goal",
     responses={303: {"description": "a form post"}, 409: {"model": ReceiptAnswer}},
 )
-async def cancel(widget: str, request: Request, site: CurrentSite) -> Response:
+async def cancel(widget: str, request: Request, site: CurrentSite, kiosk: CurrentKiosk) -> Response:
     who = request.client.host if request.client else "unknown"
-    receipt = await site.kiosk.presses.cancel(widget, who)
+    receipt = await kiosk.presses.cancel(widget, who)
     _count(site, receipt)
     if request.headers.get("content-type", "").startswith("application/x-www-form-urlencoded"):
-        return RedirectResponse(_page_with(site, receipt), status_code=303)
+        return RedirectResponse(_page_with(kiosk, receipt), status_code=303)
     return JSONResponse(receipt.as_json(), status_code=STATUS[receipt.cause])
+
+
+def _doubt(site: Site, kiosk: Kiosk, seen: str | None) -> str:
+    """Why what the browser had seen can't be what this press is meant for; "" if it can."""
+    boot = (seen or "").partition("-")[0]
+    if not boot or boot == kiosk.board.boot:
+        return ""
+    others = (other.board.boot for other in site.fleet.kiosks)
+    return "seen_on_another" if boot in others else "seen_before_restart"
 
 
 def _count(site: Site, receipt: Receipt) -> None:
@@ -145,8 +154,8 @@ def _form(body: bytes) -> dict[str, str]:
     return inputs
 
 
-def _page_with(site: Site, receipt: Receipt) -> str:
+def _page_with(kiosk: Kiosk, receipt: Receipt) -> str:
     """Where the receipt is shown: on the page of its widget."""
-    pages = site.kiosk.panel.pages
+    pages = kiosk.panel.pages
     page = next(p for p in pages if any(w.id == receipt.widget for w in p.widgets))
-    return f"/pages/{page.id}?receipt={quote(receipt.id)}"
+    return f"{kiosk.base}/pages/{page.id}?receipt={quote(receipt.id)}"

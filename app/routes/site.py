@@ -3,22 +3,23 @@
 from dataclasses import dataclass
 from typing import Annotated
 
-from fastapi import Depends, Request
+from fastapi import Depends, Path, Request
 from fastapi.responses import HTMLResponse, JSONResponse, Response
 from jinja2 import Environment
 from starlette.exceptions import HTTPException
 
 from app.assets import Assets
 from app.errors import KioskError
+from app.fleet import Fleet
 from app.kiosk import Kiosk
 from app.metrics import Metrics
 
 
 @dataclass(slots=True)
 class Site:
-    """All that a request needs; in development `kiosk` and `assets` are replaced together."""
+    """All that a request needs; in development `fleet` and `assets` are replaced together."""
 
-    kiosk: Kiosk
+    fleet: Fleet
     assets: Assets
     templates: Environment
     metrics: Metrics
@@ -37,12 +38,23 @@ async def _current(request: Request) -> Site:
 CurrentSite = Annotated[Site, Depends(_current)]
 
 
+async def _of_robot(request: Request) -> Kiosk:
+    return site_of(request).fleet.kiosk(request.path_params.get("robot"))
+
+
+CurrentKiosk = Annotated[Kiosk, Depends(_of_robot)]
+
+
+async def named_robot(robot: Annotated[str, Path(description="The id of a [[robot]]")]) -> None:
+    """What every path of one of several robots has in it."""
+
+
 def error_answer(request: Request, status: int, message: str) -> Response:
     """An error for whom it is: a page for who reads pages, JSON for programs."""
     site = site_of(request)
     if "text/html" not in request.headers.get("accept", ""):
         return JSONResponse({"error": message}, status_code=status)
-    context = {"site": site, "panel": site.kiosk.panel, "status": status, "message": message}
+    context = {"site": site, "panel": site.fleet.panel, "status": status, "message": message}
     html = site.templates.get_template("error.html").render(**context)
     return HTMLResponse(html, status_code=status, headers={"cache-control": "no-store"})
 

@@ -54,6 +54,15 @@ function showLink(lamps) {
   }
 }
 
+// How each of several robots is, on its tab.
+function showRobots(robots) {
+  for (const [id, lamp] of Object.entries(robots)) {
+    const tab = document.querySelector(`[data-robot="${id}"]`);
+    tab.dataset.state = lamp.state;
+    setText(tab.querySelector("b"), lamp.text);
+  }
+}
+
 function showNotice(notice) {
   for (const [id, text] of Object.entries(notice)) {
     const element = document.getElementById(id);
@@ -69,6 +78,10 @@ function lockAll() {
     const server = lamp.dataset.lamp === "server";
     lamp.dataset.state = server ? "bad" : "wait";
     setText(lamp.querySelector("b"), server ? body.dataset.lostShort : body.dataset.unknown);
+  }
+  for (const tab of document.querySelectorAll("[data-robot]")) {
+    tab.dataset.state = "wait";
+    setText(tab.querySelector("b"), body.dataset.unknown);
   }
   for (const root of widgets.values()) {
     const buttons = root.querySelectorAll("button[type=submit]");
@@ -97,10 +110,12 @@ const source = new Source({
     showWidgets(all.widgets);
     showLink(all.link);
     showNotice(all.notice);
+    showRobots(all.robots);
   },
   update: showWidgets,
   link: showLink,
   notice: showNotice,
+  robots: showRobots,
   beat: ({ clock }) => setText(document.getElementById("clock"), clock),
   lost: lockAll,
 });

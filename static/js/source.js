@@ -7,7 +7,8 @@ const POLL_MS = 700;
 const OPEN_AGAIN_MS = 3000;
 // A browser opens six connections to one server; pages and presses need some of them.
 const STREAMS_PER_BROWSER = 3;
-const EVENTS = ["snapshot", "update", "link", "notice", "beat"];
+const EVENTS = ["snapshot", "update", "link", "notice", "robots", "beat"];
+const BASE = document.body.dataset.base; // of the robot that this page shows
 
 export class Source {
   #on;
@@ -91,7 +92,7 @@ export class Source {
   }
 
   #listen() {
-    this.#stream = new EventSource("/events");
+    this.#stream = new EventSource(`${BASE}/events`);
     for (const name of EVENTS) {
       this.#stream.addEventListener(name, (event) => this.#got(name, event.data, event.lastEventId));
     }
@@ -112,7 +113,7 @@ export class Source {
     const asked = performance.now();
     const turn = this.#turn;
     try {
-      const answer = await fetch("/events?once=1", { cache: "no-store", signal: AbortSignal.timeout(SILENCE_MS) });
+      const answer = await fetch(`${BASE}/events?once=1`, { cache: "no-store", signal: AbortSignal.timeout(SILENCE_MS) });
       const text = await answer.text();
       if (turn !== this.#turn) return;
       for (const [, name, data, id] of text.matchAll(/^event: (.*)\ndata: (.*)\n(?:id: (.*)\n)?/gm)) {

@@ -1,0 +1,93 @@
+"""The robots of one panel: each has a kiosk of its own, with its own link, state and presses.
+
+They share nothing that can fail: a lost bridge, a renewed session or a flood is one robot's. Each
+page shows how the others are.
+"""
+
+import asyncio
+import logging
+from collections.abc import Callable, Mapping
+
+from app.errors import NotFound
+from app.kiosk import Kiosk
+from app.link import Config
+from app.panel.model import Panel, RobotEntry
+from app.views import Lamp
+
+log = logging.getLogger("kiosk.fleet")
+
+ConfigOf = Callable[[RobotEntry | None], Config]
+
+
+class Fleet:
+    """Opened by `start`, closed by `stop`."""
+
+    def __init__(
+        self,
+        panel: Panel,
+        config_of: ConfigOf,
+        revision: str,
+        *,
+        simulated: bool = False,
+        fault: str = "",
+    ) -> None:
+        """One robot without a name, or the panel's `[[robot]]` entries."""
+        self.panel = panel
+        self.fault = fault
+        self._kiosks: dict[str | None, Kiosk] = {}
+        for entry in panel.robots or (None,):
+            self._kiosks[entry.id if entry else None] = Kiosk(
+                panel,
+                config_of(entry),
+                revision,
+                entry=entry,
+                robots=self._lamps,
+                told=self._tell_others,
+                simulated=simulated,
+                fault=fault,
+            )
+
+    async def start(self) -> None:
+        """Opens every link; whether anybody is there shows later."""
+        for kiosk in self.kiosks:
+            await kiosk.start()
+
+    async def stop(self) -> None:
+        """Ends the streams and the sessions of all."""
+        self.close_streams()
+        await asyncio.gather(*(kiosk.stop() for kiosk in self.kiosks))
+
+    def close_streams(self) -> None:
+        for kiosk in self.kiosks:
+            kiosk.board.close()
+
+    def show_fault(self, text: str) -> None:
+        """A fault of the panel file, shown on every page; "" takes it away."""
+        self.fault = text
+        for kiosk in self.kiosks:
+            kiosk.show_fault(text)
+
+    @property
+    def kiosks(self) -> list[Kiosk]:
+        return list(self._kiosks.values())
+
+    @property
+    def first(self) -> Kiosk:
+        return self.kiosks[0]
+
+    def kiosk(self, robot: str | None) -> Kiosk:
+        """The kiosk of a robot; None is the one without a name. NotFound says which there are."""
+        if robot in self._kiosks:
+            return self._kiosks[robot]
+        if robot is None:
+            raise NotFound(f"this panel has several robots: begin with {self.first.base}/")
+        known = ", ".join(str(name) for name in self._kiosks if name) or "one robot without a name"
+        raise NotFound(f'there is no robot "{robot:.64}" on this panel; there is {known}')
+
+    def _lamps(self) -> Mapping[str, Lamp]:
+        return {entry: kiosk.lamp for entry, kiosk in self._kiosks.items() if entry is not None}
+
+    def _tell_others(self, which: Kiosk) -> None:
+        for kiosk in self.kiosks:
+            if kiosk is not which:
+                kiosk.show()

@@ -1,0 +1,254 @@
+"""One kiosk for several robots: each press reaches the one that was on the screen, and no other."""
+
+import sys
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from app.errors import PanelError
+from app.panel import load_panel
+from tests.parts import ROOT, Bridge, Process, RosNode, Server, free_port, has_heard, live, until
+
+MANY = 10
+PANEL = (ROOT / "app/panel.toml").read_text()
+TEXT = "std_msgs/msg/String"
+
+
+def panel_file(folder: Path, *robots: str) -> Path:
+    """The shipped panel, for several robots: their tables without the heading."""
+    tables = "".join(f"[[robot]]\n{robot}\n" for robot in robots)
+    path = folder / "robots.toml"
+    path.write_text(
+        PANEL.replace('namespace = ""\n', "").replace("[[interlock]]", f"{tables}[[interlock]]", 1)
+    )
+    return path
+
+
+def entry(number: int, connect: str = "") -> str:
+    where = f'connect = ["{connect}"]\n' if connect else ""
+    return f'id = "r{number}"\nname = "Robot {number}"\nnamespace = "/robot{number}"\n{where}'
+
+
+@pytest.fixture(scope="module")
+def ten(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    """Ten demo robots behind one server."""
+    folder = tmp_path_factory.mktemp("ten")
+    path = panel_file(folder, *(entry(number + 1) for number in range(MANY)))
+    mine = Server(ROOT, KIOSK_PANEL=str(path))
+    until(mine.ready, "every robot is ready", within_s=30)
+    yield mine
+    mine.end()
+
+
+def heard(server: Server) -> str:
+    return str(server.widget("last_heard")["text"])
+
+
+def shows(server: Server, text: str) -> bool:
+    return heard(server) == text
+
+
+def permitted(server: Server) -> bool:
+    return bool(server.widget("operation1")["enabled"])
+
+
+def test_ten_robots_hear_each_what_was_pressed_for_it(ten: Server) -> None:
+    robots = [ten.robot(f"r{number + 1}") for number in range(MANY)]
+    for number, robot in enumerate(robots):
+        assert robot.press("operation", f"for {number}").json()["outcome"] == "published"
+    for number, robot in enumerate(robots):
+        wanted = f"for {number} (/operation)"
+        until(partial(shows, robot, wanted), f"robot {number} heard it")
+
+
+def test_a_page_is_of_one_robot_and_leads_to_the_others(ten: Server) -> None:
+    html = ten.http.get("/robots/r3/pages/operation").text
+    assert "Robot cell 1 – Robot 3" in html
+    assert 'formaction="/robots/r3/widgets/operation"' in html
+    assert 'formaction="/widgets/' not in html
+    for number in range(1, MANY + 1):
+        assert f'href="/robots/r{number}/pages/operation"' in html
+
+
+@pytest.mark.parametrize("path", ["/", "/pages/operation"])
+def test_a_page_without_a_robot_leads_to_the_first(ten: Server, path: str) -> None:
+    answer = ten.http.get(path)
+    assert (answer.status_code, answer.headers["location"]) == (303, f"/robots/r1{path}")
+
+
+def test_nothing_is_pressed_for_an_unnamed_robot(ten: Server) -> None:
+    answer = ten.press("operation", "whose?")
+    assert answer.status_code == 404
+    assert "several robots: begin with /robots/r1/" in answer.json()["error"]
+    unknown = ten.robot("r99").press("operation", "whose?")
+    assert unknown.status_code == 404
+    assert 'no robot "r99"' in unknown.json()["error"]
+    for number in range(MANY):
+        assert "whose?" not in heard(ten.robot(f"r{number + 1}"))
+
+
+def test_a_press_by_what_another_robots_page_showed_is_refused(ten: Server) -> None:
+    seen = ten.robot("r1").snapshot()["id"]
+    answer = ten.robot("r2").press("operation", "not this one", seen=seen)
+    assert (answer.status_code, answer.json()["outcome"]) == (409, "refused")
+    assert "another robot" in answer.json()["reason"]
+    assert ten.robot("r1").press("operation", "this one", seen=seen).status_code == 200
+
+
+def test_a_form_leads_back_to_its_robot(ten: Server) -> None:
+    answer = ten.http.post("/robots/r4/widgets/operation", data={"message": "by form"})
+    assert answer.status_code == 303
+    assert answer.headers["location"].startswith("/robots/r4/pages/operation?receipt=")
+    assert "Sent" in ten.http.get(answer.headers["location"]).text
+
+
+def test_ten_robots_fit_the_screen(ten: Server, page: Page) -> None:
+    page.set_viewport_size({"width": 1024, "height": 600})
+    page.goto(f"{ten.url}/robots/r10/")
+    tabs = page.locator("[data-robot]")
+    expect(tabs).to_have_count(MANY)
+    for tab in tabs.all():
+        box = tab.bounding_box()
+        assert box is not None
+        assert box["width"] >= 20 / 0.22  # millimetres
+        assert box["height"] >= 62  # as a text field has
+        name = tab.locator("span")
+        assert name.evaluate("e => e.scrollWidth <= e.clientWidth"), name.text_content()
+    last = page.get_by_role("button", name="Publish2").bounding_box()
+    assert last is not None
+    assert last["y"] + last["height"] < 500
+    page.get_by_role("link", name="Robot 7").click()
+    expect(page.locator("h1")).to_have_text("Robot cell 1 – Robot 7")
+    page.get_by_label("Message").fill("from the screen")
+    page.get_by_role("button", name="Publish", exact=True).click()
+    expect(page.locator('[data-widget="last_heard"]')).to_contain_text("from the screen (/operation)")
+    assert "from the screen" not in heard(ten.robot("r10"))
+
+
+@pytest.fixture
+def two(
+    domain: int, tmp_path: Path, servers: Callable[[Server], Server]
+) -> Iterator[tuple[Server, list[Bridge], list[RosNode]]]:
+    """Two robots, each on a domain of its own behind a bridge of its own."""
+    bridges = [Bridge(domain + 53 + n, f"/robot{n + 1}") for n in range(2)]
+    nodes = []
+    try:
+        for bridge in bridges:
+            bridge.start()
+            nodes.append(RosNode(bridge.domain))
+            nodes[-1].subscribe("/operation1", TEXT)
+            nodes[-1].advertise(
+                "/operation_enabled", "std_msgs/msg/Bool", durability="transient_local", depth=1
+            )
+        path = panel_file(tmp_path, *(entry(n + 1, b.endpoint) for n, b in enumerate(bridges)))
+        kiosk = servers(live("tcp/127.0.0.1:1", tmp_path, KIOSK_PANEL=str(path)))
+        until(kiosk.ready, "both robots are ready", within_s=20)
+        yield kiosk, bridges, nodes
+    finally:
+        for node in nodes:
+            node.end()
+        for bridge in bridges:
+            bridge.end()
+
+
+def test_each_of_two_robots_has_its_own_bridge_permission_and_presses(
+    two: tuple[Server, list[Bridge], list[RosNode]], page: Page
+) -> None:
+    kiosk, bridges, nodes = two
+    first, second = kiosk.robot("r1"), kiosk.robot("r2")
+    nodes[0].publish("/operation_enabled", {"data": True})
+    until(lambda: first.widget("operation1")["enabled"], "the first permits")
+    assert "waiting for" in second.widget("operation1")["reason"]
+    assert second.press("operation1", "no").status_code == 409
+    assert first.press("operation1", "one").json()["outcome"] == "published"
+    nodes[1].publish("/operation_enabled", {"data": True})
+    until(lambda: second.widget("operation1")["enabled"], "the second permits")
+    assert second.press("operation1", "two").json()["outcome"] == "published"
+    until(lambda: all(has_heard(node, "/operation1", 1) for node in nodes), "both heard")
+    assert [node.heard_data("/operation1") for node in nodes] == [["one"], ["two"]]
+
+    page.goto(f"{kiosk.url}/robots/r2/")
+    lost, there = page.locator('[data-robot="r1"]'), page.locator('[data-robot="r2"]')
+    expect(lost).to_have_attribute("data-state", "ok")
+    bridges[0].kill()
+    expect(lost).to_have_attribute("data-state", "bad")
+    expect(there).to_have_attribute("data-state", "ok")
+    expect(page.get_by_role("button", name="Publish1")).to_be_enabled()
+    assert first.press("operation1", "late").status_code == 503
+    assert kiosk.http.get("/readyz").json()["robots"] == {"r1": "no_link", "r2": "permitted"}
+    bridges[0].start()
+    until(lambda: "waiting" in (first.widget("operation1")["reason"] or ""), "joined again", 20)
+    assert second.widget("operation1")["enabled"]
+    assert nodes[0].heard_data("/operation1") == ["one"]
+
+
+def test_a_frozen_bridge_of_one_robot_locks_that_robot_only(
+    two: tuple[Server, list[Bridge], list[RosNode]],
+) -> None:
+    kiosk, bridges, nodes = two
+    robots = [kiosk.robot("r1"), kiosk.robot("r2")]
+    for node, robot in zip(nodes, robots, strict=True):
+        node.publish("/operation_enabled", {"data": True})
+        until(partial(permitted, robot), "permitted")
+    bridges[1].freeze()
+    until(lambda: not robots[1].widget("operation1")["enabled"], "locked", 5)
+    assert robots[0].widget("operation1")["enabled"]
+    bridges[1].thaw()
+    nodes[1].publish("/operation_enabled", {"data": False})
+    until(lambda: "does not permit" in (robots[1].widget("operation1")["reason"] or ""), "heard", 20)
+    assert robots[0].widget("operation1")["enabled"]
+
+
+def test_one_bridge_may_carry_robots_with_namespaces_of_their_own(
+    bridge: Bridge, node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    for topic in ("/robot1/operation", "/robot2/operation"):
+        node.subscribe(topic, TEXT)
+    path = panel_file(tmp_path, entry(1), entry(2))
+    kiosk = servers(live(bridge.endpoint, tmp_path, KIOSK_PANEL=str(path)))
+    until(kiosk.ready, "ready", within_s=20)
+    assert kiosk.robot("r2").press("operation", "second").json()["outcome"] == "published"
+    until(lambda: has_heard(node, "/robot2/operation", 1), "the second heard it")
+    assert node.heard("/robot1/operation") == []
+
+
+def test_a_bridge_with_another_namespace_is_not_this_robots(
+    domain: int, tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    other = Bridge(domain + 53, "/robot2")
+    other.start()
+    try:
+        path = panel_file(tmp_path, entry(1), entry(2))
+        kiosk = servers(live(other.endpoint, tmp_path, KIOSK_PANEL=str(path)))
+        until(lambda: kiosk.robot("r2").widget("operation")["enabled"], "the bridge of robot 2", 20)
+        reason = kiosk.robot("r1").widget("operation")["reason"]
+        assert "no ROS 2 bridge of its namespace" in reason
+        assert kiosk.robot("r1").press("operation", "whose?").status_code == 503
+    finally:
+        other.end()
+
+
+def test_the_panel_file_says_what_is_wrong_with_its_robots(tmp_path: Path) -> None:
+    path = panel_file(tmp_path, entry(1), entry(1), 'id = "r3"\nname = "R3"\nnamespace = "a b"')
+    with pytest.raises(PanelError) as caught:
+        load_panel(path)
+    text = str(caught.value)
+    assert 'robot[2].namespace: "a b" is not a ROS 2 namespace' in text
+    assert 'robot[1].id: "r1" is already the id of robot[0]' in text
+    assert 'robot[1].name: "Robot 1" is already the name of robot[0]' in text
+    assert "robot[1].namespace: robot[0] has the same namespace and endpoints" in text
+
+
+def test_an_endpoint_that_is_none_ends_the_start_in_words(tmp_path: Path) -> None:
+    path = panel_file(tmp_path, entry(1, "robot1:7447"))
+    command = [sys.executable, "-m", "uvicorn", "app.main:app", "--port", str(free_port())]
+    kiosk = Process(command, {"KIOSK_PANEL": str(path), "KIOSK_MODE": "live"}, cwd=ROOT)
+    try:
+        assert kiosk.wait(15) != 0
+    finally:
+        kiosk.end()
+    assert "a Zenoh endpoint is like tcp/robot1:7447" in kiosk.text
+    assert "Traceback" not in kiosk.text
