@@ -7,11 +7,14 @@ the difference to the newest. Streams that are equally far share the same prepar
 import asyncio
 import json
 import secrets
+import time
 from collections.abc import Mapping
 from typing import Any
 
 from fastapi.sse import format_sse_event
 
+from app import moments
+from app.sentences import clock
 from app.views import View
 
 
@@ -27,6 +30,7 @@ class Board:
         self._changed = asyncio.Event()
         self._prepared: dict[int, bytes] = {}
         self._snapshot: bytes | None = None
+        self._turned: dict[str, int] = {}
         self.closed = False
 
     @property
@@ -38,11 +42,18 @@ class Board:
         """A view as of now; nothing happens if it is the same as before."""
         if view == self.view:
             return
-        self.view = view
         self.version += 1
+        for name, attributes in view["widgets"].items():
+            if attributes.get("enabled") != self.view["widgets"].get(name, {}).get("enabled"):
+                self._turned[name] = self.version
+        self.view = view
         self._prepared = {}
         self._snapshot = None
         self._wake()
+
+    def turned(self, widget: str) -> int:
+        """The version in which a widget's lock has last closed or opened; 0 if it never has."""
+        return self._turned.get(widget, 0)
 
     def close(self) -> None:
         """Ends every stream."""
@@ -105,9 +116,13 @@ class Board:
         return format_sse_event(event=name, data_str=text, id=self.id)
 
 
-def beat(text: str) -> bytes:
-    """The heartbeat: a page that misses it locks itself. It has no id: nothing has changed."""
-    return format_sse_event(event="beat", data_str=json.dumps({"clock": text}))
+def beat() -> bytes:
+    """The heartbeat: a page that misses it locks itself. It has no id: nothing has changed.
+
+    `clock` is to be shown; `now` is the server's own time, in milliseconds.
+    """
+    data = {"clock": clock(time.time()), "now": round(moments.now() * 1000)}
+    return format_sse_event(event="beat", data_str=json.dumps(data))
 
 
 def _changed(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from typing import Any, Final
 
-from app import keys
+from app import keys, moments
 from app.actions import Actions
 from app.board import Board
 from app.calls import Calls
@@ -25,12 +25,14 @@ from app.logs import RobotLog, RosoutHandler
 from app.panel.model import Panel, RobotEntry
 from app.presses import Presses, Receipt
 from app.robot import Robot
+from app.sentences import say
 from app.views import Lamp, Sight, sight
 
 log = logging.getLogger("kiosk")
 
 FRAMES_PER_S: Final = 20.0
 RENEW_AGAIN_S: Final = 1.0
+AHEAD_S: Final = 1.0  # a press can't be from later than now, but for rounding and drift
 
 
 class Kiosk:
@@ -110,10 +112,35 @@ class Kiosk:
         """Whether commands can reach the robot now."""
         return way(self.robot, time.monotonic())
 
-    async def press(self, widget: str, inputs: Mapping[str, Any], press_id: str, who: str) -> Receipt:
-        """A press, judged by all that has come from the robot until now."""
+    async def press(
+        self,
+        widget: str,
+        inputs: Mapping[str, Any],
+        press_id: str,
+        who: str,
+        version: int | None = None,
+        at: float | None = None,
+    ) -> Receipt:
+        """A press, judged by all that has come from the robot until now.
+
+        `version` is of the board that the operator saw, `at` when it was pressed, in the server's
+        own time; None where that is not known.
+        """
         self._take()
-        return await self.presses.press(widget, inputs, press_id, who)
+
+        def doubt() -> str:
+            return self._doubt(widget, version, at)
+
+        return await self.presses.press(widget, inputs, press_id, who, doubt)
+
+    def _doubt(self, widget: str, version: int | None, at: float | None) -> str:
+        """Why a press is no longer what was meant; "" if it is."""
+        if version is not None and version < self.board.turned(widget):
+            return say("changed_meanwhile")
+        age = 0.0 if at is None else moments.now() - at
+        if age > self.panel.press_expires_s:
+            return say("expired", seconds=f"{age:.1f}")
+        return say("ahead") if age < -AHEAD_S else ""
 
     def renew(self) -> None:
         """A new Zenoh session: until it is joined, nobody is known to be there."""

@@ -80,6 +80,11 @@ class _UnderWay:
     receipt: "asyncio.Future[Receipt]"
 
 
+def no_doubt() -> str:
+    """Of who does not say what was seen, and when it was pressed."""
+    return ""
+
+
 class Presses:
     """Presses of one panel, with their receipts by press id."""
 
@@ -125,17 +130,23 @@ class Presses:
         return self._receipts.get(press_id)
 
     async def press(
-        self, widget_id: str, inputs: Mapping[str, Any], press_id: str, who: str
+        self,
+        widget_id: str,
+        inputs: Mapping[str, Any],
+        press_id: str,
+        who: str,
+        doubt: Callable[[], str] = no_doubt,
     ) -> Receipt:
         """Sends what the widget is for, or refuses. The same id again is the same press.
 
-        `who` is whom the log names. Until something is sent nothing here waits, so that no second
+        `who` is whom the log names; `doubt` says why what the operator saw no longer holds, in the
+        moment of sending. Until something is sent nothing here waits, so that no second
         press comes between.
         """
         widget = self.widget(widget_id)
         known = self._under_way.get(press_id) or self._receipts.get(press_id)
         if known is None:
-            return await self._first(widget, inputs, press_id, who)
+            return await self._first(widget, inputs, press_id, who, doubt)
         if (known.widget, known.inputs) != (widget_id, inputs):
             reused = say("press_reused", id=press_id)
             self._log.warning("press %s of %s by %s: %s", press_id, widget_id, who, reused)
@@ -168,13 +179,18 @@ class Presses:
         return self._receipt(widget, {}, "", answer.outcome, answer.text, cause)
 
     async def _first(
-        self, widget: Pressed, inputs: Mapping[str, Any], press_id: str, who: str
+        self,
+        widget: Pressed,
+        inputs: Mapping[str, Any],
+        press_id: str,
+        who: str,
+        doubt: Callable[[], str],
     ) -> Receipt:
         loop = asyncio.get_running_loop()
         under_way = _UnderWay(widget.id, dict(inputs), loop.create_future())
         self._under_way[press_id] = under_way
         try:
-            receipt = await self._pressed(widget, inputs, press_id)
+            receipt = await self._pressed(widget, inputs, press_id, doubt)
         except BaseException as error:
             under_way.receipt.set_exception(error)
             under_way.receipt.exception()  # who else waited is told; nobody needs to have
@@ -200,7 +216,13 @@ class Presses:
                 old, outcome=answer.outcome, reason=answer.text, cause=""
             )
 
-    async def _pressed(self, widget: Pressed, inputs: Mapping[str, Any], press_id: str) -> Receipt:
+    async def _pressed(
+        self,
+        widget: Pressed,
+        inputs: Mapping[str, Any],
+        press_id: str,
+        doubt: Callable[[], str],
+    ) -> Receipt:
         def receipt(answer: Answer, cause: Cause = "") -> Receipt:
             return self._receipt(widget, inputs, press_id, answer.outcome, answer.text, cause)
 
@@ -213,6 +235,8 @@ class Presses:
         if not verdict.permitted:
             cause: Cause = "link" if verdict.code in NO_WAY else "interlock"
             return refused("refused", verdict.reason or "", cause)
+        if why := doubt():
+            return refused("refused", why, "interlock")
         try:
             values = self._checked(widget, inputs)
             answer = await self._sent(widget, filled(widget.template, values), press_id)

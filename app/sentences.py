@@ -57,6 +57,9 @@ ENGLISH: Final[Mapping[str, str]] = {
     "cancel_sent": "The robot was asked to cancel at {time}.",
     "cancel_refused": "The robot did not cancel it at {time}.",
     "nothing_to_cancel": "there is nothing under way to cancel",
+    "changed_meanwhile": "it changed while you pressed.",
+    "expired": "it took {seconds} s to get here: press again.",
+    "ahead": "its time is ahead of the panel's server: load the page again.",
     "seen_on_another": "the page showed another robot.",
     "seen_before_restart": "the panel's server was started anew since the page showed this.",
     # What a readout shows beside or instead of a value.

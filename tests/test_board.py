@@ -2,11 +2,13 @@
 
 import asyncio
 import json
+import re
 from collections.abc import Coroutine
 from typing import Any
 
 import pytest
 
+from app import moments
 from app.board import Board, beat
 from app.robot import Robot
 from app.views import View, sight
@@ -189,4 +191,20 @@ def test_after_the_end_nobody_waits(board: Board) -> None:
 
 
 def test_the_heartbeat_tells_the_time_and_has_no_id() -> None:
-    assert events_in(beat("12:00:00").decode()) == [("beat", '{"clock": "12:00:00"}', "")]
+    before = moments.now()
+    ((name, data, event_id),) = events_in(beat().decode())
+    told = json.loads(data)
+    assert (name, event_id) == ("beat", "")
+    assert re.fullmatch(r"\d\d:\d\d:\d\d", told["clock"])
+    assert round(before * 1000) <= told["now"] <= round(moments.now() * 1000)
+
+
+def test_the_board_knows_when_a_lock_has_last_turned(board: Board, robot: Robot) -> None:
+    assert (board.turned("guarded"), board.turned("free")) == (0, 0)
+    permits(robot)
+    board.post(view_of(robot))
+    assert (board.turned("guarded"), board.turned("free")) == (2, 0)
+    board.post(view_of(robot, fault="x"))
+    permits(robot, False)
+    board.post(view_of(robot))
+    assert (board.turned("guarded"), board.turned("free")) == (4, 0)

@@ -14,6 +14,7 @@ ORDER = (
     "app.settings",
     "app.sentences",
     "app.logs",
+    "app.moments",
     "app.keys",
     "app.interfaces.definitions",
     "app.interfaces.scalars",

@@ -137,6 +137,7 @@ class Panel(Description):
     distro: Literal["humble", "iron", "jazzy", "kilted"] = "jazzy"
     interfaces: Annotated[tuple[Folder, ...], Field(strict=False)] = ()
     namespace: Annotated[str, AfterValidator(namespace_of)] = ""
+    press_expires_s: Annotated[float, Field(ge=0.5, le=60)] = 2.0
     mm_per_px: Annotated[float, Field(gt=0.02, lt=1)] = 0.22
     robots: Annotated[tuple[RobotEntry, ...], Field(strict=False)] = Field((), alias="robot")
     interlocks: Annotated[tuple[Interlock, ...], Field(strict=False)] = Field((), alias="interlock")

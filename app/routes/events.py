@@ -10,7 +10,6 @@ from fastapi.sse import EventSourceResponse
 
 from app.board import Board, beat
 from app.routes.site import CurrentKiosk, CurrentSite, Site
-from app.sentences import clock
 
 router = APIRouter()
 
@@ -30,7 +29,7 @@ async def events(site: CurrentSite, kiosk: CurrentKiosk, once: bool = False) -> 
     """`once`: the snapshot alone, for a browser that has no stream to spare."""
     board = kiosk.board
     if once:
-        both = board.snapshot() + beat(clock(time.time()))
+        both = board.snapshot() + beat()
         return Response(both, media_type="text/event-stream", headers=HEADERS)
     return EventSourceResponse(_counted(site, board), headers=HEADERS)
 
@@ -44,7 +43,7 @@ async def _counted(site: Site, board: Board) -> AsyncIterator[bytes]:
 async def stream(board: Board) -> AsyncIterator[bytes]:
     """What one browser gets. It waits while the browser does not read, and then skips to now."""
     version, view = board.version, board.view
-    yield f"retry: {RECONNECT_MS}\n\n".encode() + board.snapshot()
+    yield f"retry: {RECONNECT_MS}\n\n".encode() + board.snapshot() + beat()
     next_beat = time.monotonic() + BEAT_S
     while not board.closed:
         await board.newer(version, next_beat - time.monotonic())
@@ -54,4 +53,4 @@ async def stream(board: Board) -> AsyncIterator[bytes]:
             yield chunk
         if not board.closed and time.monotonic() >= next_beat:
             next_beat = time.monotonic() + BEAT_S
-            yield beat(clock(time.time()))
+            yield beat()

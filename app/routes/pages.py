@@ -7,6 +7,7 @@ from typing import Any, TypedDict
 from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse, RedirectResponse, Response
 
+from app import moments
 from app.errors import NotFound
 from app.panel.model import Input, Page, Panel
 from app.presses import Receipt
@@ -20,6 +21,7 @@ router = APIRouter(include_in_schema=True)
 # input, rarely enough to type in.
 REFRESH_S = 5
 REFRESH_WITH_INPUTS_S = 30
+RELOADED_S = 2.0  # a press on a page that should have reloaded before is one on an old page
 
 
 class PageContext(TypedDict):
@@ -43,6 +45,8 @@ class PageContext(TypedDict):
     unknown: str
     unsure: str
     refresh_s: int
+    now: int
+    until: float
 
 
 @router.get("/", response_class=HTMLResponse, summary="The first page of the panel")
@@ -75,6 +79,8 @@ def _render(request: Request, site: Site, page: Page) -> Response:
     board = kiosk.board
     typed = any(isinstance(widget, Input) for widget in page.widgets)
     receipt = kiosk.presses.receipt(request.query_params.get("receipt", ""))
+    refresh_s = REFRESH_WITH_INPUTS_S if typed else REFRESH_S
+    now = moments.now()
     context = PageContext(
         site=site,
         panel=site.fleet.panel,
@@ -93,7 +99,9 @@ def _render(request: Request, site: Site, page: Page) -> Response:
         lost_short=say("lost"),
         unknown=say("unknown"),
         unsure=say("server_unsure"),
-        refresh_s=REFRESH_WITH_INPUTS_S if typed else REFRESH_S,
+        refresh_s=refresh_s,
+        now=round(now * 1000),
+        until=round(now + refresh_s + RELOADED_S, 3),
     )
     html = site.templates.get_template("screen.html").render(**context)
     return HTMLResponse(html, headers={"cache-control": "no-store"})

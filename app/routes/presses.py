@@ -1,6 +1,7 @@
 """A press: JSON for the panel's scripts, a form for a browser without them; one module behind."""
 
 import json
+import math
 import re
 import secrets
 from collections.abc import Mapping
@@ -11,6 +12,7 @@ from fastapi import APIRouter, Request
 from fastapi.responses import JSONResponse, RedirectResponse, Response
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, JsonValue, ValidationError
 
+from app import moments
 from app.errors import InputError
 from app.kiosk import Kiosk
 from app.presses import Receipt
@@ -72,7 +74,9 @@ async def press(widget: str, request: Request, site: CurrentSite, kiosk: Current
         if code := _doubt(site, kiosk, given.seen):
             receipt = kiosk.presses.refuse(widget, given.inputs, press_id, code)
         else:
-            receipt = await kiosk.press(widget, given.inputs, press_id, who)
+            version = int(given.seen.partition("-")[2]) if given.seen else None
+            at = given.at.timestamp() if given.at else None
+            receipt = await kiosk.press(widget, given.inputs, press_id, who, version, at)
         _count(site, receipt)
         return JSONResponse(receipt.as_json(), status_code=STATUS[receipt.cause])
     if kind == "application/x-www-form-urlencoded":
@@ -82,8 +86,9 @@ async def press(widget: str, request: Request, site: CurrentSite, kiosk: Current
         if not re.fullmatch(PRESS_ID, page_id):
             raise InputError(f'_id: "{page_id:.40}" is not the id of a press')
         press_id = f"{page_id}.{widget}"
+        version, at = _of_page(kiosk, inputs)
         values = kiosk.presses.typed(inputs)
-        receipt = await kiosk.press(widget, values, press_id, who)
+        receipt = await kiosk.press(widget, values, press_id, who, version, at)
         _count(site, receipt)
         return RedirectResponse(_page_with(kiosk, receipt), status_code=303)
     raise InputError(
@@ -106,10 +111,34 @@ async def cancel(widget: str, request: Request, site: CurrentSite, kiosk: Curren
     return JSONResponse(receipt.as_json(), status_code=STATUS[receipt.cause])
 
 
+def _of_page(kiosk: Kiosk, inputs: dict[str, str]) -> tuple[int | None, float | None]:
+    """What a page without scripts showed: its version, and when it should have loaded anew.
+
+    It can't say when it was pressed, but a page that does not reload itself is none to press on.
+    """
+    seen, at = inputs.pop("_seen", None), inputs.pop("_until", None)
+    if seen is None or at is None:
+        return None, None
+    try:
+        boot, _, version = seen.partition("-")
+        until = float(at)
+        if not math.isfinite(until):
+            raise ValueError(at)
+        return (int(version) if boot == kiosk.board.boot else -1), min(until, moments.now())
+    except ValueError:
+        raise InputError("_seen and _until are not those of a page") from None
+
+
 def _doubt(site: Site, kiosk: Kiosk, seen: str | None) -> str:
     """Why what the browser had seen can't be what this press is meant for; "" if it can."""
-    boot = (seen or "").partition("-")[0]
-    if not boot or boot == kiosk.board.boot:
+    boot, _, version = (seen or "").partition("-")
+    if not boot:
+        return ""
+    if boot == kiosk.board.boot:
+        if int(version) > kiosk.board.version:
+            raise InputError(
+                f"seen: version {version} is not there yet, the newest is {kiosk.board.id}"
+            )
         return ""
     others = (other.board.boot for other in site.fleet.kiosks)
     return "seen_on_another" if boot in others else "seen_before_restart"

@@ -18,20 +18,20 @@ function valueOf(input) {
 
 export class Presser {
   #widgets;
-  #source;
   #sentences;
   #underWay = new Set();
   #down = null; // the button that was open when the pointer went down on it
+  #click = null; // when the last click was, in the server's time, and what was seen then
 
   constructor(widgets, source, sentences) {
     this.#widgets = widgets;
-    this.#source = source;
     this.#sentences = sentences;
     addEventListener("pointerdown", ({ target }) => (this.#down = target.closest?.("button:enabled")), true);
     for (const form of document.forms) {
       // A button that opened under a resting finger was not pressed.
       form.addEventListener("click", (event) => {
         const button = event.target.closest("button");
+        this.#click = { seen: source.seen, at: source.timeOf(event) };
         if (button && event.detail > 0 && button !== this.#down) event.preventDefault();
       });
       form.addEventListener("submit", (event) => {
@@ -51,7 +51,7 @@ export class Presser {
     const pause = new Promise((resolve) => setTimeout(resolve, TAP_AGAIN_MS));
     try {
       const answerMs = ANSWER_WITHIN_MS + 1000 * (root.dataset.answerS ?? 0);
-      this.#show(root, await this.#send(url, form, answerMs));
+      this.#show(root, await this.#send(url, form, this.#click, answerMs));
       await pause;
     } finally {
       this.#underWay.delete(url);
@@ -60,12 +60,12 @@ export class Presser {
   }
 
   // Sent once and never again: when no answer comes, it is not known what became of it.
-  async #send(url, form, answerMs) {
+  async #send(url, form, click, answerMs) {
     const inputs = {};
     for (const input of form.elements) {
       if (input.matches(ENTRIES) && input.closest("[data-widget]")) inputs[input.name] = valueOf(input);
     }
-    const press = { inputs, id: newId(), seen: this.#source.seen, at: new Date().toISOString() };
+    const press = { inputs, id: newId(), ...click };
     try {
       const answer = await fetch(url, {
         method: "POST",

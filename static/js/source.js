@@ -7,6 +7,7 @@ const POLL_MS = 700;
 const OPEN_AGAIN_MS = 3000;
 // A browser opens six connections to one server; pages and presses need some of them.
 const STREAMS_PER_BROWSER = 3;
+const BEATS_KEPT = 8;
 const EVENTS = ["snapshot", "update", "link", "notice", "robots", "beat"];
 const BASE = document.body.dataset.base; // of the robot that this page shows
 
@@ -21,6 +22,9 @@ export class Source {
   #turn = 0; // counts openings and closings: what was asked for before the last one is void
   #fresh = true; // the page itself is a snapshot, until its time is up
   #seen = document.body.dataset.seen;
+  // The server's own time is at least performance.now() plus the largest of these: what comes late
+  // makes one smaller.
+  #offsets = [Number(document.body.dataset.now) - this.#aliveAt];
 
   // `handlers` has a function for each event, and `lost`.
   constructor(handlers) {
@@ -30,6 +34,11 @@ export class Source {
   // The id of the last event: what the operator has seen.
   get seen() {
     return this.#seen;
+  }
+
+  // The server's own time of an event here, in RFC 3339.
+  timeOf(event) {
+    return new Date(Math.max(...this.#offsets) + event.timeStamp).toISOString();
   }
 
   start() {
@@ -130,6 +139,7 @@ export class Source {
     if (!this.#fresh) return; // after a loss only a snapshot says what is so
     this.#aliveAt = at;
     const data = JSON.parse(text);
+    if (data.now) this.#offsets = [data.now - performance.now(), ...this.#offsets].slice(0, BEATS_KEPT);
     if (id) this.#seen = id;
     this.#on[name](data);
   }
