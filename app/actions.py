@@ -12,11 +12,11 @@ from collections.abc import Callable, Coroutine
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from app.calls import Asker, Corrected, with_fields
+from app.calls import Asker, with_fields
 from app.errors import DecodeError
 from app.interfaces import Interfaces, value_at
 from app.panel.model import Action
-from app.progress import Answer, Outcome, Progress
+from app.progress import Answer, Corrected, Outcome, Progress
 from app.robot import Robot, Sample
 from app.sentences import clock, say
 

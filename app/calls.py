@@ -15,7 +15,7 @@ from app.errors import DecodeError
 from app.interfaces import Interfaces, to_plain, value_at
 from app.panel.model import Call
 from app.panel.template import PLACE
-from app.progress import Answer, Progress
+from app.progress import Answer, Corrected, Progress
 from app.robot import Robot
 from app.sentences import clock, say
 
@@ -24,8 +24,6 @@ log = logging.getLogger("kiosk.calls")
 CUT_NEWS_S: Final = 0.3
 LATE_S: Final = 60.0  # how long after its time an answer is still waited for
 MOST_UNANSWERED: Final = 8  # the bridge keeps ten requests of a service
-
-Corrected = Callable[[str, Answer], None]
 
 
 class Asker(Protocol):

@@ -79,6 +79,8 @@ def publish_verdict(publish: Publish, interlock: Interlock | None, robot: Robot,
         return passable
     if doubt := misfit("MP", publish, robot):
         return doubt
+    if publish.one_shot and robot.progress.get(publish.id, IDLE).busy:
+        return locked("busy")
     return PERMITTED if interlock is None else interlock_verdict(interlock, robot, now)
 
 

@@ -16,6 +16,7 @@ from app import keys, moments
 from app.actions import Actions
 from app.board import Board
 from app.calls import Calls
+from app.confirmations import Confirmations
 from app.errors import KioskError, LinkError
 from app.interfaces import interfaces_of
 from app.interlocks import Verdict, way
@@ -70,8 +71,15 @@ class Kiosk:
         self.board = Board(first.view, revision)
         self._calls = Calls(self.interfaces, self.robot, self.link, self.show)
         self._actions = Actions(self.interfaces, self.robot, self.link, self.show)
+        self._confirmations = Confirmations(self.robot, self.show)
         self.presses = Presses(
-            panel, self.interfaces, self.robot, self.link, self._calls, self._actions
+            panel,
+            self.interfaces,
+            self.robot,
+            self.link,
+            self._calls,
+            self._actions,
+            self._confirmations,
         )
         self._feedback = {keys.feedback(self.robot.key(one)): one for one in panel.actions()}
         self._joining = Joining(panel, self.interfaces, self.robot, self.link, self.show, self.renew)
@@ -198,6 +206,7 @@ class Kiosk:
                 self._actions.hear_feedback(self._feedback[key], sample)
                 continue
             self.robot.take(key, sample)
+            self._confirmations.hear(key)
             urgent = urgent or key in self._urgent
         came = False
         for token_key, token in changes.tokens.items():

@@ -16,13 +16,14 @@ from typing import Any, Final, Literal, Protocol
 
 from app.actions import Actions
 from app.calls import Calls
+from app.confirmations import Confirmations
 from app.errors import FieldError, InputError, LinkError, NotFound
 from app.inputs import checked, typed
 from app.interfaces import Interfaces
 from app.interlocks import press_verdict
 from app.logs import RobotLog
 from app.panel.model import Action, Call, Input, Panel, Pressed, Publish
-from app.panel.template import filled, named
+from app.panel.template import filled, inputs_of
 from app.progress import Answer, Outcome
 from app.robot import Robot
 from app.sentences import clock, say
@@ -36,7 +37,7 @@ LONGEST_LOGGED: Final = 300
 NO_WAY: Final = frozenset(
     {"no_link", "no_bridge", "no_bridge_of", "bridge_silent", "joining", "no_service"}
 )
-FINE: Final = frozenset({"published", "accepted", "succeeded"})
+FINE: Final = frozenset({"published", "confirmed", "accepted", "succeeded"})
 
 
 class Way(Protocol):
@@ -96,6 +97,7 @@ class Presses:
         way: Way,
         calls: Calls,
         actions: Actions,
+        confirmations: Confirmations,
         monotonic: Callable[[], float] = time.monotonic,
     ) -> None:
         self._widgets = {w.id: w for w in panel.widgets()}
@@ -106,6 +108,7 @@ class Presses:
         self._way = way
         self._calls = calls
         self._actions = actions
+        self._confirmations = confirmations
         self._under_way: dict[str, _UnderWay] = {}
         self._monotonic = monotonic
         self._receipts: OrderedDict[str, Receipt] = OrderedDict()
@@ -239,7 +242,7 @@ class Presses:
             return refused("refused", why, "interlock")
         try:
             values = self._checked(widget, inputs)
-            answer = await self._sent(widget, filled(widget.template, values), press_id)
+            answer = await self._sent(widget, values, press_id)
         except (FieldError, InputError) as error:
             return refused("not_encoded", str(error), "input")
         except LinkError as error:
@@ -248,10 +251,18 @@ class Presses:
             return refused("not_encoded", answer.text, "interlock")
         return receipt(answer, "time" if answer.outcome == "timed_out" else "")
 
-    async def _sent(self, widget: Pressed, fields: dict[str, Any], press_id: str) -> Answer:
+    async def _sent(self, widget: Pressed, values: Mapping[str, Any], press_id: str) -> Answer:
+        fields = filled(widget.template, values)
         match widget:
             case Publish():
-                return self._published(widget, fields)
+                since = self._monotonic()
+                answer = self._published(widget, fields)
+                if widget.confirm is None:
+                    return answer
+                equals = filled(widget.confirm.equals, values)
+                return await self._confirmations.awaited(
+                    widget, equals, press_id, since, answer.text, self._correct
+                )
             case Call():
                 request, _ = self._interfaces.service(widget.type)
                 payload = self._interfaces.encode(request, fields)
@@ -274,7 +285,7 @@ class Presses:
             if not isinstance(self._widgets.get(name), Input):
                 raise InputError(f'there is no input "{name:.60}" on this panel')
         values: dict[str, Any] = {}
-        for _, name in named(widget.template):
+        for name in inputs_of(widget):
             field = self._widgets[name]
             if name not in inputs:
                 raise InputError(f'the input "{name}" is missing')

@@ -1,10 +1,12 @@
 """How far it is with what was asked of the robot: one state per widget that waits for an answer."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
 Outcome = Literal[
     "published",
+    "confirmed",
     "accepted",
     "succeeded",
     "rejected",
@@ -40,3 +42,6 @@ class Answer:
 
     outcome: Outcome
     text: str
+
+
+Corrected = Callable[[str, Answer], None]  # (press id, what is known of it now)

@@ -62,6 +62,13 @@ ENGLISH: Final[Mapping[str, str]] = {
     "ahead": "its time is ahead of the panel's server: load the page again.",
     "seen_on_another": "the page showed another robot.",
     "seen_before_restart": "the panel's server was started anew since the page showed this.",
+    # The effect of a command.
+    "waiting_for_effect": "Sent; waiting for {topic} to show it.",
+    "confirmed": "Confirmed by {topic} at {time}.",
+    "no_effect": "{topic} did not show it within {seconds} s: it is not known whether it was done.",
+    # Before a command.
+    "ask": "{label}: do it?",
+    "back": "Back",
     # What a readout shows beside or instead of a value.
     "readout_waiting": "waiting for {topic}",
     "readout_cut": "from before the connection was cut, received {time}",

@@ -93,7 +93,7 @@ def sight(
                 interlock = panel.interlock(widget.interlock)
                 verdict = noted(press_verdict(widget, interlock, robot, now))
                 widgets[widget.id] = {**enabled(verdict)}
-                if not isinstance(widget, Publish):
+                if not isinstance(widget, Publish) or widget.confirm:
                     widgets[widget.id] |= progress(robot.progress.get(widget.id, IDLE))
             case Readout():
                 widgets[widget.id], until = readout(widget, robot, now)

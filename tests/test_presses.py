@@ -12,6 +12,7 @@ import pytest
 
 from app.actions import Actions
 from app.calls import Calls
+from app.confirmations import Confirmations
 from app.errors import LinkError, NotFound
 from app.panel.model import Panel
 from app.presses import RECEIPTS_KEPT, Presses, Receipt
@@ -78,8 +79,9 @@ class Bench:
         permits(self.robot)
         calls = Calls(INTERFACES, self.robot, NOBODY, lambda: None)
         actions = Actions(INTERFACES, self.robot, NOBODY, lambda: None)
+        confirmations = Confirmations(self.robot, lambda: None)
         self._presses = Presses(
-            panel, INTERFACES, self.robot, self.way, calls, actions, lambda: self.now
+            panel, INTERFACES, self.robot, self.way, calls, actions, confirmations, lambda: self.now
         )
         self.receipt = self._presses.receipt
         self.typed = self._presses.typed

@@ -5,11 +5,12 @@ from collections.abc import Collection, Iterator
 from app.errors import Fault, InterfaceError
 from app.interfaces import Interfaces
 from app.panel.check_calls import answer_faults, sent
+from app.panel.check_confirm import confirm_faults
 from app.panel.check_displays import display_faults, field_faults
 from app.panel.check_inputs import input_faults
 from app.panel.displays import Indicator, Readout
 from app.panel.examples import template_faults
-from app.panel.model import Action, Call, Display, Input, Interlock, Panel, Pressed, Publish
+from app.panel.model import Action, Call, Confirm, Display, Input, Interlock, Panel, Pressed, Publish
 
 
 def faults_in(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = ()) -> Iterator[Fault]:
@@ -48,6 +49,10 @@ def faults_in(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = ()
                         faulty,
                     )
                     yield from answer_faults(place, widget, interfaces)
+                    if isinstance(widget, Publish):
+                        yield from confirm_faults(
+                            place, widget, panel, on_page, inputs.keys(), interfaces
+                        )
                 case Readout() | Indicator():
                     yield from display_faults(place, widget, interfaces)
                 case _:
@@ -102,16 +107,21 @@ def _interlocked(place: str, widget: Pressed, panel: Panel) -> Iterator[Fault]:
 
 def _topics_of_two_kinds(panel: Panel) -> Iterator[Fault]:
     """A topic has one type and one QoS, wherever the panel names it."""
-    places: list[tuple[str, Interlock | Publish | Display]] = []
+    places: list[tuple[str, Interlock | Publish | Display | Confirm]] = []
+    confirms: list[tuple[str, Confirm]] = []
     places += [(f"interlock[{i}]", one) for i, one in enumerate(panel.interlocks)]
     for p, page in enumerate(panel.pages):
         for w, widget in enumerate(page.widgets):
             if isinstance(widget, Publish | Display):
                 places.append((f"page[{p}].widget[{w}]", widget))
-    firsts: dict[str, tuple[str, Interlock | Publish | Display]] = {}
-    for place, one in places:
+            if isinstance(widget, Publish) and widget.confirm and widget.confirm.type:
+                confirms.append((f"page[{p}].widget[{w}].confirm", widget.confirm))
+    firsts: dict[str, tuple[str, Interlock | Publish | Display | Confirm]] = {}
+    for place, one in (*places, *confirms):
         above, first = firsts.setdefault(one.topic, (place, one))
         if one.type != first.type:
             yield Fault(f"{place}.type", f"{one.topic} is {one.type} here but {first.type} above")
+        if isinstance(one, Confirm) or isinstance(first, Confirm):
+            continue  # it takes the topic's, whatever that is
         if one.qos != first.qos:
             yield Fault(f"{place}.qos", f"{one.topic} has another QoS at {above}: a topic has one")

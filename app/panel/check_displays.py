@@ -2,19 +2,22 @@
 
 import re
 from collections.abc import Iterator
-from typing import Final
+from typing import Any, Final
 
 from app.errors import Fault, InterfaceError
 from app.interfaces import INTEGERS, Interfaces
 from app.panel.displays import Indicator, Readout
-from app.panel.model import Display, Interlock
+from app.panel.model import Confirm, Display, Interlock
 
 NUMBERS: Final = frozenset({*INTEGERS, "float32", "float64"})
 SHAPE_AND_TEXT: Final = "only the colour would tell them apart"
 
 
-def field_faults(place: str, of: Interlock | Display, interfaces: Interfaces) -> Iterator[Fault]:
+def field_faults(
+    place: str, of: Interlock | Display | Confirm, interfaces: Interfaces
+) -> Iterator[Fault]:
     """A type that is not there, a field that it does not have."""
+    assert of.type is not None
     try:
         interfaces.require(of.type)
     except InterfaceError as error:
@@ -81,7 +84,7 @@ def _states(place: str, of: Indicator, kind: str) -> Iterator[Fault]:
     values = [(type(state.value), state.value) for state in of.states]
     for i, state in enumerate(of.states):
         at = f"{place}.states[{i}]"
-        if fault := _misfit(state.value, kind):
+        if fault := misfit(state.value, kind):
             yield Fault(f"{at}.value", fault)
             continue
         if values[i] in values[:i]:
@@ -92,8 +95,11 @@ def _states(place: str, of: Indicator, kind: str) -> Iterator[Fault]:
             yield Fault(at, f"has the shape and text of states[{first}]: {SHAPE_AND_TEXT}")
 
 
-def _misfit(value: bool | int | str, kind: str) -> str | None:
+def misfit(value: Any, kind: str) -> str | None:
     """Why a field of this type never has this value."""
+    if kind in ("float32", "float64"):
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        return None if number else f"must be a number ({kind}), not {value!r}"
     if kind == "bool":
         return None if isinstance(value, bool) else f"must be true or false (bool), not {value!r}"
     if kind in INTEGERS:

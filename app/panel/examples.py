@@ -38,7 +38,7 @@ def template_faults(
     """
     try:
         names = list(named(template))
-        yield from _unknown(place, names, inputs, anywhere)
+        yield from unknown(place, names, inputs, anywhere)
         known = {name: inputs[name] for _, name in names if name in inputs}
         if len(known) == len({name for _, name in names}) and not known.keys() & set(faulty):
             yield from _tried(place, template, type_name, known, interfaces)
@@ -46,7 +46,7 @@ def template_faults(
         yield Fault(f"{place}.{error.field}".rstrip("."), error.message)
 
 
-def _unknown(
+def unknown(
     place: str, names: list[tuple[str, str]], inputs: Collection[str], anywhere: Collection[str]
 ) -> Iterator[Fault]:
     for where, name in names:

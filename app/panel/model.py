@@ -41,13 +41,30 @@ class Interlock(Description):
         return self.label or self.id
 
 
+class Confirm(Description):
+    """A field of the robot's that shows that a command took effect: it comes to have the value
+    `equals` (or that of an input, `"{id}"`) in time. The type is that which the panel gives for
+    the topic elsewhere, if there is none here."""
+
+    topic: Topic
+    type: Type | None = None
+    field: FieldPath = "data"
+    equals: Any
+    within_s: Seconds = 2.0
+
+
 class Publish(Placed):
+    """A command; with `one_shot` it is locked until its effect is confirmed, or did not show."""
+
     kind: Literal["publish"]
     topic: Topic
     type: Type
     message: dict[str, Any]
     interlock: Id | None = None
     qos: TopicQos = TopicQos()
+    confirm: Confirm | None = None
+    one_shot: bool = False
+    confirm_press: bool = False
     span: Annotated[int, Field(ge=1, le=12)] = 4
 
     @property
@@ -68,6 +85,7 @@ class Call(Placed):
     success: FieldPath | None = None
     message: FieldPath | None = None
     answer: str = ""
+    confirm_press: bool = False
     span: Annotated[int, Field(ge=1, le=12)] = 4
 
     @property
@@ -89,6 +107,7 @@ class Action(Placed):
     progress_max: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 100.0
     feedback: str = ""
     result: str = ""
+    confirm_press: bool = False
     span: Annotated[int, Field(ge=1, le=12)] = 6
 
     @property
@@ -157,7 +176,14 @@ class Panel(Description):
 
     def subscriptions(self) -> dict[str, str]:
         """Topic → type of all that the panel listens to."""
-        return {of.topic: of.type for of in self.listening()}
+        own = {one.topic: one.type for one in self.confirms() if one.type is not None}
+        return own | {of.topic: of.type for of in self.listening()}
+
+    def confirms(self) -> Iterator[Confirm]:
+        """All that shows that a command took effect."""
+        for widget in self.widgets():
+            if isinstance(widget, Publish) and widget.confirm is not None:
+                yield widget.confirm
 
     def listening(self) -> Iterator[Interlock | Display]:
         """All that shows or judges what a topic says."""
@@ -175,4 +201,5 @@ class Panel(Description):
     def qos(self, topic: str) -> TopicQos:
         """A topic's QoS, which is the same wherever the panel names it."""
         speaking = (w for w in self.widgets() if isinstance(w, Publish))
-        return next(of.qos for of in (*self.listening(), *speaking) if of.topic == topic)
+        of_topic = (of.qos for of in (*self.listening(), *speaking) if of.topic == topic)
+        return next(of_topic, TopicQos())

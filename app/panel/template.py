@@ -6,6 +6,7 @@ from string import Formatter
 from typing import Any, Final
 
 from app.errors import FieldError
+from app.panel.model import Pressed, Publish
 
 # In what is shown of an answer: a path in its type. (In what is sent: the id of an input.)
 PLACE: Final = re.compile(r"\{([^{}]*)\}")
@@ -61,6 +62,14 @@ def named(template: Any, where: str = "") -> Iterator[tuple[str, str]]:
             yield from named(item, f"{where}[{i}]")
     elif isinstance(template, str):
         yield from ((where, name) for _, name in _parts(template, where) if name is not None)
+
+
+def inputs_of(widget: Pressed) -> list[str]:
+    """The ids of the inputs that a press needs."""
+    templates: list[Any] = [widget.template]
+    if isinstance(widget, Publish) and widget.confirm is not None:
+        templates.append(widget.confirm.equals)
+    return list(dict.fromkeys(name for template in templates for _, name in named(template)))
 
 
 def _parts(text: str, where: str) -> list[tuple[str, str | None]]:

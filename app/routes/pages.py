@@ -9,7 +9,8 @@ from fastapi.responses import HTMLResponse, RedirectResponse, Response
 
 from app import moments
 from app.errors import NotFound
-from app.panel.model import Input, Page, Panel
+from app.panel.model import Input, Page, Panel, Pressed
+from app.panel.template import inputs_of
 from app.presses import Receipt
 from app.routes.site import CurrentSite, Site
 from app.sentences import clock, say
@@ -39,7 +40,7 @@ class PageContext(TypedDict):
     press_id: str
     receipt: Receipt | None
     inputs: dict[str, Any]
-    words: dict[str, str]
+    words: dict[str, Any]
     lost: str
     lost_short: str
     unknown: str
@@ -64,6 +65,13 @@ async def named_page(page: str, request: Request, site: CurrentSite) -> Response
     if found is None:
         raise NotFound(f'there is no page "{page}"')
     return _render(request, site, found)
+
+
+class Ask(TypedDict):
+    """What will be done by a press, and the inputs that it takes."""
+
+    sentence: str
+    inputs: list[Input]
 
 
 def _to_a_robot(request: Request, site: Site, path: str) -> Response | None:
@@ -94,7 +102,13 @@ def _render(request: Request, site: Site, page: Page) -> Response:
         press_id=secrets.token_hex(8),
         receipt=receipt,
         inputs=dict(receipt.inputs) if receipt else {},
-        words={"cancel": say("cancel"), "robots": say("robots"), "base": kiosk.base},
+        words={
+            "cancel": say("cancel"),
+            "robots": say("robots"),
+            "back": say("back"),
+            "base": kiosk.base,
+            "asks": asks_of(site.fleet.panel, page),
+        },
         lost=say("server_lost"),
         lost_short=say("lost"),
         unknown=say("unknown"),
@@ -105,3 +119,15 @@ def _render(request: Request, site: Site, page: Page) -> Response:
     )
     html = site.templates.get_template("screen.html").render(**context)
     return HTMLResponse(html, headers={"cache-control": "no-store"})
+
+
+def asks_of(panel: Panel, page: Page) -> dict[str, Ask]:
+    """What is asked before the presses of a page that ask first."""
+    pressed = (w for w in page.widgets if isinstance(w, Pressed) and w.confirm_press)
+    return {widget.id: ask_of(panel, widget) for widget in pressed}
+
+
+def ask_of(panel: Panel, widget: Pressed) -> Ask:
+    inputs = {w.id: w for w in panel.widgets() if isinstance(w, Input)}
+    needed = [inputs[name] for name in inputs_of(widget)]
+    return Ask(sentence=say("ask", label=widget.label), inputs=needed)

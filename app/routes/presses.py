@@ -9,17 +9,22 @@ from typing import Annotated, Final
 from urllib.parse import parse_qsl, quote
 
 from fastapi import APIRouter, Request
-from fastapi.responses import JSONResponse, RedirectResponse, Response
+from fastapi.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, JsonValue, ValidationError
 
 from app import moments
 from app.errors import InputError
 from app.kiosk import Kiosk
+from app.panel.model import Page
 from app.presses import Receipt
+from app.routes.pages import ask_of
 from app.routes.site import CurrentKiosk, CurrentSite, Site
+from app.sentences import say
 
 router = APIRouter()
 
+CONFIRMED: Final = "_confirmed"  # a form's field: the server has asked, and this is the yes
+ASKED_S: Final = 30.0  # the answer is a press, and no later one
 PRESS_ID: Final = r"^[A-Za-z0-9_.:-]{1,64}$"
 STATUS: Final[Mapping[str, int]] = {"": 200, "interlock": 409, "input": 422, "link": 503, "time": 504}
 
@@ -81,6 +86,8 @@ async def press(widget: str, request: Request, site: CurrentSite, kiosk: Current
         return JSONResponse(receipt.as_json(), status_code=STATUS[receipt.cause])
     if kind == "application/x-www-form-urlencoded":
         inputs = _form(body)
+        if kiosk.presses.widget(widget).confirm_press and inputs.pop(CONFIRMED, "") != "yes":
+            return _ask(site, kiosk, widget, inputs)
         # One rendered page has one id for all its buttons, and each button is a press of its own.
         page_id = inputs.pop("_id", secrets.token_hex(8))
         if not re.fullmatch(PRESS_ID, page_id):
@@ -109,6 +116,31 @@ async def cancel(widget: str, request: Request, site: CurrentSite, kiosk: Curren
     if request.headers.get("content-type", "").startswith("application/x-www-form-urlencoded"):
         return RedirectResponse(_page_with(kiosk, receipt), status_code=303)
     return JSONResponse(receipt.as_json(), status_code=STATUS[receipt.cause])
+
+
+def _ask(site: Site, kiosk: Kiosk, widget: str, inputs: dict[str, str]) -> Response:
+    """Asks a browser without scripts whether it is meant: the answer is the press."""
+    pressed = kiosk.presses.widget(widget)
+    html = site.templates.get_template("ask.html").render(
+        site=site,
+        panel=kiosk.panel,
+        asked=ask_of(kiosk.panel, pressed),
+        action=f"{kiosk.base}/widgets/{widget}",
+        back=f"{kiosk.base}/pages/{_page_of(kiosk, widget).id}",
+        fields={
+            **inputs,
+            CONFIRMED: "yes",
+            "_seen": kiosk.board.id,
+            "_until": str(round(moments.now() + ASKED_S, 3)),
+        },
+        no=say("back"),
+        label=pressed.label,
+    )
+    return HTMLResponse(html, headers={"cache-control": "no-store"})
+
+
+def _page_of(kiosk: Kiosk, widget: str) -> Page:
+    return next(p for p in kiosk.panel.pages if any(w.id == widget for w in p.widgets))
 
 
 def _of_page(kiosk: Kiosk, inputs: dict[str, str]) -> tuple[int | None, float | None]:
@@ -185,6 +217,5 @@ def _form(body: bytes) -> dict[str, str]:
 
 def _page_with(kiosk: Kiosk, receipt: Receipt) -> str:
     """Where the receipt is shown: on the page of its widget."""
-    pages = kiosk.panel.pages
-    page = next(p for p in pages if any(w.id == receipt.widget for w in p.widgets))
+    page = _page_of(kiosk, receipt.widget)
     return f"{kiosk.base}/pages/{page.id}?receipt={quote(receipt.id)}"

@@ -13,7 +13,10 @@ function setText(element, text) {
 
 // How each attribute of a widget is shown; what is not here is a text with its own place.
 const SHOW = {
-  enabled: (root, value) => (root.querySelector("button").disabled = !value),
+  enabled: (root, value) => {
+    root.querySelector("button").disabled = !value;
+    if (!value) root.querySelector("dialog.ask")?.close();
+  },
   stoppable: (root, value) => {
     const cancel = root.querySelector(".cancel");
     if (cancel) cancel.disabled = !value;
@@ -86,6 +89,7 @@ function lockAll() {
   for (const root of widgets.values()) {
     const buttons = root.querySelectorAll("button[type=submit]");
     for (const button of buttons) button.disabled = true;
+    root.querySelector("dialog.ask")?.close();
     if (buttons.length) {
       setText(root.querySelector('[data-text="reason"]'), body.dataset.lost);
     } else if (root.dataset.state) {

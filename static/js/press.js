@@ -1,3 +1,5 @@
+import { asked } from "./ask.js";
+
 // A press: on release, once, with an id of its own; its receipt is shown where it was pressed.
 const ANSWER_WITHIN_MS = 5000;
 // Two taps of a finger come within this time: the second one is the same press.
@@ -19,6 +21,7 @@ function valueOf(input) {
 export class Presser {
   #widgets;
   #sentences;
+  #source;
   #underWay = new Set();
   #down = null; // the button that was open when the pointer went down on it
   #click = null; // when the last click was, in the server's time, and what was seen then
@@ -26,24 +29,35 @@ export class Presser {
   constructor(widgets, source, sentences) {
     this.#widgets = widgets;
     this.#sentences = sentences;
+    this.#source = source;
     addEventListener("pointerdown", ({ target }) => (this.#down = target.closest?.("button:enabled")), true);
     for (const form of document.forms) {
       // A button that opened under a resting finger was not pressed.
       form.addEventListener("click", (event) => {
         const button = event.target.closest("button");
-        this.#click = { seen: source.seen, at: source.timeOf(event) };
+        this.#click = this.#moment(event);
         if (button && event.detail > 0 && button !== this.#down) event.preventDefault();
       });
       form.addEventListener("submit", (event) => {
         event.preventDefault();
         const root = event.submitter?.closest("[data-widget]");
-        if (root && !event.submitter.disabled) this.#press(root, event.submitter, form);
+        if (!root || event.submitter.disabled) return;
+        if (event.submitter.classList.contains("cancel") || !root.querySelector("dialog.ask")) {
+          this.#press(root, event.submitter, form, this.#click);
+        } else {
+          asked(root, form, (yes) => this.#press(root, event.submitter, form, this.#moment(yes)));
+        }
       });
     }
   }
 
+  // What was seen at an event, and when that was, in the server's time.
+  #moment(event) {
+    return { seen: this.#source.seen, at: this.#source.timeOf(event) };
+  }
+
   // A second tap while the first is under way is the same press: it sends nothing.
-  async #press(root, button, form) {
+  async #press(root, button, form, click) {
     const url = button.getAttribute("formaction");
     if (this.#underWay.has(url)) return;
     this.#underWay.add(url);
@@ -51,7 +65,7 @@ export class Presser {
     const pause = new Promise((resolve) => setTimeout(resolve, TAP_AGAIN_MS));
     try {
       const answerMs = ANSWER_WITHIN_MS + 1000 * (root.dataset.answerS ?? 0);
-      this.#show(root, await this.#send(url, form, this.#click, answerMs));
+      this.#show(root, await this.#send(url, form, click, answerMs));
       await pause;
     } finally {
       this.#underWay.delete(url);
@@ -76,11 +90,11 @@ export class Presser {
       const receipt = await answer.json();
       return receipt.outcome ? receipt : { outcome: "refused", reason: receipt.error };
     } catch {
-      return { outcome: "unknown", reason: this.#sentences.unsure };
+      return { outcome: "unknown", reason: this.#sentences.unsure, unheard: true };
     }
   }
 
-  #show(root, { outcome, reason }) {
+  #show(root, { outcome, reason, unheard = false }) {
     for (const other of this.#widgets.values()) {
       const old = other.querySelector(".receipt");
       if (old && other !== root) {
@@ -89,7 +103,7 @@ export class Presser {
       }
     }
     // What came of a call is shown to every browser, with the widget's other texts.
-    if (root.querySelector(".result") && outcome !== "refused" && outcome !== "unknown") return;
+    if (root.querySelector(".result") && outcome !== "refused" && !unheard) return;
     const receipt = root.querySelector(".receipt");
     receipt.dataset.outcome = outcome;
     receipt.textContent = reason;
