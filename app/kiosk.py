@@ -23,6 +23,8 @@ from app.joining import LOG_TYPE, Joining
 from app.link import Config, Link
 from app.logs import RosoutHandler
 from app.panel.model import Panel
+from app.panel.parameter import EVENTS
+from app.parameters import Parameters
 from app.presses import Presses, Receipt
 from app.robot import Robot
 from app.views import Sight, sight
@@ -56,8 +58,17 @@ class Kiosk:
         self.board = Board(self._sight().view, revision)
         self._calls = Calls(self.interfaces, self.robot, self.link, self._show)
         self._actions = Actions(self.interfaces, self.robot, self.link, self._show)
+        self._parameters = Parameters(
+            panel, self.interfaces, self.robot, self.link, self._calls, self._show
+        )
         self.presses = Presses(
-            panel, self.interfaces, self.robot, self.link, self._calls, self._actions
+            panel,
+            self.interfaces,
+            self.robot,
+            self.link,
+            self._calls,
+            self._actions,
+            self._parameters,
         )
         self._feedback = {keys.feedback(self.robot.key(one)): one for one in panel.actions()}
         self._joining = Joining(panel, self.interfaces, self.robot, self.link, self._show, self.renew)
@@ -88,6 +99,7 @@ class Kiosk:
             await asyncio.gather(self._renewing, return_exceptions=True)
         await self._joining.stop()
         await self._actions.stop()
+        await self._parameters.stop()
         try:
             await asyncio.to_thread(self.link.close)
         except LinkError as error:
@@ -158,10 +170,14 @@ class Kiosk:
             if key in self._feedback:
                 self._actions.hear_feedback(self._feedback[key], sample)
                 continue
+            if key == self.robot.key(EVENTS):
+                self._parameters.hear(sample)
             self.robot.take(key, sample)
             urgent = urgent or key in self._urgent
         came = False
         for token_key, token in changes.tokens.items():
+            if token.lost_seq:
+                self._parameters.lose(token_key)
             if token.lost_seq and (zid := self.robot.graph.apply(token_key, False)):
                 self.robot.cut(zid, token.lost_seq)
                 log.warning("bridge %s lost", zid)
@@ -181,6 +197,7 @@ class Kiosk:
         self.robot.follow_publishers()
         self._calls.follow()
         self._actions.follow()
+        self._parameters.follow()
         self._joining.follow(came)
 
     # Showing.

@@ -14,6 +14,7 @@ from app.actions import Actions
 from app.calls import Calls
 from app.errors import LinkError, NotFound
 from app.panel.model import Panel
+from app.parameters import Parameters
 from app.presses import RECEIPTS_KEPT, Presses, Receipt
 from app.robot import Robot, Sample
 from tests.builders import (
@@ -78,8 +79,9 @@ class Bench:
         permits(self.robot)
         calls = Calls(INTERFACES, self.robot, NOBODY, lambda: None)
         actions = Actions(INTERFACES, self.robot, NOBODY, lambda: None)
+        parameters = Parameters(panel, INTERFACES, self.robot, NOBODY, calls, lambda: None)
         self._presses = Presses(
-            panel, INTERFACES, self.robot, self.way, calls, actions, lambda: self.now
+            panel, INTERFACES, self.robot, self.way, calls, actions, parameters, lambda: self.now
         )
         self.receipt = self._presses.receipt
         self.typed = self._presses.typed

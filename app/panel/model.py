@@ -22,6 +22,7 @@ from app.panel.description import (
 )
 from app.panel.displays import Indicator, Readout
 from app.panel.inputs import NumberInput, SelectInput, SliderInput, TextInput, ToggleInput
+from app.panel.parameter import EVENT_TYPE, EVENTS, Parameter
 
 
 class Interlock(Description):
@@ -97,9 +98,9 @@ class Action(Placed):
 
 
 Input = TextInput | NumberInput | SliderInput | SelectInput | ToggleInput
-Pressed = Publish | Call | Action
+Pressed = Publish | Call | Action | Parameter
 Display = Readout | Indicator
-Widget = Annotated[Input | Publish | Call | Action | Display, Field(discriminator="kind")]
+Widget = Annotated[Input | Pressed | Display, Field(discriminator="kind")]
 KINDS: Final[Mapping[str, type[Placed]]] = {
     "text": TextInput,
     "number": NumberInput,
@@ -109,9 +110,14 @@ KINDS: Final[Mapping[str, type[Placed]]] = {
     "publish": Publish,
     "call": Call,
     "action": Action,
+    "parameter": Parameter,
     "readout": Readout,
     "indicator": Indicator,
 }
+
+
+# rmw_qos_profile_parameter_events; the durability is given, so that no first event is missed.
+OF_EVENTS: Final = TopicQos(durability="volatile", depth=1000)
 
 
 class Page(Description):
@@ -133,7 +139,7 @@ class Panel(Description):
     # Of the file, not in it: changes when what a browser has loaded is out of date.
     revision: Annotated[str, Field(exclude=True)] = ""
 
-    def widgets(self) -> Iterator[Input | Publish | Call | Action | Display]:
+    def widgets(self) -> Iterator[Input | Pressed | Display]:
         for page in self.pages:
             yield from page.widgets
 
@@ -145,7 +151,8 @@ class Panel(Description):
 
     def subscriptions(self) -> dict[str, str]:
         """Topic → type of all that the panel listens to."""
-        return {of.topic: of.type for of in self.listening()}
+        found = {of.topic: of.type for of in self.listening()}
+        return found | ({EVENTS: EVENT_TYPE} if any(self.parameters()) else {})
 
     def listening(self) -> Iterator[Interlock | Display]:
         """All that shows or judges what a topic says."""
@@ -156,6 +163,9 @@ class Panel(Description):
         """Action → type of all that the panel may send goals to."""
         return {w.action: w.type for w in self.widgets() if isinstance(w, Action)}
 
+    def parameters(self) -> Iterator[Parameter]:
+        yield from (w for w in self.widgets() if isinstance(w, Parameter))
+
     def publications(self) -> dict[str, str]:
         """Topic → type of all that the panel publishes."""
         return {w.topic: w.type for w in self.widgets() if isinstance(w, Publish)}
@@ -163,4 +173,5 @@ class Panel(Description):
     def qos(self, topic: str) -> TopicQos:
         """A topic's QoS, which is the same wherever the panel names it."""
         speaking = (w for w in self.widgets() if isinstance(w, Publish))
-        return next(of.qos for of in (*self.listening(), *speaking) if of.topic == topic)
+        named = (of.qos for of in (*self.listening(), *speaking) if of.topic == topic)
+        return next(named, OF_EVENTS)

@@ -9,6 +9,7 @@ from fastapi.responses import HTMLResponse, Response
 
 from app.errors import NotFound
 from app.panel.model import Input, Page, Panel
+from app.panel.parameter import Parameter
 from app.presses import Receipt
 from app.routes.site import CurrentSite, Site
 from app.sentences import clock, say
@@ -58,7 +59,7 @@ async def named_page(page: str, request: Request, site: CurrentSite) -> Response
 
 def _render(request: Request, site: Site, page: Page) -> Response:
     board = site.kiosk.board
-    typed = any(isinstance(widget, Input) for widget in page.widgets)
+    typed = any(isinstance(widget, Input | Parameter) for widget in page.widgets)
     receipt = site.kiosk.presses.receipt(request.query_params.get("receipt", ""))
     context = PageContext(
         site=site,
@@ -71,7 +72,7 @@ def _render(request: Request, site: Site, page: Page) -> Response:
         press_id=secrets.token_hex(8),
         receipt=receipt,
         inputs=dict(receipt.inputs) if receipt else {},
-        words={"cancel": say("cancel")},
+        words={"cancel": say("cancel"), "set": say("set")},
         lost=say("server_lost"),
         lost_short=say("lost"),
         unknown=say("unknown"),
