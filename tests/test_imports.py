@@ -71,12 +71,19 @@ ORDER = (
     "app.routes.health",
     "app.routes",
     "app.development",
+    "app.demo_parameters",
     "app.demo",
     "app.simulator",
     "app.main",
 )
 SPEAK_ZENOH = {"app.link", "app.simulator"}
-KNOWN_TO_THE_SIMULATOR = {"app.demo", "app.errors", "app.interfaces", "app.keys"}
+KNOWN_TO_THE_SIMULATOR = {
+    "app.demo",
+    "app.demo_parameters",
+    "app.errors",
+    "app.interfaces",
+    "app.keys",
+}
 
 
 def name_of(path: Path) -> str:
