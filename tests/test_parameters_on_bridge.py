@@ -7,7 +7,6 @@ from typing import Any
 
 import httpx
 import pytest
-from playwright.sync_api import Page, expect
 
 from tests import cyclone
 from tests.cyclone import Client, CycloneRobot, served
