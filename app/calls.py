@@ -9,6 +9,7 @@ import logging
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Final, Protocol
 
 from app.errors import DecodeError
@@ -32,11 +33,23 @@ class Asker(Protocol):
     def query(self, key: str, payload: bytes, timeout_s: float) -> "asyncio.Future[bytes | None]": ...
 
 
+@dataclass(frozen=True, slots=True)
+class Request:
+    """What a widget asks of a service; `read` makes an answer of the decoded response."""
+
+    widget: str
+    service: str
+    type: str
+    payload: bytes
+    timeout_s: float
+    read: Callable[[Any], Answer]
+
+
 @dataclass(slots=True)
 class _Waiting:
     """A call whose query is not over; `cut` is done when the bridge went away meanwhile."""
 
-    widget: Call
+    request: Request
     press_id: str
     answered: "asyncio.Future[bytes | None]"
     cut: "asyncio.Future[None]"
@@ -59,7 +72,7 @@ class Calls:
 
     def unanswered(self, key: str) -> int:
         """How many requests of a service the bridge may still hold."""
-        return sum(self._robot.key(w.widget.service) == key for w in self._open.values())
+        return sum(self._robot.key(w.request.service) == key for w in self._open.values())
 
     def follow(self) -> None:
         """After every change of the graph: without a bridge no answer will come."""
@@ -68,29 +81,39 @@ class Calls:
                 if not waiting.cut.done():
                     waiting.cut.set_result(None)
 
+    def answers(self, service: str) -> None:
+        """This service, or another one of its node, has answered before."""
+        self._ever_answered.add(service)
+
     async def call(self, widget: Call, payload: bytes, press_id: str, corrected: Corrected) -> Answer:
-        """Sends the request and waits; `corrected` gets the answer that comes after the time."""
-        key = self._robot.key(widget.service)
+        """Calls the service of a widget; see `ask`."""
+        read = partial(self._read_call, widget)
+        request = Request(widget.id, widget.service, widget.type, payload, widget.timeout_s, read)
+        return await self.ask(request, press_id, corrected)
+
+    async def ask(self, request: Request, press_id: str, corrected: Corrected) -> Answer:
+        """Sends a request and waits; `corrected` gets the answer that comes after the time."""
+        key = self._robot.key(request.service)
         if self.unanswered(key) >= MOST_UNANSWERED:
-            return Answer("refused", say("too_many", service=widget.service))
+            return Answer("refused", say("too_many", service=request.service))
         loop = asyncio.get_running_loop()
-        query = self._link.query(key, payload, widget.timeout_s + LATE_S)
-        waiting = _Waiting(widget, press_id, query, loop.create_future())
+        query = self._link.query(key, request.payload, request.timeout_s + LATE_S)
+        waiting = _Waiting(request, press_id, query, loop.create_future())
         number = id(waiting)
         self._open[number] = waiting
         query.add_done_callback(lambda _: self._open.pop(number, None))
-        self._latest[widget.id] = press_id
-        self._show(widget, Progress(busy=True, text=say("waiting_for_answer")))
+        self._latest[request.widget] = press_id
+        self._show(request, Progress(busy=True, text=say("waiting_for_answer")))
         answer = await self._awaited(waiting, corrected)
-        self._show(widget, Progress(outcome=answer.outcome, text=answer.text))
+        self._show(request, Progress(outcome=answer.outcome, text=answer.text))
         return answer
 
     async def _awaited(self, waiting: _Waiting, corrected: Corrected) -> Answer:
-        widget = waiting.widget
+        asked = waiting.request
         ends: set[asyncio.Future[Any]] = {waiting.answered, waiting.cut}
-        await asyncio.wait(ends, timeout=widget.timeout_s, return_when=asyncio.FIRST_COMPLETED)
+        await asyncio.wait(ends, timeout=asked.timeout_s, return_when=asyncio.FIRST_COMPLETED)
         if waiting.answered.done() and (reply := waiting.answered.result()) is not None:
-            return self._read(widget, reply)
+            return self._read(asked, reply)
         if waiting.answered.done():  # without an answer: the news that the bridge is gone may follow
             await asyncio.wait({waiting.cut}, timeout=CUT_NEWS_S)
         else:
@@ -98,29 +121,34 @@ class Calls:
         if waiting.cut.done() or not self._robot.graph.bridges:
             return Answer("unknown", say("call_cut"))
         if waiting.answered.done():
-            return Answer("unknown", say("call_dropped", service=widget.service))
-        hint = "" if widget.service in self._ever_answered else say("cyclone_hint")
-        return Answer("timed_out", say("timed_out", seconds=f"{widget.timeout_s:g}") + hint)
+            return Answer("unknown", say("call_dropped", service=asked.service))
+        hint = "" if asked.service in self._ever_answered else say("cyclone_hint")
+        return Answer("timed_out", say("timed_out", seconds=f"{asked.timeout_s:g}") + hint)
 
     def _late(
         self, waiting: _Waiting, done: "asyncio.Future[bytes | None]", corrected: Corrected
     ) -> None:
         if done.cancelled() or (reply := done.result()) is None:
             return
-        answer = self._read(waiting.widget, reply)
+        asked = waiting.request
+        answer = self._read(asked, reply)
         log.warning("press %s: a late answer: %s: %s", waiting.press_id, answer.outcome, answer.text)
         corrected(waiting.press_id, answer)
-        if self._latest.get(waiting.widget.id) == waiting.press_id:
-            self._show(waiting.widget, Progress(outcome=answer.outcome, text=answer.text))
+        if self._latest.get(asked.widget) == waiting.press_id:
+            self._show(asked, Progress(outcome=answer.outcome, text=answer.text))
 
-    def _read(self, widget: Call, reply: bytes) -> Answer:
-        self._ever_answered.add(widget.service)
-        _, response_type = self._interfaces.service(widget.type)
+    def _read(self, asked: Request, reply: bytes) -> Answer:
+        self._ever_answered.add(asked.service)
+        _, response_type = self._interfaces.service(asked.type)
         try:
             response = self._interfaces.decode(response_type, reply)
         except DecodeError as error:
-            log.error("%s: %s", widget.service, error)
-            return Answer("unknown", say("answer_unreadable", wanted=widget.type))
+            log.error("%s: %s", asked.service, error)
+            return Answer("unknown", say("answer_unreadable", wanted=asked.type))
+        return asked.read(response)
+
+    def _read_call(self, widget: Call, response: Any) -> Answer:
+        _, response_type = self._interfaces.service(widget.type)
         success = field_of(self._interfaces, response_type, widget.success, "success", "bool")
         message = field_of(self._interfaces, response_type, widget.message, "message", "string")
         words = [str(value_at(response, message))] if message else []
@@ -132,8 +160,8 @@ class Calls:
             return Answer("succeeded", say("answered", time=now) + said)
         return Answer("rejected", say("said_no", time=now) + said)
 
-    def _show(self, widget: Call, progress: Progress) -> None:
-        self._robot.progress[widget.id] = progress
+    def _show(self, asked: Request, progress: Progress) -> None:
+        self._robot.progress[asked.widget] = progress
         self._changed()
 
 

@@ -1,12 +1,14 @@
 """What the demo robot does, with the time given: pure, so that it can be stepped.
 
 A `system_controller` that permits and forbids operation in turns, echoes what it heard, has a
-light, can be reset, and counts Fibonacci numbers as an action.
+light, can be reset, counts Fibonacci numbers as an action, and has parameters.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
+
+from app.demo_parameters import EVENTS, DemoParameters
 
 PERMITTED_S: Final = 20.0
 FORBIDDEN_S: Final = 8.0
@@ -51,6 +53,7 @@ class DemoRobot:
         self._told: tuple[bool, float] | None = None
         self._heard: list[Message] = []
         self._goals: dict[bytes, Goal] = {}
+        self.parameters = DemoParameters()
 
     @property
     def permits(self) -> bool:
@@ -75,6 +78,7 @@ class DemoRobot:
             self._began = now
         self._now = now
         said, self._heard = self._heard, []
+        said += [(EVENTS, event) for event in self.parameters.news()]
         if self._told is None or self._told[0] != self.permits or now - self._told[1] >= REPEAT_S:
             self._told = (self.permits, now)
             said.append(("/operation_enabled", {"data": self.permits}))

@@ -8,8 +8,10 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
+from app.declared import UNKNOWN, Declared, allowed, limits_text, own_range
 from app.keys import TopicRole
 from app.panel.model import Action, Call, Display, Interlock, Pressed, Publish
+from app.panel.parameter import DESCRIBE, GET, SET, Parameter
 from app.progress import IDLE
 from app.robot import Robot, value_of
 from app.sentences import say
@@ -103,10 +105,62 @@ def call_verdict(call: Call | Action, interlock: Interlock | None, robot: Robot,
     return PERMITTED if interlock is None else interlock_verdict(interlock, robot, now)
 
 
+def parameter_verdict(of: Parameter, interlock: Interlock | None, robot: Robot, now: float) -> Verdict:
+    """Whether a parameter may be set: its node is there, has told what may be set, no answer is
+    awaited, and the interlock permits."""
+    passable = way(robot, now)
+    if not passable.permitted:
+        return passable
+    if doubt := parameters_offered(of.node, robot) or unsettable(
+        of, robot.parameters.get(of.id, UNKNOWN)
+    ):
+        return doubt
+    if robot.progress.get(of.id, IDLE).busy:
+        return locked("busy")
+    return PERMITTED if interlock is None else interlock_verdict(interlock, robot, now)
+
+
+def parameters_offered(node: str, robot: Robot) -> Verdict | None:
+    """Why the parameters of a node can't be read and set, by what the graph shows."""
+    for name, wanted in (GET, DESCRIBE, SET):
+        found = robot.graph.server_type("SS", robot.key(f"{node}/{name}"))
+        if found is None:
+            return locked("no_parameters", node=node)
+        if found != wanted:
+            return locked("wrong_type", topic=f"{node}/{name}", found=found, wanted=wanted)
+    return None
+
+
+def unsettable(of: Parameter, known: Declared) -> Verdict | None:
+    """Why a parameter can't be set, by what its node says of it."""
+    code = {
+        "waiting": "parameter_waiting",
+        "cut": "parameter_waiting",
+        "silent": "parameter_silent",
+        "undeclared": "parameter_undeclared",
+        "mistyped": "parameter_mistyped",
+        "unreadable": "parameter_unreadable",
+    }.get(known.state)
+    node, name = of.node, of.parameter
+    if code == "parameter_silent" and known.wall == 0.0:
+        return Verdict(False, code, say(code, node=node, name=name) + say("cyclone_hint"))
+    if code is not None:
+        return locked(code, node=node, name=name, found=known.found, wanted=of.type)
+    if known.read_only:
+        return locked("parameter_read_only", node=node, name=name)
+    if allowed(of, known).empty:
+        theirs, ours = limits_text(of, known.range), limits_text(of, own_range(of))
+        return locked("parameter_apart", node=node, name=name, theirs=theirs, ours=ours)
+    return None
+
+
 def press_verdict(widget: Pressed, interlock: Interlock | None, robot: Robot, now: float) -> Verdict:
     """Whether a widget may be pressed."""
-    if isinstance(widget, Publish):
-        return publish_verdict(widget, interlock, robot, now)
+    match widget:
+        case Publish():
+            return publish_verdict(widget, interlock, robot, now)
+        case Parameter():
+            return parameter_verdict(widget, interlock, robot, now)
     return call_verdict(widget, interlock, robot, now)
 
 

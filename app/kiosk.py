@@ -24,6 +24,8 @@ from app.joining import LOG_TYPE, Joining
 from app.link import Config, Link
 from app.logs import RobotLog, RosoutHandler
 from app.panel.model import Panel, RobotEntry
+from app.panel.parameter import EVENTS
+from app.parameters import Parameters
 from app.presses import Presses, Receipt
 from app.robot import Robot
 from app.sentences import say
@@ -72,6 +74,9 @@ class Kiosk:
         self._calls = Calls(self.interfaces, self.robot, self.link, self.show)
         self._actions = Actions(self.interfaces, self.robot, self.link, self.show)
         self._confirmations = Confirmations(self.robot, self.show)
+        self._parameters = Parameters(
+            panel, self.interfaces, self.robot, self.link, self._calls, self.show
+        )
         self.presses = Presses(
             panel,
             self.interfaces,
@@ -80,6 +85,7 @@ class Kiosk:
             self._calls,
             self._actions,
             self._confirmations,
+            self._parameters,
         )
         self._feedback = {keys.feedback(self.robot.key(one)): one for one in panel.actions()}
         self._joining = Joining(panel, self.interfaces, self.robot, self.link, self.show, self.renew)
@@ -110,6 +116,7 @@ class Kiosk:
             await asyncio.gather(self._renewing, return_exceptions=True)
         await self._joining.stop()
         await self._actions.stop()
+        await self._parameters.stop()
         try:
             await asyncio.to_thread(self.link.close)
         except LinkError as error:
@@ -205,11 +212,15 @@ class Kiosk:
             if key in self._feedback:
                 self._actions.hear_feedback(self._feedback[key], sample)
                 continue
+            if key == self.robot.key(EVENTS):
+                self._parameters.hear(sample)
             self.robot.take(key, sample)
             self._confirmations.hear(key)
             urgent = urgent or key in self._urgent
         came = False
         for token_key, token in changes.tokens.items():
+            if token.lost_seq:
+                self._parameters.lose(token_key)
             if token.lost_seq and (zid := self.robot.graph.apply(token_key, False)):
                 self.robot.cut(zid, token.lost_seq)
                 self._log.warning("bridge %s lost", zid)
@@ -229,6 +240,7 @@ class Kiosk:
         self.robot.follow_publishers()
         self._calls.follow()
         self._actions.follow()
+        self._parameters.follow()
         self._joining.follow(came)
 
     # Showing.

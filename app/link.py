@@ -278,8 +278,10 @@ class Link:
             if last is not None and last.get_id() == stamp.get_id() and not stamp >= last:
                 return  # history that came after what is newer
             self._stamps[key] = stamp
+        unseen = self._samples.get(key)
+        skipped = 0 if unseen is None else unseen.skipped + 1
         self._samples[key] = Sample(
-            sample.payload, next(self._seq), time.monotonic(), time.time(), source
+            sample.payload, next(self._seq), time.monotonic(), time.time(), source, skipped
         )
         self._wake()
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from typing import Any, Final, Literal, Protocol
 
+from app import declared
 from app.actions import Actions
 from app.calls import Calls
 from app.confirmations import Confirmations
@@ -23,7 +24,9 @@ from app.interfaces import Interfaces
 from app.interlocks import press_verdict
 from app.logs import RobotLog
 from app.panel.model import Action, Call, Input, Panel, Pressed, Publish
+from app.panel.parameter import Parameter
 from app.panel.template import filled, inputs_of
+from app.parameters import Parameters
 from app.progress import Answer, Outcome
 from app.robot import Robot
 from app.sentences import clock, say
@@ -35,7 +38,15 @@ Cause = Literal["", "interlock", "input", "link", "time"]
 RECEIPTS_KEPT: Final = 1000
 LONGEST_LOGGED: Final = 300
 NO_WAY: Final = frozenset(
-    {"no_link", "no_bridge", "no_bridge_of", "bridge_silent", "joining", "no_service"}
+    {
+        "no_link",
+        "no_bridge",
+        "no_bridge_of",
+        "bridge_silent",
+        "joining",
+        "no_service",
+        "no_parameters",
+    }
 )
 FINE: Final = frozenset({"published", "confirmed", "accepted", "succeeded"})
 
@@ -98,6 +109,7 @@ class Presses:
         calls: Calls,
         actions: Actions,
         confirmations: Confirmations,
+        parameters: Parameters,
         monotonic: Callable[[], float] = time.monotonic,
     ) -> None:
         self._widgets = {w.id: w for w in panel.widgets()}
@@ -109,6 +121,7 @@ class Presses:
         self._calls = calls
         self._actions = actions
         self._confirmations = confirmations
+        self._parameters = parameters
         self._under_way: dict[str, _UnderWay] = {}
         self._monotonic = monotonic
         self._receipts: OrderedDict[str, Receipt] = OrderedDict()
@@ -122,11 +135,13 @@ class Presses:
 
     def typed(self, form: Mapping[str, str]) -> dict[str, Any]:
         """A form's texts as values of the inputs that they are named by."""
-        fields = {name: self._widgets.get(name) for name in form}
-        return {
-            name: typed(field, form[name]) if isinstance(field, Input) else form[name]
-            for name, field in fields.items()
-        }
+        return {name: self._typed(name, text) for name, text in form.items()}
+
+    def _typed(self, name: str, text: str) -> Any:
+        field = self._widgets.get(name)
+        if isinstance(field, Parameter):
+            return declared.typed(field, text)
+        return typed(field, text) if isinstance(field, Input) else text
 
     def receipt(self, press_id: str) -> Receipt | None:
         """The receipt of a press, as it is known now."""
@@ -269,6 +284,8 @@ class Presses:
                 return await self._calls.call(widget, payload, press_id, self._correct)
             case Action():
                 return await self._actions.start(widget, fields, press_id, self._correct)
+            case Parameter():
+                return await self._parameters.set(widget, fields["value"], press_id, self._correct)
 
     def _published(self, widget: Publish, fields: dict[str, Any]) -> Answer:
         payload = self._interfaces.encode(widget.type, fields)
@@ -282,7 +299,7 @@ class Presses:
     def _checked(self, widget: Pressed, inputs: Mapping[str, Any]) -> dict[str, Any]:
         """The values of the inputs that the widget's message names."""
         for name in inputs:
-            if not isinstance(self._widgets.get(name), Input):
+            if not isinstance(self._widgets.get(name), Input | Parameter):
                 raise InputError(f'there is no input "{name:.60}" on this panel')
         values: dict[str, Any] = {}
         for name in inputs_of(widget):
@@ -291,6 +308,8 @@ class Presses:
                 raise InputError(f'the input "{name}" is missing')
             if isinstance(field, Input):
                 values[name] = checked(field, inputs[name])
+            elif isinstance(field, Parameter):
+                values[name] = self._parameters.checked(field, inputs[name])
         return values
 
     def _receipt(

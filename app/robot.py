@@ -9,6 +9,7 @@ from collections import Counter
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
+from app.declared import Declared
 from app.errors import DecodeError, FieldError
 from app.graph import Graph
 from app.interfaces import Interfaces, value_at
@@ -32,7 +33,8 @@ class Sample:
     """One message as it came: `at` monotonic seconds, `wall` seconds since the epoch.
 
     `source` is the zid of the bridge that sent it (from its timestamp), None if it did not say;
-    `seq` orders samples and losses of bridges as this session saw them.
+    `seq` orders samples and losses of bridges as this session saw them; `skipped` is how many came
+    just before it that nobody looked at.
     """
 
     payload: Buffer
@@ -40,6 +42,7 @@ class Sample:
     at: float
     wall: float
     source: str | None
+    skipped: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +76,7 @@ class Robot:
         self._told_apart = entry.namespace if entry else None
         self.graph = Graph(own_zid, self._told_apart)
         self.progress: dict[str, Progress] = {}  # of what widgets have asked, by their ids
+        self.parameters: dict[str, Declared] = {}  # what nodes said of them, by their widgets' ids
         self.undecodable: Counter[str] = Counter()
         self._interfaces = interfaces
         self._types = {self.key(topic): name for topic, name in panel.subscriptions().items()}

@@ -23,6 +23,7 @@ from zenoh.handlers import Callback
 
 from app import keys
 from app.demo import COUNT, COUNT_TYPE, LISTENS, SERVES, SPEAKS, DemoRobot
+from app.demo_parameters import EVENT_TYPE, EVENTS, SERVICES
 from app.errors import DecodeError
 from app.interfaces import Interfaces, interfaces_of
 from app.keys import Qos
@@ -30,6 +31,9 @@ from app.keys import Qos
 ENDPOINT: Final = "tcp/127.0.0.1:7447"
 STEP_S: Final = 0.1
 LATCHED: Final = Qos(transient_local=True, depth=1)
+OF_EVENTS: Final = Qos(depth=1000)  # rmw_qos_profile_parameter_events
+SAID: Final = {**SPEAKS, EVENTS: EVENT_TYPE}
+SERVED: Final = {**SERVES, **SERVICES}
 
 
 class Simulator:
@@ -43,11 +47,12 @@ class Simulator:
         self._ends = threading.Event()
         self._session = zenoh.open(_listening(endpoint))
         self._publishers = {topic: self._publisher(topic) for topic in SPEAKS}
+        self._publishers[EVENTS] = self._session.declare_publisher(self._key(EVENTS))
         self._results: list[tuple[bytes, zenoh.Query]] = []
         self._types = self._interfaces.action(COUNT_TYPE)
         self._declared = [
             *self._subscribers(),
-            *(self._served(self._key(one), kind, self._server(one)) for one, kind in SERVES.items()),
+            *(self._served(self._key(one), kind, self._server(one)) for one, kind in SERVED.items()),
             *self._action(),
             *self._graph(),
         ]
@@ -105,7 +110,9 @@ class Simulator:
         return self._session.declare_queryable(key, Callback(on_query, indirect=False), complete=True)
 
     def _server(self, service: str) -> Callable[[Any], Mapping[str, Any]]:
-        return lambda request: self._robot.serve(service, request)
+        robot = self._robot
+        serve = robot.parameters.serve if service in SERVICES else robot.serve
+        return lambda request: serve(service, request)
 
     def _action(self) -> Iterator[Any]:
         key = f"{self._key(COUNT)}/_action"
@@ -143,6 +150,7 @@ class Simulator:
         ends: list[tuple[keys.TopicRole, Mapping[str, str], Qos]] = [
             ("MS", LISTENS, Qos()),
             ("MP", SPEAKS, LATCHED),
+            ("MP", {EVENTS: EVENT_TYPE}, OF_EVENTS),
         ]
         for role, topics, qos in ends:
             for topic, name in topics.items():
@@ -150,7 +158,7 @@ class Simulator:
                 yield liveliness.declare_token(
                     keys.token(zid, role, self._key(topic), name, qos, type_hash)
                 )
-        for service, name in SERVES.items():
+        for service, name in SERVED.items():
             yield liveliness.declare_token(keys.server_token(zid, "SS", self._key(service), name))
         yield liveliness.declare_token(keys.server_token(zid, "AS", self._key(COUNT), COUNT_TYPE))
         yield liveliness.declare_token(keys.bridge_token(zid))
@@ -173,7 +181,7 @@ class Simulator:
                 answered = {id(query) for query, _ in ended}
                 self._results = [one for one in self._results if id(one[1]) not in answered]
             for topic, fields in said:
-                self._publishers[topic].put(self._interfaces.encode(SPEAKS[topic], fields))
+                self._publishers[topic].put(self._interfaces.encode(SAID[topic], fields))
             for goal_id, sequence in counted:
                 self._tell(goal_id, sequence)
             for query, (status, sequence) in ended:

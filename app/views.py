@@ -15,6 +15,8 @@ from app.interlocks import Verdict, interlock_verdict, press_verdict, way
 from app.panel.displays import Indicator, Readout
 from app.panel.inputs import Numeric, SelectInput, TextInput, ToggleInput
 from app.panel.model import Action, Call, Panel, Publish
+from app.panel.parameter import Parameter
+from app.parameter_display import parameter
 from app.progress import IDLE, Progress
 from app.robot import Robot
 from app.sentences import say
@@ -89,12 +91,14 @@ def sight(
                 widgets[widget.id] = {}
             case Numeric():
                 widgets[widget.id] = {"limits": limits(widget)}
-            case Publish() | Call() | Action():
+            case Publish() | Call() | Action() | Parameter():
                 interlock = panel.interlock(widget.interlock)
                 verdict = noted(press_verdict(widget, interlock, robot, now))
                 widgets[widget.id] = {**enabled(verdict)}
                 if not isinstance(widget, Publish) or widget.confirm:
                     widgets[widget.id] |= progress(robot.progress.get(widget.id, IDLE))
+                if isinstance(widget, Parameter):
+                    widgets[widget.id] |= parameter(widget, robot)
             case Readout():
                 widgets[widget.id], until = readout(widget, robot, now)
                 untils.append(until)

@@ -16,6 +16,7 @@ from app.confirmations import Confirmations, equal
 from app.errors import PanelError
 from app.panel import load_panel
 from app.panel.model import Panel
+from app.parameters import Parameters
 from app.presses import Presses, Receipt
 from app.robot import Robot
 from tests.builders import BOOL, FREE, HEARD, INTERFACES, MESSAGE, robot_there, says
@@ -40,6 +41,7 @@ class Desk:
         self.confirmations = Confirmations(self.robot, lambda: None)
         calls = Calls(INTERFACES, self.robot, NOBODY, lambda: None)
         actions = Actions(INTERFACES, self.robot, NOBODY, lambda: None)
+        parameters = Parameters(panel, INTERFACES, self.robot, NOBODY, calls, lambda: None)
         self.presses = Presses(
             panel,
             INTERFACES,
@@ -48,6 +50,7 @@ class Desk:
             calls,
             actions,
             self.confirmations,
+            parameters,
             lambda: self.now,
         )
         self._seq = itertools.count(1)

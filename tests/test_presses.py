@@ -15,6 +15,7 @@ from app.calls import Calls
 from app.confirmations import Confirmations
 from app.errors import LinkError, NotFound
 from app.panel.model import Panel
+from app.parameters import Parameters
 from app.presses import RECEIPTS_KEPT, Presses, Receipt
 from app.robot import Robot, Sample
 from tests.builders import (
@@ -80,8 +81,17 @@ class Bench:
         calls = Calls(INTERFACES, self.robot, NOBODY, lambda: None)
         actions = Actions(INTERFACES, self.robot, NOBODY, lambda: None)
         confirmations = Confirmations(self.robot, lambda: None)
+        parameters = Parameters(panel, INTERFACES, self.robot, NOBODY, calls, lambda: None)
         self._presses = Presses(
-            panel, INTERFACES, self.robot, self.way, calls, actions, confirmations, lambda: self.now
+            panel,
+            INTERFACES,
+            self.robot,
+            self.way,
+            calls,
+            actions,
+            confirmations,
+            parameters,
+            lambda: self.now,
         )
         self.receipt = self._presses.receipt
         self.typed = self._presses.typed

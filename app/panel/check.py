@@ -8,9 +8,11 @@ from app.panel.check_calls import answer_faults, sent
 from app.panel.check_confirm import confirm_faults
 from app.panel.check_displays import display_faults, field_faults
 from app.panel.check_inputs import input_faults
+from app.panel.check_parameters import parameter_faults, type_faults
 from app.panel.displays import Indicator, Readout
 from app.panel.examples import template_faults
 from app.panel.model import Action, Call, Confirm, Display, Input, Interlock, Panel, Pressed, Publish
+from app.panel.parameter import Parameter
 
 
 def faults_in(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = ()) -> Iterator[Fault]:
@@ -53,11 +55,15 @@ def faults_in(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = ()
                         yield from confirm_faults(
                             place, widget, panel, on_page, inputs.keys(), interfaces
                         )
+                case Parameter():
+                    yield from _interlocked(place, widget, panel)
+                    yield from parameter_faults(place, widget)
                 case Readout() | Indicator():
                     yield from display_faults(place, widget, interfaces)
                 case _:
                     yield from input_faults(place, widget)
     yield from _topics_of_two_kinds(panel)
+    yield from type_faults(panel)
 
 
 def _robots(panel: Panel) -> Iterator[Fault]:

@@ -12,7 +12,7 @@ NUMBER = r"u?int(8|16|32|64)|float(32|64)|byte|char"
 WORDS = {NUMBER: "a number"}
 
 
-def sent(widget: Pressed, interfaces: Interfaces) -> tuple[str, str]:
+def sent(widget: Publish | Call | Action, interfaces: Interfaces) -> tuple[str, str]:
     """The key that holds what is sent, and its type; InterfaceError if there is no such type."""
     match widget:
         case Publish():

@@ -22,6 +22,7 @@ from app.panel.description import (
 )
 from app.panel.displays import Indicator, Readout
 from app.panel.inputs import NumberInput, SelectInput, SliderInput, TextInput, ToggleInput
+from app.panel.parameter import EVENT_TYPE, EVENTS, Parameter
 
 
 class Interlock(Description):
@@ -116,9 +117,9 @@ class Action(Placed):
 
 
 Input = TextInput | NumberInput | SliderInput | SelectInput | ToggleInput
-Pressed = Publish | Call | Action
+Pressed = Publish | Call | Action | Parameter
 Display = Readout | Indicator
-Widget = Annotated[Input | Publish | Call | Action | Display, Field(discriminator="kind")]
+Widget = Annotated[Input | Pressed | Display, Field(discriminator="kind")]
 KINDS: Final[Mapping[str, type[Placed]]] = {
     "text": TextInput,
     "number": NumberInput,
@@ -128,6 +129,7 @@ KINDS: Final[Mapping[str, type[Placed]]] = {
     "publish": Publish,
     "call": Call,
     "action": Action,
+    "parameter": Parameter,
     "readout": Readout,
     "indicator": Indicator,
 }
@@ -141,6 +143,10 @@ class RobotEntry(Description):
     name: Label
     namespace: Annotated[str, AfterValidator(namespace_of)] = ""
     connect: Annotated[tuple[Label, ...], Field(strict=False)] = ()
+
+
+# rmw_qos_profile_parameter_events; the durability is given, so that no first event is missed.
+OF_EVENTS: Final = TopicQos(durability="volatile", depth=1000)
 
 
 class Page(Description):
@@ -164,7 +170,7 @@ class Panel(Description):
     # Of the file, not in it: changes when what a browser has loaded is out of date.
     revision: Annotated[str, Field(exclude=True)] = ""
 
-    def widgets(self) -> Iterator[Input | Publish | Call | Action | Display]:
+    def widgets(self) -> Iterator[Input | Pressed | Display]:
         for page in self.pages:
             yield from page.widgets
 
@@ -177,7 +183,8 @@ class Panel(Description):
     def subscriptions(self) -> dict[str, str]:
         """Topic → type of all that the panel listens to."""
         own = {one.topic: one.type for one in self.confirms() if one.type is not None}
-        return own | {of.topic: of.type for of in self.listening()}
+        events = {EVENTS: EVENT_TYPE} if any(self.parameters()) else {}
+        return own | {of.topic: of.type for of in self.listening()} | events
 
     def confirms(self) -> Iterator[Confirm]:
         """All that shows that a command took effect."""
@@ -194,6 +201,9 @@ class Panel(Description):
         """Action → type of all that the panel may send goals to."""
         return {w.action: w.type for w in self.widgets() if isinstance(w, Action)}
 
+    def parameters(self) -> Iterator[Parameter]:
+        yield from (w for w in self.widgets() if isinstance(w, Parameter))
+
     def publications(self) -> dict[str, str]:
         """Topic → type of all that the panel publishes."""
         return {w.topic: w.type for w in self.widgets() if isinstance(w, Publish)}
@@ -201,5 +211,5 @@ class Panel(Description):
     def qos(self, topic: str) -> TopicQos:
         """A topic's QoS, which is the same wherever the panel names it."""
         speaking = (w for w in self.widgets() if isinstance(w, Publish))
-        of_topic = (of.qos for of in (*self.listening(), *speaking) if of.topic == topic)
-        return next(of_topic, TopicQos())
+        named = (of.qos for of in (*self.listening(), *speaking) if of.topic == topic)
+        return next(named, OF_EVENTS if topic == EVENTS else TopicQos())

@@ -10,6 +10,7 @@ from fastapi.responses import HTMLResponse, RedirectResponse, Response
 from app import moments
 from app.errors import NotFound
 from app.panel.model import Input, Page, Panel, Pressed
+from app.panel.parameter import Parameter
 from app.panel.template import inputs_of
 from app.presses import Receipt
 from app.routes.site import CurrentSite, Site
@@ -71,7 +72,7 @@ class Ask(TypedDict):
     """What will be done by a press, and the inputs that it takes."""
 
     sentence: str
-    inputs: list[Input]
+    inputs: list[Input | Parameter]
 
 
 def _to_a_robot(request: Request, site: Site, path: str) -> Response | None:
@@ -85,7 +86,7 @@ def _to_a_robot(request: Request, site: Site, path: str) -> Response | None:
 def _render(request: Request, site: Site, page: Page) -> Response:
     kiosk = site.fleet.kiosk(request.path_params.get("robot"))
     board = kiosk.board
-    typed = any(isinstance(widget, Input) for widget in page.widgets)
+    typed = any(isinstance(widget, Input | Parameter) for widget in page.widgets)
     receipt = kiosk.presses.receipt(request.query_params.get("receipt", ""))
     refresh_s = REFRESH_WITH_INPUTS_S if typed else REFRESH_S
     now = moments.now()
@@ -105,6 +106,7 @@ def _render(request: Request, site: Site, page: Page) -> Response:
         words={
             "cancel": say("cancel"),
             "robots": say("robots"),
+            "set": say("set"),
             "back": say("back"),
             "base": kiosk.base,
             "asks": asks_of(site.fleet.panel, page),
@@ -128,6 +130,6 @@ def asks_of(panel: Panel, page: Page) -> dict[str, Ask]:
 
 
 def ask_of(panel: Panel, widget: Pressed) -> Ask:
-    inputs = {w.id: w for w in panel.widgets() if isinstance(w, Input)}
+    inputs = {w.id: w for w in panel.widgets() if isinstance(w, Input | Parameter)}
     needed = [inputs[name] for name in inputs_of(widget)]
     return Ask(sentence=say("ask", label=widget.label), inputs=needed)

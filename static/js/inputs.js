@@ -13,7 +13,8 @@ function equip(input) {
     button.hidden = false;
     button.addEventListener("click", () => {
       if (input.value === "") input.value = input.min;
-      else input.stepUp(Number(button.dataset.step));
+      else if (input.step !== "any") input.stepUp(Number(button.dataset.step));
+      input.dispatchEvent(new Event("input", { bubbles: true }));
       show();
     });
   }

@@ -1,6 +1,7 @@
 // Puts what the server says onto the page: texts and attributes, in place. It composes no sentence.
 import { Source } from "./source.js";
 import { Presser } from "./press.js";
+import { showBounds, showEntry } from "./entry.js";
 
 const body = document.body;
 const widgets = new Map(
@@ -14,7 +15,7 @@ function setText(element, text) {
 // How each attribute of a widget is shown; what is not here is a text with its own place.
 const SHOW = {
   enabled: (root, value) => {
-    root.querySelector("button").disabled = !value;
+    root.querySelector("button[type=submit]").disabled = !value;
     if (!value) root.querySelector("dialog.ask")?.close();
   },
   stoppable: (root, value) => {
@@ -29,6 +30,9 @@ const SHOW = {
     const bar = root.querySelector("progress");
     if (bar) bar.hidden = !value;
   },
+  entry: showEntry,
+  bounds: showBounds,
+  settable: (root, value) => (root.querySelector(".setting").inert = !value),
   progress: (root, value) => {
     const bar = root.querySelector("progress");
     if (value === null) bar?.removeAttribute("value");
@@ -90,9 +94,8 @@ function lockAll() {
     const buttons = root.querySelectorAll("button[type=submit]");
     for (const button of buttons) button.disabled = true;
     root.querySelector("dialog.ask")?.close();
-    if (buttons.length) {
-      setText(root.querySelector('[data-text="reason"]'), body.dataset.lost);
-    } else if (root.dataset.state) {
+    if (buttons.length) setText(root.querySelector('[data-text="reason"]'), body.dataset.lost);
+    if (root.dataset.state) {
       root.dataset.state = "old"; // its note still says from when it is
       if (root.dataset.shape) {
         Object.assign(root.dataset, { shape: "old", colour: "none" });

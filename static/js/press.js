@@ -1,6 +1,7 @@
-import { asked } from "./ask.js";
-
 // A press: on release, once, with an id of its own; its receipt is shown where it was pressed.
+import { asked } from "./ask.js";
+import { settle } from "./entry.js";
+
 const ANSWER_WITHIN_MS = 5000;
 // Two taps of a finger come within this time: the second one is the same press.
 const TAP_AGAIN_MS = 700;
@@ -11,11 +12,14 @@ function newId() {
   return [...bytes].map((byte) => byte.toString(16).padStart(2, "0")).join("");
 }
 
-// With its type. What is no number (an empty field) goes as it is: the server says what is wrong.
+// With its type. What is no number (an empty field), or a whole one that is not exact here, goes as it
+// is written: the server says what is wrong.
 function valueOf(input) {
   if (input.type === "checkbox") return input.checked;
   const number = input.type === "number" || input.type === "range";
-  return number && input.value !== "" ? Number(input.value) : input.value;
+  if (!number || input.value === "") return input.value;
+  const value = Number(input.value);
+  return Number.isInteger(value) && !Number.isSafeInteger(value) ? input.value : value;
 }
 
 export class Presser {
@@ -95,6 +99,7 @@ export class Presser {
   }
 
   #show(root, { outcome, reason, unheard = false }) {
+    if (outcome === "succeeded") settle(root);
     for (const other of this.#widgets.values()) {
       const old = other.querySelector(".receipt");
       if (old && other !== root) {

@@ -1,6 +1,8 @@
 """The parameters of the robot's node: their values, ranges, refusals, services and events."""
 
+import threading
 import time
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -30,6 +32,7 @@ from cyclone_types import (
 NAMES = ("not set", "bool", "integer", "double", "string")
 FIELDS = ("", "bool_value", "integer_value", "double_value", "string_value")
 _, BOOL, INTEGER, DOUBLE, STRING = range(5)
+KINDS = {bool: BOOL, int: INTEGER, float: DOUBLE, str: STRING}
 
 EVENT_HASH = "RIHS01_043e627780fcad87a22d225bc2a037361dba713fca6a6b9f4b869a5aa0393204"
 
@@ -81,6 +84,9 @@ class Parameters:
     def __init__(self, node: Node) -> None:
         self._node_name = f"/{node.name}"
         self._declared = {p.descriptor.name: p for p in robot_parameters()}
+        self._silent: dict[str, float | None] = {}
+        self._asked: list[str] = []
+        self.refusal = ""  # why every set is refused
         self._events = node.advertise(
             "/parameter_events", ParameterEvent, qos_of(1000, user_data=f"typehash={EVENT_HASH};")
         )
@@ -96,7 +102,44 @@ class Parameters:
                 self._describe,
             ),
         ):
-            node.serve(f"{self._node_name}/{service}", request, response, handler)
+            node.serve(
+                f"{self._node_name}/{service}", request, response, self._served(service, handler)
+            )
+
+    def _served(self, service: str, handler: Callable[..., None]) -> Callable[..., None]:
+        def serve(request: Any, answer: Answer) -> None:
+            self._asked.append(service)
+            delay = self._silent.get(service, 0.0)
+            if delay == 0.0:
+                handler(request, answer)
+            elif delay is not None:
+                later = threading.Timer(delay, handler, [request, answer])
+                later.daemon = True
+                later.start()
+
+        return serve
+
+    def asked(self, service: str) -> int:
+        """How often a service was asked."""
+        return self._asked.count(service)
+
+    def answer(self, service: str, seconds: float | None) -> None:
+        """After how many seconds a service does what it is asked and answers; None: never."""
+        self._silent[service] = seconds
+
+    def declare(self, name: str, value: Any, **more: Any) -> None:
+        """Declares a parameter, or declares it anew, and tells of it."""
+        type_ = KINDS[type(value)]
+        self._declared[name] = Declared(ParameterDescriptor(name, type_, **more), value)
+        self._tell([], new=[self._declared[name]])
+
+    def undeclare(self, name: str) -> None:
+        self._tell([], deleted=[self._declared.pop(name)])
+
+    def take_all(self, values: dict[str, Any]) -> None:
+        """Each change with an event of its own, as fast as it goes."""
+        for name, value in values.items():
+            self.take(name, value)
 
     def values(self) -> dict[str, Any]:
         return {name: p.value for name, p in self._declared.items()}
@@ -133,7 +176,7 @@ class Parameters:
         if declared is None:
             return f"parameter '{parameter.name}' was not declared"
         value = getattr(parameter.value, FIELDS[type_]) if 0 < type_ < len(FIELDS) else None
-        reason = declared.refusal(type_, value)
+        reason = self.refusal or declared.refusal(type_, value)
         if not reason:
             declared.value = value
             self._tell([declared])
@@ -145,7 +188,9 @@ class Parameters:
             return []
         return [self._declared[name] for name in names]
 
-    def _tell(self, changed: list[Declared]) -> None:
+    def _tell(
+        self, changed: list[Declared], new: Sequence[Declared] = (), deleted: Sequence[Declared] = ()
+    ) -> None:
         stamp = Time.at(time.time_ns())
-        parameters = [p.parameter for p in changed]
-        self._events.write(ParameterEvent(stamp, self._node_name, [], parameters, []))
+        told = [[p.parameter for p in some] for some in (new, changed, deleted)]
+        self._events.write(ParameterEvent(stamp, self._node_name, *told))

@@ -90,6 +90,24 @@ class Commands:
     def set_parameter(self, name: str, value: Any) -> None:
         self._parameters.take(name, value)
 
+    def set_parameters(self, values: dict[str, Any]) -> None:
+        self._parameters.take_all(values)
+
+    def declare_parameter(self, name: str, value: Any, **descriptor: Any) -> None:
+        self._parameters.declare(name, value, **descriptor)
+
+    def undeclare_parameter(self, name: str) -> None:
+        self._parameters.undeclare(name)
+
+    def answer_parameters(self, service: str, seconds: float | None) -> None:
+        self._parameters.answer(service, seconds)
+
+    def refuse_parameters(self, reason: str) -> None:
+        self._parameters.refusal = reason
+
+    def asked_parameters(self, service: str) -> int:
+        return self._parameters.asked(service)
+
     def advertise(self, topic: str, type: str, **qos: Any) -> None:
         idl, hash_ = TOPIC_TYPES[type]
         profile = qos_of(**qos, user_data=f"typehash={hash_};")

@@ -1,0 +1,78 @@
+"""The description of a ROS 2 parameter of a node, shown and set."""
+
+from typing import Annotated, Any, Final, Literal
+
+from pydantic import AfterValidator, Field
+
+from app.keys import TOPIC
+from app.panel.description import Id, Placed, Seconds
+from app.panel.inputs import Number, Unit
+from app.panel.ranges import decimal
+from app.sentences import say
+
+EVENTS: Final = "/parameter_events"
+EVENT_TYPE: Final = "rcl_interfaces/msg/ParameterEvent"
+
+# The services of a node that a parameter needs, with their types.
+GET: Final = ("get_parameters", "rcl_interfaces/srv/GetParameters")
+DESCRIBE: Final = ("describe_parameters", "rcl_interfaces/srv/DescribeParameters")
+SET: Final = ("set_parameters", "rcl_interfaces/srv/SetParameters")
+
+
+def _node(given: str) -> str:
+    if not TOPIC.fullmatch(given) or "__" in given:
+        raise ValueError(
+            f'"{given}" is not the absolute name of a ROS 2 node: it must be like /arm or /cell1/arm'
+        )
+    return given
+
+
+class Parameter(Placed):
+    """A parameter of a node; `min`, `max` and `step` narrow what the node describes.
+
+    It is its own input: a press sets the value that comes under the widget's id.
+    """
+
+    kind: Literal["parameter"]
+    node: Annotated[str, AfterValidator(_node), Field(max_length=200)]
+    parameter: Annotated[str, Field(pattern=r"^[^\s\x00-\x1f]{1,255}$")]
+    type: Literal["bool", "integer", "double", "string"]
+    unit: Unit = ""
+    min: Number | None = None
+    max: Number | None = None
+    step: Annotated[Number, Field(gt=0)] | None = None
+    on: Annotated[str, Field(min_length=1, max_length=120)] = say("on")
+    off: Annotated[str, Field(min_length=1, max_length=120)] = say("off")
+    interlock: Id | None = None
+    timeout_s: Seconds = 5.0
+    confirm_press: bool = False
+    span: Annotated[int, Field(ge=1, le=12)] = 6
+
+    @property
+    def numeric(self) -> bool:
+        return self.type in ("integer", "double")
+
+    @property
+    def template(self) -> dict[str, Any]:
+        return {"value": f"{{{self.id}}}"}
+
+    @property
+    def less(self) -> str:
+        return say("less", label=self.label)
+
+    @property
+    def more(self) -> str:
+        return say("more", label=self.label)
+
+    @property
+    def press(self) -> str:
+        """What the button is called where its place does not tell what it sets."""
+        return say("set_named", label=self.label)
+
+    def written(self, value: bool | float | str) -> str:
+        """A value as an operator reads it, exactly."""
+        if isinstance(value, bool):
+            return self.on if value else self.off
+        if isinstance(value, float):
+            value = decimal(value)
+        return f"{value} {self.unit}" if self.unit else f"{value}"

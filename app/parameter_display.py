@@ -1,0 +1,88 @@
+"""What a parameter shows: its value and how sure that is, what may be set: pure."""
+
+import math
+from typing import Any, Final
+
+from app.declared import LONGEST_TEXT, UNKNOWN, Declared, Value, allowed, limits_text
+from app.displays import NOTHING, written
+from app.panel.parameter import EVENT_TYPE, EVENTS, Parameter
+from app.panel.ranges import decimal
+from app.robot import Robot
+from app.sentences import clock, say
+
+# How each state looks: as those of a readout.
+LOOKS: Final = {
+    "waiting": "waiting",
+    "live": "live",
+    "cut": "old",
+    "silent": "old",
+    "missing": "missing",
+    "undeclared": "missing",
+    "mistyped": "unreadable",
+    "unreadable": "unreadable",
+}
+LONGEST_HINT: Final = 200
+ANY_STEP: Final = {False: "any", True: "1"}
+
+
+def parameter(of: Parameter, robot: Robot) -> dict[str, Any]:
+    """Attributes: `state`, `text`, `note`, `hint`, `limits`, `settable`, and of the input `entry`
+    (the value to start from) and `bounds` (`min`, `max` and `step` as HTML has them)."""
+    known = robot.parameters.get(of.id, UNKNOWN)
+    limits = allowed(of, known)
+    return {
+        "state": "waiting" if never_told(known) else LOOKS[known.state],
+        "text": NOTHING if known.value is None else written(of.written(known.value)),
+        "note": _note(of, known, robot),
+        "hint": known.hint[:LONGEST_HINT],
+        "limits": limits_text(of, limits),
+        "settable": not known.read_only,
+        "entry": _entry(known.value),
+        "bounds": {
+            "min": "" if limits.low is None else decimal(limits.low),
+            "max": "" if limits.high is None else decimal(limits.high),
+            "step": ANY_STEP[of.type == "integer"] if limits.step is None else decimal(limits.step),
+        },
+    }
+
+
+def never_told(known: Declared) -> bool:
+    return known.state in ("waiting", "silent") and known.value is None
+
+
+def _note(of: Parameter, known: Declared, robot: Robot) -> str:
+    time = clock(known.wall)
+    if never_told(known):
+        return say("parameter_asking", node=of.node)
+    match known.state:
+        case "cut":
+            return say("parameter_cut", time=time)
+        case "silent":
+            return say("parameter_no_answer", time=time)
+        case "missing":
+            return say("parameter_no_value")
+        case "undeclared":
+            return say("parameter_not_there", node=of.node)
+        case "mistyped":
+            name, found = of.parameter, known.found
+            return say("parameter_mistyped", name=name, node=of.node, found=found, wanted=of.type)
+        case "unreadable":
+            return say("parameter_unreadable", node=of.node, name=of.parameter)
+    told = tells(robot)
+    return say("parameter_read" if told else "parameter_told", time=time, node=of.node)
+
+
+def tells(robot: Robot) -> bool:
+    """Whether changes that others make are heard, by what the graph shows."""
+    key, graph = robot.key(EVENTS), robot.graph
+    heard = graph.on_robot("MP", key) and not graph.unheard(key)
+    return heard and graph.wrong_type("MS", key, EVENT_TYPE) is None
+
+
+def _entry(value: Value | None) -> bool | str:
+    """What the input starts from, exactly; "" where it can't hold the value as it is."""
+    if value is None or (isinstance(value, float) and not math.isfinite(value)):
+        return ""
+    if isinstance(value, str):
+        return value if len(value) <= LONGEST_TEXT and value.isprintable() else ""
+    return value if isinstance(value, bool) else decimal(value)

@@ -1,0 +1,296 @@
+"""The parameters of a robot's nodes: read when a node is there, followed by its events, and set.
+
+A node is asked when its services appear in the graph, once more when events must have been flowing
+for a while, after a set, and where an event may have been missed; never twice at a time. What was
+asked of a bridge or a node that went away meanwhile no longer counts.
+"""
+
+import asyncio
+import logging
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any, Final
+
+from app import keys
+from app.calls import Asker, Calls, Request
+from app.declared import UNKNOWN, Declared, Value, checked, declared, name_of, value_in, wire
+from app.errors import DecodeError, LinkError
+from app.interfaces import Interfaces
+from app.interlocks import parameters_offered
+from app.panel.model import Panel
+from app.panel.parameter import DESCRIBE, EVENT_TYPE, GET, SET, Parameter
+from app.progress import Answer, Corrected
+from app.robot import Robot, Sample
+from app.sentences import clock, say
+
+log = logging.getLogger("kiosk.parameters")
+
+ANSWER_S: Final = 5.0  # within which a node has to tell its parameters
+LATE_S: Final = 5.0  # how long after that nothing more is asked: it may only be slow
+CONFIRM_S: Final = 3.0  # after which the bridge surely brings the events of a node that appeared
+AGAIN_S: Final = 1.0  # between two readings at least, and before the first try again
+AGAIN_MOST_S: Final = 600.0  # the pause between tries doubles up to this
+
+
+@dataclass(slots=True)
+class _Node:
+    """A node with the panel's parameters; `heard` are values of events while it is being asked."""
+
+    name: str
+    widgets: list[Parameter] = field(default_factory=list)
+    wanted: asyncio.Event = field(default_factory=asyncio.Event)
+    heard: dict[str, Any] = field(default_factory=dict)
+    task: "asyncio.Task[None] | None" = None
+
+
+class _NoAnswer(Exception):
+    """Nothing that could be read came in time."""
+
+
+class Parameters:
+    """The parameters of one robot that its panel shows; used on the event loop only."""
+
+    def __init__(
+        self,
+        panel: Panel,
+        interfaces: Interfaces,
+        robot: Robot,
+        link: Asker,
+        calls: Calls,
+        changed: Callable[[], None],
+    ) -> None:
+        """`changed` is called when what the widgets show has changed."""
+        self._interfaces = interfaces
+        self._robot = robot
+        self._link = link
+        self._calls = calls
+        self._changed = changed
+        self._nodes: dict[str, _Node] = {}
+        for widget in panel.parameters():
+            self._nodes.setdefault(widget.node, _Node(widget.node)).widgets.append(widget)
+        services = (name for name, _ in (GET, DESCRIBE, SET))
+        self._served_by = {
+            robot.key(f"{node.name}/{service}"): node
+            for service in services
+            for node in self._nodes.values()
+        }
+
+    # What the graph shows.
+
+    def lose(self, token_key: str) -> None:
+        """A token ended, be it for a moment: its node may be another one now."""
+        if (endpoint := keys.parsed(token_key)) is None:
+            return
+        if endpoint.role is None:
+            for node in self._nodes.values():
+                self._cut(node)
+        elif endpoint.role == "SS" and (lost := self._served_by.get(endpoint.key)):
+            self._cut(lost)
+
+    def follow(self) -> None:
+        """After every change of the graph: asks the nodes that are there now."""
+        for node in self._nodes.values():
+            offered = parameters_offered(node.name, self._robot) is None
+            if not (offered and self._robot.graph.bridges):
+                self._cut(node)
+            elif node.task is None:
+                node.task = asyncio.get_running_loop().create_task(self._follow_node(node))
+                node.task.add_done_callback(_told)
+
+    async def stop(self) -> None:
+        """Ends its tasks."""
+        tasks = [node.task for node in self._nodes.values() if node.task is not None]
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+    def _cut(self, node: _Node) -> None:
+        if node.task is None:
+            return
+        node.task.cancel()
+        node.task = None
+        for widget in node.widgets:
+            known = self._known(widget)
+            cut = replace(known, state="cut") if known.value is not None else UNKNOWN
+            self._robot.parameters[widget.id] = cut
+
+    # What the node tells.
+
+    def hear(self, sample: Sample) -> None:
+        """An event of some node's: takes the values that changed; what it may hide is asked for."""
+        passed_on = sample.source is None or sample.source in self._robot.graph.bridges
+        if not (self._nodes and passed_on):
+            return
+        if sample.skipped:
+            for node in self._nodes.values():
+                node.wanted.set()
+        try:
+            event = self._interfaces.decode(EVENT_TYPE, bytes(sample.payload))
+        except DecodeError as error:
+            log.debug("%s", error)
+            return
+        if (told := self._nodes.get(event.node)) and told.task is not None:
+            self._take_event(told, event, sample.wall)
+
+    def _take_event(self, node: _Node, event: Any, wall: float) -> None:
+        redeclared = {one.name for one in (*event.new_parameters, *event.deleted_parameters)}
+        changed = {one.name: one.value for one in event.changed_parameters}
+        node.heard |= {
+            w.parameter: changed[w.parameter] for w in node.widgets if w.parameter in changed
+        }
+        for widget in node.widgets:
+            if widget.parameter in redeclared:
+                node.wanted.set()
+            elif widget.parameter in changed:
+                self._take_value(node, widget, changed[widget.parameter], wall)
+
+    def _take_value(self, node: _Node, widget: Parameter, value: Any, wall: float) -> None:
+        known = self._known(widget)
+        if known.state not in ("live", "missing"):
+            node.wanted.set()
+        elif name_of(value.type) != widget.type:
+            self._learn(widget, Declared("mistyped", found=name_of(value.type), wall=wall))
+        else:
+            self._learn(widget, replace(known, state="live", value=value_in(widget, value), wall=wall))
+
+    async def _follow_node(self, node: _Node) -> None:
+        """Asks a node, as often as there is need, until it is cut off."""
+        confirmed, pause = False, AGAIN_S
+        while True:
+            node.wanted.clear()
+            node.heard.clear()
+            whole = await self._read(node)
+            await asyncio.sleep(AGAIN_S)
+            if whole:
+                await _within(node.wanted, None if confirmed else CONFIRM_S)
+                confirmed, pause = True, AGAIN_S
+            else:
+                await _within(node.wanted, pause)
+                pause = min(2 * pause, AGAIN_MOST_S)
+
+    async def _read(self, node: _Node) -> bool:
+        """Asks for all of a node's parameters; False where one of them has no value to show."""
+        names = list(dict.fromkeys(widget.parameter for widget in node.widgets))
+        try:
+            descriptors = await self._ask_each(node, DESCRIBE, names, "descriptors")
+            values = await self._ask_each(node, GET, names, "values")
+        except _NoAnswer:
+            return False
+        except DecodeError as error:
+            log.error("%s: %s", node.name, error)
+            self._learn_all(node, lambda known: Declared("unreadable", wall=time.time()))
+            return False
+        self._calls.answers(f"{node.name}/{SET[0]}")
+        values |= node.heard  # told after it was asked
+        for widget in node.widgets:
+            name = widget.parameter
+            found = declared(widget, descriptors.get(name), values.get(name), time.time())
+            self._learn(widget, found)
+        self._changed()
+        return all(self._known(widget).state == "live" for widget in node.widgets)
+
+    async def _ask_each(
+        self, node: _Node, service: tuple[str, str], names: Sequence[str], part: str
+    ) -> dict[str, Any]:
+        """What a node answers by name: where one of several is not declared, rclcpp answers none."""
+        found = await self._ask(node, service, names, part)
+        if len(found) == len(names):
+            return dict(zip(names, found, strict=True))
+        if len(names) == 1:
+            return {}
+        each: dict[str, Any] = {}
+        for name in names:
+            each |= await self._ask_each(node, service, [name], part)
+        return each
+
+    async def _ask(
+        self, node: _Node, service: tuple[str, str], names: Sequence[str], part: str
+    ) -> list[Any]:
+        request, response = self._interfaces.service(service[1])
+        key = self._robot.key(f"{node.name}/{service[0]}")
+        payload = self._interfaces.encode(request, {"names": list(names)})
+        try:
+            query = self._link.query(key, payload, ANSWER_S + LATE_S)
+        except LinkError as error:
+            log.warning("%s", error)
+            raise _NoAnswer from None
+        await asyncio.wait({query}, timeout=ANSWER_S)
+        in_time = query.done()
+        if not in_time:
+            self._silent(node)
+        reply = await query
+        if reply is None or not in_time:
+            self._silent(node)
+            raise _NoAnswer
+        answer: list[Any] = getattr(self._interfaces.decode(response, reply), part)
+        return answer
+
+    # Setting.
+
+    def checked(self, widget: Parameter, given: Any) -> Value:
+        """The value to set; InputError with a sentence that names label and limits."""
+        return checked(widget, self._known(widget), given)
+
+    async def set(self, widget: Parameter, value: Value, press_id: str, corrected: Corrected) -> Answer:
+        """Sets a parameter, as a call does; whatever came of it, the node is asked how it is now."""
+        service, type_name = SET
+        fields = {"parameters": [{"name": widget.parameter, "value": wire(widget, value)}]}
+        payload = self._interfaces.encode(self._interfaces.service(type_name)[0], fields)
+        name, read = f"{widget.node}/{service}", partial(_answer, widget, value)
+        request = Request(widget.id, name, type_name, payload, widget.timeout_s, read)
+        wanted = self._nodes[widget.node].wanted
+
+        def late(press_id: str, answer: Answer) -> None:
+            wanted.set()
+            corrected(press_id, answer)
+
+        answer = await self._calls.ask(request, press_id, late)
+        wanted.set()
+        return answer
+
+    # What is known.
+
+    def _known(self, widget: Parameter) -> Declared:
+        return self._robot.parameters.get(widget.id, UNKNOWN)
+
+    def _learn(self, widget: Parameter, known: Declared) -> None:
+        if known.state == "undeclared" and self._known(widget).state != "undeclared":
+            log.warning("%s has no parameter %s", widget.node, widget.parameter)
+        self._robot.parameters[widget.id] = known
+
+    def _learn_all(self, node: _Node, of: Callable[[Declared], Declared]) -> None:
+        for widget in node.widgets:
+            self._learn(widget, of(self._known(widget)))
+        self._changed()
+
+    def _silent(self, node: _Node) -> None:
+        log.debug("%s does not tell its parameters", node.name)
+        self._learn_all(node, lambda known: replace(known, state="silent"))
+
+
+def _answer(widget: Parameter, value: Value, response: Any) -> Answer:
+    """What a response of SetParameters says of the one parameter that was to be set."""
+    now = clock(time.time())
+    if len(response.results) != 1:
+        return Answer("unknown", say("answer_unreadable", wanted=SET[1]))
+    result = response.results[0]
+    if result.successful:
+        return Answer("succeeded", say("parameter_set", value=widget.written(value), time=now))
+    said = f": {result.reason}" if result.reason else "."
+    return Answer("rejected", say("said_no", time=now) + said)
+
+
+async def _within(event: asyncio.Event, longest_s: float | None) -> None:
+    """Waits for an event, or until this time is up."""
+    try:
+        async with asyncio.timeout(longest_s):
+            await event.wait()
+    except TimeoutError:
+        pass
+
+
+def _told(task: "asyncio.Task[None]") -> None:
+    if not task.cancelled() and (error := task.exception()):
+        log.error("following a node's parameters failed", exc_info=error)
