@@ -1,5 +1,7 @@
 """The demo robot, stepped by hand."""
 
+from collections.abc import Callable
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -8,6 +10,7 @@ import pytest
 from app.declared import EMPTY
 from app.demo import COUNT_STEP_S, FORBIDDEN_S, LONGEST_COUNT, PERMITTED_S, REPEAT_S, DemoRobot
 from app.demo_parameters import EVENTS, NODE
+from tests.parts import ROOT, Server, until
 
 
 def test_it_permits_and_forbids_in_turns_and_says_so_once_a_second() -> None:
@@ -99,3 +102,57 @@ def test_its_parameters_are_set_or_refused_with_words(
     assert result == {"successful": not reason, "reason": reason}
     told = [fields for topic, fields in robot.step(0.0) if topic == EVENTS]
     assert [one["changed_parameters"][0]["name"] for one in told] == ([] if reason else [name])
+
+
+PANEL = """
+title = "Demo"
+mode = "demo"
+
+[[page]]
+id = "setup"
+title = "Setup"
+""" + "".join(
+    f"""
+[[page.widget]]
+id = "{name}"
+kind = "parameter"
+label = "{name}"
+node = "{NODE}"
+parameter = "{name}"
+type = "{kind}"
+"""
+    for name, kind in {
+        "speed": "double",
+        "parts": "integer",
+        "work_light": "bool",
+        "batch": "string",
+        "serial": "string",
+    }.items()
+)
+
+
+@pytest.mark.parametrize("namespace", ["", "/robot1"])
+def test_a_panel_sets_and_follows_its_parameters(
+    tmp_path: Path, servers: Callable[[Server], Server], namespace: str
+) -> None:
+    path = tmp_path / "demo.toml"
+    path.write_text(f'namespace = "{namespace}"\n{PANEL}')
+    kiosk = servers(Server(ROOT, KIOSK_PANEL=str(path)))
+    until(lambda: kiosk.widget("speed")["enabled"], "its parameters are read")
+    shown = kiosk.snapshot()
+    assert {name: one["text"] for name, one in shown["widgets"].items()} == {
+        "speed": "120",
+        "parts": "24",
+        "work_light": "Off",
+        "batch": "A-17",
+        "serial": "DEMO-0001",
+    }
+    assert shown["link"]["node"]["state"] == "ok"
+    assert shown["widgets"]["speed"]["note"].startswith("read ")
+    assert "does not tell" not in shown["widgets"]["speed"]["note"]
+    for name, value in {"speed": 200, "work_light": True, "batch": " "}.items():
+        kiosk.http.post(f"/widgets/{name}", json={"inputs": {name: value}})
+    until(lambda: kiosk.widget("work_light")["text"] == "On", "it is followed")
+    until(lambda: kiosk.widget("speed")["text"] == "200", "each event of several counts")
+    assert kiosk.widget("batch")["outcome"] == "rejected"
+    assert kiosk.widget("batch")["result"].endswith(": a batch needs a name")
