@@ -81,8 +81,8 @@ class Calls:
                 if not waiting.cut.done():
                     waiting.cut.set_result(None)
 
-    def answers(self, service: str) -> None:
-        """This service, or another one of its node, has answered before."""
+    def mark_answered(self, service: str) -> None:
+        """This service can answer: another one of its node has."""
         self._ever_answered.add(service)
 
     async def call(self, widget: Call, payload: bytes, press_id: str, corrected: Corrected) -> Answer:

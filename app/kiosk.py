@@ -90,6 +90,7 @@ class Kiosk:
         self._feedback = {keys.feedback(self.robot.key(one)): one for one in panel.actions()}
         self._joining = Joining(panel, self.interfaces, self.robot, self.link, self.show, self.renew)
         self._urgent = {self.robot.key(i.topic) for i in panel.interlocks}
+        self._events = self.robot.key(EVENTS)
         self._shown_at = 0.0
         self._timer: asyncio.TimerHandle | None = None
         self._rosout = RosoutHandler(self._publish_log, self.robot.name)
@@ -212,7 +213,7 @@ class Kiosk:
             if key in self._feedback:
                 self._actions.hear_feedback(self._feedback[key], sample)
                 continue
-            if key == self.robot.key(EVENTS):
+            if key == self._events:
                 self._parameters.hear(sample)
             self.robot.take(key, sample)
             self._confirmations.hear(key)

@@ -36,13 +36,21 @@ AGAIN_MOST_S: Final = 600.0  # the pause between tries doubles up to this
 
 @dataclass(slots=True)
 class _Node:
-    """A node with the panel's parameters; `heard` are values of events while it is being asked."""
+    """A node with the panel's parameters; `heard` are values of events while it is being asked.
+
+    `wanted` is set when it is to be asked again, `urgent` when that is not to wait for `AGAIN_S`.
+    """
 
     name: str
     widgets: list[Parameter] = field(default_factory=list)
     wanted: asyncio.Event = field(default_factory=asyncio.Event)
+    urgent: asyncio.Event = field(default_factory=asyncio.Event)
     heard: dict[str, Any] = field(default_factory=dict)
     task: "asyncio.Task[None] | None" = None
+
+    def ask_now(self) -> None:
+        self.wanted.set()
+        self.urgent.set()
 
 
 class _NoAnswer(Exception):
@@ -160,9 +168,10 @@ class Parameters:
         confirmed, pause = False, AGAIN_S
         while True:
             node.wanted.clear()
+            node.urgent.clear()
             node.heard.clear()
             whole = await self._read(node)
-            await asyncio.sleep(AGAIN_S)
+            await _within(node.urgent, AGAIN_S)
             if whole:
                 await _within(node.wanted, None if confirmed else CONFIRM_S)
                 confirmed, pause = True, AGAIN_S
@@ -182,7 +191,7 @@ class Parameters:
             log.error("%s: %s", node.name, error)
             self._learn_all(node, lambda known: Declared("unreadable", wall=time.time()))
             return False
-        self._calls.answers(f"{node.name}/{SET[0]}")
+        self._calls.mark_answered(f"{node.name}/{SET[0]}")
         values |= node.heard  # told after it was asked
         for widget in node.widgets:
             name = widget.parameter
@@ -240,14 +249,14 @@ class Parameters:
         payload = self._interfaces.encode(self._interfaces.service(type_name)[0], fields)
         name, read = f"{widget.node}/{service}", partial(_answer, widget, value)
         request = Request(widget.id, name, type_name, payload, widget.timeout_s, read)
-        wanted = self._nodes[widget.node].wanted
+        node = self._nodes[widget.node]
 
         def late(press_id: str, answer: Answer) -> None:
-            wanted.set()
+            node.ask_now()
             corrected(press_id, answer)
 
         answer = await self._calls.ask(request, press_id, late)
-        wanted.set()
+        node.ask_now()
         return answer
 
     # What is known.
@@ -266,7 +275,8 @@ class Parameters:
         self._changed()
 
     def _silent(self, node: _Node) -> None:
-        log.debug("%s does not tell its parameters", node.name)
+        if any(self._known(widget).state != "silent" for widget in node.widgets):
+            log.warning("%s does not answer when it is asked for its parameters", node.name)
         self._learn_all(node, lambda known: replace(known, state="silent"))
 
 

@@ -11,7 +11,7 @@ from typing import Any, Final, Literal, TypedDict
 
 from app.displays import indicator, readout
 from app.inputs import limits
-from app.interlocks import Verdict, interlock_verdict, press_verdict, way
+from app.interlocks import Verdict, interlock_verdict, parameters_offered, press_verdict, way
 from app.panel.displays import Indicator, Readout
 from app.panel.inputs import Numeric, SelectInput, TextInput, ToggleInput
 from app.panel.model import Action, Call, Panel, Publish
@@ -150,10 +150,12 @@ def lamps(panel: Panel, robot: Robot, passable: Verdict) -> dict[str, Lamp]:
         "permitted": ("ok", "ok"),
     }
     state, text = bridge[passable.code]
-    topics = [("MP", t) for t in panel.subscriptions()] + [("MS", t) for t in panel.publications()]
+    # Every node publishes its parameters' events: they show none of the panel's.
+    listened = [of.topic for of in panel.listening()]
+    topics = [("MP", t) for t in listened] + [("MS", t) for t in panel.publications()]
     seen = any(
         robot.graph.on_robot("MP" if role == "MP" else "MS", robot.key(topic)) for role, topic in topics
-    )
+    ) or any(parameters_offered(of.node, robot) is None for of in panel.parameters())
     node: tuple[Literal["ok", "wait", "bad"], str] = ("ok", "ok") if seen else ("wait", "no_node")
     if state == "bad":
         node = ("bad", "lost")

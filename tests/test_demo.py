@@ -1,8 +1,16 @@
 """The demo robot, stepped by hand."""
 
+from collections.abc import Callable
+from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
+import pytest
+
+from app.declared import EMPTY
 from app.demo import COUNT_STEP_S, FORBIDDEN_S, LONGEST_COUNT, PERMITTED_S, REPEAT_S, DemoRobot
+from app.demo_parameters import EVENTS, NODE
+from tests.parts import ROOT, Server, until
 
 
 def test_it_permits_and_forbids_in_turns_and_says_so_once_a_second() -> None:
@@ -56,3 +64,95 @@ def test_a_count_is_canceled_rejected_and_unknown() -> None:
     assert robot.cancel(b"b") == 2
     assert robot.result(b"a") == (5, [0, 1])
     assert robot.result(b"b") == (0, [])
+
+
+def asked(service: str, *names: str) -> Any:
+    response = DemoRobot().parameters.serve(f"{NODE}/{service}", SimpleNamespace(names=names))
+    (answer,) = response.values()
+    return answer
+
+
+def test_its_parameters_are_described_and_told_as_rclcpp_does() -> None:
+    speed, serial = asked("describe_parameters", "speed", "serial")
+    assert speed["floating_point_range"] == [{"from_value": 0.0, "to_value": 500.0, "step": 10.0}]
+    assert (speed["read_only"], serial["read_only"]) == (False, True)
+    assert [one["double_value"] for one in asked("get_parameters", "speed")] == [120.0]
+    assert asked("get_parameters", "speed", "nothing") == []
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "field", "value", "reason"),
+    [
+        ("speed", 3, "double_value", 200.0, ""),
+        ("speed", 3, "double_value", 205.0, "parameter 'speed' is out of its range"),
+        ("speed", 2, "integer_value", 200, "parameter 'speed' has another type"),
+        ("parts", 2, "integer_value", 0, "parameter 'parts' is out of its range"),
+        ("batch", 4, "string_value", " ", "a batch needs a name"),
+        ("serial", 4, "string_value", "mine", "parameter 'serial' is read-only"),
+        ("nothing", 1, "bool_value", True, "parameter 'nothing' is not declared"),
+    ],
+)
+def test_its_parameters_are_set_or_refused_with_words(
+    name: str, kind: int, field: str, value: Any, reason: str
+) -> None:
+    robot = DemoRobot()
+    given = SimpleNamespace(name=name, value=SimpleNamespace(**{**EMPTY, "type": kind, field: value}))
+    request = SimpleNamespace(parameters=[given])
+    (result,) = robot.parameters.serve(f"{NODE}/set_parameters", request)["results"]
+    assert result == {"successful": not reason, "reason": reason}
+    told = [fields for topic, fields in robot.step(0.0) if topic == EVENTS]
+    assert [one["changed_parameters"][0]["name"] for one in told] == ([] if reason else [name])
+
+
+PANEL = """
+title = "Demo"
+mode = "demo"
+
+[[page]]
+id = "setup"
+title = "Setup"
+""" + "".join(
+    f"""
+[[page.widget]]
+id = "{name}"
+kind = "parameter"
+label = "{name}"
+node = "{NODE}"
+parameter = "{name}"
+type = "{kind}"
+"""
+    for name, kind in {
+        "speed": "double",
+        "parts": "integer",
+        "work_light": "bool",
+        "batch": "string",
+        "serial": "string",
+    }.items()
+)
+
+
+@pytest.mark.parametrize("namespace", ["", "/robot1"])
+def test_a_panel_sets_and_follows_its_parameters(
+    tmp_path: Path, servers: Callable[[Server], Server], namespace: str
+) -> None:
+    path = tmp_path / "demo.toml"
+    path.write_text(f'namespace = "{namespace}"\n{PANEL}')
+    kiosk = servers(Server(ROOT, KIOSK_PANEL=str(path)))
+    until(lambda: kiosk.widget("speed")["enabled"], "its parameters are read")
+    shown = kiosk.snapshot()
+    assert {name: one["text"] for name, one in shown["widgets"].items()} == {
+        "speed": "120",
+        "parts": "24",
+        "work_light": "Off",
+        "batch": "A-17",
+        "serial": "DEMO-0001",
+    }
+    assert shown["link"]["node"]["state"] == "ok"
+    assert shown["widgets"]["speed"]["note"].startswith("read ")
+    assert "does not tell" not in shown["widgets"]["speed"]["note"]
+    for name, value in {"speed": 200, "work_light": True, "batch": " "}.items():
+        kiosk.http.post(f"/widgets/{name}", json={"inputs": {name: value}})
+    until(lambda: kiosk.widget("work_light")["text"] == "On", "it is followed")
+    until(lambda: kiosk.widget("speed")["text"] == "200", "each event of several counts")
+    assert kiosk.widget("batch")["outcome"] == "rejected"
+    assert kiosk.widget("batch")["result"].endswith(": a batch needs a name")

@@ -4,10 +4,13 @@ from collections.abc import Mapping
 from typing import Any
 
 import pytest
+from pydantic import ValidationError
 
 from app.errors import Fault
+from app.interfaces import DISTROS, interfaces_of
 from app.panel.check import faults_in
 from app.panel.description import TopicQos
+from app.panel.parameter import DESCRIBE, EVENT_TYPE, GET, SET
 from tests.builders import ENABLED, FREE, GUARDED, HEARD, INTERFACES, MESSAGE, TEXT, panel_of
 
 TWIST = "geometry_msgs/msg/Twist"
@@ -225,3 +228,76 @@ def test_what_depends_on_a_fault_that_is_told_already_is_not_judged() -> None:
     panel = panel_of(MESSAGE, std("Float64", "{message}"))
     assert list(faults_in(panel, INTERFACES, {"message"})) == []
     assert [type(f) for f in faults_in(panel, INTERFACES, {"other"})] == [Fault]
+
+
+PARAMETER: Mapping[str, Any] = {
+    "id": "p", "kind": "parameter", "label": "P", "node": "/arm", "parameter": "speed",
+    "type": "double",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        {"min": 0, "max": 2, "step": 0.1, "unit": "m/s"},
+        {"type": "integer", "min": -5, "max": 5, "step": 2, "interlock": "operation"},
+        {"type": "bool", "on": "Open", "off": "Closed"},
+        {"type": "string", "parameter": "qos_overrides./tf.publisher.depth"},
+        {"node": "/cell1/arm", "timeout_s": 0.5},
+    ],
+)
+def test_a_parameter_that_fits_has_no_fault(more: dict[str, Any]) -> None:
+    assert faults({**PARAMETER, **more}) == []
+
+
+@pytest.mark.parametrize("distro", DISTROS)
+def test_every_distribution_has_the_services_of_parameters(distro: str) -> None:
+    interfaces = interfaces_of(distro)
+    for _, type_name in (GET, DESCRIBE, SET):
+        interfaces.service(type_name)
+    interfaces.require(EVENT_TYPE)
+
+
+@pytest.mark.parametrize(
+    ("more", "fault"),
+    [
+        ({"type": "bool", "min": 0}, '.min: is for numbers; the type is "bool"'),
+        ({"type": "string", "unit": "m"}, '.unit: is for numbers; the type is "string"'),
+        ({"type": "integer", "step": 0.5}, ".step: 0.5 must be whole: the type is integer"),
+        ({"min": 2, "max": 1}, ".max: 1 must be more than min (2)"),
+        (
+            {"min": 0, "max": 1, "step": 0.3},
+            ".step: no whole number of steps of 0.3 leads from 0 to 1",
+        ),
+        ({"interlock": "door"}, '.interlock: no interlock "door"; there is operation'),
+    ],
+)
+def test_a_parameter_that_does_not_fit_is_told(more: dict[str, Any], fault: str) -> None:
+    assert faults({**PARAMETER, **more}) == [f"page[0].widget[0]{fault}"]
+
+
+def test_a_parameter_has_one_type_in_a_panel() -> None:
+    assert faults(PARAMETER, {**PARAMETER, "id": "q", "type": "string"}) == [
+        "page[0].widget[1].type: speed of /arm is string here but double above"
+    ]
+
+
+@pytest.mark.parametrize(
+    ("more", "fault"),
+    [
+        ({"node": "arm"}, "is not the absolute name of a ROS 2 node: it must be like /arm"),
+        ({"type": "float"}, "'bool', 'integer', 'double' or 'string'"),
+        ({"parameter": "a b"}, "should match pattern"),
+        ({"step": 0}, "greater than 0"),
+    ],
+)
+def test_a_parameter_whose_shape_is_wrong_is_told(more: dict[str, Any], fault: str) -> None:
+    with pytest.raises(ValidationError, match=fault):
+        panel_of({**PARAMETER, **more})
+
+
+def test_a_panel_with_parameters_listens_to_their_events() -> None:
+    panel = panel_of(PARAMETER)
+    assert panel.subscriptions()["/parameter_events"] == "rcl_interfaces/msg/ParameterEvent"
+    assert panel.qos("/parameter_events") == TopicQos(durability="volatile", depth=1000)
+    assert "/parameter_events" not in panel_of(FREE).subscriptions()

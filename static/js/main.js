@@ -1,7 +1,6 @@
 // Puts what the server says onto the page: texts and attributes, in place. It composes no sentence.
 import { Source } from "./source.js";
-import { Presser } from "./press.js";
-import { showBounds, showEntry } from "./entry.js";
+import { Presser, showBounds, showEntry } from "./press.js";
 
 const body = document.body;
 const widgets = new Map(
