@@ -35,6 +35,7 @@ ORDER = (
     "app.panel.template",
     "app.panel.examples",
     "app.panel.check_inputs",
+    "app.panel.constants",
     "app.panel.check_displays",
     "app.panel.check_calls",
     "app.panel.check",

@@ -9,7 +9,7 @@ import pytest
 from pydantic import ValidationError
 
 from app.errors import PanelError
-from app.panel import Panel, Publish, Readout, TextInput, load_panel
+from app.panel import Indicator, Panel, Publish, Readout, TextInput, load_panel
 from app.settings import PACKAGE
 from tests.builders import FREE, GUARDED, HEARD, INTERLOCK, MESSAGE, TEXT, Table, small_panel
 
@@ -538,6 +538,65 @@ def test_a_panel_may_bring_interfaces_beside_it(load: Load, tmp_path: Path) -> N
     assert faults(load, with_doors("closed[2]")) == {
         f"{READOUT}.field": 'there is no [2] (in "closed[2]"): bool[2] ends with [1]'
     }
+
+
+def with_lamp(**changes: Any) -> dict[str, Any]:
+    """A lamp of a field of the message in `interface`."""
+    lamp = {**HEARD, "kind": "indicator", "type": "cell_msgs/msg/Doors", "field": "mode", **changes}
+    made = tables()
+    made["page"][0]["widget"][3] = lamp
+    return {"interfaces": ["msgs"], **made}
+
+
+MODES = "int8 HALTED=-1\nint8 RUNNING=2\nstring MAKER=ACME\nint16 FAR=300\nint8 mode\nstring name\n"
+NAMED = "must be a whole number (int8) or the name of a constant of cell_msgs/msg/Doors"
+
+
+def test_a_lamp_takes_the_value_of_a_constant_by_its_name(load: Load, tmp_path: Path) -> None:
+    interface(tmp_path, MODES)
+    states: list[dict[str, Any]] = [
+        {"value": "RUNNING", "text": "Running", "shape": "circle"},
+        {"value": "HALTED", "text": "Halted", "shape": "bar"},
+        {"value": 0, "text": "Idle", "shape": "square"},
+    ]
+    panel = load(with_lamp(states=states))
+    (lamp,) = [w for w in panel.widgets() if isinstance(w, Indicator)]
+    assert [state.value for state in lamp.states] == [2, -1, 0]
+    assert panel.revision  # is still the file's
+    word = [{**states[0], "value": "HALTED"}]
+    of_text = load(with_lamp(states=word, field="name"))
+    (lamp,) = [w for w in of_text.widgets() if isinstance(w, Indicator)]
+    assert lamp.states[0].value == "HALTED"  # a text field's value is a text
+
+
+@pytest.mark.parametrize(
+    ("value", "why"),
+    [
+        (
+            "RUNING",
+            f'{NAMED}, not "RUNING"; did you mean RUNNING? it has HALTED, RUNNING',
+        ),
+        ("zzz", f'{NAMED}, not "zzz"; it has HALTED, RUNNING'),
+        ("FAR", "300 is out of range: int8 goes from -128 to 127"),
+        (2, "2 is already the value of states[0]"),
+    ],
+)
+def test_a_name_that_is_no_constants_is_told_with_those_that_there_are(
+    load: Load, tmp_path: Path, value: Any, why: str
+) -> None:
+    interface(tmp_path, MODES)
+    states = [
+        {"value": "RUNNING", "text": "Running", "shape": "circle"},
+        {"value": value, "text": "Other", "shape": "bar"},
+    ]
+    assert faults(load, with_lamp(states=states)) == {f"{READOUT}.states[1].value": why}
+
+
+def test_a_text_for_a_number_without_constants_is_told(load: Load) -> None:
+    states = [{"value": "ON", "text": "On", "shape": "circle"}]
+    given = with_lamp(type="std_msgs/msg/UInt8", field="data", states=states)
+    del given["interfaces"]
+    assert faults(load, given)[f"{READOUT}.states[0].value"].endswith('not "ON"; it has none')
 
 
 def test_an_interface_file_with_a_fault_is_named(load: Load, tmp_path: Path) -> None:
