@@ -160,13 +160,13 @@ class Kiosk:
                 continue
             self.robot.take(key, sample)
             urgent = urgent or key in self._urgent
-        came = False
+        came, now = False, time.monotonic()
         for token_key, token in changes.tokens.items():
             if token.lost_seq and (zid := self.robot.graph.apply(token_key, False)):
                 self.robot.cut(zid, token.lost_seq)
                 log.warning("bridge %s lost", zid)
                 had_bridge = had_bridge and bool(self.robot.graph.bridges)
-            if token.alive and (zid := self.robot.graph.apply(token_key, True)):
+            if token.alive and (zid := self.robot.graph.apply(token_key, True, now)):
                 log.info("bridge %s found", zid)
                 came = True
         if changes.tokens:

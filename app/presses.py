@@ -32,7 +32,9 @@ Cause = Literal["", "interlock", "input", "link", "time"]
 
 RECEIPTS_KEPT: Final = 1000
 LONGEST_LOGGED: Final = 300
-NO_WAY: Final = frozenset({"no_link", "no_bridge", "bridge_silent", "joining", "no_service"})
+NO_WAY: Final = frozenset(
+    {"no_link", "no_bridge", "bridge_silent", "joining", "no_service", "getting_ready"}
+)
 FINE: Final = frozenset({"published", "accepted", "succeeded"})
 
 

@@ -31,6 +31,7 @@ ENGLISH: Final[Mapping[str, str]] = {
     "server_lost": "There is no connection to the panel's server.",
     "server_unsure": "No answer from the panel's server: it is not known whether this was sent.",
     "no_service": "Locked: the robot does not offer {name} now.",
+    "getting_ready": "Locked: the robot has just begun to offer {name}; getting ready.",
     "busy": "Under way: waiting for the robot.",
     # What came of a call or a goal.
     "waiting_for_answer": "Sent; waiting for the robot's answer.",

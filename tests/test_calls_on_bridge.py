@@ -12,7 +12,7 @@ from playwright.sync_api import Page, expect
 
 from tests import cyclone
 from tests.cyclone import Client, CycloneRobot, served
-from tests.parts import Bridge, Server, live, until
+from tests.parts import Bridge, Server, Stream, live, until
 
 cyclone_bridge = cyclone.cyclone_bridge
 own_cyclone_bridge = cyclone.own_cyclone_bridge
@@ -181,6 +181,38 @@ def test_while_a_call_waits_its_button_is_locked_and_others_go_on(
         assert slow.result().json() == same.result().json()
     assert len(robot.requests("/slow")) == 1
     assert kiosk.widget("slow")["enabled"]
+
+
+def test_a_robot_that_has_just_come_gets_the_first_call(
+    own_cyclone_bridge: Bridge,
+    robots: Callable[..., CycloneRobot],
+    tmp_path: Path,
+    servers: Callable[[Server], Server],
+) -> None:
+    kiosk = servers(live(own_cyclone_bridge.endpoint, tmp_path, KIOSK_PANEL=panel_file(tmp_path)))
+    until(lambda: "does not offer" in (kiosk.widget("add")["reason"] or ""), "joined, and no robot")
+    for number in range(3):
+        with kiosk.stream() as stream:
+            stream.next("snapshot")
+            robot = robots(own_cyclone_bridge.domain)
+            reasons = list(reasons_of("add", stream))
+        receipt = press(kiosk, "add", id=f"first-{number}")
+        assert receipt.json()["outcome"] == "succeeded", receipt.json()
+        assert len(reasons) == 1
+        assert "getting ready" in reasons[0]
+        assert len(robot.requests("/add_two_ints")) == 1
+        robot.end()
+        until(lambda: not kiosk.widget("add")["enabled"], "the robot is gone")
+
+
+def reasons_of(widget: str, stream: Stream) -> Iterator[str]:
+    """Why a widget is locked, as it changes, until it opens."""
+    while True:
+        _, changes, _ = stream.next("update")
+        if changes.get(widget, {}).get("enabled"):
+            return
+        if reason := changes.get(widget, {}).get("reason"):
+            yield reason
 
 
 def test_a_bridge_lost_while_waiting_leaves_it_unknown(
