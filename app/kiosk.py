@@ -59,7 +59,9 @@ class Kiosk:
         self.presses = Presses(
             panel, self.interfaces, self.robot, self.link, self._calls, self._actions
         )
-        self._feedback = {keys.feedback(self.robot.key(one)): one for one in panel.actions()}
+        goals = {self.robot.key(one): one for one in panel.actions()}
+        self._feedback = {keys.feedback(key): one for key, one in goals.items()}
+        self._status = {keys.status(key): one for key, one in goals.items()}
         self._joining = Joining(panel, self.interfaces, self.robot, self.link, self._show, self.renew)
         self._urgent = {self.robot.key(i.topic) for i in panel.interlocks}
         self._shown_at = 0.0
@@ -73,7 +75,7 @@ class Kiosk:
         self._warm_up()
         subscribe = [self.robot.key(topic) for topic in self.panel.subscriptions()]
         publish = [self.robot.key(topic) for topic in (*self.panel.publications(), "/rosout")]
-        self.link.start([*subscribe, *self._feedback], publish)
+        self.link.start([*subscribe, *self._feedback, *self._status], publish)
         logging.getLogger().addHandler(self._rosout)
         self._joining.start()
 
@@ -157,6 +159,9 @@ class Kiosk:
         for key, sample in changes.samples.items():
             if key in self._feedback:
                 self._actions.hear_feedback(self._feedback[key], sample)
+                continue
+            if key in self._status:
+                self._actions.hear_status(self._status[key], sample)
                 continue
             self.robot.take(key, sample)
             urgent = urgent or key in self._urgent

@@ -52,6 +52,7 @@ ENGLISH: Final[Mapping[str, str]] = {
     "goal_aborted": "The robot aborted it at {time}",
     "goal_lost": "The robot no longer knows this goal: what came of it is not known.",
     "goal_cut": "The connection was cut: the robot may still be doing it.",
+    "goal_gone": "The robot no longer offers {name}: what came of it is not known.",
     "cancel": "Cancel",
     "cancel_sent": "The robot was asked to cancel at {time}.",
     "cancel_refused": "The robot did not cancel it at {time}.",

@@ -101,13 +101,15 @@ def enabled(verdict: Verdict) -> Enabled:
 
 
 def progress(of: Progress) -> dict[str, Any]:
-    """Attributes of a call or an action: `progress` from 0 to 1, None where it is not known."""
+    """Attributes of a call or an action: `progress` from 0 to 1, None where it is not known; `goal`
+    is the state of an action's goal as ROS names it, "" where there is none."""
     return {
         "busy": of.busy,
         "outcome": of.outcome,
         "result": of.text,
         "progress": of.fraction,
         "stoppable": of.stoppable,
+        "goal": of.goal,
     }
 
 

@@ -7,11 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import httpx
+import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
 
 from tests import cyclone
-from tests.cyclone import Client, CycloneRobot, served
+from tests.cyclone import TYPES, Client, CycloneRobot, served
 from tests.parts import Bridge, Server, Stream, live, until
 
 cyclone_bridge = cyclone.cyclone_bridge
@@ -20,6 +21,8 @@ client = cyclone.client
 own_client = cyclone.own_client
 robots = cyclone.robots
 robot = cyclone.robot
+
+FIBONACCI = "example_interfaces/action/Fibonacci"
 
 PANEL = """
 title = "Cyclone cell"
@@ -113,6 +116,14 @@ def kiosk(cyclone_bridge: Bridge, robot: CycloneRobot, tmp_path: Path) -> Iterat
     until(lambda: mine.widget("enable")["enabled"], "the service is offered")
     yield mine
     mine.end()
+
+
+def uuid_of(octets: bytes) -> Any:
+    return TYPES.types["unique_identifier_msgs/msg/UUID"](np.frombuffer(octets, dtype=np.uint8))
+
+
+def goal_of(order: int) -> Any:
+    return TYPES.types[f"{FIBONACCI}_Goal"](order)
 
 
 def press(kiosk: Server, widget: str, **more: Any) -> httpx.Response:
@@ -244,7 +255,9 @@ def test_a_goal_runs_to_its_result_and_shows_in_every_browser(
     assert (receipt.status_code, receipt.json()["outcome"]) == (200, "accepted")
     assert "waiting for the robot" in kiosk.widget("count")["reason"]
     until(lambda: "so far [0, 1, 1" in kiosk.widget("count")["result"], "its feedback is shown")
+    assert kiosk.widget("count")["goal"] == "EXECUTING"
     until(lambda: kiosk.widget("count")["outcome"] == "succeeded", "its result is there")
+    assert kiosk.widget("count")["goal"] == "SUCCEEDED"
     assert "[0, 1, 1, 2, 3, 5, 8]" in kiosk.widget("count")["result"]
     assert kiosk.widget("count")["enabled"]
     assert press(kiosk, "count", id="goal-1").json()["outcome"] == "succeeded"
@@ -270,12 +283,53 @@ def test_a_goal_that_the_robot_ends_itself(
     assert press(kiosk, "count").json()["outcome"] == "accepted"
     getattr(robot, end)()
     until(lambda: kiosk.widget("count")["outcome"] == outcome, outcome)
+    assert kiosk.widget("count")["goal"] == outcome.upper()
 
 
 def test_a_goal_that_the_robot_rejects(kiosk: Server) -> None:
     receipt = press(kiosk, "refused")
     assert (receipt.status_code, receipt.json()["outcome"]) == (200, "rejected")
     assert kiosk.widget("refused")["enabled"]
+    assert kiosk.widget("refused")["goal"] == ""
+
+
+def test_another_clients_goal_is_not_shown_as_ours(
+    kiosk: Server, robot: CycloneRobot, client: Client
+) -> None:
+    robot.fibonacci(step_s=0.1)
+    other = uuid_of(b"other goal" + bytes(6))
+    sent = client.call("fibonacci/_action/send_goal", f"{FIBONACCI}_SendGoal", other, goal_of(20))
+    assert sent.accepted
+    assert press(kiosk, "refused").json()["outcome"] == "rejected"
+    assert press(kiosk, "count").json()["outcome"] == "accepted"
+    until(lambda: kiosk.widget("count")["outcome"] == "succeeded", "ours has ended")
+    assert [goal["status"] for goal in robot.goals()] == [2, 4], "the other's goes on"
+    assert kiosk.widget("count")["goal"] == "SUCCEEDED"
+    assert (kiosk.widget("refused")["goal"], kiosk.widget("refused")["busy"]) == ("", False)
+    robot.cancel()
+
+
+def test_a_node_that_ends_in_the_middle_of_a_goal_leaves_it_unknown_and_the_widget_usable(
+    own_cyclone_bridge: Bridge,
+    robots: Callable[..., CycloneRobot],
+    tmp_path: Path,
+    servers: Callable[[Server], Server],
+) -> None:
+    kiosk = servers(live(own_cyclone_bridge.endpoint, tmp_path, KIOSK_PANEL=panel_file(tmp_path)))
+    robot = robots(own_cyclone_bridge.domain)
+    until(lambda: kiosk.widget("count")["enabled"], "offered")
+    robot.fibonacci(step_s=30)
+    assert press(kiosk, "count", id="goal-1").json()["outcome"] == "accepted"
+    robot.end()
+    until(lambda: kiosk.widget("count")["goal"] == "UNKNOWN", "it is not known any more")
+    assert "no longer offers /fibonacci" in kiosk.widget("count")["result"]
+    assert press(kiosk, "count", id="goal-1").json()["outcome"] == "unknown"
+    robot = robots(own_cyclone_bridge.domain)
+    until(lambda: "no longer knows this goal" in kiosk.widget("count")["result"], "asked for again")
+    until(lambda: kiosk.widget("count")["enabled"], "offered again")
+    robot.fibonacci(step_s=0.01)
+    assert press(kiosk, "count").json()["outcome"] == "accepted"
+    until(lambda: kiosk.widget("count")["goal"] == "SUCCEEDED", "another goal is done")
 
 
 def test_a_goal_of_more_than_five_seconds_survives_a_reload(
@@ -288,10 +342,49 @@ def test_a_goal_of_more_than_five_seconds_survives_a_reload(
     expect(count.locator(".result")).to_contain_text("Under way")
     page.reload()
     expect(count.locator(".result")).to_contain_text("so far [0, 1")
+    expect(count.locator(".goal")).to_have_text("EXECUTING")
+    other = page.context.new_page()
+    other.goto(kiosk.url)
+    seen_elsewhere = other.locator('[data-widget="count"]')
+    expect(seen_elsewhere.locator(".goal")).to_have_text("EXECUTING")
     expect(count.get_by_role("button", name="Cancel")).to_be_enabled()
     expect(count.locator(".result")).to_contain_text("Succeeded", timeout=20_000)
+    expect(count.locator(".goal")).to_have_text("SUCCEEDED")
+    expect(seen_elsewhere.locator(".goal")).to_have_text("SUCCEEDED")
     expect(count.get_by_role("button", name="Cancel")).to_be_disabled()
     expect(count.get_by_role("button", name="Count", exact=True)).to_be_enabled()
+
+
+def test_a_late_answer_corrects_what_every_browser_shows(
+    kiosk: Server, robot: CycloneRobot, page: Page
+) -> None:
+    robot.answer_slow(seconds=2.5)
+    page.goto(kiosk.url)
+    other = page.context.new_page()
+    other.goto(kiosk.url)
+    page.get_by_role("button", name="Slow", exact=True).click()
+    results = [one.locator('[data-widget="slow"] .result') for one in (page, other)]
+    for result in results:
+        expect(result).to_contain_text("No answer within 1 s")
+        expect(result).to_have_attribute("data-outcome", "timed_out")
+    for result in results:
+        expect(result).to_contain_text("Done at")
+        expect(result).to_have_attribute("data-outcome", "succeeded")
+    expect(page.locator('[data-widget="slow"] .receipt')).to_be_empty()
+
+
+def test_a_cancel_that_the_robot_refuses_is_told(
+    kiosk: Server, robot: CycloneRobot, page: Page
+) -> None:
+    robot.fibonacci(step_s=30, refuse_cancels=True)
+    page.goto(kiosk.url)
+    count = page.locator('[data-widget="count"]')
+    count.get_by_role("button", name="Count", exact=True).click()
+    count.get_by_role("button", name="Cancel").click()
+    expect(count.locator(".receipt")).to_contain_text("The robot did not cancel it")
+    expect(count.locator(".goal")).to_have_text("EXECUTING")
+    robot.fibonacci(step_s=0.01, refuse_cancels=False)
+    expect(count.locator(".goal")).to_have_text("SUCCEEDED")
 
 
 def test_calls_and_cancels_work_without_scripts(kiosk: Server, robot: CycloneRobot) -> None:

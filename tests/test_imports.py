@@ -51,6 +51,7 @@ ORDER = (
     "app.views",
     "app.board",
     "app.calls",
+    "app.goals",
     "app.actions",
     "app.presses",
     "app.link",

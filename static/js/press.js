@@ -80,16 +80,18 @@ export class Presser {
     }
   }
 
-  #show(root, { outcome, reason }) {
+  #show(root, { id, outcome, reason }) {
     for (const other of this.#widgets.values()) {
       const old = other.querySelector(".receipt");
-      if (old && other !== root) {
+      if (old) {
         old.textContent = "";
         delete old.dataset.outcome;
       }
     }
-    // What came of a call is shown to every browser, with the widget's other texts.
-    if (root.querySelector(".result") && outcome !== "refused" && outcome !== "unknown") return;
+    // What came of a call is shown to every browser, with the widget's other texts, and corrected
+    // there. A cancel's receipt has no id; that it was asked for shows with the goal.
+    const shared = id ? outcome !== "refused" : outcome === "accepted";
+    if (root.querySelector(".result") && shared) return;
     const receipt = root.querySelector(".receipt");
     receipt.dataset.outcome = outcome;
     receipt.textContent = reason;
