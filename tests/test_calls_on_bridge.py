@@ -1,9 +1,11 @@
 """Services and actions of a robot on Cyclone DDS, from the panel, through the real bridge."""
 
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 import httpx
@@ -11,6 +13,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
 
+from app.calls import MOST_UNANSWERED
 from tests import cyclone
 from tests.cyclone import TYPES, Client, CycloneRobot, served
 from tests.parts import Bridge, Server, Stream, live, until
@@ -192,6 +195,66 @@ def test_while_a_call_waits_its_button_is_locked_and_others_go_on(
         assert slow.result().json() == same.result().json()
     assert len(robot.requests("/slow")) == 1
     assert kiosk.widget("slow")["enabled"]
+
+
+def heard_after_s(kiosk: Server, robot: CycloneRobot, words: str) -> float:
+    """From a press of a publish widget to the node's having heard it."""
+    began = time.monotonic()
+    receipt = kiosk.http.post("/widgets/say", json={"inputs": {"words": words}})
+    assert receipt.json()["outcome"] == "published"
+    until(lambda: {"data": words} in robot.heard(topic="/said"), "heard", every_s=0.001)
+    return time.monotonic() - began
+
+
+def test_calls_that_wait_hold_up_no_press(
+    cyclone_bridge: Bridge,
+    robot: CycloneRobot,
+    tmp_path: Path,
+    servers: Callable[[Server], Server],
+) -> None:
+    path = tmp_path / "waiting.toml"
+    names = [f"wait_{n}" for n in range(3 * (MOST_UNANSWERED + 1))]
+    path.write_text(PANEL + "".join(waiting_widget(*one) for one in enumerate(names)))
+    kiosk = servers(live(cyclone_bridge.endpoint, tmp_path, KIOSK_PANEL=str(path)))
+    robot.subscribe(topic="/said", type="std_msgs/msg/String")
+    robot.answer_slow(seconds=None)
+    until(lambda: kiosk.widget("say")["enabled"], "joined")
+    until(lambda: kiosk.widget(names[-1])["enabled"], "offered")
+    until(lambda: robot.publishers(topic="/said"), "the bridge publishes")
+    alone = median(heard_after_s(kiosk, robot, f"alone {n}") for n in range(20))
+    with ThreadPoolExecutor(len(names)) as pool:
+        began = time.monotonic()
+        calls = [pool.submit(press_alone, kiosk, name) for name in names]
+        until(lambda: sum(call.done() for call in calls) == 3, "what is too many is told at once")
+        assert time.monotonic() - began < WAITING_S / 2
+        beside = median(heard_after_s(kiosk, robot, f"beside {n}") for n in range(20))
+        assert sum(call.done() for call in calls) == 3, "the others wait all the while"
+        outcomes = Counter(call.result().json()["outcome"] for call in calls)
+    assert outcomes == {"timed_out": 3 * MOST_UNANSWERED, "refused": 3}
+    assert len(robot.requests("/slow")) == MOST_UNANSWERED
+    assert beside < 3 * alone + 0.02, f"{beside * 1000:.1f} ms instead of {alone * 1000:.1f} ms"
+
+
+WAITING_S = 6.0
+
+
+def waiting_widget(number: int, name: str) -> str:
+    service = ("/slow", "/slow_2", "/slow_3")[number % 3]
+    return f"""
+        [[page.widget]]
+        id = "{name}"
+        kind = "call"
+        label = "Wait"
+        service = "{service}"
+        type = "std_srvs/srv/Trigger"
+        timeout_s = {WAITING_S}
+    """
+
+
+def press_alone(kiosk: Server, widget: str) -> httpx.Response:
+    """A press with a connection of its own."""
+    with httpx.Client(base_url=kiosk.url, timeout=2 * WAITING_S, trust_env=False) as http:
+        return http.post(f"/widgets/{widget}", json={"inputs": {}})
 
 
 def test_a_robot_that_has_just_come_gets_the_first_call(
