@@ -10,7 +10,7 @@ from typing import Any, Literal, TypedDict
 
 from app.displays import indicator, readout
 from app.inputs import limits
-from app.interlocks import Verdict, interlock_verdict, press_verdict, way
+from app.interlocks import Verdict, interlock_verdict, press_verdict, served, way
 from app.panel.displays import Indicator, Readout
 from app.panel.inputs import Numeric, SelectInput, TextInput, ToggleInput
 from app.panel.model import Action, Call, Panel, Publish
@@ -127,6 +127,8 @@ def lamps(panel: Panel, robot: Robot, passable: Verdict) -> dict[str, Lamp]:
     seen = any(
         robot.graph.on_robot("MP" if role == "MP" else "MS", robot.key(topic)) for role, topic in topics
     )
+    asked = [served(w) for w in panel.widgets() if isinstance(w, Call | Action)]
+    seen = seen or any(robot.graph.on_robot(role, robot.key(name)) for role, name in asked)
     node: tuple[Literal["ok", "wait", "bad"], str] = ("ok", "ok") if seen else ("wait", "no_node")
     if state == "bad":
         node = ("bad", "lost")

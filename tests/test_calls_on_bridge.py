@@ -1,5 +1,6 @@
 """Services and actions of a robot on Cyclone DDS, from the panel, through the real bridge."""
 
+import signal
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -175,7 +176,7 @@ def test_a_late_answer_corrects_the_receipt(kiosk: Server, robot: CycloneRobot) 
     again = press(kiosk, "slow", id="slow-1")
     assert (again.status_code, again.json()["outcome"]) == (200, "succeeded")
     assert len(robot.requests("/slow")) == 1
-    assert "a late answer" in kiosk.process.text
+    until(lambda: "a late answer" in kiosk.process.text, "it is logged")
 
 
 def test_while_a_call_waits_its_button_is_locked_and_others_go_on(
@@ -416,6 +417,21 @@ def test_a_goal_of_more_than_five_seconds_survives_a_reload(
     expect(seen_elsewhere.locator(".goal")).to_have_text("SUCCEEDED")
     expect(count.get_by_role("button", name="Cancel")).to_be_disabled()
     expect(count.get_by_role("button", name="Count", exact=True)).to_be_enabled()
+
+
+def test_a_goals_state_is_not_known_while_the_server_is_lost(
+    kiosk: Server, robot: CycloneRobot, page: Page
+) -> None:
+    robot.fibonacci(step_s=30)
+    page.goto(kiosk.url)
+    count = page.locator('[data-widget="count"]')
+    count.get_by_role("button", name="Count", exact=True).click()
+    expect(count.locator(".goal")).to_have_text("EXECUTING")
+    kiosk.process.send(signal.SIGSTOP)
+    expect(count.locator(".goal")).to_have_text("not known")
+    kiosk.process.send(signal.SIGCONT)
+    expect(count.locator(".goal")).to_have_text("EXECUTING")
+    expect(count.get_by_role("button", name="Cancel")).to_be_enabled()
 
 
 def test_a_late_answer_corrects_what_every_browser_shows(
