@@ -8,15 +8,16 @@ import asyncio
 import logging
 import time
 import uuid
-from collections.abc import Callable, Coroutine
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator
 from typing import Any, Final
 
-from app.calls import Asker, with_fields
+from app.calls import CUT_NEWS_S, LATE_S, MOST_UNANSWERED, Asker, with_fields
 from app.errors import DecodeError
+from app.goals import ACCEPTED, CANCELING, ENDS, UNKNOWN, Goal
 from app.interfaces import Interfaces, value_at
+from app.interlocks import SERVER_SETTLE_S
 from app.panel.model import Action
-from app.progress import Answer, Corrected, Outcome, Progress
+from app.progress import Answer, Corrected, Progress
 from app.robot import Robot, Sample
 from app.sentences import clock, say
 
@@ -25,27 +26,6 @@ log = logging.getLogger("kiosk.actions")
 CANCEL: Final = "action_msgs/srv/CancelGoal"
 RESULT_S: Final = 86_400.0  # a result is waited for as long as the goal takes
 ASK_AGAIN_S: Final = 1.0
-
-# action_msgs/msg/GoalStatus
-ENDS: Final[dict[int, tuple[Outcome, str]]] = {
-    4: ("succeeded", "goal_succeeded"),
-    5: ("canceled", "goal_canceled"),
-    6: ("aborted", "goal_aborted"),
-}
-
-
-@dataclass(slots=True)
-class _Goal:
-    """The last goal of a widget; `cut` is done when the bridge went away meanwhile."""
-
-    widget: Action
-    press_id: str
-    id: uuid.UUID
-    cut: "asyncio.Future[None]"
-    corrected: Corrected
-    said: str = ""
-    fraction: float | None = None
-    tasks: set["asyncio.Task[None]"] = field(default_factory=set)
 
 
 class Actions:
@@ -59,18 +39,25 @@ class Actions:
         self._robot = robot
         self._link = link
         self._changed = changed
-        self._goals: dict[str, _Goal] = {}
+        self._latest: dict[str, Goal] = {}  # by widget
+        self._following: dict[asyncio.Task[None], Goal] = {}
 
     def follow(self) -> None:
-        """After every change of the graph: without a bridge nothing more is heard of a goal."""
-        if not self._robot.graph.bridges:
-            for goal in self._goals.values():
-                if not goal.cut.done():
-                    goal.cut.set_result(None)
+        """After every change of the graph: of a goal whose server is gone nothing more is heard."""
+        bridge = bool(self._robot.graph.bridges)
+        for goal in (*self._latest.values(), *self._following.values()):
+            if not goal.cut.done() and not (bridge and self._offered(goal.widget)):
+                gone = say("goal_gone", name=goal.widget.action)
+                goal.cut.set_result(gone if bridge else "")
+
+    @property
+    def following(self) -> int:
+        """How many goals' ends are waited for."""
+        return len(self._following)
 
     async def stop(self) -> None:
         """Ends its tasks; goals go on in the robot."""
-        tasks = [task for goal in self._goals.values() for task in goal.tasks]
+        tasks = list(self._following)
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
@@ -83,23 +70,23 @@ class Actions:
         goal_id = uuid.uuid4()
         wrapped = {"goal_id": {"uuid": list(goal_id.bytes)}, "goal": fields}
         payload = self._interfaces.encode(types.send_goal_request, wrapped)
+        if sum(g.widget.action == widget.action for g in self._following.values()) >= MOST_UNANSWERED:
+            return Answer("refused", say("too_many", service=widget.action))
         cut = asyncio.get_running_loop().create_future()
-        goal = _Goal(widget, press_id, goal_id, cut, corrected)
-        self._goals[widget.id] = goal
+        goal = Goal(widget, press_id, goal_id, cut, corrected)
+        self._latest[widget.id] = goal
         self._show(goal, Progress(busy=True, text=say("waiting_for_answer")))
         reply = await self._asked(goal, "send_goal", payload, widget.timeout_s)
         answer = self._first_answer(goal, types.send_goal_response, reply)
-        if answer.outcome == "accepted" or answer.outcome == "timed_out":
-            self._task(goal, self._follow_to_the_end(goal))
-        if answer.outcome == "accepted":
-            self._show(goal, self._under_way(goal, say("goal_executing")))
-        else:
-            self._show(goal, Progress(outcome=answer.outcome, text=answer.text))
+        if answer.outcome in ("accepted", "timed_out"):
+            goal.advance(ACCEPTED if answer.outcome == "accepted" else UNKNOWN)
+            self._task(goal)
+        self._show(goal, goal.under_way if goal.lives else goal.came_to(answer))
         return answer
 
     async def cancel(self, widget: Action) -> Answer:
         """Asks the robot to cancel the goal that is under way."""
-        goal = self._goals.get(widget.id)
+        goal = self._latest.get(widget.id)
         if goal is None or not self._robot.progress[widget.id].stoppable:
             return Answer("refused", say("nothing_to_cancel"))
         request, response = self._interfaces.service(CANCEL)
@@ -113,18 +100,39 @@ class Actions:
         now = clock(time.time())
         if code != 0:
             return Answer("rejected", say("cancel_refused", time=now))
-        if self._robot.progress[widget.id].busy:
-            self._show(goal, self._under_way(goal, say("goal_canceling")))
+        if goal.advance(CANCELING) and self._robot.progress[widget.id].busy:
+            self._show(goal, goal.under_way)
         return Answer("accepted", say("cancel_sent", time=now))
 
     def hear_feedback(self, action: str, sample: Sample) -> None:
         """The latest feedback of an action; of another program's goal it is passed over."""
-        for goal in self._goals.values():
-            widget = goal.widget
-            if widget.action == action and self._robot.progress[widget.id].stoppable:
+        for goal in self._of(action):
+            if self._robot.progress[goal.widget.id].stoppable:
                 self._take_feedback(goal, sample)
 
-    def _take_feedback(self, goal: _Goal, sample: Sample) -> None:
+    def hear_status(self, action: str, sample: Sample) -> None:
+        """The states of an action's goals; those of other programs are passed over."""
+        for goal in self._of(action):
+            status = self._interfaces.action(goal.widget.type).status
+            found = self._decoded(status, bytes(sample.payload), "status_list")
+            for one in found or ():
+                if bytes(one.goal_info.goal_id.uuid) == goal.id.bytes and goal.advance(one.status):
+                    self._advanced(goal)
+
+    def _of(self, action: str) -> Iterator[Goal]:
+        return (goal for goal in self._latest.values() if goal.widget.action == action)
+
+    def _advanced(self, goal: Goal) -> None:
+        """It has another state; while its first answer or its result is awaited, that will show."""
+        if not goal.lives or goal not in self._following.values():
+            return
+        if not self._robot.progress[goal.widget.id].busy:  # it was not known whether it runs
+            goal.corrected(
+                goal.press_id, Answer("accepted", say("goal_accepted", time=clock(time.time())))
+            )
+        self._show(goal, goal.under_way)
+
+    def _take_feedback(self, goal: Goal, sample: Sample) -> None:
         widget = goal.widget
         types = self._interfaces.action(widget.type)
         try:
@@ -138,9 +146,9 @@ class Actions:
             done = float(value_at(message.feedback, widget.progress)) / widget.progress_max
             goal.fraction = min(1.0, max(0.0, done)) if done == done else None  # NaN is no progress
         goal.said = with_fields(widget.feedback, message.feedback)
-        self._show(goal, self._under_way(goal, say("goal_executing")))
+        self._show(goal, goal.under_way)
 
-    def _first_answer(self, goal: _Goal, response: str, reply: bytes | None) -> Answer:
+    def _first_answer(self, goal: Goal, response: str, reply: bytes | None) -> Answer:
         now = clock(time.time())
         if reply is not None:
             accepted = self._decoded(response, reply, "accepted")
@@ -150,50 +158,61 @@ class Actions:
                 return Answer("rejected", say("goal_rejected", time=now))
             return Answer("unknown", say("answer_unreadable", wanted=goal.widget.type))
         if goal.cut.done():
-            return Answer("unknown", say("call_cut"))
+            return Answer("unknown", goal.cut.result() or say("call_cut"))
         seconds = f"{goal.widget.timeout_s:g}"
         return Answer("timed_out", say("timed_out", seconds=seconds) + say("cyclone_hint"))
 
-    async def _follow_to_the_end(self, goal: _Goal) -> None:
+    async def _follow_to_the_end(self, goal: Goal) -> None:
         """Waits for the result, over cuts of the connection too: the robot goes on meanwhile."""
-        while True:
-            answer = await self._ended(goal)
-            if answer.outcome == "unknown" and goal.cut.done():
-                self._show(goal, Progress(outcome="unknown", text=answer.text))
-                goal.corrected(goal.press_id, answer)
+        while (answer := await self._ended(goal)) is None:
+            if goal.cut.done():
+                goal.state = UNKNOWN
+                self._tell(goal, Answer("unknown", goal.cut.result() or say("goal_cut")))
                 await self._until_offered(goal)
                 goal.cut = asyncio.get_running_loop().create_future()
-                continue
-            break
+            elif not goal.known:
+                return  # it was never heard of: what was said of it stands
+            else:
+                await asyncio.sleep(ASK_AGAIN_S)
         log.info("press %s: goal %s: %s: %s", goal.press_id, goal.id, answer.outcome, answer.text)
-        goal.corrected(goal.press_id, answer)
-        if self._goals.get(goal.widget.id) is goal:
-            self._show(goal, Progress(outcome=answer.outcome, text=answer.text))
+        self._tell(goal, answer)
 
-    async def _until_offered(self, goal: _Goal) -> None:
+    async def _until_offered(self, goal: Goal) -> None:
         key = self._robot.key(goal.widget.action)
-        while self._robot.graph.server_type("AS", key) != goal.widget.type:
+        while not (
+            self._offered(goal.widget)
+            and time.monotonic() >= self._robot.graph.served_since("AS", key) + SERVER_SETTLE_S
+        ):
             await asyncio.sleep(ASK_AGAIN_S)
 
-    async def _ended(self, goal: _Goal) -> Answer:
+    def _offered(self, widget: Action) -> bool:
+        return self._robot.graph.server_type("AS", self._robot.key(widget.action)) == widget.type
+
+    async def _ended(self, goal: Goal) -> Answer | None:
+        """What came of it; None where nothing more is heard, or nobody answered.
+
+        One that the robot is not known to have is asked for not much longer than a call.
+        """
         types = self._interfaces.action(goal.widget.type)
         request = {"goal_id": {"uuid": list(goal.id.bytes)}}
         payload = self._interfaces.encode(types.get_result_request, request)
-        reply = await self._asked(goal, "get_result", payload, RESULT_S)
+        reply = await self._asked(goal, "get_result", payload, RESULT_S if goal.known else LATE_S)
         if reply is None:
-            return Answer("unknown", say("goal_cut"))
+            await asyncio.wait({goal.cut}, timeout=CUT_NEWS_S)  # the news of a cut may follow
+            return None
         try:
             message = self._interfaces.decode(types.get_result_response, reply)
         except DecodeError as error:
             log.error("%s: %s", goal.widget.action, error)
             return Answer("unknown", say("answer_unreadable", wanted=goal.widget.type))
+        goal.state = message.status if message.status in ENDS else UNKNOWN
         if message.status not in ENDS:
             return Answer("unknown", say("goal_lost"))
         outcome, sentence = ENDS[message.status]
         said = with_fields(goal.widget.result, message.result)
         return Answer(outcome, say(sentence, time=clock(time.time())) + (f": {said}" if said else "."))
 
-    async def _asked(self, goal: _Goal, what: str, payload: bytes, timeout_s: float) -> bytes | None:
+    async def _asked(self, goal: Goal, what: str, payload: bytes, timeout_s: float) -> bytes | None:
         """The reply; None when there is none in time, or the bridge went away."""
         key = f"{self._robot.key(goal.widget.action)}/_action/{what}"
         query = self._link.query(key, payload, timeout_s)
@@ -208,22 +227,22 @@ class Actions:
             log.error("%s", error)
             return None
 
-    def _under_way(self, goal: _Goal, text: str) -> Progress:
-        said = f"{text} {goal.said}".strip()
-        return Progress(True, "accepted", said, goal.fraction, stoppable=True)
+    def _tell(self, goal: Goal, answer: Answer) -> None:
+        """What came of it, or that it is not known any more: to the widget and the receipt."""
+        self._show(goal, goal.came_to(answer))
+        goal.corrected(goal.press_id, answer)
 
-    def _show(self, goal: _Goal, progress: Progress) -> None:
-        if self._goals.get(goal.widget.id) is goal:
+    def _show(self, goal: Goal, progress: Progress) -> None:
+        if self._latest.get(goal.widget.id) is goal:
             self._robot.progress[goal.widget.id] = progress
             self._changed()
 
-    def _task(self, goal: _Goal, work: Coroutine[Any, Any, None]) -> None:
-        task = asyncio.get_running_loop().create_task(work)
-        goal.tasks.add(task)
-        task.add_done_callback(goal.tasks.discard)
-        task.add_done_callback(_told)
+    def _task(self, goal: Goal) -> None:
+        task = asyncio.get_running_loop().create_task(self._follow_to_the_end(goal))
+        self._following[task] = goal
+        task.add_done_callback(self._followed)
 
-
-def _told(task: "asyncio.Task[None]") -> None:
-    if not task.cancelled() and (error := task.exception()):
-        log.error("following a goal failed", exc_info=error)
+    def _followed(self, task: "asyncio.Task[None]") -> None:
+        del self._following[task]
+        if not task.cancelled() and (error := task.exception()):
+            log.error("following a goal failed", exc_info=error)

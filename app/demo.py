@@ -116,6 +116,10 @@ class DemoRobot:
                     goal.status = SUCCEEDED
         return news
 
+    def states(self) -> list[tuple[bytes, int]]:
+        """The goals that it knows, each with its status."""
+        return [(goal_id, goal.status) for goal_id, goal in self._goals.items()]
+
     def result(self, goal_id: bytes) -> tuple[int, list[int]] | None:
         """(status, numbers) of a goal that has ended, or is unknown (status 0); None until then."""
         goal = self._goals.get(goal_id)

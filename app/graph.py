@@ -3,6 +3,7 @@
 Kept by topic key, so that asking costs the same however large the robot's graph is.
 """
 
+import math
 from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -40,12 +41,14 @@ class Graph:
         self._bridges: set[str] = set()
         self._fits: dict[str, bool] = {}  # whether a bridge's namespace is the robot's
         self._tokens: defaultdict[str, dict[str, Endpoint]] = defaultdict(dict)
+        self._since: dict[str, float] = {}  # of servers' tokens
         self._routes: defaultdict[str, list[Route]] = defaultdict(list)
         self._nodes: defaultdict[str, list[Endpoint]] = defaultdict(list)
         self._answered: Mapping[str, str] | None = None
 
-    def apply(self, token_key: str, alive: bool) -> str | None:
-        """Takes one token's appearance or end; returns the zid of a bridge that came or went."""
+    def apply(self, token_key: str, alive: bool, now: float = -math.inf) -> str | None:
+        """Takes one token's appearance (`now`, monotonic seconds) or end; returns the zid of a
+        bridge that came or went."""
         endpoint = parsed(token_key)
         if endpoint is None or endpoint.zid == self.own_zid:
             return None
@@ -53,8 +56,11 @@ class Graph:
             return self._bridge(endpoint.zid, alive)
         if alive:
             self._tokens[endpoint.key][token_key] = endpoint
+            if endpoint.role in ("SS", "AS"):
+                self._since[token_key] = now
         else:
             self._tokens[endpoint.key].pop(token_key, None)
+            self._since.pop(token_key, None)
         return None
 
     def _bridge(self, zid: str, alive: bool) -> str:
@@ -114,6 +120,12 @@ class Graph:
     def server_type(self, role: ServerRole, key: str) -> str | None:
         """The type of the robot's service or action; None if it offers none of this name now."""
         return next((e.type for e in self._on_robot(role, key)), None)
+
+    def served_since(self, role: ServerRole, key: str) -> float:
+        """When (monotonic seconds) the last server of this name came; -inf where there is none."""
+        tokens = self._tokens.get(key, {}).items()
+        here = (self._since[t] for t, e in tokens if e.role == role and e.zid in self._bridges)
+        return max(here, default=-math.inf)
 
     def latched(self, key: str) -> bool | None:
         """Whether the robot's publisher is TRANSIENT_LOCAL; None if it has none now."""

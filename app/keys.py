@@ -99,6 +99,11 @@ def feedback(action_key: str) -> str:
     return f"{action_key}/_action/feedback"
 
 
+def status(action_key: str) -> str:
+    """Where the states of an action's goals come."""
+    return f"{action_key}/_action/status"
+
+
 def bridge_token(zid: str) -> str:
     """The token by which a bridge says that it is there."""
     return f"@/{zid}/@ros2_lv"

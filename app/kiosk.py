@@ -87,7 +87,9 @@ class Kiosk:
             self._confirmations,
             self._parameters,
         )
-        self._feedback = {keys.feedback(self.robot.key(one)): one for one in panel.actions()}
+        goals = {self.robot.key(one): one for one in panel.actions()}
+        self._feedback = {keys.feedback(key): one for key, one in goals.items()}
+        self._status = {keys.status(key): one for key, one in goals.items()}
         self._joining = Joining(panel, self.interfaces, self.robot, self.link, self.show, self.renew)
         self._urgent = {self.robot.key(i.topic) for i in panel.interlocks}
         self._events = self.robot.key(EVENTS)
@@ -102,7 +104,7 @@ class Kiosk:
         self._warm_up()
         subscribe = [self.robot.key(topic) for topic in self.panel.subscriptions()]
         publish = [self.robot.key(topic) for topic in (*self.panel.publications(), "/rosout")]
-        self.link.start([*subscribe, *self._feedback], publish)
+        self.link.start([*subscribe, *self._feedback, *self._status], publish)
         logging.getLogger().addHandler(self._rosout)
         self._joining.start()
 
@@ -213,12 +215,15 @@ class Kiosk:
             if key in self._feedback:
                 self._actions.hear_feedback(self._feedback[key], sample)
                 continue
+            if key in self._status:
+                self._actions.hear_status(self._status[key], sample)
+                continue
             if key == self._events:
                 self._parameters.hear(sample)
             self.robot.take(key, sample)
             self._confirmations.hear(key)
             urgent = urgent or key in self._urgent
-        came = False
+        came, now = False, time.monotonic()
         for token_key, token in changes.tokens.items():
             if token.lost_seq:
                 self._parameters.lose(token_key)
@@ -226,7 +231,7 @@ class Kiosk:
                 self.robot.cut(zid, token.lost_seq)
                 self._log.warning("bridge %s lost", zid)
                 had_bridge = had_bridge and bool(self.robot.graph.bridges)
-            if token.alive and (zid := self.robot.graph.apply(token_key, True)):
+            if token.alive and (zid := self.robot.graph.apply(token_key, True, now)):
                 self._log.info("bridge %s found", zid)
                 came = True
         if changes.tokens:

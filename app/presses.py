@@ -46,6 +46,7 @@ NO_WAY: Final = frozenset(
         "joining",
         "no_service",
         "no_parameters",
+        "getting_ready",
     }
 )
 FINE: Final = frozenset({"published", "confirmed", "accepted", "succeeded"})

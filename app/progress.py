@@ -23,7 +23,7 @@ class Progress:
     """`busy` while an answer is awaited; then `outcome` and `text` say what came of it.
 
     `fraction` (0 to 1) is how far an action is, None where it does not say; `stoppable` while a
-    cancel makes sense.
+    cancel makes sense; `goal` is the goal's state by its name in action_msgs/msg/GoalStatus.
     """
 
     busy: bool = False
@@ -31,6 +31,7 @@ class Progress:
     text: str = ""
     fraction: float | None = None
     stoppable: bool = False
+    goal: str = ""
 
 
 IDLE = Progress()

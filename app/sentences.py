@@ -60,6 +60,7 @@ ENGLISH: Final[Mapping[str, str]] = {
     "server_lost": "There is no connection to the panel's server.",
     "server_unsure": "No answer from the panel's server: it is not known whether this was sent.",
     "no_service": "Locked: the robot does not offer {name} now.",
+    "getting_ready": "Locked: the robot has just begun to offer {name}; getting ready.",
     "busy": "Under way: waiting for the robot.",
     # What came of a call or a goal.
     "waiting_for_answer": "Sent; waiting for the robot's answer.",
@@ -80,6 +81,7 @@ ENGLISH: Final[Mapping[str, str]] = {
     "goal_aborted": "The robot aborted it at {time}",
     "goal_lost": "The robot no longer knows this goal: what came of it is not known.",
     "goal_cut": "The connection was cut: the robot may still be doing it.",
+    "goal_gone": "The robot no longer offers {name}: what came of it is not known.",
     "cancel": "Cancel",
     "robots": "Robots",
     "cancel_sent": "The robot was asked to cancel at {time}.",

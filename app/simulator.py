@@ -46,8 +46,10 @@ class Simulator:
         self._lock = threading.Lock()
         self._ends = threading.Event()
         self._session = zenoh.open(_listening(endpoint))
-        self._publishers = {topic: self._publisher(topic) for topic in SPEAKS}
+        self._publishers = {topic: self._publisher(self._key(topic)) for topic in SPEAKS}
         self._publishers[EVENTS] = self._session.declare_publisher(self._key(EVENTS))
+        self._status = self._publisher(keys.status(self._key(COUNT)))
+        self._states: list[tuple[bytes, int]] = []
         self._results: list[tuple[bytes, zenoh.Query]] = []
         self._types = self._interfaces.action(COUNT_TYPE)
         self._declared = [
@@ -70,10 +72,10 @@ class Simulator:
     def _key(self, topic: str) -> str:
         return keys.key_of(topic, self._namespace)
 
-    def _publisher(self, topic: str) -> Any:
+    def _publisher(self, key: str) -> Any:
         return declare_advanced_publisher(
             self._session,
-            self._key(topic),
+            key,
             cache=CacheConfig(max_samples=1),
             publisher_detection=True,
         )
@@ -177,6 +179,7 @@ class Simulator:
             with self._lock:
                 said = self._robot.step(time.monotonic())
                 counted = self._robot.count()
+                states = self._robot.states()
                 ended = [(q, end) for goal, q in self._results if (end := self._robot.result(goal))]
                 answered = {id(query) for query, _ in ended}
                 self._results = [one for one in self._results if id(one[1]) not in answered]
@@ -184,6 +187,9 @@ class Simulator:
                 self._publishers[topic].put(self._interfaces.encode(SAID[topic], fields))
             for goal_id, sequence in counted:
                 self._tell(goal_id, sequence)
+            if states != self._states:
+                self._states = states
+                self._tell_states()
             for query, (status, sequence) in ended:
                 self._answer(query, status, sequence)
 
@@ -191,6 +197,15 @@ class Simulator:
         fields = {"goal_id": {"uuid": goal_id}, "feedback": {"sequence": sequence}}
         payload = self._interfaces.encode(self._types.feedback_message, fields)
         self._session.put(keys.feedback(self._key(COUNT)), payload)
+
+    def _tell_states(self) -> None:
+        """As an action server does whenever a goal has another state."""
+        never = {"sec": 0, "nanosec": 0}
+        known = [
+            {"goal_info": {"goal_id": {"uuid": goal_id}, "stamp": never}, "status": status}
+            for goal_id, status in self._states
+        ]
+        self._status.put(self._interfaces.encode(self._types.status, {"status_list": known}))
 
     def _answer(self, query: zenoh.Query, status: int, sequence: list[int]) -> None:
         fields = {"status": status, "result": {"sequence": sequence}}

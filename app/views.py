@@ -11,7 +11,14 @@ from typing import Any, Final, Literal, TypedDict
 
 from app.displays import indicator, readout
 from app.inputs import limits
-from app.interlocks import Verdict, interlock_verdict, parameters_offered, press_verdict, way
+from app.interlocks import (
+    Verdict,
+    interlock_verdict,
+    parameters_offered,
+    press_verdict,
+    served,
+    way,
+)
 from app.panel.displays import Indicator, Readout
 from app.panel.inputs import Numeric, SelectInput, TextInput, ToggleInput
 from app.panel.model import Action, Call, Panel, Publish
@@ -123,13 +130,15 @@ def enabled(verdict: Verdict) -> Enabled:
 
 
 def progress(of: Progress) -> dict[str, Any]:
-    """Attributes of a call or an action: `progress` from 0 to 1, None where it is not known."""
+    """Attributes of a call or an action: `progress` from 0 to 1, None where it is not known; `goal`
+    is the state of an action's goal as ROS names it, "" where there is none."""
     return {
         "busy": of.busy,
         "outcome": of.outcome,
         "result": of.text,
         "progress": of.fraction,
         "stoppable": of.stoppable,
+        "goal": of.goal,
     }
 
 
@@ -156,6 +165,8 @@ def lamps(panel: Panel, robot: Robot, passable: Verdict) -> dict[str, Lamp]:
     seen = any(
         robot.graph.on_robot("MP" if role == "MP" else "MS", robot.key(topic)) for role, topic in topics
     ) or any(parameters_offered(of.node, robot) is None for of in panel.parameters())
+    asked = [served(w) for w in panel.widgets() if isinstance(w, Call | Action)]
+    seen = seen or any(robot.graph.on_robot(role, robot.key(name)) for role, name in asked)
     node: tuple[Literal["ok", "wait", "bad"], str] = ("ok", "ok") if seen else ("wait", "no_node")
     if state == "bad":
         node = ("bad", "lost")

@@ -38,6 +38,8 @@ GRAPH = {
     "SS/set_enabled/std_srvs/srv/SetBool",
     "SS/reset/std_srvs/srv/Trigger",
     "SS/slow/std_srvs/srv/Trigger",
+    "SS/slow_2/std_srvs/srv/Trigger",
+    "SS/slow_3/std_srvs/srv/Trigger",
     "SS/add_two_ints/example_interfaces/srv/AddTwoInts",
     f"SS/{NODE}/get_parameters/rcl_interfaces/srv/GetParameters",
     f"SS/{NODE}/get_parameter_types/rcl_interfaces/srv/GetParameterTypes",

@@ -237,13 +237,14 @@ class Server:
         *,
         python: str = sys.executable,
         options: Sequence[str] = (),
+        app: str = "app.main:app",
         **environment: str,
     ) -> None:
         self.base = ""
         self.port = port or free_port()
         self.url = f"http://127.0.0.1:{self.port}"
         self.http = httpx.Client(base_url=self.url, timeout=10, trust_env=False)
-        command = [python, "-m", "uvicorn", "app.main:app", "--port", str(self.port), *options]
+        command = [python, "-m", "uvicorn", app, "--port", str(self.port), *options]
         self.process = Process(command, {**environment, "PYTHONPATH": ""}, cwd=folder)
         until(self.answers, "the server answers", within_s=20)
 

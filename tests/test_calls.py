@@ -8,9 +8,9 @@ import pytest
 
 from app import keys
 from app.actions import Actions
-from app.calls import MOST_UNANSWERED, Calls
+from app.calls import LATE_S, MOST_UNANSWERED, Calls
 from app.panel.model import Action, Call, Panel
-from app.progress import Answer
+from app.progress import Answer, Progress
 from app.robot import Robot, Sample
 from tests.builders import BRIDGE, INTERFACES, panel_of, robot_there
 
@@ -25,14 +25,23 @@ class Line:
 
     def __init__(self) -> None:
         self.asked: list[tuple[str, bytes, asyncio.Future[bytes | None]]] = []
+        self.timeouts: list[float] = []
 
     def query(self, key: str, payload: bytes, timeout_s: float) -> "asyncio.Future[bytes | None]":
         future: asyncio.Future[bytes | None] = asyncio.get_running_loop().create_future()
         self.asked.append((key, payload, future))
+        self.timeouts.append(timeout_s)
+        if key.endswith("send_goal"):  # as Zenoh, where nobody is waited for any longer
+            asyncio.get_running_loop().call_later(timeout_s, give_up, future)
         return future
 
     def answer(self, type_name: str, number: int = -1, **fields: Any) -> None:
         self.asked[number][2].set_result(INTERFACES.encode(type_name, fields))
+
+
+def give_up(future: "asyncio.Future[bytes | None]") -> None:
+    if not future.done():
+        future.set_result(None)
 
 
 class Bench:
@@ -63,6 +72,14 @@ class Bench:
 
     def send_goal(self) -> "asyncio.Task[Answer]":
         return asyncio.create_task(self.actions.start(self.count, {"order": 3}, "g1", self.correct))
+
+    @property
+    def shown(self) -> Progress:
+        return self.robot.progress["count"]
+
+    def answer_goal(self, accepted: bool) -> None:
+        response = INTERFACES.action(COUNT).send_goal_response
+        self.line.answer(response, accepted=accepted, stamp={"sec": 0, "nanosec": 0})
 
     def lose_the_bridge(self) -> None:
         self.robot.graph.apply(keys.bridge_token(BRIDGE), False)
@@ -187,6 +204,141 @@ def test_a_goal_cut_off_is_unknown_until_the_robot_tells_its_result() -> None:
         await bench.actions.stop()
 
     run(test)
+
+
+def goal_id(bench: Bench) -> bytes:
+    """The id of the goal that was sent, as the robot got it."""
+    request = INTERFACES.action(COUNT).send_goal_request
+    return bytes(INTERFACES.decode(request, bench.line.asked[0][1]).goal_id.uuid)
+
+
+def tell_states(bench: Bench, *states: tuple[bytes, int]) -> None:
+    """The action's server publishes the states of its goals."""
+    stamp = {"sec": 0, "nanosec": 0}
+    told = [{"goal_info": {"goal_id": {"uuid": i}, "stamp": stamp}, "status": s} for i, s in states]
+    payload = INTERFACES.encode(INTERFACES.action(COUNT).status, {"status_list": told})
+    bench.actions.hear_status("/count", sample_of(payload))
+
+
+async def accepted(bench: Bench) -> None:
+    start = bench.send_goal()
+    await asked(bench, 1)
+    bench.answer_goal(accepted=True)
+    assert (await start).outcome == "accepted"
+    await asked(bench, 2)
+
+
+def test_a_goals_state_has_its_ros_name_and_only_goes_on() -> None:
+    async def test(bench: Bench) -> None:
+        await accepted(bench)
+        names = [bench.shown.goal]
+        for state in (2, 1, 3, 2, 7, -1):
+            tell_states(bench, (bytes(16), 6), (goal_id(bench), state))
+            names.append(bench.shown.goal)
+        assert names == ["ACCEPTED", *["EXECUTING"] * 2, *["CANCELING"] * 4]
+        assert bench.shown.text.startswith("Being canceled")
+        assert bench.shown.stoppable
+        tell_states(bench, (goal_id(bench), 5))
+        bench.line.answer(
+            INTERFACES.action(COUNT).get_result_response, status=5, result={"sequence": []}
+        )
+        await settled(bench)
+        assert (bench.shown.goal, bench.shown.outcome) == ("CANCELED", "canceled")
+        tell_states(bench, (goal_id(bench), 6))
+        assert bench.shown.goal == "CANCELED"
+
+    run(test)
+
+
+def test_a_state_that_comes_before_the_answer_counts() -> None:
+    async def test(bench: Bench) -> None:
+        start = bench.send_goal()
+        await asked(bench, 1)
+        tell_states(bench, (goal_id(bench), 2))
+        assert bench.shown.goal == ""  # the answer is awaited
+        bench.answer_goal(accepted=True)
+        await start
+        assert bench.shown.goal == "EXECUTING"
+        await bench.actions.stop()
+
+    run(test)
+
+
+def test_another_programs_goal_and_a_rejected_one_have_no_state() -> None:
+    async def test(bench: Bench) -> None:
+        tell_states(bench, (b"\7" * 16, 2))
+        assert "count" not in bench.robot.progress
+        start = bench.send_goal()
+        await asked(bench, 1)
+        bench.answer_goal(accepted=False)
+        assert (await start).outcome == "rejected"
+        tell_states(bench, (b"\7" * 16, 2))
+        assert (bench.shown.goal, bench.shown.busy) == ("", False)
+
+    run(test)
+
+
+def test_a_goal_without_an_answer_is_under_way_when_the_robot_says_so() -> None:
+    async def test(bench: Bench) -> None:
+        assert (await bench.send_goal()).outcome == "timed_out"
+        assert (bench.shown.goal, bench.shown.busy) == ("UNKNOWN", False)
+        tell_states(bench, (goal_id(bench), 2))
+        assert (bench.shown.goal, bench.shown.busy) == ("EXECUTING", True)
+        assert [answer.outcome for _, answer in bench.corrected] == ["accepted"]
+        await bench.actions.stop()
+
+    run(test)
+
+
+def test_a_goal_that_nobody_heard_of_is_asked_for_only_for_a_while(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("app.actions.CUT_NEWS_S", 0)
+
+    async def test(bench: Bench) -> None:
+        for number in range(MOST_UNANSWERED):
+            assert (await bench.send_goal()).outcome == "timed_out"
+            await asked(bench, 2 * (number + 1))
+        assert bench.line.timeouts[1] == LATE_S
+        assert (await bench.send_goal()).outcome == "refused"
+        assert len(bench.line.asked) == 2 * MOST_UNANSWERED
+        for _, _, future in bench.line.asked:
+            if not future.done():
+                future.set_result(None)
+        await settled(bench)
+        assert bench.corrected == []  # what was said of them stands
+        assert (await bench.send_goal()).outcome == "timed_out"
+        await bench.actions.stop()
+
+    run(test)
+
+
+def test_a_goal_whose_server_ends_is_unknown_and_asked_for_when_it_is_back() -> None:
+    async def test(bench: Bench) -> None:
+        await accepted(bench)
+        token = keys.server_token(BRIDGE, "AS", "count", COUNT)
+        bench.robot.graph.apply(token, False)
+        bench.actions.follow()
+        while bench.shown.busy:
+            await asyncio.sleep(0)
+        assert (bench.shown.goal, bench.shown.outcome) == ("UNKNOWN", "unknown")
+        assert "no longer offers /count" in bench.shown.text
+        bench.robot.graph.apply(token, True)
+        await asked(bench, 3)
+        bench.line.answer(
+            INTERFACES.action(COUNT).get_result_response, status=0, result={"sequence": []}
+        )
+        await settled(bench)
+        assert "no longer knows this goal" in bench.shown.text
+        assert [answer.outcome for _, answer in bench.corrected] == ["unknown", "unknown"]
+
+    run(test)
+
+
+async def settled(bench: Bench) -> None:
+    """Nothing is followed any more."""
+    while bench.actions.following:
+        await asyncio.sleep(0.001)
 
 
 def test_feedback_of_another_programs_goal_is_passed_over() -> None:

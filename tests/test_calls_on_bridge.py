@@ -1,18 +1,23 @@
 """Services and actions of a robot on Cyclone DDS, from the panel, through the real bridge."""
 
+import signal
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 import httpx
+import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
 
+from app.calls import MOST_UNANSWERED
 from tests import cyclone
-from tests.cyclone import Client, CycloneRobot, served
-from tests.parts import Bridge, Server, live, until
+from tests.cyclone import TYPES, Client, CycloneRobot, served
+from tests.parts import Bridge, Server, Stream, live, until
 
 cyclone_bridge = cyclone.cyclone_bridge
 own_cyclone_bridge = cyclone.own_cyclone_bridge
@@ -20,6 +25,8 @@ client = cyclone.client
 own_client = cyclone.own_client
 robots = cyclone.robots
 robot = cyclone.robot
+
+FIBONACCI = "example_interfaces/action/Fibonacci"
 
 PANEL = """
 title = "Cyclone cell"
@@ -115,6 +122,14 @@ def kiosk(cyclone_bridge: Bridge, robot: CycloneRobot, tmp_path: Path) -> Iterat
     mine.end()
 
 
+def uuid_of(octets: bytes) -> Any:
+    return TYPES.types["unique_identifier_msgs/msg/UUID"](np.frombuffer(octets, dtype=np.uint8))
+
+
+def goal_of(order: int) -> Any:
+    return TYPES.types[f"{FIBONACCI}_Goal"](order)
+
+
 def press(kiosk: Server, widget: str, **more: Any) -> httpx.Response:
     return kiosk.http.post(f"/widgets/{widget}", json={"inputs": {}, **more})
 
@@ -161,7 +176,7 @@ def test_a_late_answer_corrects_the_receipt(kiosk: Server, robot: CycloneRobot) 
     again = press(kiosk, "slow", id="slow-1")
     assert (again.status_code, again.json()["outcome"]) == (200, "succeeded")
     assert len(robot.requests("/slow")) == 1
-    assert "a late answer" in kiosk.process.text
+    until(lambda: "a late answer" in kiosk.process.text, "it is logged")
 
 
 def test_while_a_call_waits_its_button_is_locked_and_others_go_on(
@@ -181,6 +196,98 @@ def test_while_a_call_waits_its_button_is_locked_and_others_go_on(
         assert slow.result().json() == same.result().json()
     assert len(robot.requests("/slow")) == 1
     assert kiosk.widget("slow")["enabled"]
+
+
+def heard_after_s(kiosk: Server, robot: CycloneRobot, words: str) -> float:
+    """From a press of a publish widget to the node's having heard it."""
+    began = time.monotonic()
+    receipt = kiosk.http.post("/widgets/say", json={"inputs": {"words": words}})
+    assert receipt.json()["outcome"] == "published"
+    until(lambda: {"data": words} in robot.heard(topic="/said"), "heard", every_s=0.001)
+    return time.monotonic() - began
+
+
+def test_calls_that_wait_hold_up_no_press(
+    cyclone_bridge: Bridge,
+    robot: CycloneRobot,
+    tmp_path: Path,
+    servers: Callable[[Server], Server],
+) -> None:
+    path = tmp_path / "waiting.toml"
+    names = [f"wait_{n}" for n in range(3 * (MOST_UNANSWERED + 1))]
+    path.write_text(PANEL + "".join(waiting_widget(*one) for one in enumerate(names)))
+    kiosk = servers(live(cyclone_bridge.endpoint, tmp_path, KIOSK_PANEL=str(path)))
+    robot.subscribe(topic="/said", type="std_msgs/msg/String")
+    robot.answer_slow(seconds=None)
+    until(lambda: kiosk.widget("say")["enabled"], "joined")
+    until(lambda: kiosk.widget(names[-1])["enabled"], "offered")
+    until(lambda: robot.publishers(topic="/said"), "the bridge publishes")
+    alone = median(heard_after_s(kiosk, robot, f"alone {n}") for n in range(20))
+    with ThreadPoolExecutor(len(names)) as pool:
+        began = time.monotonic()
+        calls = [pool.submit(press_alone, kiosk, name) for name in names]
+        until(lambda: sum(call.done() for call in calls) == 3, "what is too many is told at once")
+        assert time.monotonic() - began < WAITING_S / 2
+        beside = median(heard_after_s(kiosk, robot, f"beside {n}") for n in range(20))
+        assert sum(call.done() for call in calls) == 3, "the others wait all the while"
+        outcomes = Counter(call.result().json()["outcome"] for call in calls)
+    assert outcomes == {"timed_out": 3 * MOST_UNANSWERED, "refused": 3}
+    assert len(robot.requests("/slow")) == MOST_UNANSWERED
+    assert beside < 3 * alone + 0.02, f"{beside * 1000:.1f} ms instead of {alone * 1000:.1f} ms"
+
+
+WAITING_S = 6.0
+
+
+def waiting_widget(number: int, name: str) -> str:
+    service = ("/slow", "/slow_2", "/slow_3")[number % 3]
+    return f"""
+        [[page.widget]]
+        id = "{name}"
+        kind = "call"
+        label = "Wait"
+        service = "{service}"
+        type = "std_srvs/srv/Trigger"
+        timeout_s = {WAITING_S}
+    """
+
+
+def press_alone(kiosk: Server, widget: str) -> httpx.Response:
+    """A press with a connection of its own."""
+    with httpx.Client(base_url=kiosk.url, timeout=2 * WAITING_S, trust_env=False) as http:
+        return http.post(f"/widgets/{widget}", json={"inputs": {}})
+
+
+def test_a_robot_that_has_just_come_gets_the_first_call(
+    own_cyclone_bridge: Bridge,
+    robots: Callable[..., CycloneRobot],
+    tmp_path: Path,
+    servers: Callable[[Server], Server],
+) -> None:
+    kiosk = servers(live(own_cyclone_bridge.endpoint, tmp_path, KIOSK_PANEL=panel_file(tmp_path)))
+    until(lambda: "does not offer" in (kiosk.widget("add")["reason"] or ""), "joined, and no robot")
+    for number in range(3):
+        with kiosk.stream() as stream:
+            stream.next("snapshot")
+            robot = robots(own_cyclone_bridge.domain)
+            reasons = list(reasons_of("add", stream))
+        receipt = press(kiosk, "add", id=f"first-{number}")
+        assert receipt.json()["outcome"] == "succeeded", receipt.json()
+        assert len(reasons) == 1
+        assert "getting ready" in reasons[0]
+        assert len(robot.requests("/add_two_ints")) == 1
+        robot.end()
+        until(lambda: not kiosk.widget("add")["enabled"], "the robot is gone")
+
+
+def reasons_of(widget: str, stream: Stream) -> Iterator[str]:
+    """Why a widget is locked, as it changes, until it opens."""
+    while True:
+        _, changes, _ = stream.next("update")
+        if changes.get(widget, {}).get("enabled"):
+            return
+        if reason := changes.get(widget, {}).get("reason"):
+            yield reason
 
 
 def test_a_bridge_lost_while_waiting_leaves_it_unknown(
@@ -212,7 +319,9 @@ def test_a_goal_runs_to_its_result_and_shows_in_every_browser(
     assert (receipt.status_code, receipt.json()["outcome"]) == (200, "accepted")
     assert "waiting for the robot" in kiosk.widget("count")["reason"]
     until(lambda: "so far [0, 1, 1" in kiosk.widget("count")["result"], "its feedback is shown")
+    assert kiosk.widget("count")["goal"] == "EXECUTING"
     until(lambda: kiosk.widget("count")["outcome"] == "succeeded", "its result is there")
+    assert kiosk.widget("count")["goal"] == "SUCCEEDED"
     assert "[0, 1, 1, 2, 3, 5, 8]" in kiosk.widget("count")["result"]
     assert kiosk.widget("count")["enabled"]
     assert press(kiosk, "count", id="goal-1").json()["outcome"] == "succeeded"
@@ -238,12 +347,53 @@ def test_a_goal_that_the_robot_ends_itself(
     assert press(kiosk, "count").json()["outcome"] == "accepted"
     getattr(robot, end)()
     until(lambda: kiosk.widget("count")["outcome"] == outcome, outcome)
+    assert kiosk.widget("count")["goal"] == outcome.upper()
 
 
 def test_a_goal_that_the_robot_rejects(kiosk: Server) -> None:
     receipt = press(kiosk, "refused")
     assert (receipt.status_code, receipt.json()["outcome"]) == (200, "rejected")
     assert kiosk.widget("refused")["enabled"]
+    assert kiosk.widget("refused")["goal"] == ""
+
+
+def test_another_clients_goal_is_not_shown_as_ours(
+    kiosk: Server, robot: CycloneRobot, client: Client
+) -> None:
+    robot.fibonacci(step_s=0.1)
+    other = uuid_of(b"other goal" + bytes(6))
+    sent = client.call("fibonacci/_action/send_goal", f"{FIBONACCI}_SendGoal", other, goal_of(20))
+    assert sent.accepted
+    assert press(kiosk, "refused").json()["outcome"] == "rejected"
+    assert press(kiosk, "count").json()["outcome"] == "accepted"
+    until(lambda: kiosk.widget("count")["outcome"] == "succeeded", "ours has ended")
+    assert [goal["status"] for goal in robot.goals()] == [2, 4], "the other's goes on"
+    assert kiosk.widget("count")["goal"] == "SUCCEEDED"
+    assert (kiosk.widget("refused")["goal"], kiosk.widget("refused")["busy"]) == ("", False)
+    robot.cancel()
+
+
+def test_a_node_that_ends_in_the_middle_of_a_goal_leaves_it_unknown_and_the_widget_usable(
+    own_cyclone_bridge: Bridge,
+    robots: Callable[..., CycloneRobot],
+    tmp_path: Path,
+    servers: Callable[[Server], Server],
+) -> None:
+    kiosk = servers(live(own_cyclone_bridge.endpoint, tmp_path, KIOSK_PANEL=panel_file(tmp_path)))
+    robot = robots(own_cyclone_bridge.domain)
+    until(lambda: kiosk.widget("count")["enabled"], "offered")
+    robot.fibonacci(step_s=30)
+    assert press(kiosk, "count", id="goal-1").json()["outcome"] == "accepted"
+    robot.end()
+    until(lambda: kiosk.widget("count")["goal"] == "UNKNOWN", "it is not known any more")
+    assert "no longer offers /fibonacci" in kiosk.widget("count")["result"]
+    assert press(kiosk, "count", id="goal-1").json()["outcome"] == "unknown"
+    robot = robots(own_cyclone_bridge.domain)
+    until(lambda: "no longer knows this goal" in kiosk.widget("count")["result"], "asked for again")
+    until(lambda: kiosk.widget("count")["enabled"], "offered again")
+    robot.fibonacci(step_s=0.01)
+    assert press(kiosk, "count").json()["outcome"] == "accepted"
+    until(lambda: kiosk.widget("count")["goal"] == "SUCCEEDED", "another goal is done")
 
 
 def test_a_goal_of_more_than_five_seconds_survives_a_reload(
@@ -256,10 +406,64 @@ def test_a_goal_of_more_than_five_seconds_survives_a_reload(
     expect(count.locator(".result")).to_contain_text("Under way")
     page.reload()
     expect(count.locator(".result")).to_contain_text("so far [0, 1")
+    expect(count.locator(".goal")).to_have_text("EXECUTING")
+    other = page.context.new_page()
+    other.goto(kiosk.url)
+    seen_elsewhere = other.locator('[data-widget="count"]')
+    expect(seen_elsewhere.locator(".goal")).to_have_text("EXECUTING")
     expect(count.get_by_role("button", name="Cancel")).to_be_enabled()
     expect(count.locator(".result")).to_contain_text("Succeeded", timeout=20_000)
+    expect(count.locator(".goal")).to_have_text("SUCCEEDED")
+    expect(seen_elsewhere.locator(".goal")).to_have_text("SUCCEEDED")
     expect(count.get_by_role("button", name="Cancel")).to_be_disabled()
     expect(count.get_by_role("button", name="Count", exact=True)).to_be_enabled()
+
+
+def test_a_goals_state_is_not_known_while_the_server_is_lost(
+    kiosk: Server, robot: CycloneRobot, page: Page
+) -> None:
+    robot.fibonacci(step_s=30)
+    page.goto(kiosk.url)
+    count = page.locator('[data-widget="count"]')
+    count.get_by_role("button", name="Count", exact=True).click()
+    expect(count.locator(".goal")).to_have_text("EXECUTING")
+    kiosk.process.send(signal.SIGSTOP)
+    expect(count.locator(".goal")).to_have_text("not known")
+    kiosk.process.send(signal.SIGCONT)
+    expect(count.locator(".goal")).to_have_text("EXECUTING")
+    expect(count.get_by_role("button", name="Cancel")).to_be_enabled()
+
+
+def test_a_late_answer_corrects_what_every_browser_shows(
+    kiosk: Server, robot: CycloneRobot, page: Page
+) -> None:
+    robot.answer_slow(seconds=2.5)
+    page.goto(kiosk.url)
+    other = page.context.new_page()
+    other.goto(kiosk.url)
+    page.get_by_role("button", name="Slow", exact=True).click()
+    results = [one.locator('[data-widget="slow"] .result') for one in (page, other)]
+    for result in results:
+        expect(result).to_contain_text("No answer within 1 s")
+        expect(result).to_have_attribute("data-outcome", "timed_out")
+    for result in results:
+        expect(result).to_contain_text("Done at")
+        expect(result).to_have_attribute("data-outcome", "succeeded")
+    expect(page.locator('[data-widget="slow"] .receipt')).to_be_empty()
+
+
+def test_a_cancel_that_the_robot_refuses_is_told(
+    kiosk: Server, robot: CycloneRobot, page: Page
+) -> None:
+    robot.fibonacci(step_s=30, refuse_cancels=True)
+    page.goto(kiosk.url)
+    count = page.locator('[data-widget="count"]')
+    count.get_by_role("button", name="Count", exact=True).click()
+    count.get_by_role("button", name="Cancel").click()
+    expect(count.locator(".receipt")).to_contain_text("The robot did not cancel it")
+    expect(count.locator(".goal")).to_have_text("EXECUTING")
+    robot.fibonacci(step_s=0.01, refuse_cancels=False)
+    expect(count.locator(".goal")).to_have_text("SUCCEEDED")
 
 
 def test_calls_and_cancels_work_without_scripts(kiosk: Server, robot: CycloneRobot) -> None:

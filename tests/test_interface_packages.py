@@ -221,6 +221,48 @@ def test_a_folder_without_interfaces_is_refused(tmp_path: Path) -> None:
         Interfaces("jazzy", [tmp_path])
 
 
+def test_an_interface_that_is_there_as_idl_only_is_named_with_what_would_be_right(make: Make) -> None:
+    folder = make(
+        {
+            "cell_msgs/msg/Lamp.msg": "bool on",
+            "cell_msgs/msg/Lamp.idl": "module cell_msgs {};",
+            "cell_msgs/msg/Doors.idl": "module cell_msgs {};",
+            "cell_msgs/srv/Change.idl": "module cell_msgs {};",
+            "cell_msgs/action/Weld.idl": "module cell_msgs {};",
+        }
+    )
+    cell = Interfaces("jazzy", [folder])
+    cell.require("cell_msgs/msg/Lamp")
+    for ask, name in (
+        (cell.require, "cell_msgs/msg/Doors"),
+        (cell.service, "cell_msgs/srv/Change"),
+        (cell.action, "cell_msgs/action/Weld"),
+    ):
+        _, kind, stem = name.split("/")
+        why = (
+            f'"{name}" is not there: {folder / name}.idl is not read, as no .idl is: put {stem}.{kind}'
+        )
+        with pytest.raises(InterfaceError) as caught:
+            ask(name)
+        assert str(caught.value) == f"{why} beside it"
+
+
+def test_what_needs_an_interface_that_is_there_as_idl_only_is_named(make: Make) -> None:
+    folder = make({"a/msg/A.msg": "b/B b", "b/msg/B.idl": "module b {};"})
+    with pytest.raises(InterfaceError) as caught:
+        Interfaces("jazzy", [folder])
+    assert f'{folder / "a/msg/A.msg"}: field "b" is of type b/msg/B, which is not there: ' in str(
+        caught.value
+    )
+    assert str(caught.value).endswith("b/msg/B.idl is not read, as no .idl is: put B.msg beside it")
+
+
+def test_a_folder_with_idl_only_is_refused_with_what_would_be_right(make: Make) -> None:
+    folder = make({"b/srv/B.idl": "module b {};"})
+    with pytest.raises(InterfaceError, match=r"has no interfaces: .*B\.idl is not read.* put B\.srv"):
+        Interfaces("jazzy", [folder])
+
+
 def test_a_file_that_is_no_text_is_refused(make: Make) -> None:
     folder = make(CELL)
     (folder / "cell_msgs/msg/Bad.msg").write_bytes(b"int8 \xff")

@@ -5,9 +5,16 @@ from collections.abc import Callable
 
 import pytest
 
-from app.interlocks import Verdict, interlock_verdict, publish_verdict, way
-from app.keys import Qos, bridge_token
-from app.panel.model import Interlock, Publish
+from app.interlocks import (
+    SERVER_SETTLE_S,
+    Verdict,
+    call_verdict,
+    interlock_verdict,
+    publish_verdict,
+    way,
+)
+from app.keys import Qos, bridge_token, server_token
+from app.panel.model import Call, Interlock, Publish
 from app.robot import Robot, Sample
 from tests.builders import (
     BOOL,
@@ -241,3 +248,22 @@ def test_a_subscriber_that_would_not_hear_locks_a_press() -> None:
         verdict.reason == "The robot asks for /free transient local; this panel publishes it volatile."
     )
     assert not verdict.permitted
+
+
+def test_a_service_that_has_just_come_is_not_called_yet() -> None:
+    robot = robot_there(small_panel())
+    call = Call(id="reset", kind="call", label="Reset", service="/reset", type="std_srvs/srv/Trigger")
+    token = server_token(BRIDGE, "SS", "reset", call.type)
+    assert call_verdict(call, None, robot, NOW).code == "no_service"
+    robot.graph.apply(token, True, NOW)
+    verdict = call_verdict(call, None, robot, NOW)
+    assert (verdict.permitted, verdict.code, verdict.reason, verdict.until) == (
+        False,
+        "getting_ready",
+        "Locked: the robot has just begun to offer /reset; getting ready.",
+        NOW + SERVER_SETTLE_S,
+    )
+    assert call_verdict(call, None, robot, NOW + SERVER_SETTLE_S).permitted
+    robot.graph.apply(token, False)
+    robot.graph.apply(token, True, NOW + 9)  # another node of this name
+    assert call_verdict(call, None, robot, NOW + 9).code == "getting_ready"

@@ -68,10 +68,9 @@ def faults(load: Load, given: dict[str, Any]) -> dict[str, str]:
 def test_the_shipped_panel_is_good_and_a_demo() -> None:
     panel = load_panel(PACKAGE / "panel.toml")
     assert panel.mode == "demo"
-    assert [w.id for w in panel.pages[0].widgets] == [
+    assert [w.id for w in panel.widgets()] == [
         "message", "operation", "operation1", "operation2", "last_heard",
     ]  # fmt: skip
-    assert {w.kind for w in panel.pages[1].widgets} == {"parameter"}
     assert [i.id for i in panel.interlocks] == ["operation"]
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from app.displays import LONGEST_TEXT, readout, written
 from app.interlocks import way
-from app.keys import DEMO_VERSION, bridge_token
+from app.keys import DEMO_VERSION, bridge_token, server_token
 from app.robot import Robot, Sample
 from app.sentences import clock
 from app.views import View, lamps, sight
@@ -166,6 +166,16 @@ def test_a_node_is_one_that_the_panel_talks_with(
 ) -> None:
     endpoint(robot, role, topic, BOOL)
     assert (view_of(robot)["link"]["node"]["state"] == "ok") is seen
+
+
+@pytest.mark.parametrize(("service", "state"), [("reset", "ok"), ("other", "wait")])
+def test_a_node_that_only_serves_is_seen_too(service: str, state: str) -> None:
+    trigger = "std_srvs/srv/Trigger"
+    reset = {"id": "reset", "kind": "call", "label": "R", "service": "/reset", "type": trigger}
+    panel = panel_of(reset)
+    robot = robot_there(panel)
+    robot.graph.apply(server_token(BRIDGE, "SS", service, trigger), True)
+    assert sight(panel, robot, NOW).view["link"]["node"]["state"] == state
 
 
 def test_a_readout_waits_for_its_topic(robot: Robot) -> None:

@@ -28,7 +28,8 @@ def read_folders(folders: Sequence[Path]) -> Definitions:
         packages = list(_packages(folder))
         if not packages:
             why = "has no interfaces: they must be in <package>/msg/*.msg, srv/*.srv, action/*.action"
-            raise InterfaceError(f"{folder} {why}", folder)
+            hint = "".join(f"; {idl_hint(file)}" for file in list(idl_only([folder]).values())[:1])
+            raise InterfaceError(f"{folder} {why}{hint}", folder)
         for package in packages:
             for file in _files(package):
                 _add(found, _read(file, _name(package)))
@@ -49,11 +50,31 @@ def _age_and_size(file: Path) -> tuple[int, int]:
     return about.st_mtime_ns, about.st_size
 
 
-def _packages(folder: Path) -> Iterator[Path]:
+def idl_only(folders: Sequence[Path]) -> dict[str, Path]:
+    """Type → file of the interfaces that are there as `.idl` and not as the robot's own file."""
+    found = {}
+    for place in (place for folder in folders for place in _places(folder)):
+        for kind in KINDS:
+            for file in sorted((place / kind).glob("*.idl")):
+                if not file.with_suffix(f".{kind}").is_file():
+                    found[f"{_name(place)}/{kind}/{file.stem}"] = file
+    return found
+
+
+def idl_hint(file: Path) -> str:
+    """What is wrong with an interface that is there as `.idl` only, and what would be right."""
+    return f"{file} is not read, as no .idl is: put {file.stem}.{file.parent.name} beside it"
+
+
+def _places(folder: Path) -> Iterator[Path]:
     for place in _PLACES:
-        for package in [folder] if place == "." else sorted(folder.glob(place)):
-            if any((package / kind).is_dir() for kind in KINDS) and any(_files(package)):
-                yield package
+        yield from [folder] if place == "." else sorted(folder.glob(place))
+
+
+def _packages(folder: Path) -> Iterator[Path]:
+    for package in _places(folder):
+        if any((package / kind).is_dir() for kind in KINDS) and any(_files(package)):
+            yield package
 
 
 def _files(package: Path) -> Iterator[Path]:
@@ -87,8 +108,8 @@ def _add(found: Definitions, read: Definitions) -> None:
     found.wholes.update(read.wholes)
 
 
-def complete(found: Definitions, known: Definitions) -> Definitions:
-    """What can be used of `found`, with `known` beside it.
+def complete(found: Definitions, known: Definitions, unread: Mapping[str, Path]) -> Definitions:
+    """What can be used of `found`, with `known` beside it; `unread` as `idl_only` tells.
 
     Events, and so the hashes of services and actions, are left out where the distribution has none
     (humble). InterfaceError where a structure needs one that is in neither, or needs itself.
@@ -96,7 +117,7 @@ def complete(found: Definitions, known: Definitions) -> Definitions:
     found = _with_events_or_none(found, known)
     every = known.structures | found.structures
     for structure in found.structures.values():
-        _require_needed(structure, every)
+        _require_needed(structure, every, unread)
     done: set[str] = set()
     for structure in found.structures.values():
         _require_end(structure, every, done, ())
@@ -129,11 +150,14 @@ def _except(structures: Mapping[str, Structure], files: set[Path | None]) -> dic
     return {name: one for name, one in structures.items() if one.source not in files}
 
 
-def _require_needed(structure: Structure, every: Mapping[str, Structure]) -> None:
+def _require_needed(
+    structure: Structure, every: Mapping[str, Structure], unread: Mapping[str, Path]
+) -> None:
     for field, need in structure.needs():
         if need not in every:
             near = get_close_matches(need, every, n=1)
             hint = f"; did you mean {near[0]}?" if near else ": its package must be in a folder too"
+            hint = f": {idl_hint(unread[need])}" if need in unread else hint
             why = f'field "{field.name}" is of type {need}, which is not there{hint}'
             raise InterfaceError(f"{structure.source}: {why}", structure.source)
 

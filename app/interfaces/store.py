@@ -14,7 +14,14 @@ from app.interfaces.codec import Codec, widened
 from app.interfaces.composition import ActionTypes, action_types
 from app.interfaces.definitions import Definitions, Structure, Type, from_store
 from app.interfaces.hashes import type_hash
-from app.interfaces.packages import available, complete, read_folders, stamp
+from app.interfaces.packages import (
+    available,
+    complete,
+    idl_hint,
+    idl_only,
+    read_folders,
+    stamp,
+)
 from app.interfaces.paths import steps
 from app.interfaces.scalars import Check
 from app.interfaces.values import field_check, message_check
@@ -51,7 +58,8 @@ class Interfaces:
         define goes before the distribution's. InterfaceError names the file that can't be used."""
         known = _distribution(distro)
         self._distro = distro
-        self._definitions = known | complete(read_folders(folders), known)
+        self._unread = idl_only(folders)
+        self._definitions = known | complete(read_folders(folders), known, self._unread)
         self._structures = self._definitions.structures
         self._codec = Codec(self._structures)
         self._checks: dict[str, Check] = {}
@@ -154,6 +162,8 @@ class Interfaces:
 
     def _unknown(self, name: str, known: Any, what: str = "an interface") -> InterfaceError:
         near = get_close_matches(name, known, n=3)
+        if name in self._unread:
+            return InterfaceError(f'"{name}" is not there: {idl_hint(self._unread[name])}')
         hint = f"; did you mean {' or '.join(near)}?" if near else ""
         return InterfaceError(f'"{name}" is not {what} of ROS 2 {self._distro}{hint}')
 

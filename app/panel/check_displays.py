@@ -1,11 +1,13 @@
 """What can be wrong in a readout or an indicator: its field, its format, its states."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from difflib import get_close_matches
 from typing import Any, Final
 
 from app.errors import Fault, InterfaceError
 from app.interfaces import INTEGERS, Interfaces
+from app.panel.constants import holder, value_of_state
 from app.panel.displays import Indicator, Readout
 from app.panel.model import Confirm, Display, Interlock
 
@@ -42,7 +44,7 @@ def display_faults(place: str, of: Display, interfaces: Interfaces) -> Iterator[
         yield from _number(place, of, kind)
         yield from _constants(place, of, interfaces)
     else:
-        yield from _states(place, of, kind)
+        yield from _states(place, of, kind, interfaces)
 
 
 def _number(place: str, of: Readout, kind: str) -> Iterator[Fault]:
@@ -60,8 +62,7 @@ def _number(place: str, of: Readout, kind: str) -> Iterator[Fault]:
 def _constants(place: str, of: Readout, interfaces: Interfaces) -> Iterator[Fault]:
     if of.constants is None:
         return
-    around, _, _ = of.field.rpartition(".")
-    type_name = interfaces.field_type(of.type, around) if around else of.type
+    type_name = holder(of, interfaces)
     names = interfaces.constants(type_name)
     found = {name: value for name, value in names.items() if name.startswith(of.constants)}
     if not found:
@@ -75,16 +76,22 @@ def _constants(place: str, of: Readout, interfaces: Interfaces) -> Iterator[Faul
             return
 
 
-def _states(place: str, of: Indicator, kind: str) -> Iterator[Fault]:
+def _states(place: str, of: Indicator, kind: str, interfaces: Interfaces) -> Iterator[Fault]:
     if kind in ("float32", "float64"):
         what = "an indicator is for whole numbers, bools and texts"
         yield Fault(f"{place}.field", f'"{of.field}" is {kind}: {what}')
         return
     looks = [(state.shape, state.text) for state in of.states]
-    values = [(type(state.value), state.value) for state in of.states]
+    type_name = holder(of, interfaces)
+    constants = interfaces.constants(type_name)
+    given = [value_of_state(state.value, kind, constants) for state in of.states]
+    values = [(type(value), value) for value in given]
     for i, state in enumerate(of.states):
         at = f"{place}.states[{i}]"
-        if fault := misfit(state.value, kind):
+        if isinstance(given[i], str) and kind in INTEGERS:
+            yield Fault(f"{at}.value", _no_constant(given[i], kind, type_name, constants))
+            continue
+        if fault := misfit(given[i], kind):
             yield Fault(f"{at}.value", fault)
             continue
         if values[i] in values[:i]:
@@ -109,3 +116,12 @@ def misfit(value: Any, kind: str) -> str | None:
         inside = low <= value <= high
         return None if inside else f"{value} is out of range: {kind} goes from {low} to {high}"
     return None if isinstance(value, str) else f"must be text ({kind}), not {value!r}"
+
+
+def _no_constant(name: str, kind: str, type_name: str, constants: Mapping[str, Any]) -> str:
+    """What would be right where a whole number is meant, and a text is no constant's name."""
+    what = f'must be a whole number ({kind}) or the name of a constant of {type_name}, not "{name}"'
+    fitting = [one for one, value in constants.items() if misfit(value, kind) is None]
+    near = get_close_matches(name, fitting, n=1, cutoff=0.5)
+    has = f"it has {', '.join(fitting)}" if fitting else "it has none"
+    return f"{what}; did you mean {near[0]}? {has}" if near else f"{what}; {has}"

@@ -46,7 +46,8 @@ def _value(given: Any) -> Any:
 
 
 class LampState(Description):
-    """How a lamp shows one value. What is normal is grey, white or black; colour is for the rest."""
+    """How a lamp shows one value, which may be a constant's name. What is normal is grey, white or
+    black; colour is for the rest."""
 
     value: Annotated[bool | int | str, BeforeValidator(_value)]
     text: Label

@@ -14,6 +14,7 @@ from pydantic import BaseModel, ValidationError
 from app.errors import Fault, InterfaceError, PanelError
 from app.interfaces import interfaces_of
 from app.panel.check import faults_in
+from app.panel.constants import resolved
 from app.panel.description import ID
 from app.panel.model import KINDS, Panel
 
@@ -42,7 +43,7 @@ def load_panel(path: Path) -> Panel:
         faults += _faults_with_types(panel)
     if faults:
         raise PanelError(str(path), tuple(faults))
-    return panel
+    return resolved(panel, interfaces_of(panel.distro, panel.interfaces))
 
 
 def _faults_with_types(panel: Panel, faulty: Collection[str] = ()) -> Iterator[Fault]:

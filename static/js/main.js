@@ -90,6 +90,9 @@ function lockAll() {
     setText(tab.querySelector("b"), body.dataset.unknown);
   }
   for (const root of widgets.values()) {
+    if (root.querySelector(".cancel:enabled")) {
+      setText(root.querySelector('[data-text="goal"]'), body.dataset.unknown); // it was under way
+    }
     const buttons = root.querySelectorAll("button[type=submit]");
     for (const button of buttons) button.disabled = true;
     root.querySelector("dialog.ask")?.close();

@@ -1,6 +1,4 @@
 // A press: on release, once, with an id of its own; its receipt is shown where it was pressed.
-import { asked } from "./ask.js";
-
 const ANSWER_WITHIN_MS = 5000;
 // Two taps of a finger come within this time: the second one is the same press.
 const TAP_AGAIN_MS = 700;
@@ -56,12 +54,14 @@ export class Presser {
   #source;
   #underWay = new Set();
   #down = null; // the button that was open when the pointer went down on it
+  #asked = () => {}; // loaded with the page that asks; until then nothing is pressed
   #click = null; // when the last click was, in the server's time, and what was seen then
 
   constructor(widgets, source, sentences) {
     this.#widgets = widgets;
     this.#sentences = sentences;
     this.#source = source;
+    if (document.querySelector("dialog.ask")) import("./ask.js").then(({ asked }) => (this.#asked = asked));
     addEventListener("pointerdown", ({ target }) => (this.#down = target.closest?.("button:enabled")), true);
     for (const form of document.forms) {
       // A button that opened under a resting finger was not pressed.
@@ -77,7 +77,7 @@ export class Presser {
         if (event.submitter.classList.contains("cancel") || !root.querySelector("dialog.ask")) {
           this.#press(root, event.submitter, form, this.#click);
         } else {
-          asked(root, form, (yes) => this.#press(root, event.submitter, form, this.#moment(yes)));
+          this.#asked(root, form, (yes) => this.#press(root, event.submitter, form, this.#moment(yes)));
         }
       });
     }
@@ -122,21 +122,23 @@ export class Presser {
       const receipt = await answer.json();
       return receipt.outcome ? receipt : { outcome: "refused", reason: receipt.error };
     } catch {
-      return { outcome: "unknown", reason: this.#sentences.unsure, unheard: true };
+      return { outcome: "unknown", reason: this.#sentences.unsure };
     }
   }
 
-  #show(root, { outcome, reason, unheard = false }) {
+  #show(root, { id, outcome, reason }) {
     if (outcome === "succeeded") settle(root);
     for (const other of this.#widgets.values()) {
       const old = other.querySelector(".receipt");
-      if (old && other !== root) {
+      if (old) {
         old.textContent = "";
         delete old.dataset.outcome;
       }
     }
-    // What came of a call is shown to every browser, with the widget's other texts.
-    if (root.querySelector(".result") && outcome !== "refused" && !unheard) return;
+    // What came of a call is shown to every browser, with the widget's other texts, and corrected
+    // there. A cancel's receipt has no id; that it was asked for shows with the goal.
+    const shared = id ? outcome !== "refused" : outcome === "accepted";
+    if (root.querySelector(".result") && shared) return;
     const receipt = root.querySelector(".receipt");
     receipt.dataset.outcome = outcome;
     receipt.textContent = reason;

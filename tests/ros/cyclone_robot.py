@@ -52,7 +52,8 @@ class Commands:
         self._node.serve("/set_enabled", SetBool_Request, SetBool_Response, self._on_set_enabled)
         self._node.serve("/reset", Trigger_Request, Trigger_Response, self._on_reset)
         self._node.serve("/add_two_ints", AddTwoInts_Request, AddTwoInts_Response, self._on_add)
-        self._node.serve("/slow", Trigger_Request, Trigger_Response, self._on_slow)
+        for slow in ("/slow", "/slow_2", "/slow_3"):
+            self._node.serve(slow, Trigger_Request, Trigger_Response, self._on_slow)
         self._fibonacci = Fibonacci(self._node)
         self._parameters = Parameters(self._node)
         self._node.start()
@@ -69,7 +70,7 @@ class Commands:
         self._answer_of_set_enabled = (success, message)
 
     def answer_slow(self, seconds: float | None) -> None:
-        """After how many seconds /slow answers; None: never."""
+        """After how many seconds /slow, /slow_2 and /slow_3 answer; None: never."""
         self._slow_s = seconds
 
     def fibonacci(self, **settings: Any) -> None:

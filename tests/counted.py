@@ -1,0 +1,36 @@
+"""The kiosk's application with one path more, `/sizes`: how much it holds, for a test of memory.
+
+It waits for late answers for `LATE_S` only, so that a test sees the end of that.
+"""
+
+import asyncio
+import gc
+from collections.abc import Iterator, Sized
+from typing import Any
+
+from fastapi import Request
+
+from app import calls
+from app.main import app
+from app.routes.site import site_of
+
+LATE_S = 0.5
+setattr(calls, "LATE_S", LATE_S)  # noqa: B010 - it is Final in what is shipped
+
+
+@app.get("/sizes")
+async def sizes(request: Request) -> dict[str, int]:
+    """Objects, tasks, and the length of everything that the kiosk and its parts hold."""
+    kiosk = site_of(request).fleet.first
+    gc.collect()
+    held = {"objects": len(gc.get_objects()), "tasks": len(asyncio.all_tasks())}
+    parts = [one for one in vars(kiosk).values() if type(one).__module__.startswith("app.")]
+    for part in (kiosk, *parts, kiosk.robot.graph):
+        held |= {f"{type(part).__name__}.{name}": len(one) for name, one in sized(part)}
+    return held
+
+
+def sized(part: Any) -> Iterator[tuple[str, Sized]]:
+    for name, one in vars(part).items():
+        if isinstance(one, Sized) and not isinstance(one, str):
+            yield name, one
