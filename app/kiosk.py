@@ -9,7 +9,7 @@ import logging
 import math
 import time
 from collections.abc import Mapping
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from typing import Any, Final
 
 from app import keys
@@ -21,9 +21,10 @@ from app.interfaces import interfaces_of
 from app.interlocks import Verdict, way
 from app.joining import LOG_TYPE, Joining
 from app.link import Config, Link
+from app.logbook import Log, Logbook
 from app.logs import RosoutHandler
 from app.panel.model import Panel
-from app.presses import Presses, Receipt
+from app.presses import Presses
 from app.robot import Robot
 from app.views import Sight, sight
 
@@ -41,12 +42,19 @@ class Kiosk:
         panel: Panel,
         config: Config,
         revision: str,
+        operators_log: Log,
         *,
+        robot_name: str = "",
         simulated: bool = False,
         fault: str = "",
     ) -> None:
-        """`revision` is of all that a page loads; `fault` stands above it until there is none."""
+        """`revision` is of all that a page loads; `fault` stands above it until there is none.
+
+        `robot_name` is what the operator's log calls the robot, "" where there is one only.
+        """
         self.panel = panel
+        self._log = operators_log
+        self._following = ExitStack()
         self._simulated = simulated
         self.fault = fault
         self.interfaces = interfaces_of(panel.distro, panel.interfaces)
@@ -57,7 +65,14 @@ class Kiosk:
         self._calls = Calls(self.interfaces, self.robot, self.link, self._show)
         self._actions = Actions(self.interfaces, self.robot, self.link, self._show)
         self.presses = Presses(
-            panel, self.interfaces, self.robot, self.link, self._calls, self._actions
+            panel,
+            self.interfaces,
+            self.robot,
+            self.link,
+            self._calls,
+            self._actions,
+            Logbook(operators_log, robot_name, lambda: self.board.id),
+            catch_up=self._take,
         )
         self._feedback = {keys.feedback(self.robot.key(one)): one for one in panel.actions()}
         self._joining = Joining(panel, self.interfaces, self.robot, self.link, self._show, self.renew)
@@ -76,10 +91,12 @@ class Kiosk:
         self.link.start([*subscribe, *self._feedback], publish)
         logging.getLogger().addHandler(self._rosout)
         self._joining.start()
+        self._following.enter_context(self._log.followed(self._show))
 
     async def stop(self) -> None:
         """Ends the streams, takes the session down; leaves no task behind."""
         self._stopped = True
+        self._following.close()
         self.board.close()
         logging.getLogger().removeHandler(self._rosout)
         if self._timer is not None:
@@ -96,12 +113,9 @@ class Kiosk:
     @property
     def way(self) -> Verdict:
         """Whether commands can reach the robot now."""
+        if self._log.lock:
+            return Verdict(False, "log", self._log.lock)
         return way(self.robot, time.monotonic())
-
-    async def press(self, widget: str, inputs: Mapping[str, Any], press_id: str, who: str) -> Receipt:
-        """A press, judged by all that has come from the robot until now."""
-        self._take()
-        return await self.presses.press(widget, inputs, press_id, who)
 
     def renew(self) -> None:
         """A new Zenoh session: until it is joined, nobody is known to be there."""
@@ -191,7 +205,8 @@ class Kiosk:
             self.robot,
             time.monotonic(),
             simulated=self._simulated,
-            fault=self.fault,
+            fault="\n".join(filter(None, (self.fault, self._log.fault))),
+            lock=self._log.lock,
         )
 
     def _show(self) -> None:

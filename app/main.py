@@ -8,6 +8,7 @@ import sys
 import threading
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import AsyncExitStack, ExitStack, asynccontextmanager, contextmanager
+from functools import partial
 from types import FrameType
 
 from fastapi import FastAPI
@@ -21,11 +22,14 @@ from app.doors import Doors
 from app.errors import KioskError, PanelError
 from app.kiosk import Kiosk
 from app.link import config_from, config_to
+from app.log import Limits, OperatorLog, Unlogged
 from app.metrics import Metrics
 from app.panel import Panel, load_panel
 from app.routes import events, health, pages, presses
+from app.routes import log as log_routes
 from app.routes.site import Site, on_http_error, on_kiosk_error
 from app.settings import Settings, shipped
+from app.startup import InWords
 
 log = logging.getLogger("kiosk")
 
@@ -42,16 +46,17 @@ def create_app(settings: Settings | None = None) -> FastAPI:
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        async with AsyncExitStack() as opened:
-            kiosk, assets = await opened.enter_async_context(_running(settings, panel, fault))
-            site = Site(kiosk, assets, _templates(settings.dev), Metrics(), settings.dev)
+        async with _logging(settings, panel) as oplog, AsyncExitStack() as opened:
+            running = partial(_running, oplog)
+            kiosk, assets = await opened.enter_async_context(running(settings, panel, fault))
+            site = Site(kiosk, assets, _templates(settings.dev), Metrics(), settings.dev, oplog)
             site.metrics.follow(kiosk)
             app.state.site = site
             loop = asyncio.get_running_loop()
             with _on_end(lambda: loop.call_soon_threadsafe(lambda: site.kiosk.board.close())):
                 if settings.dev:
                     await opened.enter_async_context(
-                        development.reloading(site, settings, _running, opened.pop_all())
+                        development.reloading(site, settings, running, opened.pop_all())
                     )
                 yield
 
@@ -66,7 +71,8 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     )
     app.add_middleware(GZipMiddleware, minimum_size=500)
     app.add_middleware(Doors, hosts=settings.hosts)
-    for routes in (pages, events, presses, health):
+    app.add_middleware(InWords)
+    for routes in (pages, events, presses, health, log_routes):
         app.include_router(routes.router)
     return app
 
@@ -82,8 +88,27 @@ def _first_panel(settings: Settings) -> tuple[Panel, str]:
 
 
 @asynccontextmanager
+async def _logging(settings: Settings, panel: Panel) -> AsyncIterator[OperatorLog | Unlogged]:
+    """The operator's log, open; FolderInUse where another server has its folder."""
+    oplog: OperatorLog | Unlogged = Unlogged()
+    if panel.log.enabled:
+        mode = settings.mode or panel.mode
+        rules = panel.log
+        limits = Limits(days=rules.days, size_mb=rules.size_mb, required=rules.required)
+        oplog = OperatorLog(settings.data_folder(mode), limits, mode)
+    await oplog.start()
+    try:
+        yield oplog
+    finally:
+        await oplog.stop()
+
+
+@asynccontextmanager
 async def _running(
-    settings: Settings, panel: Panel, fault: str = ""
+    oplog: OperatorLog | Unlogged,
+    settings: Settings,
+    panel: Panel,
+    fault: str = "",
 ) -> AsyncIterator[tuple[Kiosk, Assets]]:
     """A kiosk on the robot that the panel is for: the real one, or a demo robot of its own."""
     demo = (settings.mode or panel.mode) == "demo"
@@ -97,7 +122,7 @@ async def _running(
             config = config_to(stack.enter_context(robot))
         else:
             config = config_from(settings.zenoh)
-        kiosk = Kiosk(panel, config, revision, simulated=demo, fault=fault)
+        kiosk = Kiosk(panel, config, revision, oplog, simulated=demo, fault=fault)
         try:
             await kiosk.start()
             log.info('panel "%s", %s robot', panel.title, "simulated" if demo else "live")

@@ -56,8 +56,17 @@ class Sight:
     until: float
 
 
-def sight(panel: Panel, robot: Robot, now: float, *, simulated: bool = False, fault: str = "") -> Sight:
-    """The view at `now` (monotonic seconds); `fault` is of a panel file that could not be loaded."""
+def sight(
+    panel: Panel,
+    robot: Robot,
+    now: float,
+    *,
+    simulated: bool = False,
+    fault: str = "",
+    lock: str = "",
+) -> Sight:
+    """The view at `now` (monotonic seconds); `fault` stands above it, for `lock` nothing can be
+    pressed, where they are not ""."""
     untils = [math.inf]
 
     def noted(verdict: Verdict) -> Verdict:
@@ -76,6 +85,8 @@ def sight(panel: Panel, robot: Robot, now: float, *, simulated: bool = False, fa
             case Publish() | Call() | Action():
                 interlock = panel.interlock(widget.interlock)
                 verdict = noted(press_verdict(widget, interlock, robot, now))
+                if lock:
+                    verdict = Verdict(False, "log", lock)
                 widgets[widget.id] = {**enabled(verdict)}
                 if not isinstance(widget, Publish):
                     widgets[widget.id] |= progress(robot.progress.get(widget.id, IDLE))

@@ -7,6 +7,7 @@ import signal
 import socket
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -236,14 +237,23 @@ class Server:
         *,
         python: str = sys.executable,
         options: Sequence[str] = (),
+        before: Sequence[str] = (),
         **environment: str,
     ) -> None:
+        """`before` is a command that starts it, such as `unshare`; without a KIOSK_DATA it has a
+        data folder of its own, which goes with it."""
+        self._own_data = tempfile.TemporaryDirectory(prefix="kiosk-data-")
+        self.data = Path(environment.setdefault("KIOSK_DATA", self._own_data.name))
         self.port = port or free_port()
         self.url = f"http://127.0.0.1:{self.port}"
         self.http = httpx.Client(base_url=self.url, timeout=10, trust_env=False)
-        command = [python, "-m", "uvicorn", "app.main:app", "--port", str(self.port), *options]
+        command = [*before, python, "-m", "uvicorn", "app.main:app", "--port", str(self.port), *options]
         self.process = Process(command, {**environment, "PYTHONPATH": ""}, cwd=folder)
-        until(self.answers, "the server answers", within_s=20)
+        try:
+            until(self.answers, "the server answers", within_s=20)
+        except BaseException:
+            self.end(signal.SIGKILL)
+            raise
 
     def answers(self) -> bool:
         assert self.process.running, self.process.text
@@ -274,7 +284,10 @@ class Server:
 
     def end(self, number: signal.Signals = signal.SIGTERM, timeout_s: float = 15) -> int:
         self.http.close()
-        return self.process.end(number, timeout_s)
+        try:
+            return self.process.end(number, timeout_s)
+        finally:
+            self._own_data.cleanup()
 
 
 class Stream:

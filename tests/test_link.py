@@ -26,9 +26,7 @@ def peer() -> Iterator[tuple[str, zenoh.Session]]:
 
 
 def tokens(zid: str, count: int) -> list[str]:
-    return [
-        keys.token(zid, "MP", f"topic{n}", "std_msgs/msg/String", Qos(), "") for n in range(count)
-    ]
+    return [keys.token(zid, "MP", f"topic{n}", "std_msgs/msg/String", Qos(), "") for n in range(count)]
 
 
 def test_a_session_is_renewed_in_the_middle_of_what_comes_in(

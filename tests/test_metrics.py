@@ -8,6 +8,7 @@ from prometheus_client.parser import text_string_to_metric_families
 from app.keys import bridge_token
 from app.kiosk import Kiosk
 from app.link import config_to
+from app.log import Unlogged
 from app.metrics import Metrics
 from app.robot import Sample
 from tests.builders import BRIDGE, small_panel
@@ -30,7 +31,7 @@ def of_kiosk(change: Callable[[Kiosk], None]) -> Samples:
     """What is read of a kiosk after a change."""
 
     async def followed() -> Samples:
-        kiosk = Kiosk(small_panel(), config_to(NOWHERE), "r1")
+        kiosk = Kiosk(small_panel(), config_to(NOWHERE), "r1", Unlogged())
         try:
             metrics = Metrics()
             metrics.follow(kiosk)
@@ -90,7 +91,7 @@ def test_counts_go_on_when_the_panel_is_loaded_anew() -> None:
     async def followed() -> Samples:
         metrics = Metrics()
         for _ in range(2):
-            kiosk = Kiosk(small_panel(), config_to(NOWHERE), "r1")
+            kiosk = Kiosk(small_panel(), config_to(NOWHERE), "r1", Unlogged())
             metrics.follow(kiosk)
             metrics.presses.labels("published").inc()
             await kiosk.stop()

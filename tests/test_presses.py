@@ -13,6 +13,8 @@ import pytest
 from app.actions import Actions
 from app.calls import Calls
 from app.errors import LinkError, NotFound
+from app.log import Origin, Unlogged
+from app.logbook import Logbook
 from app.panel.model import Panel
 from app.presses import RECEIPTS_KEPT, Presses, Receipt
 from app.robot import Robot, Sample
@@ -65,6 +67,7 @@ class Nobody:
 
 
 NOBODY = Nobody()
+FROM = Origin(address="127.0.0.1")
 
 
 class Bench:
@@ -79,7 +82,14 @@ class Bench:
         calls = Calls(INTERFACES, self.robot, NOBODY, lambda: None)
         actions = Actions(INTERFACES, self.robot, NOBODY, lambda: None)
         self._presses = Presses(
-            panel, INTERFACES, self.robot, self.way, calls, actions, lambda: self.now
+            panel,
+            INTERFACES,
+            self.robot,
+            self.way,
+            calls,
+            actions,
+            Logbook(Unlogged()),
+            lambda: self.now,
         )
         self.receipt = self._presses.receipt
         self.typed = self._presses.typed
@@ -88,7 +98,7 @@ class Bench:
         self, widget: str = "free", inputs: Mapping[str, Any] | None = None, press_id: str = "p1"
     ) -> Receipt:
         given = {"message": "hello"} if inputs is None else inputs
-        return asyncio.run(self._presses.press(widget, given, press_id, "127.0.0.1"))
+        return asyncio.run(self._presses.press(widget, given, press_id, FROM))
 
 
 @pytest.fixture

@@ -22,6 +22,7 @@ from app.panel.description import (
 )
 from app.panel.displays import Indicator, Readout
 from app.panel.inputs import NumberInput, SelectInput, SliderInput, TextInput, ToggleInput
+from app.panel.log import LogRules
 
 
 class Interlock(Description):
@@ -128,6 +129,7 @@ class Panel(Description):
     interfaces: Annotated[tuple[Folder, ...], Field(strict=False)] = ()
     namespace: Annotated[str, AfterValidator(namespace_of)] = ""
     mm_per_px: Annotated[float, Field(gt=0.02, lt=1)] = 0.22
+    log: LogRules = LogRules()
     interlocks: Annotated[tuple[Interlock, ...], Field(strict=False)] = Field((), alias="interlock")
     pages: Annotated[tuple[Page, ...], Field(strict=False)] = Field(alias="page")
     # Of the file, not in it: changes when what a browser has loaded is out of date.

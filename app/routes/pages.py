@@ -71,7 +71,7 @@ def _render(request: Request, site: Site, page: Page) -> Response:
         press_id=secrets.token_hex(8),
         receipt=receipt,
         inputs=dict(receipt.inputs) if receipt else {},
-        words={"cancel": say("cancel")},
+        words={"cancel": say("cancel"), "log": say("log_link")},
         lost=say("server_lost"),
         lost_short=say("lost"),
         unknown=say("unknown"),

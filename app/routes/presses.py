@@ -12,13 +12,22 @@ from fastapi.responses import JSONResponse, RedirectResponse, Response
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, JsonValue, ValidationError
 
 from app.errors import InputError
+from app.log import Origin
 from app.presses import Receipt
 from app.routes.site import CurrentSite, Site
 
 router = APIRouter()
 
+BROWSER_COOKIE: Final = "browser"
 PRESS_ID: Final = r"^[A-Za-z0-9_.:-]{1,64}$"
-STATUS: Final[Mapping[str, int]] = {"": 200, "interlock": 409, "input": 422, "link": 503, "time": 504}
+STATUS: Final[Mapping[str, int]] = {
+    "": 200,
+    "interlock": 409,
+    "input": 422,
+    "link": 503,
+    "log": 503,
+    "time": 504,
+}
 
 
 class Press(BaseModel):
@@ -50,7 +59,7 @@ class ReceiptAnswer(BaseModel):
         303: {"description": "a form post: back to the page, with the receipt on it"},
         409: {"model": ReceiptAnswer, "description": "refused by an interlock"},
         422: {"model": ReceiptAnswer, "description": "bad input"},
-        503: {"model": ReceiptAnswer, "description": "no way to the robot"},
+        503: {"model": ReceiptAnswer, "description": "no way to the robot, or none to the log"},
         504: {"model": ReceiptAnswer, "description": "no answer in time"},
     },
     openapi_extra={
@@ -62,17 +71,17 @@ class ReceiptAnswer(BaseModel):
 )
 async def press(widget: str, request: Request, site: CurrentSite) -> Response:
     site.kiosk.presses.widget(widget)
-    who = request.client.host if request.client else "unknown"
     body = await request.body()
     kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
     if kind == "application/json":
         given = _json(body)
         press_id = given.id or secrets.token_hex(8)
+        origin = origin_of(request, given.seen or "")
         if given.seen and given.seen.partition("-")[0] != site.kiosk.board.boot:
             code = "seen_before_restart"
-            receipt = site.kiosk.presses.refuse(widget, given.inputs, press_id, code)
+            receipt = await site.kiosk.presses.refuse(widget, given.inputs, press_id, origin, code)
         else:
-            receipt = await site.kiosk.press(widget, given.inputs, press_id, who)
+            receipt = await site.kiosk.presses.press(widget, given.inputs, press_id, origin)
         _count(site, receipt)
         return JSONResponse(receipt.as_json(), status_code=STATUS[receipt.cause])
     if kind == "application/x-www-form-urlencoded":
@@ -83,7 +92,7 @@ async def press(widget: str, request: Request, site: CurrentSite) -> Response:
             raise InputError(f'_id: "{page_id:.40}" is not the id of a press')
         press_id = f"{page_id}.{widget}"
         values = site.kiosk.presses.typed(inputs)
-        receipt = await site.kiosk.press(widget, values, press_id, who)
+        receipt = await site.kiosk.presses.press(widget, values, press_id, origin_of(request))
         _count(site, receipt)
         return RedirectResponse(_page_with(site, receipt), status_code=303)
     raise InputError(
@@ -98,12 +107,17 @@ async def press(widget: str, request: Request, site: CurrentSite) -> Response:
     responses={303: {"description": "a form post"}, 409: {"model": ReceiptAnswer}},
 )
 async def cancel(widget: str, request: Request, site: CurrentSite) -> Response:
-    who = request.client.host if request.client else "unknown"
-    receipt = await site.kiosk.presses.cancel(widget, who)
+    receipt = await site.kiosk.presses.cancel(widget, origin_of(request))
     _count(site, receipt)
     if request.headers.get("content-type", "").startswith("application/x-www-form-urlencoded"):
         return RedirectResponse(_page_with(site, receipt), status_code=303)
     return JSONResponse(receipt.as_json(), status_code=STATUS[receipt.cause])
+
+
+def origin_of(request: Request, seen: str = "") -> Origin:
+    """Where a press comes from; the browser's id is in a cookie, where it has one."""
+    address = request.client.host if request.client else "unknown"
+    return Origin(address=address, browser=request.cookies.get(BROWSER_COOKIE, ""), seen=seen)
 
 
 def _count(site: Site, receipt: Receipt) -> None:

@@ -11,6 +11,7 @@ from starlette.exceptions import HTTPException
 from app.assets import Assets
 from app.errors import KioskError
 from app.kiosk import Kiosk
+from app.log import OperatorLog, Unlogged
 from app.metrics import Metrics
 
 
@@ -23,6 +24,7 @@ class Site:
     templates: Environment
     metrics: Metrics
     dev: bool
+    log: OperatorLog | Unlogged
 
 
 def site_of(request: Request) -> Site:
