@@ -76,6 +76,7 @@ class LogContext(TypedDict):
     labels: dict[str, str]
     outcomes: tuple[str, ...]
     off: str
+    banner: str
     fault: str
     older: str
     newest: str
@@ -98,13 +99,14 @@ async def page(site: CurrentSite, wanted: Annotated[Wanted, Query()]) -> Respons
         labels={w.id: w.label for w in panel.widgets() if isinstance(w, Pressed)},
         outcomes=OUTCOMES,
         off="" if site.log.enabled else say("log_off"),
+        banner=site.kiosk.board.view["notice"]["banner"],
         fault=site.log.fault,
         older=wanted.query(rows[-1].entry.seq) if more else "",
         newest=wanted.query() if wanted.before else "",
         csv=wanted.query(),
     )
     html = site.templates.get_template("log.html").render(
-        **context, clock_of=_clock_of, values_of=_values_of
+        **context, clock_of=_clock_of, values_of=_values_of, word=_word
     )
     return HTMLResponse(html, headers={"cache-control": "no-store"})
 
@@ -160,6 +162,10 @@ def _time(ms: int) -> datetime:
 
 def _clock_of(ms: int) -> str:
     return _time(ms).strftime("%Y-%m-%d %H:%M:%S.%f")[:-3]
+
+
+def _word(name: str, **about: object) -> str:
+    return say(f"log_page_{name}", **about)
 
 
 def _values_of(text: str) -> list[tuple[str, str]]:
