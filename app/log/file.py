@@ -53,7 +53,9 @@ def in_words() -> Iterator[None]:
             raise LogCorrupt(f"the file is damaged: {error}") from error
         raise LogError(WORDS.get(short, str(error))) from error
     except OSError as error:
-        raise LogError((error.strerror or str(error)).lower()) from error
+        words = "not a folder" if isinstance(error, FileExistsError) else error.strerror or str(error)
+        where = f" ({error.filename})" if error.filename else ""
+        raise LogError(words[:1].lower() + words[1:] + where) from error
 
 
 def opened(folder: Path, first: int = 1) -> sqlite3.Connection:

@@ -207,8 +207,8 @@ class Keeper:
         try:
             sealed = self._store.append([ticket.entry for ticket in wanted])
         except LogError as error:
-            self._fail(wanted, error)
             self._broken(error)
+            self._fail(wanted, error)
             return
         self.head = self._store.head
         self._fresh_wal = False
