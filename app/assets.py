@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-LAYERS: Final = ("tokens", "base", "layout", "widgets")
+LAYERS: Final = ("tokens", "base", "layout", "widgets", "log")
 MEDIA_TYPES: Final = {".css": "text/css", ".js": "text/javascript"}
 
 

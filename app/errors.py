@@ -8,7 +8,10 @@
     ├── InputError             422  a request that is not what the contract says
     ├── NotFound               404  no such page or widget
     ├── DecodeError            –    bytes that are not a message of the type
-    └── LinkError              503  Zenoh refused; nothing was sent
+    ├── LinkError              503  Zenoh refused; nothing was sent
+    └── LogError               503  the operator's log can't be written or read
+        ├── LogCorrupt         –    its file is damaged: a new one has to be begun
+        └── FolderInUse        –    another process holds the data folder
 
 One handler (`routes.on_kiosk_error`) maps them to HTTP; "–" never reaches a client by itself.
 """
@@ -77,3 +80,17 @@ class DecodeError(KioskError):
 
 class LinkError(KioskError):
     status = 503
+
+
+class LogError(KioskError):
+    """The message is why, to stand in a sentence: "no space left on device"."""
+
+    status = 503
+
+
+class LogCorrupt(LogError):
+    pass
+
+
+class FolderInUse(LogError):
+    pass

@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping
 from app.errors import NotFound
 from app.kiosk import Kiosk
 from app.link import Config
+from app.logbook import Log
 from app.panel.model import Panel, RobotEntry
 from app.views import Lamp
 
@@ -27,6 +28,7 @@ class Fleet:
         panel: Panel,
         config_of: ConfigOf,
         revision: str,
+        operators_log: Log,
         *,
         simulated: bool = False,
         fault: str = "",
@@ -40,6 +42,7 @@ class Fleet:
                 panel,
                 config_of(entry),
                 revision,
+                operators_log,
                 entry=entry,
                 robots=self._lamps,
                 told=self._tell_others,

@@ -9,7 +9,7 @@ import logging
 import math
 import time
 from collections.abc import Callable, Mapping
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from typing import Any, Final
 
 from app import keys, moments
@@ -22,6 +22,8 @@ from app.interfaces import interfaces_of
 from app.interlocks import Verdict, way
 from app.joining import LOG_TYPE, Joining
 from app.link import Config, Link
+from app.log import Origin
+from app.logbook import Log, Logbook
 from app.logs import RobotLog, RosoutHandler
 from app.panel.model import Panel, RobotEntry
 from app.panel.parameter import EVENTS
@@ -46,6 +48,7 @@ class Kiosk:
         panel: Panel,
         config: Config,
         revision: str,
+        operators_log: Log,
         *,
         entry: RobotEntry | None = None,
         robots: Callable[[], Mapping[str, Lamp]] = dict,
@@ -61,6 +64,8 @@ class Kiosk:
         self.base = f"/robots/{entry.id}" if entry else ""
         self._robots = robots
         self._told = told
+        self._operators_log = operators_log
+        self._following = ExitStack()
         self._simulated = simulated
         self.fault = fault
         self.interfaces = interfaces_of(panel.distro, panel.interfaces)
@@ -86,6 +91,8 @@ class Kiosk:
             self._actions,
             self._confirmations,
             self._parameters,
+            Logbook(operators_log, self.robot.name, lambda: self.board.id),
+            catch_up=self._take,
         )
         goals = {self.robot.key(one): one for one in panel.actions()}
         self._feedback = {keys.feedback(key): one for key, one in goals.items()}
@@ -107,10 +114,12 @@ class Kiosk:
         self.link.start([*subscribe, *self._feedback, *self._status], publish)
         logging.getLogger().addHandler(self._rosout)
         self._joining.start()
+        self._following.enter_context(self._operators_log.followed(self.show))
 
     async def stop(self) -> None:
         """Ends the streams, takes the session down; leaves no task behind."""
         self._stopped = True
+        self._following.close()
         self.board.close()
         logging.getLogger().removeHandler(self._rosout)
         if self._timer is not None:
@@ -128,6 +137,8 @@ class Kiosk:
     @property
     def way(self) -> Verdict:
         """Whether commands can reach the robot now."""
+        if self._operators_log.lock:
+            return Verdict(False, "log", self._operators_log.lock)
         return way(self.robot, time.monotonic())
 
     async def press(
@@ -135,7 +146,7 @@ class Kiosk:
         widget: str,
         inputs: Mapping[str, Any],
         press_id: str,
-        who: str,
+        origin: Origin,
         version: int | None = None,
         at: float | None = None,
     ) -> Receipt:
@@ -144,12 +155,11 @@ class Kiosk:
         `version` is of the board that the operator saw, `at` when it was pressed, in the server's
         own time; None where that is not known.
         """
-        self._take()
 
         def doubt() -> str:
             return self._doubt(widget, version, at)
 
-        return await self.presses.press(widget, inputs, press_id, who, doubt)
+        return await self.presses.press(widget, inputs, press_id, origin, doubt)
 
     def _doubt(self, widget: str, version: int | None, at: float | None) -> str:
         """Why a press is no longer what was meant; "" if it is."""
@@ -258,7 +268,8 @@ class Kiosk:
             time.monotonic(),
             robots=self._robots(),
             simulated=self._simulated,
-            fault=self.fault,
+            fault="\n".join(filter(None, (self.fault, self._operators_log.fault))),
+            lock=self._operators_log.lock,
         )
 
     def show(self) -> None:

@@ -8,6 +8,7 @@ import sys
 import threading
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import AsyncExitStack, ExitStack, asynccontextmanager, contextmanager
+from functools import partial
 from types import FrameType
 
 from fastapi import Depends, FastAPI
@@ -21,12 +22,15 @@ from app.doors import Doors
 from app.errors import KioskError, PanelError
 from app.fleet import Fleet
 from app.link import Config, config_from, config_to
+from app.log import Limits, OperatorLog, Unlogged
 from app.metrics import Metrics
 from app.panel import Panel, load_panel
 from app.panel.model import RobotEntry
 from app.routes import events, health, pages, presses, static
+from app.routes import log as log_routes
 from app.routes.site import Site, named_robot, on_http_error, on_kiosk_error
 from app.settings import Settings, shipped
+from app.startup import InWords
 
 log = logging.getLogger("kiosk")
 
@@ -44,16 +48,17 @@ def create_app(settings: Settings | None = None) -> FastAPI:
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        async with AsyncExitStack() as opened:
-            fleet, assets = await opened.enter_async_context(_running(settings, panel, fault))
-            site = Site(fleet, assets, _templates(settings.dev), Metrics(), settings.dev)
+        async with _logging(settings, panel) as oplog, AsyncExitStack() as opened:
+            running = partial(_running, oplog)
+            fleet, assets = await opened.enter_async_context(running(settings, panel, fault))
+            site = Site(fleet, assets, _templates(settings.dev), Metrics(), settings.dev, oplog)
             site.metrics.follow(fleet)
             app.state.site = site
             loop = asyncio.get_running_loop()
             with _on_end(lambda: loop.call_soon_threadsafe(lambda: site.fleet.close_streams())):
                 if settings.dev:
                     await opened.enter_async_context(
-                        development.reloading(site, settings, _running, opened.pop_all())
+                        development.reloading(site, settings, running, opened.pop_all())
                     )
                 yield
 
@@ -68,10 +73,11 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     )
     app.add_middleware(GZipMiddleware, minimum_size=500)
     app.add_middleware(Doors, hosts=settings.hosts)
+    app.add_middleware(InWords)
     for routes in (pages, events, presses):
         app.include_router(routes.router)
         app.include_router(routes.router, prefix="/robots/{robot}", dependencies=[Depends(named_robot)])
-    for common in (static, health):
+    for common in (static, health, log_routes):
         app.include_router(common.router)
     return app
 
@@ -87,8 +93,27 @@ def _first_panel(settings: Settings) -> tuple[Panel, str]:
 
 
 @asynccontextmanager
+async def _logging(settings: Settings, panel: Panel) -> AsyncIterator[OperatorLog | Unlogged]:
+    """The operator's log, open; FolderInUse where another server has its folder."""
+    oplog: OperatorLog | Unlogged = Unlogged()
+    if panel.log.enabled:
+        mode = settings.mode or panel.mode
+        rules = panel.log
+        limits = Limits(days=rules.days, size_mb=rules.size_mb, required=rules.required)
+        oplog = OperatorLog(settings.data_folder(mode), limits, mode)
+    await oplog.start()
+    try:
+        yield oplog
+    finally:
+        await oplog.stop()
+
+
+@asynccontextmanager
 async def _running(
-    settings: Settings, panel: Panel, fault: str = ""
+    oplog: OperatorLog | Unlogged,
+    settings: Settings,
+    panel: Panel,
+    fault: str = "",
 ) -> AsyncIterator[tuple[Fleet, Assets]]:
     """The robots that the panel is for: the real ones, or demo robots of its own."""
     demo = (settings.mode or panel.mode) == "demo"
@@ -104,7 +129,7 @@ async def _running(
             namespace = entry.namespace if entry else panel.namespace
             return config_to(stack.enter_context(simulator.in_process(namespace, panel.distro)))
 
-        fleet = Fleet(panel, config_of, revision, simulated=demo, fault=fault)
+        fleet = Fleet(panel, config_of, revision, oplog, simulated=demo, fault=fault)
         try:
             await fleet.start()
             log.info('panel "%s", %s robot', panel.title, "simulated" if demo else "live")

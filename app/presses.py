@@ -1,7 +1,7 @@
-"""One press: permission, encoding, put, receipt. Knows no HTTP.
+"""One press: log, permission, encoding, put, log, receipt. Knows no HTTP.
 
-The permission is judged here, at the press, by what the server knows then; what the browser
-showed does not count.
+The permission is judged here, by what the server knows when the press stands in the operator's log;
+what the browser showed does not count. Between judging and sending nothing waits.
 """
 
 import asyncio
@@ -9,19 +9,23 @@ import logging
 import secrets
 import time
 from collections import OrderedDict
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Coroutine, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from functools import partial
 from typing import Any, Final, Literal, Protocol
 
 from app import declared
 from app.actions import Actions
 from app.calls import Calls
 from app.confirmations import Confirmations
-from app.errors import FieldError, InputError, LinkError, NotFound
+from app.errors import FieldError, InputError, LinkError, LogError, NotFound
 from app.inputs import checked, typed
 from app.interfaces import Interfaces
 from app.interlocks import press_verdict
+from app.log import Origin
+from app.logbook import Logbook, Noted
 from app.logs import RobotLog
 from app.panel.model import Action, Call, Input, Panel, Pressed, Publish
 from app.panel.parameter import Parameter
@@ -33,7 +37,7 @@ from app.sentences import clock, say
 
 log = logging.getLogger("kiosk.presses")
 
-Cause = Literal["", "interlock", "input", "link", "time"]
+Cause = Literal["", "interlock", "input", "link", "log", "time"]
 
 RECEIPTS_KEPT: Final = 1000
 LONGEST_LOGGED: Final = 300
@@ -111,8 +115,11 @@ class Presses:
         actions: Actions,
         confirmations: Confirmations,
         parameters: Parameters,
+        logbook: Logbook,
         monotonic: Callable[[], float] = time.monotonic,
+        catch_up: Callable[[], None] = lambda: None,
     ) -> None:
+        """`catch_up` takes in all that has come from the robot, right before a press is judged."""
         self._widgets = {w.id: w for w in panel.widgets()}
         self._panel = panel
         self._interfaces = interfaces
@@ -123,6 +130,8 @@ class Presses:
         self._actions = actions
         self._confirmations = confirmations
         self._parameters = parameters
+        self._logbook = logbook
+        self._catch_up = catch_up
         self._under_way: dict[str, _UnderWay] = {}
         self._monotonic = monotonic
         self._receipts: OrderedDict[str, Receipt] = OrderedDict()
@@ -153,63 +162,69 @@ class Presses:
         widget_id: str,
         inputs: Mapping[str, Any],
         press_id: str,
-        who: str,
+        origin: Origin,
         doubt: Callable[[], str] = no_doubt,
     ) -> Receipt:
         """Sends what the widget is for, or refuses. The same id again is the same press.
 
-        `who` is whom the log names; `doubt` says why what the operator saw no longer holds, in the
-        moment of sending. Until something is sent nothing here waits, so that no second
-        press comes between.
+        `doubt` says why what the operator saw no longer holds, in the moment of sending.
         """
         widget = self.widget(widget_id)
         known = self._under_way.get(press_id) or self._receipts.get(press_id)
         if known is None:
-            return await self._first(widget, inputs, press_id, who, doubt)
+            work = self._logged(widget, inputs, press_id, origin, doubt)
+            return await self._once(widget, inputs, press_id, work)
         if (known.widget, known.inputs) != (widget_id, inputs):
             reused = say("press_reused", id=press_id)
-            self._log.warning("press %s of %s by %s: %s", press_id, widget_id, who, reused)
             own_id = f"{press_id:.40}.{secrets.token_hex(4)}"
-            refusal = self._receipt(widget, inputs, own_id, "refused", reused, "input")
-            self._keep(refusal)
-            return refusal
+            work = self._refused(widget, inputs, own_id, origin, reused, "input")
+            return await self._once(widget, inputs, own_id, work)
         if isinstance(known, _UnderWay):
             return await asyncio.shield(known.receipt)
         return known
 
-    def refuse(self, widget_id: str, inputs: Mapping[str, Any], press_id: str, code: str) -> Receipt:
+    async def refuse(
+        self, widget_id: str, inputs: Mapping[str, Any], press_id: str, origin: Origin, code: str
+    ) -> Receipt:
         """A press that can't be judged by what its browser had seen, for the reason of this code."""
-        if known := self._receipts.get(press_id):
+        known = self._under_way.get(press_id) or self._receipts.get(press_id)
+        if isinstance(known, _UnderWay):
+            return await asyncio.shield(known.receipt)
+        if known is not None:
             return known
         text = say("refused", why=say(code), time=clock(time.time()))
-        receipt = self._receipt(self.widget(widget_id), inputs, press_id, "refused", text, "interlock")
-        self._keep(receipt)
-        self._log.warning("press %s of %s: %s", press_id, widget_id, text)
-        return receipt
+        widget = self.widget(widget_id)
+        work = self._refused(widget, inputs, press_id, origin, text, "interlock")
+        return await self._once(widget, inputs, press_id, work)
 
-    async def cancel(self, widget_id: str, who: str) -> Receipt:
+    async def cancel(self, widget_id: str, origin: Origin) -> Receipt:
         """Asks the robot to cancel the goal of an action widget."""
         widget = self.widget(widget_id)
         if not isinstance(widget, Action):
             raise NotFound(f'"{widget_id}" is not an action: there is nothing to cancel')
-        answer = await self._actions.cancel(widget)
-        self._log.info("cancel of %s by %s: %s: %s", widget_id, who, answer.outcome, answer.text)
+        noted = await self._logbook.canceled(widget_id, origin)
+        with _noted_to_the_end(noted):
+            answer = await self._actions.cancel(widget)
+        self._log.info(
+            "cancel of %s by %s: %s: %s", widget_id, origin.address, answer.outcome, answer.text
+        )
         cause: Cause = "interlock" if answer.outcome == "refused" else ""
-        return self._receipt(widget, {}, "", answer.outcome, answer.text, cause)
+        receipt = self._receipt(widget, {}, "", answer.outcome, answer.text, cause)
+        return await _closed(noted, receipt)
 
-    async def _first(
+    async def _once(
         self,
         widget: Pressed,
         inputs: Mapping[str, Any],
         press_id: str,
-        who: str,
-        doubt: Callable[[], str],
+        work: Coroutine[Any, Any, Receipt],
     ) -> Receipt:
+        """Does the work of a press, while others of the same id wait for its receipt."""
         loop = asyncio.get_running_loop()
         under_way = _UnderWay(widget.id, dict(inputs), loop.create_future())
         self._under_way[press_id] = under_way
         try:
-            receipt = await self._pressed(widget, inputs, press_id, doubt)
+            receipt = await work
         except BaseException as error:
             under_way.receipt.set_exception(error)
             under_way.receipt.exception()  # who else waited is told; nobody needs to have
@@ -218,28 +233,64 @@ class Presses:
             del self._under_way[press_id]
         self._keep(receipt)
         under_way.receipt.set_result(receipt)
+        return receipt
+
+    async def _logged(
+        self,
+        widget: Pressed,
+        inputs: Mapping[str, Any],
+        press_id: str,
+        origin: Origin,
+        doubt: Callable[[], str],
+    ) -> Receipt:
+        try:
+            noted = await self._logbook.pressed(widget.id, inputs, press_id, origin)
+        except LogError as error:
+            text = say("refused", why=str(error), time=clock(time.time()))
+            receipt = self._receipt(widget, inputs, press_id, "refused", text, "log")
+        else:
+            with _noted_to_the_end(noted):
+                receipt = await self._pressed(widget, inputs, press_id, noted, doubt)
+            receipt = await _closed(noted, receipt)
         level = logging.INFO if receipt.outcome in FINE else logging.WARNING
-        self._log.log(level, "press %s of %s by %s with %.*s: %s: %s", press_id, widget.id, who,
+        self._log.log(level, "press %s of %s by %s with %.*s: %s: %s", press_id, widget.id,
+                origin.address,
                 LONGEST_LOGGED, inputs, receipt.outcome, receipt.reason)  # fmt: skip
         return receipt
+
+    async def _refused(
+        self,
+        widget: Pressed,
+        inputs: Mapping[str, Any],
+        press_id: str,
+        origin: Origin,
+        text: str,
+        cause: Cause,
+    ) -> Receipt:
+        """A press that is not even judged."""
+        receipt = self._receipt(widget, inputs, press_id, "refused", text, cause)
+        log.warning("press %s of %s by %s: %s", press_id, widget.id, origin.address, text)
+        return _with_doubt(
+            receipt, await self._logbook.refused(widget.id, inputs, press_id, origin, text)
+        )
 
     def _keep(self, receipt: Receipt) -> None:
         self._receipts[receipt.id] = receipt
         while len(self._receipts) > RECEIPTS_KEPT:
             self._receipts.popitem(last=False)
 
-    def _correct(self, press_id: str, answer: Answer) -> None:
+    def _correct(self, noted: Noted, press_id: str, answer: Answer) -> None:
         """What is known of a press now is another thing than its receipt said."""
+        noted.corrected(answer)
         if old := self._receipts.get(press_id):
-            self._receipts[press_id] = replace(
-                old, outcome=answer.outcome, reason=answer.text, cause=""
-            )
+            self._receipts[press_id] = _corrected(old, answer)
 
     async def _pressed(
         self,
         widget: Pressed,
         inputs: Mapping[str, Any],
         press_id: str,
+        noted: Noted,
         doubt: Callable[[], str],
     ) -> Receipt:
         def receipt(answer: Answer, cause: Cause = "") -> Receipt:
@@ -249,8 +300,10 @@ class Presses:
             now = clock(time.time())
             return receipt(Answer("refused", say(sentence, why=why, time=now)), cause)
 
+        self._catch_up()
         interlock = self._panel.interlock(widget.interlock)
         verdict = press_verdict(widget, interlock, self._robot, self._monotonic())
+        noted.judged(verdict.code)
         if not verdict.permitted:
             cause: Cause = "link" if verdict.code in NO_WAY else "interlock"
             return refused("refused", verdict.reason or "", cause)
@@ -258,7 +311,7 @@ class Presses:
             return refused("refused", why, "interlock")
         try:
             values = self._checked(widget, inputs)
-            answer = await self._sent(widget, values, press_id)
+            answer = await self._sent(widget, values, press_id, noted)
         except (FieldError, InputError) as error:
             return refused("not_encoded", str(error), "input")
         except LinkError as error:
@@ -267,7 +320,10 @@ class Presses:
             return refused("not_encoded", answer.text, "interlock")
         return receipt(answer, "time" if answer.outcome == "timed_out" else "")
 
-    async def _sent(self, widget: Pressed, values: Mapping[str, Any], press_id: str) -> Answer:
+    async def _sent(
+        self, widget: Pressed, values: Mapping[str, Any], press_id: str, noted: Noted
+    ) -> Answer:
+        correct = partial(self._correct, noted)
         fields = filled(widget.template, values)
         match widget:
             case Publish():
@@ -277,16 +333,16 @@ class Presses:
                     return answer
                 equals = filled(widget.confirm.equals, values)
                 return await self._confirmations.awaited(
-                    widget, equals, press_id, since, answer.text, self._correct
+                    widget, equals, press_id, since, answer.text, correct
                 )
             case Call():
                 request, _ = self._interfaces.service(widget.type)
                 payload = self._interfaces.encode(request, fields)
-                return await self._calls.call(widget, payload, press_id, self._correct)
+                return await self._calls.call(widget, payload, press_id, correct)
             case Action():
-                return await self._actions.start(widget, fields, press_id, self._correct)
+                return await self._actions.start(widget, fields, press_id, correct)
             case Parameter():
-                return await self._parameters.set(widget, fields["value"], press_id, self._correct)
+                return await self._parameters.set(widget, fields["value"], press_id, correct)
 
     def _published(self, widget: Publish, fields: dict[str, Any]) -> Answer:
         payload = self._interfaces.encode(widget.type, fields)
@@ -324,3 +380,34 @@ class Presses:
     ) -> Receipt:
         at = datetime.now(UTC).isoformat(timespec="milliseconds")
         return Receipt(press_id, widget.id, outcome, reason, at, cause, dict(inputs))
+
+
+@contextmanager
+def _noted_to_the_end(noted: Noted) -> Iterator[None]:
+    """What breaks off in here is said to have, in the log."""
+    try:
+        yield
+    except asyncio.CancelledError:
+        noted.broke_off("log_ended")
+        raise
+    except BaseException:
+        noted.broke_off("log_broke_off")
+        raise
+
+
+async def _closed(noted: Noted, receipt: Receipt) -> Receipt:
+    """The receipt, when what it says is on the disk; where it is not, it says so."""
+    doubt = await noted.closed(receipt.outcome, receipt.reason)
+    if noted.corrected_to is not None:  # meanwhile
+        receipt = _corrected(receipt, noted.corrected_to)
+    return _with_doubt(receipt, doubt)
+
+
+def _corrected(receipt: Receipt, answer: Answer) -> Receipt:
+    return replace(receipt, outcome=answer.outcome, reason=answer.text, cause="")
+
+
+def _with_doubt(receipt: Receipt, doubt: str) -> Receipt:
+    if not doubt:
+        return receipt
+    return replace(receipt, reason=say("log_not_on_disk", said=receipt.reason, why=doubt))

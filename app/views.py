@@ -81,8 +81,10 @@ def sight(
     robots: Mapping[str, Lamp] = NO_OTHERS,
     simulated: bool = False,
     fault: str = "",
+    lock: str = "",
 ) -> Sight:
-    """The view at `now` (monotonic seconds); `fault` is of a panel file that could not be loaded."""
+    """The view at `now` (monotonic seconds); `fault` stands above it, for `lock` nothing can be
+    pressed, where they are not ""."""
     untils = [math.inf]
 
     def noted(verdict: Verdict) -> Verdict:
@@ -101,6 +103,8 @@ def sight(
             case Publish() | Call() | Action() | Parameter():
                 interlock = panel.interlock(widget.interlock)
                 verdict = noted(press_verdict(widget, interlock, robot, now))
+                if lock:
+                    verdict = Verdict(False, "log", lock)
                 widgets[widget.id] = {**enabled(verdict)}
                 if not isinstance(widget, Publish) or widget.confirm:
                     widgets[widget.id] |= progress(robot.progress.get(widget.id, IDLE))

@@ -1,12 +1,20 @@
 """Small real things that unit tests are made of: a panel, a robot that is there, what it says."""
 
-from collections.abc import Mapping
-from typing import Any, Final
+import asyncio
+from collections.abc import Callable, Mapping
+from typing import Any, Final, Protocol
 
 from app import keys
+from app.actions import Actions
+from app.calls import Asker, Calls
+from app.confirmations import Confirmations
 from app.interfaces import interfaces_of
 from app.keys import Qos, TopicRole
+from app.log import Origin, Unlogged
+from app.logbook import Logbook
 from app.panel.model import Panel
+from app.parameters import Parameters
+from app.presses import Presses
 from app.robot import Robot, Sample
 
 Table = Mapping[str, Any]
@@ -18,6 +26,7 @@ BRIDGE: Final = "b1"
 KIOSK: Final = "c1"
 ENABLED: Final = "/operation_enabled"
 NOW: Final = 1000.0  # monotonic seconds
+FROM: Final = Origin(address="127.0.0.1")
 NOTHING: Final[Table] = {}
 
 INTERLOCK: Final[Table] = {"id": "operation", "topic": ENABLED}
@@ -94,3 +103,44 @@ def says(
 def permits(robot: Robot, permitted: bool = True, *, at: float = NOW) -> None:
     """The robot says whether operation is permitted."""
     says(robot, ENABLED, permitted, BOOL, at=at)
+
+
+class Nobody:
+    """A link on which no service is ever asked."""
+
+    def query(self, key: str, payload: bytes, timeout_s: float) -> "asyncio.Future[bytes | None]":
+        raise AssertionError(f"{key} was asked")
+
+
+class Asked(Protocol):
+    """The link as a test has it: what is put and what is asked."""
+
+    def put(self, key: str, payload: bytes) -> None: ...
+    def heard(self, key: str) -> bool: ...
+
+
+def presses_of(
+    panel: Panel,
+    robot: Robot,
+    way: Asked,
+    *,
+    asker: Asker | None = None,
+    confirmations: Confirmations | None = None,
+    logbook: Logbook | None = None,
+    monotonic: Callable[[], float] = lambda: NOW,
+) -> Presses:
+    """The presses of a robot, with all that they need and a test does not care for."""
+    asker = asker or Nobody()
+    calls = Calls(INTERFACES, robot, asker, lambda: None)
+    return Presses(
+        panel,
+        INTERFACES,
+        robot,
+        way,
+        calls,
+        Actions(INTERFACES, robot, asker, lambda: None),
+        confirmations or Confirmations(robot, lambda: None),
+        Parameters(panel, INTERFACES, robot, asker, calls, lambda: None),
+        logbook or Logbook(Unlogged()),
+        monotonic,
+    )

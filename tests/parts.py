@@ -7,6 +7,7 @@ import signal
 import socket
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -238,15 +239,24 @@ class Server:
         python: str = sys.executable,
         options: Sequence[str] = (),
         app: str = "app.main:app",
+        before: Sequence[str] = (),
         **environment: str,
     ) -> None:
+        """`before` is a command that starts it, such as `unshare`; without a KIOSK_DATA it has a
+        data folder of its own, which goes with it."""
+        self._own_data = tempfile.TemporaryDirectory(prefix="kiosk-data-")
+        self.data = Path(environment.setdefault("KIOSK_DATA", self._own_data.name))
         self.base = ""
         self.port = port or free_port()
         self.url = f"http://127.0.0.1:{self.port}"
         self.http = httpx.Client(base_url=self.url, timeout=10, trust_env=False)
-        command = [python, "-m", "uvicorn", app, "--port", str(self.port), *options]
+        command = [*before, python, "-m", "uvicorn", app, "--port", str(self.port), *options]
         self.process = Process(command, {**environment, "PYTHONPATH": ""}, cwd=folder)
-        until(self.answers, "the server answers", within_s=20)
+        try:
+            until(self.answers, "the server answers", within_s=20)
+        except BaseException:
+            self.end(signal.SIGKILL)
+            raise
 
     def robot(self, name: str) -> "Server":
         """The same server, asked for one of its robots."""
@@ -285,7 +295,10 @@ class Server:
 
     def end(self, number: signal.Signals = signal.SIGTERM, timeout_s: float = 15) -> int:
         self.http.close()
-        return self.process.end(number, timeout_s)
+        try:
+            return self.process.end(number, timeout_s)
+        finally:
+            self._own_data.cleanup()
 
 
 class Stream:

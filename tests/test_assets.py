@@ -41,6 +41,7 @@ def test_the_stylesheet_is_its_layers_in_order_with_the_millimetre(
         "/* base */",
         "/* layout */",
         "/* widgets */",
+        "/* log */",
         ":root{--mm:4.0000px}",
     ]
 

@@ -10,19 +10,16 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from app import confirmations
-from app.actions import Actions
-from app.calls import Calls
 from app.confirmations import Confirmations, equal
 from app.errors import PanelError
 from app.panel import load_panel
 from app.panel.model import Panel
-from app.parameters import Parameters
-from app.presses import Presses, Receipt
+from app.presses import Receipt
 from app.robot import Robot
-from tests.builders import BOOL, FREE, HEARD, INTERFACES, MESSAGE, robot_there, says
+from tests.builders import BOOL, FREE, FROM, HEARD, MESSAGE, presses_of, robot_there, says
 from tests.builders import panel_of as panel_with
 from tests.parts import ROOT, Server, until
-from tests.test_presses import NOBODY, Way
+from tests.test_presses import Way
 
 CONFIRM = {"topic": "/heard", "field": "data", "equals": "{message}", "within_s": 0.2}
 
@@ -39,24 +36,17 @@ class Desk:
         self.way = Way()
         self.robot: Robot = robot_there(panel)
         self.confirmations = Confirmations(self.robot, lambda: None)
-        calls = Calls(INTERFACES, self.robot, NOBODY, lambda: None)
-        actions = Actions(INTERFACES, self.robot, NOBODY, lambda: None)
-        parameters = Parameters(panel, INTERFACES, self.robot, NOBODY, calls, lambda: None)
-        self.presses = Presses(
+        self.presses = presses_of(
             panel,
-            INTERFACES,
             self.robot,
             self.way,
-            calls,
-            actions,
-            self.confirmations,
-            parameters,
-            lambda: self.now,
+            confirmations=self.confirmations,
+            monotonic=lambda: self.now,
         )
         self._seq = itertools.count(1)
 
     async def press(self, text: str = "on", press_id: str = "p1") -> Receipt:
-        return await self.presses.press("free", {"message": text}, press_id, "127.0.0.1")
+        return await self.presses.press("free", {"message": text}, press_id, FROM)
 
     def says(self, text: str, at: float) -> None:
         says(self.robot, "/heard", text, at=at, seq=next(self._seq))

@@ -9,6 +9,7 @@ from app.fleet import Fleet
 from app.keys import bridge_token
 from app.kiosk import Kiosk
 from app.link import config_to
+from app.log import Unlogged
 from app.metrics import Metrics
 from app.robot import Sample
 from tests.builders import BRIDGE, small_panel
@@ -28,7 +29,7 @@ def read(metrics: Metrics) -> Samples:
 
 
 def nowhere() -> Fleet:
-    return Fleet(small_panel(), lambda _: config_to(NOWHERE), "r1")
+    return Fleet(small_panel(), lambda _: config_to(NOWHERE), "r1", Unlogged())
 
 
 def of_kiosk(change: Callable[[Kiosk], None]) -> Samples:
@@ -72,7 +73,7 @@ def test_samples_that_were_not_their_type_are_counted_by_key() -> None:
             kiosk.robot.take("heard", Sample(b"broken", seq, 0.0, 0.0, BRIDGE))
             kiosk.robot.reading("/heard")
 
-    assert of_kiosk(hear)["kiosk_undecodable_total", ("", "heard")] == 2
+    assert of_kiosk(hear)["kiosk_undecodable_total", ("heard", "")] == 2
 
 
 def test_presses_are_counted_by_outcome() -> None:

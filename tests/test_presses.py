@@ -10,19 +10,16 @@ from typing import Any
 
 import pytest
 
-from app.actions import Actions
-from app.calls import Calls
-from app.confirmations import Confirmations
 from app.errors import LinkError, NotFound
 from app.panel.model import Panel
-from app.parameters import Parameters
-from app.presses import RECEIPTS_KEPT, Presses, Receipt
+from app.presses import RECEIPTS_KEPT, Receipt
 from app.robot import Robot, Sample
 from tests.builders import (
     BOOL,
     BRIDGE,
     ENABLED,
     FREE,
+    FROM,
     GUARDED,
     HEARD,
     INTERFACES,
@@ -33,6 +30,7 @@ from tests.builders import (
     endpoint,
     panel_of,
     permits,
+    presses_of,
     robot_there,
     small_panel,
 )
@@ -59,16 +57,6 @@ class Way:
         return [INTERFACES.decode(TEXT, payload).data for _, payload in self.sent]
 
 
-class Nobody:
-    """A link on which no service is ever asked."""
-
-    def query(self, key: str, payload: bytes, timeout_s: float) -> "asyncio.Future[bytes | None]":
-        raise AssertionError(f"{key} was asked")
-
-
-NOBODY = Nobody()
-
-
 class Bench:
     """Presses on a robot that is there and permits, at a time that is set."""
 
@@ -78,21 +66,7 @@ class Bench:
         self.way = Way()
         self.robot = robot_there(panel)
         permits(self.robot)
-        calls = Calls(INTERFACES, self.robot, NOBODY, lambda: None)
-        actions = Actions(INTERFACES, self.robot, NOBODY, lambda: None)
-        confirmations = Confirmations(self.robot, lambda: None)
-        parameters = Parameters(panel, INTERFACES, self.robot, NOBODY, calls, lambda: None)
-        self._presses = Presses(
-            panel,
-            INTERFACES,
-            self.robot,
-            self.way,
-            calls,
-            actions,
-            confirmations,
-            parameters,
-            lambda: self.now,
-        )
+        self._presses = presses_of(panel, self.robot, self.way, monotonic=lambda: self.now)
         self.receipt = self._presses.receipt
         self.typed = self._presses.typed
 
@@ -100,7 +74,7 @@ class Bench:
         self, widget: str = "free", inputs: Mapping[str, Any] | None = None, press_id: str = "p1"
     ) -> Receipt:
         given = {"message": "hello"} if inputs is None else inputs
-        return asyncio.run(self._presses.press(widget, given, press_id, "127.0.0.1"))
+        return asyncio.run(self._presses.press(widget, given, press_id, FROM))
 
 
 @pytest.fixture

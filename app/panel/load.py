@@ -81,6 +81,8 @@ def _faults_of_the_rest(
             case ("page", int(p), str(key)):
                 mended["page"][p].pop(key, None)
                 mended["page"][p] = {"id": f"faulty_{p}", "title": "?"} | mended["page"][p]
+            case ("log", *_):
+                mended.pop("log", None)
             case (str(key),):
                 mended.pop(key, None)
                 mended.setdefault("title", "?")

@@ -22,6 +22,7 @@ from app.panel.description import (
 )
 from app.panel.displays import Indicator, Readout
 from app.panel.inputs import NumberInput, SelectInput, SliderInput, TextInput, ToggleInput
+from app.panel.log import LogRules
 from app.panel.parameter import EVENT_TYPE, EVENTS, Parameter
 
 
@@ -165,6 +166,7 @@ class Panel(Description):
     press_expires_s: Annotated[float, Field(ge=0.5, le=60)] = 2.0
     mm_per_px: Annotated[float, Field(gt=0.02, lt=1)] = 0.22
     robots: Annotated[tuple[RobotEntry, ...], Field(strict=False)] = Field((), alias="robot")
+    log: LogRules = LogRules()
     interlocks: Annotated[tuple[Interlock, ...], Field(strict=False)] = Field((), alias="interlock")
     pages: Annotated[tuple[Page, ...], Field(strict=False)] = Field(alias="page")
     # Of the file, not in it: changes when what a browser has loaded is out of date.

@@ -108,6 +108,7 @@ def _render(request: Request, site: Site, page: Page) -> Response:
             "robots": say("robots"),
             "set": say("set"),
             "back": say("back"),
+            "log": say("log_link"),
             "base": kiosk.base,
             "asks": asks_of(site.fleet.panel, page),
         },

@@ -12,6 +12,7 @@ from app.assets import Assets
 from app.errors import KioskError
 from app.fleet import Fleet
 from app.kiosk import Kiosk
+from app.log import OperatorLog, Unlogged
 from app.metrics import Metrics
 
 
@@ -24,6 +25,7 @@ class Site:
     templates: Environment
     metrics: Metrics
     dev: bool
+    log: OperatorLog | Unlogged
 
 
 def site_of(request: Request) -> Site:

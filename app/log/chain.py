@@ -1,0 +1,102 @@
+"""Whether the operator's log is as it was written: each entry's hash, and how they follow.
+
+What this can't see is the removal of the newest entries, and a log that somebody wrote anew as a
+whole: for that the head is compared with one that was noted elsewhere.
+"""
+
+import json
+import sqlite3
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from app.errors import LogError
+from app.log.entry import FIELDS, Entry
+from app.log.file import in_words, read_only
+from app.log.store import COLUMNS
+
+
+@dataclass(frozen=True, slots=True)
+class Verified:
+    """`fault` says which entry is the first that is not as it was written; "" when all are."""
+
+    count: int
+    head: str
+    fault: str = ""
+
+
+def verify(folder: Path) -> Verified:
+    """Checks the whole log, as it is at this moment; LogError where it can't be read."""
+    db = read_only(folder)
+    try:
+        with in_words():
+            db.execute("BEGIN")
+            (genesis,) = db.execute("SELECT value FROM about WHERE key = 'genesis'").fetchone() or ("",)
+            return _Chain(genesis).follow(_entries(db))
+    finally:
+        db.close()
+
+
+def _entries(db: sqlite3.Connection) -> Iterator[Entry]:
+    for row in db.execute(f"SELECT {COLUMNS} FROM entry ORDER BY seq"):
+        try:
+            yield Entry(**dict(zip(FIELDS, row, strict=True)))
+        except (TypeError, ValueError) as error:
+            raise LogError(f"the file has what is no entry: {error}") from error
+
+
+class _Chain:
+    """Follows the entries from the oldest; keeps no more of them than the last two hashes."""
+
+    def __init__(self, genesis: str) -> None:
+        self._genesis = genesis
+        self._first: Entry | None = None
+        self._anchored = False
+        self._last = ("", genesis)  # the hashes of the one before the last, and of the last
+        self._seq = 0
+        self._count = 0
+
+    def follow(self, entries: Iterator[Entry]) -> Verified:
+        for entry in entries:
+            if fault := self._fault(entry):
+                return self._verified(fault)
+            self._first = self._first or entry
+            self._anchored = self._anchored or self._is_anchor(entry)
+            self._last, self._seq = (entry.prev, entry.hash), entry.seq
+            self._count += 1
+        if self._first and self._first.prev != self._genesis and not self._anchored:
+            return self._verified(
+                f"what stood before entry {self._first.seq} was removed, by none of the log's own rules"
+            )
+        return self._verified("")
+
+    def _verified(self, fault: str) -> Verified:
+        return Verified(self._count, self._last[1], fault)
+
+    def _fault(self, entry: Entry) -> str:
+        before, last = self._last
+        if self._first is None:
+            before, last = "", entry.prev
+        elif entry.prev == before:
+            return f"entry {self._seq} was inserted"
+        elif entry.seq != self._seq + 1:
+            gone = (self._seq + 1, entry.seq - 1)
+            names = (
+                f"entry {gone[0]} is" if gone[0] == gone[1] else f"entries {gone[0]} to {gone[1]} are"
+            )
+            return f"{names} missing"
+        if entry.hash != entry.computed_hash():
+            return f"entry {entry.seq} was changed, or is not in its place"
+        if entry.prev != last:
+            return f"entry {entry.seq} does not follow the one before it"
+        return ""
+
+    def _is_anchor(self, entry: Entry) -> bool:
+        """Whether it says that what stood before the first entry was removed by the log's rules."""
+        if entry.kind != "removed" or self._first is None:
+            return False
+        try:
+            about = json.loads(entry.values)
+        except ValueError:
+            return False
+        return (about.get("last"), about.get("hash")) == (self._first.seq - 1, self._first.prev)

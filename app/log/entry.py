@@ -1,0 +1,122 @@
+"""One entry of the operator's log, and the hash that ties it to the one before.
+
+An entry's hash is SHA-256 over a JSON array of all its fields but the hash itself, in their order,
+in UTF-8, without spaces, with nothing escaped that need not be. `prev`, the last of these fields,
+is the hash of the entry before; the first entry's is the log's genesis, 32 random bytes.
+"""
+
+import hashlib
+import json
+import time
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields, replace
+from typing import Any, Final, Literal, Self
+
+Kind = Literal["began", "pressed", "closed", "corrected", "refused", "removed", "resumed"]
+
+LONGEST_VALUES: Final = 2000
+LONGEST_TEXT: Final = 500
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Origin:
+    """Where a press comes from: the browser's address and id, who is logged in, and the version of
+    the page that was seen; "" where it is not known."""
+
+    address: str
+    browser: str = ""
+    who: str = ""
+    seen: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Entry:
+    """`at` is milliseconds since 1970 (UTC); `monotonic` microseconds on a clock that nobody sets,
+    which counts within one `boot` of the server; `of` the number of the press that it tells of.
+
+    `values` is JSON, `verdict` the code of what permitted or locked, `board` the version of the
+    view at that moment. `seq`, `boot`, `prev` and `hash` are there once it is written.
+    """
+
+    seq: int = 0
+    at: int
+    boot: str = ""
+    monotonic: int
+    kind: Kind
+    of: int | None = None
+    address: str = ""
+    browser: str = ""
+    who: str = ""
+    robot: str = ""
+    press: str = ""
+    widget: str = ""
+    action: str = ""
+    values: str = "{}"
+    seen: str = ""
+    verdict: str = ""
+    board: str = ""
+    outcome: str = ""
+    reason: str = ""
+    prev: str = ""
+    hash: str = ""
+
+    def sealed(self, seq: int, boot: str, prev: str) -> Self:
+        """As it stands in the log, after the entry whose hash is `prev`."""
+        placed = replace(self, seq=seq, boot=boot, prev=prev)
+        return replace(placed, hash=placed.computed_hash())
+
+    def computed_hash(self) -> str:
+        """What its hash must be."""
+        values = [getattr(self, name) for name in FIELDS[:-1]]
+        text = json.dumps(values, ensure_ascii=False, separators=(",", ":"))
+        return hashlib.sha256(text.encode()).hexdigest()
+
+    def followed(self, kind: Kind, outcome: str, reason: str, **more: str) -> Self:
+        """The entry that tells, now, what came of this press."""
+        at, monotonic = _now()
+        return replace(
+            self,
+            seq=0,
+            at=at,
+            monotonic=monotonic,
+            kind=kind,
+            of=self.seq,
+            outcome=outcome,
+            reason=plain(reason),
+            **{name: plain(text) for name, text in more.items()},
+        )
+
+
+FIELDS: Final = tuple(field.name for field in fields(Entry))
+
+
+def entered(
+    kind: Kind, origin: Origin | None = None, values: Mapping[str, Any] | None = None, **texts: str
+) -> Entry:
+    """An entry as of now, with texts that any file and any page can take."""
+    at, monotonic = _now()
+    from_whom = asdict(origin) if origin is not None else {}
+    cleaned: dict[str, Any] = {name: plain(text) for name, text in (from_whom | texts).items()}
+    return Entry(at=at, monotonic=monotonic, kind=kind, values=as_json(values or {}), **cleaned)
+
+
+def plain(text: str, longest: int = LONGEST_TEXT) -> str:
+    """A text that is Unicode, without NUL, and not too long; what was cut ends in "…"."""
+    cut = text if len(text) <= longest else text[: longest - 1] + "…"
+    return cut.replace("\0", "\\0").encode("utf-8", "backslashreplace").decode()
+
+
+def as_json(values: Mapping[str, Any]) -> str:
+    """The values of a press; too long ones as `{"…": "<their first 2000 characters>", …}`."""
+    try:
+        text = json.dumps(values, ensure_ascii=False, allow_nan=False)
+    except (TypeError, ValueError):
+        text = json.dumps({"…": repr(values)}, ensure_ascii=False)
+    if len(text) > LONGEST_VALUES:
+        cut = {"…": text[:LONGEST_VALUES], "… of": len(text)}
+        text = json.dumps(cut, ensure_ascii=False)
+    return plain(text, len(text))
+
+
+def _now() -> tuple[int, int]:
+    return time.time_ns() // 1_000_000, time.monotonic_ns() // 1000

@@ -1,0 +1,342 @@
+"""The threads behind the operator's log: one owns the file, one takes it to the disk."""
+
+import asyncio
+import logging
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from app.errors import LogCorrupt, LogError
+from app.log.entry import Entry, entered
+from app.log.file import in_words, set_aside
+from app.log.folder import Folder
+from app.log.store import Head, Store
+from app.sentences import say
+
+log = logging.getLogger("kiosk.log")
+
+TRIED_AGAIN_S: Final = (0.5, 1.0, 2.0, 4.0, 8.0)  # the last one again and again
+HOUR_S: Final = 3600.0
+QUIET_S: Final = 1.0  # after so long without a press there is time for the file
+WAL_BYTES: Final = 16_000_000  # then it can wait no longer
+CHECKPOINT_S: Final = 5.0  # between two that can't wait: a reader may hold them up
+TIDY_AFTER: Final = 1000  # entries
+MOST_OWED: Final = 1000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limits:
+    """How long entries are kept, how large the file may be, and whether presses need it."""
+
+    days: float = 365.0
+    size_mb: float = 512.0
+    required: bool = True
+
+
+@dataclass(slots=True, eq=False)
+class Ticket:
+    """An entry to be written; `done` gets it as it stands in the file, or why it could not be.
+
+    That of a press is done when it is committed, any other when it is on the disk.
+    """
+
+    entry: Entry
+    done: "asyncio.Future[Entry | LogError]"
+    abandoned: bool = False
+
+    @property
+    def durable(self) -> bool:
+        return self.entry.kind != "pressed"
+
+
+Results = list[tuple[Ticket, Entry | LogError]]
+
+
+class Syncer:
+    """Takes what was committed to the disk, all that came together at once."""
+
+    def __init__(self, done: Callable[[Results], None], failed: Callable[[Results], None]) -> None:
+        self._done = done
+        self._failed = failed
+        self._waiting: Results = []
+        self._store: Store | None = None
+        self._ended = False
+        self._wake = threading.Condition()
+        self._syncing = threading.Lock()
+        self._thread = threading.Thread(target=self._run, name="operators-log-sync", daemon=True)
+
+    def start(self) -> None:
+        self._thread.start()
+
+    def use(self, store: Store | None) -> None:
+        """Waits for a sync that is under way: a file must stay open while it is synced."""
+        with self._syncing:
+            self._store = store
+
+    def add(self, written: Results) -> None:
+        with self._wake:
+            self._waiting += written
+            self._wake.notify()
+
+    def end(self, timeout_s: float) -> None:
+        """Does what is waiting, and ends."""
+        with self._wake:
+            self._ended = True
+            self._wake.notify()
+        self._thread.join(timeout_s)
+
+    def _run(self) -> None:
+        while True:
+            with self._wake:
+                self._wake.wait_for(lambda: self._waiting or self._ended)
+                batch, self._waiting = self._waiting, []
+            if not batch:
+                return
+            try:
+                with self._syncing:
+                    if self._store is None:
+                        raise LogError(say("log_closed"))
+                    self._store.sync()
+            except LogError as error:
+                self._failed([(ticket, error) for ticket, _ in batch])
+            else:
+                self._done(batch)
+
+
+class Keeper:
+    """Owns the file: writes what is handed to it, keeps the file small, and opens it again."""
+
+    def __init__(
+        self,
+        folder: Folder,
+        limits: Limits,
+        boot: str,
+        mode: str,
+        tell: Callable[[Results, bool], None],
+    ) -> None:
+        """`tell` gets, on a thread of these, what is done; and whether `fault` has changed."""
+        self._folder = folder
+        self._limits = limits
+        self._boot = boot
+        self._mode = mode
+        self._tell = tell
+        self.fault = ""
+        self.head: Head | None = None
+        self.tried = threading.Event()
+        self._queue: deque[Ticket] = deque()
+        self._owed: deque[Entry] = deque(maxlen=MOST_OWED)
+        self._store: Store | None = None
+        self._began = False
+        self._corrupt = False
+        self._lost_sync: LogError | None = None
+        self._failures = 0
+        self._fault_since = ""
+        self._try_at = 0.0
+        self._hourly_at = 0.0
+        self._checkpoint_at = 0.0
+        self._since_tidy = 0
+        self._fresh_wal = True
+        self._ended = False
+        self._wake = threading.Condition()
+        self._syncer = Syncer(lambda results: self._tell(results, False), self._sync_failed)
+        self._thread = threading.Thread(target=self._run, name="operators-log", daemon=True)
+
+    # On the event loop.
+
+    def start(self) -> None:
+        self._syncer.start()
+        self._thread.start()
+
+    def stop(self, timeout_s: float) -> None:
+        """Writes what is waiting, and closes the file; gives up after the time."""
+        with self._wake:
+            self._ended = True
+            self._wake.notify()
+        self._thread.join(timeout_s)
+
+    def add(self, ticket: Ticket, most: int | None) -> bool:
+        """Takes it, unless as many as `most` are waiting already."""
+        with self._wake:
+            if most is not None and len(self._queue) >= most:
+                return False
+            self._queue.append(ticket)
+            self._wake.notify()
+        return True
+
+    # On the keeper's thread.
+
+    def _run(self) -> None:
+        ended = False
+        while not ended:
+            if self._store is None and time.monotonic() >= self._try_at:
+                self._open()
+                self.tried.set()
+            with self._wake:
+                self._wake.wait_for(self._must_do, self._idle_s())
+                batch = list(self._queue)
+                self._queue.clear()
+                ended = self._ended
+            if self._lost_sync is not None:
+                self._broken(self._lost_sync)
+            if batch:
+                self._write(batch)
+            if self._store is not None:
+                self._tidy(self._store, quiet=not batch)
+        self._syncer.end(QUIET_S * 5)
+        self._close()
+
+    def _must_do(self) -> bool:
+        return bool(self._queue or self._ended or self._lost_sync)
+
+    def _idle_s(self) -> float:
+        if self._store is None:
+            return max(0.0, self._try_at - time.monotonic())
+        until_hour = max(0.0, self._hourly_at - time.monotonic())
+        return until_hour if self._fresh_wal else min(until_hour, QUIET_S)
+
+    def _write(self, batch: list[Ticket]) -> None:
+        wanted = [ticket for ticket in batch if not ticket.abandoned]
+        given_up = LogError(say("log_abandoned"))
+        self._tell([(ticket, given_up) for ticket in batch if ticket.abandoned], False)
+        if self._store is None:
+            self._fail(wanted, LogError(self.fault))
+            return
+        try:
+            sealed = self._store.append([ticket.entry for ticket in wanted])
+        except LogError as error:
+            self._broken(error)
+            self._fail(wanted, error)
+            return
+        self.head = self._store.head
+        self._fresh_wal = False
+        self._since_tidy += len(sealed)
+        results: Results = list(zip(wanted, sealed, strict=True))
+        self._tell([(ticket, entry) for ticket, entry in results if not ticket.durable], False)
+        if durable := [(ticket, entry) for ticket, entry in results if ticket.durable]:
+            self._syncer.add(durable)
+
+    def _fail(self, tickets: Sequence[Ticket], error: LogError) -> None:
+        self._owed += [ticket.entry for ticket in tickets if ticket.entry.of is not None]
+        self._tell([(ticket, error) for ticket in tickets], False)
+
+    def _broken(self, error: LogError) -> None:
+        """From now on nothing is written, until the file could be opened again."""
+        self._lost_sync = None
+        self._close()
+        self._corrupt = self._corrupt or isinstance(error, LogCorrupt)
+        wait = TRIED_AGAIN_S[min(self._failures, len(TRIED_AGAIN_S) - 1)]
+        self._failures += 1
+        self._try_at = time.monotonic() + wait
+        if self.fault != str(error):
+            log.error("the operator's log can't be written: %s", error)
+            self._fault_since = self._fault_since or time.strftime("%H:%M:%S")
+            self.fault = str(error)
+            self._tell([], True)
+
+    def _open(self) -> None:
+        try:
+            with in_words():
+                self._folder.hold()
+            store, aside = self._opened()
+            self._store = store
+            self._syncer.use(store)
+            store.probe()
+            self._catch_up(store, aside)
+        except LogError as error:
+            self._broken(error)
+            return
+        self._failures, self._fresh_wal, self._hourly_at = 0, False, 0.0
+        if self.fault:
+            log.info("the operator's log can be written again")
+            self.fault = self._fault_since = ""
+            self._tell([], True)
+
+    def _opened(self) -> tuple[Store, str]:
+        """The file; where it is damaged it is put aside, under the name that is returned."""
+        path, first = self._folder.path, self.head.seq + 1 if self.head else 1
+        try:
+            if self._corrupt:
+                raise LogCorrupt(self.fault)
+            return Store(path, self._boot), ""
+        except LogCorrupt as error:
+            name = set_aside(path)
+            log.error("the operator's log is damaged (%s): it is kept as %s", error, name)
+            self._corrupt = False
+            return Store(path, self._boot, first), name
+
+    def _catch_up(self, store: Store, aside: str) -> None:
+        """What the file has to be told before anything new."""
+        lost = self.head.seq - store.head.seq if self.head else 0
+        entries = list(self._owed)
+        if aside:
+            entries.append(entered("began", reason=say("log_began_anew", name=aside)))
+        elif lost > 0 and self.head:
+            gone = say("log_lost", first=store.head.seq + 1, last=self.head.seq)
+            log.error("%s", gone)
+            entries.append(entered("resumed", reason=gone))
+        if not self._began:
+            entries += [_ended(entry, store.answered(entry.seq)) for entry in store.undone()]
+            values = {"mode": self._mode}
+            entries.append(entered("began", values=values, reason=say("log_began")))
+        if self.fault:
+            text = say("log_resumed", since=self._fault_since, why=self.fault)
+            entries.append(entered("resumed", reason=text))
+        store.append(entries)
+        self._owed.clear()
+        self._began = True
+        self.head = store.head
+        store.sync()
+
+    def _tidy(self, store: Store, quiet: bool) -> None:
+        """Keeps the files small, a little at a time; says the head once an hour."""
+        try:
+            self._remove_old(store)
+            self._empty_wal(store, quiet)
+        except LogError as error:
+            self._broken(error)
+
+    def _remove_old(self, store: Store) -> None:
+        now = time.monotonic()
+        if now < self._hourly_at and self._since_tidy < TIDY_AFTER:
+            return
+        limits = self._limits
+        more = store.remove_old(limits.days, limits.size_mb, time.time_ns() // 1_000_000)
+        self._since_tidy = TIDY_AFTER if more else 0
+        self._fresh_wal = self._fresh_wal and not more
+        self.head = store.head
+        if now >= self._hourly_at and not more:
+            self._hourly_at = now + HOUR_S
+            log.info("operator's log: %d entries, head %s", self.head.count, self.head.hash)
+
+    def _empty_wal(self, store: Store, quiet: bool) -> None:
+        now = time.monotonic()
+        must = now >= self._checkpoint_at and store.wal_bytes() > WAL_BYTES
+        if must or (quiet and not self._fresh_wal):
+            store.checkpoint()
+            self._fresh_wal, self._checkpoint_at = True, now + CHECKPOINT_S
+
+    def _close(self) -> None:
+        self._syncer.use(None)
+        if self._store is not None:
+            store, self._store = self._store, None
+            try:
+                store.close()
+            except LogError as error:
+                log.error("the operator's log could not be closed: %s", error)
+
+    # On the syncer's thread.
+
+    def _sync_failed(self, results: Results) -> None:
+        """What is not known to be on the disk is not known to be in the log."""
+        self._tell(results, False)
+        with self._wake:
+            self._lost_sync = next(error for _, error in results if isinstance(error, LogError))
+            self._wake.notify()
+
+
+def _ended(entry: Entry, answered: bool) -> Entry:
+    """What is to be said of a press of a server that ended before it knew."""
+    return entry.followed("corrected" if answered else "closed", "unknown", say("log_ended"))

@@ -1,0 +1,94 @@
+"""Reading the operator's log, page by page, beside the writer and never holding it up.
+
+Each call is one short read on a connection of its own: a slow reader keeps nothing open.
+"""
+
+import time
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from app.errors import LogError
+from app.log.entry import FIELDS, Entry
+from app.log.file import in_words, read_only
+
+LONGEST_SEARCH_S: Final = 5.0
+STEPS_BETWEEN_LOOKS: Final = 10_000
+
+# What has become more by now is told by a later entry.
+DONE: Final = "(e.kind <> 'pressed' OR e.seq IN (SELECT seq FROM undone))"
+CONDITIONS: Final = {
+    "since": "e.at >= :since",
+    "until": "e.at < :until",
+    "widget": "e.widget = :widget",
+    "outcome": "(CASE WHEN e.outcome = '' THEN e.kind ELSE e.outcome END) = :outcome",
+    "who": "(e.who = :who OR e.address = :who)",
+    "text": (
+        "(e.reason || ' ' || e.\"values\" || ' ' || e.widget || ' ' || e.press || ' ' || e.robot"
+        " || ' ' || e.who || ' ' || e.address || ' ' || e.outcome) LIKE :pattern ESCAPE '\\'"
+    ),
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Filter:
+    """Which entries; times in ms since 1970 (UTC), `since` included and `until` not.
+
+    `every`: presses too of which a later entry tells what came of them.
+    """
+
+    since: int | None = None
+    until: int | None = None
+    widget: str = ""
+    outcome: str = ""
+    who: str = ""
+    text: str = ""
+    every: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """An entry, and when what it tells of was pressed (ms; None where that is no longer there)."""
+
+    entry: Entry
+    pressed_at: int | None
+
+
+def rows(folder: Path, wanted: Filter, before: int | None, count: int) -> list[Row]:
+    """The newest `count` entries before the number `before`, the newest first; LogError."""
+    query, values = _query(wanted, before, count)
+    db = read_only(folder)
+    end = time.monotonic() + LONGEST_SEARCH_S
+    db.set_progress_handler(lambda: time.monotonic() > end, STEPS_BETWEEN_LOOKS)
+    try:
+        with in_words():
+            found = db.execute(query, values).fetchall()
+    except LogError as error:
+        if time.monotonic() > end:
+            raise LogError("the search took too long: give a shorter time") from error
+        raise
+    finally:
+        db.close()
+    return [Row(Entry(**dict(zip(FIELDS, row[:-1], strict=True))), row[-1]) for row in found]
+
+
+def _query(wanted: Filter, before: int | None, count: int) -> tuple[str, dict[str, Any]]:
+    given = {name: value for name, value in asdict(wanted).items() if value not in (None, "")}
+    conditions = [CONDITIONS[name] for name in given if name in CONDITIONS]
+    if not wanted.every:
+        conditions.append(DONE)
+    if before is not None:
+        conditions.append("e.seq < :before")
+    where = f"WHERE {' AND '.join(conditions)}" if conditions else ""
+    columns = ", ".join(f'e."{name}"' for name in FIELDS)
+    query = (
+        f"SELECT {columns}, p.at FROM entry e LEFT JOIN entry p ON p.seq = e.of {where}"
+        " ORDER BY e.seq DESC LIMIT :count"
+    )
+    return query, given | {"pattern": _pattern(wanted.text), "before": before, "count": count}
+
+
+def _pattern(text: str) -> str:
+    for special in "\\%_":
+        text = text.replace(special, f"\\{special}")
+    return f"%{text}%"

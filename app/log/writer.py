@@ -1,0 +1,199 @@
+"""The face of the operator's log to the event loop, and the thread that owns its file.
+
+`pressed` returns when the entry is committed to the operating system: a process that is killed
+after that has it. `closed` returns when the outcome, and every entry before it, is on the disk
+(fdatasync): so is all that has a receipt, after a power cut too. What comes together is committed
+together, and shares a sync; syncs have a thread of their own, so that no press waits for one of
+another. Neither ever blocks the event loop.
+"""
+
+import asyncio
+import logging
+import secrets
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from typing import Final
+
+from app.errors import FolderInUse, LogError
+from app.log.entry import Entry
+from app.log.folder import Folder
+from app.log.keeper import Keeper, Limits, Ticket
+from app.log.reading import Filter, Row, rows
+from app.log.store import Head
+from app.sentences import say
+
+log = logging.getLogger("kiosk.log")
+
+READERS: Final = 2
+MOST_WAITING: Final = 1000
+PRESSED_WITHIN_S: Final = 2.0  # an entry that takes longer is a press that is not sent
+CLOSED_WITHIN_S: Final = 3.0  # a receipt does not wait longer: it says that it is not on the disk
+HELD_BY_OTHER_S: Final = 5.0  # a server that is started anew waits so long for the old one's lock
+ENDED_WITHIN_S: Final = 10.0
+
+
+class OperatorLog:
+    """One log for a whole server, in a folder that is its own; used on the event loop only."""
+
+    def __init__(self, folder: Path, limits: Limits, mode: str = "live") -> None:
+        self.folder = folder
+        self._limits = limits
+        self._folder = Folder(folder)
+        self._changed: set[Callable[[], None]] = set()
+        self._readers = ThreadPoolExecutor(READERS, "operators-log-reader")
+        self._stuck: set[Ticket] = set()
+        self._loop = asyncio.get_running_loop()
+        self._keeper = Keeper(self._folder, limits, secrets.token_hex(4), mode, self._tell)
+
+    async def start(self) -> None:
+        """Opens the log; FolderInUse when another server has the folder. What else may be wrong is
+        its `fault`, and tried again."""
+        end = self._loop.time() + HELD_BY_OTHER_S
+        while True:
+            try:
+                self._folder.hold()
+            except FolderInUse:
+                if self._loop.time() > end:
+                    raise
+                await asyncio.sleep(0.1)
+                continue
+            except OSError:
+                pass  # the keeper meets it again, and says it
+            break
+        self._keeper.start()
+        await asyncio.to_thread(self._keeper.tried.wait, ENDED_WITHIN_S)
+
+    async def stop(self) -> None:
+        """Writes what is waiting, and lets go of the folder."""
+        await asyncio.to_thread(self._keeper.stop, ENDED_WITHIN_S)
+        self._readers.shutdown(wait=False, cancel_futures=True)
+        self._folder.release()
+
+    @property
+    def enabled(self) -> bool:
+        return True
+
+    @property
+    def head(self) -> Head | None:
+        """None until it could be opened."""
+        return self._keeper.head
+
+    @property
+    def fault(self) -> str:
+        """The sentence that says that the log can't be written; "" while it can."""
+        why = self._why
+        sentence = "log_unwritable" if self._limits.required else "log_unwritable_free"
+        return say(sentence, why=why) if why else ""
+
+    @property
+    def _why(self) -> str:
+        slow = say("log_slow", seconds=f"{PRESSED_WITHIN_S:g}")
+        return self._keeper.fault or (slow if self._stuck else "")
+
+    @property
+    def lock(self) -> str:
+        """Why nothing may be pressed; "" while it may."""
+        return self.fault if self._limits.required else ""
+
+    @contextmanager
+    def followed(self, changed: Callable[[], None]) -> Iterator[None]:
+        """`changed` is called, on the loop, whenever `fault` has changed."""
+        self._changed.add(changed)
+        try:
+            yield
+        finally:
+            self._changed.discard(changed)
+
+    async def pressed(self, entry: Entry) -> Entry | None:
+        """Writes the entry of a press that is about to be sent, and returns it as it stands.
+
+        Raises LogError when it can't be written and must be; where it need not be, None.
+        """
+        try:
+            return await self._written(entry)
+        except LogError as error:
+            if self._limits.required:
+                raise LogError(self.fault or say("log_unwritable", why=error)) from error
+            return None
+
+    async def closed(self, entry: Entry) -> str:
+        """Writes what came of a press; returns when that is on the disk, or why it is not."""
+        try:
+            await self._within(self._add(entry), CLOSED_WITHIN_S)
+        except LogError as error:
+            return str(error)
+        return ""
+
+    def add(self, entry: Entry) -> None:
+        """Writes what came of a press, when nobody waits for it."""
+        self._add(entry)
+
+    async def rows(self, wanted: Filter, before: int | None, count: int) -> list[Row]:
+        """The newest entries that are wanted before a number; LogError when they can't be read."""
+        read = partial(rows, self.folder, wanted, before, count)
+        try:
+            return await self._loop.run_in_executor(self._readers, read)
+        except LogError as error:
+            raise LogError(say("log_unreadable", why=error)) from error
+
+    async def _written(self, entry: Entry) -> Entry:
+        if why := self._why:
+            raise LogError(why)
+        ticket = self._add(entry)
+        try:
+            return await self._within(ticket, PRESSED_WITHIN_S)
+        except BaseException:
+            ticket.abandoned = True
+            ticket.done.add_done_callback(self._close_abandoned)
+            raise
+
+    async def _within(self, ticket: Ticket, seconds: float) -> Entry:
+        await asyncio.wait({ticket.done}, timeout=seconds)
+        if not ticket.done.done():
+            self._stuck.add(ticket)
+            ticket.done.add_done_callback(lambda _: self._unstick(ticket))
+            self._say_changed()
+            raise LogError(say("log_slow", seconds=f"{seconds:g}"))
+        result = ticket.done.result()
+        if isinstance(result, LogError):
+            raise result
+        return result
+
+    def _unstick(self, ticket: Ticket) -> None:
+        self._stuck.discard(ticket)
+        self._say_changed()
+
+    def _close_abandoned(self, done: "asyncio.Future[Entry | LogError]") -> None:
+        """A press that nobody waited for any more was written all the same."""
+        entry = done.result() if not done.cancelled() else None
+        if isinstance(entry, Entry):
+            self._add(entry.followed("closed", "refused", say("log_abandoned")))
+
+    def _add(self, entry: Entry) -> Ticket:
+        """Hands it to the keeper. Only what starts a press is turned away when too much waits: what
+        came of it is bounded by the presses that there are."""
+        ticket = Ticket(entry, self._loop.create_future())
+        if not self._keeper.add(ticket, MOST_WAITING if entry.of is None else None):
+            raise LogError(say("log_full_queue"))
+        return ticket
+
+    def _tell(self, results: list[tuple[Ticket, Entry | LogError]], changed: bool) -> None:
+        """On the keeper's threads."""
+        try:
+            self._loop.call_soon_threadsafe(self._told, results, changed)
+        except RuntimeError:  # the loop is closed: the process ends
+            log.debug("nobody is told of %d entries", len(results))
+
+    def _told(self, results: list[tuple[Ticket, Entry | LogError]], changed: bool) -> None:
+        for ticket, result in results:
+            if not ticket.done.done():
+                ticket.done.set_result(result)
+        if changed:
+            self._say_changed()
+
+    def _say_changed(self) -> None:
+        for listener in tuple(self._changed):
+            listener()
