@@ -56,6 +56,7 @@ ORDER = (
     "app.board",
     "app.calls",
     "app.actions",
+    "app.parameter_services",
     "app.parameters",
     "app.presses",
     "app.link",
