@@ -8,7 +8,7 @@ asked of a bridge or a node that went away meanwhile no longer counts.
 import asyncio
 import logging
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, Final
@@ -16,19 +16,18 @@ from typing import Any, Final
 from app import keys
 from app.calls import Asker, Calls, Request
 from app.declared import UNKNOWN, Declared, Value, checked, declared, name_of, value_in, wire
-from app.errors import DecodeError, LinkError
+from app.errors import DecodeError
 from app.interfaces import Interfaces
 from app.interlocks import parameters_offered
 from app.panel.model import Panel
 from app.panel.parameter import DESCRIBE, EVENT_TYPE, GET, SET, Parameter
+from app.parameter_services import NoAnswer, ParameterServices
 from app.progress import Answer, Corrected
 from app.robot import Robot, Sample
 from app.sentences import clock, say
 
 log = logging.getLogger("kiosk.parameters")
 
-ANSWER_S: Final = 5.0  # within which a node has to tell its parameters
-LATE_S: Final = 5.0  # how long after that nothing more is asked: it may only be slow
 CONFIRM_S: Final = 3.0  # after which the bridge surely brings the events of a node that appeared
 AGAIN_S: Final = 1.0  # between two readings at least, and before the first try again
 AGAIN_MOST_S: Final = 600.0  # the pause between tries doubles up to this
@@ -53,10 +52,6 @@ class _Node:
         self.urgent.set()
 
 
-class _NoAnswer(Exception):
-    """Nothing that could be read came in time."""
-
-
 class Parameters:
     """The parameters of one robot that its panel shows; used on the event loop only."""
 
@@ -72,7 +67,7 @@ class Parameters:
         """`changed` is called when what the widgets show has changed."""
         self._interfaces = interfaces
         self._robot = robot
-        self._link = link
+        self._services = ParameterServices(interfaces, robot, link)
         self._calls = calls
         self._changed = changed
         self._nodes: dict[str, _Node] = {}
@@ -183,9 +178,9 @@ class Parameters:
         """Asks for all of a node's parameters; False where one of them has no value to show."""
         names = list(dict.fromkeys(widget.parameter for widget in node.widgets))
         try:
-            descriptors = await self._ask_each(node, DESCRIBE, names, "descriptors")
-            values = await self._ask_each(node, GET, names, "values")
-        except _NoAnswer:
+            asked = self._services.read(node.name, names, partial(self._silent, node))
+            descriptors, values = await asked
+        except NoAnswer:
             return False
         except DecodeError as error:
             log.error("%s: %s", node.name, error)
@@ -199,42 +194,6 @@ class Parameters:
             self._learn(widget, found)
         self._changed()
         return all(self._known(widget).state == "live" for widget in node.widgets)
-
-    async def _ask_each(
-        self, node: _Node, service: tuple[str, str], names: Sequence[str], part: str
-    ) -> dict[str, Any]:
-        """What a node answers by name: where one of several is not declared, rclcpp answers none."""
-        found = await self._ask(node, service, names, part)
-        if len(found) == len(names):
-            return dict(zip(names, found, strict=True))
-        if len(names) == 1:
-            return {}
-        each: dict[str, Any] = {}
-        for name in names:
-            each |= await self._ask_each(node, service, [name], part)
-        return each
-
-    async def _ask(
-        self, node: _Node, service: tuple[str, str], names: Sequence[str], part: str
-    ) -> list[Any]:
-        request, response = self._interfaces.service(service[1])
-        key = self._robot.key(f"{node.name}/{service[0]}")
-        payload = self._interfaces.encode(request, {"names": list(names)})
-        try:
-            query = self._link.query(key, payload, ANSWER_S + LATE_S)
-        except LinkError as error:
-            log.warning("%s", error)
-            raise _NoAnswer from None
-        await asyncio.wait({query}, timeout=ANSWER_S)
-        in_time = query.done()
-        if not in_time:
-            self._silent(node)
-        reply = await query
-        if reply is None or not in_time:
-            self._silent(node)
-            raise _NoAnswer
-        answer: list[Any] = getattr(self._interfaces.decode(response, reply), part)
-        return answer
 
     # Setting.
 

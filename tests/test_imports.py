@@ -73,6 +73,7 @@ ORDER = (
     "app.calls",
     "app.goals",
     "app.actions",
+    "app.parameter_services",
     "app.parameters",
     "app.logbook",
     "app.presses",

@@ -75,4 +75,5 @@ def test_nothing_is_lost_by_kills_under_presses(
     assert pressed.keys() == closed.keys(), seed
     cut = {p for p, entry in closed.items() if entry.reason == say("log_ended")}
     assert cut.isdisjoint(receipts), seed
+    until(last.ready, "ready")
     assert last.press("operation", "after all").status_code == 200

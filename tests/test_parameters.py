@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from app import keys, parameters
+from app import keys, parameter_services, parameters
 from app.calls import Calls
 from app.declared import UNKNOWN, Declared, allowed, checked, limits_text, typed, wire
 from app.errors import InputError
@@ -259,7 +259,7 @@ def test_a_node_that_was_another_one_for_a_moment_is_asked_anew() -> None:
 def test_a_silent_node_locks_and_is_asked_one_question_at_a_time(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(parameters, "ANSWER_S", 0.01)
+    monkeypatch.setattr(parameter_services, "ANSWER_S", 0.01)
 
     async def test(bench: Bench) -> None:
         bench.offer()
@@ -273,7 +273,7 @@ def test_a_silent_node_locks_and_is_asked_one_question_at_a_time(
         assert len(bench.line.asked) == 1
         await bench.answer(1, DESCRIBE, descriptors=[descriptor("speed", DOUBLE)])  # late
         assert bench.known().state == "silent"
-        monkeypatch.setattr(parameters, "ANSWER_S", 5.0)
+        monkeypatch.setattr(parameter_services, "ANSWER_S", 5.0)
         await bench.tell(2, 0.5)
         assert bench.known().value == 0.5
 

@@ -1,0 +1,84 @@
+"""Asking a node for its parameters: ROS 2's services `get_parameters` and `describe_parameters`."""
+
+import asyncio
+from collections.abc import Callable, Sequence
+from typing import Any, Final
+
+from app.calls import Asker
+from app.errors import LinkError
+from app.interfaces import Interfaces
+from app.panel.parameter import DESCRIBE, GET
+from app.robot import Robot
+
+ANSWER_S: Final = 5.0  # within which a node has to tell its parameters
+LATE_S: Final = 5.0  # how long after that nothing more is asked: it may only be slow
+
+
+class NoAnswer(Exception):
+    """Nothing came in time; what comes late does not count."""
+
+
+class ParameterServices:
+    """The services of one robot's nodes; one question of a caller's at a time."""
+
+    def __init__(self, interfaces: Interfaces, robot: Robot, link: Asker) -> None:
+        self._interfaces = interfaces
+        self._robot = robot
+        self._link = link
+
+    async def read(
+        self, node: str, names: Sequence[str], silent: Callable[[], None]
+    ) -> tuple[dict[str, Any], dict[str, Any]]:
+        """ParameterDescriptor and ParameterValue by name, without those that the node has not.
+
+        NoAnswer when it does not answer in time, which `silent` tells at once; DecodeError for what
+        is no answer.
+        """
+        descriptors = await self._each(node, DESCRIBE, names, "descriptors", silent)
+        return descriptors, await self._each(node, GET, names, "values", silent)
+
+    async def _each(
+        self,
+        node: str,
+        service: tuple[str, str],
+        names: Sequence[str],
+        part: str,
+        silent: Callable[[], None],
+    ) -> dict[str, Any]:
+        """What a node answers by name: where one of several is not declared, rclcpp answers none."""
+        found = await self._ask(node, service, names, part, silent)
+        if len(found) == len(names):
+            return dict(zip(names, found, strict=True))
+        if len(names) == 1:
+            return {}
+        each: dict[str, Any] = {}
+        for name in names:
+            each |= await self._each(node, service, [name], part, silent)
+        return each
+
+    async def _ask(
+        self,
+        node: str,
+        service: tuple[str, str],
+        names: Sequence[str],
+        part: str,
+        silent: Callable[[], None],
+    ) -> list[Any]:
+        request, response = self._interfaces.service(service[1])
+        payload = self._interfaces.encode(request, {"names": list(names)})
+        key = self._robot.key(f"{node}/{service[0]}")
+        try:
+            query = self._link.query(key, payload, ANSWER_S + LATE_S)
+        except LinkError as error:
+            silent()
+            raise NoAnswer(str(error)) from error
+        await asyncio.wait({query}, timeout=ANSWER_S)
+        in_time = query.done()
+        if not in_time:
+            silent()
+        reply = await query
+        if reply is None or not in_time:
+            silent()
+            raise NoAnswer(f"{key} did not answer")
+        answer: list[Any] = getattr(self._interfaces.decode(response, reply), part)
+        return answer
