@@ -54,6 +54,8 @@ ORDER = (
     "app.log.store",
     "app.log.chain",
     "app.log.reading",
+    "app.log.ticket",
+    "app.log.syncer",
     "app.log.keeper",
     "app.log.writer",
     "app.log.unlogged",

@@ -211,6 +211,8 @@ def test_removing_the_newest_shows_by_the_head_alone(tmp_path: Path) -> None:
     found = verify(tmp_path)
     assert found.fault == ""
     assert found.head != head
+    assert verify(tmp_path, found.head).fault == ""
+    assert main(["verify", "--data", str(tmp_path), "--head", head]) == 1
 
 
 # Retention.

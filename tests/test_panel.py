@@ -99,6 +99,12 @@ def test_an_interlock_is_called_by_its_label(label: str | None, name: str) -> No
     assert small_panel({"label": label}).interlocks[0].name == name
 
 
+def test_the_operators_log_is_kept_and_required_unless_the_file_says_otherwise(load: Load) -> None:
+    rules = load(tables()).log
+    assert (rules.enabled, rules.required, rules.days, rules.size_mb) == (True, True, 365, 512)
+    assert load(tables(log={"required": False, "days": 30})).log.required is False
+
+
 def test_what_is_loaded_can_not_be_changed(load: Load) -> None:
     panel = load(tables())
     with pytest.raises(ValidationError, match="frozen"):
@@ -164,6 +170,10 @@ def test_an_interlock_and_a_widget_may_have_one_id(load: Load) -> None:
             '"a b" is not a ROS 2 namespace: it must be like /robot1',
         ),
         (tables(namespace="/a//b"), "namespace", "is not a ROS 2 namespace"),
+        (tables(log={"days": 0}), "log.days", "greater than 0"),
+        (tables(log={"size_mb": 1}), "log.size_mb", "greater than or equal to 8"),
+        (tables(log={"required": "no"}), "log.required", "valid boolean"),
+        (tables(log={"requierd": False}), "log.requierd", 'did you mean "required"?'),
         (tables(mm_per_px=0), "mm_per_px", "greater than 0.02"),
         (tables(mm_per_px="0.2"), "mm_per_px", "valid number"),
         (

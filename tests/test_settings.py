@@ -78,6 +78,24 @@ def test_kiosk_dev_is_for_development(given: str, dev: bool) -> None:
     assert Settings.from_environment({"KIOSK_DEV": given}).dev is dev
 
 
+def test_databases_live_in_the_users_state_folder(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    settings = Settings.from_environment({})
+    assert settings.data_folder("live") == tmp_path / "operator-panel"
+    assert settings.data_folder("demo") == tmp_path / "operator-panel/demo"
+    for unset in ("", "relative/path"):
+        monkeypatch.setenv("XDG_STATE_HOME", unset)
+        monkeypatch.setenv("HOME", "/home/kim")
+        assert settings.data_folder("live") == Path("/home/kim/.local/state/operator-panel")
+
+
+def test_kiosk_data_is_the_folder_of_whatever_mode(tmp_path: Path) -> None:
+    settings = Settings.from_environment({"KIOSK_DATA": str(tmp_path)})
+    assert settings.data_folder("live") == settings.data_folder("demo") == tmp_path
+
+
 @pytest.mark.parametrize("name", ["templates", "static", "zenoh.json5", "panel.toml"])
 def test_what_the_project_ships_is_found(name: str) -> None:
     assert shipped(name).exists()

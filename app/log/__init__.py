@@ -1,8 +1,8 @@
 """The operator's log: who pressed what, and what came of it."""
 
 from app.log.entry import Entry, Origin, entered
-from app.log.keeper import Limits
 from app.log.reading import Filter, Row
+from app.log.ticket import Limits
 from app.log.unlogged import Unlogged
 from app.log.writer import OperatorLog
 

@@ -1,4 +1,4 @@
-"""`python -m app.log verify [--data FOLDER]`: is the operator's log as it was written?
+"""`python -m app.log verify [--data FOLDER] [--head HASH]`: is the operator's log as it was written?
 
 Exit status: 0 it is, 1 an entry was changed, removed, reordered or inserted, 2 it can't be read.
 """
@@ -20,14 +20,17 @@ def main(arguments: list[str]) -> int:
     check.add_argument(
         "--data", type=Path, metavar="FOLDER", help="where the log is; default: KIOSK_DATA's folder"
     )
-    folder = parser.parse_args(arguments).data
+    check.add_argument(
+        "--head", default="", metavar="HASH", help="a head that was noted once, and must be in it"
+    )
+    given = parser.parse_args(arguments)
     try:
-        found = verify(folder or _usual_folder())
+        found = verify(given.data or _usual_folder(), given.head)
     except KioskError as error:
         print(f"the operator's log can't be read: {error}", file=sys.stderr)
         return 2
     if found.fault:
-        print(f"not as it was written: {found.fault}; {found.count} entries before are")
+        print(f"not as it was written: {found.fault} ({found.count} entries are)")
         return 1
     print(f"ok, {found.count} entries, head {found.head}")
     return 0

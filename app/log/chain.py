@@ -25,14 +25,15 @@ class Verified:
     fault: str = ""
 
 
-def verify(folder: Path) -> Verified:
-    """Checks the whole log, as it is at this moment; LogError where it can't be read."""
+def verify(folder: Path, noted: str = "") -> Verified:
+    """Checks the whole log, as it is at this moment, and that a head which was noted once is in it,
+    unless that is ""; LogError where it can't be read."""
     db = read_only(folder)
     try:
         with in_words():
             db.execute("BEGIN")
             (genesis,) = db.execute("SELECT value FROM about WHERE key = 'genesis'").fetchone() or ("",)
-            return _Chain(genesis).follow(_entries(db))
+            return _Chain(genesis, noted).follow(_entries(db))
     finally:
         db.close()
 
@@ -48,8 +49,9 @@ def _entries(db: sqlite3.Connection) -> Iterator[Entry]:
 class _Chain:
     """Follows the entries from the oldest; keeps no more of them than the last two hashes."""
 
-    def __init__(self, genesis: str) -> None:
+    def __init__(self, genesis: str, noted: str) -> None:
         self._genesis = genesis
+        self._noted = noted
         self._first: Entry | None = None
         self._anchored = False
         self._last = ("", genesis)  # the hashes of the one before the last, and of the last
@@ -61,6 +63,8 @@ class _Chain:
             if fault := self._fault(entry):
                 return self._verified(fault)
             self._first = self._first or entry
+            if self._noted in (entry.hash, entry.prev):
+                self._noted = ""
             self._anchored = self._anchored or self._is_anchor(entry)
             self._last, self._seq = (entry.prev, entry.hash), entry.seq
             self._count += 1
@@ -68,6 +72,8 @@ class _Chain:
             return self._verified(
                 f"what stood before entry {self._first.seq} was removed, by none of the log's own rules"
             )
+        if self._noted:
+            return self._verified(f"no entry has the head {self._noted}: the newest were removed")
         return self._verified("")
 
     def _verified(self, fault: str) -> Verified:

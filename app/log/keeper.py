@@ -1,12 +1,10 @@
-"""The threads behind the operator's log: one owns the file, one takes it to the disk."""
+"""The thread that owns the file of the operator's log: it writes, keeps it small, opens it again."""
 
-import asyncio
 import logging
 import threading
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Final
 
 from app.errors import LogCorrupt, LogError
@@ -14,6 +12,8 @@ from app.log.entry import Entry, entered
 from app.log.file import in_words, set_aside
 from app.log.folder import Folder
 from app.log.store import Head, Store
+from app.log.syncer import Syncer
+from app.log.ticket import Limits, Results, Ticket
 from app.sentences import say
 
 log = logging.getLogger("kiosk.log")
@@ -25,85 +25,6 @@ WAL_BYTES: Final = 16_000_000  # then it can wait no longer
 CHECKPOINT_S: Final = 5.0  # between two that can't wait: a reader may hold them up
 TIDY_AFTER: Final = 1000  # entries
 MOST_OWED: Final = 1000
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Limits:
-    """How long entries are kept, how large the file may be, and whether presses need it."""
-
-    days: float = 365.0
-    size_mb: float = 512.0
-    required: bool = True
-
-
-@dataclass(slots=True, eq=False)
-class Ticket:
-    """An entry to be written; `done` gets it as it stands in the file, or why it could not be.
-
-    That of a press is done when it is committed, any other when it is on the disk.
-    """
-
-    entry: Entry
-    done: "asyncio.Future[Entry | LogError]"
-    abandoned: bool = False
-
-    @property
-    def durable(self) -> bool:
-        return self.entry.kind != "pressed"
-
-
-Results = list[tuple[Ticket, Entry | LogError]]
-
-
-class Syncer:
-    """Takes what was committed to the disk, all that came together at once."""
-
-    def __init__(self, done: Callable[[Results], None], failed: Callable[[Results], None]) -> None:
-        self._done = done
-        self._failed = failed
-        self._waiting: Results = []
-        self._store: Store | None = None
-        self._ended = False
-        self._wake = threading.Condition()
-        self._syncing = threading.Lock()
-        self._thread = threading.Thread(target=self._run, name="operators-log-sync", daemon=True)
-
-    def start(self) -> None:
-        self._thread.start()
-
-    def use(self, store: Store | None) -> None:
-        """Waits for a sync that is under way: a file must stay open while it is synced."""
-        with self._syncing:
-            self._store = store
-
-    def add(self, written: Results) -> None:
-        with self._wake:
-            self._waiting += written
-            self._wake.notify()
-
-    def end(self, timeout_s: float) -> None:
-        """Does what is waiting, and ends."""
-        with self._wake:
-            self._ended = True
-            self._wake.notify()
-        self._thread.join(timeout_s)
-
-    def _run(self) -> None:
-        while True:
-            with self._wake:
-                self._wake.wait_for(lambda: self._waiting or self._ended)
-                batch, self._waiting = self._waiting, []
-            if not batch:
-                return
-            try:
-                with self._syncing:
-                    if self._store is None:
-                        raise LogError(say("log_closed"))
-                    self._store.sync()
-            except LogError as error:
-                self._failed([(ticket, error) for ticket, _ in batch])
-            else:
-                self._done(batch)
 
 
 class Keeper:

@@ -20,9 +20,10 @@ from typing import Final
 from app.errors import FolderInUse, LogError
 from app.log.entry import Entry
 from app.log.folder import Folder
-from app.log.keeper import Keeper, Limits, Ticket
+from app.log.keeper import Keeper
 from app.log.reading import Filter, Row, rows
 from app.log.store import Head
+from app.log.ticket import Limits, Results, Ticket
 from app.sentences import say
 
 log = logging.getLogger("kiosk.log")
@@ -180,14 +181,14 @@ class OperatorLog:
             raise LogError(say("log_full_queue"))
         return ticket
 
-    def _tell(self, results: list[tuple[Ticket, Entry | LogError]], changed: bool) -> None:
+    def _tell(self, results: Results, changed: bool) -> None:
         """On the keeper's threads."""
         try:
             self._loop.call_soon_threadsafe(self._told, results, changed)
         except RuntimeError:  # the loop is closed: the process ends
             log.debug("nobody is told of %d entries", len(results))
 
-    def _told(self, results: list[tuple[Ticket, Entry | LogError]], changed: bool) -> None:
+    def _told(self, results: Results, changed: bool) -> None:
         for ticket, result in results:
             if not ticket.done.done():
                 ticket.done.set_result(result)

@@ -1,0 +1,35 @@
+"""What is handed to the operator's log, and the rules that it follows."""
+
+import asyncio
+from dataclasses import dataclass
+
+from app.errors import LogError
+from app.log.entry import Entry
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limits:
+    """How long entries are kept, how large the file may be, and whether presses need it."""
+
+    days: float = 365.0
+    size_mb: float = 512.0
+    required: bool = True
+
+
+@dataclass(slots=True, eq=False)
+class Ticket:
+    """An entry to be written; `done` gets it as it stands in the file, or why it could not be.
+
+    That of a press is done when it is committed, any other when it is on the disk.
+    """
+
+    entry: Entry
+    done: "asyncio.Future[Entry | LogError]"
+    abandoned: bool = False
+
+    @property
+    def durable(self) -> bool:
+        return self.entry.kind != "pressed"
+
+
+Results = list[tuple[Ticket, Entry | LogError]]
