@@ -15,7 +15,9 @@ from typing import Any, Final
 from app import keys
 from app.actions import Actions
 from app.board import Board
+from app.browsers import Browser
 from app.calls import Calls
+from app.control import Control
 from app.errors import KioskError, LinkError
 from app.interfaces import interfaces_of
 from app.interlocks import Verdict, way
@@ -63,13 +65,20 @@ class Kiosk:
         self.link = Link(config, self._wake)
         self.robot = Robot(panel, self.interfaces, self.link.zid, entry)
         self._log = RobotLog(log, self.robot.name)
+        self.control = Control(panel.control, self.robot.name, tell=self._log.info)
         first = self._sight()
         self.lamp = first.robot
         self.board = Board(first.view, revision)
         self._calls = Calls(self.interfaces, self.robot, self.link, self.show)
         self._actions = Actions(self.interfaces, self.robot, self.link, self.show)
         self.presses = Presses(
-            panel, self.interfaces, self.robot, self.link, self._calls, self._actions
+            panel,
+            self.interfaces,
+            self.robot,
+            self.link,
+            self._calls,
+            self._actions,
+            self.control.verdict,
         )
         self._feedback = {keys.feedback(self.robot.key(one)): one for one in panel.actions()}
         self._joining = Joining(panel, self.interfaces, self.robot, self.link, self.show, self.renew)
@@ -110,9 +119,12 @@ class Kiosk:
         """Whether commands can reach the robot now."""
         return way(self.robot, time.monotonic())
 
-    async def press(self, widget: str, inputs: Mapping[str, Any], press_id: str, who: str) -> Receipt:
+    async def press(
+        self, widget: str, inputs: Mapping[str, Any], press_id: str, who: Browser
+    ) -> Receipt:
         """A press, judged by all that has come from the robot until now."""
         self._take()
+        self.control.touch(who)
         return await self.presses.press(widget, inputs, press_id, who)
 
     def renew(self) -> None:
@@ -205,6 +217,7 @@ class Kiosk:
             robots=self._robots(),
             simulated=self._simulated,
             fault=self.fault,
+            control=self.control.view(),
         )
 
     def show(self) -> None:
@@ -221,7 +234,7 @@ class Kiosk:
             self._told(self)
             seen = self._sight()
         self.board.post(seen.view)
-        self._show_at(seen.until)
+        self._show_at(min(seen.until, self.control.until))
 
     def _show_at(self, when: float) -> None:
         """Shows again at `when` (monotonic seconds), or sooner if that is planned already."""

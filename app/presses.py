@@ -15,11 +15,12 @@ from datetime import UTC, datetime
 from typing import Any, Final, Literal, Protocol
 
 from app.actions import Actions
+from app.browsers import Browser
 from app.calls import Calls
 from app.errors import FieldError, InputError, LinkError, NotFound
 from app.inputs import checked, typed
 from app.interfaces import Interfaces
-from app.interlocks import press_verdict
+from app.interlocks import PERMITTED, Verdict, press_verdict, way
 from app.logs import RobotLog
 from app.panel.model import Action, Call, Input, Panel, Pressed, Publish
 from app.panel.template import filled, named
@@ -91,8 +92,10 @@ class Presses:
         way: Way,
         calls: Calls,
         actions: Actions,
+        may_press: Callable[[Browser], Verdict] = lambda _: PERMITTED,
         monotonic: Callable[[], float] = time.monotonic,
     ) -> None:
+        """`may_press` says whether a browser has control of the robot."""
         self._widgets = {w.id: w for w in panel.widgets()}
         self._panel = panel
         self._interfaces = interfaces
@@ -101,6 +104,7 @@ class Presses:
         self._way = way
         self._calls = calls
         self._actions = actions
+        self._may_press = may_press
         self._under_way: dict[str, _UnderWay] = {}
         self._monotonic = monotonic
         self._receipts: OrderedDict[str, Receipt] = OrderedDict()
@@ -125,7 +129,7 @@ class Presses:
         return self._receipts.get(press_id)
 
     async def press(
-        self, widget_id: str, inputs: Mapping[str, Any], press_id: str, who: str
+        self, widget_id: str, inputs: Mapping[str, Any], press_id: str, who: Browser
     ) -> Receipt:
         """Sends what the widget is for, or refuses. The same id again is the same press.
 
@@ -157,8 +161,8 @@ class Presses:
         self._log.warning("press %s of %s: %s", press_id, widget_id, text)
         return receipt
 
-    async def cancel(self, widget_id: str, who: str) -> Receipt:
-        """Asks the robot to cancel the goal of an action widget."""
+    async def cancel(self, widget_id: str, who: Browser) -> Receipt:
+        """Asks the robot to cancel the goal of an action widget: anybody may, whoever has control."""
         widget = self.widget(widget_id)
         if not isinstance(widget, Action):
             raise NotFound(f'"{widget_id}" is not an action: there is nothing to cancel')
@@ -168,13 +172,13 @@ class Presses:
         return self._receipt(widget, {}, "", answer.outcome, answer.text, cause)
 
     async def _first(
-        self, widget: Pressed, inputs: Mapping[str, Any], press_id: str, who: str
+        self, widget: Pressed, inputs: Mapping[str, Any], press_id: str, who: Browser
     ) -> Receipt:
         loop = asyncio.get_running_loop()
         under_way = _UnderWay(widget.id, dict(inputs), loop.create_future())
         self._under_way[press_id] = under_way
         try:
-            receipt = await self._pressed(widget, inputs, press_id)
+            receipt = await self._pressed(widget, inputs, press_id, who)
         except BaseException as error:
             under_way.receipt.set_exception(error)
             under_way.receipt.exception()  # who else waited is told; nobody needs to have
@@ -200,7 +204,17 @@ class Presses:
                 old, outcome=answer.outcome, reason=answer.text, cause=""
             )
 
-    async def _pressed(self, widget: Pressed, inputs: Mapping[str, Any], press_id: str) -> Receipt:
+    def _judged(self, widget: Pressed, who: Browser) -> Verdict:
+        """The first that locks: the way to the robot, who has control, the widget's interlock."""
+        now = self._monotonic()
+        for verdict in (way(self._robot, now), self._may_press(who)):
+            if not verdict.permitted:
+                return verdict
+        return press_verdict(widget, self._panel.interlock(widget.interlock), self._robot, now)
+
+    async def _pressed(
+        self, widget: Pressed, inputs: Mapping[str, Any], press_id: str, who: Browser
+    ) -> Receipt:
         def receipt(answer: Answer, cause: Cause = "") -> Receipt:
             return self._receipt(widget, inputs, press_id, answer.outcome, answer.text, cause)
 
@@ -208,8 +222,7 @@ class Presses:
             now = clock(time.time())
             return receipt(Answer("refused", say(sentence, why=why, time=now)), cause)
 
-        interlock = self._panel.interlock(widget.interlock)
-        verdict = press_verdict(widget, interlock, self._robot, self._monotonic())
+        verdict = self._judged(widget, who)
         if not verdict.permitted:
             cause: Cause = "link" if verdict.code in NO_WAY else "interlock"
             return refused("refused", verdict.reason or "", cause)

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from app.actions import Actions
+from app.browsers import stranger
 from app.calls import Calls
 from app.errors import LinkError, NotFound
 from app.panel.model import Panel
@@ -79,7 +80,13 @@ class Bench:
         calls = Calls(INTERFACES, self.robot, NOBODY, lambda: None)
         actions = Actions(INTERFACES, self.robot, NOBODY, lambda: None)
         self._presses = Presses(
-            panel, INTERFACES, self.robot, self.way, calls, actions, lambda: self.now
+            panel,
+            INTERFACES,
+            self.robot,
+            self.way,
+            calls,
+            actions,
+            monotonic=lambda: self.now,
         )
         self.receipt = self._presses.receipt
         self.typed = self._presses.typed
@@ -88,7 +95,7 @@ class Bench:
         self, widget: str = "free", inputs: Mapping[str, Any] | None = None, press_id: str = "p1"
     ) -> Receipt:
         given = {"message": "hello"} if inputs is None else inputs
-        return asyncio.run(self._presses.press(widget, given, press_id, "127.0.0.1"))
+        return asyncio.run(self._presses.press(widget, given, press_id, stranger("127.0.0.1")))
 
 
 @pytest.fixture

@@ -80,7 +80,7 @@ def _faults_of_the_rest(
             case ("page", int(p), str(key)):
                 mended["page"][p].pop(key, None)
                 mended["page"][p] = {"id": f"faulty_{p}", "title": "?"} | mended["page"][p]
-            case (str(key),):
+            case (str(key),) | ("control" as key, *_):
                 mended.pop(key, None)
                 mended.setdefault("title", "?")
     try:

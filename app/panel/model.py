@@ -5,6 +5,7 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, Field
 
+from app.panel.control import ControlRules
 from app.panel.description import (
     ActionType,
     Description,
@@ -138,6 +139,7 @@ class Panel(Description):
     interfaces: Annotated[tuple[Folder, ...], Field(strict=False)] = ()
     namespace: Annotated[str, AfterValidator(namespace_of)] = ""
     mm_per_px: Annotated[float, Field(gt=0.02, lt=1)] = 0.22
+    control: ControlRules = ControlRules()
     robots: Annotated[tuple[RobotEntry, ...], Field(strict=False)] = Field((), alias="robot")
     interlocks: Annotated[tuple[Interlock, ...], Field(strict=False)] = Field((), alias="interlock")
     pages: Annotated[tuple[Page, ...], Field(strict=False)] = Field(alias="page")

@@ -2,17 +2,19 @@
 
 import secrets
 import time
-from typing import Any, TypedDict
+from typing import Any, TypedDict, get_args
 
 from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse, RedirectResponse, Response
 
+from app.control import Refusal, Role, role
 from app.errors import NotFound
 from app.panel.model import Input, Page, Panel
 from app.presses import Receipt
 from app.routes.site import CurrentSite, Site
+from app.routes.visitors import by_hand, keep, welcomed
 from app.sentences import clock, say
-from app.views import View
+from app.views import View, as_seen_by
 
 router = APIRouter(include_in_schema=True)
 
@@ -20,6 +22,12 @@ router = APIRouter(include_in_schema=True)
 # input, rarely enough to type in.
 REFRESH_S = 5
 REFRESH_WITH_INPUTS_S = 30
+
+
+# How long after a page without scripts was due it is still thought to be there.
+GRACE_S = 5
+REFUSALS = get_args(Refusal)
+CONTROL_ACTS = ("take", "ask", "give", "keep", "release", "withdraw")
 
 
 class PageContext(TypedDict):
@@ -43,6 +51,10 @@ class PageContext(TypedDict):
     unknown: str
     unsure: str
     refresh_s: int
+    browser: str
+    over: bool
+    role: Role
+    refused: str
 
 
 @router.get("/", response_class=HTMLResponse, summary="The first page of the panel")
@@ -72,8 +84,15 @@ def _to_a_robot(request: Request, site: Site, path: str) -> Response | None:
 
 def _render(request: Request, site: Site, page: Page) -> Response:
     kiosk = site.fleet.kiosk(request.path_params.get("robot"))
-    board = kiosk.board
     typed = any(isinstance(widget, Input) for widget in page.widgets)
+    refresh_s = REFRESH_WITH_INPUTS_S if typed else REFRESH_S
+    browser, token = welcomed(request, site)
+    rules = kiosk.control.rules
+    if rules.required:
+        kiosk.control.loaded(browser, refresh_s + GRACE_S, by_hand(request))
+        kiosk.show()
+    board = kiosk.board
+    refusal = request.query_params.get("control", "")
     receipt = kiosk.presses.receipt(request.query_params.get("receipt", ""))
     context = PageContext(
         site=site,
@@ -81,19 +100,25 @@ def _render(request: Request, site: Site, page: Page) -> Response:
         page=page,
         base=kiosk.base,
         robot=kiosk.entry.id if kiosk.entry else "",
-        view=board.view,
+        view=as_seen_by(board.view, browser),
         event_id=board.id,
         revision=board.revision,
         clock=clock(time.time()),
         press_id=secrets.token_hex(8),
         receipt=receipt,
         inputs=dict(receipt.inputs) if receipt else {},
-        words={"cancel": say("cancel"), "robots": say("robots"), "base": kiosk.base},
+        words={"base": kiosk.base}
+        | {word: say(word) for word in ("cancel", "robots", "control")}
+        | {act: say(f"control_{act}") for act in CONTROL_ACTS},
         lost=say("server_lost"),
         lost_short=say("lost"),
         unknown=say("unknown"),
         unsure=say("server_unsure"),
-        refresh_s=REFRESH_WITH_INPUTS_S if typed else REFRESH_S,
+        refresh_s=refresh_s,
+        browser=browser.id,
+        over=rules.local and browser.local,
+        role=role(board.view["control"], browser, rules),
+        refused=say(refusal) if refusal and refusal in REFUSALS else "",
     )
     html = site.templates.get_template("screen.html").render(**context)
-    return HTMLResponse(html, headers={"cache-control": "no-store"})
+    return keep(HTMLResponse(html, headers={"cache-control": "no-store"}), request, token)

@@ -15,6 +15,7 @@ from app.errors import InputError
 from app.kiosk import Kiosk
 from app.presses import Receipt
 from app.routes.site import CurrentKiosk, CurrentSite, Site
+from app.routes.visitors import visitor
 
 router = APIRouter()
 
@@ -49,7 +50,7 @@ class ReceiptAnswer(BaseModel):
     summary="Press a widget",
     responses={
         303: {"description": "a form post: back to the page, with the receipt on it"},
-        409: {"model": ReceiptAnswer, "description": "refused by an interlock"},
+        409: {"model": ReceiptAnswer, "description": "refused by an interlock or by who has control"},
         422: {"model": ReceiptAnswer, "description": "bad input"},
         503: {"model": ReceiptAnswer, "description": "no way to the robot"},
         504: {"model": ReceiptAnswer, "description": "no answer in time"},
@@ -63,7 +64,7 @@ class ReceiptAnswer(BaseModel):
 )
 async def press(widget: str, request: Request, site: CurrentSite, kiosk: CurrentKiosk) -> Response:
     kiosk.presses.widget(widget)
-    who = request.client.host if request.client else "unknown"
+    who = visitor(request, site)
     body = await request.body()
     kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
     if kind == "application/json":
@@ -98,7 +99,7 @@ async def press(widget: str, request: Request, site: CurrentSite, kiosk: Current
     responses={303: {"description": "a form post"}, 409: {"model": ReceiptAnswer}},
 )
 async def cancel(widget: str, request: Request, site: CurrentSite, kiosk: CurrentKiosk) -> Response:
-    who = request.client.host if request.client else "unknown"
+    who = visitor(request, site)
     receipt = await kiosk.presses.cancel(widget, who)
     _count(site, receipt)
     if request.headers.get("content-type", "").startswith("application/x-www-form-urlencoded"):
