@@ -75,6 +75,12 @@ def stranger(address: str) -> Browser:
     return Browser("", address, local, 0)
 
 
+def newcomer(token: str, address: str) -> Browser:
+    """Who is given this token just now: it is counted when it comes back with it."""
+    address, local = where(address)
+    return Browser(public_id(token), address, local, 0)
+
+
 def new_token() -> str:
     return secrets.token_hex(16)
 

@@ -218,8 +218,8 @@ class Control:
             other = say("control_held", name=holder.title, robot=robot)
         if holder and asker:
             limit = f"{self.rules.takeover_after_s:g}"
-            mine = say("control_asks", name=asker.title, robot=robot)
-            asked = say("control_asked", name=holder.title, robot=robot, seconds=limit)
+            mine = say("control_asks", name=asker.title, robot=robot, seconds=limit)
+            asked = say("control_asked", name=holder.title, seconds=limit)
         return ControlView(
             required=True,
             holder=holder.id if holder else "",

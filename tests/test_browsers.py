@@ -2,7 +2,7 @@
 
 import pytest
 
-from app.browsers import BROWSERS_KEPT, TOKEN, Browsers, new_token, public_id, stranger
+from app.browsers import BROWSERS_KEPT, TOKEN, Browsers, new_token, newcomer, public_id, stranger
 
 
 def token(number: int) -> str:
@@ -84,6 +84,13 @@ def test_those_not_seen_for_longest_are_forgotten_and_their_numbers_free() -> No
     assert browsers.seen(token(9999), "192.0.2.7").number == BROWSERS_KEPT + 1
     assert browsers.seen(token(9998), "192.0.2.7").number == 2
     assert browsers.seen(token(0), "192.0.2.7").number == 1
+
+
+def test_who_does_not_come_back_takes_no_number() -> None:
+    browsers = Browsers()
+    first = newcomer(token(1), "192.0.2.7")
+    assert (first.id, first.local) == (public_id(token(1)), False)
+    assert browsers.seen(token(2), "192.0.2.7").number == 1
 
 
 def test_a_stranger_has_no_id() -> None:

@@ -157,7 +157,9 @@ def test_a_request_is_shown_to_all(asked: Room) -> None:
     view = asked.control.view()
     assert (view["holder"], view["asker"]) == (ANN.id, BOB.id)
     assert view["asker_name"] == "Panel 2 (192.0.2.2)"
-    assert view["holder_text"] == "Panel 2 (192.0.2.2) asks for control of Robot 1."
+    assert view["holder_text"] == (
+        "Panel 2 (192.0.2.2) asks for control of Robot 1: given by itself after 30 s untouched."
+    )
     assert "after 30 s without a touch" in view["asker_text"]
     assert view["text"] == "Panel 1 (192.0.2.1) has control of Robot 1."
     assert view["since"] == "1970-01-01T00:16:40.000+00:00"

@@ -11,9 +11,12 @@ from typing import Any
 import pytest
 
 from app.actions import Actions
-from app.browsers import stranger
+from app.browsers import Browser, Browsers, stranger
 from app.calls import Calls
+from app.control import Control
 from app.errors import LinkError, NotFound
+from app.interlocks import PERMITTED, Verdict, locked
+from app.panel.control import ControlRules
 from app.panel.model import Panel
 from app.presses import RECEIPTS_KEPT, Presses, Receipt
 from app.robot import Robot, Sample
@@ -66,6 +69,7 @@ class Nobody:
 
 
 NOBODY = Nobody()
+PROGRAM = stranger("127.0.0.1")
 
 
 class Bench:
@@ -86,16 +90,25 @@ class Bench:
             self.way,
             calls,
             actions,
-            monotonic=lambda: self.now,
+            lambda who: self.may_press(who),
+            lambda: self.now,
         )
+        self.may_press: Callable[[Browser], Verdict] = lambda _: PERMITTED
         self.receipt = self._presses.receipt
         self.typed = self._presses.typed
 
     def press(
-        self, widget: str = "free", inputs: Mapping[str, Any] | None = None, press_id: str = "p1"
+        self,
+        widget: str = "free",
+        inputs: Mapping[str, Any] | None = None,
+        press_id: str = "p1",
+        who: Browser = PROGRAM,
     ) -> Receipt:
         given = {"message": "hello"} if inputs is None else inputs
-        return asyncio.run(self._presses.press(widget, given, press_id, stranger("127.0.0.1")))
+        return asyncio.run(self._presses.press(widget, given, press_id, who))
+
+    def cancel(self, widget: str) -> Receipt:
+        return asyncio.run(self._presses.cancel(widget, PROGRAM))
 
 
 @pytest.fixture
@@ -357,6 +370,57 @@ def test_the_log_tells_who_pressed_what_and_what_came_of_it(
     assert record.levelno == level
     for part in ("p1", "guarded", "127.0.0.1", "'hello'", receipt.outcome, receipt.reason):
         assert part in record.getMessage()
+
+
+class Locked:
+    """Presses of a robot that another browser has control of."""
+
+    def __init__(self) -> None:
+        self.bench = Bench()
+        self.other = Browsers().seen("0" * 32, "192.0.2.7")
+        control = Control(ControlRules(required=True), "", monotonic=lambda: NOW)
+        control.take(self.other)
+        self.bench.may_press = control.verdict
+
+
+def test_a_press_without_control_is_refused_with_who_has_it() -> None:
+    bench = Locked().bench
+    cause, reason = refused(bench, bench.press())
+    assert (cause, reason) == (
+        "interlock",
+        "Not sent: Panel 1 (192.0.2.7) has control of the robot.",
+    )
+
+
+def test_a_press_of_who_has_control_is_sent() -> None:
+    locked = Locked()
+    assert locked.bench.press(who=locked.other).outcome == "published"
+
+
+def test_the_link_is_told_before_control_and_control_before_an_interlock() -> None:
+    bench = Locked().bench
+    permits(bench.robot, False)
+    assert "has control" in refused(bench, bench.press("guarded", press_id="p1"))[1]
+    bench.robot.link_up = False
+    cause, reason = refused(bench, bench.press("guarded", press_id="p2"))
+    assert (cause, reason.startswith("Not sent: No connection")) == ("link", True)
+
+
+def test_cancelling_needs_no_control() -> None:
+    home = {
+        **FREE,
+        "id": "home",
+        "kind": "action",
+        "action": "/count",
+        "type": "example_interfaces/action/Fibonacci",
+        "goal": {"order": 1},
+    }
+    for key in ("topic", "message"):
+        home.pop(key)
+    bench = Bench(panel_of(MESSAGE, home))
+    bench.may_press = lambda _: locked("control_free", robot="the robot")
+    assert "Nobody has control" in bench.press("home").reason
+    assert bench.cancel("home").reason == "there is nothing under way to cancel"
 
 
 SPEED = {

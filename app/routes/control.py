@@ -1,7 +1,7 @@
 """Taking control of a robot, asking for it, giving it: JSON for scripts, forms without them."""
 
-from collections.abc import Mapping
-from typing import Annotated, Final, Literal
+import json
+from typing import Annotated, Any, Final, TypeVar
 from urllib.parse import parse_qsl
 
 from fastapi import APIRouter, Request
@@ -19,7 +19,7 @@ from app.sentences import say
 
 router = APIRouter()
 
-Act = Literal["take", "ask", "give", "keep", "release"]
+FORM: Final = "application/x-www-form-urlencoded"
 
 # A form's browser shows that it is there by loading its page anew, at the latest after this time.
 FORM_LIFE_S: Final = 35.0
@@ -42,6 +42,9 @@ class Here(BaseModel):
     touched: bool = False
 
 
+Fields = TypeVar("Fields", bound=BaseModel)
+
+
 class ControlAnswer(BaseModel):
     """What came of an act: `browser` is the id of who asked, `reason` is "" where it was done."""
 
@@ -51,10 +54,20 @@ class ControlAnswer(BaseModel):
     control: dict[str, bool | str]
 
 
-@router.post("/control/here", status_code=204, summary="The holder's or asker's page is still there")
-async def here(request: Request, given: Here, site: CurrentSite, kiosk: CurrentKiosk) -> Response:
+def _body_of(model: type[BaseModel]) -> dict[str, Any]:
+    """A body that may be left out, for the description of the interface."""
+    return {"requestBody": {"content": {"application/json": {"schema": model.model_json_schema()}}}}
+
+
+@router.post(
+    "/control/here",
+    status_code=204,
+    summary="The holder's or asker's page is still there",
+    openapi_extra=_body_of(Here),
+)
+async def here(request: Request, site: CurrentSite, kiosk: CurrentKiosk) -> Response:
     _required(kiosk)
-    kiosk.control.here(visitor(request, site), given.touched)
+    kiosk.control.here(visitor(request, site), _read(Here, await _sent(request)).touched)
     return Response(status_code=204)
 
 
@@ -63,17 +76,14 @@ async def here(request: Request, given: Here, site: CurrentSite, kiosk: CurrentK
     response_model=ControlAnswer,
     summary="Take, ask for, give, keep or release control of the robot",
     responses={303: {"description": "a form post"}, 409: {"model": ControlAnswer}},
-    openapi_extra={
-        "requestBody": {"content": {"application/json": {"schema": Acting.model_json_schema()}}}
-    },
+    openapi_extra=_body_of(Acting),
 )
-async def act(act: Act, request: Request, site: CurrentSite, kiosk: CurrentKiosk) -> Response:
+async def act(act: str, request: Request, site: CurrentSite, kiosk: CurrentKiosk) -> Response:
     _required(kiosk)
     browser = visitor(request, site)
     _, token = welcomed(request, site)  # without a cookie nothing is done yet, the next time it is
-    kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
-    form = kind == "application/x-www-form-urlencoded"
-    given = _acting(await request.body(), form)
+    form = _kind(request) == FORM
+    given = _read(Acting, await _sent(request))
     refusal = _done(kiosk, act, browser, given.to, FORM_LIFE_S if form else LIFE_S)
     kiosk.show()
     if form:
@@ -92,7 +102,7 @@ def _required(kiosk: Kiosk) -> None:
         raise NotFound("on this panel nobody needs control: its file has no [control] required = true")
 
 
-def _done(kiosk: Kiosk, act: Act, browser: Browser, to: str, life_s: float) -> Refusal:
+def _done(kiosk: Kiosk, act: str, browser: Browser, to: str, life_s: float) -> Refusal:
     control = kiosk.control
     match act:
         case "take":
@@ -105,19 +115,33 @@ def _done(kiosk: Kiosk, act: Act, browser: Browser, to: str, life_s: float) -> R
             return control.keep(browser, to)
         case "release":
             return control.release(browser)
+    raise NotFound(f'there is no "/control/{act:.40}": there is take, ask, give, keep, release, here')
 
 
-def _acting(body: bytes, form: bool) -> Acting:
+def _kind(request: Request) -> str:
+    return request.headers.get("content-type", "").partition(";")[0].strip().lower()
+
+
+async def _sent(request: Request) -> dict[str, Any]:
+    """The fields of a body: JSON, a form, or nothing at all."""
+    kind, body = _kind(request), await request.body()
     try:
-        if form:
-            fields: Mapping[str, str] = dict(
-                parse_qsl(body.decode("ascii"), keep_blank_values=True, max_num_fields=8)
-            )
-            return Acting.model_validate(fields)
-        return Acting.model_validate_json(body or b"{}")
+        if kind == FORM:
+            text = body.decode("ascii")
+            return dict(parse_qsl(text, keep_blank_values=True, max_num_fields=8))
+        fields = json.loads(body or b"{}")
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"the body is not what its type says: {error}") from None
+    if kind not in ("application/json", "") or not isinstance(fields, dict):
+        raise InputError(
+            f'the body must be an object of "application/json" or a "{FORM}", not "{kind}"'
+        )
+    return fields
+
+
+def _read(model: type[Fields], sent: dict[str, Any]) -> Fields:
+    try:
+        return model.model_validate(sent)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
-        place = ".".join(str(step) for step in first["loc"])
-        raise InputError(f"{place or 'the body'}: {first['msg']}") from None
-    except ValueError as error:
-        raise InputError(f"the body is not a form: {error}") from None
+        raise InputError(f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from None

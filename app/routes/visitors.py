@@ -6,7 +6,7 @@ from typing import Final
 from fastapi import Request
 from fastapi.responses import Response
 
-from app.browsers import TOKEN, Browser, new_token, stranger
+from app.browsers import TOKEN, Browser, new_token, newcomer, stranger
 from app.routes.site import Site
 
 COOKIE: Final = "panel_browser"
@@ -31,7 +31,9 @@ def welcomed(request: Request, site: Site) -> tuple[Browser, str]:
     if browser.id or request.headers.get("sec-fetch-site") in OTHER_SITES:
         return browser, ""
     token = new_token()
-    return site.browsers.seen(token, browser.address), token
+    if by_hand(request):
+        return site.browsers.seen(token, browser.address), token
+    return newcomer(token, browser.address), token
 
 
 def keep(response: Response, request: Request, token: str) -> Response:

@@ -122,6 +122,7 @@ export class Control {
   async #act(button) {
     if (this.#busy || button.disabled) return;
     this.#busy = true;
+    this.#bar.setAttribute("aria-busy", "true");
     const pause = new Promise((resolve) => setTimeout(resolve, TAP_AGAIN_MS));
     const said = this.#bar.querySelector(".refused");
     try {
@@ -133,6 +134,7 @@ export class Control {
     }
     await pause;
     this.#busy = false;
+    this.#bar.removeAttribute("aria-busy");
   }
 
   #post(act, body, keepalive = false) {
