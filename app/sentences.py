@@ -69,7 +69,7 @@ ENGLISH: Final[Mapping[str, str]] = {
     "control_held": "{name} has control of {robot}.",
     "control_free": "Nobody has control of {robot}: take control first.",
     "control_mine": "This panel has control of {robot}.",
-    "control_asks": "{name} asks for control of {robot}: given by itself after {seconds} s untouched.",
+    "control_asks": "{name} asks for control of {robot}; untouched, it goes over in {seconds} s.",
     "control_asked": "{name} was asked: control is yours after {seconds} s without a touch there.",
     "control_take": "Take control",
     "control_ask": "Ask for control",

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
@@ -10,6 +11,8 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 
 from app.browsers import Browser, Browsers, stranger
 from app.control import ASK_AGAIN_S, LIFE_S, Control, Refusal, Role, role
+from app.errors import PanelError
+from app.panel import Panel, load_panel
 from app.panel.control import ControlRules
 
 RULES = ControlRules(required=True)
@@ -66,7 +69,7 @@ def asked(held: Room) -> Room:
 
 
 def test_where_it_is_not_required_everybody_may_press() -> None:
-    room = Room(ControlRules())
+    room = Room(ControlRules(required=False))
     assert all(room.may(one) for one in (ANN, CELL, NOBODY))
     assert not room.control.view()["required"]
     assert room.control.until == math.inf
@@ -158,7 +161,7 @@ def test_a_request_is_shown_to_all(asked: Room) -> None:
     assert (view["holder"], view["asker"]) == (ANN.id, BOB.id)
     assert view["asker_name"] == "Panel 2 (192.0.2.2)"
     assert view["holder_text"] == (
-        "Panel 2 (192.0.2.2) asks for control of Robot 1: given by itself after 30 s untouched."
+        "Panel 2 (192.0.2.2) asks for control of Robot 1; untouched, it goes over in 30 s."
     )
     assert "after 30 s without a touch" in view["asker_text"]
     assert view["text"] == "Panel 1 (192.0.2.1) has control of Robot 1."
@@ -405,6 +408,50 @@ def test_the_log_tells_every_change_with_who_it_was(asked: Room) -> None:
         "control taken over by the panel at the cell (127.0.0.1)",
         "control lost by the panel at the cell (127.0.0.1), now of nobody",
     ]
+
+
+# What a panel file says of it.
+
+
+def panel_with(folder: Path, table: str) -> Panel:
+    path = folder / "cell.toml"
+    path.write_text(f'title = "Cell"\n{table}\n[[page]]\nid = "one"\ntitle = "One"\n')
+    return load_panel(path)
+
+
+def test_it_is_off_where_a_panel_does_not_ask_for_it(tmp_path: Path) -> None:
+    assert panel_with(tmp_path, "").control.required is False
+    assert panel_with(tmp_path, "[control]\nrequired = false").control.required is False
+
+
+def test_one_line_requires_it(tmp_path: Path) -> None:
+    rules = panel_with(tmp_path, "[control]\nrequired = true").control
+    assert (rules.required, rules.takeover_after_s, rules.local) == (True, 30.0, True)
+
+
+@pytest.mark.parametrize(
+    ("table", "fault"),
+    [
+        ("control = true", "control: must be a table, not True"),
+        ("[control]", "control.required: is missing"),
+        ("[control]\ntakeover_after_s = 5", "control.required: is missing"),
+        ('[control]\nrequired = "yes"', "control.required: input should be a valid boolean, not 'yes'"),
+        (
+            "[control]\nrequired = true\ntakeover_after_s = 0",
+            "control.takeover_after_s: input should be greater than 0, not 0",
+        ),
+        ("[control]\nrequired = true\ntakeover_after_s = nan", "control.takeover_after_s: "),
+        ("[control]\nrequired = true\ntakeover_after_s = 1e9", "control.takeover_after_s: "),
+        ("[control]\nrequired = true\nlocl = true", 'control.locl: unknown key; did you mean "local"?'),
+    ],
+)
+def test_what_is_wrong_with_the_table_is_told_with_all_else(
+    tmp_path: Path, table: str, fault: str
+) -> None:
+    with pytest.raises(PanelError) as caught:
+        panel_with(tmp_path, f'{table}\n[[interlock]]\nid = "a"\ntopic = "nowhere"\n')
+    assert fault in str(caught.value)
+    assert "interlock[0].topic" in str(caught.value)
 
 
 # Whatever they do, in whatever order.

@@ -160,6 +160,8 @@ def _message(error: Any, model: type[BaseModel], location: tuple[str | int, ...]
             return f"must be a list of tables: write [[{'.'.join(map(str, _names(location)))}]]"
         case "missing":
             return "is missing"
+        case "model_type":
+            return f"must be a table, not {error['input']!r}"
         case "union_tag_not_found":
             return f'"kind" is missing; one of {", ".join(KINDS)}'
         case "union_tag_invalid":

@@ -139,7 +139,7 @@ class Panel(Description):
     interfaces: Annotated[tuple[Folder, ...], Field(strict=False)] = ()
     namespace: Annotated[str, AfterValidator(namespace_of)] = ""
     mm_per_px: Annotated[float, Field(gt=0.02, lt=1)] = 0.22
-    control: ControlRules = ControlRules()
+    control: ControlRules = ControlRules(required=False)
     robots: Annotated[tuple[RobotEntry, ...], Field(strict=False)] = Field((), alias="robot")
     interlocks: Annotated[tuple[Interlock, ...], Field(strict=False)] = Field((), alias="interlock")
     pages: Annotated[tuple[Page, ...], Field(strict=False)] = Field(alias="page")
