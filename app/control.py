@@ -8,9 +8,10 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import Final, Literal, TypedDict
+from typing import Final, Literal
 
 from app.browsers import Browser
+from app.control_view import ControlView, control_view
 from app.interlocks import PERMITTED, Verdict, locked
 from app.panel.control import ControlRules
 from app.sentences import say
@@ -18,7 +19,6 @@ from app.sentences import say
 LIFE_S: Final = 5.0  # without a sign of life; a page with scripts gives one every 1.5 s
 ASK_AGAIN_S: Final = 10.0  # after a request was denied
 
-Role = Literal["free", "held", "over", "asking", "holding", "asked"]
 Refusal = Literal[
     "",
     "control_taken",
@@ -27,34 +27,6 @@ Refusal = Literal[
     "control_not_yours",
     "control_stranger",
 ]
-
-
-class ControlView(TypedDict):
-    """What every page shows; each picks its text by comparing the ids with its own. "" is nobody;
-    `since` is RFC 3339."""
-
-    required: bool
-    holder: str
-    holder_name: str
-    asker: str
-    asker_name: str
-    since: str
-    holder_text: str
-    asker_text: str
-    text: str
-
-
-NO_CONTROL: Final = ControlView(
-    required=False,
-    holder="",
-    holder_name="",
-    asker="",
-    asker_name="",
-    since="",
-    holder_text="",
-    asker_text="",
-    text="",
-)
 
 
 @dataclass(slots=True)
@@ -208,29 +180,7 @@ class Control:
 
     def view(self) -> ControlView:
         """What the pages show."""
-        if not self.rules.required:
-            return NO_CONTROL
-        holder, asker, robot = self.holder, self.asker, self._robot
-        other = say("control_free", robot=robot)
-        mine = say("control_mine", robot=robot)
-        asked = ""
-        if holder:
-            other = say("control_held", name=holder.title, robot=robot)
-        if holder and asker:
-            limit = f"{self.rules.takeover_after_s:g}"
-            mine = say("control_asks", name=asker.title, robot=robot, seconds=limit)
-            asked = say("control_asked", name=holder.title, seconds=limit)
-        return ControlView(
-            required=True,
-            holder=holder.id if holder else "",
-            holder_name=holder.title if holder else "",
-            asker=asker.id if asker else "",
-            asker_name=asker.title if asker else "",
-            since=self._since,
-            holder_text=mine,
-            asker_text=asked,
-            text=other,
-        )
+        return control_view(self.rules, self._robot, self.holder, self.asker, self._since)
 
     def _over(self, browser: Browser) -> bool:
         return browser.local and self.rules.local and bool(browser.id)
@@ -275,17 +225,6 @@ class Control:
         if self._asker:
             self._tell(f"{self._asker.browser} asks for control no more")
         self._asker = None
-
-
-def role(control: ControlView, browser: Browser, rules: ControlRules) -> Role:
-    """What a browser is to who has control; pages show their buttons by it."""
-    if not control["holder"]:
-        return "free"
-    if browser.id == control["holder"]:
-        return "asked" if control["asker"] else "holding"
-    if browser.id and browser.id == control["asker"]:
-        return "asking"
-    return "over" if browser.local and rules.local else "held"
 
 
 def _is(browser: Browser, other: Browser | None) -> bool:

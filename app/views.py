@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any, Final, Literal, TypedDict
 
 from app.browsers import Browser
-from app.control import NO_CONTROL, ControlView
+from app.control_view import NO_CONTROL, ControlView
 from app.displays import indicator, readout
 from app.inputs import limits
 from app.interlocks import Verdict, interlock_verdict, press_verdict, way

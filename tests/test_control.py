@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
 from app.browsers import Browser, Browsers, stranger
-from app.control import ASK_AGAIN_S, LIFE_S, Control, Refusal, Role, role
+from app.control import ASK_AGAIN_S, LIFE_S, Control, Refusal
+from app.control_view import Role, role
 from app.errors import PanelError
 from app.panel import Panel, load_panel
 from app.panel.control import ControlRules

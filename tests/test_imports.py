@@ -48,6 +48,7 @@ ORDER = (
     "app.progress",
     "app.robot",
     "app.interlocks",
+    "app.control_view",
     "app.control",
     "app.displays",
     "app.views",

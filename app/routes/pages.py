@@ -7,7 +7,8 @@ from typing import Any, TypedDict, get_args
 from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse, RedirectResponse, Response
 
-from app.control import Refusal, Role, role
+from app.control import Refusal
+from app.control_view import Role, role
 from app.errors import NotFound
 from app.panel.model import Input, Page, Panel
 from app.presses import Receipt
