@@ -105,6 +105,8 @@ class Board:
             events.append(self._event("update", widgets))
         if old["link"] != new["link"]:
             events.append(self._event("link", new["link"]))
+        if old["control"] != new["control"]:
+            events.append(self._event("control", new["control"]))
         if old["notice"] != new["notice"]:
             events.append(self._event("notice", new["notice"]))
         if old["robots"] != new["robots"]:
@@ -123,6 +125,11 @@ def beat() -> bytes:
     """
     data = {"clock": clock(time.time()), "now": round(moments.now() * 1000)}
     return format_sse_event(event="beat", data_str=json.dumps(data))
+
+
+def told(browser: str) -> bytes:
+    """Tells a page the id of its browser: it knows by it what `control` means for it."""
+    return format_sse_event(event="browser", data_str=json.dumps({"id": browser}))
 
 
 def _changed(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:

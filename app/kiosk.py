@@ -15,20 +15,21 @@ from typing import Any, Final
 from app import keys, moments
 from app.actions import Actions
 from app.board import Board
+from app.browsers import Browser
 from app.calls import Calls
 from app.confirmations import Confirmations
+from app.control import Control
 from app.errors import KioskError, LinkError
 from app.interfaces import interfaces_of
 from app.interlocks import Verdict, way
 from app.joining import LOG_TYPE, Joining
 from app.link import Config, Link
-from app.log import Origin
-from app.logbook import Log, Logbook
+from app.logbook import Log, Logbook, origin_of
 from app.logs import RobotLog, RosoutHandler
 from app.panel.model import Panel, RobotEntry
 from app.panel.parameter import EVENTS
 from app.parameters import Parameters
-from app.presses import Presses, Receipt
+from app.presses import By, Presses, Receipt
 from app.robot import Robot
 from app.sentences import say
 from app.views import Lamp, Sight, sight
@@ -73,6 +74,7 @@ class Kiosk:
         self.link = Link(config, self._wake)
         self.robot = Robot(panel, self.interfaces, self.link.zid, entry)
         self._log = RobotLog(log, self.robot.name)
+        self.control = Control(panel.control, self.robot.name, tell=self._log.info)
         first = self._sight()
         self.lamp = first.robot
         self.board = Board(first.view, revision)
@@ -146,20 +148,23 @@ class Kiosk:
         widget: str,
         inputs: Mapping[str, Any],
         press_id: str,
-        origin: Origin,
+        browser: Browser,
+        seen: str = "",
         version: int | None = None,
         at: float | None = None,
     ) -> Receipt:
         """A press, judged by all that has come from the robot until now.
 
-        `version` is of the board that the operator saw, `at` when it was pressed, in the server's
-        own time; None where that is not known.
+        `seen` is what the log is told of what the operator saw: the `version` of the board; `at` is
+        when it was pressed, in the server's own time. None where that is not known.
         """
-
-        def doubt() -> str:
-            return self._doubt(widget, version, at)
-
-        return await self.presses.press(widget, inputs, press_id, origin, doubt)
+        self.control.touch(browser)
+        by = By(
+            origin_of(browser, seen),
+            lambda: self.control.verdict(browser),
+            lambda: self._doubt(widget, version, at),
+        )
+        return await self.presses.press(widget, inputs, press_id, by)
 
     def _doubt(self, widget: str, version: int | None, at: float | None) -> str:
         """Why a press is no longer what was meant; "" if it is."""
@@ -270,6 +275,7 @@ class Kiosk:
             simulated=self._simulated,
             fault="\n".join(filter(None, (self.fault, self._operators_log.fault))),
             lock=self._operators_log.lock,
+            control=self.control.view(),
         )
 
     def show(self) -> None:
@@ -286,7 +292,7 @@ class Kiosk:
             self._told(self)
             seen = self._sight()
         self.board.post(seen.view)
-        self._show_at(seen.until)
+        self._show_at(min(seen.until, self.control.until))
 
     def _show_at(self, when: float) -> None:
         """Shows again at `when` (monotonic seconds), or sooner if that is planned already."""

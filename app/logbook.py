@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
 from typing import Any, Protocol
 
+from app.browsers import Browser
 from app.errors import LogError
 from app.log.entry import Entry, Origin, entered
 from app.progress import Answer
@@ -101,3 +102,8 @@ class Logbook:
 
     def _about(self, widget: str, press_id: str, action: str) -> dict[str, str]:
         return {"widget": widget, "press": press_id, "action": action, "robot": self._robot}
+
+
+def origin_of(browser: Browser, seen: str = "") -> Origin:
+    """Where a press comes from: a browser, which is named until users log in."""
+    return Origin(address=browser.address, browser=browser.id, who=browser.name, seen=seen)

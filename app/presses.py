@@ -23,7 +23,7 @@ from app.confirmations import Confirmations
 from app.errors import FieldError, InputError, LinkError, LogError, NotFound
 from app.inputs import checked, typed
 from app.interfaces import Interfaces
-from app.interlocks import press_verdict
+from app.interlocks import PERMITTED, Verdict, press_verdict, way
 from app.log import Origin
 from app.logbook import Logbook, Noted
 from app.logs import RobotLog
@@ -102,6 +102,16 @@ def no_doubt() -> str:
     return ""
 
 
+@dataclass(frozen=True, slots=True)
+class By:
+    """Who presses, and what has to hold beside the robot's permission when it is sent: `controls`
+    judges who has control, `doubt` says why what the operator saw is no longer so."""
+
+    origin: Origin
+    controls: Callable[[], Verdict] = lambda: PERMITTED
+    doubt: Callable[[], str] = no_doubt
+
+
 class Presses:
     """Presses of one panel, with their receipts by press id."""
 
@@ -157,27 +167,20 @@ class Presses:
         """The receipt of a press, as it is known now."""
         return self._receipts.get(press_id)
 
-    async def press(
-        self,
-        widget_id: str,
-        inputs: Mapping[str, Any],
-        press_id: str,
-        origin: Origin,
-        doubt: Callable[[], str] = no_doubt,
-    ) -> Receipt:
+    async def press(self, widget_id: str, inputs: Mapping[str, Any], press_id: str, by: By) -> Receipt:
         """Sends what the widget is for, or refuses. The same id again is the same press.
 
-        `doubt` says why what the operator saw no longer holds, in the moment of sending.
+        What it is judged by, is judged in the moment of sending.
         """
         widget = self.widget(widget_id)
         known = self._under_way.get(press_id) or self._receipts.get(press_id)
         if known is None:
-            work = self._logged(widget, inputs, press_id, origin, doubt)
+            work = self._logged(widget, inputs, press_id, by)
             return await self._once(widget, inputs, press_id, work)
         if (known.widget, known.inputs) != (widget_id, inputs):
             reused = say("press_reused", id=press_id)
             own_id = f"{press_id:.40}.{secrets.token_hex(4)}"
-            work = self._refused(widget, inputs, own_id, origin, reused, "input")
+            work = self._refused(widget, inputs, own_id, by.origin, reused, "input")
             return await self._once(widget, inputs, own_id, work)
         if isinstance(known, _UnderWay):
             return await asyncio.shield(known.receipt)
@@ -198,7 +201,7 @@ class Presses:
         return await self._once(widget, inputs, press_id, work)
 
     async def cancel(self, widget_id: str, origin: Origin) -> Receipt:
-        """Asks the robot to cancel the goal of an action widget."""
+        """Asks the robot to cancel the goal of an action widget: anybody may, whoever has control."""
         widget = self.widget(widget_id)
         if not isinstance(widget, Action):
             raise NotFound(f'"{widget_id}" is not an action: there is nothing to cancel')
@@ -206,7 +209,7 @@ class Presses:
         with _noted_to_the_end(noted):
             answer = await self._actions.cancel(widget)
         self._log.info(
-            "cancel of %s by %s: %s: %s", widget_id, origin.address, answer.outcome, answer.text
+            "cancel of %s by %s: %s: %s", widget_id, _named(origin), answer.outcome, answer.text
         )
         cause: Cause = "interlock" if answer.outcome == "refused" else ""
         receipt = self._receipt(widget, {}, "", answer.outcome, answer.text, cause)
@@ -240,21 +243,20 @@ class Presses:
         widget: Pressed,
         inputs: Mapping[str, Any],
         press_id: str,
-        origin: Origin,
-        doubt: Callable[[], str],
+        by: By,
     ) -> Receipt:
         try:
-            noted = await self._logbook.pressed(widget.id, inputs, press_id, origin)
+            noted = await self._logbook.pressed(widget.id, inputs, press_id, by.origin)
         except LogError as error:
             text = say("refused", why=str(error), time=clock(time.time()))
             receipt = self._receipt(widget, inputs, press_id, "refused", text, "log")
         else:
             with _noted_to_the_end(noted):
-                receipt = await self._pressed(widget, inputs, press_id, noted, doubt)
+                receipt = await self._pressed(widget, inputs, press_id, noted, by)
             receipt = await _closed(noted, receipt)
         level = logging.INFO if receipt.outcome in FINE else logging.WARNING
         self._log.log(level, "press %s of %s by %s with %.*s: %s: %s", press_id, widget.id,
-                origin.address,
+                _named(by.origin),
                 LONGEST_LOGGED, inputs, receipt.outcome, receipt.reason)  # fmt: skip
         return receipt
 
@@ -269,7 +271,7 @@ class Presses:
     ) -> Receipt:
         """A press that is not even judged."""
         receipt = self._receipt(widget, inputs, press_id, "refused", text, cause)
-        log.warning("press %s of %s by %s: %s", press_id, widget.id, origin.address, text)
+        self._log.warning("press %s of %s by %s: %s", press_id, widget.id, _named(origin), text)
         return _with_doubt(
             receipt, await self._logbook.refused(widget.id, inputs, press_id, origin, text)
         )
@@ -285,13 +287,16 @@ class Presses:
         if old := self._receipts.get(press_id):
             self._receipts[press_id] = _corrected(old, answer)
 
+    def _judged(self, widget: Pressed, by: By) -> Verdict:
+        """The first that locks: the way to the robot, who has control, the widget's interlock."""
+        now = self._monotonic()
+        for verdict in (way(self._robot, now), by.controls()):
+            if not verdict.permitted:
+                return verdict
+        return press_verdict(widget, self._panel.interlock(widget.interlock), self._robot, now)
+
     async def _pressed(
-        self,
-        widget: Pressed,
-        inputs: Mapping[str, Any],
-        press_id: str,
-        noted: Noted,
-        doubt: Callable[[], str],
+        self, widget: Pressed, inputs: Mapping[str, Any], press_id: str, noted: Noted, by: By
     ) -> Receipt:
         def receipt(answer: Answer, cause: Cause = "") -> Receipt:
             return self._receipt(widget, inputs, press_id, answer.outcome, answer.text, cause)
@@ -301,13 +306,12 @@ class Presses:
             return receipt(Answer("refused", say(sentence, why=why, time=now)), cause)
 
         self._catch_up()
-        interlock = self._panel.interlock(widget.interlock)
-        verdict = press_verdict(widget, interlock, self._robot, self._monotonic())
+        verdict = self._judged(widget, by)
         noted.judged(verdict.code)
         if not verdict.permitted:
             cause: Cause = "link" if verdict.code in NO_WAY else "interlock"
             return refused("refused", verdict.reason or "", cause)
-        if why := doubt():
+        if why := by.doubt():
             return refused("refused", why, "interlock")
         try:
             values = self._checked(widget, inputs)
@@ -411,3 +415,7 @@ def _with_doubt(receipt: Receipt, doubt: str) -> Receipt:
     if not doubt:
         return receipt
     return replace(receipt, reason=say("log_not_on_disk", said=receipt.reason, why=doubt))
+
+
+def _named(origin: Origin) -> str:
+    return f"{origin.who} ({origin.address})" if origin.who else origin.address

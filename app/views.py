@@ -9,6 +9,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Literal, TypedDict
 
+from app.browsers import Browser
+from app.control_view import NO_CONTROL, ControlView
 from app.displays import indicator, readout
 from app.inputs import limits
 from app.interlocks import (
@@ -58,6 +60,7 @@ class View(TypedDict):
     widgets: dict[str, dict[str, Any]]
     notice: Notice
     robots: dict[str, Lamp]
+    control: ControlView
 
 
 NO_OTHERS: Final[Mapping[str, Lamp]] = {}
@@ -82,6 +85,7 @@ def sight(
     simulated: bool = False,
     fault: str = "",
     lock: str = "",
+    control: ControlView = NO_CONTROL,
 ) -> Sight:
     """The view at `now` (monotonic seconds); `fault` stands above it, for `lock` nothing can be
     pressed, where they are not ""."""
@@ -125,8 +129,21 @@ def sight(
             banner=say("simulated") if simulated or robot.graph.simulated else "", fault=fault
         ),
         robots=dict(robots),
+        control=control,
     )
     return Sight(view, summary(robot.name, link), min(untils))
+
+
+def as_seen_by(view: View, browser: Browser) -> View:
+    """The view as a page shows it: without control what can be pressed is locked, unless there is no
+    way to the robot at all. Pages with scripts do the same to what events bring."""
+    control = view["control"]
+    mine = browser.id and browser.id == control["holder"]
+    if not control["required"] or mine or view["link"]["bridge"]["state"] != "ok":
+        return view
+    lock = {"enabled": False, "reason": control["text"]}
+    widgets = {w: {**a, **lock} if "enabled" in a else a for w, a in view["widgets"].items()}
+    return {**view, "widgets": widgets}
 
 
 def enabled(verdict: Verdict) -> Enabled:

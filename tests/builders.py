@@ -14,7 +14,7 @@ from app.log import Origin, Unlogged
 from app.logbook import Logbook
 from app.panel.model import Panel
 from app.parameters import Parameters
-from app.presses import Presses
+from app.presses import By, Presses
 from app.robot import Robot, Sample
 
 Table = Mapping[str, Any]
@@ -26,7 +26,7 @@ BRIDGE: Final = "b1"
 KIOSK: Final = "c1"
 ENABLED: Final = "/operation_enabled"
 NOW: Final = 1000.0  # monotonic seconds
-FROM: Final = Origin(address="127.0.0.1")
+FROM: Final = By(Origin(address="127.0.0.1"))
 NOTHING: Final[Table] = {}
 
 INTERLOCK: Final[Table] = {"id": "operation", "topic": ENABLED}

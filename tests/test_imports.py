@@ -13,6 +13,7 @@ ORDER = (
     "app.errors",
     "app.settings",
     "app.sentences",
+    "app.browsers",
     "app.logs",
     "app.moments",
     "app.keys",
@@ -30,6 +31,7 @@ ORDER = (
     "app.interfaces.store",
     "app.interfaces",
     "app.panel.description",
+    "app.panel.control",
     "app.panel.inputs",
     "app.panel.displays",
     "app.panel.ranges",
@@ -67,6 +69,8 @@ ORDER = (
     "app.progress",
     "app.robot",
     "app.interlocks",
+    "app.control_view",
+    "app.control",
     "app.displays",
     "app.parameter_display",
     "app.views",
@@ -88,9 +92,11 @@ ORDER = (
     "app.doors",
     "app.startup",
     "app.routes.site",
+    "app.routes.visitors",
     "app.routes.pages",
     "app.routes.events",
     "app.routes.presses",
+    "app.routes.control",
     "app.routes.health",
     "app.routes.static",
     "app.routes.log",
@@ -169,7 +175,7 @@ def test_the_link_knows_no_view_and_no_panel() -> None:
 
 
 @pytest.mark.parametrize(
-    "module", ["app.interlocks", "app.views", "app.presses", "app.board", "app.kiosk"]
+    "module", ["app.interlocks", "app.control", "app.views", "app.presses", "app.board", "app.kiosk"]
 )
 def test_what_decides_knows_no_http(module: str) -> None:
     frameworks = {"starlette", "uvicorn", "jinja2", "app.routes"}

@@ -14,11 +14,12 @@ from app.log import Entry, Filter, Limits, OperatorLog, Origin
 from app.log.reading import rows
 from app.logbook import Log, Logbook
 from app.panel.model import Panel
-from app.presses import Receipt
+from app.presses import By, Receipt
 from app.progress import IDLE
 from tests.builders import INTERFACES, panel_of, permits, presses_of, robot_there, small_panel
 
-FROM = Origin(address="10.0.0.7", browser="b1", who="Kim", seen="boot-7")
+KIM = Origin(address="10.0.0.7", browser="b1", who="Kim", seen="boot-7")
+FROM = By(KIM)
 SET = {
     "id": "light",
     "kind": "call",
@@ -222,7 +223,7 @@ def test_no_log_keeps_anybody_from_canceling() -> None:
         log.written.set()
         log.fails = True
         bench.robot.progress["count"] = IDLE
-        receipt = await bench.presses.cancel("count", FROM)
+        receipt = await bench.presses.cancel("count", KIM)
         assert "there is nothing under way to cancel" in receipt.reason
         assert "Not safely in the operator's log" in receipt.reason
 
@@ -280,7 +281,7 @@ def test_every_refusal_is_in_the_log(tmp_path: Path) -> None:
         permits(bench.robot, False)
         await bench.press("guarded", "p2")
         await bench.press("free", "p2")
-        await bench.presses.refuse("free", {}, "p3", FROM, "seen_before_restart")
+        await bench.presses.refuse("free", {}, "p3", KIM, "seen_before_restart")
 
     entries = [entry for entry in real(tmp_path, work) if entry.kind != "pressed"]
     assert [entry.outcome for entry in entries] == ["refused"] * 4

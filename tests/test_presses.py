@@ -10,16 +10,20 @@ from typing import Any
 
 import pytest
 
+from app.browsers import Browser, Browsers, stranger
+from app.control import Control
 from app.errors import LinkError, NotFound
+from app.interlocks import PERMITTED, Verdict, locked
+from app.logbook import origin_of
+from app.panel.control import ControlRules
 from app.panel.model import Panel
-from app.presses import RECEIPTS_KEPT, Receipt
+from app.presses import RECEIPTS_KEPT, By, Receipt
 from app.robot import Robot, Sample
 from tests.builders import (
     BOOL,
     BRIDGE,
     ENABLED,
     FREE,
-    FROM,
     GUARDED,
     HEARD,
     INTERFACES,
@@ -57,6 +61,9 @@ class Way:
         return [INTERFACES.decode(TEXT, payload).data for _, payload in self.sent]
 
 
+PROGRAM = stranger("127.0.0.1")
+
+
 class Bench:
     """Presses on a robot that is there and permits, at a time that is set."""
 
@@ -67,14 +74,23 @@ class Bench:
         self.robot = robot_there(panel)
         permits(self.robot)
         self._presses = presses_of(panel, self.robot, self.way, monotonic=lambda: self.now)
+        self.may_press: Callable[[Browser], Verdict] = lambda _: PERMITTED
         self.receipt = self._presses.receipt
         self.typed = self._presses.typed
 
     def press(
-        self, widget: str = "free", inputs: Mapping[str, Any] | None = None, press_id: str = "p1"
+        self,
+        widget: str = "free",
+        inputs: Mapping[str, Any] | None = None,
+        press_id: str = "p1",
+        who: Browser = PROGRAM,
     ) -> Receipt:
         given = {"message": "hello"} if inputs is None else inputs
-        return asyncio.run(self._presses.press(widget, given, press_id, FROM))
+        by = By(origin_of(who), lambda: self.may_press(who))
+        return asyncio.run(self._presses.press(widget, given, press_id, by))
+
+    def cancel(self, widget: str) -> Receipt:
+        return asyncio.run(self._presses.cancel(widget, origin_of(PROGRAM)))
 
 
 @pytest.fixture
@@ -336,6 +352,57 @@ def test_the_log_tells_who_pressed_what_and_what_came_of_it(
     assert record.levelno == level
     for part in ("p1", "guarded", "127.0.0.1", "'hello'", receipt.outcome, receipt.reason):
         assert part in record.getMessage()
+
+
+class Locked:
+    """Presses of a robot that another browser has control of."""
+
+    def __init__(self) -> None:
+        self.bench = Bench()
+        self.other = Browsers().seen("0" * 32, "192.0.2.7")
+        control = Control(ControlRules(required=True), "", monotonic=lambda: NOW)
+        control.take(self.other)
+        self.bench.may_press = control.verdict
+
+
+def test_a_press_without_control_is_refused_with_who_has_it() -> None:
+    bench = Locked().bench
+    cause, reason = refused(bench, bench.press())
+    assert (cause, reason) == (
+        "interlock",
+        "Not sent: Panel 1 (192.0.2.7) has control of the robot.",
+    )
+
+
+def test_a_press_of_who_has_control_is_sent() -> None:
+    locked = Locked()
+    assert locked.bench.press(who=locked.other).outcome == "published"
+
+
+def test_the_link_is_told_before_control_and_control_before_an_interlock() -> None:
+    bench = Locked().bench
+    permits(bench.robot, False)
+    assert "has control" in refused(bench, bench.press("guarded", press_id="p1"))[1]
+    bench.robot.link_up = False
+    cause, reason = refused(bench, bench.press("guarded", press_id="p2"))
+    assert (cause, reason.startswith("Not sent: No connection")) == ("link", True)
+
+
+def test_cancelling_needs_no_control() -> None:
+    home = {
+        **FREE,
+        "id": "home",
+        "kind": "action",
+        "action": "/count",
+        "type": "example_interfaces/action/Fibonacci",
+        "goal": {"order": 1},
+    }
+    for key in ("topic", "message"):
+        home.pop(key)
+    bench = Bench(panel_of(MESSAGE, home))
+    bench.may_press = lambda _: locked("control_free", robot="the robot")
+    assert "Nobody has control" in bench.press("home").reason
+    assert bench.cancel("home").reason == "there is nothing under way to cancel"
 
 
 SPEED = {

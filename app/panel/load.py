@@ -81,9 +81,7 @@ def _faults_of_the_rest(
             case ("page", int(p), str(key)):
                 mended["page"][p].pop(key, None)
                 mended["page"][p] = {"id": f"faulty_{p}", "title": "?"} | mended["page"][p]
-            case ("log", *_):
-                mended.pop("log", None)
-            case (str(key),):
+            case (str(key),) | ("control" | "log" as key, *_):
                 mended.pop(key, None)
                 mended.setdefault("title", "?")
     try:
@@ -163,6 +161,8 @@ def _message(error: Any, model: type[BaseModel], location: tuple[str | int, ...]
             return f"must be a list of tables: write [[{'.'.join(map(str, _names(location)))}]]"
         case "missing":
             return "is missing"
+        case "model_type":
+            return f"must be a table, not {error['input']!r}"
         case "union_tag_not_found":
             return f'"kind" is missing; one of {", ".join(KINDS)}'
         case "union_tag_invalid":

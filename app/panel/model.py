@@ -5,6 +5,7 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, Field
 
+from app.panel.control import ControlRules
 from app.panel.description import (
     ActionType,
     Description,
@@ -165,6 +166,7 @@ class Panel(Description):
     namespace: Annotated[str, AfterValidator(namespace_of)] = ""
     press_expires_s: Annotated[float, Field(ge=0.5, le=60)] = 2.0
     mm_per_px: Annotated[float, Field(gt=0.02, lt=1)] = 0.22
+    control: ControlRules = ControlRules(required=False)
     robots: Annotated[tuple[RobotEntry, ...], Field(strict=False)] = Field((), alias="robot")
     log: LogRules = LogRules()
     interlocks: Annotated[tuple[Interlock, ...], Field(strict=False)] = Field((), alias="interlock")

@@ -4,12 +4,13 @@ import time
 from collections.abc import AsyncIterator
 from typing import Final
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Request
 from fastapi.responses import Response
 from fastapi.sse import EventSourceResponse
 
-from app.board import Board, beat
+from app.board import Board, beat, told
 from app.routes.site import CurrentKiosk, CurrentSite, Site
+from app.routes.visitors import keep, welcomed
 
 router = APIRouter()
 
@@ -23,27 +24,34 @@ HEADERS: Final = {"cache-control": "no-store", "x-accel-buffering": "no"}
     "/events",
     response_class=Response,
     responses={200: {"content": {"text/event-stream": {}}}},
-    summary="Server-sent events: snapshot, <interlock>-enabled-updated, update, link, beat",
+    summary="Server-sent events: snapshot, <interlock>-enabled-updated, update, link, control, beat",
 )
-async def events(site: CurrentSite, kiosk: CurrentKiosk, once: bool = False) -> Response:
+async def events(
+    request: Request, site: CurrentSite, kiosk: CurrentKiosk, once: bool = False
+) -> Response:
     """`once`: the snapshot alone, for a browser that has no stream to spare."""
     board = kiosk.board
+    browser, token = welcomed(request, site) if board.view["control"]["required"] else (None, "")
+    first = told(browser.id) if browser else b""
     if once:
-        both = board.snapshot() + beat()
-        return Response(both, media_type="text/event-stream", headers=HEADERS)
-    return EventSourceResponse(_counted(site, board), headers=HEADERS)
+        all_of_it = board.snapshot() + first + beat()
+        answer = Response(all_of_it, media_type="text/event-stream", headers=HEADERS)
+    else:
+        answer = EventSourceResponse(_counted(site, board, first), headers=HEADERS)
+    return keep(answer, request, token)
 
 
-async def _counted(site: Site, board: Board) -> AsyncIterator[bytes]:
+async def _counted(site: Site, board: Board, first: bytes) -> AsyncIterator[bytes]:
     with site.metrics.streams.track_inprogress():
-        async for chunk in stream(board):
+        async for chunk in stream(board, first):
             yield chunk
 
 
-async def stream(board: Board) -> AsyncIterator[bytes]:
-    """What one browser gets. It waits while the browser does not read, and then skips to now."""
+async def stream(board: Board, first: bytes = b"") -> AsyncIterator[bytes]:
+    """What one browser gets; `first` comes with the snapshot. It waits while the browser does not
+    read, and then skips to now."""
     version, view = board.version, board.view
-    yield f"retry: {RECONNECT_MS}\n\n".encode() + board.snapshot() + beat()
+    yield f"retry: {RECONNECT_MS}\n\n".encode() + board.snapshot() + first + beat()
     next_beat = time.monotonic() + BEAT_S
     while not board.closed:
         await board.newer(version, next_beat - time.monotonic())

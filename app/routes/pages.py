@@ -2,20 +2,23 @@
 
 import secrets
 import time
-from typing import Any, TypedDict
+from typing import Any, TypedDict, get_args
 
 from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse, RedirectResponse, Response
 
 from app import moments
+from app.control import Refusal
+from app.control_view import Role, role
 from app.errors import NotFound
 from app.panel.model import Input, Page, Panel, Pressed
 from app.panel.parameter import Parameter
 from app.panel.template import inputs_of
 from app.presses import Receipt
 from app.routes.site import CurrentSite, Site
+from app.routes.visitors import by_hand, keep, welcomed
 from app.sentences import clock, say
-from app.views import View
+from app.views import View, as_seen_by
 
 router = APIRouter(include_in_schema=True)
 
@@ -24,6 +27,12 @@ router = APIRouter(include_in_schema=True)
 REFRESH_S = 5
 REFRESH_WITH_INPUTS_S = 30
 RELOADED_S = 2.0  # a press on a page that should have reloaded before is one on an old page
+
+
+# How long after a page without scripts was due it is still thought to be there.
+GRACE_S = 5
+REFUSALS = get_args(Refusal)
+CONTROL_ACTS = ("take", "ask", "give", "keep", "release", "withdraw")
 
 
 class PageContext(TypedDict):
@@ -49,6 +58,10 @@ class PageContext(TypedDict):
     refresh_s: int
     now: int
     until: float
+    browser: str
+    over: bool
+    role: Role
+    refused: str
 
 
 @router.get("/", response_class=HTMLResponse, summary="The first page of the panel")
@@ -85,8 +98,15 @@ def _to_a_robot(request: Request, site: Site, path: str) -> Response | None:
 
 def _render(request: Request, site: Site, page: Page) -> Response:
     kiosk = site.fleet.kiosk(request.path_params.get("robot"))
-    board = kiosk.board
     typed = any(isinstance(widget, Input | Parameter) for widget in page.widgets)
+    refresh_s = REFRESH_WITH_INPUTS_S if typed else REFRESH_S
+    browser, token = welcomed(request, site)
+    rules = kiosk.control.rules
+    if rules.required:
+        kiosk.control.loaded(browser, refresh_s + GRACE_S, by_hand(request))
+        kiosk.show()
+    board = kiosk.board
+    refusal = request.query_params.get("control", "")
     receipt = kiosk.presses.receipt(request.query_params.get("receipt", ""))
     refresh_s = REFRESH_WITH_INPUTS_S if typed else REFRESH_S
     now = moments.now()
@@ -96,22 +116,16 @@ def _render(request: Request, site: Site, page: Page) -> Response:
         page=page,
         base=kiosk.base,
         robot=kiosk.entry.id if kiosk.entry else "",
-        view=board.view,
+        view=as_seen_by(board.view, browser),
         event_id=board.id,
         revision=board.revision,
         clock=clock(time.time()),
         press_id=secrets.token_hex(8),
         receipt=receipt,
         inputs=dict(receipt.inputs) if receipt else {},
-        words={
-            "cancel": say("cancel"),
-            "robots": say("robots"),
-            "set": say("set"),
-            "back": say("back"),
-            "log": say("log_link"),
-            "base": kiosk.base,
-            "asks": asks_of(site.fleet.panel, page),
-        },
+        words={"base": kiosk.base, "log": say("log_link"), "asks": asks_of(site.fleet.panel, page)}
+        | {word: say(word) for word in ("cancel", "robots", "control", "set", "back")}
+        | {act: say(f"control_{act}") for act in CONTROL_ACTS},
         lost=say("server_lost"),
         lost_short=say("lost"),
         unknown=say("unknown"),
@@ -119,9 +133,13 @@ def _render(request: Request, site: Site, page: Page) -> Response:
         refresh_s=refresh_s,
         now=round(now * 1000),
         until=round(now + refresh_s + RELOADED_S, 3),
+        browser=browser.id,
+        over=rules.local and browser.local,
+        role=role(board.view["control"], browser, rules),
+        refused=say(refusal) if refusal and refusal in REFUSALS else "",
     )
     html = site.templates.get_template("screen.html").render(**context)
-    return HTMLResponse(html, headers={"cache-control": "no-store"})
+    return keep(HTMLResponse(html, headers={"cache-control": "no-store"}), request, token)
 
 
 def asks_of(panel: Panel, page: Page) -> dict[str, Ask]:

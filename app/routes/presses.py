@@ -15,18 +15,18 @@ from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, JsonValue, Val
 from app import moments
 from app.errors import InputError
 from app.kiosk import Kiosk
-from app.log import Origin
+from app.logbook import origin_of
 from app.panel.model import Page
 from app.presses import Receipt
 from app.routes.pages import ask_of
 from app.routes.site import CurrentKiosk, CurrentSite, Site
+from app.routes.visitors import visitor
 from app.sentences import say
 
 router = APIRouter()
 
 CONFIRMED: Final = "_confirmed"  # a form's field: the server has asked, and this is the yes
 ASKED_S: Final = 30.0  # the answer is a press, and no later one
-BROWSER_COOKIE: Final = "browser"
 PRESS_ID: Final = r"^[A-Za-z0-9_.:-]{1,64}$"
 STATUS: Final[Mapping[str, int]] = {
     "": 200,
@@ -65,7 +65,7 @@ class ReceiptAnswer(BaseModel):
     summary="Press a widget",
     responses={
         303: {"description": "a form post: back to the page, with the receipt on it"},
-        409: {"model": ReceiptAnswer, "description": "refused by an interlock"},
+        409: {"model": ReceiptAnswer, "description": "refused by an interlock or by who has control"},
         422: {"model": ReceiptAnswer, "description": "bad input"},
         503: {"model": ReceiptAnswer, "description": "no way to the robot, or none to the log"},
         504: {"model": ReceiptAnswer, "description": "no answer in time"},
@@ -79,18 +79,21 @@ class ReceiptAnswer(BaseModel):
 )
 async def press(widget: str, request: Request, site: CurrentSite, kiosk: CurrentKiosk) -> Response:
     kiosk.presses.widget(widget)
+    browser = visitor(request, site)
     body = await request.body()
     kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
     if kind == "application/json":
         given = _json(body)
         press_id = given.id or secrets.token_hex(8)
-        origin = origin_of(request, given.seen or "")
+        seen = given.seen or ""
         if code := _doubt(site, kiosk, given.seen):
-            receipt = await kiosk.presses.refuse(widget, given.inputs, press_id, origin, code)
+            receipt = await kiosk.presses.refuse(
+                widget, given.inputs, press_id, origin_of(browser, seen), code
+            )
         else:
             version = int(given.seen.partition("-")[2]) if given.seen else None
             at = given.at.timestamp() if given.at else None
-            receipt = await kiosk.press(widget, given.inputs, press_id, origin, version, at)
+            receipt = await kiosk.press(widget, given.inputs, press_id, browser, seen, version, at)
         _count(site, receipt)
         return JSONResponse(receipt.as_json(), status_code=STATUS[receipt.cause])
     if kind == "application/x-www-form-urlencoded":
@@ -102,10 +105,10 @@ async def press(widget: str, request: Request, site: CurrentSite, kiosk: Current
         if not re.fullmatch(PRESS_ID, page_id):
             raise InputError(f'_id: "{page_id:.40}" is not the id of a press')
         press_id = f"{page_id}.{widget}"
-        origin = origin_of(request, inputs.get("_seen", ""))
+        seen = inputs.get("_seen", "")
         version, at = _of_page(kiosk, inputs)
         values = kiosk.presses.typed(inputs)
-        receipt = await kiosk.press(widget, values, press_id, origin, version, at)
+        receipt = await kiosk.press(widget, values, press_id, browser, seen, version, at)
         _count(site, receipt)
         return RedirectResponse(_page_with(kiosk, receipt), status_code=303)
     raise InputError(
@@ -120,7 +123,8 @@ async def press(widget: str, request: Request, site: CurrentSite, kiosk: Current
     responses={303: {"description": "a form post"}, 409: {"model": ReceiptAnswer}},
 )
 async def cancel(widget: str, request: Request, site: CurrentSite, kiosk: CurrentKiosk) -> Response:
-    receipt = await kiosk.presses.cancel(widget, origin_of(request))
+    browser = visitor(request, site)
+    receipt = await kiosk.presses.cancel(widget, origin_of(browser))
     _count(site, receipt)
     if request.headers.get("content-type", "").startswith("application/x-www-form-urlencoded"):
         return RedirectResponse(_page_with(kiosk, receipt), status_code=303)
@@ -183,12 +187,6 @@ def _doubt(site: Site, kiosk: Kiosk, seen: str | None) -> str:
         return ""
     others = (other.board.boot for other in site.fleet.kiosks)
     return "seen_on_another" if boot in others else "seen_before_restart"
-
-
-def origin_of(request: Request, seen: str = "") -> Origin:
-    """Where a press comes from; the browser's id is in a cookie, where it has one."""
-    address = request.client.host if request.client else "unknown"
-    return Origin(address=address, browser=request.cookies.get(BROWSER_COOKIE, ""), seen=seen)
 
 
 def _count(site: Site, receipt: Receipt) -> None:

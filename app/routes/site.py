@@ -1,6 +1,6 @@
 """What the routes share: the application's state, typed, and answers for errors."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated
 
 from fastapi import Depends, Path, Request
@@ -9,6 +9,7 @@ from jinja2 import Environment
 from starlette.exceptions import HTTPException
 
 from app.assets import Assets
+from app.browsers import Browsers
 from app.errors import KioskError
 from app.fleet import Fleet
 from app.kiosk import Kiosk
@@ -26,6 +27,7 @@ class Site:
     metrics: Metrics
     dev: bool
     log: OperatorLog | Unlogged
+    browsers: Browsers = field(default_factory=Browsers)
 
 
 def site_of(request: Request) -> Site:

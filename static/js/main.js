@@ -1,4 +1,5 @@
 // Puts what the server says onto the page: texts and attributes, in place. It composes no sentence.
+import { Control } from "./control.js";
 import { Source } from "./source.js";
 import { Presser, showBounds, showEntry } from "./press.js";
 
@@ -42,17 +43,20 @@ const SHOW = {
 function showWidget(id, attributes) {
   const root = widgets.get(id);
   if (!root) return;
-  for (const [name, value] of Object.entries(attributes)) {
+  for (const [name, value] of Object.entries(control.over(id, attributes))) {
     if (name in SHOW) SHOW[name](root, value);
     else setText(root.querySelector(`[data-text="${name}"]`), value ?? "");
   }
 }
+
+const control = new Control(showWidget);
 
 function showWidgets(changes) {
   for (const [id, attributes] of Object.entries(changes)) showWidget(id, attributes);
 }
 
 function showLink(lamps) {
+  control.link(lamps);
   for (const [name, lamp] of Object.entries(lamps)) {
     const item = document.querySelector(`[data-lamp="${name}"]`);
     item.dataset.state = lamp.state;
@@ -80,6 +84,7 @@ function showNotice(notice) {
 // The server is gone: what was permitted is no longer known to be.
 function lockAll() {
   body.dataset.cut = "";
+  control.lost();
   for (const lamp of document.querySelectorAll("[data-lamp]")) {
     const server = lamp.dataset.lamp === "server";
     lamp.dataset.state = server ? "bad" : "wait";
@@ -116,6 +121,7 @@ const source = new Source({
       return;
     }
     delete body.dataset.cut;
+    control.show(all.control);
     showWidgets(all.widgets);
     showLink(all.link);
     showNotice(all.notice);
@@ -125,7 +131,12 @@ const source = new Source({
   link: showLink,
   notice: showNotice,
   robots: showRobots,
-  beat: ({ clock }) => setText(document.getElementById("clock"), clock),
+  control: (state) => control.show(state),
+  browser: (mine) => control.browser(mine),
+  beat({ clock }) {
+    setText(document.getElementById("clock"), clock);
+    control.beat();
+  },
   lost: lockAll,
 });
 

@@ -8,7 +8,7 @@ const OPEN_AGAIN_MS = 3000;
 // A browser opens six connections to one server; pages and presses need some of them.
 const STREAMS_PER_BROWSER = 3;
 const BEATS_KEPT = 8;
-const EVENTS = ["snapshot", "update", "link", "notice", "robots", "beat"];
+const EVENTS = ["snapshot", "update", "link", "notice", "robots", "control", "browser", "beat"];
 const BASE = document.body.dataset.base; // of the robot that this page shows
 
 export class Source {
