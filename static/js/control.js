@@ -1,5 +1,5 @@
 // Who has control of the robot: the bar that says so, the lock on every button of who has not, and
-// the holder's sign of life. Without a bar nobody needs control, and nothing here does anything.
+// the holder's sign of life. Loaded only where the panel requires control.
 const TAP_AGAIN_MS = 700;
 const ANSWER_WITHIN_MS = 5000;
 const BEATS_PER_SIGN = 3; // the server beats twice a second, and gives up who is silent for 5 s
@@ -7,7 +7,7 @@ const TOUCH_AGAIN_MS = 1000;
 const TEXT = { asking: "asker_text", holding: "holder_text", asked: "holder_text" };
 
 export class Control {
-  #bar = document.getElementById("control");
+  #bar;
   #said = new Map(); // what the server says of each button, whoever has control
   #state = null;
   #passable = true;
@@ -18,9 +18,9 @@ export class Control {
   #showAgain;
 
   // `showAgain` gets (widget id, attributes) where a lock has changed.
-  constructor(showAgain) {
+  constructor(bar, showAgain) {
+    this.#bar = bar;
     this.#showAgain = showAgain;
-    if (!this.#bar) return;
     for (const kind of ["pointerdown", "keydown"]) addEventListener(kind, () => this.#touch(), true);
     this.#bar.addEventListener("submit", (event) => {
       event.preventDefault();
@@ -42,7 +42,6 @@ export class Control {
   }
 
   show(state) {
-    if (!this.#bar) return;
     this.#state = state;
     this.#bar.querySelector(".refused").textContent = "";
     this.#draw();
@@ -50,7 +49,7 @@ export class Control {
 
   // The id of this browser, from the stream: the page may have been loaded without its cookie.
   browser({ id }) {
-    if (!this.#bar || this.#bar.dataset.me === id) return;
+    if (this.#bar.dataset.me === id) return;
     this.#bar.dataset.me = id;
     if (this.#state) this.#draw();
   }
@@ -61,7 +60,6 @@ export class Control {
   }
 
   lost() {
-    if (!this.#bar) return;
     this.#state = null;
     this.#said.clear();
     this.#bar.querySelector(".who").textContent = document.body.dataset.unknown;
@@ -70,7 +68,7 @@ export class Control {
 
   // The attributes as this page shows them. A lost link is told before who has control.
   over(id, attributes) {
-    if (!this.#bar || !("enabled" in attributes || this.#said.has(id))) return attributes;
+    if (!("enabled" in attributes || this.#said.has(id))) return attributes;
     const { enabled, reason } = { ...this.#said.get(id), ...attributes };
     this.#said.set(id, { enabled, reason });
     return { ...attributes, ...this.#locked(this.#said.get(id)) };

@@ -1,5 +1,4 @@
 // Puts what the server says onto the page: texts and attributes, in place. It composes no sentence.
-import { Control } from "./control.js";
 import { Source } from "./source.js";
 import { Presser, showBounds, showEntry } from "./press.js";
 
@@ -49,7 +48,12 @@ function showWidget(id, attributes) {
   }
 }
 
-const control = new Control(showWidget);
+// Where there is no bar, nobody needs control.
+const bar = document.getElementById("control");
+const nothing = () => {};
+const control = bar
+  ? new (await import("./control.js")).Control(bar, showWidget)
+  : { over: (_, attributes) => attributes, link: nothing, show: nothing, lost: nothing, beat: nothing };
 
 function showWidgets(changes) {
   for (const [id, attributes] of Object.entries(changes)) showWidget(id, attributes);
@@ -132,7 +136,7 @@ const source = new Source({
   notice: showNotice,
   robots: showRobots,
   control: (state) => control.show(state),
-  browser: (mine) => control.browser(mine),
+  browser: (mine) => control.browser(mine), // comes only where control is required
   beat({ clock }) {
     setText(document.getElementById("clock"), clock);
     control.beat();
