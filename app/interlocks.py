@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from app.keys import TopicRole
-from app.panel.model import Action, Call, Display, Interlock, Pressed, Publish
+from app.panel.model import Action, Call, Display, Hold, Interlock, Pressed, Published
 from app.progress import IDLE
 from app.robot import Robot, value_of
 from app.sentences import say
@@ -72,8 +72,10 @@ def interlock_verdict(interlock: Interlock, robot: Robot, now: float) -> Verdict
     return Verdict(True, until=stale_at)
 
 
-def publish_verdict(publish: Publish, interlock: Interlock | None, robot: Robot, now: float) -> Verdict:
-    """Whether a publish widget may be pressed: a way, the right type, and its interlock."""
+def publish_verdict(
+    publish: Published, interlock: Interlock | None, robot: Robot, now: float
+) -> Verdict:
+    """Whether a message may be published: a way, the right type, and the interlock."""
     passable = way(robot, now)
     if not passable.permitted:
         return passable
@@ -101,14 +103,16 @@ def call_verdict(call: Call | Action, interlock: Interlock | None, robot: Robot,
     return PERMITTED if interlock is None else interlock_verdict(interlock, robot, now)
 
 
-def press_verdict(widget: Pressed, interlock: Interlock | None, robot: Robot, now: float) -> Verdict:
+def press_verdict(
+    widget: Pressed | Hold, interlock: Interlock | None, robot: Robot, now: float
+) -> Verdict:
     """Whether a widget may be pressed."""
-    if isinstance(widget, Publish):
+    if isinstance(widget, Published):
         return publish_verdict(widget, interlock, robot, now)
     return call_verdict(widget, interlock, robot, now)
 
 
-def misfit(role: TopicRole, of: Interlock | Publish | Display, robot: Robot) -> Verdict | None:
+def misfit(role: TopicRole, of: Interlock | Published | Display, robot: Robot) -> Verdict | None:
     """Why a topic can't be trusted, by what the graph shows: another type, a QoS that DDS would
     not match. `role` is what the panel does with it: publish ("MP") or listen ("MS")."""
     key = robot.key(of.topic)

@@ -17,6 +17,7 @@ from app.actions import Actions
 from app.board import Board
 from app.calls import Calls
 from app.errors import KioskError, LinkError
+from app.holds import Holds
 from app.interfaces import interfaces_of
 from app.interlocks import Verdict, way
 from app.joining import LOG_TYPE, Joining
@@ -71,6 +72,16 @@ class Kiosk:
         self.presses = Presses(
             panel, self.interfaces, self.robot, self.link, self._calls, self._actions
         )
+        self.holds = Holds(
+            panel,
+            self.interfaces,
+            self.robot,
+            self.link,
+            self._loop,
+            checked=self.presses.checked,
+            take=self._take,
+            changed=self.show,
+        )
         self._feedback = {keys.feedback(self.robot.key(one)): one for one in panel.actions()}
         self._joining = Joining(panel, self.interfaces, self.robot, self.link, self.show, self.renew)
         self._urgent = {self.robot.key(i.topic) for i in panel.interlocks}
@@ -91,8 +102,8 @@ class Kiosk:
 
     async def stop(self) -> None:
         """Ends the streams, takes the session down; leaves no task behind."""
+        self.close()
         self._stopped = True
-        self.board.close()
         logging.getLogger().removeHandler(self._rosout)
         if self._timer is not None:
             self._timer.cancel()
@@ -104,6 +115,11 @@ class Kiosk:
             await asyncio.to_thread(self.link.close)
         except LinkError as error:
             self._log.warning("%s", error)
+
+    def close(self) -> None:
+        """Ends holds, while there is a way to say so to the robot, and streams."""
+        self.holds.close()
+        self.board.close()
 
     @property
     def way(self) -> Verdict:
@@ -215,6 +231,7 @@ class Kiosk:
             self._timer.cancel()
             self._timer = None
         self._shown_at = time.monotonic()
+        self.holds.judge()
         seen = self._sight()
         if seen.robot != self.lamp:
             self.lamp = seen.robot

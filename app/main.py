@@ -24,7 +24,7 @@ from app.link import Config, config_from, config_to
 from app.metrics import Metrics
 from app.panel import Panel, load_panel
 from app.panel.model import RobotEntry
-from app.routes import events, health, pages, presses, static
+from app.routes import events, health, holds, pages, presses, static
 from app.routes.site import Site, named_robot, on_http_error, on_kiosk_error
 from app.settings import Settings, shipped
 
@@ -50,7 +50,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
             site.metrics.follow(fleet)
             app.state.site = site
             loop = asyncio.get_running_loop()
-            with _on_end(lambda: loop.call_soon_threadsafe(lambda: site.fleet.close_streams())):
+            with _on_end(lambda: loop.call_soon_threadsafe(lambda: site.fleet.close())):
                 if settings.dev:
                     await opened.enter_async_context(
                         development.reloading(site, settings, _running, opened.pop_all())
@@ -68,7 +68,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     )
     app.add_middleware(GZipMiddleware, minimum_size=500)
     app.add_middleware(Doors, hosts=settings.hosts)
-    for routes in (pages, events, presses):
+    for routes in (pages, events, presses, holds):
         app.include_router(routes.router)
         app.include_router(routes.router, prefix="/robots/{robot}", dependencies=[Depends(named_robot)])
     for common in (static, health):

@@ -214,7 +214,7 @@ class Presses:
             cause: Cause = "link" if verdict.code in NO_WAY else "interlock"
             return refused("refused", verdict.reason or "", cause)
         try:
-            values = self._checked(widget, inputs)
+            values = self.checked(widget.template, inputs)
             answer = await self._sent(widget, filled(widget.template, values), press_id)
         except (FieldError, InputError) as error:
             return refused("not_encoded", str(error), "input")
@@ -244,13 +244,13 @@ class Presses:
         text = say(sentence, topic=widget.topic, time=clock(time.time()))
         return Answer("published" if heard else "unknown", text)
 
-    def _checked(self, widget: Pressed, inputs: Mapping[str, Any]) -> dict[str, Any]:
-        """The values of the inputs that the widget's message names."""
+    def checked(self, template: Any, inputs: Mapping[str, Any]) -> dict[str, Any]:
+        """The values of the inputs that a template names."""
         for name in inputs:
             if not isinstance(self._widgets.get(name), Input):
                 raise InputError(f'there is no input "{name:.60}" on this panel')
         values: dict[str, Any] = {}
-        for _, name in named(widget.template):
+        for _, name in named(template):
             field = self._widgets[name]
             if name not in inputs:
                 raise InputError(f'the input "{name}" is missing')

@@ -73,6 +73,7 @@ class Robot:
         self._told_apart = entry.namespace if entry else None
         self.graph = Graph(own_zid, self._told_apart)
         self.progress: dict[str, Progress] = {}  # of what widgets have asked, by their ids
+        self.held: dict[str, str] = {}  # by the ids of hold widgets: since when, in words
         self.undecodable: Counter[str] = Counter()
         self._interfaces = interfaces
         self._types = {self.key(topic): name for topic, name in panel.subscriptions().items()}

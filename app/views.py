@@ -14,7 +14,7 @@ from app.inputs import limits
 from app.interlocks import Verdict, interlock_verdict, press_verdict, way
 from app.panel.displays import Indicator, Readout
 from app.panel.inputs import Numeric, SelectInput, TextInput, ToggleInput
-from app.panel.model import Action, Call, Panel, Publish
+from app.panel.model import Action, Call, Hold, Panel, Publish
 from app.progress import IDLE, Progress
 from app.robot import Robot
 from app.sentences import say
@@ -95,6 +95,11 @@ def sight(
                 widgets[widget.id] = {**enabled(verdict)}
                 if not isinstance(widget, Publish):
                     widgets[widget.id] |= progress(robot.progress.get(widget.id, IDLE))
+            case Hold():
+                interlock = panel.interlock(widget.interlock)
+                verdict = noted(press_verdict(widget, interlock, robot, now))
+                holding = robot.held.get(widget.id, "")
+                widgets[widget.id] = {**enabled(verdict), "held": bool(holding), "holding": holding}
             case Readout():
                 widgets[widget.id], until = readout(widget, robot, now)
                 untils.append(until)

@@ -29,6 +29,26 @@ def filled(template: Any, inputs: Mapping[str, Any], where: str = "") -> Any:
     return "".join(text + ("" if name is None else _text(inputs[name], where)) for text, name in parts)
 
 
+def placed(fields: Any, path: str, value: Any) -> Any:
+    """Fields of a message with a value at a path like "header.seq" or "data[2]"; they themselves stay
+    as they are. FieldError where a list on the way is too short."""
+    return _placed(fields, re.findall(r"[^.\[\]]+|\[[0-9]+\]", path), path, value)
+
+
+def _placed(fields: Any, steps: list[str], path: str, value: Any) -> Any:
+    if not steps:
+        return value
+    step, rest = steps[0], steps[1:]
+    if not step.startswith("["):
+        known = dict(fields) if isinstance(fields, Mapping) else {}
+        return known | {step: _placed(known.get(step, {}), rest, path, value)}
+    index, known_items = int(step[1:-1]), list(fields) if isinstance(fields, list | tuple) else []
+    if index >= len(known_items):
+        raise FieldError(path, f"there is no {step}: the message has {len(known_items)} elements")
+    known_items[index] = _placed(known_items[index], rest, path, value)
+    return known_items
+
+
 def at(template: Any, where: str) -> Any:
     """What stands in a template at a field like "poses[0].x", or at the nearest one around it."""
     found = template

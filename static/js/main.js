@@ -18,6 +18,7 @@ const SHOW = {
     const cancel = root.querySelector(".cancel");
     if (cancel) cancel.disabled = !value;
   },
+  held: (root, value) => root.toggleAttribute("data-held", value),
   state: (root, value) => (root.dataset.state = value),
   shape: (root, value) => (root.dataset.shape = value),
   colour: (root, value) => (root.dataset.colour = value),
@@ -84,7 +85,7 @@ function lockAll() {
     setText(tab.querySelector("b"), body.dataset.unknown);
   }
   for (const root of widgets.values()) {
-    const buttons = root.querySelectorAll("button[type=submit]");
+    const buttons = root.querySelectorAll("button[type=submit], .hold");
     for (const button of buttons) button.disabled = true;
     if (buttons.length) {
       setText(root.querySelector('[data-text="reason"]'), body.dataset.lost);
@@ -121,5 +122,7 @@ const source = new Source({
 });
 
 if (document.querySelector("[data-step]")) import("./inputs.js");
+const holds = document.querySelectorAll('[data-kind="hold"]');
+if (holds.length) import("./hold.js").then(({ Hold }) => holds.forEach((root) => new Hold(root, source)));
 new Presser(widgets, source, { unsure: body.dataset.unsure, lost: body.dataset.lost });
 source.start();

@@ -2,7 +2,7 @@
 const ANSWER_WITHIN_MS = 5000;
 // Two taps of a finger come within this time: the second one is the same press.
 const TAP_AGAIN_MS = 700;
-const ENTRIES = "input:not([type=hidden]), select";
+export const ENTRIES = "input:not([type=hidden]), select";
 
 function newId() {
   const bytes = crypto.getRandomValues(new Uint8Array(16));
@@ -10,7 +10,7 @@ function newId() {
 }
 
 // With its type. What is no number (an empty field) goes as it is: the server says what is wrong.
-function valueOf(input) {
+export function valueOf(input) {
   if (input.type === "checkbox") return input.checked;
   const number = input.type === "number" || input.type === "range";
   return number && input.value !== "" ? Number(input.value) : input.value;
