@@ -68,6 +68,7 @@ def _own_fields(place: str, hold: Hold, interfaces: Interfaces) -> Iterator[Faul
             continue
         if not re.fullmatch(kinds, found):
             yield Fault(f"{place}.{key}", f'"{path}" is {found}: it must be {words}')
+            continue
         for part, template in (("message", hold.message), ("release", hold.release)):
             if _gives(template, path):
                 yield Fault(f"{place}.{part}.{path}", f"is filled in by the kiosk: it is the {key}")
