@@ -109,7 +109,7 @@ ENGLISH: Final[Mapping[str, str]] = {
     "hold_by_closing": "the connection to the browser was closed.",
     "hold_by_stall": "the panel's server stood still.",
     "hold_by_nonsense": "the browser sent what can't be understood.",
-    "hold_by_stopping": "the panel's server is being stopped.",
+    "hold_by_stopping": "the panel's server stops or takes a new panel.",
     "hold_elsewhere": "held by another browser.",
     "hold_same_topic": "{label} is held, which sends on {topic} too.",
     "hold_late": "the press came too late.",

@@ -12,8 +12,8 @@ import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
-from tests.parts import ROOT, Server, until
-from tests.test_holds_in_browser import PANEL
+from tests.parts import ROOT, Bridge, RosNode, Server, live, until
+from tests.test_holds_in_browser import PANEL, permit
 
 TRIES: Final = 5
 
@@ -58,6 +58,12 @@ class Socket:
         self.say(do="beat", **{"number": self.number, "lease": self.lease, **more})
         return self.hear()
 
+    def beat_until_it_ends(self) -> dict[str, Any]:
+        """As a browser does, which sends on until it is told."""
+        while (said := self.beat())["state"] == "held":
+            time.sleep(0.05)
+        return said
+
     def closed(self) -> int:
         """The code that the server closes with."""
         with pytest.raises(ConnectionClosed) as closed:
@@ -70,7 +76,7 @@ class Socket:
 def opened(server: Server, **headers: str) -> Iterator[Socket]:
     until(lambda: server.widget("jog")["enabled"], "the demo robot permits", within_s=40)
     seen = server.snapshot()["id"]
-    url = f"ws://127.0.0.1:{server.port}/widgets/jog/hold"
+    url = f"ws://127.0.0.1:{server.port}{server.base}/widgets/jog/hold"
     with connect(url, additional_headers=headers) as connection:
         yield Socket(connection, seen)
 
@@ -179,6 +185,53 @@ def test_what_can_not_be_held_is_not_found(demo: Server) -> None:
         raise AssertionError("it opened")
     assert refused.value.response.status_code == 404
     assert b"can be held" in (refused.value.response.body or b"")
+
+
+def test_each_of_several_robots_is_held_on_its_own(tmp_path: Path) -> None:
+    robots = "".join(
+        f'[[robot]]\nid = "{one}"\nname = "{one}"\nnamespace = "/{one}"\n' for one in ("r1", "r2")
+    )
+    panel = tmp_path / "two.toml"
+    panel.write_text(PANEL.replace("[[interlock]]", robots + "[[interlock]]"))
+    server = Server(ROOT, KIOSK_PANEL=str(panel), KIOSK_MODE="demo")
+    try:
+        until(server.ready, "ready")
+        with held(server.robot("r2")) as socket:
+            assert server.robot("r1").widget("jog")["held"] is False
+            assert server.robot("r2").widget("jog")["held"] is True
+            socket.say(do="end", why="released", lease=socket.lease)
+            assert socket.hear()["state"] == "ended"
+        for path in ("/robots/r3/widgets/jog/hold", "/widgets/jog/hold"):
+            with pytest.raises(InvalidStatus), connect(f"ws://127.0.0.1:{server.port}{path}"):
+                raise AssertionError("it opened")
+    finally:
+        server.end()
+
+
+def test_a_lost_bridge_ends_it_and_what_could_not_be_said_is_not_said_later(
+    own_bridge: Bridge, own_node: RosNode, tmp_path: Path
+) -> None:
+    panel = tmp_path / "jog.toml"
+    panel.write_text(PANEL)
+    own_node.subscribe("/jog", "geometry_msgs/msg/Point", depth=1000)
+    own_node.advertise("/operation_enabled", "std_msgs/msg/Bool")
+    server = live(own_bridge.endpoint, tmp_path, KIOSK_PANEL=str(panel))
+    try:
+        until(server.ready, "ready", within_s=20)
+        permit(server, own_node, True)
+        with held(server) as socket:
+            until(lambda: own_node.heard("/jog"), "it moves", every_s=0.001)
+            own_bridge.kill()
+            said = socket.beat_until_it_ends()
+            assert said["outcome"] == "unknown"
+            assert "The message that ends it was not sent: No connection" in said["reason"]
+        own_bridge.start()
+        until(server.ready, "ready again", within_s=30)
+        permit(server, own_node, True)
+        xs = [point["x"] for point in own_node.heard("/jog")]
+        assert set(xs) == {0.5}
+    finally:
+        server.end()
 
 
 def test_nobody_presses_a_hold(demo: Server) -> None:
