@@ -1,6 +1,7 @@
 """The WebSocket of a hold, with the demo robot: who may open it, and what it answers."""
 
 import json
+import signal
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -230,6 +231,32 @@ def test_a_lost_bridge_ends_it_and_what_could_not_be_said_is_not_said_later(
         permit(server, own_node, True)
         xs = [point["x"] for point in own_node.heard("/jog")]
         assert set(xs) == {0.5}
+    finally:
+        server.end()
+
+
+def test_a_server_that_stood_still_has_ended_it_when_it_wakes(demo: Server) -> None:
+    with held(demo) as socket:
+        demo.process.send(signal.SIGSTOP)
+        time.sleep(0.5)
+        socket.say(do="beat", number=1, lease=socket.lease)
+        demo.process.send(signal.SIGCONT)
+        said = socket.hear()
+        assert (said["state"], said["outcome"]) == ("ended", "aborted")
+        assert "the panel's server stood still" in said["reason"]
+
+
+def test_a_new_panel_ends_what_is_held_by_the_old_one(tmp_path: Path) -> None:
+    panel = tmp_path / "jog.toml"
+    panel.write_text(PANEL)
+    server = Server(ROOT, KIOSK_PANEL=str(panel), KIOSK_MODE="demo", KIOSK_DEV="1")
+    try:
+        until(server.ready, "ready")
+        with held(server) as socket:
+            panel.write_text(PANEL.replace('"Jog"', '"Jog it"'))
+            said = socket.beat_until_it_ends()
+            assert (said["state"], said["outcome"]) == ("ended", "aborted")
+            assert "takes a new panel" in said["reason"]
     finally:
         server.end()
 
