@@ -9,7 +9,7 @@ import signal
 import subprocess
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -173,15 +173,25 @@ def has_ended(server: Server, ends: int) -> bool:
     return len(ended(server)) > ends
 
 
+def begun(finger: Finger, node: RosNode) -> tuple[int, int]:
+    """Holds until it moves: how much was heard before that, and how many holds had ended."""
+    for _ in range(TRIES):
+        before, ends = len(node.heard(TOPIC)), len(ended(finger.server))
+        finger.down()
+        with suppress(AssertionError):
+            until(partial(has_heard, node, TOPIC, before + 5), "it moves", within_s=3)
+            return before, ends
+        finger.up()
+    raise AssertionError(f"it never moved: {finger.server.process.text}")
+
+
 def measured(
     finger: Finger, node: RosNode, cause: Callable[[], Any], code: str, lift: bool = True
 ) -> Times:
     """Holds, lets the cause happen, and gives the times, if that is what ended the hold."""
     for _ in range(TRIES):
         expect(finger.button).to_be_enabled()
-        ends, before = len(ended(finger.server)), len(node.heard(TOPIC))
-        finger.down()
-        until(partial(has_heard, node, TOPIC, before + 5), "it moves")
+        before, ends = begun(finger, node)
         began = time.monotonic()
         cause()
         until(partial(has_ended, finger.server, ends), "it ends")
@@ -312,9 +322,7 @@ def test_a_browser_that_goes_ends_it(
         folder = tmp_path / str(attempt)
         with own_chromium(chromium, folder) as (browser, group):
             finger = Finger(browser.new_context(has_touch=True).new_page(), kiosk)
-            ends, before = len(ended(kiosk)), len(jogger.heard(TOPIC))
-            finger.down()
-            until(partial(has_heard, jogger, TOPIC, before + 5), "it moves")
+            before, ends = begun(finger, jogger)
             began = time.monotonic()
             os.killpg(group, number)
             until(partial(has_ended, kiosk, ends), "it ends")
@@ -326,9 +334,7 @@ def test_a_browser_that_goes_ends_it(
 
 
 def test_the_servers_end_stops_the_robot_first(touched: Finger, jogger: RosNode) -> None:
-    before = len(jogger.heard(TOPIC))
-    touched.down()
-    until(partial(has_heard, jogger, TOPIC, before + 5), "it moves")
+    before, _ = begun(touched, jogger)
     began = time.monotonic()
     touched.server.process.send(signal.SIGTERM)
     touched.server.process.wait(10)
@@ -341,9 +347,7 @@ def test_the_servers_end_stops_the_robot_first(touched: Finger, jogger: RosNode)
 
 def test_from_a_killed_server_nothing_more_comes(touched: Finger, jogger: RosNode) -> None:
     """The robot's own deadline has to act: nobody is left to say stop."""
-    before = len(jogger.heard(TOPIC))
-    touched.down()
-    until(partial(has_heard, jogger, TOPIC, before + 5), "it moves")
+    before, _ = begun(touched, jogger)
     began = time.monotonic()
     touched.server.process.kill()
     time.sleep(QUIET_S)
@@ -398,9 +402,7 @@ def test_another_browser_sees_it_and_is_refused(
     holding = other.page.locator('[data-widget="jog"] .holding')
     said = other.page.locator("#receipt-jog")
     for _ in range(TRIES):
-        before, ends = len(jogger.heard(TOPIC)), len(ended(touched.server))
-        touched.down()
-        until(partial(has_heard, jogger, TOPIC, before + 3), "it moves")
+        _, ends = begun(touched, jogger)
         expect(holding).to_contain_text("Held since")
         other.down()
         expect(said).not_to_be_empty()
