@@ -15,6 +15,8 @@ from starlette.responses import JSONResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 GUARDED_PATHS: Final = frozenset({"/events"})
+STARTS: Final = frozenset({"http.response.start", "websocket.http.response.start"})
+POLICY_VIOLATION: Final = 1008
 READING: Final = frozenset({"GET", "HEAD"})
 HOST: Final = re.compile(r"(?P<name>\[[0-9a-f:.]+\]|[a-z0-9._-]+)(:\d{1,5})?")
 OWN_SITE: Final = frozenset({"same-origin", "none"})
@@ -40,12 +42,12 @@ class Doors:
         self._hosts = frozenset(hosts)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        if scope["type"] != "http":
+        if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
 
         async def send_secured(message: Message) -> None:
-            if message["type"] == "http.response.start":
+            if message["type"] in STARTS:
                 headers = MutableHeaders(scope=message)
                 for name, value in SECURITY_HEADERS.items():
                     headers.setdefault(name, value)
@@ -53,6 +55,11 @@ class Doors:
 
         why = self._refusal(scope)
         answer = self._app if why is None else JSONResponse({"error": why}, status_code=403)
+        if why is not None and scope["type"] == "websocket":
+            await receive()  # its wish to connect
+            if "websocket.http.response" not in scope.get("extensions", {}):
+                await send({"type": "websocket.close", "code": POLICY_VIOLATION, "reason": ""})
+                return
         await answer(scope, receive, send_secured)
 
     def _refusal(self, scope: Scope) -> str | None:
@@ -60,7 +67,11 @@ class Doors:
         host = headers.get("host", "").lower()
         if _without_port(host) not in self._hosts:
             return f'"{host}" is not a name of this panel: KIOSK_HOSTS lists the names it answers to'
-        if scope["method"] in READING and scope["path"] not in GUARDED_PATHS:
+        if (
+            scope["type"] == "http"
+            and scope["method"] in READING
+            and scope["path"] not in GUARDED_PATHS
+        ):
             return None
         site = headers.get("sec-fetch-site", "none")
         if site not in OWN_SITE:

@@ -57,12 +57,13 @@ class Fleet:
 
     async def stop(self) -> None:
         """Ends the streams and the sessions of all."""
-        self.close_streams()
+        self.close()
         await asyncio.gather(*(kiosk.stop() for kiosk in self.kiosks))
 
-    def close_streams(self) -> None:
+    def close(self) -> None:
+        """Ends holds and streams: what would keep the process from its end, or go on after it."""
         for kiosk in self.kiosks:
-            kiosk.board.close()
+            kiosk.close()
 
     def show_fault(self, text: str) -> None:
         """A fault of the panel file, shown on every page; "" takes it away."""

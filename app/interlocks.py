@@ -10,7 +10,7 @@ from typing import Final
 
 from app.declared import UNKNOWN, Declared, allowed, limits_text, own_range
 from app.keys import ServerRole, TopicRole
-from app.panel.model import Action, Call, Display, Interlock, Pressed, Publish
+from app.panel.model import Action, Call, Display, Hold, Interlock, Pressed, Publish, Published
 from app.panel.parameter import DESCRIBE, GET, SET, Parameter
 from app.progress import IDLE
 from app.robot import Robot, value_of
@@ -78,14 +78,16 @@ def interlock_verdict(interlock: Interlock, robot: Robot, now: float) -> Verdict
     return Verdict(True, until=stale_at)
 
 
-def publish_verdict(publish: Publish, interlock: Interlock | None, robot: Robot, now: float) -> Verdict:
-    """Whether a publish widget may be pressed: a way, the right type, and its interlock."""
+def publish_verdict(
+    publish: Published, interlock: Interlock | None, robot: Robot, now: float
+) -> Verdict:
+    """Whether a message may be published: a way, the right type, and the interlock."""
     passable = way(robot, now)
     if not passable.permitted:
         return passable
     if doubt := misfit("MP", publish, robot):
         return doubt
-    if publish.one_shot and robot.progress.get(publish.id, IDLE).busy:
+    if isinstance(publish, Publish) and publish.one_shot and robot.progress.get(publish.id, IDLE).busy:
         return locked("busy")
     return PERMITTED if interlock is None else interlock_verdict(interlock, robot, now)
 
@@ -165,17 +167,19 @@ def served(call: Call | Action) -> tuple[ServerRole, str]:
     return ("SS", call.service) if isinstance(call, Call) else ("AS", call.action)
 
 
-def press_verdict(widget: Pressed, interlock: Interlock | None, robot: Robot, now: float) -> Verdict:
+def press_verdict(
+    widget: Pressed | Hold, interlock: Interlock | None, robot: Robot, now: float
+) -> Verdict:
     """Whether a widget may be pressed."""
     match widget:
-        case Publish():
+        case Publish() | Hold():
             return publish_verdict(widget, interlock, robot, now)
         case Parameter():
             return parameter_verdict(widget, interlock, robot, now)
     return call_verdict(widget, interlock, robot, now)
 
 
-def misfit(role: TopicRole, of: Interlock | Publish | Display, robot: Robot) -> Verdict | None:
+def misfit(role: TopicRole, of: Interlock | Published | Display, robot: Robot) -> Verdict | None:
     """Why a topic can't be trusted, by what the graph shows: another type, a QoS that DDS would
     not match. `role` is what the panel does with it: publish ("MP") or listen ("MS")."""
     key = robot.key(of.topic)

@@ -20,6 +20,7 @@ from app.calls import Calls
 from app.confirmations import Confirmations
 from app.control import Control
 from app.errors import KioskError, LinkError
+from app.holds import Holds
 from app.interfaces import interfaces_of
 from app.interlocks import Verdict, way
 from app.joining import LOG_TYPE, Joining
@@ -84,6 +85,7 @@ class Kiosk:
         self._parameters = Parameters(
             panel, self.interfaces, self.robot, self.link, self._calls, self.show
         )
+        self.logbook = Logbook(operators_log, self.robot.name, lambda: self.board.id)
         self.presses = Presses(
             panel,
             self.interfaces,
@@ -93,8 +95,18 @@ class Kiosk:
             self._actions,
             self._confirmations,
             self._parameters,
-            Logbook(operators_log, self.robot.name, lambda: self.board.id),
+            self.logbook,
             catch_up=self._take,
+        )
+        self.holds = Holds(
+            panel,
+            self.interfaces,
+            self.robot,
+            self.link,
+            self._loop,
+            checked=self.presses.checked,
+            take=self._take,
+            changed=self.show,
         )
         goals = {self.robot.key(one): one for one in panel.actions()}
         self._feedback = {keys.feedback(key): one for key, one in goals.items()}
@@ -120,9 +132,9 @@ class Kiosk:
 
     async def stop(self) -> None:
         """Ends the streams, takes the session down; leaves no task behind."""
+        self.close()
         self._stopped = True
         self._following.close()
-        self.board.close()
         logging.getLogger().removeHandler(self._rosout)
         if self._timer is not None:
             self._timer.cancel()
@@ -135,6 +147,11 @@ class Kiosk:
             await asyncio.to_thread(self.link.close)
         except LinkError as error:
             self._log.warning("%s", error)
+
+    def close(self) -> None:
+        """Ends holds, while there is a way to say so to the robot, and streams."""
+        self.holds.close()
+        self.board.close()
 
     @property
     def way(self) -> Verdict:
@@ -158,13 +175,29 @@ class Kiosk:
         `seen` is what the log is told of what the operator saw: the `version` of the board; `at` is
         when it was pressed, in the server's own time. None where that is not known.
         """
+        by = self.by(widget, browser, seen, version, at)
+        return await self.presses.press(widget, inputs, press_id, by)
+
+    def by(
+        self,
+        widget: str,
+        browser: Browser,
+        seen: str = "",
+        version: int | None = None,
+        at: float | None = None,
+    ) -> By:
+        """Who presses or holds a widget, with what has to hold for that at every moment."""
         self.control.touch(browser)
-        by = By(
+        return By(
             origin_of(browser, seen),
-            lambda: self.control.verdict(browser),
+            lambda: self._controls(browser),
             lambda: self._doubt(widget, version, at),
         )
-        return await self.presses.press(widget, inputs, press_id, by)
+
+    def _controls(self, browser: Browser) -> Verdict:
+        if self._operators_log.lock:
+            return Verdict(False, "log", self._operators_log.lock)
+        return self.control.verdict(browser)
 
     def _doubt(self, widget: str, version: int | None, at: float | None) -> str:
         """Why a press is no longer what was meant; "" if it is."""
@@ -286,6 +319,7 @@ class Kiosk:
             self._timer.cancel()
             self._timer = None
         self._shown_at = time.monotonic()
+        self.holds.judge()
         seen = self._sight()
         if seen.robot != self.lamp:
             self.lamp = seen.robot

@@ -76,10 +76,15 @@ class Logbook:
         self._board = board
 
     async def pressed(
-        self, widget: str, inputs: Mapping[str, Any], press_id: str, origin: Origin
+        self,
+        widget: str,
+        inputs: Mapping[str, Any],
+        press_id: str,
+        origin: Origin,
+        action: str = "press",
     ) -> Noted:
         """Written before anything is sent; LogError when it can't be and must."""
-        entry = entered("pressed", origin, inputs, **self._about(widget, press_id, "press"))
+        entry = entered("pressed", origin, inputs, **self._about(widget, press_id, action))
         written = await self._log.pressed(entry)
         return Noted(self._log, written, self._board, self._log.fault)
 

@@ -26,7 +26,7 @@ from app.log import Limits, OperatorLog, Unlogged
 from app.metrics import Metrics
 from app.panel import Panel, load_panel
 from app.panel.model import RobotEntry
-from app.routes import control, events, health, pages, presses, static
+from app.routes import control, events, health, holds, pages, presses, static
 from app.routes import log as log_routes
 from app.routes.site import Site, named_robot, on_http_error, on_kiosk_error
 from app.settings import Settings, shipped
@@ -55,7 +55,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
             site.metrics.follow(fleet)
             app.state.site = site
             loop = asyncio.get_running_loop()
-            with _on_end(lambda: loop.call_soon_threadsafe(lambda: site.fleet.close_streams())):
+            with _on_end(lambda: loop.call_soon_threadsafe(lambda: site.fleet.close())):
                 if settings.dev:
                     await opened.enter_async_context(
                         development.reloading(site, settings, running, opened.pop_all())
@@ -74,7 +74,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.add_middleware(GZipMiddleware, minimum_size=500)
     app.add_middleware(Doors, hosts=settings.hosts)
     app.add_middleware(InWords)
-    for routes in (pages, events, presses, control):
+    for routes in (pages, events, presses, control, holds):
         app.include_router(routes.router)
         app.include_router(routes.router, prefix="/robots/{robot}", dependencies=[Depends(named_robot)])
     for common in (static, health, log_routes):

@@ -9,7 +9,7 @@ import logging
 import secrets
 import time
 from collections import OrderedDict
-from collections.abc import Callable, Coroutine, Iterator, Mapping
+from collections.abc import Callable, Coroutine, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -209,7 +209,7 @@ class Presses:
         with _noted_to_the_end(noted):
             answer = await self._actions.cancel(widget)
         self._log.info(
-            "cancel of %s by %s: %s: %s", widget_id, _named(origin), answer.outcome, answer.text
+            "cancel of %s by %s: %s: %s", widget_id, named(origin), answer.outcome, answer.text
         )
         cause: Cause = "interlock" if answer.outcome == "refused" else ""
         receipt = self._receipt(widget, {}, "", answer.outcome, answer.text, cause)
@@ -256,7 +256,7 @@ class Presses:
             receipt = await _closed(noted, receipt)
         level = logging.INFO if receipt.outcome in FINE else logging.WARNING
         self._log.log(level, "press %s of %s by %s with %.*s: %s: %s", press_id, widget.id,
-                _named(by.origin),
+                named(by.origin),
                 LONGEST_LOGGED, inputs, receipt.outcome, receipt.reason)  # fmt: skip
         return receipt
 
@@ -271,7 +271,7 @@ class Presses:
     ) -> Receipt:
         """A press that is not even judged."""
         receipt = self._receipt(widget, inputs, press_id, "refused", text, cause)
-        self._log.warning("press %s of %s by %s: %s", press_id, widget.id, _named(origin), text)
+        self._log.warning("press %s of %s by %s: %s", press_id, widget.id, named(origin), text)
         return _with_doubt(
             receipt, await self._logbook.refused(widget.id, inputs, press_id, origin, text)
         )
@@ -314,7 +314,7 @@ class Presses:
         if why := by.doubt():
             return refused("refused", why, "interlock")
         try:
-            values = self._checked(widget, inputs)
+            values = self.checked(inputs_of(widget), inputs)
             answer = await self._sent(widget, values, press_id, noted)
         except (FieldError, InputError) as error:
             return refused("not_encoded", str(error), "input")
@@ -357,13 +357,13 @@ class Presses:
         text = say(sentence, topic=widget.topic, time=clock(time.time()))
         return Answer("published" if heard else "unknown", text)
 
-    def _checked(self, widget: Pressed, inputs: Mapping[str, Any]) -> dict[str, Any]:
-        """The values of the inputs that the widget's message names."""
+    def checked(self, names: Iterable[str], inputs: Mapping[str, Any]) -> dict[str, Any]:
+        """The values of the inputs with these ids."""
         for name in inputs:
             if not isinstance(self._widgets.get(name), Input | Parameter):
                 raise InputError(f'there is no input "{name:.60}" on this panel')
         values: dict[str, Any] = {}
-        for name in inputs_of(widget):
+        for name in names:
             field = self._widgets[name]
             if name not in inputs:
                 raise InputError(f'the input "{name}" is missing')
@@ -417,5 +417,5 @@ def _with_doubt(receipt: Receipt, doubt: str) -> Receipt:
     return replace(receipt, reason=say("log_not_on_disk", said=receipt.reason, why=doubt))
 
 
-def _named(origin: Origin) -> str:
+def named(origin: Origin) -> str:
     return f"{origin.who} ({origin.address})" if origin.who else origin.address

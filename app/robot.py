@@ -77,6 +77,7 @@ class Robot:
         self.graph = Graph(own_zid, self._told_apart)
         self.progress: dict[str, Progress] = {}  # of what widgets have asked, by their ids
         self.parameters: dict[str, Declared] = {}  # what nodes said of them, by their widgets' ids
+        self.held: dict[str, str] = {}  # by the ids of hold widgets: since when, in words
         self.undecodable: Counter[str] = Counter()
         self._interfaces = interfaces
         self._types = {self.key(topic): name for topic, name in panel.subscriptions().items()}

@@ -23,7 +23,7 @@ from app.interlocks import (
 )
 from app.panel.displays import Indicator, Readout
 from app.panel.inputs import Numeric, SelectInput, TextInput, ToggleInput
-from app.panel.model import Action, Call, Panel, Publish
+from app.panel.model import Action, Call, Hold, Panel, Publish
 from app.panel.parameter import Parameter
 from app.parameter_display import parameter
 from app.progress import IDLE, Progress
@@ -114,6 +114,13 @@ def sight(
                     widgets[widget.id] |= progress(robot.progress.get(widget.id, IDLE))
                 if isinstance(widget, Parameter):
                     widgets[widget.id] |= parameter(widget, robot)
+            case Hold():
+                interlock = panel.interlock(widget.interlock)
+                verdict = noted(press_verdict(widget, interlock, robot, now))
+                if lock:
+                    verdict = Verdict(False, "log", lock)
+                holding = robot.held.get(widget.id, "")
+                widgets[widget.id] = {**enabled(verdict), "held": bool(holding), "holding": holding}
             case Readout():
                 widgets[widget.id], until = readout(widget, robot, now)
                 untils.append(until)

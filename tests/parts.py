@@ -216,6 +216,7 @@ def has_heard(node: RosNode, topic: str, count: int) -> bool:
 ORDERS: Mapping[str, tuple[str, ...]] = {
     "subscribe": ("topic", "type"),
     "heard": ("topic",),
+    "heard_at": ("topic",),
     "advertise": ("topic", "type"),
     "publish": ("topic", "fields"),
     "every": ("topic", "fields", "period_s"),

@@ -1,7 +1,7 @@
 """Who may come in: the names the panel is known by, and no page but its own."""
 
 import asyncio
-from collections.abc import Mapping
+from collections.abc import Mapping, MutableMapping
 
 import httpx
 import pytest
@@ -200,3 +200,49 @@ def test_an_origin_that_is_none_is_refused(origin: str) -> None:
 @pytest.mark.parametrize("host", ["[::1", "[::1]evil.com", "localhost:80@evil", "localhost:"])
 def test_what_only_begins_like_a_name_of_the_panel_is_refused(host: str) -> None:
     assert not let_in("GET", "/", {"host": host})
+
+
+def wanted_socket(headers: Mapping[str, str], *extensions: str) -> list[dict[str, object]]:
+    """What goes out when a WebSocket to `/widgets/x/hold` is wanted; inside, it is accepted."""
+    sent: list[dict[str, object]] = []
+
+    async def inside(scope: Scope, receive: Receive, send: Send) -> None:
+        await send({"type": "websocket.accept"})
+
+    async def receive() -> dict[str, str]:
+        return {"type": "websocket.connect"}
+
+    async def send(message: MutableMapping[str, object]) -> None:
+        sent.append(dict(message))
+
+    scope = {
+        "type": "websocket",
+        "path": "/widgets/x/hold",
+        "headers": [(name.encode(), value.encode()) for name, value in headers.items()],
+        "extensions": {key: {} for key in extensions},
+    }
+    asyncio.run(Doors(inside, HOSTS)(scope, receive, send))
+    return sent
+
+
+@pytest.mark.parametrize("headers", [{}, {"origin": "http://localhost:8000"}])
+def test_the_panels_own_page_and_programs_may_hold(headers: Mapping[str, str]) -> None:
+    assert wanted_socket({**OWN, **headers}) == [{"type": "websocket.accept"}]
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {**OWN, "origin": "http://evil.example"},
+        {**OWN, "origin": "null"},
+        {**OWN, "origin": "http://localhost:8001"},
+        {**OWN, "sec-fetch-site": "cross-site"},
+        {"host": "evil.example", "origin": "http://evil.example"},
+        {},
+    ],
+)
+def test_another_sites_page_and_another_name_may_not_hold(headers: Mapping[str, str]) -> None:
+    start, body = wanted_socket(headers, "websocket.http.response")
+    assert (start["type"], start["status"]) == ("websocket.http.response.start", 403)
+    assert b"error" in bytes(body["body"])  # type: ignore[call-overload]
+    assert wanted_socket(headers) == [{"type": "websocket.close", "code": 1008, "reason": ""}]

@@ -3,10 +3,11 @@
 from app.panel.displays import Indicator, LampState, Readout
 from app.panel.inputs import NumberInput, SelectInput, SliderInput, TextInput, ToggleInput
 from app.panel.load import load_panel
-from app.panel.model import Display, Input, Interlock, Page, Panel, Publish
+from app.panel.model import Display, Hold, Input, Interlock, Page, Panel, Publish
 
 __all__ = [
     "Display",
+    "Hold",
     "Indicator",
     "Input",
     "Interlock",

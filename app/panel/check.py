@@ -7,11 +7,24 @@ from app.interfaces import Interfaces
 from app.panel.check_calls import answer_faults, sent
 from app.panel.check_confirm import confirm_faults
 from app.panel.check_displays import display_faults, field_faults
+from app.panel.check_holds import hold_faults
 from app.panel.check_inputs import input_faults
 from app.panel.check_parameters import parameter_faults, type_faults
 from app.panel.displays import Indicator, Readout
 from app.panel.examples import template_faults
-from app.panel.model import Action, Call, Confirm, Display, Input, Interlock, Panel, Pressed, Publish
+from app.panel.model import (
+    Action,
+    Call,
+    Confirm,
+    Display,
+    Hold,
+    Input,
+    Interlock,
+    Panel,
+    Pressed,
+    Publish,
+    Published,
+)
 from app.panel.parameter import Parameter
 
 
@@ -58,6 +71,9 @@ def faults_in(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = ()
                 case Parameter():
                     yield from _interlocked(place, widget, panel)
                     yield from parameter_faults(place, widget)
+                case Hold():
+                    yield from _interlocked(place, widget, panel)
+                    yield from hold_faults(place, widget, on_page, inputs.keys(), interfaces, faulty)
                 case Readout() | Indicator():
                     yield from display_faults(place, widget, interfaces)
                 case _:
@@ -103,8 +119,8 @@ def _interlock(place: str, interlock: Interlock, interfaces: Interfaces) -> Iter
         yield Fault(f"{place}.field", f'"{interlock.field}" is {found}: an interlock needs a bool')
 
 
-def _interlocked(place: str, widget: Pressed, panel: Panel) -> Iterator[Fault]:
-    if isinstance(widget, Publish) and widget.topic == "/rosout":
+def _interlocked(place: str, widget: Pressed | Hold, panel: Panel) -> Iterator[Fault]:
+    if isinstance(widget, Published) and widget.topic == "/rosout":
         yield Fault(f"{place}.topic", "/rosout is where the kiosk's own log goes: choose another")
     if widget.interlock is not None and panel.interlock(widget.interlock) is None:
         known = ", ".join(i.id for i in panel.interlocks) or "none"
@@ -113,16 +129,16 @@ def _interlocked(place: str, widget: Pressed, panel: Panel) -> Iterator[Fault]:
 
 def _topics_of_two_kinds(panel: Panel) -> Iterator[Fault]:
     """A topic has one type and one QoS, wherever the panel names it."""
-    places: list[tuple[str, Interlock | Publish | Display | Confirm]] = []
+    places: list[tuple[str, Interlock | Published | Display | Confirm]] = []
     confirms: list[tuple[str, Confirm]] = []
     places += [(f"interlock[{i}]", one) for i, one in enumerate(panel.interlocks)]
     for p, page in enumerate(panel.pages):
         for w, widget in enumerate(page.widgets):
-            if isinstance(widget, Publish | Display):
+            if isinstance(widget, Published | Display):
                 places.append((f"page[{p}].widget[{w}]", widget))
             if isinstance(widget, Publish) and widget.confirm and widget.confirm.type:
                 confirms.append((f"page[{p}].widget[{w}].confirm", widget.confirm))
-    firsts: dict[str, tuple[str, Interlock | Publish | Display | Confirm]] = {}
+    firsts: dict[str, tuple[str, Interlock | Published | Display | Confirm]] = {}
     for place, one in (*places, *confirms):
         above, first = firsts.setdefault(one.topic, (place, one))
         if one.type != first.type:

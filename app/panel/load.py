@@ -16,11 +16,15 @@ from app.interfaces import interfaces_of
 from app.panel.check import faults_in
 from app.panel.constants import resolved
 from app.panel.description import ID
-from app.panel.model import KINDS, Panel
+from app.panel.model import KINDS, Hold, Panel
 
 INLINE: Final[Mapping[str | int, str]] = {
     "options": '[{ value = 1, label = "One" }]',
     "states": '[{ value = 0, text = "Idle", shape = "circle" }]',
+}
+NEEDED: Final[Mapping[str | int, str]] = {
+    "interlock": "a hold needs the interlock whose loss ends it",
+    "release": "a hold needs the message that is published when it ends",
 }
 
 
@@ -159,6 +163,8 @@ def _message(error: Any, model: type[BaseModel], location: tuple[str | int, ...]
             return f'"{error["input"]}" is not how names of constants start: it must be like STATUS_'
         case "tuple_type":
             return f"must be a list of tables: write [[{'.'.join(map(str, _names(location)))}]]"
+        case "missing" if model is Hold and location[-1] in NEEDED:
+            return f"is missing: {NEEDED[location[-1]]}"
         case "missing":
             return "is missing"
         case "model_type":

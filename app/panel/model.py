@@ -75,6 +75,35 @@ class Publish(Placed):
         return self.message
 
 
+class Hold(Placed):
+    """Published `rate_hz` times a second while its button is held, and `release` once after.
+
+    `deadline_field` gets the milliseconds within which the next message must come, 0 in the last
+    one; `counter_field` counts the messages.
+    """
+
+    kind: Literal["hold"]
+    topic: Topic
+    type: Type
+    message: dict[str, Any]
+    release: dict[str, Any]
+    interlock: Id
+    rate_hz: Annotated[float, Field(ge=1, le=100)] = 20.0
+    deadline_field: FieldPath | None = None
+    counter_field: FieldPath | None = None
+    qos: TopicQos = TopicQos()
+    span: Annotated[int, Field(ge=1, le=12)] = 4
+
+    @property
+    def period_s(self) -> float:
+        return 1 / self.rate_hz
+
+    @property
+    def deadline_ms(self) -> int:
+        """Three periods, 100 ms at least: two messages may be late or lost before the robot stops."""
+        return max(100, round(3000 / self.rate_hz))
+
+
 class Call(Placed):
     """A service call; `success` and `message` are fields of the response, found by themselves
     where it has a bool and a string of these names; `answer` is shown with `{field}` filled in."""
@@ -121,7 +150,8 @@ class Action(Placed):
 Input = TextInput | NumberInput | SliderInput | SelectInput | ToggleInput
 Pressed = Publish | Call | Action | Parameter
 Display = Readout | Indicator
-Widget = Annotated[Input | Pressed | Display, Field(discriminator="kind")]
+Published = Publish | Hold
+Widget = Annotated[Input | Pressed | Hold | Display, Field(discriminator="kind")]
 KINDS: Final[Mapping[str, type[Placed]]] = {
     "text": TextInput,
     "number": NumberInput,
@@ -129,6 +159,7 @@ KINDS: Final[Mapping[str, type[Placed]]] = {
     "select": SelectInput,
     "toggle": ToggleInput,
     "publish": Publish,
+    "hold": Hold,
     "call": Call,
     "action": Action,
     "parameter": Parameter,
@@ -174,7 +205,7 @@ class Panel(Description):
     # Of the file, not in it: changes when what a browser has loaded is out of date.
     revision: Annotated[str, Field(exclude=True)] = ""
 
-    def widgets(self) -> Iterator[Input | Pressed | Display]:
+    def widgets(self) -> Iterator[Input | Pressed | Hold | Display]:
         for page in self.pages:
             yield from page.widgets
 
@@ -210,10 +241,10 @@ class Panel(Description):
 
     def publications(self) -> dict[str, str]:
         """Topic → type of all that the panel publishes."""
-        return {w.topic: w.type for w in self.widgets() if isinstance(w, Publish)}
+        return {w.topic: w.type for w in self.widgets() if isinstance(w, Published)}
 
     def qos(self, topic: str) -> TopicQos:
         """A topic's QoS, which is the same wherever the panel names it."""
-        speaking = (w for w in self.widgets() if isinstance(w, Publish))
+        speaking = (w for w in self.widgets() if isinstance(w, Published))
         named = (of.qos for of in (*self.listening(), *speaking) if of.topic == topic)
         return next(named, OF_EVENTS if topic == EVENTS else TopicQos())

@@ -1,7 +1,7 @@
 """Message templates: `{ data = "{message}" }` with the values of the inputs it names."""
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from string import Formatter
 from typing import Any, Final
 
@@ -28,6 +28,26 @@ def filled(template: Any, inputs: Mapping[str, Any], where: str = "") -> Any:
     if len(parts) == 1 and parts[0][0] == "" and parts[0][1] is not None:
         return inputs[parts[0][1]]
     return "".join(text + ("" if name is None else _text(inputs[name], where)) for text, name in parts)
+
+
+def placed(fields: Any, path: str, value: Any) -> Any:
+    """Fields of a message with a value at a path like "header.seq" or "data[2]"; they themselves stay
+    as they are. FieldError where a list on the way is too short."""
+    return _placed(fields, re.findall(r"[^.\[\]]+|\[[0-9]+\]", path), path, value)
+
+
+def _placed(fields: Any, steps: list[str], path: str, value: Any) -> Any:
+    if not steps:
+        return value
+    step, rest = steps[0], steps[1:]
+    if not step.startswith("["):
+        known = dict(fields) if isinstance(fields, Mapping) else {}
+        return known | {step: _placed(known.get(step, {}), rest, path, value)}
+    index, known_items = int(step[1:-1]), list(fields) if isinstance(fields, list | tuple) else []
+    if index >= len(known_items):
+        raise FieldError(path, f"there is no {step}: the message has {len(known_items)} elements")
+    known_items[index] = _placed(known_items[index], rest, path, value)
+    return known_items
 
 
 def at(template: Any, where: str) -> Any:
@@ -69,6 +89,11 @@ def inputs_of(widget: Pressed) -> list[str]:
     templates: list[Any] = [widget.template]
     if isinstance(widget, Publish) and widget.confirm is not None:
         templates.append(widget.confirm.equals)
+    return names_in(templates)
+
+
+def names_in(templates: Iterable[Any]) -> list[str]:
+    """The ids of the inputs that templates name, each once."""
     return list(dict.fromkeys(name for template in templates for _, name in named(template)))
 
 

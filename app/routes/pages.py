@@ -32,6 +32,7 @@ RELOADED_S = 2.0  # a press on a page that should have reloaded before is one on
 # How long after a page without scripts was due it is still thought to be there.
 GRACE_S = 5
 REFUSALS = get_args(Refusal)
+WORDS = ("cancel", "robots", "control", "set", "back", "hold_cut", "hold_scripts")
 CONTROL_ACTS = ("take", "ask", "give", "keep", "release", "withdraw")
 
 
@@ -124,7 +125,7 @@ def _render(request: Request, site: Site, page: Page) -> Response:
         receipt=receipt,
         inputs=dict(receipt.inputs) if receipt else {},
         words={"base": kiosk.base, "log": say("log_link"), "asks": asks_of(site.fleet.panel, page)}
-        | {word: say(word) for word in ("cancel", "robots", "control", "set", "back")}
+        | {word: say(word) for word in WORDS}
         | {act: say(f"control_{act}") for act in CONTROL_ACTS},
         lost=say("server_lost"),
         lost_short=say("lost"),

@@ -7,6 +7,7 @@ from fastapi import Depends, Path, Request
 from fastapi.responses import HTMLResponse, JSONResponse, Response
 from jinja2 import Environment
 from starlette.exceptions import HTTPException
+from starlette.requests import HTTPConnection
 
 from app.assets import Assets
 from app.browsers import Browsers
@@ -30,19 +31,19 @@ class Site:
     browsers: Browsers = field(default_factory=Browsers)
 
 
-def site_of(request: Request) -> Site:
+def site_of(request: HTTPConnection) -> Site:
     site: Site = request.app.state.site
     return site
 
 
-async def _current(request: Request) -> Site:
+async def _current(request: HTTPConnection) -> Site:
     return site_of(request)  # not itself the dependency: plain functions run on a thread
 
 
 CurrentSite = Annotated[Site, Depends(_current)]
 
 
-async def _of_robot(request: Request) -> Kiosk:
+async def _of_robot(request: HTTPConnection) -> Kiosk:
     return site_of(request).fleet.kiosk(request.path_params.get("robot"))
 
 

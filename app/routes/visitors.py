@@ -5,6 +5,7 @@ from typing import Final
 
 from fastapi import Request
 from fastapi.responses import Response
+from starlette.requests import HTTPConnection
 
 from app.browsers import TOKEN, Browser, new_token, newcomer, stranger
 from app.routes.site import Site
@@ -14,7 +15,7 @@ KEPT_S: Final = 365 * 86_400
 OTHER_SITES: Final = frozenset({"cross-site", "same-site"})
 
 
-def visitor(request: Request, site: Site) -> Browser:
+def visitor(request: HTTPConnection, site: Site) -> Browser:
     """The browser by its cookie; without one, or with one that is none of ours, a stranger."""
     token = request.cookies.get(COOKIE, "")
     address = request.client.host if request.client else ""

@@ -21,6 +21,7 @@ const SHOW = {
     const cancel = root.querySelector(".cancel");
     if (cancel) cancel.disabled = !value;
   },
+  held: (root, value) => root.toggleAttribute("data-held", value),
   state: (root, value) => (root.dataset.state = value),
   shape: (root, value) => (root.dataset.shape = value),
   colour: (root, value) => (root.dataset.colour = value),
@@ -102,7 +103,7 @@ function lockAll() {
     if (root.querySelector(".cancel:enabled")) {
       setText(root.querySelector('[data-text="goal"]'), body.dataset.unknown); // it was under way
     }
-    const buttons = root.querySelectorAll("button[type=submit]");
+    const buttons = root.querySelectorAll("button[type=submit], .hold");
     for (const button of buttons) button.disabled = true;
     root.querySelector("dialog.ask")?.close();
     if (buttons.length) setText(root.querySelector('[data-text="reason"]'), body.dataset.lost);
@@ -145,5 +146,7 @@ const source = new Source({
 });
 
 if (document.querySelector("[data-step]")) import("./inputs.js");
+const holds = document.querySelectorAll('[data-kind="hold"]');
+if (holds.length) import("./hold.js").then(({ Hold }) => holds.forEach((root) => new Hold(root, source)));
 new Presser(widgets, source, { unsure: body.dataset.unsure, lost: body.dataset.lost });
 source.start();

@@ -2,7 +2,7 @@
 const ANSWER_WITHIN_MS = 5000;
 // Two taps of a finger come within this time: the second one is the same press.
 const TAP_AGAIN_MS = 700;
-const ENTRIES = "input:not([type=hidden]), select";
+export const ENTRIES = "input:not([type=hidden]), select";
 
 function newId() {
   const bytes = crypto.getRandomValues(new Uint8Array(16));
@@ -11,7 +11,7 @@ function newId() {
 
 // With its type. What is no number (an empty field), or a whole one that is not exact here, goes as it
 // is written: the server says what is wrong.
-function valueOf(input) {
+export function valueOf(input) {
   if (input.type === "checkbox") return input.checked;
   const number = input.type === "number" || input.type === "range";
   if (!number || input.value === "") return input.value;

@@ -50,17 +50,25 @@ class Commands:
     def __init__(self, name: str) -> None:
         self.node = rclpy.create_node(name)
         self.heard_on: dict[str, list[dict[str, Any]]] = {}
+        self.times_of: dict[str, list[float]] = {}
         self.publishers: dict[str, Any] = {}
         self.timers: dict[str, Any] = {}
 
     def subscribe(self, topic: str, type: str, **qos: Any) -> None:
         heard = self.heard_on.setdefault(topic, [])
-        self.node.create_subscription(
-            type_named(type), topic, lambda m: heard.append(fields_of(m)), qos_of(qos)
-        )
+        times = self.times_of.setdefault(topic, [])
+
+        def hear(message: Any) -> None:
+            times.append(time.monotonic())  # the same clock in all processes of one machine
+            heard.append(fields_of(message))
+
+        self.node.create_subscription(type_named(type), topic, hear, qos_of(qos))
 
     def heard(self, topic: str) -> list[dict[str, Any]]:
         return self.heard_on[topic]
+
+    def heard_at(self, topic: str) -> list[float]:
+        return self.times_of[topic]
 
     def advertise(self, topic: str, type: str, **qos: Any) -> None:
         self.publishers[topic] = self.node.create_publisher(type_named(type), topic, qos_of(qos))

@@ -1,0 +1,280 @@
+"""Hold-to-run: a message at a rate while one browser holds a button, and one more when it ends.
+
+Each message is judged as a press is. Whatever ends a hold ends it for good: to go on, the operator
+has to let go and press again. Nothing is sent late: where there is no way for the last message when
+a hold ends, it is not sent at all.
+"""
+
+import asyncio
+import logging
+import secrets
+import time
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Any, Final, Protocol
+
+from app.errors import FieldError, InputError, LinkError, NotFound
+from app.interfaces import INTEGERS, Interfaces
+from app.interlocks import Verdict, press_verdict, way
+from app.leases import LEASE_S, Lease
+from app.logs import RobotLog
+from app.panel.check_holds import with_own_fields
+from app.panel.model import Hold, Panel
+from app.panel.template import filled, names_in
+from app.presses import LONGEST_LOGGED, NO_WAY, By, Cause, Receipt, named
+from app.progress import Outcome
+from app.robot import Robot
+from app.sentences import clock, say
+
+log = logging.getLogger("kiosk.holds")
+
+RELEASED: Final = "hold_released"
+
+Checked = Callable[[Iterable[str], Mapping[str, Any]], dict[str, Any]]
+
+
+class Way(Protocol):
+    """What a hold needs of the link."""
+
+    def put(self, key: str, payload: bytes) -> None: ...
+
+
+class Clock(Protocol):
+    """What a hold needs of the event loop; `time` is in monotonic seconds."""
+
+    def time(self) -> float: ...
+    def call_at(self, when: float, callback: Callable[[], object]) -> asyncio.TimerHandle: ...
+
+
+@dataclass(slots=True, eq=False)
+class Holding:
+    """A hold that is going on; `told` gets its receipt when it ends, whatever ends it."""
+
+    widget: Hold
+    lease: Lease
+    by: By
+    inputs: Mapping[str, Any]
+    fields: Mapping[str, Any]
+    last_fields: Mapping[str, Any]
+    told: Callable[[Receipt], None]
+    since: str
+    messages: int = 0
+
+
+class Holds:
+    """The holds of one robot, one for each widget at most; used on the event loop only."""
+
+    def __init__(
+        self,
+        panel: Panel,
+        interfaces: Interfaces,
+        robot: Robot,
+        way: Way,
+        loop: Clock,
+        *,
+        checked: Checked,
+        take: Callable[[], None],
+        changed: Callable[[], None],
+    ) -> None:
+        """`checked` are the values that a template gets of what was entered; `take` takes in what
+        has come from the robot; `changed` is called when what the widgets show has changed."""
+        self._panel = panel
+        self._interfaces = interfaces
+        self._robot = robot
+        self._log = RobotLog(log, robot.name)
+        self._way = way
+        self._loop = loop
+        self._checked = checked
+        self._take = take
+        self._changed = changed
+        self._widgets = {w.id: w for w in panel.widgets() if isinstance(w, Hold)}
+        self._held: dict[str, Holding] = {}
+        self._counts = dict.fromkeys(self._widgets, 0)
+        self._timer: asyncio.TimerHandle | None = None
+        self._closed = False
+
+    def widget(self, widget_id: str) -> Hold:
+        """What can be held; NotFound for everything else."""
+        if widget_id not in self._widgets:
+            raise NotFound(f'there is no widget "{widget_id}" that can be held')
+        return self._widgets[widget_id]
+
+    def begin(
+        self,
+        widget_id: str,
+        inputs: Mapping[str, Any],
+        sent: float,
+        by: By,
+        told: Callable[[Receipt], None],
+    ) -> Receipt | Holding:
+        """Begins to publish, or says why not. `sent` is when the browser asked, at the latest."""
+        self._take()
+        self.judge()
+        widget, now = self.widget(widget_id), self._loop.time()
+        if self._closed:
+            return self._refused(widget, inputs, by, say("hold_by_stopping"), "interlock")
+        if other := next(
+            (one for one in self._held.values() if one.widget.topic == widget.topic), None
+        ):
+            code = "hold_elsewhere" if other.widget is widget else "hold_same_topic"
+            why = say(code, label=other.widget.label, topic=widget.topic)
+            return self._refused(widget, inputs, by, why, "interlock")
+        if now >= sent + LEASE_S:
+            return self._refused(widget, inputs, by, say("hold_late"), "interlock")
+        if not (verdict := self._verdict(widget, by, now)).permitted:
+            cause: Cause = "link" if verdict.code in NO_WAY else "interlock"
+            return self._refused(widget, inputs, by, verdict.reason or "", cause)
+        if why := by.doubt():
+            return self._refused(widget, inputs, by, why, "interlock")
+        try:
+            values = self._checked(names_in([widget.message, widget.release]), inputs)
+            fields, last_fields = filled(widget.message, values), filled(widget.release, values)
+            for each in (fields, last_fields):
+                self._interfaces.encode(widget.type, with_own_fields(widget, each, 0, 0))
+        except (FieldError, InputError) as error:
+            return self._refused(widget, inputs, by, f"{error}.", "input")
+        lease = Lease.begun(secrets.token_hex(8), widget.period_s, sent, now)
+        since = say("hold_since", time=clock(time.time()))
+        holding = Holding(widget, lease, by, dict(inputs), fields, last_fields, told, since)
+        self._held[widget_id] = holding
+        self._robot.held[widget_id] = since
+        self._log.info("hold %s of %s by %s with %.*s begins", lease.id, widget_id, named(by.origin),
+                LONGEST_LOGGED, holding.inputs)  # fmt: skip
+        self._changed()
+        self.step()
+        return holding
+
+    def refuse(self, widget_id: str, by: By, code: str, **about: object) -> Receipt:
+        """A hold that can't be judged by what its browser said, for the reason of this code."""
+        return self._refused(self.widget(widget_id), {}, by, say(code, **about), "interlock")
+
+    def beat(self, holding: Holding, number: int, sent: float) -> bool:
+        """A heartbeat; whether the hold goes on."""
+        self.judge()
+        if not self._on(holding) or not holding.lease.beat(number, sent, self._loop.time()):
+            return False
+        self._plan()
+        return True
+
+    def end(self, holding: Holding, code: str) -> None:
+        """Ends a hold, if it is going on; `code` is of the sentence that says why."""
+        self.judge()
+        if self._on(holding):
+            self._end(holding, code, say(code) if code != RELEASED else "")
+
+    def close(self) -> None:
+        """Ends all for good."""
+        self._closed = True
+        for holding in list(self._held.values()):
+            self.end(holding, "hold_by_stopping")
+        self._plan()
+
+    def judge(self) -> None:
+        """Ends what has lost its ground: after every change, and before anything goes on."""
+        for holding in list(self._held.values()):
+            now = self._loop.time()
+            if not self._on(holding):
+                continue  # ended meanwhile, by what the end of another one showed
+            if code := holding.lease.over(now):
+                self._end(holding, code, say(code))
+            elif not (verdict := self._verdict(holding.widget, holding.by, now)).permitted:
+                self._end(holding, verdict.code, verdict.reason or "")
+
+    def step(self) -> None:
+        """Sends what is due, by all that has come until now, and plans the next step."""
+        self._take()
+        self.judge()
+        for holding in list(self._held.values()):
+            if self._on(holding) and holding.lease.due(self._loop.time()):
+                self._send(holding)
+        self._plan()
+
+    def _on(self, holding: Holding) -> bool:
+        return self._held.get(holding.widget.id) is holding
+
+    def _verdict(self, widget: Hold, by: By, now: float) -> Verdict:
+        """The first that locks: the way to the robot, who has control, the widget's interlock."""
+        for verdict in (way(self._robot, now), by.controls()):
+            if not verdict.permitted:
+                return verdict
+        return press_verdict(widget, self._panel.interlock(widget.interlock), self._robot, now)
+
+    def _plan(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        now = self._loop.time()
+        whens = [
+            min(one.lease.next_at, one.lease.until, self._verdict(one.widget, one.by, now).until)
+            for one in self._held.values()
+        ]
+        if whens:
+            self._timer = self._loop.call_at(min(whens), self.step)
+
+    def _send(self, holding: Holding) -> None:
+        try:
+            self._put(holding.widget, holding.fields, holding.widget.deadline_ms)
+        except LinkError as error:
+            self._end(holding, "link", f"{error}.")
+        else:
+            holding.messages += 1
+
+    def _put(self, widget: Hold, fields: Mapping[str, Any], deadline_ms: int) -> None:
+        count = self._counts[widget.id] + 1
+        if widget.counter_field is not None:
+            kind = self._interfaces.field_type(widget.type, widget.counter_field)
+            count %= INTEGERS[kind][1] + 1
+        whole = with_own_fields(widget, fields, deadline_ms, count)
+        payload = self._interfaces.encode(widget.type, whole)
+        self._way.put(self._robot.key(widget.topic), payload)
+        self._counts[widget.id] = count
+
+    def _end(self, holding: Holding, code: str, why: str) -> None:
+        widget, now = holding.widget, self._loop.time()
+        del self._held[widget.id]
+        del self._robot.held[widget.id]
+        unsaid = self._put_last(holding, now)
+        seconds = now - holding.lease.begun_at
+        at = clock(time.time())
+        sentence = RELEASED if code == RELEASED else "hold_ended"
+        text = say(sentence, time=at, seconds=f"{seconds:.1f}", why=why)
+        text += say("hold_unsaid", why=unsaid) if unsaid else ""
+        outcome: Outcome = "unknown" if unsaid else "published" if code == RELEASED else "aborted"
+        level = logging.INFO if outcome == "published" else logging.WARNING
+        self._log.log(level, "hold %s of %s by %s ended after %.3f s and %d messages (%s): %s",
+                holding.lease.id, widget.id, named(holding.by.origin), seconds, holding.messages,
+                code, text)  # fmt: skip
+        holding.told(_receipt(holding.lease.id, widget, outcome, text, "", holding.inputs))
+        self._changed()
+
+    def _put_last(self, holding: Holding, now: float) -> str:
+        """The message that ends it, if there is a way now; why it was not sent, or ""."""
+        verdict = press_verdict(holding.widget, None, self._robot, now)
+        if not verdict.permitted:
+            return verdict.reason or ""
+        try:
+            self._put(holding.widget, holding.last_fields, 0)
+        except LinkError as error:
+            return f"{error}."
+        return ""
+
+    def _refused(
+        self, widget: Hold, inputs: Mapping[str, Any], by: By, why: str, cause: Cause
+    ) -> Receipt:
+        text = say("refused", why=why, time=clock(time.time()))
+        self._log.warning("hold of %s by %s with %.*s: %s", widget.id, named(by.origin),
+                LONGEST_LOGGED, inputs, text)  # fmt: skip
+        return _receipt(secrets.token_hex(8), widget, "refused", text, cause, inputs)
+
+
+def _receipt(
+    receipt_id: str,
+    widget: Hold,
+    outcome: Outcome,
+    reason: str,
+    cause: Cause,
+    inputs: Mapping[str, Any],
+) -> Receipt:
+    at = datetime.now(UTC).isoformat(timespec="milliseconds")
+    return Receipt(receipt_id, widget.id, outcome, reason, at, cause, dict(inputs))

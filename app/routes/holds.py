@@ -1,0 +1,218 @@
+"""A hold: one WebSocket from the press to its end, because its closing is seen at once.
+
+The server speaks first. Every message of the server's has `stamp`, its own time in ms since the socket
+opened; every message of the browser's has the last `stamp` that it got, and `after`, for how many ms it
+had it: so each one's age is known. Without an answer no browser shows that something is held.
+
+    server   {"stamp": 0.2}
+    browser  {"do": "begin", "inputs": {…}, "seen": "<boot>-<version>", "stamp": 0.2, "after": 0.9}
+    server   {"stamp": 2.1, "state": "held", "lease": "…", "reason": "Held since 10:00:00."}
+    browser  {"do": "beat", "number": 1, "lease": "…", "stamp": 2.1, "after": 80}
+    server   {"stamp": 83.0, "state": "held"}
+    browser  {"do": "end", "why": "released", "lease": "…", "stamp": 83.0, "after": 12}
+    server   {"stamp": 96.4, "state": "ended", "outcome": "published", "reason": "…"}
+"""
+
+import asyncio
+import json
+import secrets
+import time
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import replace
+from typing import Annotated, Any, Final, Literal
+
+from fastapi import APIRouter, WebSocket, WebSocketDisconnect
+from pydantic import BaseModel, ConfigDict, Field, JsonValue, TypeAdapter, ValidationError
+
+from app.browsers import Browser
+from app.errors import LogError
+from app.holds import RELEASED, Holding
+from app.kiosk import Kiosk
+from app.leases import sent_at
+from app.logbook import Noted
+from app.presses import Receipt
+from app.routes.site import CurrentKiosk, CurrentSite
+from app.routes.visitors import visitor
+from app.sentences import say
+
+router = APIRouter()
+
+BEGIN_WITHIN_S: Final = 2.0  # from the opening of the socket
+SILENCE_S: Final = 2.0  # a hold is over long before: nobody is there
+LONGEST_MESSAGE: Final = 64 * 1024
+CLOSE: Final[Mapping[str, int]] = {"interlock": 4409, "input": 4422, "link": 4503}  # 4000 + HTTP's
+
+# What a browser may say of why it ends a hold → the code of the sentence.
+WHYS: Final[Mapping[str, str]] = {
+    "released": RELEASED,
+    "cancel": "hold_by_cancel",
+    "sliding": "hold_by_sliding",
+    "second": "hold_by_second",
+    "menu": "hold_by_menu",
+    "blur": "hold_by_blur",
+    "hiding": "hold_by_hiding",
+    "leaving": "hold_by_leaving",
+    "lock": "hold_by_lock",
+    "escape": "hold_by_escape",
+    "silence": "hold_by_silence",
+}
+Milliseconds = Annotated[float, Field(ge=0, le=1e12, allow_inf_nan=False)]
+
+
+class Said(BaseModel):
+    """What every message of a browser has."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    stamp: Milliseconds
+    after: Milliseconds
+
+
+class Begin(Said):
+    do: Literal["begin"]
+    inputs: dict[str, JsonValue]
+    seen: Annotated[str, Field(pattern=r"^[0-9a-f]{1,32}-[0-9]{1,18}$")]
+
+
+class Beat(Said):
+    do: Literal["beat"]
+    lease: str
+    number: Annotated[int, Field(ge=1)]
+
+
+class End(Said):
+    do: Literal["end"]
+    lease: str
+    why: str
+
+
+_message: TypeAdapter[Begin | Beat | End] = TypeAdapter(
+    Annotated[Begin | Beat | End, Field(discriminator="do")]
+)
+
+
+@router.websocket("/widgets/{widget}/hold")
+async def hold(socket: WebSocket, widget: str, site: CurrentSite, kiosk: CurrentKiosk) -> None:
+    kiosk.holds.widget(widget)
+    await socket.accept()
+    session = _Session(socket, kiosk, visitor(socket, site))
+    with suppress(WebSocketDisconnect):
+        receipt = await session.run(widget)
+        site.metrics.presses.labels(receipt.outcome).inc()
+
+
+class _Session:
+    """One socket and its one hold."""
+
+    def __init__(self, socket: WebSocket, kiosk: Kiosk, browser: Browser) -> None:
+        self._socket = socket
+        self._kiosk = kiosk
+        self._opened_at = time.monotonic()
+        self._ended: asyncio.Future[Receipt] = asyncio.get_running_loop().create_future()
+        self._browser = browser
+        self._noted: Noted | None = None
+
+    async def run(self, widget: str) -> Receipt:
+        """From the first message to the end; the receipt of the hold, of a refusal too."""
+        await self._say()
+        begun = await self._begun(widget)
+        if isinstance(begun, Receipt):
+            await self._closed(begun)
+            await self._say(state="refused", status=CLOSE[begun.cause] - 4000, **begun.as_json())
+            await self._close(CLOSE[begun.cause])
+            return begun
+        telling = asyncio.create_task(self._tell())
+        try:
+            if not self._ended.done():
+                await self._say(state="held", lease=begun.lease.id, reason=begun.since)
+            await self._listen(begun)
+        finally:
+            self._kiosk.holds.end(begun, "hold_by_closing")
+            await asyncio.gather(telling, return_exceptions=True)
+        return self._ended.result()
+
+    async def _begun(self, widget: str) -> Receipt | Holding:
+        holds, by = self._kiosk.holds, self._kiosk.by(widget, self._browser)
+        try:
+            async with asyncio.timeout(BEGIN_WITHIN_S):
+                said = await self._read()
+        except TimeoutError:
+            return holds.refuse(widget, by, "hold_late")
+        if not isinstance(said, Begin):
+            return holds.refuse(widget, by, "hold_by_nonsense")
+        boot, _, version = said.seen.partition("-")
+        if boot != self._kiosk.board.boot:
+            return holds.refuse(widget, by, "seen_before_restart")
+        by = self._kiosk.by(widget, self._browser, said.seen, int(version))
+        sent, name = self._sent(said), secrets.token_hex(8)
+        try:
+            logbook = self._kiosk.logbook
+            self._noted = await logbook.pressed(widget, said.inputs, name, by.origin, "hold")
+        except LogError as error:
+            return holds.refuse(widget, by, "hold_unlogged", why=str(error))
+        return holds.begin(widget, said.inputs, sent, by, self._ended.set_result)
+
+    async def _closed(self, receipt: Receipt) -> Receipt:
+        """Its end in the operator's log, on the disk before it is told."""
+        why = await self._noted.closed(receipt.outcome, receipt.reason) if self._noted else ""
+        said = say("log_not_on_disk", said=receipt.reason, why=why)
+        return replace(receipt, reason=said) if why else receipt
+
+    async def _listen(self, holding: Holding) -> None:
+        """Until the browser closes or says nothing any more: what is late gets its answer too."""
+        with suppress(TimeoutError, WebSocketDisconnect):
+            while True:
+                async with asyncio.timeout(SILENCE_S):
+                    said = await self._read()
+                if self._hear(said, holding):
+                    await self._say(state="held")
+                elif isinstance(said, Beat):
+                    await self._say(state="ended", **self._ended.result().as_json())
+        await self._close(1000)
+
+    def _hear(self, said: Begin | Beat | End | None, holding: Holding) -> bool:
+        """Whether the hold goes on after what was said."""
+        holds = self._kiosk.holds
+        if said is None or isinstance(said, Begin) or said.lease != holding.lease.id:
+            holds.end(holding, "hold_by_nonsense")
+            return False
+        if isinstance(said, End):
+            holds.end(holding, WHYS.get(said.why, "hold_by_nonsense"))
+            return False
+        return holds.beat(holding, said.number, self._sent(said))
+
+    async def _read(self) -> Begin | Beat | End | None:
+        message = await self._socket.receive()
+        if message["type"] == "websocket.disconnect":
+            raise WebSocketDisconnect(message.get("code", 1000))
+        return _read(message.get("text") or "")
+
+    def _sent(self, said: Said) -> float:
+        return sent_at(self._opened_at, said.stamp, said.after, time.monotonic())
+
+    async def _tell(self) -> None:
+        """The end, as soon as it is there, whatever ended it; then the browser may close."""
+        receipt = await self._closed(await asyncio.shield(self._ended))
+        with suppress(WebSocketDisconnect, RuntimeError):
+            await self._say(state="ended", **receipt.as_json())
+
+    async def _say(self, **what: Any) -> None:
+        stamp = round(1000 * (time.monotonic() - self._opened_at), 1)
+        await self._socket.send_text(json.dumps({"stamp": stamp, **what}, ensure_ascii=False))
+
+    async def _close(self, code: int) -> None:
+        with suppress(WebSocketDisconnect, RuntimeError):  # the browser was faster
+            await self._socket.close(code)
+
+
+def _read(text: str) -> Begin | Beat | End | None:
+    """A message of a browser's; None for what is none."""
+    if len(text) > LONGEST_MESSAGE:
+        return None
+    try:
+        given = json.loads(text)
+        json.dumps(given, ensure_ascii=False, allow_nan=False).encode()
+        return _message.validate_python(given)
+    except (ValueError, ValidationError, RecursionError):
+        return None

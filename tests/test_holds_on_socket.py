@@ -1,0 +1,270 @@
+"""The WebSocket of a hold, with the demo robot: who may open it, and what it answers."""
+
+import json
+import signal
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from socket import create_connection
+from typing import Any, Final
+
+import pytest
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import ClientConnection, connect
+
+from tests.parts import ROOT, Bridge, RosNode, Server, live, until
+from tests.test_holds_in_browser import PANEL, permit
+
+TRIES: Final = 5
+
+
+@pytest.fixture(scope="module")
+def demo(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    panel = tmp_path_factory.mktemp("panel") / "jog.toml"
+    panel.write_text(PANEL)
+    mine = Server(ROOT, KIOSK_PANEL=str(panel), KIOSK_MODE="demo")
+    until(mine.ready, "ready")
+    yield mine
+    mine.end()
+
+
+class Socket:
+    """One hold, spoken by hand."""
+
+    def __init__(self, connection: ClientConnection, seen: str) -> None:
+        self._connection = connection
+        self._seen = seen
+        self.number = 0
+        self.lease = ""
+        self.hear()
+
+    def hear(self) -> dict[str, Any]:
+        said: dict[str, Any] = json.loads(self._connection.recv(timeout=5))
+        self.stamp, self.at = said["stamp"], time.monotonic()
+        return said
+
+    def say(self, **what: Any) -> None:
+        after = 1000 * (time.monotonic() - self.at)
+        self._connection.send(json.dumps({"stamp": self.stamp, "after": after, **what}))
+
+    def begin(self, **more: Any) -> dict[str, Any]:
+        self.say(do="begin", **{"inputs": {"speed": 0.5}, "seen": self._seen, **more})
+        said = self.hear()
+        self.lease = said.get("lease", "")
+        return said
+
+    def beat(self, **more: Any) -> dict[str, Any]:
+        self.number += 1
+        self.say(do="beat", **{"number": self.number, "lease": self.lease, **more})
+        return self.hear()
+
+    def beat_until_it_ends(self) -> dict[str, Any]:
+        """As a browser does, which sends on until it is told."""
+        while (said := self.beat())["state"] == "held":
+            time.sleep(0.05)
+        return said
+
+    def closed(self) -> int:
+        """The code that the server closes with."""
+        with pytest.raises(ConnectionClosed) as closed:
+            self.hear()
+        assert closed.value.rcvd is not None
+        return closed.value.rcvd.code
+
+
+@contextmanager
+def opened(server: Server, **headers: str) -> Iterator[Socket]:
+    until(lambda: server.widget("jog")["enabled"], "the demo robot permits", within_s=40)
+    seen = server.snapshot()["id"]
+    url = f"ws://127.0.0.1:{server.port}{server.base}/widgets/jog/hold"
+    with connect(url, additional_headers=headers) as connection:
+        yield Socket(connection, seen)
+
+
+@contextmanager
+def held(server: Server) -> Iterator[Socket]:
+    """A hold that has begun; on a busy machine the time from press to hold may be too long."""
+    for _ in range(TRIES):
+        with opened(server) as socket:
+            if socket.begin()["state"] == "held":
+                yield socket
+                return
+    raise AssertionError("no hold began")
+
+
+def test_a_hold_is_begun_kept_and_let_go(demo: Server) -> None:
+    with held(demo) as socket:
+        assert socket.beat()["state"] == "held"
+        assert demo.widget("jog")["held"] is True
+        socket.say(do="end", why="released", lease=socket.lease)
+        said = socket.hear()
+        assert (said["state"], said["widget"], said["id"]) == ("ended", "jog", socket.lease)
+        until(lambda: not demo.widget("jog")["held"], "no longer held")
+
+
+def test_a_heartbeat_for_a_hold_that_is_over_is_told_so_and_revives_nothing(demo: Server) -> None:
+    with held(demo) as socket:
+        time.sleep(0.4)
+        said = socket.hear()
+        assert (said["state"], said["outcome"]) == ("ended", "aborted")
+        for _ in range(3):
+            again = socket.beat()
+            assert (again["state"], again["reason"]) == ("ended", said["reason"])
+        assert demo.widget("jog")["held"] is False
+        assert socket.closed() == 1000
+
+
+def test_a_second_holder_is_refused(demo: Server) -> None:
+    with held(demo) as first, opened(demo) as second:
+        first.beat()
+        said = second.begin()
+        if first.beat()["state"] == "held":  # else the machine stood still: nothing to compare
+            assert (said["state"], said["status"], said["outcome"]) == ("refused", 409, "refused")
+            assert said["reason"].endswith("held by another browser.")
+            assert second.closed() == 4409
+
+
+@pytest.mark.parametrize(
+    ("more", "status", "reason"),
+    [
+        ({"stamp": 0, "after": 0, "do": "beat", "lease": "x", "number": 1}, 409, "can't be understood"),
+        ({"seen": "abc-1"}, 409, "started anew"),
+        ({"inputs": {"speed": 7}}, 422, "Speed is 7"),
+        ({"inputs": []}, 409, "can't be understood"),
+        ({"stamp": 1e9}, 409, "too late"),
+    ],
+)
+def test_what_can_not_be_begun_is_refused(
+    demo: Server, more: dict[str, Any], status: int, reason: str
+) -> None:
+    with opened(demo) as socket:
+        if more.get("do") == "beat":
+            socket.say(**more)
+            said = socket.hear()
+        else:
+            said = socket.begin(**more)
+        assert (said["state"], said["status"]) == ("refused", status)
+        assert reason in said["reason"]
+        assert socket.closed() == 4000 + status
+
+
+def test_a_begin_that_was_long_on_its_way_is_refused(demo: Server) -> None:
+    with opened(demo) as socket:
+        time.sleep(0.3)
+        said = socket.begin(after=0.0)
+        assert (said["state"], "too late" in said["reason"]) == ("refused", True)
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{", '{"do":"dance"}', "9" * 70_000, '"\ud800"'])
+def test_nonsense_ends_a_hold(demo: Server, text: str) -> None:
+    with held(demo) as socket:
+        socket._connection.send(text.encode("utf-8", "replace").decode())
+        said = socket.hear()
+        assert (said["state"], said["outcome"]) == ("ended", "aborted")
+
+
+@pytest.mark.parametrize("header", ["Origin: http://evil.example", "Sec-Fetch-Site: cross-site"])
+def test_the_doors_are_shut_for_other_sites(demo: Server, header: str) -> None:
+    name, _, value = header.partition(": ")
+    with pytest.raises(InvalidStatus) as refused, opened(demo, **{name: value}):
+        raise AssertionError("it opened")
+    assert refused.value.response.status_code == 403
+
+
+def test_the_doors_are_shut_under_other_names(demo: Server) -> None:
+    way = create_connection(("127.0.0.1", demo.port))
+    url = f"ws://evil.example:{demo.port}/widgets/jog/hold"
+    with pytest.raises(InvalidStatus) as refused, connect(url, sock=way):
+        raise AssertionError("it opened")
+    assert refused.value.response.status_code == 403
+
+
+def test_what_can_not_be_held_is_not_found(demo: Server) -> None:
+    url = f"ws://127.0.0.1:{demo.port}/widgets/speed/hold"
+    with pytest.raises(InvalidStatus) as refused, connect(url):
+        raise AssertionError("it opened")
+    assert refused.value.response.status_code == 404
+    assert b"can be held" in (refused.value.response.body or b"")
+
+
+def test_each_of_several_robots_is_held_on_its_own(tmp_path: Path) -> None:
+    robots = "".join(
+        f'[[robot]]\nid = "{one}"\nname = "{one}"\nnamespace = "/{one}"\n' for one in ("r1", "r2")
+    )
+    panel = tmp_path / "two.toml"
+    panel.write_text(PANEL.replace("[[interlock]]", robots + "[[interlock]]"))
+    server = Server(ROOT, KIOSK_PANEL=str(panel), KIOSK_MODE="demo")
+    try:
+        until(server.ready, "ready")
+        with held(server.robot("r2")) as socket:
+            assert server.robot("r1").widget("jog")["held"] is False
+            assert server.robot("r2").widget("jog")["held"] is True
+            socket.say(do="end", why="released", lease=socket.lease)
+            assert socket.hear()["state"] == "ended"
+        for path in ("/robots/r3/widgets/jog/hold", "/widgets/jog/hold"):
+            with pytest.raises(InvalidStatus), connect(f"ws://127.0.0.1:{server.port}{path}"):
+                raise AssertionError("it opened")
+    finally:
+        server.end()
+
+
+def test_a_lost_bridge_ends_it_and_what_could_not_be_said_is_not_said_later(
+    own_bridge: Bridge, own_node: RosNode, tmp_path: Path
+) -> None:
+    panel = tmp_path / "jog.toml"
+    panel.write_text(PANEL)
+    own_node.subscribe("/jog", "geometry_msgs/msg/Point", depth=1000)
+    own_node.advertise("/operation_enabled", "std_msgs/msg/Bool")
+    server = live(own_bridge.endpoint, tmp_path, KIOSK_PANEL=str(panel))
+    try:
+        until(server.ready, "ready", within_s=20)
+        permit(server, own_node, True)
+        with held(server) as socket:
+            until(lambda: own_node.heard("/jog"), "it moves", every_s=0.001)
+            own_bridge.kill()
+            said = socket.beat_until_it_ends()
+            assert said["outcome"] == "unknown"
+            assert "The message that ends it was not sent: No connection" in said["reason"]
+        own_bridge.start()
+        until(server.ready, "ready again", within_s=30)
+        permit(server, own_node, True)
+        xs = [point["x"] for point in own_node.heard("/jog")]
+        assert set(xs) == {0.5}
+    finally:
+        server.end()
+
+
+def test_a_server_that_stood_still_has_ended_it_when_it_wakes(demo: Server) -> None:
+    with held(demo) as socket:
+        demo.process.send(signal.SIGSTOP)
+        time.sleep(0.5)
+        socket.say(do="beat", number=1, lease=socket.lease)
+        demo.process.send(signal.SIGCONT)
+        said = socket.hear()
+        assert (said["state"], said["outcome"]) == ("ended", "aborted")
+        assert "the panel's server stood still" in said["reason"]
+
+
+def test_a_new_panel_ends_what_is_held_by_the_old_one(tmp_path: Path) -> None:
+    panel = tmp_path / "jog.toml"
+    panel.write_text(PANEL)
+    server = Server(ROOT, KIOSK_PANEL=str(panel), KIOSK_MODE="demo", KIOSK_DEV="1")
+    try:
+        until(server.ready, "ready")
+        with held(server) as socket:
+            panel.write_text(PANEL.replace('"Jog"', '"Jog it"'))
+            said = socket.beat_until_it_ends()
+            assert (said["state"], said["outcome"]) == ("ended", "aborted")
+            assert "takes a new panel" in said["reason"]
+    finally:
+        server.end()
+
+
+def test_nobody_presses_a_hold(demo: Server) -> None:
+    assert demo.http.post("/widgets/jog", json={"inputs": {"speed": 0.5}}).status_code == 404
+
+
+def test_no_hold_leaves_anything_behind(demo: Server, tmp_path: Path) -> None:
+    assert "Traceback" not in demo.process.text
+    assert demo.http.get("/healthz").status_code == 200
