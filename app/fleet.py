@@ -12,6 +12,7 @@ from app.errors import NotFound
 from app.kiosk import Kiosk
 from app.link import Config
 from app.panel.model import Panel, RobotEntry
+from app.recording import Recordings
 from app.views import Lamp
 
 log = logging.getLogger("kiosk.fleet")
@@ -28,6 +29,7 @@ class Fleet:
         config_of: ConfigOf,
         revision: str,
         *,
+        recordings: Recordings | None = None,
         simulated: bool = False,
         fault: str = "",
     ) -> None:
@@ -43,6 +45,7 @@ class Fleet:
                 entry=entry,
                 robots=self._lamps,
                 told=self._tell_others,
+                recordings=recordings,
                 simulated=simulated,
                 fault=fault,
             )

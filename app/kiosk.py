@@ -24,6 +24,7 @@ from app.link import Config, Link
 from app.logs import RobotLog, RosoutHandler
 from app.panel.model import Panel, RobotEntry
 from app.presses import Presses, Receipt
+from app.recording import Recorder, Recordings
 from app.robot import Robot
 from app.sentences import say
 from app.views import Lamp, Sight, sight
@@ -47,6 +48,7 @@ class Kiosk:
         entry: RobotEntry | None = None,
         robots: Callable[[], Mapping[str, Lamp]] = dict,
         told: Callable[["Kiosk"], None] = lambda _: None,
+        recordings: Recordings | None = None,
         simulated: bool = False,
         fault: str = "",
     ) -> None:
@@ -65,13 +67,21 @@ class Kiosk:
         self.link = Link(config, self._wake)
         self.robot = Robot(panel, self.interfaces, self.link.zid, entry)
         self._log = RobotLog(log, self.robot.name)
+        self._recordings = recordings
         first = self._sight()
         self.lamp = first.robot
+        self._recorder = self._recording(recordings)
         self.board = Board(first.view, revision)
         self._calls = Calls(self.interfaces, self.robot, self.link, self.show)
         self._actions = Actions(self.interfaces, self.robot, self.link, self.show)
         self.presses = Presses(
-            panel, self.interfaces, self.robot, self.link, self._calls, self._actions
+            panel,
+            self.interfaces,
+            self.robot,
+            self.link,
+            self._calls,
+            self._actions,
+            witness=self._recorder,
         )
         self._feedback = {keys.feedback(self.robot.key(one)): one for one in panel.actions()}
         self._joining = Joining(panel, self.interfaces, self.robot, self.link, self.show, self.renew)
@@ -102,10 +112,21 @@ class Kiosk:
             await asyncio.gather(self._renewing, return_exceptions=True)
         await self._joining.stop()
         await self._actions.stop()
+        if self._recorder is not None:
+            self._recorder.stop()
         try:
             await asyncio.to_thread(self.link.close)
         except LinkError as error:
             self._log.warning("%s", error)
+
+    def _recording(self, recordings: Recordings | None) -> Recorder | None:
+        """What records around presses, where the panel asks for it."""
+        if recordings is None or self.panel.record is None:
+            return None
+        recordings.follow(self.show)
+        name = self.entry.id if self.entry else ""
+        rules = self.panel.record
+        return Recorder(self.panel, rules, self.interfaces, self.robot, name, recordings)
 
     @property
     def way(self) -> Verdict:
@@ -198,6 +219,8 @@ class Kiosk:
                 self._actions.hear_feedback(self._feedback[key], sample)
                 continue
             self.robot.take(key, sample)
+            if self._recorder is not None:
+                self._recorder.hear(key, sample)
             urgent = urgent or key in self._urgent
         came = False
         for token_key, token in changes.tokens.items():
@@ -225,13 +248,14 @@ class Kiosk:
     # Showing.
 
     def _sight(self) -> Sight:
+        recordings = self._recordings.fault if self._recordings else ""
         return sight(
             self.panel,
             self.robot,
             time.monotonic(),
             robots=self._robots(),
             simulated=self._simulated,
-            fault=self.fault,
+            fault="\n".join(filter(None, (self.fault, recordings))),
         )
 
     def show(self) -> None:

@@ -273,13 +273,14 @@ class Link:
     def _on_sample(self, key: str, sample: zenoh.Sample) -> None:
         stamp = sample.timestamp
         source = None if stamp is None else str(stamp.get_id())
+        sent = None if stamp is None else stamp.get_time().timestamp()
         if stamp is not None:
             last = self._stamps.get(key)
             if last is not None and last.get_id() == stamp.get_id() and not stamp >= last:
                 return  # history that came after what is newer
             self._stamps[key] = stamp
         self._samples[key] = Sample(
-            sample.payload, next(self._seq), time.monotonic(), time.time(), source
+            sample.payload, next(self._seq), time.monotonic(), time.time(), source, sent
         )
         self._wake()
 

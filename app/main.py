@@ -24,6 +24,7 @@ from app.link import Config, config_from, config_to
 from app.metrics import Metrics
 from app.panel import Panel, load_panel
 from app.panel.model import RobotEntry
+from app.recording import Recordings
 from app.routes import events, health, pages, presses, static
 from app.routes.site import Site, named_robot, on_http_error, on_kiosk_error
 from app.settings import Settings, shipped
@@ -104,13 +105,26 @@ async def _running(
             namespace = entry.namespace if entry else panel.namespace
             return config_to(stack.enter_context(simulator.in_process(namespace, panel.distro)))
 
-        fleet = Fleet(panel, config_of, revision, simulated=demo, fault=fault)
+        recordings = _recordings(settings, panel, demo)
+        fleet = Fleet(panel, config_of, revision, recordings=recordings, simulated=demo, fault=fault)
         try:
+            if recordings is not None:
+                recordings.start()
             await fleet.start()
             log.info('panel "%s", %s robot', panel.title, "simulated" if demo else "live")
             yield fleet, assets
         finally:
             await fleet.stop()
+            if recordings is not None:
+                await asyncio.to_thread(recordings.stop)
+
+
+def _recordings(settings: Settings, panel: Panel, demo: bool) -> Recordings | None:
+    """Where the panel asks for them."""
+    if panel.record is None:
+        return None
+    folder = settings.data_folder("demo" if demo else "live") / "recordings"
+    return Recordings(folder, panel.record.max_mb, len(panel.robots) or 1)
 
 
 def _templates(dev: bool) -> Environment:

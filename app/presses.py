@@ -71,6 +71,13 @@ class Receipt:
         }
 
 
+class Witness(Protocol):
+    """Who is told of each press when it is made, and of each receipt, also of a corrected one."""
+
+    def pressed(self, press_id: str, widget: str, who: str, inputs: Mapping[str, Any]) -> None: ...
+    def answered(self, receipt: Receipt) -> None: ...
+
+
 @dataclass(frozen=True, slots=True)
 class _UnderWay:
     """A press whose receipt is not there yet."""
@@ -97,6 +104,7 @@ class Presses:
         calls: Calls,
         actions: Actions,
         monotonic: Callable[[], float] = time.monotonic,
+        witness: Witness | None = None,
     ) -> None:
         self._widgets = {w.id: w for w in panel.widgets()}
         self._panel = panel
@@ -109,6 +117,7 @@ class Presses:
         self._under_way: dict[str, _UnderWay] = {}
         self._monotonic = monotonic
         self._receipts: OrderedDict[str, Receipt] = OrderedDict()
+        self._witness = witness
 
     def widget(self, widget_id: str) -> Pressed:
         """What can be pressed; NotFound for everything else."""
@@ -151,6 +160,7 @@ class Presses:
             reused = say("press_reused", id=press_id)
             self._log.warning("press %s of %s by %s: %s", press_id, widget_id, who, reused)
             own_id = f"{press_id:.40}.{secrets.token_hex(4)}"
+            self._witnessed(own_id, widget_id, who, inputs)
             refusal = self._receipt(widget, inputs, own_id, "refused", reused, "input")
             self._keep(refusal)
             return refusal
@@ -164,6 +174,7 @@ class Presses:
             return known
         text = say("refused", why=say(code), time=clock(time.time()))
         receipt = self._receipt(self.widget(widget_id), inputs, press_id, "refused", text, "interlock")
+        self._witnessed(press_id, widget_id, "", inputs)
         self._keep(receipt)
         self._log.warning("press %s of %s: %s", press_id, widget_id, text)
         return receipt
@@ -189,6 +200,7 @@ class Presses:
         loop = asyncio.get_running_loop()
         under_way = _UnderWay(widget.id, dict(inputs), loop.create_future())
         self._under_way[press_id] = under_way
+        self._witnessed(press_id, widget.id, who, inputs)
         try:
             receipt = await self._pressed(widget, inputs, press_id, doubt)
         except BaseException as error:
@@ -204,7 +216,13 @@ class Presses:
                 LONGEST_LOGGED, inputs, receipt.outcome, receipt.reason)  # fmt: skip
         return receipt
 
+    def _witnessed(self, press_id: str, widget: str, who: str, inputs: Mapping[str, Any]) -> None:
+        if self._witness is not None:
+            self._witness.pressed(press_id, widget, who, inputs)
+
     def _keep(self, receipt: Receipt) -> None:
+        if self._witness is not None:
+            self._witness.answered(receipt)
         self._receipts[receipt.id] = receipt
         while len(self._receipts) > RECEIPTS_KEPT:
             self._receipts.popitem(last=False)
@@ -212,9 +230,7 @@ class Presses:
     def _correct(self, press_id: str, answer: Answer) -> None:
         """What is known of a press now is another thing than its receipt said."""
         if old := self._receipts.get(press_id):
-            self._receipts[press_id] = replace(
-                old, outcome=answer.outcome, reason=answer.text, cause=""
-            )
+            self._keep(replace(old, outcome=answer.outcome, reason=answer.text, cause=""))
 
     async def _pressed(
         self,

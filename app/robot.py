@@ -25,6 +25,7 @@ class Buffer(Protocol):
     """Bytes, or what becomes bytes when asked (Zenoh's buffers: no copy until then)."""
 
     def __bytes__(self) -> bytes: ...
+    def __len__(self) -> int: ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +33,8 @@ class Sample:
     """One message as it came: `at` monotonic seconds, `wall` seconds since the epoch.
 
     `source` is the zid of the bridge that sent it (from its timestamp), None if it did not say;
-    `seq` orders samples and losses of bridges as this session saw them.
+    `seq` orders samples and losses of bridges as this session saw them; `sent` is the timestamp of
+    its sender's clock, in seconds since the epoch.
     """
 
     payload: Buffer
@@ -40,6 +42,7 @@ class Sample:
     at: float
     wall: float
     source: str | None
+    sent: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -93,6 +93,7 @@ ENGLISH: Final[Mapping[str, str]] = {
     "refused": "Not sent at {time}: {why}",
     "not_encoded": "Not sent at {time}: {why}.",
     "press_reused": "Not sent: the press id {id} was already used for another press.",
+    "not_recorded": "Presses are not recorded: {why}. They work as always.",
     # The way to the robot.
     "server": "Server",
     "bridge": "Bridge",

@@ -5,12 +5,13 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Literal, overload
 
 from app.errors import SettingsError
 
 Mode = Literal["demo", "live"]
 
+APP = "operator-panel"
 PACKAGE = Path(__file__).resolve().parent
 LOOPBACK_HOSTS = ("127.0.0.1", "localhost", "[::1]")
 HOST_NAME = re.compile(r"\[[0-9a-f:.]+\]|[a-z0-9._-]+")
@@ -33,6 +34,13 @@ class Settings:
     hosts: tuple[str, ...] = LOOPBACK_HOSTS
     log_level: str = "info"
     dev: bool = False
+    data: Path | None = None
+
+    def data_folder(self, mode: Mode) -> Path:
+        """Where databases live; a demo that nobody gave a folder never mixes with a real panel's."""
+        if self.data is not None:
+            return self.data
+        return state_home() / APP / "demo" if mode == "demo" else state_home() / APP
 
     @classmethod
     def from_environment(cls, env: Mapping[str, str] = os.environ) -> "Settings":
@@ -47,7 +55,14 @@ class Settings:
             hosts=(*LOOPBACK_HOSTS, *_hosts(env.get("KIOSK_HOSTS", ""))),
             log_level=level,
             dev=env.get("KIOSK_DEV", "") not in ("", "0"),
+            data=_path(env, "KIOSK_DATA", None),
         )
+
+
+def state_home() -> Path:
+    """The user's folder for state (XDG Base Directory Specification); a relative one does not count."""
+    given = Path(os.environ.get("XDG_STATE_HOME", ""))
+    return given if given.is_absolute() else Path("~/.local/state").expanduser()
 
 
 def _mode(given: str) -> Mode | None:
@@ -69,6 +84,10 @@ def _hosts(given: str) -> Iterator[str]:
         yield host
 
 
-def _path(env: Mapping[str, str], name: str, default: Path) -> Path:
+@overload
+def _path(env: Mapping[str, str], name: str, default: Path) -> Path: ...
+@overload
+def _path(env: Mapping[str, str], name: str, default: None) -> Path | None: ...
+def _path(env: Mapping[str, str], name: str, default: Path | None) -> Path | None:
     given = env.get(name)
     return Path(given).expanduser().resolve() if given else default

@@ -22,6 +22,7 @@ from app.panel.description import (
 )
 from app.panel.displays import Indicator, Readout
 from app.panel.inputs import NumberInput, SelectInput, SliderInput, TextInput, ToggleInput
+from app.panel.record import RecordRules
 
 
 class Interlock(Description):
@@ -139,6 +140,7 @@ class Panel(Description):
     namespace: Annotated[str, AfterValidator(namespace_of)] = ""
     press_expires_s: Annotated[float, Field(ge=0.5, le=60)] = 2.0
     mm_per_px: Annotated[float, Field(gt=0.02, lt=1)] = 0.22
+    record: RecordRules | None = None
     robots: Annotated[tuple[RobotEntry, ...], Field(strict=False)] = Field((), alias="robot")
     interlocks: Annotated[tuple[Interlock, ...], Field(strict=False)] = Field((), alias="interlock")
     pages: Annotated[tuple[Page, ...], Field(strict=False)] = Field(alias="page")
