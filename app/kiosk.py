@@ -14,11 +14,12 @@ from typing import Any, Final
 
 from app import keys, moments
 from app.actions import Actions
+from app.asked import WITHIN_S, Asked
 from app.board import Board
 from app.calls import Calls
 from app.errors import KioskError, LinkError
 from app.interfaces import interfaces_of
-from app.interlocks import Verdict, way
+from app.interlocks import Verdict, locked, way
 from app.joining import LOG_TYPE, Joining
 from app.link import Config, Link
 from app.logs import RobotLog, RosoutHandler
@@ -85,6 +86,7 @@ class Kiosk:
         )
         self._feedback = {keys.feedback(self.robot.key(one)): one for one in panel.actions()}
         self._joining = Joining(panel, self.interfaces, self.robot, self.link, self.show, self.renew)
+        self._asked = Asked(lambda: self._joining.answered(WITHIN_S))
         self._urgent = {self.robot.key(i.topic) for i in panel.interlocks}
         self._shown_at = 0.0
         self._timer: asyncio.TimerHandle | None = None
@@ -110,6 +112,7 @@ class Kiosk:
             self._timer.cancel()
         if self._renewing is not None:
             await asyncio.gather(self._renewing, return_exceptions=True)
+        await self._asked.stop()
         await self._joining.stop()
         await self._actions.stop()
         if self._recorder is not None:
@@ -132,6 +135,12 @@ class Kiosk:
     def way(self) -> Verdict:
         """Whether commands can reach the robot now."""
         return way(self.robot, time.monotonic())
+
+    async def way_asked(self) -> Verdict:
+        """The same, when the bridges have been asked whether they run: a second at most."""
+        if not self.way.permitted or await self._asked.answers():
+            return self.way
+        return locked("bridge_silent") if self.way.permitted else self.way
 
     async def press(
         self,

@@ -229,8 +229,8 @@ class Link:
             )
         return answered
 
-    async def ask(self, selector: str) -> list[tuple[str, bytes]]:
-        """(key, payload) of each answer to a query; at most `ASK_TIMEOUT_S` long."""
+    async def ask(self, selector: str, timeout_s: float = ASK_TIMEOUT_S) -> list[tuple[str, bytes]]:
+        """(key, payload) of each answer to a query that comes within `timeout_s`."""
         loop = asyncio.get_running_loop()
         done: asyncio.Future[None] = loop.create_future()
         answers: list[tuple[str, bytes]] = []
@@ -248,11 +248,9 @@ class Link:
                 loop.call_soon_threadsafe(finish)
 
         with _translated(f"can't ask {selector}"):
-            self._session.get(
-                selector, Callback(on_reply, on_end, indirect=False), timeout=ASK_TIMEOUT_S
-            )
+            self._session.get(selector, Callback(on_reply, on_end, indirect=False), timeout=timeout_s)
         with suppress(TimeoutError):
-            await asyncio.wait_for(done, ASK_TIMEOUT_S + 1)
+            await asyncio.wait_for(done, timeout_s + 1)
         return answers
 
     def drain(self) -> Changes:

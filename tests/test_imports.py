@@ -63,6 +63,7 @@ ORDER = (
     "app.recording",
     "app.link",
     "app.joining",
+    "app.asked",
     "app.kiosk",
     "app.fleet",
     "app.metrics",
