@@ -28,6 +28,8 @@ from app.recording import Recordings
 from app.routes import events, health, pages, presses, static
 from app.routes.site import Site, named_robot, on_http_error, on_kiosk_error
 from app.settings import Settings, shipped
+from app.systemd import Manager
+from app.watchdog import Watchdog
 
 log = logging.getLogger("kiosk")
 
@@ -51,12 +53,24 @@ def create_app(settings: Settings | None = None) -> FastAPI:
             site.metrics.follow(fleet)
             app.state.site = site
             loop = asyncio.get_running_loop()
-            with _on_end(lambda: loop.call_soon_threadsafe(lambda: site.fleet.close_streams())):
+
+            def ending() -> None:
+                watchdog.end()
+                site.fleet.close_streams()
+
+            watchdog = _watchdog(site)
+            with _on_end(lambda: loop.call_soon_threadsafe(ending)):
                 if settings.dev:
                     await opened.enter_async_context(
                         development.reloading(site, settings, _running, opened.pop_all())
                     )
-                yield
+                watching = asyncio.create_task(watchdog.run())
+                try:
+                    yield
+                finally:
+                    watching.cancel()
+                    await asyncio.gather(watching, return_exceptions=True)
+                    watchdog.end()
 
     app = FastAPI(
         title="Operator panel",
@@ -117,6 +131,15 @@ async def _running(
             await fleet.stop()
             if recordings is not None:
                 await asyncio.to_thread(recordings.stop)
+
+
+def _watchdog(site: Site) -> Watchdog:
+    """What tells the service manager of the robots that the site has at the time."""
+    return Watchdog(
+        Manager(),
+        lambda: [(kiosk.robot.name, kiosk.link) for kiosk in site.fleet.kiosks],
+        lambda: site.fleet.state,
+    )
 
 
 def _recordings(settings: Settings, panel: Panel, demo: bool) -> Recordings | None:

@@ -94,6 +94,11 @@ ENGLISH: Final[Mapping[str, str]] = {
     "not_encoded": "Not sent at {time}: {why}.",
     "press_reused": "Not sent: the press id {id} was already used for another press.",
     "not_recorded": "Presses are not recorded: {why}. They work as always.",
+    # What the service manager is told.
+    "ready": "Ready: commands can reach the robot.",
+    "ready_of": "{name}: {state}",
+    "link_stands_still": "The Zenoh link of {name} stands still: the server must be started anew.",
+    "stopping": "Stopping.",
     # The way to the robot.
     "server": "Server",
     "bridge": "Bridge",

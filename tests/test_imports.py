@@ -15,6 +15,8 @@ ORDER = (
     "app.sentences",
     "app.logs",
     "app.moments",
+    "app.systemd",
+    "app.watchdog",
     "app.keys",
     "app.interfaces.definitions",
     "app.interfaces.scalars",
