@@ -13,6 +13,8 @@ from app.kiosk import Kiosk
 from app.link import Config
 from app.logbook import Log
 from app.panel.model import Panel, RobotEntry
+from app.recording import Recordings
+from app.sentences import say
 from app.views import Lamp
 
 log = logging.getLogger("kiosk.fleet")
@@ -30,6 +32,7 @@ class Fleet:
         revision: str,
         operators_log: Log,
         *,
+        recordings: Recordings | None = None,
         simulated: bool = False,
         fault: str = "",
     ) -> None:
@@ -46,6 +49,7 @@ class Fleet:
                 entry=entry,
                 robots=self._lamps,
                 told=self._tell_others,
+                recordings=recordings,
                 simulated=simulated,
                 fault=fault,
             )
@@ -74,6 +78,12 @@ class Fleet:
     @property
     def kiosks(self) -> list[Kiosk]:
         return list(self._kiosks.values())
+
+    @property
+    def state(self) -> str:
+        """How the way to each robot is, in words."""
+        states = [(kiosk.robot.name, kiosk.way.reason or say("ready")) for kiosk in self.kiosks]
+        return " ".join(say("ready_of", name=n, state=s) if n else s for n, s in states)
 
     @property
     def first(self) -> Kiosk:

@@ -85,6 +85,15 @@ class Joining:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
 
+    async def answered(self, within_s: float) -> bool:
+        """Asks this robot's bridges whether they run; where one does not answer, all that is known
+        of them is asked for again soon."""
+        answers = await self._link.ask(keys.VERSION, within_s)
+        if self._robot.graph.bridges <= {keys.zid_of(key) for key, _ in answers}:
+            return True
+        self._changed.set()
+        return False
+
     def follow(self, came: bool) -> None:
         """After every change of the graph; `came`: there is a bridge where there was none."""
         if came or not self._robot.graph.bridges:
@@ -239,13 +248,14 @@ class Joining:
     async def _ask(self) -> None:
         """Asks the bridges how they are, and of their routes and nodes."""
         graph = self._robot.graph
-        answers = await self._link.ask(keys.VERSION)
+        answers, namespaces = await asyncio.gather(self._link.ask(keys.VERSION), self._namespaces())
         versions = {keys.zid_of(key): told.decode(errors="replace") for key, told in answers}
-        namespaces = await self._namespaces()
         graph.configured(namespaces)
         self._missed = 0 if graph.bridges <= versions.keys() else self._missed + 1
         if self._missed == 0 or self._missed > MISSES_ALLOWED:
             graph.answered(versions)
+        if self._missed:
+            return  # it would answer nothing else either, and each question takes its time
         routes = [r for key, told in await self._ask_json(keys.ROUTES) if (r := _route(key, told))]
         nodes: set[Endpoint] = set()
         for key, told in await self._ask_json(keys.NODES):

@@ -14,6 +14,7 @@ from typing import Any, Final
 
 from app import keys, moments
 from app.actions import Actions
+from app.asked import WITHIN_S, Asked
 from app.board import Board
 from app.browsers import Browser
 from app.calls import Calls
@@ -22,7 +23,7 @@ from app.control import Control
 from app.errors import KioskError, LinkError
 from app.holds import Holds
 from app.interfaces import interfaces_of
-from app.interlocks import Verdict, way
+from app.interlocks import Verdict, locked, way
 from app.joining import LOG_TYPE, Joining
 from app.link import Config, Link
 from app.logbook import Log, Logbook, origin_of
@@ -31,6 +32,7 @@ from app.panel.model import Panel, RobotEntry
 from app.panel.parameter import EVENTS
 from app.parameters import Parameters
 from app.presses import By, Presses, Receipt
+from app.recording import Recorder, Recordings
 from app.robot import Robot
 from app.sentences import say
 from app.views import Lamp, Sight, sight
@@ -55,6 +57,7 @@ class Kiosk:
         entry: RobotEntry | None = None,
         robots: Callable[[], Mapping[str, Lamp]] = dict,
         told: Callable[["Kiosk"], None] = lambda _: None,
+        recordings: Recordings | None = None,
         simulated: bool = False,
         fault: str = "",
     ) -> None:
@@ -76,8 +79,10 @@ class Kiosk:
         self.robot = Robot(panel, self.interfaces, self.link.zid, entry)
         self._log = RobotLog(log, self.robot.name)
         self.control = Control(panel.control, self.robot.name, tell=self._log.info)
+        self._recordings = recordings
         first = self._sight()
         self.lamp = first.robot
+        self._recorder = self._recording(recordings)
         self.board = Board(first.view, revision)
         self._calls = Calls(self.interfaces, self.robot, self.link, self.show)
         self._actions = Actions(self.interfaces, self.robot, self.link, self.show)
@@ -97,6 +102,7 @@ class Kiosk:
             self._parameters,
             self.logbook,
             catch_up=self._take,
+            witness=self._recorder,
         )
         self.holds = Holds(
             panel,
@@ -112,6 +118,7 @@ class Kiosk:
         self._feedback = {keys.feedback(key): one for key, one in goals.items()}
         self._status = {keys.status(key): one for key, one in goals.items()}
         self._joining = Joining(panel, self.interfaces, self.robot, self.link, self.show, self.renew)
+        self._asked = Asked(lambda: self._joining.answered(WITHIN_S))
         self._urgent = {self.robot.key(i.topic) for i in panel.interlocks}
         self._events = self.robot.key(EVENTS)
         self._shown_at = 0.0
@@ -140,9 +147,12 @@ class Kiosk:
             self._timer.cancel()
         if self._renewing is not None:
             await asyncio.gather(self._renewing, return_exceptions=True)
+        await self._asked.stop()
         await self._joining.stop()
         await self._actions.stop()
         await self._parameters.stop()
+        if self._recorder is not None:
+            self._recorder.stop()
         try:
             await asyncio.to_thread(self.link.close)
         except LinkError as error:
@@ -153,12 +163,27 @@ class Kiosk:
         self.holds.close()
         self.board.close()
 
+    def _recording(self, recordings: Recordings | None) -> Recorder | None:
+        """What records around presses, where the panel asks for it."""
+        if recordings is None or self.panel.record is None:
+            return None
+        recordings.follow(self.show)
+        name = self.entry.id if self.entry else ""
+        rules = self.panel.record
+        return Recorder(self.panel, rules, self.interfaces, self.robot, name, recordings)
+
     @property
     def way(self) -> Verdict:
         """Whether commands can reach the robot now."""
         if self._operators_log.lock:
             return Verdict(False, "log", self._operators_log.lock)
         return way(self.robot, time.monotonic())
+
+    async def way_asked(self) -> Verdict:
+        """The same, when the bridges have been asked whether they run: a second at most."""
+        if not self.way.permitted or await self._asked.answers():
+            return self.way
+        return locked("bridge_silent") if self.way.permitted else self.way
 
     async def press(
         self,
@@ -270,6 +295,8 @@ class Kiosk:
                 self._parameters.hear(sample)
             self.robot.take(key, sample)
             self._confirmations.hear(key)
+            if self._recorder is not None:
+                self._recorder.hear(key, sample)
             urgent = urgent or key in self._urgent
         came, now = False, time.monotonic()
         for token_key, token in changes.tokens.items():
@@ -300,13 +327,14 @@ class Kiosk:
     # Showing.
 
     def _sight(self) -> Sight:
+        recordings = self._recordings.fault if self._recordings else ""
         return sight(
             self.panel,
             self.robot,
             time.monotonic(),
             robots=self._robots(),
             simulated=self._simulated,
-            fault="\n".join(filter(None, (self.fault, self._operators_log.fault))),
+            fault="\n".join(filter(None, (self.fault, self._operators_log.fault, recordings))),
             lock=self._operators_log.lock,
             control=self.control.view(),
         )

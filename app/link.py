@@ -229,8 +229,8 @@ class Link:
             )
         return answered
 
-    async def ask(self, selector: str) -> list[tuple[str, bytes]]:
-        """(key, payload) of each answer to a query; at most `ASK_TIMEOUT_S` long."""
+    async def ask(self, selector: str, timeout_s: float = ASK_TIMEOUT_S) -> list[tuple[str, bytes]]:
+        """(key, payload) of each answer to a query that comes within `timeout_s`."""
         loop = asyncio.get_running_loop()
         done: asyncio.Future[None] = loop.create_future()
         answers: list[tuple[str, bytes]] = []
@@ -248,12 +248,19 @@ class Link:
                 loop.call_soon_threadsafe(finish)
 
         with _translated(f"can't ask {selector}"):
-            self._session.get(
-                selector, Callback(on_reply, on_end, indirect=False), timeout=ASK_TIMEOUT_S
-            )
+            self._session.get(selector, Callback(on_reply, on_end, indirect=False), timeout=timeout_s)
         with suppress(TimeoutError):
-            await asyncio.wait_for(done, ASK_TIMEOUT_S + 1)
+            await asyncio.wait_for(done, timeout_s + 1)
         return answers
+
+    def respond(self) -> None:
+        """Returns when neither the lock nor the session stands still; blocks while one does."""
+        with self._lock:
+            pass
+        with suppress(zenoh.ZError):  # a session that is being renewed has responded too
+            info = self._session.info
+            info.peers_zid()
+            info.routers_zid()
 
     def drain(self) -> Changes:
         """Takes all that came since the last call."""
@@ -273,6 +280,7 @@ class Link:
     def _on_sample(self, key: str, sample: zenoh.Sample) -> None:
         stamp = sample.timestamp
         source = None if stamp is None else str(stamp.get_id())
+        sent = None if stamp is None else stamp.get_time().timestamp()
         if stamp is not None:
             last = self._stamps.get(key)
             if last is not None and last.get_id() == stamp.get_id() and not stamp >= last:
@@ -281,7 +289,7 @@ class Link:
         unseen = self._samples.get(key)
         skipped = 0 if unseen is None else unseen.skipped + 1
         self._samples[key] = Sample(
-            sample.payload, next(self._seq), time.monotonic(), time.time(), source, skipped
+            sample.payload, next(self._seq), time.monotonic(), time.time(), source, skipped, sent
         )
         self._wake()
 

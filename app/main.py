@@ -26,11 +26,14 @@ from app.log import Limits, OperatorLog, Unlogged
 from app.metrics import Metrics
 from app.panel import Panel, load_panel
 from app.panel.model import RobotEntry
+from app.recording import Recordings
 from app.routes import control, events, health, holds, pages, presses, static
 from app.routes import log as log_routes
 from app.routes.site import Site, named_robot, on_http_error, on_kiosk_error
 from app.settings import Settings, shipped
 from app.startup import InWords
+from app.systemd import Manager
+from app.watchdog import Watchdog
 
 log = logging.getLogger("kiosk")
 
@@ -55,12 +58,24 @@ def create_app(settings: Settings | None = None) -> FastAPI:
             site.metrics.follow(fleet)
             app.state.site = site
             loop = asyncio.get_running_loop()
-            with _on_end(lambda: loop.call_soon_threadsafe(lambda: site.fleet.close())):
+
+            def ending() -> None:
+                watchdog.end()
+                site.fleet.close()
+
+            watchdog = _watchdog(site)
+            with _on_end(lambda: loop.call_soon_threadsafe(ending)):
                 if settings.dev:
                     await opened.enter_async_context(
                         development.reloading(site, settings, running, opened.pop_all())
                     )
-                yield
+                watching = asyncio.create_task(watchdog.run())
+                try:
+                    yield
+                finally:
+                    watching.cancel()
+                    await asyncio.gather(watching, return_exceptions=True)
+                    watchdog.end()
 
     app = FastAPI(
         title="Operator panel",
@@ -129,13 +144,43 @@ async def _running(
             namespace = entry.namespace if entry else panel.namespace
             return config_to(stack.enter_context(simulator.in_process(namespace, panel.distro)))
 
-        fleet = Fleet(panel, config_of, revision, oplog, simulated=demo, fault=fault)
+        recordings = _recordings(settings, panel, demo)
+        fleet = Fleet(
+            panel,
+            config_of,
+            revision,
+            oplog,
+            recordings=recordings,
+            simulated=demo,
+            fault=fault,
+        )
         try:
+            if recordings is not None:
+                recordings.start()
             await fleet.start()
             log.info('panel "%s", %s robot', panel.title, "simulated" if demo else "live")
             yield fleet, assets
         finally:
             await fleet.stop()
+            if recordings is not None:
+                await asyncio.to_thread(recordings.stop)
+
+
+def _watchdog(site: Site) -> Watchdog:
+    """What tells the service manager of the robots that the site has at the time."""
+    return Watchdog(
+        Manager(),
+        lambda: [(kiosk.robot.name, kiosk.link) for kiosk in site.fleet.kiosks],
+        lambda: site.fleet.state,
+    )
+
+
+def _recordings(settings: Settings, panel: Panel, demo: bool) -> Recordings | None:
+    """Where the panel asks for them."""
+    if panel.record is None:
+        return None
+    folder = settings.data_folder("demo" if demo else "live") / "recordings"
+    return Recordings(folder, panel.record.max_mb, len(panel.robots) or 1)
 
 
 def _templates(dev: bool) -> Environment:

@@ -88,6 +88,13 @@ class Receipt:
         }
 
 
+class Witness(Protocol):
+    """Who is told of each press when it is made, and of each receipt, also of a corrected one."""
+
+    def pressed(self, press_id: str, widget: str, who: str, inputs: Mapping[str, Any]) -> None: ...
+    def answered(self, receipt: Receipt) -> None: ...
+
+
 @dataclass(frozen=True, slots=True)
 class _UnderWay:
     """A press whose receipt is not there yet."""
@@ -128,6 +135,7 @@ class Presses:
         logbook: Logbook,
         monotonic: Callable[[], float] = time.monotonic,
         catch_up: Callable[[], None] = lambda: None,
+        witness: Witness | None = None,
     ) -> None:
         """`catch_up` takes in all that has come from the robot, right before a press is judged."""
         self._widgets = {w.id: w for w in panel.widgets()}
@@ -145,6 +153,7 @@ class Presses:
         self._under_way: dict[str, _UnderWay] = {}
         self._monotonic = monotonic
         self._receipts: OrderedDict[str, Receipt] = OrderedDict()
+        self._witness = witness
 
     def widget(self, widget_id: str) -> Pressed:
         """What can be pressed; NotFound for everything else."""
@@ -245,6 +254,7 @@ class Presses:
         press_id: str,
         by: By,
     ) -> Receipt:
+        self._witnessed(press_id, widget.id, by.origin, inputs)
         try:
             noted = await self._logbook.pressed(widget.id, inputs, press_id, by.origin)
         except LogError as error:
@@ -270,13 +280,20 @@ class Presses:
         cause: Cause,
     ) -> Receipt:
         """A press that is not even judged."""
+        self._witnessed(press_id, widget.id, origin, inputs)
         receipt = self._receipt(widget, inputs, press_id, "refused", text, cause)
         self._log.warning("press %s of %s by %s: %s", press_id, widget.id, named(origin), text)
         return _with_doubt(
             receipt, await self._logbook.refused(widget.id, inputs, press_id, origin, text)
         )
 
+    def _witnessed(self, press_id: str, widget: str, origin: Origin, inputs: Mapping[str, Any]) -> None:
+        if self._witness is not None:
+            self._witness.pressed(press_id, widget, named(origin), inputs)
+
     def _keep(self, receipt: Receipt) -> None:
+        if self._witness is not None:
+            self._witness.answered(receipt)
         self._receipts[receipt.id] = receipt
         while len(self._receipts) > RECEIPTS_KEPT:
             self._receipts.popitem(last=False)
@@ -285,7 +302,7 @@ class Presses:
         """What is known of a press now is another thing than its receipt said."""
         noted.corrected(answer)
         if old := self._receipts.get(press_id):
-            self._receipts[press_id] = _corrected(old, answer)
+            self._keep(_corrected(old, answer))
 
     def _judged(self, widget: Pressed, by: By) -> Verdict:
         """The first that locks: the way to the robot, who has control, the widget's interlock."""

@@ -26,6 +26,7 @@ class Buffer(Protocol):
     """Bytes, or what becomes bytes when asked (Zenoh's buffers: no copy until then)."""
 
     def __bytes__(self) -> bytes: ...
+    def __len__(self) -> int: ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +35,8 @@ class Sample:
 
     `source` is the zid of the bridge that sent it (from its timestamp), None if it did not say;
     `seq` orders samples and losses of bridges as this session saw them; `skipped` is how many came
-    just before it that nobody looked at.
+    just before it that nobody looked at; `sent` is the timestamp of its sender's clock, in seconds
+    since the epoch.
     """
 
     payload: Buffer
@@ -43,6 +45,7 @@ class Sample:
     wall: float
     source: str | None
     skipped: int = 0
+    sent: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -223,6 +223,12 @@ ENGLISH: Final[Mapping[str, str]] = {
     "hold_over": "This hold is over: let go and press again.",
     "hold_scripts": "Locked: holding needs the page's scripts.",
     "hold_cut": "The connection to the panel's server was lost while this was held.",
+    "not_recorded": "Presses are not recorded: {why}. They work as always.",
+    # What the service manager is told.
+    "ready": "Ready: commands can reach the robot.",
+    "ready_of": "{name}: {state}",
+    "link_stands_still": "The Zenoh link of {name} stands still: the server must be started anew.",
+    "stopping": "Stopping.",
     # The way to the robot.
     "server": "Server",
     "bridge": "Bridge",

@@ -29,6 +29,9 @@ class Counted:
         self.asked += 1
         return self.data
 
+    def __len__(self) -> int:
+        return len(self.data)
+
 
 @pytest.fixture
 def robot() -> Robot:

@@ -37,6 +37,20 @@ def test_a_file_is_taken_from_where_the_variable_points(name: str, tmp_path: Pat
     assert tmp_path / "mine" in (settings.panel, settings.zenoh)
 
 
+def test_data_lives_where_the_variable_points(tmp_path: Path) -> None:
+    settings = Settings.from_environment({"KIOSK_DATA": str(tmp_path)})
+    assert settings.data_folder("live") == settings.data_folder("demo") == tmp_path
+
+
+def test_a_demo_keeps_its_data_apart(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    settings = Settings.from_environment({})
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    assert settings.data_folder("live") == tmp_path / "operator-panel"
+    assert settings.data_folder("demo") == tmp_path / "operator-panel/demo"
+    monkeypatch.setenv("XDG_STATE_HOME", "relative")
+    assert settings.data_folder("live") == Path.home() / ".local/state/operator-panel"
+
+
 def test_a_path_may_be_relative_or_start_at_home(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

@@ -74,12 +74,14 @@ class Field:
 
 @dataclass(frozen=True, slots=True)
 class Structure:
-    """A message, or a part of a service or an action; `source` is the file it was read from."""
+    """A message, or a part of a service or an action; `source` is the file it was read from.
+    `constant_types` has the base type of each constant."""
 
     name: str
     fields: tuple[Field, ...]
     constants: Mapping[str, Any] = field(default_factory=dict)
     source: Path | None = field(default=None, compare=False)
+    constant_types: Mapping[str, str] = field(default_factory=dict, compare=False)
 
     def needs(self) -> Iterator[tuple[Field, str]]:
         """Each field whose type is another structure, with that one's name."""
@@ -109,6 +111,7 @@ def from_store(name: str, definition: Any) -> Structure:
         name,
         tuple(Field(each, _type(described)) for each, described in fields if each != PLACEHOLDER),
         {each: value for each, _, value in constants},
+        constant_types={each: kind for each, kind, _ in constants},
     )
 
 

@@ -35,13 +35,19 @@ SEQUENCE: Final = 144
 
 def type_hash(of: Structure, find: Callable[[str], Structure]) -> str:
     """`RIHS01_` and 64 hexadecimal digits; `find` gives the structures that it is made of."""
-    inner: dict[str, Structure] = {}
-    _gather(of, find, inner)
+    inner = gathered(of, find)
     whole = {
         "type_description": _described(of),
         "referenced_type_descriptions": [_described(inner[name]) for name in sorted(inner)],
     }
     return f"RIHS01_{sha256(json.dumps(whole).encode()).hexdigest()}"
+
+
+def gathered(of: Structure, find: Callable[[str], Structure]) -> dict[str, Structure]:
+    """All structures that one is made of, by name; not itself."""
+    inner: dict[str, Structure] = {}
+    _gather(of, find, inner)
+    return inner
 
 
 def _gather(of: Structure, find: Callable[[str], Structure], inner: dict[str, Structure]) -> None:

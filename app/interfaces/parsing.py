@@ -73,6 +73,7 @@ def _sections(text: str) -> list[list[Line]]:
 def _structure(name: str, lines: list[Line], source: Path) -> Structure:
     fields: dict[str, Field] = {}
     constants: dict[str, Any] = {}
+    types: dict[str, str] = {}
     for number, line in lines:
         try:
             match = _LINE.fullmatch(line) or _fail(f'"{line}" is not "type name"')
@@ -82,11 +83,12 @@ def _structure(name: str, lines: list[Line], source: Path) -> Structure:
                 _fail(f'"{each}" is there twice')
             if match["is"]:
                 constants[each] = _constant(kind, each, value)
+                types[each] = kind.name
             else:
                 fields[each] = _field(kind, each, value)
         except ValueError as error:
             raise InterfaceError(f"{source}:{number}: {error}", source) from None
-    return Structure(name, tuple(fields.values()), constants, source)
+    return Structure(name, tuple(fields.values()), constants, source, types)
 
 
 def _constant(kind: Type, name: str, value: str) -> Any:

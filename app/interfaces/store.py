@@ -24,6 +24,7 @@ from app.interfaces.packages import (
 )
 from app.interfaces.paths import steps
 from app.interfaces.scalars import Check
+from app.interfaces.text import definition_text
 from app.interfaces.values import field_check, message_check
 
 DISTROS: Final[Mapping[str, Stores]] = {
@@ -111,6 +112,11 @@ class Interfaces:
         if type_name not in self._hashes:
             self._hashes[type_name] = type_hash(self._described(type_name), self._described)
         return self._hashes[type_name]
+
+    def definition(self, type_name: str) -> str:
+        """The definition of a message with all that it is made of, in the format "ros2msg"."""
+        self.require(type_name)
+        return definition_text(self._structures[type_name], self._structures.__getitem__)
 
     def encode(self, type_name: str, fields: Mapping[str, Any]) -> bytes:
         """The message as XCDR1 bytes with their encapsulation header (00 01 00 00).

@@ -80,6 +80,19 @@ def faults_in(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = ()
                     yield from input_faults(place, widget)
     yield from _topics_of_two_kinds(panel)
     yield from type_faults(panel)
+    yield from _recorded(panel)
+
+
+def _recorded(panel: Panel) -> Iterator[Fault]:
+    """What is recorded is what the panel listens to anyway."""
+    known = panel.subscriptions()
+    for t, topic in enumerate((panel.record and panel.record.topics) or ()):
+        if topic not in known:
+            listens = ", ".join(known) or "nothing"
+            yield Fault(
+                f"record.topics[{t}]",
+                f"{topic} is no topic that this panel listens to; it listens to {listens}",
+            )
 
 
 def _robots(panel: Panel) -> Iterator[Fault]:

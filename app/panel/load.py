@@ -82,6 +82,8 @@ def _faults_of_the_rest(
             case ("interlock", int(i), *_):
                 topic = {"topic": f"/faulty_{i}"}
                 mended["interlock"][i] = _stand_in(tables["interlock"][i], str(i)) | topic
+            case ("record", *_):
+                mended.pop("record", None)
             case ("page", int(p), str(key)):
                 mended["page"][p].pop(key, None)
                 mended["page"][p] = {"id": f"faulty_{p}", "title": "?"} | mended["page"][p]

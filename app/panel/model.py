@@ -25,6 +25,7 @@ from app.panel.displays import Indicator, Readout
 from app.panel.inputs import NumberInput, SelectInput, SliderInput, TextInput, ToggleInput
 from app.panel.log import LogRules
 from app.panel.parameter import EVENT_TYPE, EVENTS, Parameter
+from app.panel.record import RecordRules
 
 
 class Interlock(Description):
@@ -198,6 +199,7 @@ class Panel(Description):
     press_expires_s: Annotated[float, Field(ge=0.5, le=60)] = 2.0
     mm_per_px: Annotated[float, Field(gt=0.02, lt=1)] = 0.22
     control: ControlRules = ControlRules(required=False)
+    record: RecordRules | None = None
     robots: Annotated[tuple[RobotEntry, ...], Field(strict=False)] = Field((), alias="robot")
     log: LogRules = LogRules()
     interlocks: Annotated[tuple[Interlock, ...], Field(strict=False)] = Field((), alias="interlock")

@@ -1,5 +1,7 @@
 """For who watches the kiosk: is it up, can commands reach the robot, how much of what."""
 
+import asyncio
+
 from fastapi import APIRouter
 from fastapi.responses import JSONResponse, Response
 from prometheus_client import CONTENT_TYPE_LATEST
@@ -16,12 +18,13 @@ async def healthz() -> dict[str, str]:
 
 @router.get("/readyz", summary="200 while commands can reach every robot, else 503 with the reason")
 async def readyz(site: CurrentSite) -> Response:
-    bad = [kiosk for kiosk in site.fleet.kiosks if not kiosk.way.permitted]
-    if not bad:
+    kiosks = site.fleet.kiosks
+    ways = await asyncio.gather(*(kiosk.way_asked() for kiosk in kiosks))
+    way = next((way for way in ways if not way.permitted), None)
+    if way is None:
         return JSONResponse({"status": "ready"})
-    way = bad[0].way
     body: dict[str, object] = {"status": "not ready", "code": way.code, "reason": way.reason}
-    robots = {kiosk.entry.id: kiosk.way.code for kiosk in site.fleet.kiosks if kiosk.entry}
+    robots = {k.entry.id: w.code for k, w in zip(kiosks, ways, strict=True) if k.entry}
     return JSONResponse(body | ({"robots": robots} if robots else {}), status_code=503)
 
 

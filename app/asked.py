@@ -1,0 +1,48 @@
+"""Whether a robot's bridges answer at this moment: many may ask, and few questions go out."""
+
+import asyncio
+import logging
+import math
+from collections.abc import Awaitable, Callable
+from typing import Final
+
+from app.errors import LinkError
+
+log = logging.getLogger("kiosk.asked")
+
+EVERY_S: Final = 0.5  # from one question to the next
+WITHIN_S: Final = 0.8  # in which a bridge has to answer
+LIMIT_S: Final = 1.0  # of a question, also where Zenoh itself does not come back
+
+
+class Asked:
+    """One question at a time, shared by all who ask while it is under way and until the next."""
+
+    def __init__(self, ask: Callable[[], Awaitable[bool]]) -> None:
+        """`ask` is whether all bridges answered; it may raise LinkError."""
+        self._ask = ask
+        self._asked_at = -math.inf
+        self._asking: asyncio.Task[bool] | None = None
+
+    async def answers(self) -> bool:
+        """What came of a question that is `EVERY_S` old at most when this is called."""
+        loop = asyncio.get_running_loop()
+        if self._asking is None or (self._asking.done() and loop.time() - self._asked_at >= EVERY_S):
+            self._asked_at = loop.time()
+            self._asking = loop.create_task(self._answered())
+        return await asyncio.shield(self._asking)
+
+    async def stop(self) -> None:
+        """Waits for the question that is under way, `LIMIT_S` at most."""
+        if self._asking is not None:
+            await asyncio.gather(self._asking, return_exceptions=True)
+
+    async def _answered(self) -> bool:
+        try:
+            async with asyncio.timeout(LIMIT_S):
+                return await self._ask()
+        except TimeoutError:
+            return False
+        except LinkError as error:
+            log.warning("%s", error)
+            return False

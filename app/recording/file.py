@@ -1,0 +1,173 @@
+"""One recording as an MCAP file (mcap.dev): profile "ros2", messages as they were received."""
+
+import fcntl
+import json
+import os
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, Any, Final
+
+from mcap.records import Channel as ChannelRecord
+from mcap.records import McapRecord, Message, Metadata, Schema
+from mcap.stream_reader import StreamReader
+from mcap.writer import CompressionType, Writer
+
+SUFFIX: Final = ".mcap"
+UNFINISHED: Final = ".mcap.unfinished"
+PROFILE: Final = "ros2"
+PRESSES: Final = "/web_ui/presses"
+PRESS_SCHEMA: Final[Mapping[str, Any]] = {
+    "$schema": "https://json-schema.org/draft/2020-12/schema",
+    "title": "web_ui/Press",
+    "description": "A press when it is made, and again with what came of it.",
+    "type": "object",
+    "properties": {
+        "id": {"type": "string"},
+        "widget": {"type": "string"},
+        "who": {"type": "string"},
+        "values": {"type": "object"},
+        "outcome": {"type": ["string", "null"]},
+        "reason": {"type": ["string", "null"]},
+        "at": {"type": "string", "format": "date-time"},
+    },
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """A topic as a recording names it; `definition` is the type's, in the format "ros2msg"."""
+
+    topic: str
+    type: str
+    definition: str
+
+
+class File:
+    """Open from its making to `finish` or `abandon`; OSError where the disk does not take it.
+
+    Until it is finished it has another name, and a lock that ends with the process.
+    """
+
+    def __init__(self, folder: Path, name: str, about: Mapping[str, str]) -> None:
+        self._folder, self._path = folder, folder / f"{name}{UNFINISHED}"
+        self._finished = folder / f"{name}{SUFFIX}"
+        flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
+        self._stream = os.fdopen(os.open(self._path, flags, 0o600), "wb")
+        self._channels: dict[str, int] = {}
+        try:
+            fcntl.flock(self._stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            self._writer = Writer(self._stream, compression=CompressionType.ZSTD)
+            self._writer.start(PROFILE)
+            if about:
+                self._writer.add_metadata("recording", dict(about))
+        except BaseException:
+            self.abandon()
+            raise
+
+    def add(self, channel: Channel, payload: bytes, received: int, sent: int) -> None:
+        """A message in CDR; times are nanoseconds since the epoch."""
+
+        def register() -> int:
+            schema = self._writer.register_schema(channel.type, "ros2msg", channel.definition.encode())
+            return self._writer.register_channel(channel.topic, "cdr", schema)
+
+        self._writer.add_message(self._channel(channel.topic, register), received, payload, sent)
+
+    def add_press(self, press: Mapping[str, Any], at: int) -> None:
+        """A press as `PRESS_SCHEMA` has it; it is on the disk when this returns."""
+
+        def register() -> int:
+            told = json.dumps(PRESS_SCHEMA).encode()
+            schema = self._writer.register_schema(str(PRESS_SCHEMA["title"]), "jsonschema", told)
+            return self._writer.register_channel(PRESSES, "json", schema)
+
+        self._writer.add_message(self._channel(PRESSES, register), at, json.dumps(press).encode(), at)
+        self._writer.flush()
+
+    def add_raw(self, schema: Schema | None, channel: ChannelRecord, message: Message) -> None:
+        """A message of another file, as it is there."""
+
+        def register() -> int:
+            own = 0
+            if schema is not None:
+                own = self._writer.register_schema(schema.name, schema.encoding, schema.data)
+            return self._writer.register_channel(
+                channel.topic, channel.message_encoding, own, channel.metadata
+            )
+
+        number = self._channel(channel.topic, register)
+        self._writer.add_message(number, message.log_time, message.data, message.publish_time)
+
+    def note(self, name: str, about: Mapping[str, str]) -> None:
+        """Metadata of the file."""
+        self._writer.add_metadata(name, dict(about))
+
+    def finish(self) -> Path:
+        """The file under its own name, all on the disk."""
+        self._writer.finish()
+        self._stream.flush()
+        os.fsync(self._stream.fileno())
+        self._path.rename(self._finished)
+        self._stream.close()
+        return self._finished
+
+    def abandon(self) -> None:
+        """Leaves nothing of it, as far as the disk lets it."""
+        with suppress(OSError):
+            self._stream.close()
+        with suppress(OSError):
+            self._path.unlink()
+
+    def _channel(self, topic: str, register: Callable[[], int]) -> int:
+        if topic not in self._channels:
+            self._channels[topic] = register()
+        return self._channels[topic]
+
+
+def recover(folder: Path, unfinished: Path) -> Path | None:
+    """Finishes what an ended process left, as far as it goes; None where there was no message in it,
+    or where another process still writes it. OSError where the disk does not take it."""
+    with open(unfinished, "rb") as stream:
+        try:
+            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return None
+        file = File(folder, f"{unfinished.name.removesuffix(UNFINISHED)}.recovered", {})
+        try:
+            found = _finished(file) if _copied(stream, file) else None
+        finally:
+            file.abandon()  # if it is not finished
+        unfinished.unlink()
+    return found
+
+
+def _finished(file: File) -> Path:
+    file.note("recovered", {"why": "the server ended while it was recording"})
+    return file.finish()
+
+
+def _copied(stream: IO[bytes], file: File) -> int:
+    """How many messages could be read."""
+    schemas: dict[int, Schema] = {}
+    channels: dict[int, ChannelRecord] = {}
+    count = 0
+    for record in _readable(stream):
+        match record:
+            case Schema():
+                schemas[record.id] = record
+            case ChannelRecord():
+                channels[record.id] = record
+            case Metadata():
+                file.note(record.name, record.metadata)
+            case Message() if channel := channels.get(record.channel_id):
+                file.add_raw(schemas.get(channel.schema_id), channel, record)
+                count += 1
+    return count
+
+
+def _readable(stream: IO[bytes]) -> Iterator[McapRecord]:
+    """The records until the first that is broken, in whatever way: it was being written."""
+    with suppress(Exception):
+        yield from StreamReader(stream).records

@@ -1,0 +1,201 @@
+"""The thread that writes recordings. What it can't write is left out, never waited for."""
+
+import asyncio
+import logging
+import queue
+import threading
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, Final
+
+from app.recording.file import Channel, File
+from app.recording.folder import Folder
+from app.recording.ring import OVERHEAD, Taken
+from app.sentences import say
+
+log = logging.getLogger("kiosk.recording")
+
+WAITING: Final = 128 * 1024 * 1024  # bytes handed over and not written yet, of all robots
+RINGS: Final = 64 * 1024 * 1024  # bytes in the rings of all robots
+ENDING_S: Final = 5.0  # given to a disk when the server ends
+
+Work = Callable[[], None]
+
+
+class Recordings:
+    """All recordings of one panel; opened by `start`, closed by `stop`.
+
+    `fault` is what an operator reads while recordings can't be written, "" if they can.
+    """
+
+    def __init__(self, path: Path, max_mb: float, robots: int) -> None:
+        """Each of `robots` may have one file open at a time: together they fill half the folder."""
+        most = int(max_mb * 1_000_000)
+        self._folder = Folder(path, most)
+        self.file_bytes = most // (2 * (robots + 1))
+        self.ring_bytes = min(RINGS // robots, self.file_bytes // 2)  # half is for what comes after
+        self._queue: queue.SimpleQueue[tuple[int, Work | None]] = queue.SimpleQueue()
+        self._counting = threading.Lock()
+        self._waiting = 0
+        self._open = 0
+        self.fault = ""
+        self._told: list[Callable[[], None]] = []
+        self._loop = asyncio.get_running_loop()
+        self._thread = threading.Thread(target=self._run, name="recordings", daemon=True)
+
+    def start(self) -> None:
+        """Begins to write; the folder is made, cleared of halves and bounded on the thread."""
+        self.hand_over(0, self._prepare)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Writes what was handed over; blocks, but for `ENDING_S` at most."""
+        self._queue.put((0, None))
+        self._thread.join(ENDING_S)
+        if self._thread.is_alive():
+            log.error("the disk does not take what was recorded: it is left unfinished")
+
+    def follow(self, told: Callable[[], None]) -> None:
+        """`told` is called on the event loop when `fault` has changed."""
+        self._told.append(told)
+
+    def hand_over(self, size: int, work: Work) -> bool:
+        """Has the thread do something that holds `size` bytes; False where too much waits."""
+        with self._counting:
+            if size and self._waiting + size > WAITING:
+                return False
+            self._waiting += size
+        self._queue.put((size, work))
+        return True
+
+    def begin(
+        self, name: str, channels: Mapping[str, Channel], about: Mapping[str, str]
+    ) -> "Recording":
+        """A new recording; `channels` are by the keys of their topics."""
+        return Recording(self, name, channels, about)
+
+    # Below: on the thread.
+
+    def opened(self, name: str, about: Mapping[str, str]) -> File:
+        self._folder.path.mkdir(mode=0o700, parents=True, exist_ok=True)
+        self._folder.make_room((self._open + 1) * self.file_bytes)
+        file = File(self._folder.path, name, about)
+        self._open += 1
+        return file
+
+    def closed(self) -> None:
+        self._open -= 1
+        self._folder.make_room(self._open * self.file_bytes)
+
+    def given_up(self) -> None:
+        self._open -= 1
+
+    def works(self) -> None:
+        self._tell("")
+
+    def failed(self, error: Exception) -> None:
+        """What went wrong with a file; the next press tries again."""
+        why = (isinstance(error, OSError) and error.strerror) or str(error)
+        log.error("recording stopped, in %s: %s", self._folder.path, why)
+        self._tell(say("not_recorded", why=why))
+
+    def _prepare(self) -> None:
+        try:
+            self._folder.open()
+        except Exception as error:
+            self.failed(error)
+
+    def _run(self) -> None:
+        while True:
+            size, work = self._queue.get()
+            if work is None:
+                return
+            try:
+                work()
+            except Exception:  # a mistake in one recording must not end all
+                log.exception("recording failed")
+            del work  # and with it what it held
+            with self._counting:
+                self._waiting -= size
+
+    def _tell(self, fault: str) -> None:
+        if fault != self.fault:
+            self.fault = fault
+            with suppress(RuntimeError):  # the loop is closed: nobody looks any more
+                for told in self._told:
+                    self._loop.call_soon_threadsafe(told)
+
+
+class Recording:
+    """One file, from the loop's side: everything is handed over. `full`: it takes no more samples."""
+
+    def __init__(
+        self,
+        all_: Recordings,
+        name: str,
+        channels: Mapping[str, Channel],
+        about: Mapping[str, str],
+    ) -> None:
+        self._all = all_
+        self._channels = channels
+        self._room = all_.file_bytes
+        self._left_out = 0
+        self._file: File | None = None
+        self._begun = all_.hand_over(OVERHEAD, lambda: self._do(lambda: self._open(name, about)))
+
+    @property
+    def full(self) -> bool:
+        return self._room <= 0 or not self._begun
+
+    def add(self, one: Taken) -> None:
+        """A sample of a topic."""
+        self._room -= one.size
+        if self.full or not self._all.hand_over(one.size, lambda: self._do(lambda: self._add(one))):
+            self._left_out += 1
+
+    def add_press(self, press: Mapping[str, Any], at: int) -> None:
+        """A press or its receipt, at nanoseconds since the epoch; also where it is full."""
+        size = OVERHEAD + len(str(press))
+        self._all.hand_over(size, lambda: self._do(lambda: self._add_press(press, at)))
+
+    def end(self) -> None:
+        self._all.hand_over(0, lambda: self._do(self._finish))
+
+    # Below: on the thread.
+
+    def _do(self, work: Work) -> None:
+        try:
+            work()
+        except Exception as error:
+            if self._file is not None:
+                self._file.abandon()
+                self._file = None
+                self._all.given_up()
+            self._all.failed(error)
+
+    def _open(self, name: str, about: Mapping[str, str]) -> None:
+        self._file = self._all.opened(name, about)
+
+    def _add(self, one: Taken) -> None:
+        if self._file is not None:
+            sample = one.sample
+            received = round(sample.wall * 1e9)
+            sent = received if sample.sent is None else round(sample.sent * 1e6) * 1000
+            self._file.add(self._channels[one.key], bytes(sample.payload), received, sent)
+
+    def _add_press(self, press: Mapping[str, Any], at: int) -> None:
+        if self._file is not None:
+            self._file.add_press(press, at)
+
+    def _finish(self) -> None:
+        if self._file is None:
+            return
+        if self._left_out:
+            self._file.note("left_out", {"samples": str(self._left_out)})
+            log.warning("%d samples were left out: too many or too large", self._left_out)
+        path = self._file.finish()
+        self._file = None
+        log.info("recorded %s", path)
+        self._all.closed()
+        self._all.works()
