@@ -39,7 +39,10 @@ class Namespace:
             raise AssertionError("network namespaces need root: try `unshare -r -n make test`")
         hold = "ip link set lo up && echo up && exec cat"
         self._holder = subprocess.Popen(
-            ["unshare", "--net", "sh", "-c", hold], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+            ["unshare", "--net", "sh", "-c", hold],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
         )
         assert self._holder.stdout is not None
         assert self._holder.stdout.readline() == "up\n", "no network namespace here"

@@ -50,17 +50,27 @@ class Commands:
     def __init__(self, name: str) -> None:
         self.node = rclpy.create_node(name)
         self.heard_on: dict[str, list[dict[str, Any]]] = {}
+        self.came_at: dict[str, list[float]] = {}
         self.publishers: dict[str, Any] = {}
         self.timers: dict[str, Any] = {}
 
     def subscribe(self, topic: str, type: str, **qos: Any) -> None:
         heard = self.heard_on.setdefault(topic, [])
-        self.node.create_subscription(
-            type_named(type), topic, lambda m: heard.append(fields_of(m)), qos_of(qos)
-        )
+        came_at = self.came_at.setdefault(topic, [])
+
+        def hear(message: Any) -> None:
+            came_at.append(time.monotonic())
+            heard.append(fields_of(message))
+
+        self.node.create_subscription(type_named(type), topic, hear, qos_of(qos))
 
     def heard(self, topic: str) -> list[dict[str, Any]]:
         return self.heard_on[topic]
+
+    def arrivals(self, topic: str) -> list[tuple[float, Any]]:
+        """(monotonic seconds of this machine, the `data` field) of all that was heard."""
+        heard = [message["data"] for message in self.heard_on[topic]]
+        return list(zip(self.came_at[topic], heard, strict=False))
 
     def advertise(self, topic: str, type: str, **qos: Any) -> None:
         self.publishers[topic] = self.node.create_publisher(type_named(type), topic, qos_of(qos))
@@ -68,6 +78,24 @@ class Commands:
     def publish(self, topic: str, fields: dict[str, Any]) -> None:
         publisher = self.publishers[topic]
         publisher.publish(filled(publisher.msg_type(), fields))
+
+    def flood(self, topic: str, fields: dict[str, Any], per_s: float, for_s: float) -> int:
+        """Publishes so often for so long, or as often as it can; returns how many went out."""
+        publisher = self.publishers[topic]
+        message = filled(publisher.msg_type(), fields)
+        began = time.monotonic()
+        sent = 0
+        while (spent := time.monotonic() - began) < for_s:
+            if sent < spent * per_s:
+                publisher.publish(message)
+                sent += 1
+            else:
+                time.sleep(0.0005)
+        return sent
+
+    def publish_long(self, topic: str, length: int) -> None:
+        """A text of so many characters."""
+        self.publish(topic, {"data": "x" * length})
 
     def every(self, topic: str, fields: dict[str, Any], period_s: float) -> None:
         self.timers[topic] = self.node.create_timer(period_s, lambda: self.publish(topic, fields))
