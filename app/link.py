@@ -61,7 +61,7 @@ def config_from(path: Path, connect: Sequence[str] = ()) -> zenoh.Config:
             raise SettingsError(
                 f"{endpoints}: can't connect there, a Zenoh endpoint is like tcp/robot1:7447: {error}"
             ) from error
-    return config
+    return _lasting(config)
 
 
 def config_to(endpoint: str) -> zenoh.Config:
@@ -76,6 +76,13 @@ def config_to(endpoint: str) -> zenoh.Config:
         "open/return_conditions/connect_scouted": "false",
     }.items():
         config.insert_json5(place, value)
+    return _lasting(config)
+
+
+def _lasting(config: zenoh.Config) -> zenoh.Config:
+    """Without shared memory, of which Zenoh keeps a segment and its file for each session that was:
+    a session is renewed at every loss of the link."""
+    config.insert_json5("transport/shared_memory/enabled", "false")
     return config
 
 

@@ -255,7 +255,11 @@ class Server:
         self.http = httpx.Client(base_url=self.url, timeout=10, trust_env=False)
         command = [python, "-m", "uvicorn", "app.main:app", "--port", str(self.port), *options]
         self.process = Process(command, {**environment, "PYTHONPATH": ""}, cwd=folder)
-        until(self.answers, "the server answers", within_s=20)
+        try:
+            until(self.answers, "the server answers", within_s=20)
+        except AssertionError:
+            self.process.kill()
+            raise
 
     def robot(self, name: str) -> "Server":
         """The same server, asked for one of its robots."""

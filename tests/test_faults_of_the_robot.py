@@ -1,20 +1,22 @@
 """The robot's own parts break, lie or shout while somebody goes on pressing."""
 
+import json
 import random
 import secrets
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 import zenoh
 
-from app.link import config_to
 from tests.faults.presser import Account, Presser, accounted
 from tests.faults.results import ms, record
 from tests.faults.rig import BOOL, LISTENED_TO, MAX_AGE_S, TEXT, Rig, permitting, several
-from tests.faults.trial import UNDER_WAY_S, Trial, tried, well
+from tests.faults.trial import Trial, tried, well
 from tests.faults.watch import Resources, Watch, answering, came_back, resources
 from tests.parts import RosNode, Server, until
 
@@ -138,9 +140,41 @@ def test_a_robot_that_restarts_again_and_again(rig: Rig, server: Server) -> None
     )
 
 
+def grown(before: Resources, after: Resources) -> str:
+    return f"{after.rss_mb - before.rss_mb:+.0f} MB, no more threads, no more files"
+
+
+@contextmanager
+def shouting(domain: int) -> Iterator[RosNode]:
+    node = RosNode(domain, "shouter")
+    try:
+        yield node
+    finally:
+        node.end()
+
+
+def flooded(
+    rig: Rig, server: Server, topic: str, node: RosNode, fields: dict[str, Any]
+) -> tuple[Account, int, Watch]:
+    """What came of presses while a node said something 2,000 times a second; how often it did."""
+    until(lambda: node.subscribers(topic), "the bridge listens", within_s=15)
+    watch = Watch(server)
+    before = resources(server.process.pid)
+    presser = Presser(server, "guarded")
+    with answering(server), ThreadPoolExecutor(1) as pool:
+        well(presser)
+        said = pool.submit(node.flood, topic, fields, FLOOD_PER_S, FLOOD_S)
+        until(said.done, "the flood ends", FLOOD_S + 10)
+        well(presser)
+    presses = presser.end()
+    account = accounted(presses, lambda: rig.arrivals("guarded"), lambda _: True, 2.0)
+    came_back(server.process.pid, before, MARGIN_MB)
+    return account, said.result(), watch
+
+
 def test_a_flood_on_an_interlock(rig: Rig, server: Server) -> None:
     """What is said last counts, and soon."""
-    account, said, watch = flooded(rig, server, "/kept", {"data": True}, rig.robot)
+    account, said, watch = flooded(rig, server, "/kept", rig.robot, {"data": True})
     until(lambda: watch.now("kept").enabled, "still permitted")
     told_at = time.monotonic()
     rig.robot.publish("/kept", {"data": False})
@@ -160,7 +194,7 @@ def test_a_flood_on_an_interlock(rig: Rig, server: Server) -> None:
 def test_a_flood_on_a_readout(rig: Rig, server: Server) -> None:
     with shouting(rig.bridge.domain) as shouter:
         shouter.advertise("/heard", TEXT)
-        account, said, watch = flooded(rig, server, "/heard", {"data": "loud"}, shouter)
+        account, said, watch = flooded(rig, server, "/heard", shouter, {"data": "loud"})
         last = secrets.token_hex(8)
         shouter.publish("/heard", {"data": last})
         until(lambda: watch.widgets["heard"]["text"] == last, "the last one is shown", SHOWN_WITHIN_S)
@@ -198,19 +232,42 @@ def test_messages_of_ten_megabytes(rig: Rig, server: Server) -> None:
     )
 
 
+def client_of(endpoint: str) -> zenoh.Config:
+    """Of a client a bridge passes on everything, of a peer it leaves that to the peers."""
+    config = zenoh.Config()
+    for place, value in {
+        "mode": "client",
+        "connect/endpoints": [endpoint],
+        "scouting/multicast/enabled": False,
+        "transport/shared_memory/enabled": False,
+    }.items():
+        config.insert_json5(place, json.dumps(value))
+    return config
+
+
+def lie(chance: random.Random) -> bytes:
+    """No message: an encapsulation that there is none of, or a body that is far too long for a bool
+    and no text."""
+    if chance.random() < 0.5:
+        return b"\xff" + chance.randbytes(chance.randrange(200))
+    return b"\0\1\0\0" + b"\xff" * 4 + chance.randbytes(chance.randrange(60, 200))
+
+
 def test_garbage_on_all_that_is_listened_to(rig: Rig, server: Server) -> None:
     """Nothing that is not the message permits anything, and the next good one does."""
     before = resources(server.process.pid)
     watch, presser = Watch(server), Presser(server, "guarded")
     chance = random.Random(7)
-    with answering(server), zenoh.open(config_to(rig.endpoint)) as liar:
+    with answering(server), zenoh.open(client_of(rig.endpoint)) as liar:
         well(presser)
-        liar.put("kept", b"\0\1\0\0")
-        locked_s, reason = watch.locked_after(time.monotonic() - SHOWN_WITHIN_S, "kept", SHOWN_WITHIN_S)
-        assert "not" in reason
+        lied_at = time.monotonic()
+        until(lambda: (liar.put("kept", b"\0\1\0\0"), not watch.now("kept").enabled)[1], "it locks")
+        locked_s, reason = watch.locked_after(lied_at, "kept", SHOWN_WITHIN_S)
+        assert "can't be read" in reason
         for number in range(GARBAGE):
-            # Never longer than a permission that was cut off: no bytes of it can say true.
             liar.put(LISTENED_TO[number % len(LISTENED_TO)], lie(chance))
+        until(lambda: "can't be read" in watch.widgets["heard"]["note"], "the readout says so")
+        assert not watch.was_open("kept", lied_at + locked_s, time.monotonic())
         rig.robot.publish("/kept", {"data": True})
         watch.opened("kept")
         watch.opened("pulsed")

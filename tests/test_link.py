@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 import zenoh
@@ -60,6 +61,18 @@ def test_a_session_is_renewed_in_the_middle_of_what_comes_in(
     assert not stuck, "renewing the session stands still"
     threads[0].join(5)
     link.close()
+
+
+def test_nothing_is_left_of_the_sessions_that_were(peer: tuple[str, zenoh.Session]) -> None:
+    """Zenoh kept a shared memory segment of each: a thousand losses of the link, and no file more."""
+    link = Link(config_to(peer[0]), lambda: None)
+    link.start(["a"], ["b"])
+    files = []
+    for _ in range(6):
+        link.renew()
+        files.append(len(list(Path("/proc/self/fd").iterdir())))
+    link.close()
+    assert files[-1] == files[0]
 
 
 def test_tokens_are_held_by_the_new_session_when_they_are_wanted_again(
