@@ -80,14 +80,20 @@ class Commands:
         publisher.publish(filled(publisher.msg_type(), fields))
 
     def flood(self, topic: str, fields: dict[str, Any], per_s: float, for_s: float) -> int:
-        """Publishes so often for so long, or as often as it can; returns how many went out."""
+        """Publishes so often for so long, or as often as it can; returns how many went out.
+
+        `{n}` in a text is the number of the message.
+        """
         publisher = self.publishers[topic]
-        message = filled(publisher.msg_type(), fields)
         began = time.monotonic()
         sent = 0
         while (spent := time.monotonic() - began) < for_s:
             if sent < spent * per_s:
-                publisher.publish(message)
+                numbered = {
+                    name: value.format(n=sent) if isinstance(value, str) else value
+                    for name, value in fields.items()
+                }
+                publisher.publish(filled(publisher.msg_type(), numbered))
                 sent += 1
             else:
                 time.sleep(0.0005)
