@@ -1,4 +1,4 @@
-"""The server itself is killed in the midst of presses: nothing is sent twice, late, or though refused."""
+"""The server is killed in the midst of presses: nothing is sent twice, late, or though refused."""
 
 import random
 import secrets

@@ -14,7 +14,7 @@ from tests.faults.rig import all_open
 from tests.parts import Server, until
 
 LIVES_AT_MOST_S = 0.8
-PRESSED_EVERY_S = 0.005
+PRESSED_EVERY_S = 0.01
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +33,7 @@ class Life:
 def kill_at_random_moments(
     start: Callable[[], Server], times: int, widget: str, chance: random.Random
 ) -> Iterator[Life]:
-    """Starts a server, presses its widget, kills it in the midst; yields what was pressed in each life."""
+    """Starts a server, presses its widget, kills it in the midst; yields what came of each life."""
     for _ in range(times):
         server = start()
         try:

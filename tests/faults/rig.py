@@ -51,6 +51,7 @@ label = "Free"
 topic = "/free"
 type = "std_msgs/msg/String"
 message = { data = "{message}" }
+qos = { depth = 1000 }   # with 10, DDS loses what a busy reader has not fetched
 
 [[page.widget]]
 id = "guarded"
@@ -59,6 +60,7 @@ label = "Guarded"
 topic = "/guarded"
 type = "std_msgs/msg/String"
 message = { data = "{message}" }
+qos = { depth = 1000 }
 interlock = "kept"
 
 [[page.widget]]
@@ -68,6 +70,7 @@ label = "Paced"
 topic = "/paced"
 type = "std_msgs/msg/String"
 message = { data = "{message}" }
+qos = { depth = 1000 }
 interlock = "pulsed"
 
 [[page.widget]]
