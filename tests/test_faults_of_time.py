@@ -31,6 +31,10 @@ def off_s(server: Server) -> float:
     return at.timestamp() - time.time()
 
 
+def is_off(server: Server, off: int) -> None:
+    until(lambda: abs(off_s(server) - off) < 5, "the server's clock is set")
+
+
 def test_a_clock_that_is_set_back_and_forward(rig: Rig, tmp_path: Path) -> None:
     clock = Clock(tmp_path)
     with rig.serving(tmp_path, **clock.environment) as server:
@@ -39,7 +43,7 @@ def test_a_clock_that_is_set_back_and_forward(rig: Rig, tmp_path: Path) -> None:
         with answering(server):
             for off in (0, -HOUR_S, HOUR_S, 0):
                 clock.set(off)
-                until(lambda off=off: abs(off_s(server) - off) < 5, "the server's clock is set")
+                is_off(server, off)
                 well(presser)
             assert not [s for s in watch.seen["pulsed"] if s.at > began and not s.enabled]
             rig.robot.freeze()

@@ -10,8 +10,8 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 from tests.faults.presser import Press, Presser
-from tests.faults.rig import all_open
-from tests.parts import Server, until
+from tests.faults.rig import permitted
+from tests.parts import Server
 
 LIVES_AT_MOST_S = 0.8
 PRESSED_EVERY_S = 0.01
@@ -37,12 +37,13 @@ def kill_at_random_moments(
     for _ in range(times):
         server = start()
         try:
-            until(lambda server=server: all_open(server), "everything is permitted", 20, every_s=0.05)
+            permitted(server)
             began_at = time.monotonic()
             presser = Presser(server, widget, PRESSED_EVERY_S)
             presser.goes_on()
             moment = time.monotonic() + chance.uniform(0, LIVES_AT_MOST_S)
-            until(lambda moment=moment: time.monotonic() >= moment, "its moment", every_s=0.0005)
+            while time.monotonic() < moment:
+                time.sleep(0.0005)
         finally:
             killed_at = time.monotonic()
             server.http.close()

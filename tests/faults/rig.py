@@ -136,9 +136,9 @@ class Rig:
     @contextmanager
     def serving(self, folder: Path, endpoint: str = "", **environment: str) -> Iterator[Server]:
         """A kiosk on it that permits everything."""
-        server = kiosk(endpoint or self.endpoint, folder, **environment)
+        server = kiosk(endpoint or self.endpoint, folder, 0, **environment)
         try:
-            until(lambda: all_open(server), "everything is permitted", within_s=20, every_s=0.05)
+            permitted(server)
             yield server
         finally:
             if server.process.running:
@@ -150,5 +150,11 @@ class Rig:
         self.ears.end()
 
 
-def all_open(server: Server) -> bool:
-    return all(server.widget(name)["enabled"] for name in SENT_ON)
+def permitted(server: Server) -> None:
+    """Waits until every button of the panel is open."""
+    until(
+        lambda: all(server.widget(name)["enabled"] for name in SENT_ON),
+        "everything is permitted",
+        within_s=20,
+        every_s=0.05,
+    )
