@@ -5,6 +5,7 @@ an answer that came late.
 """
 
 import asyncio
+import math
 from typing import Any, Final
 
 from hypothesis import HealthCheck, settings
@@ -53,7 +54,7 @@ BUTTONS: Final = some.sampled_from(["guarded", "add"])
 GARBAGE: Final = some.binary(max_size=4) | some.binary().map(lambda data: b"\xff" + data)
 CORRECTED: Final = frozenset({"timed_out", "unknown"})
 FEW: Final = settings(
-    max_examples=60,
+    max_examples=200,
     stateful_step_count=40,
     deadline=None,
     derandomize=True,
@@ -87,7 +88,9 @@ class Way:
 class Grounds:
     """What must be so for a permission, kept beside the robot and by its simplest rules."""
 
-    def __init__(self) -> None:
+    def __init__(self, strict: bool = True) -> None:
+        """`strict`: of an interlock that wants a publisher, and a value that is not old."""
+        self.strict = strict
         self.link = self.bridge = self.publisher = False
         self.silent = self.wrong_type = self.unheard = False
         self.settled_at: float | None = None
@@ -95,16 +98,14 @@ class Grounds:
         self.said_at = 0.0
 
     def hold(self, now: float) -> bool:
-        return (
-            self.way(now)
-            and self.publisher
-            and not self.wrong_type
-            and not self.unheard
-            and self.value is True
-            and self.settled_at is not None
-            and self.said_at >= self.settled_at + HISTORY_S
-            and now < self.said_at + MAX_AGE_S
-        )
+        told = self.way(now) and not self.wrong_type and self.value is True
+        if not told or (self.unheard and self.publisher):
+            return False
+        return not self.strict or (self.publisher and self.fresh(now))
+
+    def fresh(self, now: float) -> bool:
+        since = math.inf if self.settled_at is None else self.settled_at + HISTORY_S
+        return self.said_at >= since and now < self.said_at + MAX_AGE_S
 
     def way(self, now: float) -> bool:
         there = self.link and self.bridge and not self.silent
@@ -125,30 +126,34 @@ class SetLoop(asyncio.SelectorEventLoop):
             self.run_until_complete(asyncio.sleep(0))
 
 
-def one_panel() -> Panel:
-    strict = {"max_age_s": MAX_AGE_S, "require_publisher": True}
-    return panel_of(MESSAGE, GUARDED, ADD, interlock=strict)
+def one_panel(strict: bool) -> Panel:
+    conditions = {"max_age_s": MAX_AGE_S, "require_publisher": True} if strict else {}
+    return panel_of(MESSAGE, GUARDED, ADD, interlock=conditions)
 
 
 class Panels(RuleBasedStateMachine):
     """One robot, one panel, whatever happens."""
 
-    def __init__(self) -> None:
-        super().__init__()
+    @initialize(strict=some.booleans(), well=some.booleans())
+    def begins(self, strict: bool, well: bool) -> None:
+        self.panel = one_panel(strict)
         self.loop = SetLoop()
         self.way = Way()
-        self.grounds = Grounds()
-        self.robot = Robot(one_panel(), INTERFACES, KIOSK)
+        self.grounds = Grounds(strict)
+        self.robot = Robot(self.panel, INTERFACES, KIOSK)
         self.key = self.robot.key(ENABLED)
         self.calls = Calls(INTERFACES, self.robot, self.way, lambda: None)
         actions = Actions(INTERFACES, self.robot, self.way, lambda: None)
         self.presses = Presses(
-            one_panel(), INTERFACES, self.robot, self.way, self.calls, actions, lambda: self.now
+            self.panel, INTERFACES, self.robot, self.way, self.calls, actions, lambda: self.now
         )
         self.seq = 0
         self.sent: list[str] = []  # press ids, once for each put or query
         self.last: dict[str, Receipt] = {}
         self.pending: list[asyncio.Task[Receipt]] = []
+        self.pressed_last = ("p1", "add", "a")
+        if well:
+            self.all_is_well()
 
     @property
     def now(self) -> float:
@@ -164,11 +169,6 @@ class Panels(RuleBasedStateMachine):
         self.loop.close()
 
     # What the robot and the way to it do.
-
-    @initialize(well=some.booleans())
-    def begins(self, well: bool) -> None:
-        if well:
-            self.all_is_well()
 
     @rule()
     def all_is_well(self) -> None:
@@ -192,7 +192,7 @@ class Panels(RuleBasedStateMachine):
     @rule()
     def link_goes(self) -> None:
         self.robot.lose()
-        self.grounds = Grounds()
+        self.grounds = Grounds(self.grounds.strict)
         self.calls.follow()
 
     @precondition(lambda self: self.grounds.link and not self.grounds.bridge)
@@ -245,7 +245,7 @@ class Panels(RuleBasedStateMachine):
     def publisher_goes(self) -> None:
         endpoint(self.robot, "MP", ENABLED, BOOL, alive=False)
         self.robot.follow_publishers()
-        if self.grounds.publisher and not self.grounds.wrong_type:
+        if self.grounds.strict and self.grounds.publisher and not self.grounds.wrong_type:
             self.grounds.value = None
         self.grounds.publisher = False
 
@@ -254,7 +254,7 @@ class Panels(RuleBasedStateMachine):
     def type_is(self, wrong: bool) -> None:
         endpoint(self.robot, "MP", ENABLED, TEXT, alive=wrong)
         self.robot.follow_publishers()
-        if self.grounds.wrong_type and not wrong and not self.grounds.publisher:
+        if self.grounds.strict and self.grounds.wrong_type and not wrong and not self.grounds.publisher:
             self.grounds.value = None
         self.grounds.wrong_type = wrong
 
@@ -285,6 +285,7 @@ class Panels(RuleBasedStateMachine):
 
     @rule(press_id=IDS, widget=BUTTONS, text=some.sampled_from(["a", "b"]))
     def pressed(self, press_id: str, widget: str, text: str) -> None:
+        self.pressed_last = (press_id, widget, text)
         puts, asked = len(self.way.put_texts), len(self.way.queries)
         inputs = {"message": text}
         self.pending.append(
@@ -297,6 +298,10 @@ class Panels(RuleBasedStateMachine):
             assert self.grounds.way(self.now), "asked without a way"
         self.sent += [press_id] * (len(self.way.put_texts) - puts + len(self.way.queries) - asked)
 
+    @rule()
+    def pressed_again(self) -> None:
+        self.pressed(*self.pressed_last)
+
     @precondition(lambda self: any(not query.done() for query in self.way.queries))
     @rule(answered=some.booleans(), which=some.integers(0, 100))
     def robot_answers(self, answered: bool, which: int) -> None:
@@ -308,7 +313,7 @@ class Panels(RuleBasedStateMachine):
     # What must be true whatever happens.
 
     def permitted(self) -> bool:
-        interlock = one_panel().interlocks[0]
+        interlock = self.panel.interlocks[0]
         return interlock_verdict(interlock, self.robot, self.now).permitted
 
     @invariant()
