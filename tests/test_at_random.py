@@ -218,6 +218,13 @@ class Panels(RuleBasedStateMachine):
 
     @precondition(lambda self: self.grounds.bridge)
     @rule()
+    def bridge_restarts(self) -> None:
+        self.bridge_goes()
+        self.bridge_comes()
+        self.joined()
+
+    @precondition(lambda self: self.grounds.bridge)
+    @rule()
     def joined(self) -> None:
         self.robot.settled_at = self.grounds.settled_at = self.now
 
