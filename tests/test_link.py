@@ -69,7 +69,11 @@ def test_a_burst_is_not_dropped(peer: tuple[str, zenoh.Session]) -> None:
     """With Zenoh's own queue some of these were lost, more on a busy machine, and nobody was told."""
     endpoint, session = peer
     heard: list[bytes] = []
-    session.declare_subscriber("b", Callback(lambda s: heard.append(bytes(s.payload)), indirect=False))
+
+    def hear(sample: zenoh.Sample) -> None:
+        heard.append(bytes(sample.payload))
+
+    session.declare_subscriber("b", Callback(hear, indirect=False))
     link = Link(config_to(endpoint), lambda: None)
     link.start([], ["b"])
     until(lambda: link.heard("b"), "the subscriber is known")
