@@ -245,6 +245,12 @@ def client_of(endpoint: str) -> zenoh.Config:
     return config
 
 
+def over(liar: zenoh.Session, watch: Watch) -> bool:
+    """Says a last word, which comes after all that was said before; whether it is shown."""
+    liar.put("heard", b"\0\1\0\0\5\0\0\0over\0")
+    return bool(watch.widgets["heard"]["text"] == "over")
+
+
 def lie(chance: random.Random) -> bytes:
     """No message: an encapsulation that there is none of, or a body that is far too long for a bool
     and no text."""
@@ -267,6 +273,7 @@ def test_garbage_on_all_that_is_listened_to(rig: Rig, server: Server) -> None:
         for number in range(GARBAGE):
             liar.put(LISTENED_TO[number % len(LISTENED_TO)], lie(chance))
         until(lambda: "can't be read" in watch.widgets["heard"]["note"], "the readout says so")
+        until(lambda: over(liar, watch), "all of it has come", every_s=0.1)
         assert not watch.was_open("kept", lied_at + locked_s, time.monotonic())
         rig.robot.publish("/kept", {"data": True})
         watch.opened("kept")
