@@ -1,6 +1,8 @@
 # make run   the panel with a simulated robot, at http://127.0.0.1:8000
 # make test  everything, on the real bridge, real ROS 2 nodes and a real browser
 # make check types and style
+# make faults every fault in its long form, and what was measured as a table in the README
+# make soak  an ordinary day for SOAK_S seconds (an hour)
 # make dev   the panel, taking every change as it is saved
 
 PYTHON ?= python3
@@ -10,7 +12,7 @@ PIP_INSTALL := -m pip install --disable-pip-version-check --quiet --require-hash
 export TEST_BRIDGE := $(CACHE)/bridge/release/test-bridge
 export TEST_ROS_PYTHON := $(CURDIR)/.venv-ros/bin/python
 
-.PHONY: run test check dev wheel test-parts bridge lock clean
+.PHONY: run test check dev wheel faults soak test-parts bridge lock clean
 .DELETE_ON_ERROR:
 
 run: .venv/run
@@ -26,6 +28,18 @@ check: .venv/test
 	.venv/bin/ruff check app tests
 	.venv/bin/ruff format --check app tests
 	.venv/bin/mypy
+
+# FORM=short: as in `make test`.
+FORM ?= long
+FAULTS_RESULTS := $(CACHE)/faults.jsonl
+faults: test-parts
+	mkdir -p $(CACHE)
+	rm -f $(FAULTS_RESULTS)
+	FAULTS=$(FORM) FAULTS_RESULTS=$(FAULTS_RESULTS) .venv/bin/pytest tests/test_faults_of_*.py tests/test_at_random.py $(ARGS)
+	FAULTS=$(FORM) .venv/bin/python -m tests.faults.results $(FAULTS_RESULTS) README.md
+
+soak: test-parts
+	.venv/bin/python -m tests.faults.soak
 
 wheel: .venv/test
 	.venv/bin/python -m build --wheel --no-isolation --outdir dist

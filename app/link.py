@@ -27,6 +27,8 @@ from app.robot import Sample
 Config = zenoh.Config
 
 ASK_TIMEOUT_S = 2.0
+MOST_QUEUED = 16  # batches; Zenoh takes no more
+DROPPED_AFTER_US = 100_000  # how long a put may wait for room
 
 
 @dataclass(slots=True)
@@ -61,7 +63,7 @@ def config_from(path: Path, connect: Sequence[str] = ()) -> zenoh.Config:
             raise SettingsError(
                 f"{endpoints}: can't connect there, a Zenoh endpoint is like tcp/robot1:7447: {error}"
             ) from error
-    return config
+    return _fit(config)
 
 
 def config_to(endpoint: str) -> zenoh.Config:
@@ -76,6 +78,20 @@ def config_to(endpoint: str) -> zenoh.Config:
         "open/return_conditions/connect_scouted": "false",
     }.items():
         config.insert_json5(place, value)
+    return _fit(config)
+
+
+def _fit(config: zenoh.Config) -> zenoh.Config:
+    """What a kiosk needs of any configuration.
+
+    No shared memory: Zenoh keeps a segment and its file for each session that was, and a session is
+    renewed at every loss of the link. Room for a burst, and time to send it: two messages and a
+    millisecond, which are Zenoh's own, lose commands in silence on a machine that is busy.
+    """
+    config.insert_json5("transport/shared_memory/enabled", "false")
+    config.insert_json5("transport/link/tx/queue/size/data", str(MOST_QUEUED))
+    wait = "transport/link/tx/queue/congestion_control/drop/wait_before_drop"
+    config.insert_json5(wait, str(DROPPED_AFTER_US))
     return config
 
 

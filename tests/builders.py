@@ -125,13 +125,14 @@ def presses_of(
     way: Asked,
     *,
     asker: Asker | None = None,
+    calls: Calls | None = None,
     confirmations: Confirmations | None = None,
     logbook: Logbook | None = None,
     monotonic: Callable[[], float] = lambda: NOW,
 ) -> Presses:
     """The presses of a robot, with all that they need and a test does not care for."""
     asker = asker or Nobody()
-    calls = Calls(INTERFACES, robot, asker, lambda: None)
+    calls = calls or Calls(INTERFACES, robot, asker, lambda: None)
     return Presses(
         panel,
         INTERFACES,

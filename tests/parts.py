@@ -199,7 +199,14 @@ class RosNode:
         self._process.kill()
         self._process.wait()
 
+    def freeze(self) -> None:
+        self._process.send_signal(signal.SIGSTOP)
+
+    def thaw(self) -> None:
+        self._process.send_signal(signal.SIGCONT)
+
     def end(self) -> None:
+        self.thaw()
         for pipe in (self._process.stdin, self._process.stdout):
             if pipe is not None:
                 pipe.close()
@@ -217,6 +224,9 @@ ORDERS: Mapping[str, tuple[str, ...]] = {
     "subscribe": ("topic", "type"),
     "heard": ("topic",),
     "heard_at": ("topic",),
+    "arrivals": ("topic",),
+    "flood": ("topic", "fields", "per_s", "for_s"),
+    "publish_long": ("topic", "length"),
     "advertise": ("topic", "type"),
     "publish": ("topic", "fields"),
     "every": ("topic", "fields", "period_s"),

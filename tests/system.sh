@@ -16,10 +16,17 @@ has_libclang() {
     ls /usr/lib/llvm-*/lib/libclang*.so* /usr/lib/*/libclang*.so* /usr/lib*/libclang*.so* 2>/dev/null | grep -q .
 }
 
+has_faketime() {
+    ls /usr/lib/*/faketime/libfaketimeMT.so.1 | grep -q .
+}
+
 need build-essential cc --version
 need cmake cmake --version
 need chromium chromium --version
 need libclang-dev has_libclang
+need faketime has_faketime
+need iproute2 ip -V
+need util-linux nsenter --version
 need python3-venv "${PYTHON:-python3}" -c "import ensurepip"
 [ -n "$only" ] || command -v cargo >/dev/null || { echo "missing: Rust 1.85 or later (cargo)" >&2; exit 1; }
 

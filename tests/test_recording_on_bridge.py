@@ -117,7 +117,7 @@ def presses(found: Mapping[str, list[Record]]) -> list[tuple[str, str | None, st
         assert (schema.encoding, channel.message_encoding) == ("jsonschema", "json")
         press = json.loads(message.data)
         assert set(press) == set(json.loads(schema.data)["properties"])
-        assert press["who"] == "127.0.0.1"
+        assert press["who"] == "a program (127.0.0.1)"
         told.append((press["id"], press["outcome"], press["reason"]))
     return told
 

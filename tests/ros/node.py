@@ -50,16 +50,16 @@ class Commands:
     def __init__(self, name: str) -> None:
         self.node = rclpy.create_node(name)
         self.heard_on: dict[str, list[dict[str, Any]]] = {}
-        self.times_of: dict[str, list[float]] = {}
+        self.came_at: dict[str, list[float]] = {}
         self.publishers: dict[str, Any] = {}
         self.timers: dict[str, Any] = {}
 
     def subscribe(self, topic: str, type: str, **qos: Any) -> None:
         heard = self.heard_on.setdefault(topic, [])
-        times = self.times_of.setdefault(topic, [])
+        came_at = self.came_at.setdefault(topic, [])
 
         def hear(message: Any) -> None:
-            times.append(time.monotonic())  # the same clock in all processes of one machine
+            came_at.append(time.monotonic())  # the same clock in all processes of one machine
             heard.append(fields_of(message))
 
         self.node.create_subscription(type_named(type), topic, hear, qos_of(qos))
@@ -68,7 +68,12 @@ class Commands:
         return self.heard_on[topic]
 
     def heard_at(self, topic: str) -> list[float]:
-        return self.times_of[topic]
+        return self.came_at[topic]
+
+    def arrivals(self, topic: str) -> list[tuple[float, Any]]:
+        """(monotonic seconds of this machine, the `data` field) of all that was heard."""
+        heard = [message["data"] for message in self.heard_on[topic]]
+        return list(zip(self.came_at[topic], heard, strict=False))
 
     def advertise(self, topic: str, type: str, **qos: Any) -> None:
         self.publishers[topic] = self.node.create_publisher(type_named(type), topic, qos_of(qos))
@@ -76,6 +81,30 @@ class Commands:
     def publish(self, topic: str, fields: dict[str, Any]) -> None:
         publisher = self.publishers[topic]
         publisher.publish(filled(publisher.msg_type(), fields))
+
+    def flood(self, topic: str, fields: dict[str, Any], per_s: float, for_s: float) -> int:
+        """Publishes so often for so long, or as often as it can; returns how many went out.
+
+        `{n}` in a text is the number of the message.
+        """
+        publisher = self.publishers[topic]
+        began = time.monotonic()
+        sent = 0
+        while (spent := time.monotonic() - began) < for_s:
+            if sent < spent * per_s:
+                numbered = {
+                    name: value.format(n=sent) if isinstance(value, str) else value
+                    for name, value in fields.items()
+                }
+                publisher.publish(filled(publisher.msg_type(), numbered))
+                sent += 1
+            else:
+                time.sleep(0.0005)
+        return sent
+
+    def publish_long(self, topic: str, length: int) -> None:
+        """A text of so many characters."""
+        self.publish(topic, {"data": "x" * length})
 
     def every(self, topic: str, fields: dict[str, Any], period_s: float) -> None:
         self.timers[topic] = self.node.create_timer(period_s, lambda: self.publish(topic, fields))

@@ -1,0 +1,52 @@
+"""A server that is killed at random moments under presses, again and again.
+
+What it knew is gone with it; what the robot received must still fit the receipts that were given.
+"""
+
+import random
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+
+from tests.faults.presser import Press, Presser
+from tests.faults.rig import permitted
+from tests.parts import Server
+
+LIVES_AT_MOST_S = 0.8
+PRESSED_EVERY_S = 0.01
+
+
+@dataclass(frozen=True, slots=True)
+class Life:
+    """A server from its first press to its kill (monotonic seconds), with all that was pressed."""
+
+    began_at: float
+    killed_at: float
+    presses: list[Press]
+
+    def whole(self, press: Press, under_way_s: float) -> bool:
+        """Whether the answer was there for so long before the kill that nothing was on its way."""
+        return 0.0 < press.answered_at < self.killed_at - under_way_s
+
+
+def kill_at_random_moments(
+    start: Callable[[], Server], times: int, widget: str, chance: random.Random
+) -> Iterator[Life]:
+    """Starts a server, presses its widget, kills it in the midst; yields what came of each life."""
+    for _ in range(times):
+        server = start()
+        try:
+            permitted(server)
+            began_at = time.monotonic()
+            presser = Presser(server, widget, PRESSED_EVERY_S)
+            presser.goes_on()
+            moment = time.monotonic() + chance.uniform(0, LIVES_AT_MOST_S)
+            while time.monotonic() < moment:
+                time.sleep(0.0005)
+        finally:
+            killed_at = time.monotonic()
+            server.http.close()
+            with suppress(ProcessLookupError):
+                server.process.kill()
+        yield Life(began_at, killed_at, presser.end())

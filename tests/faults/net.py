@@ -1,0 +1,143 @@
+"""Network namespaces of a test's own, and a cable between two of them that can be cut, slow or lossy.
+
+A namespace lives as long as the process that holds it, and that one ends with the pipe to the tests:
+nothing is left, whatever happens to them. Many kernels come without `tc netem`; so the cable is two
+pairs of veth with a small program in the middle (`wire.py`) that carries the frames: TCP itself meets
+the loss and the delay, on any kernel.
+"""
+
+import ctypes
+import fcntl
+import json
+import os
+import socket
+import struct
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Any, Final
+
+CLONE_NEWNET: Final = 0x40000000
+KIOSK_IP: Final = "10.99.0.1"
+ROBOT_IP: Final = "10.99.0.2"
+
+# linux/sockios.h, linux/ethtool.h: a frame that is carried by hand needs its checksum, and no more
+# than the MTU.
+SIOCETHTOOL: Final = 0x8946
+ETHTOOL_STXCSUM: Final = 0x17
+ETHTOOL_STSO: Final = 0x1F
+ETHTOOL_SGSO: Final = 0x24
+
+
+class Namespace:
+    """A network namespace with its loopback up."""
+
+    def __init__(self) -> None:
+        if os.geteuid() != 0:
+            raise AssertionError("network namespaces need root: try `unshare -r -n make test`")
+        hold = "ip link set lo up && echo up && exec cat"
+        self._holder = subprocess.Popen(
+            ["unshare", "--net", "sh", "-c", hold],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        assert self._holder.stdout is not None
+        assert self._holder.stdout.readline() == "up\n", "no network namespace here"
+
+    @property
+    def pid(self) -> int:
+        return self._holder.pid
+
+    @property
+    def enter(self) -> list[str]:
+        """What stands before a command that is to run in it."""
+        return ["nsenter", f"--net=/proc/{self.pid}/ns/net"]
+
+    def run(self, *command: str) -> None:
+        subprocess.run([*self.enter, *command], check=True)
+
+    @contextmanager
+    def inside(self) -> Iterator[None]:
+        """This thread, and all that it starts meanwhile, is in the namespace."""
+        with open("/proc/thread-self/ns/net") as before, open(f"/proc/{self.pid}/ns/net") as here:
+            _set(here.fileno())
+            try:
+                yield
+            finally:
+                _set(before.fileno())
+
+    def end(self) -> None:
+        assert self._holder.stdin is not None
+        assert self._holder.stdout is not None
+        self._holder.stdin.close()
+        self._holder.wait(5)
+        self._holder.stdout.close()
+
+
+class Cable:
+    """Two namespaces, `kiosk` and `robot`, and what lies between."""
+
+    def __init__(self) -> None:
+        with ExitStack() as stack:
+            self.kiosk, self._middle, self.robot = (self._begun(stack) for _ in range(3))
+            self._plug(self.kiosk, "kiosk", KIOSK_IP)
+            self._plug(self.robot, "robot", ROBOT_IP)
+            self._wire = subprocess.Popen(
+                [*self._middle.enter, sys.executable, str(Path(__file__).with_name("wire.py")),
+                 "to-kiosk", "to-robot"], stdin=subprocess.PIPE, text=True,
+            )  # fmt: skip
+            stack.callback(self._end_wire)
+            self._stack = stack.pop_all()
+
+    @staticmethod
+    def _begun(stack: ExitStack) -> Namespace:
+        one = Namespace()
+        stack.callback(one.end)
+        return one
+
+    def _plug(self, side: Namespace, name: str, ip: str) -> None:
+        there = ["peer", "name", "eth0", "netns", str(side.pid)]
+        self._middle.run("ip", "link", "add", f"to-{name}", "type", "veth", *there)
+        self._middle.run("ip", "link", "set", f"to-{name}", "up")
+        side.run("ip", "address", "add", f"{ip}/30", "dev", "eth0")
+        with side.inside():
+            for command in (ETHTOOL_STXCSUM, ETHTOOL_STSO, ETHTOOL_SGSO):
+                _switch_off("eth0", command)
+        side.run("ip", "link", "set", "eth0", "up")
+
+    def _end_wire(self) -> None:
+        assert self._wire.stdin is not None
+        self._wire.stdin.close()
+        assert self._wire.wait(5) == 0, "the wire broke by itself"
+
+    def cut(self) -> None:
+        """The kiosk's link goes down; frames on their way are lost."""
+        self._middle.run("ip", "link", "set", "to-kiosk", "down")
+
+    def mend(self) -> None:
+        self._middle.run("ip", "link", "set", "to-kiosk", "up")
+
+    def weather(self, *, delay_s: float = 0.0, loss: float = 0.0) -> None:
+        """From now on each frame takes so long, each way, and this fraction of them is lost."""
+        assert self._wire.stdin is not None
+        self._wire.stdin.write(json.dumps({"delay_s": delay_s, "loss": loss}) + "\n")
+        self._wire.stdin.flush()
+
+    def end(self) -> None:
+        self._stack.close()
+
+
+def _set(namespace: int) -> None:
+    libc: Any = ctypes.CDLL(None, use_errno=True)
+    if libc.setns(namespace, CLONE_NEWNET) != 0:
+        raise OSError(ctypes.get_errno(), "setns")
+
+
+def _switch_off(interface: str, command: int) -> None:
+    value = ctypes.create_string_buffer(struct.pack("II", command, 0))
+    request = struct.pack("16sP8x", interface.encode(), ctypes.addressof(value))
+    with socket.socket() as any_socket:
+        fcntl.ioctl(any_socket, SIOCETHTOOL, request)

@@ -1,0 +1,75 @@
+"""One fault from beginning to end: presses go on, something breaks, it is mended, all is well again."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+from tests.faults.presser import Account, Press, Presser, accounted
+from tests.faults.rig import Rig
+from tests.faults.watch import Watch, answering
+from tests.parts import Server, until
+
+# What is answered `published` so shortly before a fault may be on its way when it breaks.
+UNDER_WAY_S: Final = 0.2
+WELL: Final = 20  # presses that come through before and after
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """`locked_s` from the fault to the first lock shown, `opened_s` from the mending to permitted."""
+
+    locked_s: float
+    reason: str
+    opened_s: float
+    account: Account
+
+
+def nothing() -> None:
+    """There is nothing to be mended: it mends by itself."""
+
+
+def tried(
+    rig: Rig,
+    server: Server,
+    breaks: Callable[[], object],
+    mends: Callable[[], object] = nothing,
+    *,
+    locks_within_s: float,
+    lasts_s: float = 0.0,
+    late_s: float = 1.0,
+    interlock: str = "kept",
+    widget: str = "guarded",
+    opens_within_s: float = 30.0,
+) -> Trial:
+    """Breaks it, waits for the lock and until `lasts_s` are over, mends it, waits until all is well."""
+    watch, presser = Watch(server), Presser(server, widget)
+    with answering(server):
+        well(presser)
+        broken_at = time.monotonic()
+        breaks()
+        locked_s, reason = watch.locked_after(broken_at, interlock, locks_within_s)
+        until(lambda: time.monotonic() >= broken_at + lasts_s, "the fault's time is over", lasts_s + 1)
+        mended_at = time.monotonic()
+        mends()
+        watch.opened(interlock, opens_within_s)
+        opened_at = watch.now(interlock).at
+        well(presser)
+    presses = presser.end()
+    watch.end()
+
+    def whole(press: Press) -> bool:
+        return press.answered_at < broken_at - UNDER_WAY_S or press.at > opened_at
+
+    account = accounted(presses, lambda: rig.arrivals(widget), whole, late_s)
+    return Trial(locked_s, reason, opened_at - mended_at, account)
+
+
+def well(presser: Presser) -> None:
+    """Waits until some more presses came through."""
+    since = time.monotonic()
+    until(
+        lambda: presser.count("published", since) >= WELL,
+        f"presses are published: {presser.presses[-1:]}",
+        within_s=20,
+    )

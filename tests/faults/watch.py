@@ -1,0 +1,175 @@
+"""What the kiosk shows while something breaks, and what its process takes: seen from outside."""
+
+import json
+import signal
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import httpx
+
+from tests.parts import Server, events_in, until
+
+DEAD_AFTER_S: Final = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """What an interlock was shown as; `at` in monotonic seconds."""
+
+    at: float
+    enabled: bool
+    reason: str | None
+
+
+class Watch:
+    """One open stream of events, read by a thread; each state of the interlocks with its time."""
+
+    def __init__(self, server: Server) -> None:
+        self.seen: dict[str, list[Seen]] = {}
+        self.widgets: dict[str, dict[str, Any]] = {}
+        self.failed = ""
+        self._server = server
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._read, daemon=True)
+        self._thread.start()
+        until(lambda: self.seen or self.failed, "the stream begins")
+
+    def _read(self) -> None:
+        try:
+            with (
+                httpx.Client(base_url=self._server.url, timeout=15, trust_env=False) as http,
+                http.stream("GET", f"{self._server.base}/events") as response,
+            ):
+                text = ""
+                for chunk in response.iter_text():
+                    text += chunk
+                    blocks, end, text = text.rpartition("\n\n")
+                    for name, data, _ in events_in(blocks + end):
+                        self._take(name, json.loads(data))
+                    if self._over.is_set():
+                        return
+        except httpx.HTTPError as error:
+            self.failed = repr(error)
+
+    def _take(self, name: str, data: dict[str, Any]) -> None:
+        now = time.monotonic()
+        suffix = "-enabled-updated"
+        shown = data["interlocks"] if name == "snapshot" else {}
+        if name.endswith(suffix):
+            shown = {name.removesuffix(suffix): data}
+        for interlock, state in shown.items():
+            self.seen.setdefault(interlock, []).append(Seen(now, state["enabled"], state["reason"]))
+        for widget, state in {"snapshot": data.get("widgets", {}), "update": data}.get(
+            name, {}
+        ).items():
+            self.widgets.setdefault(widget, {}).update(state)
+
+    def now(self, interlock: str) -> Seen:
+        return self.seen[interlock][-1]
+
+    def locked_after(self, since: float, interlock: str, within_s: float) -> tuple[float, str]:
+        """Seconds from `since` to the first lock after it, and its reason."""
+
+        def found() -> Seen | None:
+            locks = (s for s in self.seen[interlock] if s.at >= since and not s.enabled)
+            return next(locks, None)
+
+        lock: Seen = until(found, f"{interlock} locked, is {self.now(interlock)}", within_s)
+        return lock.at - since, lock.reason or ""
+
+    def opened(self, interlock: str, within_s: float = 20.0) -> None:
+        try:
+            until(lambda: self.now(interlock).enabled, "", within_s)
+        except AssertionError:
+            raise AssertionError(
+                f"{interlock} not open in {within_s} s: {self.now(interlock)}"
+            ) from None
+
+    def was_open(self, interlock: str, since: float, to: float) -> bool:
+        """Whether it was shown as permitted at any moment between."""
+        seen = self.seen[interlock]
+        shown_at_first = [s for s in seen if s.at <= since][-1:]
+        return any(s.enabled for s in (*shown_at_first, *(s for s in seen if since < s.at <= to)))
+
+    def end(self) -> None:
+        self._over.set()
+        self._thread.join(5)
+
+
+@contextmanager
+def answering(server: Server) -> Iterator[None]:
+    """Asks the server all the time; one that does not answer is ended, with where its threads stood.
+
+    It has to run with `PYTHONFAULTHANDLER=1`: Python then writes all stacks when it is aborted.
+    """
+    over = threading.Event()
+    stood: list[str] = []
+
+    def ask() -> None:
+        with httpx.Client(base_url=server.url, timeout=DEAD_AFTER_S, trust_env=False) as http:
+            while not over.wait(0.5):
+                try:
+                    http.get("/healthz")
+                except httpx.TimeoutException:
+                    stood.append(stacks(server))
+                    return
+                except httpx.TransportError:
+                    continue  # it was ended: whoever did that has to know
+
+    thread = threading.Thread(target=ask, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join(DEAD_AFTER_S + 5)
+        assert not stood, f"no answer in {DEAD_AFTER_S:g} s; it stood here:\n{stood[0]}"
+
+
+def stacks(server: Server) -> str:
+    """Where all threads of a server are; it is dead after that."""
+    server.process.send(signal.SIGABRT)
+    server.process.wait(10)
+    until(lambda: "Current thread" in server.process.text, "the stacks are written", 5)
+    return server.process.text
+
+
+@dataclass(frozen=True, slots=True)
+class Resources:
+    """What a process takes."""
+
+    rss_mb: float
+    threads: int
+    files: int
+
+
+def resources(pid: int) -> Resources:
+    status = dict(
+        line.split(":\t", 1)
+        for line in Path(f"/proc/{pid}/status").read_text().splitlines()
+        if ":\t" in line
+    )
+    rss_kb = float(status["VmRSS"].split()[0])
+    return Resources(
+        rss_kb / 1024, int(status["Threads"]), len(list(Path(f"/proc/{pid}/fd").iterdir()))
+    )
+
+
+def came_back(pid: int, before: Resources, margin_mb: float, within_s: float = 15.0) -> Resources:
+    """Waits until memory is within a margin of what it was, and threads and open files are no more."""
+
+    def found() -> Resources | None:
+        now = resources(pid)
+        fits = now.threads <= before.threads and now.files <= before.files
+        return now if fits and now.rss_mb <= before.rss_mb + margin_mb else None
+
+    try:
+        found_at_last: Resources = until(found, "", within_s, every_s=0.1)
+    except AssertionError:
+        raise AssertionError(f"was {before}, is {resources(pid)} after {within_s} s") from None
+    return found_at_last
