@@ -11,7 +11,6 @@ import secrets
 import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from typing import Any, Final, Protocol
 
 from app.errors import FieldError, InputError, LinkError, NotFound
@@ -22,8 +21,8 @@ from app.logs import RobotLog
 from app.panel.check_holds import with_own_fields
 from app.panel.model import Hold, Panel
 from app.panel.template import filled, names_in
-from app.presses import LONGEST_LOGGED, NO_WAY, By, Cause, Receipt, named
-from app.progress import Outcome
+from app.progress import Answer, Outcome
+from app.receipts import LONGEST_LOGGED, NO_WAY, By, Cause, Receipt, named, receipt_of
 from app.robot import Robot
 from app.sentences import clock, say
 
@@ -245,7 +244,7 @@ class Holds:
         self._log.log(level, "hold %s of %s by %s ended after %.3f s and %d messages (%s): %s",
                 holding.lease.id, widget.id, named(holding.by.origin), seconds, holding.messages,
                 code, text)  # fmt: skip
-        holding.told(_receipt(holding.lease.id, widget, outcome, text, "", holding.inputs))
+        holding.told(receipt_of(widget, holding.inputs, holding.lease.id, Answer(outcome, text)))
         self._changed()
 
     def _put_last(self, holding: Holding, now: float) -> str:
@@ -265,16 +264,4 @@ class Holds:
         text = say("refused", why=why, time=clock(time.time()))
         self._log.warning("hold of %s by %s with %.*s: %s", widget.id, named(by.origin),
                 LONGEST_LOGGED, inputs, text)  # fmt: skip
-        return _receipt(secrets.token_hex(8), widget, "refused", text, cause, inputs)
-
-
-def _receipt(
-    receipt_id: str,
-    widget: Hold,
-    outcome: Outcome,
-    reason: str,
-    cause: Cause,
-    inputs: Mapping[str, Any],
-) -> Receipt:
-    at = datetime.now(UTC).isoformat(timespec="milliseconds")
-    return Receipt(receipt_id, widget.id, outcome, reason, at, cause, dict(inputs))
+        return receipt_of(widget, inputs, secrets.token_hex(8), Answer("refused", text), cause)

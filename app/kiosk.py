@@ -31,9 +31,11 @@ from app.logs import RobotLog, RosoutHandler
 from app.panel.model import Panel, RobotEntry
 from app.panel.parameter import EVENTS
 from app.parameters import Parameters
-from app.presses import By, Presses, Receipt
+from app.presses import Presses
+from app.receipts import By, Receipt
 from app.recording import Recorder, Recordings
 from app.robot import Robot
+from app.sending import Sending
 from app.sentences import say
 from app.views import Lamp, Sight, sight
 
@@ -91,7 +93,7 @@ class Kiosk:
             panel, self.interfaces, self.robot, self.link, self._calls, self.show
         )
         self.logbook = Logbook(operators_log, self.robot.name, lambda: self.board.id)
-        self.presses = Presses(
+        self.sending = Sending(
             panel,
             self.interfaces,
             self.robot,
@@ -100,6 +102,11 @@ class Kiosk:
             self._actions,
             self._confirmations,
             self._parameters,
+        )
+        self.presses = Presses(
+            panel,
+            self.robot,
+            self.sending,
             self.logbook,
             catch_up=self._take,
             witness=self._recorder,
@@ -110,7 +117,7 @@ class Kiosk:
             self.robot,
             self.link,
             self._loop,
-            checked=self.presses.checked,
+            checked=self.sending.checked,
             take=self._take,
             changed=self.show,
         )

@@ -14,8 +14,10 @@ from app.log import Origin, Unlogged
 from app.logbook import Logbook
 from app.panel.model import Panel
 from app.parameters import Parameters
-from app.presses import By, Presses
+from app.presses import Presses
+from app.receipts import By
 from app.robot import Robot, Sample
+from app.sending import Sending
 
 Table = Mapping[str, Any]
 
@@ -119,7 +121,7 @@ class Asked(Protocol):
     def heard(self, key: str) -> bool: ...
 
 
-def presses_of(
+def sending_of(
     panel: Panel,
     robot: Robot,
     way: Asked,
@@ -127,13 +129,12 @@ def presses_of(
     asker: Asker | None = None,
     calls: Calls | None = None,
     confirmations: Confirmations | None = None,
-    logbook: Logbook | None = None,
     monotonic: Callable[[], float] = lambda: NOW,
-) -> Presses:
-    """The presses of a robot, with all that they need and a test does not care for."""
+) -> Sending:
+    """What is sent to a robot, with all that is needed for it and a test does not care for."""
     asker = asker or Nobody()
     calls = calls or Calls(INTERFACES, robot, asker, lambda: None)
-    return Presses(
+    return Sending(
         panel,
         INTERFACES,
         robot,
@@ -142,6 +143,19 @@ def presses_of(
         Actions(INTERFACES, robot, asker, lambda: None),
         confirmations or Confirmations(robot, lambda: None),
         Parameters(panel, INTERFACES, robot, asker, calls, lambda: None),
-        logbook or Logbook(Unlogged()),
         monotonic,
     )
+
+
+def presses_of(
+    panel: Panel,
+    robot: Robot,
+    way: Asked,
+    *,
+    logbook: Logbook | None = None,
+    monotonic: Callable[[], float] = lambda: NOW,
+    **more: Any,
+) -> Presses:
+    """The presses of a robot; `more` is for `sending_of`."""
+    sending = sending_of(panel, robot, way, monotonic=monotonic, **more)
+    return Presses(panel, robot, sending, logbook or Logbook(Unlogged()), monotonic)

@@ -18,7 +18,7 @@ from app.errors import LinkError
 from app.graph import Route
 from app.interlocks import HISTORY_S, interlock_verdict
 from app.panel.model import Panel
-from app.presses import Receipt
+from app.receipts import Receipt
 from app.robot import Robot, Sample
 from tests.builders import (
     BOOL,

@@ -14,7 +14,7 @@ from app.confirmations import Confirmations, equal
 from app.errors import PanelError
 from app.panel import load_panel
 from app.panel.model import Panel
-from app.presses import Receipt
+from app.receipts import Receipt
 from app.robot import Robot
 from tests.builders import BOOL, FREE, FROM, HEARD, MESSAGE, presses_of, robot_there, says
 from tests.builders import panel_of as panel_with

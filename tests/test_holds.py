@@ -15,7 +15,7 @@ from app.errors import LinkError, NotFound
 from app.holds import RELEASED, Holding, Holds
 from app.leases import AHEAD_S, LEASE_S, Lease, sent_at
 from app.panel.model import Panel
-from app.presses import Receipt
+from app.receipts import Receipt
 from app.routes.holds import WHYS
 from app.sentences import ENGLISH
 from app.views import sight
@@ -27,8 +27,8 @@ from tests.builders import (
     Table,
     panel_of,
     permits,
-    presses_of,
     robot_there,
+    sending_of,
 )
 
 POINT: Final = "geometry_msgs/msg/Point"
@@ -127,7 +127,7 @@ class Bench:
         self.robot = robot_there(self.panel)
         permits(self.robot, at=NOW)
         way: Any = self.way
-        checked = presses_of(self.panel, self.robot, way).checked
+        checked = sending_of(self.panel, self.robot, way).checked
         self.receipts: list[Receipt] = []
         self.pending: list[Callable[[], None]] = []  # what has come from the robot, not taken in yet
         self.holds = Holds(

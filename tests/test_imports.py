@@ -87,6 +87,8 @@ ORDER = (
     "app.parameter_services",
     "app.parameters",
     "app.logbook",
+    "app.receipts",
+    "app.sending",
     "app.presses",
     "app.leases",
     "app.holds",

@@ -14,8 +14,8 @@ from app.log import Entry, Filter, Limits, OperatorLog, Origin
 from app.log.reading import rows
 from app.logbook import Log, Logbook
 from app.panel.model import Panel
-from app.presses import By, Receipt
 from app.progress import IDLE
+from app.receipts import By, Receipt
 from tests.builders import INTERFACES, panel_of, permits, presses_of, robot_there, small_panel
 
 KIM = Origin(address="10.0.0.7", browser="b1", who="Kim", seen="boot-7")

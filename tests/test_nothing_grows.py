@@ -16,7 +16,7 @@ import zenoh
 from zenoh.handlers import Callback
 
 from app import keys
-from app.presses import RECEIPTS_KEPT
+from app.receipts import RECEIPTS_KEPT
 from tests.builders import INTERFACES
 from tests.parts import ROOT, Server, free_port, until, zenoh_file
 

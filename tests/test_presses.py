@@ -17,7 +17,7 @@ from app.interlocks import PERMITTED, Verdict, locked
 from app.logbook import origin_of
 from app.panel.control import ControlRules
 from app.panel.model import Panel
-from app.presses import RECEIPTS_KEPT, By, Receipt
+from app.receipts import RECEIPTS_KEPT, By, Receipt
 from app.robot import Robot, Sample
 from tests.builders import (
     BOOL,
@@ -36,6 +36,7 @@ from tests.builders import (
     permits,
     presses_of,
     robot_there,
+    sending_of,
     small_panel,
 )
 
@@ -76,7 +77,7 @@ class Bench:
         self._presses = presses_of(panel, self.robot, self.way, monotonic=lambda: self.now)
         self.may_press: Callable[[Browser], Verdict] = lambda _: PERMITTED
         self.receipt = self._presses.receipt
-        self.typed = self._presses.typed
+        self.typed = sending_of(panel, self.robot, self.way).typed
 
     def press(
         self,

@@ -17,7 +17,7 @@ from app.errors import PanelError
 from app.interfaces import Structure
 from app.panel import load_panel
 from app.panel.record import RecordRules
-from app.presses import Receipt
+from app.receipts import Receipt
 from app.recording import Recorder, Recordings
 from app.recording.file import PRESSES, UNFINISHED, Channel, File
 from app.recording.folder import Folder, name_of

@@ -9,7 +9,7 @@ from typing import Any, Final
 from app.interfaces import Interfaces
 from app.panel.model import Panel
 from app.panel.record import RecordRules
-from app.presses import Receipt
+from app.receipts import Receipt
 from app.recording.file import Channel
 from app.recording.folder import name_of
 from app.recording.ring import Ring, taken

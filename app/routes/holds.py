@@ -31,7 +31,7 @@ from app.holds import RELEASED, Holding
 from app.kiosk import Kiosk
 from app.leases import sent_at
 from app.logbook import Noted
-from app.presses import Receipt
+from app.receipts import Receipt
 from app.routes.site import CurrentKiosk, CurrentSite
 from app.routes.visitors import visitor
 from app.sentences import say

@@ -14,7 +14,7 @@ from app.errors import NotFound
 from app.panel.model import Input, Page, Panel, Pressed
 from app.panel.parameter import Parameter
 from app.panel.template import inputs_of
-from app.presses import Receipt
+from app.receipts import Receipt
 from app.routes.site import CurrentSite, Site
 from app.routes.visitors import by_hand, keep, welcomed
 from app.sentences import clock, say

@@ -17,7 +17,7 @@ from app.errors import InputError
 from app.kiosk import Kiosk
 from app.logbook import origin_of
 from app.panel.model import Page
-from app.presses import Receipt
+from app.receipts import Receipt
 from app.routes.pages import ask_of
 from app.routes.site import CurrentKiosk, CurrentSite, Site
 from app.routes.visitors import visitor
@@ -107,7 +107,7 @@ async def press(widget: str, request: Request, site: CurrentSite, kiosk: Current
         press_id = f"{page_id}.{widget}"
         seen = inputs.get("_seen", "")
         version, at = _of_page(kiosk, inputs)
-        values = kiosk.presses.typed(inputs)
+        values = kiosk.sending.typed(inputs)
         receipt = await kiosk.press(widget, values, press_id, browser, seen, version, at)
         _count(site, receipt)
         return RedirectResponse(_page_with(kiosk, receipt), status_code=303)

@@ -1,0 +1,128 @@
+"""Who presses and what came of it: what presses and holds have in common."""
+
+from collections import OrderedDict
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from typing import Any, Final, Literal, Protocol
+
+from app.interlocks import PERMITTED, Verdict
+from app.log import Origin
+from app.panel.model import Hold, Pressed
+from app.progress import Answer, Outcome
+from app.sentences import say
+
+Cause = Literal["", "interlock", "input", "link", "log", "time"]
+
+RECEIPTS_KEPT: Final = 1000
+LONGEST_LOGGED: Final = 300
+NO_WAY: Final = frozenset(
+    {
+        "no_link",
+        "no_bridge",
+        "no_bridge_of",
+        "bridge_silent",
+        "joining",
+        "no_service",
+        "no_parameters",
+        "getting_ready",
+    }
+)
+FINE: Final = frozenset({"published", "confirmed", "accepted", "succeeded"})
+
+
+@dataclass(frozen=True, slots=True)
+class Receipt:
+    """What came of a press; `reason` is a sentence for the operator, `cause` why it was refused.
+
+    `inputs` are those that the press came with: a page without scripts shows them again.
+    """
+
+    id: str
+    widget: str
+    outcome: Outcome
+    reason: str
+    at: str
+    cause: Cause
+    inputs: Mapping[str, Any]
+
+    def as_json(self) -> dict[str, str]:
+        return {
+            "id": self.id,
+            "widget": self.widget,
+            "outcome": self.outcome,
+            "reason": self.reason,
+            "at": self.at,
+        }
+
+
+def no_doubt() -> str:
+    """Of who does not say what was seen, and when it was pressed."""
+    return ""
+
+
+@dataclass(frozen=True, slots=True)
+class By:
+    """Who presses, and what has to hold beside the robot's permission when it is sent: `controls`
+    judges who has control, `doubt` says why what the operator saw is no longer so."""
+
+    origin: Origin
+    controls: Callable[[], Verdict] = lambda: PERMITTED
+    doubt: Callable[[], str] = no_doubt
+
+
+class Witness(Protocol):
+    """Who is told of each press when it is made, and of each receipt, also of a corrected one."""
+
+    def pressed(self, press_id: str, widget: str, who: str, inputs: Mapping[str, Any]) -> None: ...
+    def answered(self, receipt: Receipt) -> None: ...
+
+
+class Receipts:
+    """The last receipts, by the ids of their presses."""
+
+    def __init__(self, witness: Witness | None = None) -> None:
+        self._witness = witness
+        self._receipts: OrderedDict[str, Receipt] = OrderedDict()
+
+    def get(self, press_id: str) -> Receipt | None:
+        """The receipt of a press, as it is known now."""
+        return self._receipts.get(press_id)
+
+    def begin(self, press_id: str, widget: str, origin: Origin, inputs: Mapping[str, Any]) -> None:
+        """A press was made."""
+        if self._witness is not None:
+            self._witness.pressed(press_id, widget, named(origin), inputs)
+
+    def keep(self, receipt: Receipt) -> None:
+        if self._witness is not None:
+            self._witness.answered(receipt)
+        self._receipts[receipt.id] = receipt
+        while len(self._receipts) > RECEIPTS_KEPT:
+            self._receipts.popitem(last=False)
+
+
+def receipt_of(
+    widget: Pressed | Hold,
+    inputs: Mapping[str, Any],
+    press_id: str,
+    answer: Answer,
+    cause: Cause = "",
+) -> Receipt:
+    """What came of a press just now."""
+    at = datetime.now(UTC).isoformat(timespec="milliseconds")
+    return Receipt(press_id, widget.id, answer.outcome, answer.text, at, cause, dict(inputs))
+
+
+def corrected(receipt: Receipt, answer: Answer) -> Receipt:
+    return replace(receipt, outcome=answer.outcome, reason=answer.text, cause="")
+
+
+def with_doubt(receipt: Receipt, doubt: str) -> Receipt:
+    if not doubt:
+        return receipt
+    return replace(receipt, reason=say("log_not_on_disk", said=receipt.reason, why=doubt))
+
+
+def named(origin: Origin) -> str:
+    return f"{origin.who} ({origin.address})" if origin.who else origin.address

@@ -1,0 +1,134 @@
+"""What a press is for: its inputs checked, its message, request or goal encoded, and sent."""
+
+import time
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, Protocol
+
+from app import declared
+from app.actions import Actions
+from app.calls import Calls
+from app.confirmations import Confirmations
+from app.errors import InputError, NotFound
+from app.inputs import checked, typed
+from app.interfaces import Interfaces
+from app.panel.model import Action, Call, Input, Panel, Pressed, Publish
+from app.panel.parameter import Parameter
+from app.panel.template import filled, inputs_of
+from app.parameters import Parameters
+from app.progress import Answer, Corrected
+from app.robot import Robot
+from app.sentences import clock, say
+
+
+class Way(Protocol):
+    """What a press needs of the link."""
+
+    def put(self, key: str, payload: bytes) -> None: ...
+    def heard(self, key: str) -> bool: ...
+
+
+class Sending:
+    """What the widgets of one panel send to one robot; judges nothing."""
+
+    def __init__(
+        self,
+        panel: Panel,
+        interfaces: Interfaces,
+        robot: Robot,
+        way: Way,
+        calls: Calls,
+        actions: Actions,
+        confirmations: Confirmations,
+        parameters: Parameters,
+        monotonic: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._widgets = {w.id: w for w in panel.widgets()}
+        self._interfaces = interfaces
+        self._robot = robot
+        self._way = way
+        self._calls = calls
+        self._actions = actions
+        self._confirmations = confirmations
+        self._parameters = parameters
+        self._monotonic = monotonic
+
+    def widget(self, widget_id: str) -> Pressed:
+        """What can be pressed; NotFound for everything else."""
+        widget = self._widgets.get(widget_id)
+        if not isinstance(widget, Pressed):
+            raise NotFound(f'there is no widget "{widget_id}" that can be pressed')
+        return widget
+
+    def typed(self, form: Mapping[str, str]) -> dict[str, Any]:
+        """A form's texts as values of the inputs that they are named by."""
+        return {name: self._typed(name, text) for name, text in form.items()}
+
+    def _typed(self, name: str, text: str) -> Any:
+        field = self._widgets.get(name)
+        if isinstance(field, Parameter):
+            return declared.typed(field, text)
+        return typed(field, text) if isinstance(field, Input) else text
+
+    async def send(
+        self,
+        widget: Pressed,
+        inputs: Mapping[str, Any],
+        press_id: str,
+        correct: Corrected,
+    ) -> Answer:
+        """Sends, and waits for what comes of it; `correct` gets what is known later.
+
+        Until it is sent nothing here waits. FieldError or InputError for bad input, LinkError where
+        it could not be sent.
+        """
+        values = self.checked(inputs_of(widget), inputs)
+        fields = filled(widget.template, values)
+        match widget:
+            case Publish():
+                since = self._monotonic()
+                answer = self._published(widget, fields)
+                if widget.confirm is None:
+                    return answer
+                equals = filled(widget.confirm.equals, values)
+                return await self._confirmations.awaited(
+                    widget, equals, press_id, since, answer.text, correct
+                )
+            case Call():
+                request, _ = self._interfaces.service(widget.type)
+                payload = self._interfaces.encode(request, fields)
+                return await self._calls.call(widget, payload, press_id, correct)
+            case Action():
+                return await self._actions.start(widget, fields, press_id, correct)
+            case Parameter():
+                return await self._parameters.set(widget, fields["value"], press_id, correct)
+
+    def _published(self, widget: Publish, fields: dict[str, Any]) -> Answer:
+        payload = self._interfaces.encode(widget.type, fields)
+        key = self._robot.key(widget.topic)
+        heard = self._way.heard(key)
+        self._way.put(key, payload)
+        sentence = "published" if heard else "sent_to_nobody"
+        text = say(sentence, topic=widget.topic, time=clock(time.time()))
+        return Answer("published" if heard else "unknown", text)
+
+    def checked(self, names: Iterable[str], inputs: Mapping[str, Any]) -> dict[str, Any]:
+        """The values of the inputs with these ids."""
+        for name in inputs:
+            if not isinstance(self._widgets.get(name), Input | Parameter):
+                raise InputError(f'there is no input "{name:.60}" on this panel')
+        values: dict[str, Any] = {}
+        for name in names:
+            field = self._widgets[name]
+            if name not in inputs:
+                raise InputError(f'the input "{name}" is missing')
+            if isinstance(field, Input):
+                values[name] = checked(field, inputs[name])
+            elif isinstance(field, Parameter):
+                values[name] = self._parameters.checked(field, inputs[name])
+        return values
+
+    async def cancel(self, widget: Pressed) -> Answer:
+        """Asks the robot to cancel the goal of an action widget; NotFound for others."""
+        if not isinstance(widget, Action):
+            raise NotFound(f'"{widget.id}" is not an action: there is nothing to cancel')
+        return await self._actions.cancel(widget)
