@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from contextlib import ExitStack, suppress
 from typing import Any, Final
 
-from app import keys, moments
+from app import moments
 from app.actions import Actions
 from app.asked import WITHIN_S, Asked
 from app.board import Board
@@ -22,19 +22,20 @@ from app.confirmations import Confirmations
 from app.control import Control
 from app.errors import KioskError, LinkError
 from app.holds import Holds
+from app.intake import Intake
 from app.interfaces import interfaces_of
 from app.interlocks import Verdict, locked, way
-from app.joining import LOG_TYPE, Joining
+from app.joining import Joining
 from app.link import Config, Link
 from app.logbook import Log, Logbook, origin_of
-from app.logs import RobotLog, RosoutHandler
+from app.logs import RobotLog
 from app.panel.model import Panel, RobotEntry
-from app.panel.parameter import EVENTS
 from app.parameters import Parameters
 from app.presses import Presses
 from app.receipts import By, Receipt
 from app.recording import Recorder, Recordings
 from app.robot import Robot
+from app.rosout import TOPIC, Rosout
 from app.sending import Sending
 from app.sentences import say
 from app.views import Lamp, Sight, sight
@@ -121,26 +122,29 @@ class Kiosk:
             take=self._take,
             changed=self.show,
         )
-        goals = {self.robot.key(one): one for one in panel.actions()}
-        self._feedback = {keys.feedback(key): one for key, one in goals.items()}
-        self._status = {keys.status(key): one for key, one in goals.items()}
+        self._intake = Intake(
+            panel,
+            self.robot,
+            self._actions,
+            self._confirmations,
+            self._parameters,
+            self._recorder,
+            self._log,
+        )
         self._joining = Joining(panel, self.interfaces, self.robot, self.link, self.show, self.renew)
         self._asked = Asked(lambda: self._joining.answered(WITHIN_S))
-        self._urgent = {self.robot.key(i.topic) for i in panel.interlocks}
-        self._events = self.robot.key(EVENTS)
         self._shown_at = 0.0
         self._timer: asyncio.TimerHandle | None = None
-        self._rosout = RosoutHandler(self._publish_log, self.robot.name)
+        self._rosout = Rosout(self.robot, self.interfaces, self.link, self._loop)
         self._renewing: asyncio.Task[None] | None = None
         self._stopped = False
 
     async def start(self) -> None:
         """Declares everything; whether anybody is there shows later."""
         self._warm_up()
-        subscribe = [self.robot.key(topic) for topic in self.panel.subscriptions()]
-        publish = [self.robot.key(topic) for topic in (*self.panel.publications(), "/rosout")]
-        self.link.start([*subscribe, *self._feedback, *self._status], publish)
-        logging.getLogger().addHandler(self._rosout)
+        publish = [self.robot.key(topic) for topic in (*self.panel.publications(), TOPIC)]
+        self.link.start(self._intake.keys, publish)
+        self._rosout.start()
         self._joining.start()
         self._following.enter_context(self._operators_log.followed(self.show))
 
@@ -149,7 +153,7 @@ class Kiosk:
         self.close()
         self._stopped = True
         self._following.close()
-        logging.getLogger().removeHandler(self._rosout)
+        self._rosout.stop()
         if self._timer is not None:
             self._timer.cancel()
         if self._renewing is not None:
@@ -286,39 +290,14 @@ class Kiosk:
             self._log.warning("Zenoh link lost")
             self.renew()
             return
-        urgent = self.robot.link_up != changes.link_up or bool(changes.tokens)
-        if self.robot.link_up != changes.link_up:
+        came_up = not self.robot.link_up and changes.link_up
+        if came_up:
             self.robot.link_up = True
             self._log.info("Zenoh link up")
-        had_bridge = bool(self.robot.graph.bridges)
-        for key, sample in changes.samples.items():
-            if key in self._feedback:
-                self._actions.hear_feedback(self._feedback[key], sample)
-                continue
-            if key in self._status:
-                self._actions.hear_status(self._status[key], sample)
-                continue
-            if key == self._events:
-                self._parameters.hear(sample)
-            self.robot.take(key, sample)
-            self._confirmations.hear(key)
-            if self._recorder is not None:
-                self._recorder.hear(key, sample)
-            urgent = urgent or key in self._urgent
-        came, now = False, time.monotonic()
-        for token_key, token in changes.tokens.items():
-            if token.lost_seq:
-                self._parameters.lose(token_key)
-            if token.lost_seq and (zid := self.robot.graph.apply(token_key, False)):
-                self.robot.cut(zid, token.lost_seq)
-                self._log.warning("bridge %s lost", zid)
-                had_bridge = had_bridge and bool(self.robot.graph.bridges)
-            if token.alive and (zid := self.robot.graph.apply(token_key, True, now)):
-                self._log.info("bridge %s found", zid)
-                came = True
+        urgent, came = self._intake.take(changes)
         if changes.tokens:
-            self._follow(came and not had_bridge)
-        if urgent:
+            self._follow(came)
+        if urgent or came_up:
             self.show()
         else:
             self._show_at(self._shown_at + 1 / FRAMES_PER_S)
@@ -370,19 +349,3 @@ class Kiosk:
                 return
             self._timer.cancel()
         self._timer = None if when == math.inf else self._loop.call_at(when, self.show)
-
-    # Beside.
-
-    def _publish_log(self, fields: Mapping[str, Any]) -> None:
-        """A log record to /rosout; on whatever thread it was written."""
-        if self.robot.link_up and not self._stopped:
-            key = self.robot.key("/rosout")
-            payload = self.interfaces.encode(LOG_TYPE, fields)
-            self._loop.call_soon_threadsafe(self._put_quietly, key, payload)
-
-    def _put_quietly(self, key: str, payload: bytes) -> None:
-        try:
-            if not self._stopped:
-                self.link.put(key, payload)
-        except LinkError:
-            pass  # a log that can't be sent must not become one more log
