@@ -1,7 +1,8 @@
 """What the link brought since the last turn, handed to who needs it: samples first, then tokens."""
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 from app import keys
 from app.actions import Actions
@@ -39,15 +40,21 @@ class Intake:
         self._status = {keys.status(key): one for key, one in goals.items()}
         self._urgent = {robot.key(i.topic) for i in panel.interlocks}
         self._events = robot.key(EVENTS)
+        # What is judged by them is judged by each value that they had, however short.
+        self.watched = self._urgent | {robot.key(one.topic) for one in panel.confirms()}
         topics = map(robot.key, panel.subscriptions())
         self.keys = [*topics, *self._feedback, *self._status]  # all that is listened to
 
-    def take(self, changes: Changes) -> tuple[bool, bool]:
+    def take(self, changes: Changes, show: Callable[[], None]) -> tuple[bool, bool]:
         """Takes it in; whether it is urgent (permissions, the graph), and whether there is a bridge
-        where there was none."""
+        where there was none. `show` is called at each value that a permission had in between."""
         urgent = bool(changes.tokens) or not self._urgent.isdisjoint(changes.samples)
         had_bridge = bool(self._robot.graph.bridges)
         for key, sample in changes.samples.items():
+            for payload in sample.between:
+                self._sample(key, replace(sample, payload=payload, between=()))
+                if key in self._urgent:
+                    show()
             self._sample(key, sample)
         return urgent, self._tokens(changes.tokens, had_bridge)
 

@@ -143,7 +143,7 @@ class Kiosk:
         """Declares everything; whether anybody is there shows later."""
         self._warm_up()
         publish = [self.robot.key(topic) for topic in (*self.panel.publications(), TOPIC)]
-        self.link.start(self._intake.keys, publish)
+        self.link.start(self._intake.keys, publish, self._intake.watched)
         self._rosout.start()
         self._joining.start()
         self._following.enter_context(self._operators_log.followed(self.show))
@@ -294,7 +294,7 @@ class Kiosk:
         if came_up:
             self.robot.link_up = True
             self._log.info("Zenoh link up")
-        urgent, came = self._intake.take(changes)
+        urgent, came = self._intake.take(changes, self.show)
         if changes.tokens:
             self._follow(came)
         if urgent or came_up:

@@ -22,11 +22,12 @@ from zenoh.handlers import Callback
 
 from app.errors import LinkError, SettingsError
 from app.keys import TOKENS
-from app.robot import Sample
+from app.robot import Buffer, Sample
 
 Config = zenoh.Config
 
 ASK_TIMEOUT_S = 2.0
+BETWEEN_MOST = 16  # changes of a watched topic that are kept from one drain to the next
 MOST_QUEUED = 16  # batches; Zenoh takes no more
 DROPPED_AFTER_US = 100_000  # how long a put may wait for room
 
@@ -115,6 +116,7 @@ class Link:
         self._session_number = 0
         self._subscribe: tuple[str, ...] = ()
         self._publish: tuple[str, ...] = ()
+        self._watched: frozenset[str] = frozenset()
         self._held: dict[str, zenoh.LivelinessToken] | None = {}  # None: between two sessions
         self._forget()
         self._open()
@@ -131,8 +133,12 @@ class Link:
             self._session = zenoh.open(self._config)
         self.zid = str(self._session.zid())
 
-    def start(self, subscribe: Iterable[str], publish: Iterable[str]) -> None:
-        """Declares everything, once in a session."""
+    def start(
+        self, subscribe: Iterable[str], publish: Iterable[str], watched: Iterable[str] = ()
+    ) -> None:
+        """Declares everything, once in a session. Of what is `watched` a value that came and went
+        between two drains is kept too."""
+        self._watched = frozenset(watched)
         self._subscribe, self._publish = tuple(subscribe), tuple(publish)
         self._declare()
 
@@ -305,7 +311,14 @@ class Link:
         unseen = self._samples.get(key)
         skipped = 0 if unseen is None else unseen.skipped + 1
         self._samples[key] = Sample(
-            sample.payload, next(self._seq), time.monotonic(), time.time(), source, skipped, sent
+            sample.payload,
+            next(self._seq),
+            time.monotonic(),
+            time.time(),
+            source,
+            skipped,
+            sent,
+            _between(unseen, sample.payload) if unseen and key in self._watched else (),
         )
         self._wake()
 
@@ -329,3 +342,10 @@ class Link:
         if not self._woken:
             self._woken = True
             self._wake_loop()
+
+
+def _between(unseen: Sample, newest: zenoh.ZBytes) -> tuple[Buffer, ...]:
+    """What came before the newest and was not looked at, each change once."""
+    if bytes(unseen.payload) == bytes(newest):
+        return unseen.between
+    return (*unseen.between[1 - BETWEEN_MOST :], unseen.payload)

@@ -36,7 +36,7 @@ class Sample:
     `source` is the zid of the bridge that sent it (from its timestamp), None if it did not say;
     `seq` orders samples and losses of bridges as this session saw them; `skipped` is how many came
     just before it that nobody looked at; `sent` is the timestamp of its sender's clock, in seconds
-    since the epoch.
+    since the epoch; `between` are other payloads that came and went unseen, for watched topics.
     """
 
     payload: Buffer
@@ -46,6 +46,7 @@ class Sample:
     source: str | None
     skipped: int = 0
     sent: float | None = None
+    between: tuple[Buffer, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,7 @@
 """The link alone, between two Zenoh sessions of this process."""
 
 import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -117,4 +118,28 @@ def test_tokens_are_held_by_the_new_session_when_they_are_wanted_again(
         return {str(reply.ok.key_expr) for reply in replies if reply.ok is not None}
 
     until(lambda: found() == set(wanted), "the tokens of the new session are there")
+    link.close()
+
+
+def test_of_a_watched_topic_what_came_and_went_between_two_drains_is_kept(
+    peer: tuple[str, zenoh.Session],
+) -> None:
+    endpoint, session = peer
+    link = Link(config_to(endpoint), lambda: None)
+    link.start(["a", "b"], [], watched=["a"])
+    until(lambda: link.drain().link_up, "a link")
+    said = [b"yes", b"no", b"no", b"yes", *(b"%d" % n for n in range(100)), b"yes"]
+    for key in ("a", "b"):
+        for payload in said:
+            session.put(key, payload)
+    time.sleep(0.5)
+    samples = link.drain().samples
+    watched, other = samples["a"], samples["b"]
+    assert bytes(watched.payload) == bytes(other.payload) == b"yes"
+    assert [bytes(one) for one in watched.between] == [b"%d" % n for n in range(84, 100)]
+    assert other.between == ()
+    for payload in (b"yes", b"no", b"no", b"yes"):
+        session.put("a", payload)
+    time.sleep(0.5)
+    assert [bytes(one) for one in link.drain().samples["a"].between] == [b"yes", b"no"]
     link.close()

@@ -15,6 +15,9 @@ from typing import Any
 import rclpy
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.subscription import RCLError
+
+GONE_S = 2.0  # within which a publisher that was withdrawn is gone
 
 
 def type_named(name: str) -> Any:
@@ -76,7 +79,16 @@ class Commands:
         return list(zip(self.came_at[topic], heard, strict=False))
 
     def advertise(self, topic: str, type: str, **qos: Any) -> None:
-        self.publishers[topic] = self.node.create_publisher(type_named(type), topic, qos_of(qos))
+        end = time.monotonic() + GONE_S
+        while True:
+            try:
+                publisher = self.node.create_publisher(type_named(type), topic, qos_of(qos))
+                break
+            except RCLError:  # one of another type is not gone yet: its timer was at it
+                if time.monotonic() > end:
+                    raise
+                time.sleep(0.02)
+        self.publishers[topic] = publisher
 
     def publish(self, topic: str, fields: dict[str, Any]) -> None:
         publisher = self.publishers[topic]
