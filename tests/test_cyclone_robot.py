@@ -45,6 +45,7 @@ def heard(robot: CycloneRobot, *topics: str) -> None:
 def test_the_bridge_announces_each_service_and_the_action_with_its_type(
     robot: CycloneRobot, client: Client
 ) -> None:
+    until(lambda: len(set(client.tokens())) > len(GRAPH), "all its tokens")
     tokens = set(client.tokens())
     assert {token for token in tokens if token.startswith(("SS/", "AS/"))} == GRAPH
     (event,) = tokens - GRAPH

@@ -14,7 +14,7 @@ function setText(element, text) {
 // How each attribute of a widget is shown; what is not here is a text with its own place.
 const SHOW = {
   enabled: (root, value) => {
-    root.querySelector("button[type=submit]").disabled = !value;
+    root.querySelector("button[type=submit], .hold").disabled = !value;
     if (!value) root.querySelector("dialog.ask")?.close();
   },
   stoppable: (root, value) => {
