@@ -4,9 +4,9 @@ What it knew is gone with it; what the robot received must still fit the receipt
 """
 
 import random
+import signal
 import time
 from collections.abc import Callable, Iterator
-from contextlib import suppress
 from dataclasses import dataclass
 
 from tests.faults.presser import Press, Presser
@@ -46,7 +46,5 @@ def kill_at_random_moments(
                 time.sleep(0.0005)
         finally:
             killed_at = time.monotonic()
-            server.http.close()
-            with suppress(ProcessLookupError):
-                server.process.kill()
+            server.end(signal.SIGKILL)
         yield Life(began_at, killed_at, presser.end())
