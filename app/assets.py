@@ -1,15 +1,19 @@
 """The static files, in memory, under a name that changes with their content.
 
 The stylesheet is the layers of `static/css` in their order, with the panel's millimetres: one
-request instead of four. Scripts keep their names, so that modules find each other.
+request instead of four; what only the log's page needs is a file of its own. Scripts keep their names,
+so that modules find each other, and their lines, but no line that is all comment.
 """
 
 import hashlib
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-LAYERS: Final = ("tokens", "base", "layout", "widgets", "log")
+LAYERS: Final = ("tokens", "base", "layout", "widgets")
+OWN_PAGE: Final = "log"
+COMMENT: Final = re.compile(rb"^[ \t]*//.*$", re.MULTILINE)
 MEDIA_TYPES: Final = {".css": "text/css", ".js": "text/javascript"}
 
 
@@ -35,8 +39,10 @@ def load_assets(static: Path, templates: Path, mm_per_px: float) -> Assets:
     layers = [(static / "css" / f"{name}.css").read_bytes() for name in LAYERS]
     millimetre = f":root{{--mm:{1 / mm_per_px:.4f}px}}\n".encode()
     files = {"kiosk.css": Asset(b"".join([*layers, millimetre]), MEDIA_TYPES[".css"])}
+    own = (static / "css" / f"{OWN_PAGE}.css").read_bytes()
+    files[f"{OWN_PAGE}.css"] = Asset(own, MEDIA_TYPES[".css"])
     for script in sorted((static / "js").glob("*.js")):
-        files[script.name] = Asset(script.read_bytes(), MEDIA_TYPES[".js"])
+        files[script.name] = Asset(COMMENT.sub(b"", script.read_bytes()), MEDIA_TYPES[".js"])
     digest = hashlib.sha256()
     for name, asset in sorted(files.items()):
         digest.update(name.encode() + b"\0" + asset.content + b"\0")

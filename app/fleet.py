@@ -10,12 +10,12 @@ from collections.abc import Callable, Mapping
 
 from app.errors import NotFound
 from app.kiosk import Kiosk
+from app.lamps import Lamp
 from app.link import Config
 from app.logbook import Log
 from app.panel.model import Panel, RobotEntry
 from app.recording import Recordings
 from app.sentences import say
-from app.views import Lamp
 
 log = logging.getLogger("kiosk.fleet")
 

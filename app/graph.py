@@ -113,6 +113,10 @@ class Graph:
         tokens = self._tokens.get(key, {}).values()
         return [e for e in tokens if e.role == role and e.zid in self._bridges]
 
+    def behind(self, role: Role, key: str) -> frozenset[str]:
+        """The bridges behind which a node publishes, subscribes or serves."""
+        return frozenset(e.zid for e in self._on_robot(role, key))
+
     def on_robot(self, role: Role, key: str) -> bool:
         """Whether a node behind a bridge publishes, subscribes or serves."""
         return bool(self._on_robot(role, key))

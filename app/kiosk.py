@@ -26,6 +26,7 @@ from app.intake import Intake
 from app.interfaces import interfaces_of
 from app.interlocks import Verdict, locked, way
 from app.joining import Joining
+from app.lamps import Lamp
 from app.link import Config, Link
 from app.logbook import Log, Logbook, origin_of
 from app.logs import RobotLog
@@ -38,7 +39,8 @@ from app.robot import Robot
 from app.rosout import TOPIC, Rosout
 from app.sending import Sending
 from app.sentences import say
-from app.views import Lamp, Sight, sight
+from app.since import Since
+from app.views import Sight, sight
 
 log = logging.getLogger("kiosk")
 
@@ -83,6 +85,7 @@ class Kiosk:
         self._log = RobotLog(log, self.robot.name)
         self.control = Control(panel.control, self.robot.name, tell=self._log.info)
         self._recordings = recordings
+        self._since = Since()
         first = self._sight()
         self.lamp = first.robot
         self._recorder = self._recording(recordings)
@@ -314,7 +317,7 @@ class Kiosk:
 
     def _sight(self) -> Sight:
         recordings = self._recordings.fault if self._recordings else ""
-        return sight(
+        seen = sight(
             self.panel,
             self.robot,
             time.monotonic(),
@@ -324,6 +327,7 @@ class Kiosk:
             lock=self._operators_log.lock,
             control=self.control.view(),
         )
+        return self._since.dated(seen)
 
     def show(self) -> None:
         """Posts the state as of now to the board."""

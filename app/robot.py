@@ -16,6 +16,7 @@ from app.interfaces import Interfaces, value_at
 from app.keys import key_of
 from app.panel.model import Panel, RobotEntry
 from app.progress import Progress
+from app.seen import Seen, ends
 
 log = logging.getLogger("kiosk.robot")
 
@@ -82,6 +83,7 @@ class Robot:
         self.progress: dict[str, Progress] = {}  # of what widgets have asked, by their ids
         self.parameters: dict[str, Declared] = {}  # what nodes said of them, by their widgets' ids
         self.held: dict[str, str] = {}  # by the ids of hold widgets: since when, in words
+        self.seen = Seen({(role, name): (role, self.key(name)) for role, name in ends(panel)})
         self.undecodable: Counter[str] = Counter()
         self._interfaces = interfaces
         self._types = {self.key(topic): name for topic, name in panel.subscriptions().items()}
@@ -109,6 +111,7 @@ class Robot:
     def follow_publishers(self) -> None:
         """After every change of the graph: where a publisher is required, what it said goes with
         it, and its successor has to say it again."""
+        self.seen.follow(self.graph)
         for key in self._required:
             if self.graph.on_robot("MP", key):
                 self._published.add(key)
@@ -122,6 +125,7 @@ class Robot:
         self.link_up = False
         self.settled_at = math.inf
         self.graph = Graph("", self._told_apart)
+        self.seen.forget()
         for key, sample in self._samples.items():
             self._cut(key, sample)
 

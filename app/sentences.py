@@ -241,6 +241,28 @@ ENGLISH: Final[Mapping[str, str]] = {
     "silent": "no answer",
     "no_node": "no node seen",
     "pending": "joining",
+    "node_silent": "silent",
+    # Its links: what each locks, why the robot's nodes are not heard and what helps.
+    "links": "The way to the robot",
+    "link_state": "State",
+    "link_since": "Since",
+    "link_locks": "What it locks, and why",
+    "locks": "Locks {names}.",
+    "locks_more": "Locks {names} and {number} more.",
+    "locks_nothing": "Locks nothing.",
+    "locks_all": "Locks every control.",
+    "node_unknown": "While the bridge can't be reached, nothing is known of the robot's nodes.",
+    "node_absent": (
+        "No node that this panel talks with is seen: start it, with the ROS domain of the bridge."
+    ),
+    "node_gone": (
+        "{name} was there and is gone, but the bridge is not: start its node again; if it runs, the "
+        "bridge has lost it: restart the node or the bridge."
+    ),
+    "node_stale": (
+        "Nothing new on {topic} for {limit} s or more, though its node is there: look whether the node "
+        "hangs or has crashed, and restart it."
+    ),
 }
 
 
@@ -256,6 +278,11 @@ def age(seconds: float) -> str:
     if seconds < 3600:
         return f"{int(seconds // 60)} min"
     return f"{int(seconds // 3600)} h"
+
+
+def moment(wall: float) -> str:
+    """Date and time in the server's zone, of seconds since the epoch."""
+    return time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(wall))
 
 
 def clock(wall: float) -> str:

@@ -7,36 +7,22 @@ nothing.
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Final, Literal, TypedDict
+from typing import Any, Final, TypedDict
 
 from app.browsers import Browser
 from app.control_view import NO_CONTROL, ControlView
 from app.displays import indicator, readout
 from app.inputs import limits
-from app.interlocks import (
-    Verdict,
-    interlock_verdict,
-    parameters_offered,
-    press_verdict,
-    served,
-    way,
-)
+from app.interlocks import Verdict, interlock_verdict, press_verdict, way
+from app.lamps import Lamp, LinkLamp, lamps, summary
 from app.panel.displays import Indicator, Readout
 from app.panel.inputs import Numeric, SelectInput, TextInput, ToggleInput
-from app.panel.model import Action, Call, Hold, Panel, Publish
+from app.panel.model import Action, Call, Hold, Panel, Pressed, Publish
 from app.panel.parameter import Parameter
 from app.parameter_display import parameter
 from app.progress import IDLE, Progress
 from app.robot import Robot
 from app.sentences import say
-
-
-class Lamp(TypedDict):
-    """One part of the way to the robot: `state` is "ok", "wait" or "bad"."""
-
-    name: str
-    state: Literal["ok", "wait", "bad"]
-    text: str
 
 
 class Enabled(TypedDict):
@@ -55,7 +41,7 @@ class View(TypedDict):
     """Everything that can change on a page; `widgets` has the attributes of each by its id, `robots`
     the lamp of each where there are several."""
 
-    link: dict[str, Lamp]
+    link: dict[str, LinkLamp]
     interlocks: dict[str, Enabled]
     widgets: dict[str, dict[str, Any]]
     notice: Notice
@@ -91,6 +77,13 @@ def sight(
     pressed, where they are not ""."""
     untils = [math.inf]
 
+    verdicts: dict[str, Verdict] = {}
+
+    def judged(widget: Pressed | Hold) -> Verdict:
+        verdict = noted(press_verdict(widget, panel.interlock(widget.interlock), robot, now))
+        verdicts[widget.id] = Verdict(False, "log", lock) if lock else verdict
+        return verdicts[widget.id]
+
     def noted(verdict: Verdict) -> Verdict:
         untils.append(verdict.until)
         return verdict
@@ -105,29 +98,26 @@ def sight(
             case Numeric():
                 widgets[widget.id] = {"limits": limits(widget)}
             case Publish() | Call() | Action() | Parameter():
-                interlock = panel.interlock(widget.interlock)
-                verdict = noted(press_verdict(widget, interlock, robot, now))
-                if lock:
-                    verdict = Verdict(False, "log", lock)
-                widgets[widget.id] = {**enabled(verdict)}
+                widgets[widget.id] = {**enabled(judged(widget))}
                 if not isinstance(widget, Publish) or widget.confirm:
                     widgets[widget.id] |= progress(robot.progress.get(widget.id, IDLE))
                 if isinstance(widget, Parameter):
                     widgets[widget.id] |= parameter(widget, robot)
             case Hold():
-                interlock = panel.interlock(widget.interlock)
-                verdict = noted(press_verdict(widget, interlock, robot, now))
-                if lock:
-                    verdict = Verdict(False, "log", lock)
                 holding = robot.held.get(widget.id, "")
-                widgets[widget.id] = {**enabled(verdict), "held": bool(holding), "holding": holding}
+                widgets[widget.id] = {
+                    **enabled(judged(widget)),
+                    "held": bool(holding),
+                    "holding": holding,
+                }
             case Readout():
                 widgets[widget.id], until = readout(widget, robot, now)
                 untils.append(until)
             case Indicator():
                 widgets[widget.id], until = indicator(widget, robot, now)
                 untils.append(until)
-    link = lamps(panel, robot, passable)
+    link, until = lamps(panel, robot, passable, verdicts, now)
+    untils.append(until)
     view = View(
         link=link,
         interlocks={i: enabled(verdict) for i, verdict in interlocks.items()},
@@ -167,39 +157,4 @@ def progress(of: Progress) -> dict[str, Any]:
         "progress": of.fraction,
         "stoppable": of.stoppable,
         "goal": of.goal,
-    }
-
-
-def summary(name: str, link: Mapping[str, Lamp]) -> Lamp:
-    """One light for a robot: what is wrong on the way to it, or how its nodes are."""
-    shown = link["node"] if link["bridge"]["state"] == "ok" else link["bridge"]
-    return Lamp(name=name, state=shown["state"], text=shown["text"])
-
-
-def lamps(panel: Panel, robot: Robot, passable: Verdict) -> dict[str, Lamp]:
-    """The three lights: the server is "ok" wherever it says so itself."""
-    bridge: dict[str, tuple[Literal["ok", "wait", "bad"], str]] = {
-        "no_link": ("bad", "lost"),
-        "no_bridge": ("bad", "absent"),
-        "no_bridge_of": ("bad", "absent"),
-        "bridge_silent": ("bad", "silent"),
-        "joining": ("wait", "pending"),
-        "permitted": ("ok", "ok"),
-    }
-    state, text = bridge[passable.code]
-    # Every node publishes its parameters' events: they show none of the panel's.
-    listened = [of.topic for of in panel.listening()]
-    topics = [("MP", t) for t in listened] + [("MS", t) for t in panel.publications()]
-    seen = any(
-        robot.graph.on_robot("MP" if role == "MP" else "MS", robot.key(topic)) for role, topic in topics
-    ) or any(parameters_offered(of.node, robot) is None for of in panel.parameters())
-    asked = [served(w) for w in panel.widgets() if isinstance(w, Call | Action)]
-    seen = seen or any(robot.graph.on_robot(role, robot.key(name)) for role, name in asked)
-    node: tuple[Literal["ok", "wait", "bad"], str] = ("ok", "ok") if seen else ("wait", "no_node")
-    if state == "bad":
-        node = ("bad", "lost")
-    return {
-        "server": Lamp(name=say("server"), state="ok", text=say("ok")),
-        "bridge": Lamp(name=say("bridge"), state=state, text=say(text)),
-        "node": Lamp(name=say("robot"), state=node[0], text=say(node[1])),
     }

@@ -4,8 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from app.assets import LAYERS, Assets, load_assets
+from app.assets import LAYERS, OWN_PAGE, Assets, load_assets
 from app.settings import shipped
+from tests.parts import ROOT
 
 
 @pytest.fixture
@@ -13,7 +14,7 @@ def static(tmp_path: Path) -> Path:
     folder = tmp_path / "static"
     for part in ("css", "js"):
         (folder / part).mkdir(parents=True)
-    for layer in LAYERS:
+    for layer in (*LAYERS, OWN_PAGE):
         (folder / "css" / f"{layer}.css").write_text(f"/* {layer} */\n")
     (folder / "js/main.js").write_text("main();\n")
     (folder / "js/press.js").write_text("press();\n")
@@ -41,15 +42,28 @@ def test_the_stylesheet_is_its_layers_in_order_with_the_millimetre(
         "/* base */",
         "/* layout */",
         "/* widgets */",
-        "/* log */",
         ":root{--mm:4.0000px}",
     ]
 
 
 def test_scripts_keep_their_names(static: Path, templates: Path) -> None:
     files = loaded(static, templates).files
-    assert set(files) == {"kiosk.css", "main.js", "press.js"}
+    assert set(files) == {"kiosk.css", "log.css", "main.js", "press.js"}
     assert files["main.js"].content == b"main();\n"
+    assert files["log.css"].content == b"/* log */\n"
+
+
+def test_scripts_go_out_without_comments_on_the_lines_where_they_were_written(
+    static: Path, templates: Path
+) -> None:
+    (static / "js/main.js").write_text('// Why.\nf("http://a"); // beside\n  // More.\ng();\n')
+    sent = loaded(static, templates).files["main.js"].content
+    assert sent == b'\nf("http://a"); // beside\n\ng();\n'
+
+
+def test_no_script_has_a_text_over_several_lines_that_a_comment_could_be_taken_from() -> None:
+    for script in (ROOT / "static/js").glob("*.js"):
+        assert all(line.count("`") % 2 == 0 for line in script.read_text().splitlines()), script
 
 
 def test_browsers_are_told_what_a_file_is(static: Path, templates: Path) -> None:

@@ -68,6 +68,7 @@ def test_a_changed_permission_is_sent_by_its_name_and_at_its_widgets(
     assert events(board.since(1, old)) == {
         "operation-enabled-updated": {"enabled": True, "reason": None},
         "update": {"guarded": {"enabled": True, "reason": None}},
+        "link": board.view["link"],  # the node locks nothing any more
     }
 
 

@@ -8,11 +8,10 @@ from typing import Any
 import pytest
 
 from app.displays import LONGEST_TEXT, readout, written
-from app.interlocks import way
 from app.keys import DEMO_VERSION, bridge_token, server_token
 from app.robot import Robot, Sample
 from app.sentences import clock
-from app.views import View, lamps, sight
+from app.views import View, sight
 from tests.builders import (
     BOOL,
     BRIDGE,
@@ -145,7 +144,7 @@ def test_the_lights_show_how_far_the_way_goes(
     robot: Robot, change: Callable[[Robot], None], bridge: tuple[str, str], on_robot: tuple[str, str]
 ) -> None:
     change(robot)
-    link = lamps(PANEL, robot, way(robot, NOW))
+    link = view_of(robot)["link"]
     assert [(lamp["state"], lamp["text"]) for lamp in link.values()] == [("ok", "ok"), bridge, on_robot]
     assert [lamp["name"] for lamp in link.values()] == ["Server", "Bridge", "Robot"]
 

@@ -17,7 +17,7 @@ from app.panel.template import inputs_of
 from app.receipts import Receipt
 from app.routes.site import CurrentSite, Site
 from app.routes.visitors import by_hand, keep, welcomed
-from app.sentences import clock, say
+from app.sentences import clock, moment, say
 from app.views import View, as_seen_by
 
 router = APIRouter(include_in_schema=True)
@@ -33,6 +33,7 @@ RELOADED_S = 2.0  # a press on a page that should have reloaded before is one on
 GRACE_S = 5
 REFUSALS = get_args(Refusal)
 WORDS = ("cancel", "robots", "control", "set", "back", "hold_cut", "hold_scripts")
+LINK_WORDS = ("links", "link_state", "link_since", "link_locks")
 CONTROL_ACTS = ("take", "ask", "give", "keep", "release", "withdraw")
 
 
@@ -48,12 +49,14 @@ class PageContext(TypedDict):
     event_id: str
     revision: str
     clock: str
+    loaded: str
     press_id: str
     receipt: Receipt | None
     inputs: dict[str, Any]
     words: dict[str, Any]
     lost: str
     lost_short: str
+    locks_all: str
     unknown: str
     unsure: str
     refresh_s: int
@@ -110,7 +113,7 @@ def _render(request: Request, site: Site, page: Page) -> Response:
     refusal = request.query_params.get("control", "")
     receipt = kiosk.presses.receipt(request.query_params.get("receipt", ""))
     refresh_s = REFRESH_WITH_INPUTS_S if typed else REFRESH_S
-    now = moments.now()
+    now, wall = moments.now(), time.time()
     context = PageContext(
         site=site,
         panel=site.fleet.panel,
@@ -120,15 +123,17 @@ def _render(request: Request, site: Site, page: Page) -> Response:
         view=as_seen_by(board.view, browser),
         event_id=board.id,
         revision=board.revision,
-        clock=clock(time.time()),
+        clock=clock(wall),
+        loaded=moment(wall),
         press_id=secrets.token_hex(8),
         receipt=receipt,
         inputs=dict(receipt.inputs) if receipt else {},
         words={"base": kiosk.base, "log": say("log_link"), "asks": asks_of(site.fleet.panel, page)}
-        | {word: say(word) for word in WORDS}
+        | {word: say(word) for word in (*WORDS, *LINK_WORDS)}
         | {act: say(f"control_{act}") for act in CONTROL_ACTS},
         lost=say("server_lost"),
         lost_short=say("lost"),
+        locks_all=say("locks_all"),
         unknown=say("unknown"),
         unsure=say("server_unsure"),
         refresh_s=refresh_s,

@@ -3,6 +3,8 @@ import { Source } from "./source.js";
 import { Presser, showBounds, showEntry } from "./press.js";
 
 const body = document.body;
+const clock = document.getElementById("clock"); // shows the last heartbeat's
+let back = false; // the server is there again, and its first heartbeat has not come
 const widgets = new Map(
   [...document.querySelectorAll("[data-widget]")].map((root) => [root.dataset.widget, root]),
 );
@@ -62,11 +64,17 @@ function showWidgets(changes) {
 
 function showLink(lamps) {
   control.link(lamps);
-  for (const [name, lamp] of Object.entries(lamps)) {
-    const item = document.querySelector(`[data-lamp="${name}"]`);
-    item.dataset.state = lamp.state;
-    setText(item.querySelector("b"), lamp.text);
+  for (const [name, { since, ...lamp }] of Object.entries(lamps)) {
+    showLamp(name, name === "server" ? lamp : { since, ...lamp }); // this page's own link to it
   }
+}
+
+function showLamp(name, lamp) {
+  const light = document.querySelector(`[data-lamp="${name}"]`);
+  const row = document.querySelector(`[data-link="${name}"]`);
+  light.dataset.state = row.dataset.state = lamp.state;
+  setText(light.querySelector("b"), lamp.text);
+  for (const [key, text] of Object.entries(lamp)) setText(row.querySelector(`[data-text="${key}"]`), text);
 }
 
 // How each of several robots is, on its tab.
@@ -90,10 +98,10 @@ function showNotice(notice) {
 function lockAll() {
   body.dataset.cut = "";
   control.lost();
-  for (const lamp of document.querySelectorAll("[data-lamp]")) {
-    const server = lamp.dataset.lamp === "server";
-    lamp.dataset.state = server ? "bad" : "wait";
-    setText(lamp.querySelector("b"), server ? body.dataset.lostShort : body.dataset.unknown);
+  const { lostShort, locksAll, lost, unknown } = body.dataset;
+  showLamp("server", { state: "bad", text: lostShort, since: clock.textContent, locks: locksAll, reason: lost });
+  for (const name of ["bridge", "node"]) {
+    showLamp(name, { state: "wait", text: unknown, since: "", locks: "", reason: "" });
   }
   for (const tab of document.querySelectorAll("[data-robot]")) {
     tab.dataset.state = "wait";
@@ -125,6 +133,7 @@ const source = new Source({
       location.reload();
       return;
     }
+    back = "cut" in body.dataset;
     delete body.dataset.cut;
     control.show(all.control);
     showWidgets(all.widgets);
@@ -138,8 +147,10 @@ const source = new Source({
   robots: showRobots,
   control: (state) => control.show(state),
   browser: (mine) => control.browser(mine), // comes only where control is required
-  beat({ clock }) {
-    setText(document.getElementById("clock"), clock);
+  beat(now) {
+    setText(clock, now.clock);
+    if (back) setText(document.querySelector('[data-link="server"] [data-text="since"]'), now.clock);
+    back = false;
     control.beat();
   },
   lost: lockAll,

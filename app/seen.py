@@ -1,0 +1,59 @@
+"""Which ends of the robot's nodes (publishers, subscribers, servers) a panel needs, and which of them
+went though their bridge stayed."""
+
+from collections.abc import Iterator, Mapping
+
+from app.graph import Graph
+from app.keys import Role
+from app.panel.model import Action, Call, Panel
+from app.panel.parameter import DESCRIBE, GET, SET
+
+End = tuple[Role, str]
+
+
+def ends(panel: Panel) -> Iterator[End]:
+    """What the panel talks with, as (role, ROS name). Every node publishes its parameters' events:
+    they show none of the panel's."""
+    for of in panel.listening():
+        yield "MP", of.topic
+    for topic in panel.publications():
+        yield "MS", topic
+    for widget in panel.widgets():
+        if isinstance(widget, Call):
+            yield "SS", widget.service
+        elif isinstance(widget, Action):
+            yield "AS", widget.action
+    for parameter in panel.parameters():
+        for name, _ in (GET, DESCRIBE, SET):
+            yield "SS", f"{parameter.node}/{name}"
+
+
+class Seen:
+    """Remembers behind which bridges each end was seen last: one entry for each that is needed."""
+
+    def __init__(self, needed: Mapping[End, End]) -> None:
+        """`needed`: (role, ROS name) → (role, key expression)."""
+        self._needed = needed
+        self._behind: dict[End, frozenset[str]] = {}
+
+    def follow(self, graph: Graph) -> None:
+        """After every change of the graph."""
+        for end, (role, key) in self._needed.items():
+            if bridges := graph.behind(role, key):
+                self._behind[end] = bridges
+
+    def forget(self) -> None:
+        """The link was lost: what is seen after it is seen for the first time."""
+        self._behind.clear()
+
+    def any(self, graph: Graph) -> bool:
+        """Whether a node is there that the panel talks with."""
+        return any(graph.on_robot(role, key) for role, key in self._needed.values())
+
+    def gone(self, graph: Graph) -> list[str]:
+        """The ROS names of what was there and is not, while its bridge is."""
+        return [
+            end[1]
+            for end, bridges in self._behind.items()
+            if bridges & graph.bridges and not graph.on_robot(*self._needed[end])
+        ]
