@@ -6,6 +6,7 @@ one. Wire format: ROS 2's `<action>/_action/…` services and topics (design.ros
 
 import asyncio
 import logging
+import math
 import time
 import uuid
 from collections.abc import Callable, Iterator
@@ -14,11 +15,11 @@ from typing import Any, Final
 from app.calls import CUT_NEWS_S, LATE_S, MOST_UNANSWERED, Asker, with_fields
 from app.errors import DecodeError
 from app.goals import ACCEPTED, CANCELING, ENDS, UNKNOWN, Goal
-from app.interfaces import Interfaces, value_at
+from app.interfaces import Interfaces
 from app.interlocks import SERVER_SETTLE_S
 from app.panel.model import Action
 from app.progress import Answer, Corrected, Progress
-from app.robot import Robot, Sample
+from app.robot import Robot, Sample, value_of
 from app.sentences import clock, say
 
 log = logging.getLogger("kiosk.actions")
@@ -143,7 +144,8 @@ class Actions:
         if bytes(message.goal_id.uuid) != goal.id.bytes:
             return
         if widget.progress is not None:
-            done = float(value_at(message.feedback, widget.progress)) / widget.progress_max
+            found = value_of(message.feedback, widget.progress)
+            done = math.nan if found is None else float(found) / widget.progress_max
             goal.fraction = min(1.0, max(0.0, done)) if done == done else None  # NaN is no progress
         goal.said = with_fields(widget.feedback, message.feedback)
         self._show(goal, goal.under_way)

@@ -12,17 +12,18 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, Final, Protocol
 
-from app.errors import DecodeError
+from app.errors import DecodeError, FieldError
 from app.interfaces import Interfaces, to_plain, value_at
 from app.panel.model import Call
 from app.panel.template import PLACE
 from app.progress import Answer, Corrected, Progress
-from app.robot import Robot
+from app.robot import Robot, value_of
 from app.sentences import clock, say
 
 log = logging.getLogger("kiosk.calls")
 
 CUT_NEWS_S: Final = 0.3
+NOTHING: Final = "—"
 LATE_S: Final = 60.0  # how long after its time an answer is still waited for
 MOST_UNANSWERED: Final = 8  # the bridge keeps ten requests of a service
 
@@ -151,12 +152,12 @@ class Calls:
         _, response_type = self._interfaces.service(widget.type)
         success = field_of(self._interfaces, response_type, widget.success, "success", "bool")
         message = field_of(self._interfaces, response_type, widget.message, "message", "string")
-        words = [str(value_at(response, message))] if message else []
+        words = [with_fields(f"{{{message}}}", response)] if message else []
         words += [with_fields(widget.answer, response)] if widget.answer else []
         said = " – ".join(word for word in words if word)
         said = f": {said}" if said else "."
         now = clock(time.time())
-        if success is None or value_at(response, success):
+        if success is None or value_of(response, success):
             return Answer("succeeded", say("answered", time=now) + said)
         return Answer("rejected", say("said_no", time=now) + said)
 
@@ -176,5 +177,13 @@ def field_of(
 
 
 def with_fields(template: str, message: Any) -> str:
-    """The template with each `{path}` replaced by that field's value."""
-    return PLACE.sub(lambda found: str(to_plain(value_at(message, found[1]))), template)
+    """The template with each `{path}` replaced by that field's value, "—" where a list in the path is
+    too short."""
+
+    def shown(path: str) -> str:
+        try:
+            return str(to_plain(value_at(message, path)))
+        except FieldError:
+            return NOTHING
+
+    return PLACE.sub(lambda found: shown(found[1]), template)

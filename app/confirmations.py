@@ -34,6 +34,7 @@ class _Waiting:
     press_id: str
     since: float
     confirmed: "asyncio.Future[float]"
+    late: bool = False
 
 
 class Confirmations:
@@ -61,6 +62,8 @@ class Confirmations:
         assert confirm is not None
         future: asyncio.Future[float] = asyncio.get_running_loop().create_future()
         waiting = _Waiting(widget, confirm, equals, press_id, since, future)
+        for older in [w for w in self._waiting.get(self._robot.key(confirm.topic), []) if w.late]:
+            self._forget(older)  # what comes now may be of this one
         self._waiting.setdefault(self._robot.key(confirm.topic), []).append(waiting)
         self._latest[widget.id] = press_id
         self._show(widget, Progress(busy=True, text=say("waiting_for_effect", topic=confirm.topic)))
@@ -75,6 +78,7 @@ class Confirmations:
 
     def _missed(self, waiting: _Waiting, sent: str, corrected: Corrected) -> Answer:
         confirm = waiting.confirm
+        waiting.late = True
         waiting.confirmed.add_done_callback(lambda _: self._too_late(waiting, corrected))
         asyncio.get_running_loop().call_later(LATE_S, self._forget, waiting)
         limit = f"{confirm.within_s:g}"

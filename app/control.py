@@ -156,6 +156,7 @@ class Control:
 
     def touch(self, browser: Browser) -> None:
         """The operator touched or pressed something: a request waits longer."""
+        self.advance()
         if self._holder and _is(browser, self.holder):
             self._holder.since = self._now()
             self._holder.alive_until = max(self._holder.alive_until, self._now() + LIFE_S)

@@ -248,10 +248,10 @@ class Holds:
         self._changed()
 
     def _put_last(self, holding: Holding, now: float) -> str:
-        """The message that ends it, if there is a way now; why it was not sent, or ""."""
-        verdict = press_verdict(holding.widget, None, self._robot, now)
-        if not verdict.permitted:
-            return verdict.reason or ""
+        """The message that ends it, if there is any way now, be it in doubt: one stop too many harms
+        nobody. Why it was not sent, or ""."""
+        if not self._robot.link_up or not self._robot.graph.bridges:
+            return way(self._robot, now).reason or ""
         try:
             self._put(holding.widget, holding.last_fields, 0)
         except LinkError as error:

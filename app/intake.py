@@ -50,13 +50,21 @@ class Intake:
         where there was none. `show` is called at each value that a permission had in between."""
         urgent = bool(changes.tokens) or not self._urgent.isdisjoint(changes.samples)
         had_bridge = bool(self._robot.graph.bridges)
-        for key, sample in changes.samples.items():
+        # What permits and forbids comes first, and nothing that fails keeps it from being taken in.
+        ordered = sorted(changes.samples.items(), key=lambda one: one[0] not in self._urgent)
+        for key, sample in ordered:
             for payload in sample.between:
-                self._sample(key, replace(sample, payload=payload, between=()))
+                self._guarded(key, replace(sample, payload=payload, between=()))
                 if key in self._urgent:
                     show()
-            self._sample(key, sample)
+            self._guarded(key, sample)
         return urgent, self._tokens(changes.tokens, had_bridge)
+
+    def _guarded(self, key: str, sample: Sample) -> None:
+        try:
+            self._sample(key, sample)
+        except Exception:
+            self._log.exception("a sample of %s was not taken in whole", key)
 
     def _sample(self, key: str, sample: Sample) -> None:
         if key in self._feedback:

@@ -140,6 +140,7 @@ class Kiosk:
         self._timer: asyncio.TimerHandle | None = None
         self._rosout = Rosout(self.robot, self.interfaces, self.link, self._loop)
         self._renewing: asyncio.Task[None] | None = None
+        self._lost_again = False
         self._stopped = False
 
     async def start(self) -> None:
@@ -234,6 +235,8 @@ class Kiosk:
         )
 
     def _controls(self, browser: Browser) -> Verdict:
+        if self._stopped:
+            return locked("ending")
         if self._operators_log.lock:
             return Verdict(False, "log", self._operators_log.lock)
         return self.control.verdict(browser)
@@ -252,16 +255,19 @@ class Kiosk:
         self.robot.lose()
         self._follow(came=False)
         self.show()
+        self._lost_again = True
         if self._renewing is None:
             self._renewing = self._loop.create_task(self._renew())
 
     async def _renew(self) -> None:
-        while not self._stopped:
+        """Until there is a session that was not lost while it was opened."""
+        while self._lost_again and not self._stopped:
+            self._lost_again = False
             try:
                 await asyncio.to_thread(self.link.renew)
-                break
-            except LinkError as error:
+            except Exception as error:  # whatever Zenoh makes of it: without a session all is locked
                 self._log.error("%s", error)
+                self._lost_again = True
                 await asyncio.sleep(RENEW_AGAIN_S)
         self.robot.graph.own_zid = self.link.zid
         self._renewing = None

@@ -98,10 +98,16 @@ class Logbook:
         return Noted(self._log, written, self._board, self._log.fault)
 
     async def refused(
-        self, widget: str, inputs: Mapping[str, Any], press_id: str, origin: Origin, reason: str
+        self,
+        widget: str,
+        inputs: Mapping[str, Any],
+        press_id: str,
+        origin: Origin,
+        reason: str,
+        action: str = "press",
     ) -> str:
         """A press that was not even judged; returns when it is on the disk, or why it is not."""
-        about = self._about(widget, press_id, "press")
+        about = self._about(widget, press_id, action)
         entry = entered("refused", origin, inputs, outcome="refused", reason=reason, **about)
         return await self._log.closed(entry)
 

@@ -32,6 +32,7 @@ from app.receipts import (
     Witness,
     corrected,
     named,
+    print_of,
     receipt_of,
     with_doubt,
 )
@@ -47,7 +48,7 @@ class _UnderWay:
     """A press whose receipt is not there yet."""
 
     widget: str
-    inputs: Mapping[str, Any]
+    print: str
     receipt: "asyncio.Future[Receipt]"
 
 
@@ -83,14 +84,26 @@ class Presses:
         What it is judged by, is judged in the moment of sending.
         """
         widget = self.widget(widget_id)
+        work = self._logged(widget, inputs, press_id, by)
+        return await self._known_or(widget, inputs, press_id, by.origin, work)
+
+    async def _known_or(
+        self,
+        widget: Pressed,
+        inputs: Mapping[str, Any],
+        press_id: str,
+        origin: Origin,
+        work: Coroutine[Any, Any, Receipt],
+    ) -> Receipt:
+        """The receipt that a press of this id has or will have; else that of the work."""
         known = self._under_way.get(press_id) or self._receipts.get(press_id)
         if known is None:
-            work = self._logged(widget, inputs, press_id, by)
             return await self._once(widget, inputs, press_id, work)
-        if (known.widget, known.inputs) != (widget_id, inputs):
+        work.close()
+        if (known.widget, known.print) != (widget.id, print_of(inputs)):
             reused = say("press_reused", id=press_id)
             own_id = f"{press_id:.40}.{secrets.token_hex(4)}"
-            work = self._refused(widget, inputs, own_id, by.origin, reused, "input")
+            work = self._refused(widget, inputs, own_id, origin, reused, "input")
             return await self._once(widget, inputs, own_id, work)
         if isinstance(known, _UnderWay):
             return await asyncio.shield(known.receipt)
@@ -100,24 +113,23 @@ class Presses:
         self, widget_id: str, inputs: Mapping[str, Any], press_id: str, origin: Origin, code: str
     ) -> Receipt:
         """A press that can't be judged by what its browser had seen, for the reason of this code."""
-        known = self._under_way.get(press_id) or self._receipts.get(press_id)
-        if isinstance(known, _UnderWay):
-            return await asyncio.shield(known.receipt)
-        if known is not None:
-            return known
         text = say("refused", why=say(code), time=clock(time.time()))
         widget = self.widget(widget_id)
         work = self._refused(widget, inputs, press_id, origin, text, "interlock")
-        return await self._once(widget, inputs, press_id, work)
+        return await self._known_or(widget, inputs, press_id, origin, work)
 
     async def cancel(self, widget_id: str, origin: Origin) -> Receipt:
         """Asks the robot to cancel the goal of an action widget: anybody may, whoever has control."""
         widget = self.widget(widget_id)
         if not isinstance(widget, Action):
             raise NotFound(f'"{widget_id}" is not an action: there is nothing to cancel')
-        noted = await self._logbook.canceled(widget_id, origin)
-        with _noted_to_the_end(noted):
-            answer = await self._sending.cancel(widget)
+        noting = asyncio.ensure_future(self._logbook.canceled(widget_id, origin))
+        try:
+            answer = await self._sending.cancel(widget)  # no disk keeps anybody from stopping a robot
+        except BaseException:
+            (await noting).broke_off("log_broke_off")
+            raise
+        noted = await noting
         self._log.info(
             "cancel of %s by %s: %s: %s", widget_id, named(origin), answer.outcome, answer.text
         )
@@ -134,7 +146,7 @@ class Presses:
     ) -> Receipt:
         """Does the work of a press, while others of the same id wait for its receipt."""
         loop = asyncio.get_running_loop()
-        under_way = _UnderWay(widget.id, dict(inputs), loop.create_future())
+        under_way = _UnderWay(widget.id, print_of(inputs), loop.create_future())
         self._under_way[press_id] = under_way
         try:
             receipt = await work
@@ -144,8 +156,8 @@ class Presses:
             raise
         finally:
             del self._under_way[press_id]
-        self._receipts.keep(receipt)
         under_way.receipt.set_result(receipt)
+        self._receipts.keep(receipt)
         return receipt
 
     async def _logged(

@@ -1,5 +1,7 @@
 """Who presses and what came of it: what presses and holds have in common."""
 
+import hashlib
+import json
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -16,6 +18,7 @@ Cause = Literal["", "interlock", "input", "link", "log", "time"]
 
 RECEIPTS_KEPT: Final = 1000
 LONGEST_LOGGED: Final = 300
+LONGEST_KEPT: Final = 4000  # characters of all inputs of a press
 NO_WAY: Final = frozenset(
     {
         "no_link",
@@ -35,7 +38,8 @@ FINE: Final = frozenset({"published", "confirmed", "accepted", "succeeded"})
 class Receipt:
     """What came of a press; `reason` is a sentence for the operator, `cause` why it was refused.
 
-    `inputs` are those that the press came with: a page without scripts shows them again.
+    `inputs` are those that the press came with, if they are few and short: a page without scripts
+    shows them again. `print` tells these from any others.
     """
 
     id: str
@@ -45,6 +49,7 @@ class Receipt:
     at: str
     cause: Cause
     inputs: Mapping[str, Any]
+    print: str
 
     def as_json(self) -> dict[str, str]:
         return {
@@ -111,7 +116,20 @@ def receipt_of(
 ) -> Receipt:
     """What came of a press just now."""
     at = datetime.now(UTC).isoformat(timespec="milliseconds")
-    return Receipt(press_id, widget.id, answer.outcome, answer.text, at, cause, dict(inputs))
+    kept = dict(inputs) if _short(inputs) else {}
+    told = answer.outcome, answer.text, at, cause
+    return Receipt(press_id, widget.id, *told, kept, print_of(inputs))
+
+
+def print_of(inputs: Mapping[str, Any]) -> str:
+    """A fingerprint of inputs: the same for the same ones only."""
+    text = json.dumps(inputs, sort_keys=True, default=str)
+    return hashlib.sha256(text.encode(errors="surrogatepass")).hexdigest()
+
+
+def _short(inputs: Mapping[str, Any]) -> bool:
+    plain = all(isinstance(value, str | int | float) for value in inputs.values())
+    return plain and sum(len(str(v)) + len(k) for k, v in inputs.items()) <= LONGEST_KEPT
 
 
 def corrected(receipt: Receipt, answer: Answer) -> Receipt:

@@ -12,6 +12,7 @@ ENGLISH: Final[Mapping[str, str]] = {
     "no_link": "No connection to the robot: its bridge can't be reached.",
     "no_bridge": "No connection to the robot: Zenoh answers, but no ROS 2 bridge is there.",
     "no_bridge_of": "No connection to {name}: Zenoh answers, but no ROS 2 bridge of its namespace.",
+    "ending": "The panel's server is ending, or takes a new panel.",
     "joining": "Joining the robot's topics: a moment.",
     "bridge_silent": "The ROS 2 bridge is connected but does not answer: restart the bridge.",
     "wrong_type": "{topic} is {found} on the robot, but this panel is made for {wanted}.",

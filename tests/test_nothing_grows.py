@@ -25,7 +25,7 @@ ANSWERED = [f"answered_{n}" for n in range(9)]
 MUTE = [f"mute_{n}" for n in range(20)]
 TIMEOUT_S = 0.2
 CALLS, UNANSWERED = 10_000, 1_000
-GROWTH_KB = 2_000  # of what the process has; a kB for each unanswered call is half of this
+GROWTH_KB = 4_000  # of what the process has: half of it is what SQLite keeps of its file
 STRAY_OBJECTS = 300  # caches of the interpreter and of libraries
 
 

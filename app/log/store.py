@@ -164,7 +164,7 @@ class Store:
                 self._db.execute("INSERT INTO undone VALUES (?, '')", (entry.seq,))
             elif entry.of and entry.outcome == "accepted" and entry.action == "press":
                 self._db.execute(
-                    "UPDATE undone SET outcome = ? WHERE seq = ?", (entry.outcome, entry.of)
+                    "INSERT OR REPLACE INTO undone VALUES (?, ?)", (entry.of, entry.outcome)
                 )
             elif entry.of:
                 self._db.execute("DELETE FROM undone WHERE seq = ?", (entry.of,))

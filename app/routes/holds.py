@@ -19,11 +19,11 @@ import secrets
 import time
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import replace
 from typing import Annotated, Any, Final, Literal
 
 from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 from pydantic import BaseModel, ConfigDict, Field, JsonValue, TypeAdapter, ValidationError
+from starlette.types import Message
 
 from app.browsers import Browser
 from app.errors import LogError
@@ -31,10 +31,9 @@ from app.holds import RELEASED, Holding
 from app.kiosk import Kiosk
 from app.leases import sent_at
 from app.logbook import Noted
-from app.receipts import Receipt
+from app.receipts import By, Receipt, with_doubt
 from app.routes.site import CurrentKiosk, CurrentSite
 from app.routes.visitors import visitor
-from app.sentences import say
 
 router = APIRouter()
 
@@ -112,13 +111,16 @@ class _Session:
         self._ended: asyncio.Future[Receipt] = asyncio.get_running_loop().create_future()
         self._browser = browser
         self._noted: Noted | None = None
+        self._next: asyncio.Future[Message] | None = None  # what the browser says next
 
     async def run(self, widget: str) -> Receipt:
         """From the first message to the end; the receipt of the hold, of a refusal too."""
         await self._say()
         begun = await self._begun(widget)
+        if self._noted is not None:
+            self._noted.judged("permitted" if isinstance(begun, Holding) else begun.cause)
         if isinstance(begun, Receipt):
-            await self._closed(begun)
+            begun = await self._refused(begun)
             await self._say(state="refused", status=CLOSE[begun.cause] - 4000, **begun.as_json())
             await self._close(CLOSE[begun.cause])
             return begun
@@ -144,20 +146,43 @@ class _Session:
         boot, _, version = said.seen.partition("-")
         if boot != self._kiosk.board.boot:
             return holds.refuse(widget, by, "seen_before_restart")
+        if int(version) > self._kiosk.board.version:
+            return holds.refuse(widget, by, "hold_by_nonsense")
         by = self._kiosk.by(widget, self._browser, said.seen, int(version))
-        sent, name = self._sent(said), secrets.token_hex(8)
+        sent = self._sent(said)
         try:
-            logbook = self._kiosk.logbook
-            self._noted = await logbook.pressed(widget, said.inputs, name, by.origin, "hold")
+            still_held = await self._written(widget, said, by)
         except LogError as error:
             return holds.refuse(widget, by, "hold_unlogged", why=str(error))
+        if not still_held:
+            return holds.refuse(widget, by, "hold_late")
         return holds.begin(widget, said.inputs, sent, by, self._ended.set_result)
+
+    async def _written(self, widget: str, said: Begin, by: By) -> bool:
+        """The entry in the log, while the browser is listened to: whether it holds still."""
+        writing = asyncio.ensure_future(
+            self._kiosk.logbook.pressed(widget, said.inputs, secrets.token_hex(8), by.origin, "hold")
+        )
+        self._next = asyncio.ensure_future(self._received())
+        await asyncio.wait({writing, self._next}, return_when=asyncio.FIRST_COMPLETED)
+        let_go = self._next.done()
+        self._noted = await writing
+        return not let_go
+
+    async def _refused(self, receipt: Receipt) -> Receipt:
+        """A hold that did not begin, in the operator's log."""
+        if self._noted is not None:
+            return await self._closed(receipt)
+        origin = self._kiosk.by(receipt.widget, self._browser).origin
+        why = await self._kiosk.logbook.refused(
+            receipt.widget, receipt.inputs, receipt.id, origin, receipt.reason, "hold"
+        )
+        return with_doubt(receipt, why)
 
     async def _closed(self, receipt: Receipt) -> Receipt:
         """Its end in the operator's log, on the disk before it is told."""
         why = await self._noted.closed(receipt.outcome, receipt.reason) if self._noted else ""
-        said = say("log_not_on_disk", said=receipt.reason, why=why)
-        return replace(receipt, reason=said) if why else receipt
+        return with_doubt(receipt, why)
 
     async def _listen(self, holding: Holding) -> None:
         """Until the browser closes or says nothing any more: what is late gets its answer too."""
@@ -166,8 +191,9 @@ class _Session:
                 async with asyncio.timeout(SILENCE_S):
                     said = await self._read()
                 if self._hear(said, holding):
+                    self._kiosk.control.touch(self._browser)
                     await self._say(state="held")
-                elif isinstance(said, Beat):
+                elif isinstance(said, Beat) and self._ended.done():
                     await self._say(state="ended", **self._ended.result().as_json())
         await self._close(1000)
 
@@ -182,8 +208,15 @@ class _Session:
             return False
         return holds.beat(holding, said.number, self._sent(said))
 
+    async def _received(self) -> Message:
+        return await self._socket.receive()
+
     async def _read(self) -> Begin | Beat | End | None:
-        message = await self._socket.receive()
+        waiting, self._next = self._next or asyncio.ensure_future(self._received()), None
+        try:
+            message = await waiting
+        finally:
+            waiting.cancel()
         if message["type"] == "websocket.disconnect":
             raise WebSocketDisconnect(message.get("code", 1000))
         return _read(message.get("text") or "")

@@ -23,8 +23,8 @@ router = APIRouter()
 ROWS_ON_PAGE: Final = 50
 ROWS_AT_ONCE: Final = 500
 OUTCOMES: Final = (
-    "published", "accepted", "succeeded", "rejected", "canceled", "aborted", "timed_out", "refused",
-    "unknown", "pressed", "began", "resumed", "removed",
+    "published", "confirmed", "accepted", "succeeded", "rejected", "canceled", "aborted", "timed_out",
+    "refused", "unknown", "pressed", "began", "resumed", "removed",
 )  # fmt: skip
 # What a spreadsheet would take as a formula.
 FORMULA: Final = ("=", "+", "-", "@", "\t", "\r")

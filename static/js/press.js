@@ -55,6 +55,7 @@ export class Presser {
   #underWay = new Set();
   #down = null; // the button that was open when the pointer went down on it
   #asked = () => {}; // loaded with the page that asks; until then nothing is pressed
+  #seen = null;
   #click = null; // when the last click was, in the server's time, and what was seen then
 
   constructor(widgets, source, sentences) {
@@ -62,12 +63,16 @@ export class Presser {
     this.#sentences = sentences;
     this.#source = source;
     if (document.querySelector("dialog.ask")) import("./ask.js").then(({ asked }) => (this.#asked = asked));
-    addEventListener("pointerdown", ({ target }) => (this.#down = target.closest?.("button:enabled")), true);
+    const down = ({ target }) => {
+      this.#down = target.closest?.("button:enabled");
+      this.#seen = source.seen; // what was permitted when the finger came down
+    };
+    addEventListener("pointerdown", down, true);
     for (const form of document.forms) {
       // A button that opened under a resting finger was not pressed.
       form.addEventListener("click", (event) => {
         const button = event.target.closest("button");
-        this.#click = this.#moment(event);
+        this.#click = this.#moment(event, event.detail > 0 ? this.#seen : source.seen);
         if (button && event.detail > 0 && button !== this.#down) event.preventDefault();
       });
       form.addEventListener("submit", (event) => {
@@ -84,8 +89,8 @@ export class Presser {
   }
 
   // What was seen at an event, and when that was, in the server's time.
-  #moment(event) {
-    return { seen: this.#source.seen, at: this.#source.timeOf(event) };
+  #moment(event, seen = this.#source.seen) {
+    return { seen, at: this.#source.timeOf(event) };
   }
 
   // A second tap while the first is under way is the same press: it sends nothing.

@@ -141,7 +141,12 @@ export class Source {
     const data = JSON.parse(text);
     if (data.now) this.#offsets = [data.now - performance.now(), ...this.#offsets].slice(0, BEATS_KEPT);
     if (id) this.#seen = id;
-    this.#on[name](data);
+    try {
+      this.#on[name](data);
+    } catch (error) {
+      this.#lose(); // what can't be shown whole is not shown as if it were
+      throw error;
+    }
   }
 
   // After a silence only a new stream brings a new snapshot, even if the old one speaks again.

@@ -1,0 +1,129 @@
+"""Where one part meets another: what fails in one must not make another act on a doubt."""
+
+import asyncio
+import logging
+from typing import Any
+
+import pytest
+
+from app.calls import with_fields
+from app.intake import Intake
+from app.link import Changes
+from app.logs import RobotLog
+from app.panel.model import Panel
+from app.receipts import LONGEST_KEPT
+from app.robot import Robot, Sample
+from tests.builders import (
+    BOOL,
+    BRIDGE,
+    ENABLED,
+    FROM,
+    INTERFACES,
+    NOW,
+    panel_of,
+    permits,
+    presses_of,
+    robot_there,
+    small_panel,
+)
+from tests.test_presses import Bench, Way
+
+COUNT = {
+    "id": "count",
+    "kind": "action",
+    "label": "Count",
+    "action": "/count",
+    "type": "example_interfaces/action/Fibonacci",
+    "goal": {"order": 3},
+}
+
+
+def flag(value: bool) -> bytes:
+    return INTERFACES.encode(BOOL, {"data": value})
+
+
+def sample(payload: bytes, *between: bytes) -> Sample:
+    return Sample(payload, 9, NOW, NOW, BRIDGE, between=between)
+
+
+class Broken:
+    """A part that fails at whatever it hears."""
+
+    def __getattr__(self, name: str) -> Any:
+        raise RuntimeError(name)
+
+
+class Deaf:
+    def hear(self, *_: object) -> None: ...
+
+
+def intake_of(panel: Panel, robot: Robot, actions: Any) -> Intake:
+    deaf: Any = Deaf()
+    return Intake(panel, robot, actions, deaf, deaf, None, RobotLog(logging.getLogger("x"), ""))
+
+
+def test_what_fails_at_a_sample_keeps_no_lock_from_closing(caplog: pytest.LogCaptureFixture) -> None:
+    panel = panel_of(COUNT)
+    robot = robot_there(panel)
+    permits(robot)
+    broken: Any = Broken()
+    intake = intake_of(panel, robot, broken)
+    feedback = next(key for key in intake.keys if key.endswith("/feedback"))
+    changes = Changes({feedback: sample(b""), robot.key(ENABLED): sample(flag(False))}, {}, True)
+    assert intake.take(changes, lambda: None) == (True, False)
+    assert robot.reading(ENABLED).message.data is False
+    assert "was not taken in whole" in caplog.text
+
+
+def test_a_permission_that_blinked_is_shown_in_between() -> None:
+    panel = small_panel()
+    robot = robot_there(panel)
+    intake = intake_of(panel, robot, Deaf())
+    shown: list[bool] = []
+    blink = Changes({robot.key(ENABLED): sample(flag(True), flag(True), flag(False))}, {}, True)
+    intake.take(blink, lambda: shown.append(robot.reading(ENABLED).message.data))
+    assert shown == [True, False]
+    assert robot.reading(ENABLED).message.data is True
+
+
+def test_a_list_that_is_too_short_is_shown_as_nothing() -> None:
+    names = INTERFACES.decode(
+        "sensor_msgs/msg/JointState",
+        INTERFACES.encode("sensor_msgs/msg/JointState", JOINTS),
+    )
+    assert with_fields("{name[0]}, {name[1]}", names) == "a, —"
+
+
+JOINTS = {
+    "header": {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""},
+    "name": ["a"],
+    "position": [],
+    "velocity": [],
+    "effort": [],
+}
+
+
+def test_a_large_press_leaves_no_large_receipt() -> None:
+    bench = Bench()
+    large = {"message": "x" * (LONGEST_KEPT + 1)}
+    refused = bench.press(inputs=large)
+    assert (refused.cause, refused.inputs) == ("input", {})
+    assert bench.press(inputs=large) == refused
+    other = bench.press(inputs={"message": "y" * (LONGEST_KEPT + 1)})
+    assert "already used" in other.reason
+
+
+def test_a_refusal_is_not_answered_with_another_press() -> None:
+    panel = small_panel()
+    way = Way()
+    robot = robot_there(panel)
+    permits(robot)
+    presses = presses_of(panel, robot, way)
+
+    async def pressed() -> None:
+        first = await presses.press("free", {"message": "a"}, "p1", FROM)
+        other = await presses.refuse("guarded", {"message": "a"}, "p1", FROM.origin, "seen_on_another")
+        assert (first.outcome, other.outcome, other.widget) == ("published", "refused", "guarded")
+        assert "already used" in other.reason
+
+    asyncio.run(pressed())
