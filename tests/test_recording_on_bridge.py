@@ -144,7 +144,8 @@ def test_a_killed_server_leaves_a_recording_to_the_next_one(
 def test_without_a_disk_it_says_so_and_presses_work(
     own_bridge: Bridge, tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:
-    (tmp_path / "data").write_text("not a folder")
+    (tmp_path / "data").mkdir()
+    (tmp_path / "data/recordings").write_text("not a folder")
     kiosk = servers(recording(own_bridge, tmp_path))
     until(kiosk.ready, "ready")
     assert kiosk.press("operation", "hello").status_code == 200
