@@ -24,7 +24,9 @@ from tests.builders import (
     FROM,
     INTERFACES,
     NOW,
+    TEXT,
     Table,
+    endpoint,
     panel_of,
     permits,
     robot_there,
@@ -187,6 +189,17 @@ def test_while_it_is_held_messages_go_out_at_the_rate_and_one_at_the_end(bench: 
     assert (receipt.outcome, receipt.widget, receipt.cause) == ("published", "jog", "")
     assert receipt.reason.startswith("Released at ")
     assert receipt.reason.endswith(", after 1.0 s.")
+
+
+def test_a_doubt_ends_it_and_the_stop_still_goes_out(bench: Bench) -> None:
+    """Another node takes the topic for another type: who moves by it has to hear the stop."""
+    bench.begun()
+    endpoint(bench.robot, "MS", "/jog", TEXT)
+    bench.holds.judge()
+    assert bench.points == [MOVES, STOPS]
+    (receipt,) = bench.receipts
+    assert receipt.outcome == "aborted"
+    assert "is std_msgs/msg/String on the robot" in receipt.reason
 
 
 @pytest.mark.parametrize("code", sorted(set(WHYS.values()) - {RELEASED} | {"hold_by_closing"}))

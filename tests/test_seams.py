@@ -2,13 +2,17 @@
 
 import asyncio
 import logging
+import time
 from typing import Any
 
 import pytest
 
+from app import kiosk
+from app.browsers import stranger
 from app.calls import with_fields
 from app.intake import Intake
-from app.link import Changes
+from app.link import Changes, config_to
+from app.log import Unlogged
 from app.logs import RobotLog
 from app.panel.model import Panel
 from app.receipts import LONGEST_KEPT
@@ -125,5 +129,47 @@ def test_a_refusal_is_not_answered_with_another_press() -> None:
         other = await presses.refuse("guarded", {"message": "a"}, "p1", FROM.origin, "seen_on_another")
         assert (first.outcome, other.outcome, other.widget) == ("published", "refused", "guarded")
         assert "already used" in other.reason
+
+    asyncio.run(pressed())
+
+
+def test_a_link_that_is_lost_while_it_is_renewed_is_renewed_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """And whatever Zenoh makes of it, it is tried until there is a session."""
+    monkeypatch.setattr(kiosk, "RENEW_AGAIN_S", 0.01)
+    renewals: list[str] = []
+
+    async def lost() -> None:
+        one = kiosk.Kiosk(small_panel(), config_to("tcp/127.0.0.1:1"), "r1", Unlogged())
+
+        def renew() -> None:
+            renewals.append("renewed")
+            time.sleep(0.05)
+            if len(renewals) == 2:
+                raise RuntimeError("no session")
+
+        monkeypatch.setattr(one.link, "renew", renew)
+        one.renew()
+        await asyncio.sleep(0.01)
+        one.renew()
+        await asyncio.sleep(0.4)
+        assert len(renewals) == 3
+        one.renew()
+        await asyncio.sleep(0.2)
+        await one.stop()
+
+    asyncio.run(lost())
+    assert len(renewals) == 4
+
+
+def test_who_ends_or_takes_a_new_panel_sends_nothing_more() -> None:
+    async def pressed() -> None:
+        one = kiosk.Kiosk(small_panel(), config_to("tcp/127.0.0.1:1"), "r1", Unlogged())
+        permits(one.robot)
+        by = one.by("free", stranger("192.0.2.1"))
+        assert by.controls().permitted
+        await one.stop()
+        assert by.controls().code == "ending"
 
     asyncio.run(pressed())
