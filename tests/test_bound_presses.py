@@ -3,7 +3,7 @@
 import signal
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -18,11 +18,12 @@ HOUR_MS = 3_600_000
 
 
 @pytest.fixture
-def kiosk(server: Server, node: RosNode) -> Server:
+def kiosk(server: Server, node: RosNode) -> Iterator[Server]:
     node.advertise("/operation_enabled", "std_msgs/msg/Bool")
     until(server.ready, "ready")
     permit(server, node, True)
-    return server
+    yield server
+    node.withdraw("/operation_enabled")
 
 
 def permit(kiosk: Server, node: RosNode, value: bool) -> None:

@@ -151,5 +151,5 @@ def test_ten_thousand_calls_leave_nothing_behind(kiosk: Server, robot: Robot) ->
     after, memory_after = rest(kiosk)
     assert after.pop("objects") - before.pop("objects") < STRAY_OBJECTS
     assert after == before
-    assert before["Presses._receipts"] == RECEIPTS_KEPT
+    assert before["Receipts._receipts"] == RECEIPTS_KEPT
     assert memory_after - memory_before < GROWTH_KB

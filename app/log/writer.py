@@ -65,13 +65,22 @@ class OperatorLog:
                 pass  # the keeper meets it again, and says it
             break
         self._keeper.start()
-        await asyncio.to_thread(self._keeper.tried.wait, ENDED_WITHIN_S)
+        await self._own(self._keeper.tried.wait)
 
     async def stop(self) -> None:
         """Writes what is waiting, and lets go of the folder."""
-        await asyncio.to_thread(self._keeper.stop, ENDED_WITHIN_S)
+        await self._own(self._keeper.stop)
         self._readers.shutdown(wait=False, cancel_futures=True)
         self._folder.release()
+
+    async def _own(self, wait: Callable[[float], object]) -> None:
+        """Waits on a thread of its own, whatever else the process's threads are busy with."""
+        thread = ThreadPoolExecutor(1, "operators-log-wait")
+        waited = self._loop.run_in_executor(thread, wait, ENDED_WITHIN_S)
+        try:
+            await waited
+        finally:
+            thread.shutdown(wait=waited.done() and not waited.cancelled())
 
     @property
     def enabled(self) -> bool:
