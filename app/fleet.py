@@ -5,8 +5,7 @@ page shows how the others are.
 """
 
 import asyncio
-import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 
 from app.errors import NotFound
 from app.kiosk import Kiosk
@@ -15,9 +14,8 @@ from app.link import Config
 from app.logbook import Log
 from app.panel.model import Panel, RobotEntry
 from app.recording import Recordings
+from app.robot import Robot
 from app.sentences import say
-
-log = logging.getLogger("kiosk.fleet")
 
 ConfigOf = Callable[[RobotEntry | None], Config]
 
@@ -38,7 +36,6 @@ class Fleet:
     ) -> None:
         """One robot without a name, or the panel's `[[robot]]` entries."""
         self.panel = panel
-        self.fault = fault
         self._kiosks: dict[str | None, Kiosk] = {}
         for entry in panel.robots or (None,):
             self._kiosks[entry.id if entry else None] = Kiosk(
@@ -47,8 +44,7 @@ class Fleet:
                 revision,
                 operators_log,
                 entry=entry,
-                robots=self._lamps,
-                told=self._tell_others,
+                others=self,
                 recordings=recordings,
                 simulated=simulated,
                 fault=fault,
@@ -71,7 +67,6 @@ class Fleet:
 
     def show_fault(self, text: str) -> None:
         """A fault of the panel file, shown on every page; "" takes it away."""
-        self.fault = text
         for kiosk in self.kiosks:
             kiosk.show_fault(text)
 
@@ -98,10 +93,15 @@ class Fleet:
         known = ", ".join(str(name) for name in self._kiosks if name) or "one robot without a name"
         raise NotFound(f'there is no robot "{robot:.64}" on this panel; there is {known}')
 
-    def _lamps(self) -> Mapping[str, Lamp]:
-        return {entry: kiosk.lamp for entry, kiosk in self._kiosks.items() if entry is not None}
+    # What each robot's kiosk needs of the others (`showing.Others`).
 
-    def _tell_others(self, which: Kiosk) -> None:
+    def lamps(self) -> Mapping[str, Lamp]:
+        return {entry: k.showing.lamp for entry, k in self._kiosks.items() if entry is not None}
+
+    def boots(self) -> Collection[str]:
+        return {kiosk.board.boot for kiosk in self.kiosks}
+
+    def show_but(self, robot: Robot) -> None:
         for kiosk in self.kiosks:
-            if kiosk is not which:
+            if kiosk.robot is not robot:
                 kiosk.show()

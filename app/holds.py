@@ -15,14 +15,14 @@ from typing import Any, Final, Protocol
 
 from app.errors import FieldError, InputError, LinkError, NotFound
 from app.interfaces import INTEGERS, Interfaces
-from app.interlocks import Verdict, press_verdict, way
+from app.interlocks import Verdict, way
 from app.leases import LEASE_S, Lease
 from app.logs import RobotLog
 from app.panel.check_holds import with_own_fields
 from app.panel.model import Hold, Panel
 from app.panel.template import filled, names_in
 from app.progress import Answer, Outcome
-from app.receipts import LONGEST_LOGGED, NO_WAY, By, Cause, Receipt, named, receipt_of
+from app.receipts import LONGEST_LOGGED, By, Cause, Receipt, cause_of, judged, named, receipt_of
 from app.robot import Robot
 from app.sentences import clock, say
 
@@ -122,8 +122,7 @@ class Holds:
         if now >= sent + LEASE_S:
             return self._refused(widget, inputs, by, say("hold_late"), "interlock")
         if not (verdict := self._verdict(widget, by, now)).permitted:
-            cause: Cause = "link" if verdict.code in NO_WAY else "interlock"
-            return self._refused(widget, inputs, by, verdict.reason or "", cause)
+            return self._refused(widget, inputs, by, verdict.reason or "", cause_of(verdict))
         if why := by.doubt():
             return self._refused(widget, inputs, by, why, "interlock")
         try:
@@ -144,9 +143,9 @@ class Holds:
         self.step()
         return holding
 
-    def refuse(self, widget_id: str, by: By, code: str, **about: object) -> Receipt:
-        """A hold that can't be judged by what its browser said, for the reason of this code."""
-        return self._refused(self.widget(widget_id), {}, by, say(code, **about), "interlock")
+    def refuse(self, widget_id: str, by: By, why: str, cause: Cause = "interlock") -> Receipt:
+        """A hold that is not even judged."""
+        return self._refused(self.widget(widget_id), {}, by, why, cause)
 
     def beat(self, holding: Holding, number: int, sent: float) -> bool:
         """A heartbeat; whether the hold goes on."""
@@ -193,11 +192,7 @@ class Holds:
         return self._held.get(holding.widget.id) is holding
 
     def _verdict(self, widget: Hold, by: By, now: float) -> Verdict:
-        """The first that locks: the way to the robot, who has control, the widget's interlock."""
-        for verdict in (way(self._robot, now), by.controls()):
-            if not verdict.permitted:
-                return verdict
-        return press_verdict(widget, self._panel.interlock(widget.interlock), self._robot, now)
+        return judged(widget, by, self._panel, self._robot, now)
 
     def _plan(self) -> None:
         if self._timer is not None:

@@ -1,52 +1,42 @@
 """A running kiosk: one robot with its link, board and presses, and how they are wired.
 
-Down: a callback of the link wakes the loop → `_take` → robot → `show` → views → board → streams.
-Permissions and the link are shown at once, values at most `FRAMES_PER_S` times a second.
+Down: a callback of the link wakes the loop → `_take` → robot → showing → views → board → streams.
 """
 
 import asyncio
 import logging
-import math
 import time
-from collections.abc import Callable, Mapping
 from contextlib import ExitStack, suppress
-from typing import Any, Final
+from typing import Final
 
-from app import moments
 from app.actions import Actions
 from app.asked import WITHIN_S, Asked
-from app.board import Board
-from app.browsers import Browser
 from app.calls import Calls
 from app.confirmations import Confirmations
 from app.control import Control
+from app.doubts import Doubts
 from app.errors import KioskError, LinkError
 from app.holds import Holds
 from app.intake import Intake
 from app.interfaces import interfaces_of
 from app.interlocks import Verdict, locked, way
 from app.joining import Joining
-from app.lamps import Lamp
 from app.link import Config, Link
-from app.logbook import Log, Logbook, origin_of
+from app.logbook import Log, Logbook
 from app.logs import RobotLog
 from app.panel.model import Panel, RobotEntry
 from app.parameters import Parameters
 from app.presses import Presses
-from app.receipts import By, Receipt
 from app.recording import Recorder, Recordings
 from app.robot import Robot
 from app.rosout import TOPIC, Rosout
 from app.sending import Sending
-from app.sentences import say
-from app.since import Since
-from app.views import Sight, sight
+from app.showing import Alone, Others, Showing
 
 log = logging.getLogger("kiosk")
 
-FRAMES_PER_S: Final = 20.0
 RENEW_AGAIN_S: Final = 1.0
-AHEAD_S: Final = 1.0  # a press can't be from later than now, but for rounding and drift
+ALONE: Final = Alone()
 
 
 class Kiosk:
@@ -60,41 +50,48 @@ class Kiosk:
         operators_log: Log,
         *,
         entry: RobotEntry | None = None,
-        robots: Callable[[], Mapping[str, Lamp]] = dict,
-        told: Callable[["Kiosk"], None] = lambda _: None,
+        others: Others = ALONE,
         recordings: Recordings | None = None,
         simulated: bool = False,
         fault: str = "",
     ) -> None:
-        """`entry` is which of the panel's robots this is for, where it has several: `robots` are
-        then the lamps of all, and `told` is called when this one's has changed. `revision` is of
-        all that a page loads; `fault` stands above it until there is none."""
+        """`entry` is which of the panel's robots this is for, where it has several, `others` are
+        then all of them. `revision` is of all that a page loads; `fault` stands above it until
+        there is none."""
         self.panel = panel
         self.entry = entry
         self.base = f"/robots/{entry.id}" if entry else ""
-        self._robots = robots
-        self._told = told
         self._operators_log = operators_log
         self._following = ExitStack()
-        self._simulated = simulated
-        self.fault = fault
         self.interfaces = interfaces_of(panel.distro, panel.interfaces)
         self._loop = asyncio.get_running_loop()
         self.link = Link(config, self._wake)
         self.robot = Robot(panel, self.interfaces, self.link.zid, entry)
         self._log = RobotLog(log, self.robot.name)
         self.control = Control(panel.control, self.robot.name, tell=self._log.info)
-        self._recordings = recordings
-        self._since = Since()
-        first = self._sight()
-        self.lamp = first.robot
+        self.showing = Showing(
+            panel,
+            self.robot,
+            revision,
+            self.control,
+            operators_log,
+            others,
+            before=lambda: self.holds.judge(),
+            recordings_fault=lambda: recordings.fault if recordings else "",
+            simulated=simulated,
+            fault=fault,
+        )
+        self.show = self.showing.now
+        self.board = self.showing.board
         self._recorder = self._recording(recordings)
-        self.board = Board(first.view, revision)
         self._calls = Calls(self.interfaces, self.robot, self.link, self.show)
         self._actions = Actions(self.interfaces, self.robot, self.link, self.show)
         self._confirmations = Confirmations(self.robot, self.show)
         self._parameters = Parameters(
             panel, self.interfaces, self.robot, self.link, self._calls, self.show
+        )
+        self.doubts = Doubts(
+            self.board, self.control, operators_log, panel.press_expires_s, others.boots
         )
         self.logbook = Logbook(operators_log, self.robot.name, lambda: self.board.id)
         self.sending = Sending(
@@ -136,11 +133,9 @@ class Kiosk:
         )
         self._joining = Joining(panel, self.interfaces, self.robot, self.link, self.show, self.renew)
         self._asked = Asked(lambda: self._joining.answered(WITHIN_S))
-        self._shown_at = 0.0
-        self._timer: asyncio.TimerHandle | None = None
         self._rosout = Rosout(self.robot, self.interfaces, self.link, self._loop)
         self._renewing: asyncio.Task[None] | None = None
-        self._lost_again = False
+        self._lost = False
         self._stopped = False
 
     async def start(self) -> None:
@@ -158,8 +153,8 @@ class Kiosk:
         self._stopped = True
         self._following.close()
         self._rosout.stop()
-        if self._timer is not None:
-            self._timer.cancel()
+        self.showing.stop()
+        self.doubts.end()
         if self._renewing is not None:
             await asyncio.gather(self._renewing, return_exceptions=True)
         await self._asked.stop()
@@ -200,81 +195,31 @@ class Kiosk:
             return self.way
         return locked("bridge_silent") if self.way.permitted else self.way
 
-    async def press(
-        self,
-        widget: str,
-        inputs: Mapping[str, Any],
-        press_id: str,
-        browser: Browser,
-        seen: str = "",
-        version: int | None = None,
-        at: float | None = None,
-    ) -> Receipt:
-        """A press, judged by all that has come from the robot until now.
-
-        `seen` is what the log is told of what the operator saw: the `version` of the board; `at` is
-        when it was pressed, in the server's own time. None where that is not known.
-        """
-        by = self.by(widget, browser, seen, version, at)
-        return await self.presses.press(widget, inputs, press_id, by)
-
-    def by(
-        self,
-        widget: str,
-        browser: Browser,
-        seen: str = "",
-        version: int | None = None,
-        at: float | None = None,
-    ) -> By:
-        """Who presses or holds a widget, with what has to hold for that at every moment."""
-        self.control.touch(browser)
-        return By(
-            origin_of(browser, seen),
-            lambda: self._controls(browser),
-            lambda: self._doubt(widget, version, at),
-        )
-
-    def _controls(self, browser: Browser) -> Verdict:
-        if self._stopped:
-            return locked("ending")
-        if self._operators_log.lock:
-            return Verdict(False, "log", self._operators_log.lock)
-        return self.control.verdict(browser)
-
-    def _doubt(self, widget: str, version: int | None, at: float | None) -> str:
-        """Why a press is no longer what was meant; "" if it is."""
-        if version is not None and version < self.board.turned(widget):
-            return say("changed_meanwhile")
-        age = 0.0 if at is None else moments.now() - at
-        if age > self.panel.press_expires_s:
-            return say("expired", seconds=f"{age:.1f}")
-        return say("ahead") if age < -AHEAD_S else ""
-
     def renew(self) -> None:
         """A new Zenoh session: until it is joined, nobody is known to be there."""
         self.robot.lose()
         self._follow(came=False)
         self.show()
-        self._lost_again = True
+        self._lost = True
         if self._renewing is None:
             self._renewing = self._loop.create_task(self._renew())
 
     async def _renew(self) -> None:
         """Until there is a session that was not lost while it was opened."""
-        while self._lost_again and not self._stopped:
-            self._lost_again = False
+        while self._lost and not self._stopped:
+            self._lost = False
             try:
                 await asyncio.to_thread(self.link.renew)
             except Exception as error:  # whatever Zenoh makes of it: without a session all is locked
                 self._log.error("%s", error)
-                self._lost_again = True
+                self._lost = True
                 await asyncio.sleep(RENEW_AGAIN_S)
         self.robot.graph.own_zid = self.link.zid
         self._renewing = None
 
     def show_fault(self, text: str) -> None:
         """A fault of the panel file, shown on every page; "" takes it away."""
-        self.fault = text
+        self.showing.fault = text
         self.show()
 
     def _warm_up(self) -> None:
@@ -309,7 +254,7 @@ class Kiosk:
         if urgent or came_up:
             self.show()
         else:
-            self._show_at(self._shown_at + 1 / FRAMES_PER_S)
+            self.showing.soon()
 
     def _follow(self, came: bool) -> None:
         """After every change of the graph; `came`: there is a bridge where there was none."""
@@ -318,44 +263,3 @@ class Kiosk:
         self._actions.follow()
         self._parameters.follow()
         self._joining.follow(came)
-
-    # Showing.
-
-    def _sight(self) -> Sight:
-        recordings = self._recordings.fault if self._recordings else ""
-        seen = sight(
-            self.panel,
-            self.robot,
-            time.monotonic(),
-            robots=self._robots(),
-            simulated=self._simulated,
-            fault="\n".join(filter(None, (self.fault, self._operators_log.fault, recordings))),
-            lock=self._operators_log.lock,
-            control=self.control.view(),
-        )
-        return self._since.dated(seen)
-
-    def show(self) -> None:
-        """Posts the state as of now to the board."""
-        if self._stopped:
-            return
-        if self._timer is not None:
-            self._timer.cancel()
-            self._timer = None
-        self._shown_at = time.monotonic()
-        self.holds.judge()
-        seen = self._sight()
-        if seen.robot != self.lamp:
-            self.lamp = seen.robot
-            self._told(self)
-            seen = self._sight()
-        self.board.post(seen.view)
-        self._show_at(min(seen.until, self.control.until))
-
-    def _show_at(self, when: float) -> None:
-        """Shows again at `when` (monotonic seconds), or sooner if that is planned already."""
-        if self._timer is not None:
-            if self._timer.when() <= when:
-                return
-            self._timer.cancel()
-        self._timer = None if when == math.inf else self._loop.call_at(when, self.show)

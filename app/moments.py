@@ -2,7 +2,6 @@
 sleeps. Heartbeats carry it, and a press says in it when it was pressed."""
 
 import time
-from datetime import UTC, datetime
 from typing import Final
 
 _WALL: Final = time.time()
@@ -12,8 +11,3 @@ _BEGAN: Final = time.clock_gettime(time.CLOCK_BOOTTIME)
 def now() -> float:
     """Seconds since the epoch, as the wall clock said when the process began."""
     return _WALL + time.clock_gettime(time.CLOCK_BOOTTIME) - _BEGAN
-
-
-def as_text(moment: float) -> str:
-    """RFC 3339, in UTC, to the millisecond."""
-    return datetime.fromtimestamp(moment, UTC).isoformat(timespec="milliseconds")

@@ -15,7 +15,6 @@ from functools import partial
 from typing import Any
 
 from app.errors import FieldError, InputError, LinkError, LogError, NotFound
-from app.interlocks import Verdict, press_verdict, way
 from app.log import Origin
 from app.logbook import Logbook, Noted
 from app.logs import RobotLog
@@ -24,15 +23,16 @@ from app.progress import Answer
 from app.receipts import (
     FINE,
     LONGEST_LOGGED,
-    NO_WAY,
     By,
     Cause,
     Receipt,
     Receipts,
     Witness,
+    cause_of,
     corrected,
+    fingerprint,
+    judged,
     named,
-    print_of,
     receipt_of,
     with_doubt,
 )
@@ -48,7 +48,7 @@ class _UnderWay:
     """A press whose receipt is not there yet."""
 
     widget: str
-    print: str
+    fingerprint: str
     receipt: "asyncio.Future[Receipt]"
 
 
@@ -84,39 +84,17 @@ class Presses:
         What it is judged by, is judged in the moment of sending.
         """
         widget = self.widget(widget_id)
-        work = self._logged(widget, inputs, press_id, by)
-        return await self._known_or(widget, inputs, press_id, by.origin, work)
-
-    async def _known_or(
-        self,
-        widget: Pressed,
-        inputs: Mapping[str, Any],
-        press_id: str,
-        origin: Origin,
-        work: Coroutine[Any, Any, Receipt],
-    ) -> Receipt:
-        """The receipt that a press of this id has or will have; else that of the work."""
         known = self._under_way.get(press_id) or self._receipts.get(press_id)
         if known is None:
+            work = self._logged(widget, inputs, press_id, by)
             return await self._once(widget, inputs, press_id, work)
-        work.close()
-        if (known.widget, known.print) != (widget.id, print_of(inputs)):
-            reused = say("press_reused", id=press_id)
+        if (known.widget, known.fingerprint) != (widget_id, fingerprint(inputs)):
             own_id = f"{press_id:.40}.{secrets.token_hex(4)}"
-            work = self._refused(widget, inputs, own_id, origin, reused, "input")
+            work = self._reused(widget, inputs, press_id, own_id, by.origin)
             return await self._once(widget, inputs, own_id, work)
         if isinstance(known, _UnderWay):
             return await asyncio.shield(known.receipt)
         return known
-
-    async def refuse(
-        self, widget_id: str, inputs: Mapping[str, Any], press_id: str, origin: Origin, code: str
-    ) -> Receipt:
-        """A press that can't be judged by what its browser had seen, for the reason of this code."""
-        text = say("refused", why=say(code), time=clock(time.time()))
-        widget = self.widget(widget_id)
-        work = self._refused(widget, inputs, press_id, origin, text, "interlock")
-        return await self._known_or(widget, inputs, press_id, origin, work)
 
     async def cancel(self, widget_id: str, origin: Origin) -> Receipt:
         """Asks the robot to cancel the goal of an action widget: anybody may, whoever has control."""
@@ -146,7 +124,7 @@ class Presses:
     ) -> Receipt:
         """Does the work of a press, while others of the same id wait for its receipt."""
         loop = asyncio.get_running_loop()
-        under_way = _UnderWay(widget.id, print_of(inputs), loop.create_future())
+        under_way = _UnderWay(widget.id, fingerprint(inputs), loop.create_future())
         self._under_way[press_id] = under_way
         try:
             receipt = await work
@@ -183,36 +161,26 @@ class Presses:
                 LONGEST_LOGGED, inputs, receipt.outcome, receipt.reason)  # fmt: skip
         return receipt
 
-    async def _refused(
+    async def _reused(
         self,
         widget: Pressed,
         inputs: Mapping[str, Any],
         press_id: str,
+        own_id: str,
         origin: Origin,
-        text: str,
-        cause: Cause,
     ) -> Receipt:
-        """A press that is not even judged."""
-        self._receipts.begin(press_id, widget.id, origin, inputs)
-        receipt = receipt_of(widget, inputs, press_id, Answer("refused", text), cause)
-        self._log.warning("press %s of %s by %s: %s", press_id, widget.id, named(origin), text)
-        return with_doubt(
-            receipt, await self._logbook.refused(widget.id, inputs, press_id, origin, text)
-        )
+        """A press with another one's id is not even judged."""
+        text = say("press_reused", id=press_id)
+        self._receipts.begin(own_id, widget.id, origin, inputs)
+        self._log.warning("press %s of %s by %s: %s", own_id, widget.id, named(origin), text)
+        why = await self._logbook.refused(widget.id, inputs, own_id, origin, text)
+        return with_doubt(receipt_of(widget, inputs, own_id, Answer("refused", text), "input"), why)
 
     def _correct(self, noted: Noted, press_id: str, answer: Answer) -> None:
         """What is known of a press now is another thing than its receipt said."""
         noted.corrected(answer)
         if old := self._receipts.get(press_id):
             self._receipts.keep(corrected(old, answer))
-
-    def _judged(self, widget: Pressed, by: By) -> Verdict:
-        """The first that locks: the way to the robot, who has control, the widget's interlock."""
-        now = self._monotonic()
-        for verdict in (way(self._robot, now), by.controls()):
-            if not verdict.permitted:
-                return verdict
-        return press_verdict(widget, self._panel.interlock(widget.interlock), self._robot, now)
 
     async def _pressed(
         self, widget: Pressed, inputs: Mapping[str, Any], press_id: str, noted: Noted, by: By
@@ -225,11 +193,10 @@ class Presses:
             return receipt(Answer("refused", say(sentence, why=why, time=now)), cause)
 
         self._catch_up()
-        verdict = self._judged(widget, by)
+        verdict = judged(widget, by, self._panel, self._robot, self._monotonic())
         noted.judged(verdict.code)
         if not verdict.permitted:
-            cause: Cause = "link" if verdict.code in NO_WAY else "interlock"
-            return refused("refused", verdict.reason or "", cause)
+            return refused("refused", verdict.reason or "", cause_of(verdict))
         if why := by.doubt():
             return refused("refused", why, "interlock")
         try:

@@ -8,10 +8,11 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from typing import Any, Final, Literal, Protocol
 
-from app.interlocks import PERMITTED, Verdict
+from app.interlocks import PERMITTED, Verdict, press_verdict, way
 from app.log import Origin
-from app.panel.model import Hold, Pressed
+from app.panel.model import Hold, Panel, Pressed
 from app.progress import Answer, Outcome
+from app.robot import Robot
 from app.sentences import say
 
 Cause = Literal["", "interlock", "input", "link", "log", "time"]
@@ -29,6 +30,7 @@ NO_WAY: Final = frozenset(
         "no_service",
         "no_parameters",
         "getting_ready",
+        "ending",
     }
 )
 FINE: Final = frozenset({"published", "confirmed", "accepted", "succeeded"})
@@ -39,7 +41,7 @@ class Receipt:
     """What came of a press; `reason` is a sentence for the operator, `cause` why it was refused.
 
     `inputs` are those that the press came with, if they are few and short: a page without scripts
-    shows them again. `print` tells these from any others.
+    shows them again. `fingerprint` tells these from any others.
     """
 
     id: str
@@ -49,7 +51,7 @@ class Receipt:
     at: str
     cause: Cause
     inputs: Mapping[str, Any]
-    print: str
+    fingerprint: str
 
     def as_json(self) -> dict[str, str]:
         return {
@@ -74,6 +76,22 @@ class By:
     origin: Origin
     controls: Callable[[], Verdict] = lambda: PERMITTED
     doubt: Callable[[], str] = no_doubt
+
+
+def judged(widget: Pressed | Hold, by: By, panel: Panel, robot: Robot, now: float) -> Verdict:
+    """Whether a widget may be pressed or held by somebody now. The first that locks is told: the way to
+    the robot, who has control, the widget's interlock."""
+    for verdict in (way(robot, now), by.controls()):
+        if not verdict.permitted:
+            return verdict
+    return press_verdict(widget, panel.interlock(widget.interlock), robot, now)
+
+
+def cause_of(verdict: Verdict) -> Cause:
+    """Why a receipt says that a verdict refused it."""
+    if verdict.code == "log":
+        return "log"
+    return "link" if verdict.code in NO_WAY else "interlock"
 
 
 class Witness(Protocol):
@@ -118,13 +136,12 @@ def receipt_of(
     at = datetime.now(UTC).isoformat(timespec="milliseconds")
     kept = dict(inputs) if _short(inputs) else {}
     told = answer.outcome, answer.text, at, cause
-    return Receipt(press_id, widget.id, *told, kept, print_of(inputs))
+    return Receipt(press_id, widget.id, *told, kept, fingerprint(inputs))
 
 
-def print_of(inputs: Mapping[str, Any]) -> str:
-    """A fingerprint of inputs: the same for the same ones only."""
-    text = json.dumps(inputs, sort_keys=True, default=str)
-    return hashlib.sha256(text.encode(errors="surrogatepass")).hexdigest()
+def fingerprint(inputs: Mapping[str, Any]) -> str:
+    """The same for the same inputs only, which are what JSON has."""
+    return hashlib.sha256(json.dumps(inputs, sort_keys=True).encode()).hexdigest()
 
 
 def _short(inputs: Mapping[str, Any]) -> bool:

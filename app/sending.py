@@ -127,8 +127,6 @@ class Sending:
                 values[name] = self._parameters.checked(field, inputs[name])
         return values
 
-    async def cancel(self, widget: Pressed) -> Answer:
-        """Asks the robot to cancel the goal of an action widget; NotFound for others."""
-        if not isinstance(widget, Action):
-            raise NotFound(f'"{widget.id}" is not an action: there is nothing to cancel')
+    async def cancel(self, widget: Action) -> Answer:
+        """Asks the robot to cancel the goal of an action widget."""
         return await self._actions.cancel(widget)

@@ -219,7 +219,6 @@ ENGLISH: Final[Mapping[str, str]] = {
     "hold_by_stopping": "the panel's server stops or takes a new panel.",
     "hold_elsewhere": "held by another browser.",
     "hold_same_topic": "{label} is held, which sends on {topic} too.",
-    "hold_unlogged": "{why}",
     "hold_late": "the press came too late.",
     "hold_over": "This hold is over: let go and press again.",
     "hold_scripts": "Locked: holding needs the page's scripts.",

@@ -16,6 +16,7 @@ from app.logbook import Log, Logbook
 from app.panel.model import Panel
 from app.progress import IDLE
 from app.receipts import By, Receipt
+from app.sentences import say
 from tests.builders import INTERFACES, panel_of, permits, presses_of, robot_there, small_panel
 
 KIM = Origin(address="10.0.0.7", browser="b1", who="Kim", seen="boot-7")
@@ -281,11 +282,12 @@ def test_every_refusal_is_in_the_log(tmp_path: Path) -> None:
         permits(bench.robot, False)
         await bench.press("guarded", "p2")
         await bench.press("free", "p2")
-        await bench.presses.refuse("free", {}, "p3", KIM, "seen_before_restart")
+        by = By(KIM, doubt=lambda: say("seen_before_restart"))
+        await bench.presses.press("free", {"message": "hi"}, "p3", by)
 
     entries = [entry for entry in real(tmp_path, work) if entry.kind != "pressed"]
     assert [entry.outcome for entry in entries] == ["refused"] * 4
-    assert [entry.kind for entry in entries] == ["closed", "closed", "refused", "refused"]
+    assert [entry.kind for entry in entries] == ["closed", "closed", "refused", "closed"]
     words = ("characters long", "does not permit", "already used", "started anew")
     assert all(word in entry.reason for word, entry in zip(words, entries, strict=True))
 

@@ -17,7 +17,7 @@ from app.errors import PanelError
 from app.interfaces import Structure
 from app.panel import load_panel
 from app.panel.record import RecordRules
-from app.receipts import Receipt, print_of
+from app.receipts import Receipt, fingerprint
 from app.recording import Recorder, Recordings
 from app.recording.file import PRESSES, UNFINISHED, Channel, File
 from app.recording.folder import Folder, name_of
@@ -213,7 +213,7 @@ class Cell:
         self.recorder.pressed(press_id, "free", "10.0.0.1", {"message": "hello"})
         at, inputs = "2026-01-01T00:00:00.000+00:00", {"message": "hello"}
         self.recorder.answered(
-            Receipt(press_id, "free", outcome, "Sent.", at, "", inputs, print_of(inputs))
+            Receipt(press_id, "free", outcome, "Sent.", at, "", inputs, fingerprint(inputs))
         )
 
     async def finished(self, count: int = 1) -> None:

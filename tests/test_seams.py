@@ -15,7 +15,7 @@ from app.link import Changes, config_to
 from app.log import Unlogged
 from app.logs import RobotLog
 from app.panel.model import Panel
-from app.receipts import LONGEST_KEPT
+from app.receipts import LONGEST_KEPT, By
 from app.robot import Robot, Sample
 from tests.builders import (
     BOOL,
@@ -117,18 +117,21 @@ def test_a_large_press_leaves_no_large_receipt() -> None:
     assert "already used" in other.reason
 
 
-def test_a_refusal_is_not_answered_with_another_press() -> None:
+def test_a_press_in_doubt_is_not_answered_with_another_press() -> None:
     panel = small_panel()
-    way = Way()
     robot = robot_there(panel)
     permits(robot)
-    presses = presses_of(panel, robot, way)
+    presses = presses_of(panel, robot, Way())
+    late = By(FROM.origin, doubt=lambda: "the page showed another robot.")
 
     async def pressed() -> None:
         first = await presses.press("free", {"message": "a"}, "p1", FROM)
-        other = await presses.refuse("guarded", {"message": "a"}, "p1", FROM.origin, "seen_on_another")
+        other = await presses.press("guarded", {"message": "a"}, "p1", late)
         assert (first.outcome, other.outcome, other.widget) == ("published", "refused", "guarded")
         assert "already used" in other.reason
+        new = await presses.press("guarded", {"message": "a"}, "p2", late)
+        assert (new.outcome, new.cause) == ("refused", "interlock")
+        assert "another robot" in new.reason
 
     asyncio.run(pressed())
 
@@ -167,7 +170,7 @@ def test_who_ends_or_takes_a_new_panel_sends_nothing_more() -> None:
     async def pressed() -> None:
         one = kiosk.Kiosk(small_panel(), config_to("tcp/127.0.0.1:1"), "r1", Unlogged())
         permits(one.robot)
-        by = one.by("free", stranger("192.0.2.1"))
+        by = one.doubts.by("free", stranger("192.0.2.1"))
         assert by.controls().permitted
         await one.stop()
         assert by.controls().code == "ending"

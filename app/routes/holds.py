@@ -26,7 +26,8 @@ from pydantic import BaseModel, ConfigDict, Field, JsonValue, TypeAdapter, Valid
 from starlette.types import Message
 
 from app.browsers import Browser
-from app.errors import LogError
+from app.doubts import SEEN
+from app.errors import InputError, LogError
 from app.holds import RELEASED, Holding
 from app.kiosk import Kiosk
 from app.leases import sent_at
@@ -34,13 +35,15 @@ from app.logbook import Noted
 from app.receipts import By, Receipt, with_doubt
 from app.routes.site import CurrentKiosk, CurrentSite
 from app.routes.visitors import visitor
+from app.sentences import say
 
 router = APIRouter()
 
 BEGIN_WITHIN_S: Final = 2.0  # from the opening of the socket
 SILENCE_S: Final = 2.0  # a hold is over long before: nobody is there
 LONGEST_MESSAGE: Final = 64 * 1024
-CLOSE: Final[Mapping[str, int]] = {"interlock": 4409, "input": 4422, "link": 4503}  # 4000 + HTTP's
+# 4000 + HTTP's
+CLOSE: Final[Mapping[str, int]] = {"interlock": 4409, "input": 4422, "link": 4503, "log": 4503}
 
 # What a browser may say of why it ends a hold → the code of the sentence.
 WHYS: Final[Mapping[str, str]] = {
@@ -71,7 +74,7 @@ class Said(BaseModel):
 class Begin(Said):
     do: Literal["begin"]
     inputs: dict[str, JsonValue]
-    seen: Annotated[str, Field(pattern=r"^[0-9a-f]{1,32}-[0-9]{1,18}$")]
+    seen: Annotated[str, Field(pattern=SEEN)]
 
 
 class Beat(Said):
@@ -95,7 +98,7 @@ _message: TypeAdapter[Begin | Beat | End] = TypeAdapter(
 async def hold(socket: WebSocket, widget: str, site: CurrentSite, kiosk: CurrentKiosk) -> None:
     kiosk.holds.widget(widget)
     await socket.accept()
-    session = _Session(socket, kiosk, visitor(socket, site))
+    session = _Session(socket, kiosk, widget, visitor(socket, site))
     with suppress(WebSocketDisconnect):
         receipt = await session.run(widget)
         site.metrics.presses.labels(receipt.outcome).inc()
@@ -104,12 +107,13 @@ async def hold(socket: WebSocket, widget: str, site: CurrentSite, kiosk: Current
 class _Session:
     """One socket and its one hold."""
 
-    def __init__(self, socket: WebSocket, kiosk: Kiosk, browser: Browser) -> None:
+    def __init__(self, socket: WebSocket, kiosk: Kiosk, widget: str, browser: Browser) -> None:
         self._socket = socket
         self._kiosk = kiosk
         self._opened_at = time.monotonic()
         self._ended: asyncio.Future[Receipt] = asyncio.get_running_loop().create_future()
         self._browser = browser
+        self._by = kiosk.doubts.by(widget, browser)
         self._noted: Noted | None = None
         self._next: asyncio.Future[Message] | None = None  # what the browser says next
 
@@ -135,27 +139,24 @@ class _Session:
         return self._ended.result()
 
     async def _begun(self, widget: str) -> Receipt | Holding:
-        holds, by = self._kiosk.holds, self._kiosk.by(widget, self._browser)
+        holds, by = self._kiosk.holds, self._by
         try:
             async with asyncio.timeout(BEGIN_WITHIN_S):
                 said = await self._read()
         except TimeoutError:
-            return holds.refuse(widget, by, "hold_late")
+            return holds.refuse(widget, by, say("hold_late"))
         if not isinstance(said, Begin):
-            return holds.refuse(widget, by, "hold_by_nonsense")
-        boot, _, version = said.seen.partition("-")
-        if boot != self._kiosk.board.boot:
-            return holds.refuse(widget, by, "seen_before_restart")
-        if int(version) > self._kiosk.board.version:
-            return holds.refuse(widget, by, "hold_by_nonsense")
-        by = self._kiosk.by(widget, self._browser, said.seen, int(version))
+            return holds.refuse(widget, by, say("hold_by_nonsense"))
         sent = self._sent(said)
         try:
+            by = self._by = self._kiosk.doubts.by(widget, self._browser, said.seen)
             still_held = await self._written(widget, said, by)
+        except InputError as error:
+            return holds.refuse(widget, by, f"{error}.", "input")
         except LogError as error:
-            return holds.refuse(widget, by, "hold_unlogged", why=str(error))
+            return holds.refuse(widget, by, str(error), "log")
         if not still_held:
-            return holds.refuse(widget, by, "hold_late")
+            return holds.refuse(widget, by, say("hold_late"))
         return holds.begin(widget, said.inputs, sent, by, self._ended.set_result)
 
     async def _written(self, widget: str, said: Begin, by: By) -> bool:
@@ -173,9 +174,8 @@ class _Session:
         """A hold that did not begin, in the operator's log."""
         if self._noted is not None:
             return await self._closed(receipt)
-        origin = self._kiosk.by(receipt.widget, self._browser).origin
         why = await self._kiosk.logbook.refused(
-            receipt.widget, receipt.inputs, receipt.id, origin, receipt.reason, "hold"
+            receipt.widget, receipt.inputs, receipt.id, self._by.origin, receipt.reason, "hold"
         )
         return with_doubt(receipt, why)
 

@@ -13,6 +13,7 @@ from fastapi.responses import HTMLResponse, JSONResponse, RedirectResponse, Resp
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, JsonValue, ValidationError
 
 from app import moments
+from app.doubts import SEEN
 from app.errors import InputError
 from app.kiosk import Kiosk
 from app.logbook import origin_of
@@ -45,7 +46,7 @@ class Press(BaseModel):
 
     inputs: dict[str, JsonValue]
     id: Annotated[str, Field(pattern=PRESS_ID)] | None = None
-    seen: Annotated[str, Field(pattern=r"^[0-9a-f]{1,32}-[0-9]{1,18}$")] | None = None
+    seen: Annotated[str, Field(pattern=SEEN)] | None = None
     at: AwareDatetime | None = None
 
 
@@ -84,16 +85,9 @@ async def press(widget: str, request: Request, site: CurrentSite, kiosk: Current
     kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
     if kind == "application/json":
         given = _json(body)
-        press_id = given.id or secrets.token_hex(8)
-        seen = given.seen or ""
-        if code := _doubt(site, kiosk, given.seen):
-            receipt = await kiosk.presses.refuse(
-                widget, given.inputs, press_id, origin_of(browser, seen), code
-            )
-        else:
-            version = int(given.seen.partition("-")[2]) if given.seen else None
-            at = given.at.timestamp() if given.at else None
-            receipt = await kiosk.press(widget, given.inputs, press_id, browser, seen, version, at)
+        at = given.at.timestamp() if given.at else None
+        by = kiosk.doubts.by(widget, browser, given.seen or "", at)
+        receipt = await kiosk.presses.press(widget, given.inputs, given.id or secrets.token_hex(8), by)
         _count(site, receipt)
         return JSONResponse(receipt.as_json(), status_code=STATUS[receipt.cause])
     if kind == "application/x-www-form-urlencoded":
@@ -105,10 +99,8 @@ async def press(widget: str, request: Request, site: CurrentSite, kiosk: Current
         if not re.fullmatch(PRESS_ID, page_id):
             raise InputError(f'_id: "{page_id:.40}" is not the id of a press')
         press_id = f"{page_id}.{widget}"
-        seen = inputs.get("_seen", "")
-        version, at = _of_page(kiosk, inputs)
-        values = kiosk.sending.typed(inputs)
-        receipt = await kiosk.press(widget, values, press_id, browser, seen, version, at)
+        by = kiosk.doubts.by(widget, browser, inputs.pop("_seen", ""), _until(inputs))
+        receipt = await kiosk.presses.press(widget, kiosk.sending.typed(inputs), press_id, by)
         _count(site, receipt)
         return RedirectResponse(_page_with(kiosk, receipt), status_code=303)
     raise InputError(
@@ -156,37 +148,21 @@ def _page_of(kiosk: Kiosk, widget: str) -> Page:
     return next(p for p in kiosk.panel.pages if any(w.id == widget for w in p.widgets))
 
 
-def _of_page(kiosk: Kiosk, inputs: dict[str, str]) -> tuple[int | None, float | None]:
-    """What a page without scripts showed: its version, and when it should have loaded anew.
+def _until(inputs: dict[str, str]) -> float | None:
+    """When a page without scripts should have loaded anew, if that is over, else now.
 
     It can't say when it was pressed, but a page that does not reload itself is none to press on.
     """
-    seen, at = inputs.pop("_seen", None), inputs.pop("_until", None)
-    if seen is None or at is None:
-        return None, None
+    given = inputs.pop("_until", None)
+    if given is None:
+        return None
     try:
-        boot, _, version = seen.partition("-")
-        until = float(at)
-        if not math.isfinite(until):
-            raise ValueError(at)
-        return (int(version) if boot == kiosk.board.boot else -1), min(until, moments.now())
+        until = float(given)
     except ValueError:
-        raise InputError("_seen and _until are not those of a page") from None
-
-
-def _doubt(site: Site, kiosk: Kiosk, seen: str | None) -> str:
-    """Why what the browser had seen can't be what this press is meant for; "" if it can."""
-    boot, _, version = (seen or "").partition("-")
-    if not boot:
-        return ""
-    if boot == kiosk.board.boot:
-        if int(version) > kiosk.board.version:
-            raise InputError(
-                f"seen: version {version} is not there yet, the newest is {kiosk.board.id}"
-            )
-        return ""
-    others = (other.board.boot for other in site.fleet.kiosks)
-    return "seen_on_another" if boot in others else "seen_before_restart"
+        until = math.nan
+    if not math.isfinite(until):
+        raise InputError(f'_until: "{given:.40}" is not that of a page')
+    return min(until, moments.now())
 
 
 def _count(site: Site, receipt: Receipt) -> None:
