@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import pytest
-from playwright.sync_api import Browser, Error, Page, expect
+from playwright.sync_api import Browser, Error, Page, Route, expect
 
 from tests.conftest import CHROMIUM_FLAGS
 from tests.parts import CHROMIUM, Bridge, RosNode, Server, free_port, has_heard, live, until
@@ -67,11 +67,12 @@ HIDE: Final = """() => {
 
 
 @pytest.fixture(scope="module")
-def jogger(node: RosNode) -> RosNode:
+def jogger(node: RosNode) -> Iterator[RosNode]:
     """The robot's node: it listens, and says whether operation is permitted."""
     node.subscribe(TOPIC, "geometry_msgs/msg/Point", depth=1000)
     node.advertise("/operation_enabled", "std_msgs/msg/Bool")
-    return node
+    yield node
+    node.withdraw("/operation_enabled")
 
 
 @pytest.fixture
@@ -423,3 +424,22 @@ def test_without_scripts_it_is_locked_and_says_why(chromium: Browser, kiosk: Ser
     expect(page.get_by_role("button", name="Jog")).to_be_disabled()
     expect(page.locator("#why-jog")).to_contain_text("holding needs the page's scripts")
     context.close()
+
+
+def test_a_page_that_did_not_load_whole_is_loaded_again(kiosk: Server, page: Page) -> None:
+    asked = []
+
+    def cut_once(route: Route) -> None:
+        asked.append(route.request.url)
+        if len(asked) == 1:
+            route.abort()
+        else:
+            route.continue_()
+
+    page.route("**/hold.js", cut_once)
+    page.goto(kiosk.url)
+    page.wait_for_function("() => performance.getEntriesByType('navigation')[0].type === 'reload'")
+    button = page.get_by_role("button", name="Jog")
+    expect(button).to_be_enabled()
+    button.dispatch_event("pointerdown", {"isPrimary": True, "button": 0, "pointerId": 7})
+    expect(button).to_have_attribute("aria-pressed", "true")

@@ -127,7 +127,7 @@ function lockAll() {
 
 const source = new Source({
   snapshot(all) {
-    if (all.revision !== body.dataset.revision) {
+    if (!source.whole || all.revision !== body.dataset.revision) {
       lockAll();
       source.stop();
       location.reload();
@@ -156,8 +156,8 @@ const source = new Source({
   lost: lockAll,
 });
 
-if (document.querySelector("[data-step]")) import("./inputs.js");
+if (document.querySelector("[data-step]")) source.load("./inputs.js", () => {});
 const holds = document.querySelectorAll('[data-kind="hold"]');
-if (holds.length) import("./hold.js").then(({ Hold }) => holds.forEach((root) => new Hold(root, source)));
+if (holds.length) source.load("./hold.js", ({ Hold }) => holds.forEach((root) => new Hold(root, source)));
 new Presser(widgets, source, { unsure: body.dataset.unsure, lost: body.dataset.lost });
 source.start();

@@ -62,7 +62,7 @@ export class Presser {
     this.#widgets = widgets;
     this.#sentences = sentences;
     this.#source = source;
-    if (document.querySelector("dialog.ask")) import("./ask.js").then(({ asked }) => (this.#asked = asked));
+    if (document.querySelector("dialog.ask")) source.load("./ask.js", ({ asked }) => (this.#asked = asked));
     const down = ({ target }) => {
       this.#down = target.closest?.("button:enabled");
       this.#seen = source.seen; // what was permitted when the finger came down

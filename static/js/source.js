@@ -21,6 +21,7 @@ export class Source {
   #openedAt = 0;
   #turn = 0; // counts openings and closings: what was asked for before the last one is void
   #fresh = true; // the page itself is a snapshot, until its time is up
+  #whole = true;
   #seen = document.body.dataset.seen;
   // The server's own time is at least performance.now() plus the largest of these: what comes late
   // makes one smaller.
@@ -29,6 +30,11 @@ export class Source {
   // `handlers` has a function for each event, and `lost`.
   constructor(handlers) {
     this.#on = handlers;
+  }
+
+  // Whether all modules that this page needs are there.
+  get whole() {
+    return this.#whole;
   }
 
   // The id of the last event: what the operator has seen.
@@ -48,6 +54,15 @@ export class Source {
     setInterval(() => this.#watch(), CHECK_MS);
     if (document.hidden) this.#rest();
     else this.#open();
+  }
+
+  // A further module. Without it the page is not whole: it is locked, and to be loaded anew.
+  load(name, use) {
+    import(name).then(use, () => {
+      this.#whole = false;
+      this.#lose();
+      this.#again();
+    });
   }
 
   // For good: the page is about to go.

@@ -79,6 +79,8 @@ class Commands:
         return list(zip(self.came_at[topic], heard, strict=False))
 
     def advertise(self, topic: str, type: str, **qos: Any) -> None:
+        if topic in self.publishers:  # the node would keep it for good
+            self.withdraw(topic)
         end = time.monotonic() + GONE_S
         while True:
             try:
