@@ -200,6 +200,16 @@ def test_a_log_that_is_not_there_or_no_log_is_unreadable(
     assert "can't be read" in capsys.readouterr().err
 
 
+def test_a_panel_with_a_fault_keeps_nobody_from_verifying(
+    store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fill(store, 2)
+    (tmp_path / "bad.toml").write_text("title = 3")
+    monkeypatch.setenv("KIOSK_PANEL", str(tmp_path / "bad.toml"))
+    monkeypatch.setenv("KIOSK_DATA", str(tmp_path))
+    assert main(["verify"]) == 0
+
+
 def test_removing_the_newest_shows_by_the_head_alone(tmp_path: Path) -> None:
     store = Store(tmp_path, "boot1")
     fill(store, 3)
