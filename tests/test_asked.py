@@ -71,7 +71,7 @@ def test_no_answer_takes_a_second_at_most_and_one_who_leaves_stops_nobody() -> N
         await asyncio.sleep(0.1)
         leaving.cancel()
         assert await staying is False
-        assert asyncio.get_running_loop().time() - began < LIMIT_S + 0.2
+        assert asyncio.get_running_loop().time() - began < LIMIT_S + 1
         assert bridges.questions == 1
 
     run(test)

@@ -186,7 +186,7 @@ def test_a_holder_whose_browser_is_killed_or_hangs_is_lost(
         for pid in pids:
             os.kill(pid, fault)
         expect(bar(second)).to_contain_text("Nobody has control", timeout=8000)
-        assert 3 < time.monotonic() - began < 6.5
+        assert 3 < time.monotonic() - began < 9
         locked_by(second, "Nobody has control of the robot")
         take(second)
     finally:

@@ -145,7 +145,7 @@ def test_a_lost_holder_frees_it(client: Callable[..., Client], kiosk: Server) ->
         began = time.monotonic()
         ann.control("here")
         assert stream.next("control")[1]["holder"] == ""
-        assert 4.5 < time.monotonic() - began < 6
+        assert 4.5 < time.monotonic() - began < 9
     assert ann.press().status_code == 409
 
 

@@ -75,7 +75,7 @@ def test_a_bridge_whose_main_loop_hangs_is_seen_at_the_request(
         began = time.monotonic()
         with ThreadPoolExecutor(20) as pool:
             answers = list(pool.map(lambda _: kiosk.http.get("/readyz"), range(20)))
-        assert time.monotonic() - began < 1.5
+        assert time.monotonic() - began < 3
         for answer in answers:
             assert (answer.status_code, answer.json()["code"]) == (503, "bridge_silent")
         assert "does not answer" in answers[0].json()["reason"]
