@@ -110,12 +110,12 @@ def _first_panel(settings: Settings) -> tuple[Panel, str]:
 @asynccontextmanager
 async def _logging(settings: Settings, panel: Panel) -> AsyncIterator[OperatorLog | Unlogged]:
     """The operator's log, open; FolderInUse where another server has its folder."""
-    oplog: OperatorLog | Unlogged = Unlogged()
-    if panel.log.enabled:
-        mode = settings.mode or panel.mode
-        rules = panel.log
+    mode, rules = settings.mode or panel.mode, panel.log
+    folder = settings.data_folder(mode)
+    oplog: OperatorLog | Unlogged = Unlogged(folder)
+    if rules.enabled:
         limits = Limits(days=rules.days, size_mb=rules.size_mb, required=rules.required)
-        oplog = OperatorLog(settings.data_folder(mode), limits, mode)
+        oplog = OperatorLog(folder, limits, mode)
     await oplog.start()
     try:
         yield oplog

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from app.errors import FolderInUse, LogCorrupt, LogError
-from app.log import Entry, Filter, Limits, OperatorLog, Origin, entered, keeper, writer
+from app.log import Entry, Filter, Limits, OperatorLog, Origin, entered, folder, keeper, writer
 from app.log.chain import verify
 from app.log.reading import rows
 from app.log.store import Store
@@ -323,10 +323,10 @@ def test_a_second_log_waits_for_the_first_to_end_and_then_gives_up(
 ) -> None:
     async def work(log: OperatorLog) -> None:
         second = OperatorLog(tmp_path, Limits())
-        monkeypatch.setattr(writer, "HELD_BY_OTHER_S", 0.3)
+        monkeypatch.setattr(folder, "HELD_BY_OTHER_S", 0.3)
         with pytest.raises(FolderInUse, match="is in use by process"):
             await second.start()
-        monkeypatch.setattr(writer, "HELD_BY_OTHER_S", 5.0)
+        monkeypatch.setattr(folder, "HELD_BY_OTHER_S", 5.0)
         starting = asyncio.create_task(second.start())
         await asyncio.sleep(0.2)
         assert not starting.done()

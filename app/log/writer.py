@@ -12,12 +12,12 @@ import logging
 import secrets
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from typing import Final
 
-from app.errors import FolderInUse, LogError
+from app.errors import LogError
 from app.log.entry import Entry
 from app.log.folder import Folder
 from app.log.keeper import Keeper
@@ -32,7 +32,6 @@ READERS: Final = 2
 MOST_WAITING: Final = 1000
 PRESSED_WITHIN_S: Final = 2.0  # an entry that takes longer is a press that is not sent
 CLOSED_WITHIN_S: Final = 3.0  # a receipt does not wait longer: it says that it is not on the disk
-HELD_BY_OTHER_S: Final = 5.0  # a server that is started anew waits so long for the old one's lock
 ENDED_WITHIN_S: Final = 10.0
 
 
@@ -52,18 +51,8 @@ class OperatorLog:
     async def start(self) -> None:
         """Opens the log; FolderInUse when another server has the folder. What else may be wrong is
         its `fault`, and tried again."""
-        end = self._loop.time() + HELD_BY_OTHER_S
-        while True:
-            try:
-                self._folder.hold()
-            except FolderInUse:
-                if self._loop.time() > end:
-                    raise
-                await asyncio.sleep(0.1)
-                continue
-            except OSError:
-                pass  # the keeper meets it again, and says it
-            break
+        with suppress(OSError):  # the keeper meets it again, and says it
+            await self._folder.hold_soon()
         self._keeper.start()
         await self._own(self._keeper.tried.wait)
 
