@@ -53,6 +53,12 @@ async def until_good(log: OperatorLog) -> None:
             await asyncio.sleep(0.01)
 
 
+async def until_commits(disk: "Disk", count: int) -> None:
+    async with asyncio.timeout(10):
+        while disk.commits < count:
+            await asyncio.sleep(0.01)
+
+
 class Disk:
     """The real file, with a disk that can be made slow, full or broken."""
 
@@ -174,12 +180,13 @@ def test_a_disk_that_hangs_blocks_no_loop_and_locks(
 def test_a_press_that_nobody_waits_for_any_more_is_closed(tmp_path: Path, disk: Disk) -> None:
     async def work(log: OperatorLog) -> None:
         disk.open.clear()
+        before = disk.commits
         task = asyncio.create_task(log.pressed(pressed(1)))
-        await asyncio.sleep(0.1)
+        await until_commits(disk, before + 1)
         task.cancel()
         await asyncio.gather(task, return_exceptions=True)
         disk.open.set()
-        await asyncio.sleep(0.1)
+        await until_commits(disk, before + 2)
 
     run(tmp_path, work)
     assert kinds(tmp_path)[1:] == [("pressed", "p1", ""), ("closed", "p1", "refused")]
