@@ -82,6 +82,7 @@ ORDER = (
     "app.parameter_display",
     "app.views",
     "app.since",
+    "app.heartbeat",
     "app.board",
     "app.confirmations",
     "app.calls",
