@@ -17,6 +17,7 @@ ORDER = (
     "app.logs",
     "app.moments",
     "app.systemd",
+    "app.sockets",
     "app.watchdog",
     "app.keys",
     "app.interfaces.definitions",
