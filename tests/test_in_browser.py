@@ -218,7 +218,6 @@ def test_a_post_that_gets_no_answer_is_not_known_and_not_repeated(
     page.route_web_socket("**/presses", lambda socket: socket.close())
     page.reload()
     expect(button(page, "Publish")).to_be_enabled()
-    page.wait_for_timeout(500)  # the socket did not open
     button(page, "Publish").click()
     expect(page.locator("#receipt-operation")).to_contain_text("not known whether this was sent")
     page.wait_for_timeout(1500)  # long enough for a retry to show, were there one

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from typing import Any, Final
 
 import pytest
-from playwright.sync_api import Page, Request, WebSocketRoute, expect
+from playwright.sync_api import Page, Request, WebSocket, WebSocketRoute, expect
 
 from app.routes.press_socket import MOST_AT_ONCE
 from tests.parts import ROOT, Server, as_response, until, zenoh_file
@@ -110,19 +110,52 @@ def posts_of(page: Page) -> list[Request]:
     return posts
 
 
+def publish(page: Page) -> Any:
+    return page.get_by_role("button", name="Publish", exact=True)
+
+
+def touched(page: Page) -> WebSocket:
+    """The socket of a page that was touched for the first time, and not pressed."""
+    expect(publish(page)).to_be_enabled()
+    page.wait_for_function("() => document.querySelector('#clock').textContent")
+    with page.expect_websocket() as opened:
+        page.get_by_role("heading", name="P", exact=True).click()
+    page.wait_for_timeout(300)  # it is open
+    return opened.value
+
+
 def test_a_page_presses_on_its_socket_and_gets_a_late_answer_there(kiosk: Server, page: Page) -> None:
     posts = posts_of(page)
-    with page.expect_websocket() as opened:
-        page.goto(kiosk.url)
-    socket = opened.value
+    page.goto(kiosk.url)
+    socket = touched(page)
     assert socket.url == f"ws://127.0.0.1:{kiosk.port}/presses"
     page.get_by_role("button", name=MUTE[2], exact=True).click()
     expect(page.locator(f'[data-widget="{MUTE[2]}"] .result')).to_contain_text("waiting")
-    page.get_by_role("button", name="Publish", exact=True).click()
+    publish(page).click()
     expect(page.locator("#receipt-free")).to_contain_text("Sent on /free at")
     expect(page.locator(f'[data-widget="{MUTE[2]}"] .result')).to_contain_text("No answer within")
     assert posts == []
     assert not socket.is_closed()
+
+
+def test_a_page_that_is_only_looked_at_has_no_socket(kiosk: Server, page: Page) -> None:
+    sockets: list[WebSocket] = []
+    page.on("websocket", lambda socket: sockets.append(socket))
+    page.add_init_script(
+        "const real = setTimeout; setTimeout = (does, ms) => real(does, ms === 60_000 ? 1000 : ms);"
+    )
+    page.goto(kiosk.url)
+    expect(publish(page)).to_be_enabled()
+    page.wait_for_function("() => document.querySelector('#clock').textContent")
+    page.mouse.move(200, 200)
+    page.wait_for_timeout(300)
+    assert sockets == []
+    with page.expect_websocket() as opened:
+        page.mouse.down()
+    socket = opened.value
+    assert not socket.is_closed()
+    socket.wait_for_event("close")
+    expect(publish(page)).to_be_enabled()
 
 
 @pytest.mark.parametrize("fault", ["it does not open", "it breaks", "it hangs"])
@@ -131,46 +164,51 @@ def test_a_press_whose_socket_breaks_is_not_known_and_not_repeated(
 ) -> None:
     posts = posts_of(page)
     said: list[str | bytes] = []
+    sockets: list[WebSocketRoute] = []
 
     def broken(socket: WebSocketRoute) -> None:
-        def on_message(text: str | bytes) -> None:
-            said.append(text)
-            if fault == "it breaks":
-                socket.close()
-
-        if fault == "it does not open":
+        sockets.append(socket)
+        if len(sockets) > 1:
+            socket.connect_to_server()
+        elif fault == "it does not open":
             socket.close()
         else:
-            socket.on_message(on_message)
+            socket.on_message(lambda text: on_message(socket, text))
+
+    def on_message(socket: WebSocketRoute, text: str | bytes) -> None:
+        said.append(text)
+        if fault == "it breaks":
+            socket.close()
 
     page.route_web_socket("**/presses", broken)
     page.goto(kiosk.url)
-    publish = page.get_by_role("button", name="Publish", exact=True)
-    page.wait_for_timeout(500)  # the socket is there, or not
-    publish.click()
+    expect(publish(page)).to_be_enabled()
+    page.wait_for_function("() => document.querySelector('#clock').textContent")
+    page.get_by_role("heading", name="P", exact=True).click()
+    page.wait_for_timeout(300)  # the socket is there, or not
+    publish(page).click()
     receipt = page.locator("#receipt-free")
-    if fault != "it does not open":
-        expect(receipt).to_contain_text("not known whether this was sent", timeout=10_000)
-        page.wait_for_timeout(1000)  # long enough for a repetition to show, were there one
-        assert (len(said), posts) == (1, [])
-        publish.click()
-    # Until there is a socket again, by posts.
+    if fault == "it does not open":
+        expect(receipt).to_contain_text("Sent on /free at")
+        return
+    expect(receipt).to_contain_text("not known whether this was sent", timeout=10_000)
+    page.wait_for_timeout(1000)  # long enough for a repetition to show, were there one
+    assert (len(said), posts, len(sockets)) == (1, [], 1)
+    publish(page).click()
     expect(receipt).to_contain_text("Sent on /free at")
-    assert len(posts) == 1
+    assert (len(said), len(sockets)) == (1, 2)
 
 
 def test_a_hidden_page_gives_its_socket_back(kiosk: Server, page: Page) -> None:
-    with page.expect_websocket() as opened:
-        page.goto(kiosk.url)
-    first = opened.value
-    expect(page.get_by_role("button", name="Publish", exact=True)).to_be_enabled()
+    page.goto(kiosk.url)
+    first = touched(page)
+    assert not first.is_closed()
     hide = "Object.defineProperty(document, 'hidden', { value: %s, configurable: true });"
     tell = "document.dispatchEvent(new Event('visibilitychange'));"
-    assert not first.is_closed()
     with first.expect_event("close"):
         page.evaluate(hide % "true" + tell)
-    with page.expect_websocket() as opened_again:
-        page.evaluate(hide % "false" + tell)
-    page.get_by_role("button", name="Publish", exact=True).click()
+    page.evaluate(hide % "false" + tell)
+    second = touched(page)
+    publish(page).click()
     expect(page.locator("#receipt-free")).to_contain_text("Sent on /free at")
-    assert (first.is_closed(), opened_again.value.is_closed()) == (True, False)
+    assert (first.is_closed(), second.is_closed()) == (True, False)

@@ -141,7 +141,6 @@ const source = new Source({
     showLink(all.link);
     showNotice(all.notice);
     showRobots(all.robots);
-    if (source.streams) presser.open();
   },
   update: showWidgets,
   link: showLink,

@@ -2,8 +2,8 @@
 const ANSWER_WITHIN_MS = 5000;
 // Two taps of a finger come within this time: the second one is the same press.
 const TAP_AGAIN_MS = 700;
-// After a socket broke, while the server is there: presses are posted meanwhile.
-const SOCKET_AGAIN_MS = 30_000;
+// A page that nobody touches for so long gives its socket back.
+const UNTOUCHED_MS = 60_000;
 export const ENTRIES = "input:not([type=hidden]), select";
 
 function newId() {
@@ -103,7 +103,7 @@ async function post(url, press, answerMs) {
 
 export class Presser {
   #line = null;
-  #again = 0;
+  #untouched = 0;
   #widgets;
   #sentences;
   #source;
@@ -121,6 +121,7 @@ export class Presser {
     const down = ({ target }) => {
       this.#down = target.closest?.("button:enabled");
       this.#seen = source.seen; // what was permitted when the finger came down
+      this.#open();
     };
     addEventListener("pointerdown", down, true);
     for (const form of document.forms) {
@@ -148,22 +149,22 @@ export class Presser {
     return { seen, at: this.#source.timeOf(event) };
   }
 
-  // While the event stream is there, so is a socket: without one, and to cancel, a press is posted.
-  open() {
-    this.close();
-    this.#line = new Line((line) => this.#broke(line));
+  // From the touch that may become a press, which takes longer than to open it. Without a socket, and
+  // to cancel, a press is posted.
+  #open() {
+    clearTimeout(this.#untouched);
+    this.#untouched = setTimeout(() => this.close(), UNTOUCHED_MS);
+    if (this.#source.streams) this.#line ??= new Line((line) => this.#broke(line));
   }
 
+  // With the event stream, too: what is under way still gets its answer.
   close() {
-    clearTimeout(this.#again);
     this.#line?.leave();
     this.#line = null;
   }
 
   #broke(line) {
-    if (line !== this.#line) return;
-    this.close();
-    this.#again = setTimeout(() => this.open(), SOCKET_AGAIN_MS);
+    if (line === this.#line) this.close();
   }
 
   // A second tap while the first is under way is the same press: it sends nothing.
