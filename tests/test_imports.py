@@ -105,6 +105,7 @@ ORDER = (
     "app.rosout",
     "app.bridges",
     "app.tokens",
+    "app.inbox",
     "app.link",
     "app.intake",
     "app.joining",
@@ -197,7 +198,7 @@ def test_the_interfaces_know_nothing_of_the_panel() -> None:
 
 
 def test_the_link_knows_no_view_and_no_panel() -> None:
-    assert of_project("app.link") <= {"app.errors", "app.keys", "app.robot"}
+    assert of_project("app.link") <= {"app.errors", "app.inbox", "app.keys"}
 
 
 @pytest.mark.parametrize(
