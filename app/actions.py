@@ -106,7 +106,8 @@ class Actions:
         return Answer("accepted", say("cancel_sent", time=now))
 
     def hear_feedback(self, action: str, sample: Sample) -> None:
-        """The latest feedback of an action; of another program's goal it is passed over."""
+        """The latest feedback of an action; of another program's goal it is passed over. Whoever
+        calls this shows it when a frame is due."""
         for goal in self._of(action):
             if self._robot.progress[goal.widget.id].stoppable:
                 self._take_feedback(goal, sample)
@@ -148,7 +149,7 @@ class Actions:
             done = math.nan if found is None else float(found) / widget.progress_max
             goal.fraction = min(1.0, max(0.0, done)) if done == done else None  # NaN is no progress
         goal.said = with_fields(widget.feedback, message.feedback)
-        self._show(goal, goal.under_way)
+        self._note(goal, goal.under_way)  # shown with the next frame: a goal may say a lot
 
     def _first_answer(self, goal: Goal, response: str, reply: bytes | None) -> Answer:
         now = clock(time.time())
@@ -235,9 +236,15 @@ class Actions:
         goal.corrected(goal.press_id, answer)
 
     def _show(self, goal: Goal, progress: Progress) -> None:
-        if self._latest.get(goal.widget.id) is goal:
-            self._robot.progress[goal.widget.id] = progress
+        if self._note(goal, progress):
             self._changed()
+
+    def _note(self, goal: Goal, progress: Progress) -> bool:
+        """What its widget will show; False where that shows another goal by now."""
+        latest = self._latest.get(goal.widget.id) is goal
+        if latest:
+            self._robot.progress[goal.widget.id] = progress
+        return latest
 
     def _task(self, goal: Goal) -> None:
         task = asyncio.get_running_loop().create_task(self._follow_to_the_end(goal))

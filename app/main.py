@@ -1,5 +1,8 @@
 """`uvicorn app.main:app`: the only wiring."""
 
+from app.collector import resume
+
+# isort: split
 import asyncio
 import logging
 import secrets
@@ -229,3 +232,4 @@ def _app_or_exit() -> FastAPI:
 
 
 app = _app_or_exit()
+resume()

@@ -10,6 +10,7 @@ from app.settings import PACKAGE
 
 # A module imports only from those that stand before it.
 ORDER = (
+    "app.collector",
     "app.errors",
     "app.settings",
     "app.sentences",
@@ -107,6 +108,7 @@ ORDER = (
     "app.rosout",
     "app.bridges",
     "app.tokens",
+    "app.inbox",
     "app.link",
     "app.intake",
     "app.joining",
@@ -201,7 +203,7 @@ def test_the_interfaces_know_nothing_of_the_panel() -> None:
 
 
 def test_the_link_knows_no_view_and_no_panel() -> None:
-    assert of_project("app.link") <= {"app.errors", "app.keys", "app.robot"}
+    assert of_project("app.link") <= {"app.errors", "app.inbox", "app.keys"}
 
 
 @pytest.mark.parametrize(

@@ -46,7 +46,7 @@ def test_a_session_is_renewed_in_the_middle_of_what_comes_in(
             for token in held:
                 token.undeclare()
 
-    link = Link(config_to(endpoint), lambda: None)
+    link = Link(config_to(endpoint), lambda _: None)
     link.start(["a"], ["b"])
 
     def renew() -> None:
@@ -75,7 +75,7 @@ def test_a_burst_is_not_dropped(peer: tuple[str, zenoh.Session]) -> None:
         heard.append(bytes(sample.payload))
 
     session.declare_subscriber("b", Callback(hear, indirect=False))
-    link = Link(config_to(endpoint), lambda: None)
+    link = Link(config_to(endpoint), lambda _: None)
     link.start([], ["b"])
     until(lambda: link.heard("b"), "the subscriber is known")
     for number in range(BURST):
@@ -87,7 +87,7 @@ def test_a_burst_is_not_dropped(peer: tuple[str, zenoh.Session]) -> None:
 
 def test_nothing_is_left_of_the_sessions_that_were(peer: tuple[str, zenoh.Session]) -> None:
     """Zenoh kept a shared memory segment of each: a thousand losses of the link, and no file more."""
-    link = Link(config_to(peer[0]), lambda: None)
+    link = Link(config_to(peer[0]), lambda _: None)
     link.start(["a"], ["b"])
 
     def files() -> int:
@@ -106,7 +106,7 @@ def test_tokens_are_held_by_the_new_session_when_they_are_wanted_again(
     peer: tuple[str, zenoh.Session],
 ) -> None:
     endpoint, session = peer
-    link = Link(config_to(endpoint), lambda: None)
+    link = Link(config_to(endpoint), lambda _: None)
     link.start([], [])
     link.hold(tokens(link.zid, 1))
     link.renew()
@@ -125,7 +125,7 @@ def test_of_a_watched_topic_what_came_and_went_between_two_drains_is_kept(
     peer: tuple[str, zenoh.Session],
 ) -> None:
     endpoint, session = peer
-    link = Link(config_to(endpoint), lambda: None)
+    link = Link(config_to(endpoint), lambda _: None)
     link.start(["a", "b"], [], watched=["a"])
     until(lambda: link.drain().link_up, "a link")
     said = [b"yes", b"no", b"no", b"yes", *(b"%d" % n for n in range(100)), b"yes"]
