@@ -51,11 +51,6 @@ class Actions:
                 gone = say("goal_gone", name=goal.widget.action)
                 goal.cut.set_result(gone if bridge else "")
 
-    @property
-    def following(self) -> int:
-        """How many goals' ends are waited for."""
-        return len(self._following)
-
     async def stop(self) -> None:
         """Ends its tasks; goals go on in the robot."""
         tasks = list(self._following)
@@ -71,8 +66,8 @@ class Actions:
         goal_id = uuid.uuid4()
         wrapped = {"goal_id": {"uuid": list(goal_id.bytes)}, "goal": fields}
         payload = self._interfaces.encode(types.send_goal_request, wrapped)
-        if sum(g.widget.action == widget.action for g in self._following.values()) >= MOST_UNANSWERED:
-            return Answer("refused", say("too_many", service=widget.action))
+        if why := self.full(widget.action):
+            return Answer("refused", why)
         cut = asyncio.get_running_loop().create_future()
         goal = Goal(widget, press_id, goal_id, cut, corrected)
         self._latest[widget.id] = goal
@@ -85,10 +80,19 @@ class Actions:
         self._show(goal, goal.under_way if goal.lives else goal.came_to(answer))
         return answer
 
+    def full(self, action: str) -> str:
+        """Why no further goal of an action is sent; "" while one may be."""
+        count = sum(goal.widget.action == action for goal in self._following.values())
+        return say("too_many", service=action) if count >= MOST_UNANSWERED else ""
+
+    def stoppable(self, widget: Action) -> Goal | None:
+        """The goal of a widget that can be canceled, if there is one."""
+        goal = self._latest.get(widget.id)
+        return goal if goal is not None and self._robot.progress[widget.id].stoppable else None
+
     async def cancel(self, widget: Action) -> Answer:
         """Asks the robot to cancel the goal that is under way."""
-        goal = self._latest.get(widget.id)
-        if goal is None or not self._robot.progress[widget.id].stoppable:
+        if (goal := self.stoppable(widget)) is None:
             return Answer("refused", say("nothing_to_cancel"))
         request, response = self._interfaces.service(CANCEL)
         stamp = {"sec": 0, "nanosec": 0}

@@ -56,7 +56,8 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         async with _logging(settings, panel) as oplog, AsyncExitStack() as opened:
             running = partial(_running, oplog)
             fleet, assets = await opened.enter_async_context(running(settings, panel, fault))
-            site = Site(fleet, assets, _templates(settings.dev), Metrics(), settings.dev, oplog)
+            metrics = Metrics(lambda: oplog.left_out)
+            site = Site(fleet, assets, _templates(settings.dev), metrics, settings.dev, oplog)
             site.metrics.follow(fleet)
             app.state.site = site
             loop = asyncio.get_running_loop()

@@ -15,6 +15,7 @@ from functools import partial
 from typing import Any
 
 from app.errors import FieldError, InputError, LinkError, LogError, NotFound
+from app.interlocks import Verdict
 from app.log import Origin
 from app.logbook import Logbook, Noted
 from app.logs import RobotLog
@@ -86,10 +87,15 @@ class Presses:
         widget = self.widget(widget_id)
         known = self._under_way.get(press_id) or self._receipts.get(press_id)
         if known is None:
+            if left_out := self._left_out(widget, inputs, press_id, by):
+                return left_out
             work = self._logged(widget, inputs, press_id, by)
             return await self._once(widget, inputs, press_id, work)
         if (known.widget, known.fingerprint) != (widget_id, fingerprint(inputs)):
             own_id = f"{press_id:.40}.{secrets.token_hex(4)}"
+            if not self._logbook.room(by.origin):
+                answer = Answer("refused", say("press_reused", id=press_id))
+                return self._counted(receipt_of(widget, inputs, own_id, answer, "input"), by.origin)
             work = self._reused(widget, inputs, press_id, own_id, by.origin)
             return await self._once(widget, inputs, own_id, work)
         if isinstance(known, _UnderWay):
@@ -101,6 +107,9 @@ class Presses:
         widget = self.widget(widget_id)
         if not isinstance(widget, Action):
             raise NotFound(f'"{widget_id}" is not an action: there is nothing to cancel')
+        if not (self._sending.can_cancel(widget) or self._logbook.room(origin)):
+            answer = Answer("refused", say("nothing_to_cancel"))
+            return self._counted(receipt_of(widget, {}, "", answer, "interlock"), origin)
         noting = asyncio.ensure_future(self._logbook.canceled(widget_id, origin))
         try:
             answer = await self._sending.cancel(widget)  # no disk keeps anybody from stopping a robot
@@ -114,6 +123,29 @@ class Presses:
         cause: Cause = "interlock" if answer.outcome == "refused" else ""
         receipt = receipt_of(widget, {}, "", answer, cause)
         return await _closed(noted, receipt)
+
+    def _left_out(
+        self, widget: Pressed, inputs: Mapping[str, Any], press_id: str, by: By
+    ) -> Receipt | None:
+        """The receipt of a refusal that the log only counts; None for every other press."""
+        if self._logbook.room(by.origin):
+            return None
+        _, why, cause = self._ground(widget, by)
+        sentence = "refused" if why else "not_encoded"
+        if not why:
+            try:
+                why, cause = self._sending.refusal(widget, inputs), "interlock"
+            except (FieldError, InputError) as error:
+                why, cause = str(error), "input"
+        if not why:
+            return None
+        answer = Answer("refused", say(sentence, why=why, time=clock(time.time())))
+        return self._counted(receipt_of(widget, inputs, press_id, answer, cause), by.origin)
+
+    def _counted(self, receipt: Receipt, origin: Origin) -> Receipt:
+        self._logbook.leave_out(origin)
+        self._receipts.keep_left_out(receipt)
+        return receipt
 
     async def _once(
         self,
@@ -192,13 +224,10 @@ class Presses:
             now = clock(time.time())
             return receipt(Answer("refused", say(sentence, why=why, time=now)), cause)
 
-        self._catch_up()
-        verdict = judged(widget, by, self._panel, self._robot, self._monotonic())
+        verdict, why, cause = self._ground(widget, by)
         noted.judged(verdict.code)
-        if not verdict.permitted:
-            return refused("refused", verdict.reason or "", cause_of(verdict))
-        if why := by.doubt():
-            return refused("refused", why, "interlock")
+        if why:
+            return refused("refused", why, cause)
         try:
             correct = partial(self._correct, noted)
             answer = await self._sending.send(widget, inputs, press_id, correct)
@@ -209,6 +238,14 @@ class Presses:
         if answer.outcome == "refused":
             return refused("not_encoded", answer.text, "interlock")
         return receipt(answer, "time" if answer.outcome == "timed_out" else "")
+
+    def _ground(self, widget: Pressed, by: By) -> tuple[Verdict, str, Cause]:
+        """The verdict now, and why it may not be sent, "" if it may."""
+        self._catch_up()
+        verdict = judged(widget, by, self._panel, self._robot, self._monotonic())
+        if not verdict.permitted:
+            return verdict, verdict.reason or "", cause_of(verdict)
+        return verdict, by.doubt(), "interlock"
 
 
 @contextmanager

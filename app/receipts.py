@@ -107,10 +107,11 @@ class Receipts:
     def __init__(self, witness: Witness | None = None) -> None:
         self._witness = witness
         self._receipts: OrderedDict[str, Receipt] = OrderedDict()
+        self._left_out: OrderedDict[str, Receipt] = OrderedDict()
 
     def get(self, press_id: str) -> Receipt | None:
         """The receipt of a press, as it is known now."""
-        return self._receipts.get(press_id)
+        return self._receipts.get(press_id) or self._left_out.get(press_id)
 
     def begin(self, press_id: str, widget: str, origin: Origin, inputs: Mapping[str, Any]) -> None:
         """A press was made."""
@@ -120,9 +121,17 @@ class Receipts:
     def keep(self, receipt: Receipt) -> None:
         if self._witness is not None:
             self._witness.answered(receipt)
-        self._receipts[receipt.id] = receipt
-        while len(self._receipts) > RECEIPTS_KEPT:
-            self._receipts.popitem(last=False)
+        _keep(self._receipts, receipt)
+
+    def keep_left_out(self, receipt: Receipt) -> None:
+        """A refusal that the log only counts: however many these are, they displace no other."""
+        _keep(self._left_out, receipt)
+
+
+def _keep(receipts: OrderedDict[str, Receipt], receipt: Receipt) -> None:
+    receipts[receipt.id] = receipt
+    while len(receipts) > RECEIPTS_KEPT:
+        receipts.popitem(last=False)
 
 
 def receipt_of(

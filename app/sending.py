@@ -12,7 +12,7 @@ from app.errors import InputError, NotFound
 from app.inputs import checked, typed
 from app.interfaces import Interfaces
 from app.panel.model import Action, Call, Input, Panel, Pressed, Publish
-from app.panel.parameter import Parameter
+from app.panel.parameter import SET, Parameter
 from app.panel.template import filled, inputs_of
 from app.parameters import Parameters
 from app.progress import Answer, Corrected
@@ -102,6 +102,21 @@ class Sending:
             case Parameter():
                 return await self._parameters.set(widget, fields["value"], press_id, correct)
 
+    def refusal(self, widget: Pressed, inputs: Mapping[str, Any]) -> str:
+        """Why `send` would refuse it now, "" if it would not; FieldError or InputError as there."""
+        fields = filled(widget.template, self.checked(inputs_of(widget), inputs))
+        match widget:
+            case Publish():
+                self._interfaces.encode(widget.type, fields)
+            case Call():
+                self._interfaces.encode(self._interfaces.service(widget.type)[0], fields)
+                return self._calls.full(widget.service)
+            case Action():
+                return self._actions.full(widget.action)
+            case Parameter():
+                return self._calls.full(f"{widget.node}/{SET[0]}")
+        return ""
+
     def _published(self, widget: Publish, fields: dict[str, Any]) -> Answer:
         payload = self._interfaces.encode(widget.type, fields)
         key = self._robot.key(widget.topic)
@@ -127,6 +142,9 @@ class Sending:
                 values[name] = self._parameters.checked(field, inputs[name])
         return values
 
+    def can_cancel(self, widget: Action) -> bool:
+        return self._actions.stoppable(widget) is not None
+
     async def cancel(self, widget: Action) -> Answer:
-        """Asks the robot to cancel the goal of an action widget."""
+        """Asks the robot to cancel the goal of an action widget, if there is one."""
         return await self._actions.cancel(widget)

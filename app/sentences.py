@@ -162,6 +162,8 @@ ENGLISH: Final[Mapping[str, str]] = {
     "log_closed": "the file is being opened anew",
     "log_slow": "the disk did not take the entry in {seconds} s",
     "log_full_queue": "more is pressed than the disk takes; press again",
+    "log_more_refused": "{count} more refusals from {name} since {since}, each answered as ever.",
+    "others": "others",
     "log_abandoned": "Not sent: the entry was written too late.",
     "log_not_on_disk": "{said} (Not safely in the operator's log: {why}.)",
     "log_ended": "the panel's server ended before it knew",

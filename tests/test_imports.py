@@ -63,6 +63,7 @@ ORDER = (
     "app.log.store",
     "app.log.chain",
     "app.log.reading",
+    "app.log.refusals",
     "app.log.ticket",
     "app.log.syncer",
     "app.log.keeper",

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from app.log.entry import Entry
+from app.log.entry import Entry, Origin
 from app.log.folder import Folder
 from app.log.store import Head
 
@@ -20,6 +20,7 @@ class Unlogged:
     fault = ""
     lock = ""
     head: Head | None = None
+    left_out = 0
 
     def __init__(self, folder: Path | None = None) -> None:
         self._folder = Folder(folder) if folder else None
@@ -40,6 +41,12 @@ class Unlogged:
     def followed(self, changed: Callable[[], None]) -> Iterator[None]:
         """There is never anything to be told."""
         yield
+
+    def room(self, origin: Origin) -> bool:
+        return True
+
+    def leave_out(self, origin: Origin) -> None:
+        """It is not counted."""
 
     async def pressed(self, entry: Entry) -> Entry | None:
         return None
