@@ -27,6 +27,7 @@ from app.logs import RobotLog
 from app.panel.model import Panel, RobotEntry
 from app.parameters import Parameters
 from app.presses import Presses
+from app.pulse import Pulse
 from app.recording import Recorder, Recordings
 from app.robot import Robot
 from app.rosout import TOPIC, Rosout
@@ -94,6 +95,7 @@ class Kiosk:
             self.board, self.control, operators_log, panel.press_expires_s, others.boots
         )
         self.logbook = Logbook(operators_log, self.robot.name, lambda: self.board.id)
+        self._pulse = Pulse(self.robot, self.link, self.show)
         self.sending = Sending(
             panel,
             self.interfaces,
@@ -103,6 +105,7 @@ class Kiosk:
             self._actions,
             self._confirmations,
             self._parameters,
+            reached=self._pulse.reached,
         )
         self.presses = Presses(
             panel,
@@ -153,6 +156,7 @@ class Kiosk:
         )
         self._rosout.start()
         self._joining.start()
+        self._pulse.start()
         self._following.enter_context(self._operators_log.followed(self.show))
 
     async def stop(self) -> None:
@@ -168,6 +172,7 @@ class Kiosk:
         if self._renewing is not None:
             await asyncio.gather(self._renewing, return_exceptions=True)
         await self._asked.stop()
+        await self._pulse.stop()
         await self._joining.stop()
         await self._actions.stop()
         await self._parameters.stop()

@@ -1,7 +1,7 @@
 """What a press is for: its inputs checked, its message, request or goal encoded, and sent."""
 
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Awaitable, Callable, Iterable, Mapping
 from typing import Any, Protocol
 
 from app import declared
@@ -27,6 +27,11 @@ class Way(Protocol):
     def heard(self, key: str) -> bool: ...
 
 
+async def no_doubt() -> bool:
+    """Where nobody asks whether something arrives."""
+    return True
+
+
 class Sending:
     """What the widgets of one panel send to one robot; judges nothing."""
 
@@ -41,7 +46,10 @@ class Sending:
         confirmations: Confirmations,
         parameters: Parameters,
         monotonic: Callable[[], float] = time.monotonic,
+        reached: Callable[[], Awaitable[bool]] = no_doubt,
     ) -> None:
+        """`reached` tells, later, whether what was sent until now has reached the bridge."""
+        self._reached = reached
         self._widgets = {w.id: w for w in panel.widgets()}
         self._interfaces = interfaces
         self._robot = robot
@@ -88,7 +96,7 @@ class Sending:
                 since = self._monotonic()
                 answer = self._published(widget, fields)
                 if widget.confirm is None:
-                    return answer
+                    return await self._arrived(widget, answer)
                 equals = filled(widget.confirm.equals, values)
                 return await self._confirmations.awaited(
                     widget, equals, press_id, since, answer.text, correct
@@ -125,6 +133,13 @@ class Sending:
         sentence = "published" if heard else "sent_to_nobody"
         text = say(sentence, topic=widget.topic, time=clock(time.time()))
         return Answer("published" if heard else "unknown", text)
+
+    async def _arrived(self, widget: Publish, answer: Answer) -> Answer:
+        """What was `published` is on its way until the bridge has answered."""
+        at = clock(time.time())
+        if answer.outcome != "published" or await self._reached():
+            return answer
+        return Answer("unknown", say("sent_unanswered", topic=widget.topic, time=at))
 
     def checked(self, names: Iterable[str], inputs: Mapping[str, Any]) -> dict[str, Any]:
         """The values of the inputs with these ids."""

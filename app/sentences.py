@@ -14,7 +14,9 @@ ENGLISH: Final[Mapping[str, str]] = {
     "no_bridge_of": "No connection to {name}: Zenoh answers, but no ROS 2 bridge of its namespace.",
     "ending": "The panel's server is ending, or takes a new panel.",
     "joining": "Joining the robot's topics: a moment.",
-    "bridge_silent": "The ROS 2 bridge is connected but does not answer: restart the bridge.",
+    "bridge_silent": (
+        "No connection to the robot: its bridge does not answer. If this stays, restart the bridge."
+    ),
     "wrong_type": "{topic} is {found} on the robot, but this panel is made for {wanted}.",
     "unheard": "Locked: the bridge does not pass on {topic}. If this stays, restart the bridge.",
     "waiting": "Locked: waiting for {topic}.",
@@ -151,6 +153,10 @@ ENGLISH: Final[Mapping[str, str]] = {
     # What came of a press.
     "published": "Sent on {topic} at {time}.",
     "sent_to_nobody": "Sent on {topic} at {time}, but no node is known to listen to it.",
+    "sent_unanswered": (
+        "Sent on {topic} at {time}, but the bridge has not answered since: it is not known whether it "
+        "reaches the robot."
+    ),
     "refused": "Not sent at {time}: {why}",
     "not_encoded": "Not sent at {time}: {why}.",
     "too_many_presses": "Not sent: {most} presses of this page have had no answer yet.",

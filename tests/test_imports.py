@@ -114,6 +114,7 @@ ORDER = (
     "app.intake",
     "app.joining",
     "app.asked",
+    "app.pulse",
     "app.showing",
     "app.kiosk",
     "app.fleet",
