@@ -22,7 +22,17 @@ from app.panel.check_holds import with_own_fields
 from app.panel.model import Hold, Panel
 from app.panel.template import filled, names_in
 from app.progress import Answer, Outcome
-from app.receipts import LONGEST_LOGGED, By, Cause, Receipt, cause_of, judged, named, receipt_of
+from app.receipts import (
+    LONGEST_LOGGED,
+    By,
+    Cause,
+    Receipt,
+    Witness,
+    cause_of,
+    judged,
+    named,
+    receipt_of,
+)
 from app.robot import Robot
 from app.sentences import clock, say
 
@@ -75,6 +85,7 @@ class Holds:
         checked: Checked,
         take: Callable[[], None],
         changed: Callable[[], None],
+        witness: Witness | None = None,
     ) -> None:
         """`checked` are the values that a template gets of what was entered; `take` takes in what
         has come from the robot; `changed` is called when what the widgets show has changed."""
@@ -85,6 +96,7 @@ class Holds:
         self._way = way
         self._loop = loop
         self._checked = checked
+        self._witness = witness
         self._take = take
         self._changed = changed
         self._widgets = {w.id: w for w in panel.widgets() if isinstance(w, Hold)}
@@ -122,6 +134,8 @@ class Holds:
         since = say("hold_since", time=clock(time.time()))
         holding = Holding(widget, lease, by, dict(inputs), fields, last_fields, told, since)
         self._held[widget_id] = holding
+        if self._witness is not None:
+            self._witness.pressed(lease.id, widget.id, named(by.origin), holding.inputs)
         self._robot.held[widget_id] = since
         self._log.info("hold %s of %s by %s with %.*s begins", lease.id, widget_id, named(by.origin),
                 LONGEST_LOGGED, holding.inputs)  # fmt: skip
@@ -268,7 +282,10 @@ class Holds:
         self._log.log(level, "hold %s of %s by %s ended after %.3f s and %d messages (%s): %s",
                 holding.lease.id, widget.id, named(holding.by.origin), seconds, holding.messages,
                 code, text)  # fmt: skip
-        holding.told(receipt_of(widget, holding.inputs, holding.lease.id, Answer(outcome, text)))
+        receipt = receipt_of(widget, holding.inputs, holding.lease.id, Answer(outcome, text))
+        if self._witness is not None:
+            self._witness.answered(receipt)
+        holding.told(receipt)
         self._changed()
 
     def _put_last(self, holding: Holding, now: float) -> str:
@@ -288,6 +305,9 @@ class Holds:
         receipt = _receipt(widget, inputs, why, cause)
         self._log.warning("hold of %s by %s with %.*s: %s", widget.id, named(by.origin),
                 LONGEST_LOGGED, inputs, receipt.reason)  # fmt: skip
+        if self._witness is not None:
+            self._witness.pressed(receipt.id, widget.id, named(by.origin), inputs)
+            self._witness.answered(receipt)
         return receipt
 
 

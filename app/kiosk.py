@@ -124,6 +124,7 @@ class Kiosk:
             checked=self.sending.checked,
             take=self._take,
             changed=self.show,
+            witness=self._recorder,
         )
         self._intake = Intake(
             panel,
