@@ -21,6 +21,11 @@ export function valueOf(input) {
   return Number.isInteger(value) && !Number.isSafeInteger(value) ? input.value : value;
 }
 
+function inputsOf(form) {
+  const entries = [...form.elements].filter((one) => one.matches(ENTRIES) && one.closest("[data-widget]"));
+  return Object.fromEntries(entries.map((input) => [input.name, valueOf(input)]));
+}
+
 // The input of a parameter: it shows the robot's value until it is touched, and then what was entered
 // until that is set.
 const touched = new WeakSet();
@@ -135,10 +140,11 @@ export class Presser {
         event.preventDefault();
         const root = event.submitter?.closest("[data-widget]");
         if (!root || event.submitter.disabled) return;
+        const inputs = inputsOf(form); // as they are now: a dialog asks for these, whatever comes meanwhile
         if (event.submitter.classList.contains("cancel") || !root.querySelector("dialog.ask")) {
-          this.#press(root, event.submitter, form, this.#click);
+          this.#press(root, event.submitter, inputs, this.#click);
         } else {
-          this.#asked(root, form, (yes) => this.#press(root, event.submitter, form, this.#moment(yes)));
+          this.#asked(root, form, (yes) => this.#press(root, event.submitter, inputs, this.#moment(yes)));
         }
       });
     }
@@ -168,7 +174,7 @@ export class Presser {
   }
 
   // A second tap while the first is under way is the same press: it sends nothing.
-  async #press(root, button, form, click) {
+  async #press(root, button, inputs, click) {
     const url = button.getAttribute("formaction");
     if (this.#underWay.has(url)) return;
     this.#underWay.add(url);
@@ -177,21 +183,13 @@ export class Presser {
     try {
       const answerMs = ANSWER_WITHIN_MS + 1000 * (root.dataset.answerS ?? 0);
       const line = this.#line?.free && !button.matches(".cancel") ? this.#line : null;
-      const press = { ...this.#given(form), ...click };
+      const press = { inputs, id: newId(), ...click };
       this.#show(root, await this.#send(root.dataset.widget, line, url, press, answerMs));
       await pause;
     } finally {
       this.#underWay.delete(url);
       button.removeAttribute("aria-busy");
     }
-  }
-
-  #given(form) {
-    const inputs = {};
-    for (const input of form.elements) {
-      if (input.matches(ENTRIES) && input.closest("[data-widget]")) inputs[input.name] = valueOf(input);
-    }
-    return { inputs, id: newId() };
   }
 
   // Sent once and never again: when no answer comes, it is not known what became of it.
