@@ -22,7 +22,7 @@ Config = zenoh.Config
 
 ASK_TIMEOUT_S = 2.0
 MOST_QUEUED = 16  # batches; Zenoh takes no more
-DROPPED_AFTER_US = 100_000  # how long a put may wait for room
+BLOCKED_MOST_US = 200_000  # how long a put or a question may wait for room: less than a hold's lease
 
 # Zenoh's own setting of its threads, read when its first session opens. By default the thread that
 # waits for the network wakes another one for each message: where one does both, it costs half.
@@ -67,13 +67,14 @@ def _fit(config: zenoh.Config) -> zenoh.Config:
     """What a kiosk needs of any configuration.
 
     No shared memory: Zenoh keeps a segment and its file for each session that was, and a session is
-    renewed at every loss of the link. Room for a burst, and time to send it: two messages and a
-    millisecond, which are Zenoh's own, lose commands in silence on a machine that is busy.
+    renewed at every loss of the link. Room for a burst, as Zenoh's own two messages are few. What finds
+    no room waits for it, which stops the event loop: where that takes too long (5 s are Zenoh's own)
+    the connection is closed, once, and all is locked. Nothing is dropped in silence.
     """
     config.insert_json5("transport/shared_memory/enabled", "false")
     config.insert_json5("transport/link/tx/queue/size/data", str(MOST_QUEUED))
-    wait = "transport/link/tx/queue/congestion_control/drop/wait_before_drop"
-    config.insert_json5(wait, str(DROPPED_AFTER_US))
+    wait = "transport/link/tx/queue/congestion_control/block/wait_before_close"
+    config.insert_json5(wait, str(BLOCKED_MOST_US))
     return config
 
 
@@ -150,7 +151,7 @@ class Link:
     def _publisher(self, key: str) -> zenoh.Publisher:
         return self._session.declare_publisher(
             key,
-            congestion_control=zenoh.CongestionControl.DROP,
+            congestion_control=zenoh.CongestionControl.BLOCK,
             express=True,
             reliability=zenoh.Reliability.RELIABLE,
             allowed_destination=zenoh.Locality.REMOTE,

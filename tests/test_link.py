@@ -1,5 +1,9 @@
 """The link alone, between two Zenoh sessions of this process."""
 
+import asyncio
+import signal
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -11,7 +15,7 @@ from zenoh.handlers import Callback
 
 from app import keys
 from app.keys import Qos
-from app.link import Link, config_to
+from app.link import BLOCKED_MOST_US, Link, config_to
 from tests.parts import free_port, until
 
 RENEWALS = 30
@@ -83,6 +87,49 @@ def test_a_burst_is_not_dropped(peer: tuple[str, zenoh.Session]) -> None:
     until(lambda: len(heard) == BURST, f"all came, of {BURST}: {len(heard)}")
     link.close()
     assert heard == [str(number).encode() for number in range(BURST)]
+
+
+LISTENER = """
+import sys, zenoh
+config = zenoh.Config()
+config.insert_json5("listen/endpoints", f'["{sys.argv[1]}"]')
+config.insert_json5("scouting/multicast/enabled", "false")
+session = zenoh.open(config)
+listener = session.declare_subscriber("b", lambda sample: None)
+print("ready", flush=True)
+sys.stdin.read()
+"""
+
+
+def test_a_link_that_takes_nothing_stops_the_loop_once_and_not_for_long() -> None:
+    """A peer that is frozen: the kernel's buffers fill, and then what is sent, and what is asked."""
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    command = [sys.executable, "-c", LISTENER, endpoint]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as peer:
+        assert peer.stdout is not None
+        assert peer.stdout.readline() == b"ready\n"
+        link = Link(config_to(endpoint), lambda: None)
+        link.start([], ["b"])
+        until(lambda: link.heard("b"), "the subscriber is known")
+        peer.send_signal(signal.SIGSTOP)
+        took = []
+        for _ in range(2000):
+            began = time.monotonic()
+            link.put("b", bytes(20_000))
+            took.append(time.monotonic() - began)
+        began = time.monotonic()
+        asyncio.run(asked(link))
+        took.append(time.monotonic() - began)
+        peer.kill()
+        link.close()
+    long = [one for one in took if one > 0.1]
+    assert len(long) == 1, "it waits for room once"
+    assert long[0] < 2 * BLOCKED_MOST_US / 1e6
+
+
+async def asked(link: Link) -> None:
+    """A question is sent, and not waited for."""
+    link.query("b", b"", 0.1).cancel()
 
 
 def test_nothing_is_left_of_the_sessions_that_were(peer: tuple[str, zenoh.Session]) -> None:
