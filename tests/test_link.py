@@ -108,7 +108,7 @@ def test_a_link_that_takes_nothing_stops_the_loop_once_and_not_for_long() -> Non
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as peer:
         assert peer.stdout is not None
         assert peer.stdout.readline() == b"ready\n"
-        link = Link(config_to(endpoint), lambda: None)
+        link = Link(config_to(endpoint), lambda urgent: None)
         link.start([], ["b"])
         until(lambda: link.heard("b"), "the subscriber is known")
         peer.send_signal(signal.SIGSTOP)
