@@ -24,6 +24,7 @@ class Place:
     domain: int  # the ROS domain, on loopback only
     folder: Path  # scratch, removed later
     topics: tuple[str, ...] = ()  # further topics to show: absolute ROS names
+    buttons: int = 1  # more, where one takes a second press only after a pause
 
 
 @dataclass(frozen=True)
