@@ -4,17 +4,17 @@ import gzip
 import html
 import mimetypes
 import os
+import socket
 import subprocess
 import sys
 import threading
 from collections.abc import Callable, Mapping, Sequence
-from functools import cache
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Final
 
 from bench.peer import Bare, Place, Running, until_answers
-from tests.parts import Process
+from tests.parts import Process, until
 
 PEERS: Final = Path(__file__).resolve().parent
 # As bench/parts.py has it, and the Makefile.
@@ -97,9 +97,21 @@ def _handler(files: Mapping[str, bytes]) -> type[BaseHTTPRequestHandler]:
     return Handler
 
 
-@cache
-def read(path: Path) -> bytes:
-    return path.read_bytes()
+def page_with(page: Path, topics: Sequence[str], scripts: Path) -> Files:
+    """A page with an element for each topic, and the files of a folder."""
+    files = {f"/{path.name}": path.read_bytes() for path in scripts.iterdir()}
+    return Files({"/": with_topics(page, topics).encode(), **files})
+
+
+def until_listens(port: int, process: Process) -> None:
+    """Waits for a server that is no HTTP server."""
+
+    def listens() -> bool:
+        assert process.running, process.text
+        with socket.socket() as probe:
+            return probe.connect_ex(("127.0.0.1", port)) == 0
+
+    until(listens, "the server listens", within_s=20.0, every_s=0.005)
 
 
 def ending(*ends: Callable[[], object]) -> Callable[[], None]:
