@@ -3,6 +3,7 @@
 # make check types and style
 # make faults every fault in its long form, and what was measured as a table in the README
 # make soak  an ordinary day for SOAK_S seconds (an hour)
+# make bench  this panel and its rivals side by side (15 minutes); QUICK=1 only shows that it works
 # make bench-setup  what the benchmark's rivals need, into the cache
 # make dev   the panel, taking every change as it is saved
 
@@ -15,7 +16,7 @@ export BENCH_CACHE := $(BENCH)
 export TEST_BRIDGE := $(CACHE)/bridge/release/test-bridge
 export TEST_ROS_PYTHON := $(CURDIR)/.venv-ros/bin/python
 
-.PHONY: run test check dev wheel faults soak bench-setup test-parts bridge lock clean
+.PHONY: run test check dev wheel faults soak bench bench-setup test-parts bridge lock clean
 .DELETE_ON_ERROR:
 
 run: .venv/run
@@ -74,6 +75,10 @@ FOR_ROS := $(PYTHON) -c 'import sys; sys.exit(None if sys.version_info[:2] == (3
 	$(PYTHON) -m venv .venv-ros
 	.venv-ros/bin/python $(PIP_INSTALL) $<
 	touch $@
+
+# PHASES: some of them, such as `PHASES="down up"`. A quick run leaves the results of the last whole one.
+bench: .venv/test bridge
+	.venv/bin/python -m bench $(if $(QUICK),--results $(BENCH)/quick,--readme README.md) $(PHASES)
 
 # The robot, then the rivals: each in an environment of its own. See bench/README.md.
 bench-setup: system .venv/test bridge $(addprefix $(BENCH)/,robot/ready rosbridge/ready nicegui/ready pages/ready router)

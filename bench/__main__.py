@@ -8,6 +8,7 @@ import argparse
 import os
 import signal
 import sys
+import time
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -50,8 +51,7 @@ class Run:
     def down(self) -> None:
         floor = next(peer for peer in self._peers if peer.id == "floor")
         asked = [(peer.id, peer) for peer in self._peers] + [(floor.id + AGAIN, floor)]
-        measure = lambda rig, peer: latency.down(rig, peer, peer.robot)  # noqa: E731
-        self._interleaved("down", asked, measure, self._rounds)
+        self._interleaved("down", asked, latency.down, self._rounds)
 
     def bridge(self) -> None:
         """Down again, from rclpy over the real bridge."""
@@ -59,14 +59,13 @@ class Run:
             self._interleaved(
                 "bridge",
                 [(peer.id, peer) for peer in self._peers if peer.robot == "zenoh"],
-                partial(latency.down, way="ros", router=locator),
+                partial(latency.down, over="ros", router=locator),
                 self._rounds,
             )
 
     def up(self) -> None:
-        measure = lambda rig, peer: latency.up(rig, peer, peer.robot)  # noqa: E731
         pressed = [(peer.id, peer) for peer in self._peers if peer.button]
-        self._interleaved("up", pressed, measure, self._rounds)
+        self._interleaved("up", pressed, latency.up, self._rounds)
 
     def cost(self) -> None:
         self._interleaved("cost", self._shown(), cost, self._rig.sizes.cost_rounds)
@@ -80,8 +79,7 @@ class Run:
     def growth(self) -> None:
         self._store.begin("growth")
         for axis, measure in Growth(self._rig).axes().items():
-            print(f"growth: {axis}", flush=True)
-            with self._store.faults(f"growth: {axis}"):
+            with timed(f"growth: {axis}"), self._store.faults(f"growth: {axis}"):
                 self._store.add("growth", 0, axis, {"points": measure()})
 
     def _shown(self) -> list[tuple[str, Peer]]:
@@ -96,12 +94,21 @@ class Run:
         for turn in range(rounds):
             first = turn * len(peers) // rounds
             for name, peer in (*peers[first:], *peers[:first]):
-                print(f"{phase}, round {turn + 1}: {name}", flush=True)
-                with self._store.faults(f"{phase}: {name}"):
+                what = f"{phase}: {name}"
+                with timed(f"{what}, round {turn + 1}"), self._store.faults(what):
                     self._store.add(phase, turn, name, measure(self._rig, peer))
 
 
 PHASES: Final = ("down", "bridge", "up", "cost", "stalled", "start", "growth")
+
+
+@contextmanager
+def timed(what: str) -> Iterator[None]:
+    """Tells what is measured now, and how long it took."""
+    print(what, end=" ", flush=True)
+    began = time.monotonic()
+    yield
+    print(f"({time.monotonic() - began:.1f} s)", flush=True)
 
 
 def proven(rig: Rig, store: Store, peers: Iterable[Peer]) -> list[Peer]:

@@ -16,8 +16,10 @@ SETTLE_S: Final = 0.4
 BUTTONS: Final = 20  # each takes another press after 0.7 s on this panel's page
 
 
-def down(rig: Rig, peer: Peer, way: str, router: str = "") -> dict[str, float]:
-    """One round of one peer; `way` is how the robot speaks, `router` where the peer listens."""
+def down(rig: Rig, peer: Peer, over: str = "", router: str = "") -> dict[str, float]:
+    """One round of one peer; `over` is how the robot speaks where that is not the peer's own way,
+    `router` is where the peer listens then."""
+    way = over or peer.robot
     with rig.running(peer, router=router) as server, rig.page(peer, server, way) as page:
         time.sleep(SETTLE_S)
         rig.warm(way)
@@ -30,11 +32,10 @@ def down(rig: Rig, peer: Peer, way: str, router: str = "") -> dict[str, float]:
         return told(matched, clock.doubt_ms)
 
 
-def up(rig: Rig, peer: Peer, way: str, router: str = "") -> dict[str, float]:
-    with (
-        rig.running(peer, router=router, buttons=BUTTONS) as server,
-        rig.page(peer, server, way) as page,
-    ):
+def up(rig: Rig, peer: Peer) -> dict[str, float]:
+    """One round of one peer."""
+    way = peer.robot
+    with rig.running(peer, buttons=BUTTONS) as server, rig.page(peer, server, way) as page:
         time.sleep(SETTLE_S)
         clock = page.clock()
         page.watch()

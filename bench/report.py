@@ -13,6 +13,7 @@ from bench.targets import FLOOR, FLOOR_AGAIN, Grown, grown, targets
 BEGIN: Final = "<!-- bench -->"
 END: Final = "<!-- /bench -->"
 NONE: Final = "–"
+PICTURE: Final = "![Latency of this panel, the floor and its rivals](bench/results.svg)"
 
 Titles = Mapping[str, str]
 Cell = Callable[[str], str]
@@ -33,7 +34,7 @@ def write(results: Results, titles: Titles, folder: Path, readme: Path | None) -
 
 def section(results: Results, titles: Titles) -> str:
     """What the README shows."""
-    parts = [main_table(results, titles), targets_table(results), faults(results, titles)]
+    parts = [PICTURE, main_table(results, titles), targets_table(results), faults(results, titles)]
     return "\n\n".join(filter(None, [machine(results), *parts]))
 
 

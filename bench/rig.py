@@ -108,10 +108,10 @@ class Rig:
 
     @contextmanager
     def page(
-        self, peer: Peer, server: Running, way: str, topics: Sequence[str] = (), path: str = ""
+        self, peer: Peer, server: Running, way: str, topics: Sequence[str] = ()
     ) -> Iterator[Watched]:
         """Its page, permitted by the robot."""
-        with self.chromium.page(server.url + path, peer.shown, topics) as page:
+        with self.chromium.page(server.url, peer.shown, topics) as page:
             self.permit(way, page)
             yield page
 

@@ -1,7 +1,7 @@
 """What is to be reached, against what was measured in the same run."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
@@ -150,7 +150,8 @@ def grown(results: Results) -> list[Grown]:
 
 def _grown(axis: Axis, points: list[list[float]]) -> Grown:
     xs, cpu, mib, noise = (tuple(column) for column in zip(*points, strict=True))
-    of: Callable[[tuple[float, ...], float], Slope] = lambda ys, doubt: slope(  # noqa: E731
-        list(zip(xs, ys, strict=True)), doubt
-    )
+
+    def of(ys: tuple[float, ...], doubt: float) -> Slope:
+        return slope(list(zip(xs, ys, strict=True)), doubt)
+
     return Grown(axis, xs, cpu, mib, of(cpu, max(noise)), of(mib, NOISE_MIB))
