@@ -1,19 +1,20 @@
 """Chromium: pages, their clock, what they show, and what is pressed on them."""
 
+import json
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any, Final
 
-from playwright.sync_api import Browser, CDPSession, Page, Playwright
+from playwright.sync_api import Browser, CDPSession, Page, Playwright, ViewportSize
 from playwright.sync_api import Error as PlaywrightError
 
 from bench.parts import family
 from tests.conftest import CHROMIUM_FLAGS
 from tests.parts import CHROMIUM
 
-VIEWPORT: Final = {"width": 1280, "height": 800}
+VIEWPORT: Final[ViewportSize] = {"width": 1280, "height": 800}
 WITHIN_MS: Final = 15_000
 TEXT_INPUT: Final = "#text, #input-text"
 ROUND_TRIPS: Final = 20
@@ -45,6 +46,28 @@ SHOWN_AT: Final = """(() => {
   const observer = new MutationObserver(look);
   observer.observe(document, { subtree: true, childList: true, attributes: true });
 })()"""
+
+# As WATCH does with values, but from the very beginning and over the page's own reloads.
+KEEP: Final = """((values) => {
+  const origin = performance.timeOrigin;
+  const moved = (texts, by) => texts.map(([at, index, text]) => [at + by, index, text]);
+  const kept = moved(JSON.parse(sessionStorage.getItem("bench") ?? "[]"), -origin);
+  const last = [];
+  window.benchKept = kept;
+  const look = () => {
+    for (const [index, value] of values.entries()) {
+      const text = document.querySelector(value)?.textContent.slice(0, 11);
+      if (!text?.startsWith("#") || text === last[index]) continue;
+      last[index] = text;
+      kept.push([performance.now(), index, text]);
+    }
+  };
+  const observer = new MutationObserver(look);
+  observer.observe(document, { subtree: true, childList: true, characterData: true });
+  addEventListener("pagehide", () => {
+    sessionStorage.setItem("bench", JSON.stringify(moved(kept.slice(-20000), origin)));
+  });
+})"""
 
 TYPE: Final = """([input, buttons, turn, text]) => {
   const entry = document.querySelector(input);
@@ -96,6 +119,10 @@ class Watched:
         """What was noted, which is forgotten then: `toggles`, `texts` or `ups`."""
         return list(self.page.evaluate(f"bench.{what}.splice(0)"))
 
+    def kept(self) -> list[Any]:
+        """(page's time, index of the topic, text) of all that it showed, if it was to keep that."""
+        return list(self.page.evaluate("benchKept"))
+
     def clock(self) -> Clock:
         """Chromium's TimeTicks are CLOCK_MONOTONIC: when the page's time began is read from it, and
         checked by round trips."""
@@ -145,15 +172,19 @@ class Chromium:
         return family((self._root,))
 
     @contextmanager
-    def page(self, url: str, shown: str, topics: Sequence[str] = ()) -> Iterator[Watched]:
-        """A page in a context of its own, loaded."""
+    def page(
+        self, url: str, shown: str, topics: Sequence[str] = (), keep: bool = False
+    ) -> Iterator[Watched]:
+        """A page in a context of its own, loaded; `keep`: see `Watched.kept`."""
         with self.blank() as page:
+            if keep:
+                page.add_init_script(f"{KEEP}({json.dumps([value_of(topic) for topic in topics])})")
             page.goto(url)
             yield Watched(page, shown, topics)
 
     @contextmanager
     def blank(self) -> Iterator[Page]:
-        context = self._browser.new_context(viewport={"width": 1280, "height": 800})
+        context = self._browser.new_context(viewport=VIEWPORT)
         context.set_default_timeout(WITHIN_MS)
         try:
             yield context.new_page()

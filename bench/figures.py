@@ -42,9 +42,11 @@ def toggles_matched(
     As many are lost as did not show: those after which the next that shows came only when the same had
     been said again. `slack_ms` is what clocks may differ.
     """
-    left = deque(one for one in seen if said and one[0] >= said[0][0] - slack_ms)
+    left = deque(seen)
     found: list[float] = []
     for turn, (at, value) in enumerate(said):
+        while left and left[0][0] < at - slack_ms:  # of one that was given up
+            left.popleft()
         missing = len(said) - turn - len(left)
         again = said[turn + 2][0] if turn + 2 < len(said) else math.inf
         if not left or (missing > 0 and left[0][0] >= again - slack_ms) or left[0][1] != value:

@@ -30,10 +30,9 @@ def stalled(rig: Rig, peer: Peer) -> dict[str, Any]:
         still = stack.enter_context(rig.another_chromium())
         server = stack.enter_context(rig.running(peer, topics))
         other = stack.enter_context(rig.page(peer, server, peer.robot, topics))
-        sleeper = stack.enter_context(still.page(server.url, peer.shown, topics))
+        sleeper = stack.enter_context(still.page(server.url, peer.shown, topics, keep=True))
         rig.permit(peer.robot, sleeper)
-        for page in (other, sleeper):
-            page.watch()
+        other.watch()
         for topic, (hz, size) in LOADS.items():
             rig.robot("load", ways=[peer.robot], topics=[topic], hz=hz, size=size)
         time.sleep(SETTLE_S)
@@ -48,11 +47,7 @@ def stalled(rig: Rig, peer: Peer) -> dict[str, Any]:
         time.sleep(AFTER_S)
         put_at = rig.robot("quiet")
         clock = sleeper.clock()
-        texts = [
-            (clock.ns(at), put_at[topic][number_of(text)])
-            for at, topic, text in sleeper.take("texts")
-            if text.startswith("#")
-        ]
+        texts = [(clock.ns(at), put_at[topic][number_of(text)]) for at, topic, text in sleeper.kept()]
         first_ms, old = shown_after(texts, went_on_ns, OLD_S)
         return {
             "before_p50": percentile(before, 50),
