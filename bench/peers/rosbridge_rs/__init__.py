@@ -1,6 +1,7 @@
 """rosbridge-server-rs, a rosbridge in Rust, on ROS 2 jazzy, with a page on roslib."""
 
 import json
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,7 +9,7 @@ from typing import Final, Literal
 
 from bench.peer import Bare, Place, Running
 from bench.peers.parts import CACHE, ending, page_with, started, until_listens
-from tests.parts import free_port
+from tests.parts import Process, free_port
 
 HERE: Final = Path(__file__).parent
 VENV: Final = CACHE / "rosbridge"
@@ -33,7 +34,7 @@ class RosbridgeRs:
         # rosapi answers questions that this page does not ask; its messages are in no registry.
         command: list[str | Path] = [PROGRAM, "--bind", f"127.0.0.1:{port}", "--no-rosapi"]
         process = started(command, environment(place), place.folder)
-        end = ending(process.end)
+        end = ending(lambda: ended(process))
         try:
             until_listens(port, process)
         except BaseException:
@@ -42,6 +43,14 @@ class RosbridgeRs:
         files = page_with(HERE / "page.html", place.topics, SCRIPTS)
         bare = Bare("websocket", "/", tuple(asked(place.topics)), port)
         return Running(f"{files.url}?port={port}", (process.pid,), ending(end, files.end), bare)
+
+
+def ended(process: Process) -> None:
+    """Ends it, and removes what Fast DDS leaves for the next one on the same domain."""
+    maps = Path(f"/proc/{process.pid}/maps").read_text() if process.running else ""
+    process.end()
+    for path in set(re.findall(r"/dev/shm/(?:sem\.)?fastrtps_\S+", maps)):
+        Path(path).unlink(missing_ok=True)
 
 
 def asked(topics: tuple[str, ...]) -> Iterator[str]:
