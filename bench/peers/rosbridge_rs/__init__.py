@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Final, Literal
 
 from bench.peer import Bare, Place, Running
-from bench.peers.parts import CACHE, ending, page_with, started, until_listens
+from bench.peers.parts import CACHE, started, with_page
 from tests.parts import Process, free_port
 
 HERE: Final = Path(__file__).parent
@@ -34,15 +34,9 @@ class RosbridgeRs:
         # rosapi answers questions that this page does not ask; its messages are in no registry.
         command: list[str | Path] = [PROGRAM, "--bind", f"127.0.0.1:{port}", "--no-rosapi"]
         process = started(command, environment(place), place.folder)
-        end = ending(lambda: ended(process))
-        try:
-            until_listens(port, process)
-        except BaseException:
-            end()
-            raise
-        files = page_with(HERE / "page.html", place.topics, SCRIPTS)
         bare = Bare("websocket", "/", tuple(asked(place.topics)), port)
-        return Running(f"{files.url}?port={port}", (process.pid,), ending(end, files.end), bare)
+        page = HERE / "page.html"
+        return with_page(process, port, page, SCRIPTS, place.topics, lambda: ended(process), bare)
 
 
 def ended(process: Process) -> None:
