@@ -97,10 +97,25 @@ def _handler(files: Mapping[str, bytes]) -> type[BaseHTTPRequestHandler]:
     return Handler
 
 
-def page_with(page: Path, topics: Sequence[str], scripts: Path) -> Files:
-    """A page with an element for each topic, and the files of a folder."""
-    files = {f"/{path.name}": path.read_bytes() for path in scripts.iterdir()}
-    return Files({"/": with_topics(page, topics).encode(), **files})
+def with_page(
+    process: Process,
+    port: int,
+    page: Path,
+    scripts: Path,
+    topics: Sequence[str],
+    end: Callable[[], None],
+    bare: Bare | None = None,
+) -> Running:
+    """A peer whose server is no web server: it listens on `port`, its page and the files of the folder
+    `scripts` come from elsewhere."""
+    try:
+        until_listens(port, process)
+        files = {f"/{path.name}": path.read_bytes() for path in scripts.iterdir()}
+        served = Files({"/": with_topics(page, topics).encode(), **files})
+    except BaseException:
+        end()
+        raise
+    return Running(f"{served.url}?port={port}", (process.pid,), ending(end, served.end), bare)
 
 
 def until_listens(port: int, process: Process) -> None:

@@ -14,6 +14,7 @@ from starlette.routing import Route
 config = zenoh.Config()
 config.insert_json5("mode", '"client"')
 config.insert_json5("connect/endpoints", f'["{os.environ["BENCH_ROUTER"]}"]')
+config.insert_json5("transport/shared_memory/enabled", "false")  # it would leave files behind
 session = zenoh.open(config)
 
 

@@ -50,6 +50,7 @@ async def connect() -> None:
     config = zenoh.Config()
     config.insert_json5("mode", '"client"')
     config.insert_json5("connect/endpoints", json.dumps([locator]))
+    config.insert_json5("transport/shared_memory/enabled", "false")  # it would leave files behind
     app.state.session = zenoh.open(config)
     for key in ("operation_enabled", *heard):
         app.state.session.declare_subscriber(key, came)

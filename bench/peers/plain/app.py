@@ -30,6 +30,7 @@ async def zenoh_session(app: Starlette) -> AsyncIterator[None]:
     config = zenoh.Config()
     config.insert_json5("mode", '"client"')
     config.insert_json5("connect/endpoints", json.dumps([os.environ["BENCH_ROUTER"]]))
+    config.insert_json5("transport/shared_memory/enabled", "false")  # it would leave files behind
     with zenoh.open(config) as session:
         for topic in ("/operation_enabled", *os.environ["BENCH_TOPICS"].split()):
             session.declare_subscriber(topic.removeprefix("/"), came)

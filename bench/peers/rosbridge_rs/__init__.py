@@ -1,14 +1,15 @@
 """rosbridge-server-rs, a rosbridge in Rust, on ROS 2 jazzy, with a page on roslib."""
 
 import json
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Literal
 
 from bench.peer import Bare, Place, Running
-from bench.peers.parts import CACHE, ending, page_with, started, until_listens
-from tests.parts import free_port
+from bench.peers.parts import CACHE, started, with_page
+from tests.parts import Process, free_port
 
 HERE: Final = Path(__file__).parent
 VENV: Final = CACHE / "rosbridge"
@@ -33,15 +34,17 @@ class RosbridgeRs:
         # rosapi answers questions that this page does not ask; its messages are in no registry.
         command: list[str | Path] = [PROGRAM, "--bind", f"127.0.0.1:{port}", "--no-rosapi"]
         process = started(command, environment(place), place.folder)
-        end = ending(process.end)
-        try:
-            until_listens(port, process)
-        except BaseException:
-            end()
-            raise
-        files = page_with(HERE / "page.html", place.topics, SCRIPTS)
         bare = Bare("websocket", "/", tuple(asked(place.topics)), port)
-        return Running(f"{files.url}?port={port}", (process.pid,), ending(end, files.end), bare)
+        page = HERE / "page.html"
+        return with_page(process, port, page, SCRIPTS, place.topics, lambda: ended(process), bare)
+
+
+def ended(process: Process) -> None:
+    """Ends it, and removes what Fast DDS leaves for the next one on the same domain."""
+    maps = Path(f"/proc/{process.pid}/maps").read_text() if process.running else ""
+    process.end()
+    for path in set(re.findall(r"/dev/shm/(?:sem\.)?fastrtps_\S+", maps)):
+        Path(path).unlink(missing_ok=True)
 
 
 def asked(topics: tuple[str, ...]) -> Iterator[str]:

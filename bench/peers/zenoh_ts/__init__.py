@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Final, Literal
 
 from bench.peer import Place, Running
-from bench.peers.parts import CACHE, ending, page_with, started, until_listens
+from bench.peers.parts import CACHE, ending, started, with_page
 from tests.parts import free_port
 
 HERE: Final = Path(__file__).parent
@@ -30,14 +30,8 @@ class ZenohTs:
         config = place.folder / "router.json5"
         config.write_text(json.dumps(configuration(place.router, port)))
         process = started([ROUTER, config], {}, place.folder)
-        end = ending(process.end)
-        try:
-            until_listens(port, process)
-        except BaseException:
-            end()
-            raise
-        files = page_with(HERE / "page.html", place.topics, SCRIPTS)
-        return Running(f"{files.url}?port={port}", (process.pid,), ending(end, files.end))
+        page = HERE / "page.html"
+        return with_page(process, port, page, SCRIPTS, place.topics, ending(process.end))
 
 
 def configuration(robot: str, port: int) -> dict[str, object]:
