@@ -86,18 +86,19 @@ class Presses:
         """
         widget = self.widget(widget_id)
         known = self._under_way.get(press_id) or self._receipts.get(press_id)
-        if known is None:
+        if known is None and not self._receipts.is_past(press_id):
             if left_out := self._left_out(widget, inputs, press_id, by):
                 return left_out
             work = self._logged(widget, inputs, press_id, by)
             return await self._once(widget, inputs, press_id, work)
+        if known is None:
+            return await self._again(
+                widget, inputs, press_id, say("press_past", id=press_id), by.origin
+            )
         if (known.widget, known.fingerprint) != (widget_id, fingerprint(inputs)):
-            own_id = f"{press_id:.40}.{secrets.token_hex(4)}"
-            if not self._logbook.room(by.origin):
-                answer = Answer("refused", say("press_reused", id=press_id))
-                return self._counted(receipt_of(widget, inputs, own_id, answer, "input"), by.origin)
-            work = self._reused(widget, inputs, press_id, own_id, by.origin)
-            return await self._once(widget, inputs, own_id, work)
+            return await self._again(
+                widget, inputs, press_id, say("press_reused", id=press_id), by.origin
+            )
         if isinstance(known, _UnderWay):
             return await asyncio.shield(known.receipt)
         return known
@@ -193,16 +194,21 @@ class Presses:
                 LONGEST_LOGGED, inputs, receipt.outcome, receipt.reason)  # fmt: skip
         return receipt
 
-    async def _reused(
-        self,
-        widget: Pressed,
-        inputs: Mapping[str, Any],
-        press_id: str,
-        own_id: str,
-        origin: Origin,
+    async def _again(
+        self, widget: Pressed, inputs: Mapping[str, Any], press_id: str, why: str, origin: Origin
     ) -> Receipt:
-        """A press with another one's id is not even judged."""
-        text = say("press_reused", id=press_id)
+        """A press with an id that was used is not even judged; its receipt has an id of its own."""
+        own_id = f"{press_id:.40}.{secrets.token_hex(4)}"
+        if self._logbook.room(origin):
+            return await self._once(
+                widget, inputs, own_id, self._reused(widget, inputs, own_id, why, origin)
+            )
+        refused = receipt_of(widget, inputs, own_id, Answer("refused", why), "input")
+        return self._counted(refused, origin)
+
+    async def _reused(
+        self, widget: Pressed, inputs: Mapping[str, Any], own_id: str, text: str, origin: Origin
+    ) -> Receipt:
         self._receipts.begin(own_id, widget.id, origin, inputs)
         self._log.warning("press %s of %s by %s: %s", own_id, widget.id, named(origin), text)
         why = await self._logbook.refused(widget.id, inputs, own_id, origin, text)

@@ -160,6 +160,7 @@ ENGLISH: Final[Mapping[str, str]] = {
     "refused": "Not sent at {time}: {why}",
     "not_encoded": "Not sent at {time}: {why}.",
     "too_many_presses": "Not sent: {most} presses of this page have had no answer yet.",
+    "press_past": "Not sent again: press {id} was made before; the operator's log has what came of it.",
     "press_reused": "Not sent: the press id {id} was already used for another press.",
     # The operator's log.
     "log_unwritable": "The operator's log can't be written: {why}.",
