@@ -118,6 +118,7 @@ ORDER = (
     "app.assets",
     "app.doors",
     "app.startup",
+    "app.direct",
     "app.routes.site",
     "app.routes.visitors",
     "app.routes.pages",
