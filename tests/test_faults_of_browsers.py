@@ -19,7 +19,7 @@ READS_NOTHING_S = several(10, 60)
 STORM_S = several(5, 30)
 BROWSERS = 200
 UPDATES_PER_S = 200.0
-MOST_UNREAD = 4_000_000  # what the kernel's buffers on both sides hold
+MOST_UNREAD = 400_000  # what the server and the kernel on both sides hold
 MARGIN_MB = 40.0
 
 

@@ -122,6 +122,7 @@ ORDER = (
     "app.assets",
     "app.doors",
     "app.startup",
+    "app.direct",
     "app.routes.messages",
     "app.routes.site",
     "app.routes.visitors",
