@@ -110,6 +110,7 @@ ORDER = (
     "app.bridges",
     "app.tokens",
     "app.inbox",
+    "app.attached",
     "app.link",
     "app.intake",
     "app.joining",
@@ -206,7 +207,7 @@ def test_the_interfaces_know_nothing_of_the_panel() -> None:
 
 
 def test_the_link_knows_no_view_and_no_panel() -> None:
-    assert of_project("app.link") <= {"app.errors", "app.inbox", "app.keys"}
+    assert of_project("app.link") <= {"app.attached", "app.errors", "app.inbox", "app.keys"}
 
 
 @pytest.mark.parametrize(
