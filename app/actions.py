@@ -17,10 +17,12 @@ from app.errors import DecodeError
 from app.goals import ACCEPTED, CANCELING, ENDS, UNKNOWN, Goal
 from app.interfaces import Interfaces
 from app.interlocks import SERVER_SETTLE_S
+from app.logs import RobotLog
 from app.panel.model import Action
 from app.progress import Answer, Corrected, Progress
 from app.robot import Robot, Sample, value_of
 from app.sentences import clock, say
+from app.tasks import told
 
 log = logging.getLogger("kiosk.actions")
 
@@ -38,6 +40,7 @@ class Actions:
         """`changed` is called when what the widgets show has changed."""
         self._interfaces = interfaces
         self._robot = robot
+        self._log = RobotLog(log, robot.name)
         self._link = link
         self._changed = changed
         self._latest: dict[str, Goal] = {}  # by widget
@@ -144,7 +147,7 @@ class Actions:
         try:
             message = self._interfaces.decode(types.feedback_message, bytes(sample.payload))
         except DecodeError as error:
-            log.error("%s: %s", widget.action, error)
+            self._log.error("%s: %s", widget.action, error)
             return
         if bytes(message.goal_id.uuid) != goal.id.bytes:
             return
@@ -181,7 +184,7 @@ class Actions:
                 return  # it was never heard of: what was said of it stands
             else:
                 await asyncio.sleep(ASK_AGAIN_S)
-        log.info("press %s: goal %s: %s: %s", goal.press_id, goal.id, answer.outcome, answer.text)
+        self._log.info("press %s: goal %s: %s: %s", goal.press_id, goal.id, answer.outcome, answer.text)
         self._tell(goal, answer)
 
     async def _until_offered(self, goal: Goal) -> None:
@@ -210,7 +213,7 @@ class Actions:
         try:
             message = self._interfaces.decode(types.get_result_response, reply)
         except DecodeError as error:
-            log.error("%s: %s", goal.widget.action, error)
+            self._log.error("%s: %s", goal.widget.action, error)
             return Answer("unknown", say("answer_unreadable", wanted=goal.widget.type))
         goal.state = message.status if message.status in ENDS else UNKNOWN
         if message.status not in ENDS:
@@ -231,7 +234,7 @@ class Actions:
         try:
             return getattr(self._interfaces.decode(type_name, reply), name)
         except DecodeError as error:
-            log.error("%s", error)
+            self._log.error("%s", error)
             return None
 
     def _tell(self, goal: Goal, answer: Answer) -> None:
@@ -251,11 +254,6 @@ class Actions:
         return latest
 
     def _task(self, goal: Goal) -> None:
-        task = asyncio.get_running_loop().create_task(self._follow_to_the_end(goal))
+        task = told(self._follow_to_the_end(goal), self._log, "following a goal failed")
         self._following[task] = goal
-        task.add_done_callback(self._followed)
-
-    def _followed(self, task: "asyncio.Task[None]") -> None:
-        del self._following[task]
-        if not task.cancelled() and (error := task.exception()):
-            log.error("following a goal failed", exc_info=error)
+        task.add_done_callback(self._following.pop)

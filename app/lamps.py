@@ -38,9 +38,6 @@ NODE: Final = GONE | {
     "parameter_read_only",
     "parameter_apart",
 }
-# By the operator's own side or the robot's word: no link is to blame.
-NO_LINK: Final = frozenset({"permitted", "forbidden", "busy", "log", "control"})
-
 BRIDGE_LAMPS: Final[Mapping[str, tuple[State, str]]] = {
     "no_link": ("bad", "lost"),
     "no_bridge": ("bad", "absent"),

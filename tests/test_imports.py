@@ -16,6 +16,7 @@ ORDER = (
     "app.sentences",
     "app.browsers",
     "app.logs",
+    "app.tasks",
     "app.moments",
     "app.systemd",
     "app.sockets",
