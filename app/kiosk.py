@@ -1,6 +1,6 @@
 """A running kiosk: one robot with its link, board and presses, and how they are wired.
 
-Down: the inbox wakes the loop → `_take` (of values: for a frame) → robot → showing → views → board → streams.
+Down: the inbox wakes the loop (by values: for a frame) → `_take` → robot → showing → board → streams.
 """
 
 import asyncio
