@@ -66,18 +66,20 @@ class Actions:
     async def start(
         self, widget: Action, fields: dict[str, Any], press_id: str, corrected: Corrected
     ) -> Answer:
-        """Sends a goal; `corrected` gets what came of it in the end. FieldError for bad fields."""
+        """Sends a goal; `corrected` gets what came of it in the end. FieldError for bad fields,
+        LinkError where it could not be sent: then nothing is under way."""
         types = self._interfaces.action(widget.type)
         goal_id = uuid.uuid4()
         wrapped = {"goal_id": {"uuid": list(goal_id.bytes)}, "goal": fields}
         payload = self._interfaces.encode(types.send_goal_request, wrapped)
         if sum(g.widget.action == widget.action for g in self._following.values()) >= MOST_UNANSWERED:
             return Answer("refused", say("too_many", service=widget.action))
+        query = self._query(widget, "send_goal", payload, widget.timeout_s)
         cut = asyncio.get_running_loop().create_future()
         goal = Goal(widget, press_id, goal_id, cut, corrected)
         self._latest[widget.id] = goal
         self._show(goal, Progress(busy=True, text=say("waiting_for_answer")))
-        reply = await self._asked(goal, "send_goal", payload, widget.timeout_s)
+        reply = await self._reply(goal, query)
         answer = self._first_answer(goal, types.send_goal_response, reply)
         if answer.outcome in ("accepted", "timed_out"):
             goal.advance(ACCEPTED if answer.outcome == "accepted" else UNKNOWN)
@@ -94,7 +96,8 @@ class Actions:
         stamp = {"sec": 0, "nanosec": 0}
         info = {"goal_id": {"uuid": list(goal.id.bytes)}, "stamp": stamp}
         payload = self._interfaces.encode(request, {"goal_info": info})
-        reply = await self._asked(goal, "cancel_goal", payload, widget.timeout_s)
+        query = self._query(widget, "cancel_goal", payload, widget.timeout_s)
+        reply = await self._reply(goal, query)
         if reply is None:
             return Answer("unknown", say("timed_out", seconds=f"{widget.timeout_s:g}"))
         code = self._decoded(response, reply, "return_code")
@@ -198,7 +201,8 @@ class Actions:
         types = self._interfaces.action(goal.widget.type)
         request = {"goal_id": {"uuid": list(goal.id.bytes)}}
         payload = self._interfaces.encode(types.get_result_request, request)
-        reply = await self._asked(goal, "get_result", payload, RESULT_S if goal.known else LATE_S)
+        wait_s = RESULT_S if goal.known else LATE_S
+        reply = await self._reply(goal, self._query(goal.widget, "get_result", payload, wait_s))
         if reply is None:
             await asyncio.wait({goal.cut}, timeout=CUT_NEWS_S)  # the news of a cut may follow
             return None
@@ -214,10 +218,15 @@ class Actions:
         said = with_fields(goal.widget.result, message.result)
         return Answer(outcome, say(sentence, time=clock(time.time())) + (f": {said}" if said else "."))
 
-    async def _asked(self, goal: Goal, what: str, payload: bytes, timeout_s: float) -> bytes | None:
+    def _query(
+        self, widget: Action, what: str, payload: bytes, timeout_s: float
+    ) -> "asyncio.Future[bytes | None]":
+        """Asks a service of the action; LinkError where that could not be sent."""
+        key = f"{self._robot.key(widget.action)}/_action/{what}"
+        return self._link.query(key, payload, timeout_s)
+
+    async def _reply(self, goal: Goal, query: "asyncio.Future[bytes | None]") -> bytes | None:
         """The reply; None when there is none in time, or the bridge went away."""
-        key = f"{self._robot.key(goal.widget.action)}/_action/{what}"
-        query = self._link.query(key, payload, timeout_s)
         ends: set[asyncio.Future[Any]] = {query, goal.cut}
         await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
         return query.result() if query.done() else None

@@ -9,6 +9,7 @@ import pytest
 from app import keys
 from app.actions import Actions
 from app.calls import LATE_S, MOST_UNANSWERED, Calls
+from app.errors import LinkError
 from app.panel.model import Action, Call, Panel
 from app.progress import Answer, Progress
 from app.robot import Robot, Sample
@@ -26,8 +27,11 @@ class Line:
     def __init__(self) -> None:
         self.asked: list[tuple[str, bytes, asyncio.Future[bytes | None]]] = []
         self.timeouts: list[float] = []
+        self.refuses = ""  # the end of the keys that can't be asked
 
     def query(self, key: str, payload: bytes, timeout_s: float) -> "asyncio.Future[bytes | None]":
+        if self.refuses and key.endswith(self.refuses):
+            raise LinkError(f"can't ask {key}")
         future: asyncio.Future[bytes | None] = asyncio.get_running_loop().create_future()
         self.asked.append((key, payload, future))
         self.timeouts.append(timeout_s)
@@ -274,6 +278,24 @@ def test_another_programs_goal_and_a_rejected_one_have_no_state() -> None:
         assert (await start).outcome == "rejected"
         tell_states(bench, (b"\7" * 16, 2))
         assert (bench.shown.goal, bench.shown.busy) == ("", False)
+
+    run(test)
+
+
+def test_a_goal_that_could_not_be_sent_locks_nothing_and_hides_no_other() -> None:
+    async def test(bench: Bench) -> None:
+        bench.line.refuses = "send_goal"
+        with pytest.raises(LinkError):
+            await bench.send_goal()
+        assert "count" not in bench.robot.progress
+        bench.line.refuses = ""
+        assert (await bench.send_goal()).outcome == "timed_out"
+        bench.line.refuses = "send_goal"
+        with pytest.raises(LinkError):
+            await bench.send_goal()
+        tell_states(bench, (goal_id(bench), 2))
+        assert (bench.shown.goal, bench.shown.stoppable) == ("EXECUTING", True)
+        await bench.actions.stop()
 
     run(test)
 
