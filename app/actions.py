@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator
 from typing import Any, Final
 
 from app.calls import CUT_NEWS_S, LATE_S, MOST_UNANSWERED, Asker, with_fields
-from app.errors import DecodeError
+from app.errors import DecodeError, LinkError
 from app.goals import ACCEPTED, CANCELING, ENDS, UNKNOWN, Goal
 from app.interfaces import Interfaces
 from app.interlocks import SERVER_SETTLE_S
@@ -81,10 +81,11 @@ class Actions:
         self._show(goal, Progress(busy=True, text=say("waiting_for_answer")))
         reply = await self._reply(goal, query)
         answer = self._first_answer(goal, types.send_goal_response, reply)
-        if answer.outcome in ("accepted", "timed_out"):
+        if answer.outcome != "rejected":
             goal.advance(ACCEPTED if answer.outcome == "accepted" else UNKNOWN)
             self._task(goal)
-        self._show(goal, goal.under_way if goal.lives else goal.came_to(answer))
+        runs = goal.lives and not cut.done()
+        self._show(goal, goal.under_way if runs else goal.came_to(answer))
         return answer
 
     async def cancel(self, widget: Action) -> Answer:
@@ -169,16 +170,18 @@ class Actions:
 
     async def _follow_to_the_end(self, goal: Goal) -> None:
         """Waits for the result, over cuts of the connection too: the robot goes on meanwhile."""
-        while (answer := await self._ended(goal)) is None:
+        while True:
             if goal.cut.done():
-                goal.state = UNKNOWN
-                self._tell(goal, Answer("unknown", goal.cut.result() or say("goal_cut")))
+                if goal.lives:
+                    goal.state = UNKNOWN
+                    self._tell(goal, Answer("unknown", goal.cut.result() or say("goal_cut")))
                 await self._until_offered(goal)
                 goal.cut = asyncio.get_running_loop().create_future()
-            elif not goal.known:
+            if answer := await self._ended(goal):
+                break
+            if not (goal.known or goal.cut.done()):
                 return  # it was never heard of: what was said of it stands
-            else:
-                await asyncio.sleep(ASK_AGAIN_S)
+            await asyncio.wait({goal.cut}, timeout=ASK_AGAIN_S)
         log.info("press %s: goal %s: %s: %s", goal.press_id, goal.id, answer.outcome, answer.text)
         self._tell(goal, answer)
 
@@ -201,10 +204,8 @@ class Actions:
         types = self._interfaces.action(goal.widget.type)
         request = {"goal_id": {"uuid": list(goal.id.bytes)}}
         payload = self._interfaces.encode(types.get_result_request, request)
-        wait_s = RESULT_S if goal.known else LATE_S
-        reply = await self._reply(goal, self._query(goal.widget, "get_result", payload, wait_s))
+        reply = await self._result(goal, payload)
         if reply is None:
-            await asyncio.wait({goal.cut}, timeout=CUT_NEWS_S)  # the news of a cut may follow
             return None
         try:
             message = self._interfaces.decode(types.get_result_response, reply)
@@ -218,6 +219,20 @@ class Actions:
         said = with_fields(goal.widget.result, message.result)
         return Answer(outcome, say(sentence, time=clock(time.time())) + (f": {said}" if said else "."))
 
+    async def _result(self, goal: Goal, payload: bytes) -> bytes | None:
+        """The reply of `get_result`, which is asked for again where Zenoh refuses."""
+        told = False
+        while not goal.cut.done():
+            wait_s = RESULT_S if goal.known else LATE_S
+            try:
+                return await self._reply(goal, self._query(goal.widget, "get_result", payload, wait_s))
+            except LinkError as error:
+                if not told:
+                    log.warning("press %s: %s", goal.press_id, error)
+                told = True
+                await asyncio.wait({goal.cut}, timeout=ASK_AGAIN_S)
+        return None
+
     def _query(
         self, widget: Action, what: str, payload: bytes, timeout_s: float
     ) -> "asyncio.Future[bytes | None]":
@@ -229,7 +244,10 @@ class Actions:
         """The reply; None when there is none in time, or the bridge went away."""
         ends: set[asyncio.Future[Any]] = {query, goal.cut}
         await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
-        return query.result() if query.done() else None
+        reply = query.result() if query.done() else None
+        if reply is None:
+            await asyncio.wait({goal.cut}, timeout=CUT_NEWS_S)  # the news of a cut may follow
+        return reply
 
     def _decoded(self, type_name: str, reply: bytes, name: str) -> Any:
         try:
@@ -254,6 +272,8 @@ class Actions:
         task.add_done_callback(self._followed)
 
     def _followed(self, task: "asyncio.Task[None]") -> None:
-        del self._following[task]
+        goal = self._following.pop(task)
         if not task.cancelled() and (error := task.exception()):
             log.error("following a goal failed", exc_info=error)
+            goal.state = UNKNOWN
+            self._tell(goal, Answer("unknown", say("goal_fault")))

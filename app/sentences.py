@@ -82,6 +82,7 @@ ENGLISH: Final[Mapping[str, str]] = {
     "goal_aborted": "The robot aborted it at {time}",
     "goal_lost": "The robot no longer knows this goal: what came of it is not known.",
     "goal_cut": "The connection was cut: the robot may still be doing it.",
+    "goal_fault": "A fault of the panel's server: what came of it is not known.",
     "goal_gone": "The robot no longer offers {name}: what came of it is not known.",
     "cancel": "Cancel",
     "robots": "Robots",

@@ -312,6 +312,99 @@ def test_a_goal_without_an_answer_is_under_way_when_the_robot_says_so() -> None:
     run(test)
 
 
+def test_a_goal_cut_off_before_its_answer_is_asked_for_when_the_bridge_is_back() -> None:
+    async def test(bench: Bench) -> None:
+        start = bench.send_goal()
+        await asked(bench, 1)
+        bench.lose_the_bridge()
+        assert (await start).outcome == "unknown"
+        assert (bench.shown.goal, bench.shown.busy) == ("UNKNOWN", False)
+        bench.robot.graph.apply(keys.bridge_token(BRIDGE), True)
+        await asked(bench, 2)
+        assert bench.line.asked[1][0].endswith("get_result")
+        tell_states(bench, (goal_id(bench), 2))
+        assert (bench.shown.goal, bench.shown.stoppable) == ("EXECUTING", True)
+        bench.line.answer(
+            INTERFACES.action(COUNT).get_result_response, status=4, result={"sequence": [0, 1]}
+        )
+        await settled(bench)
+        assert bench.shown.text.startswith("Succeeded")
+        assert [answer.outcome for _, answer in bench.corrected] == ["accepted", "succeeded"]
+
+    run(test)
+
+
+def test_a_goal_that_began_and_is_cut_off_before_its_answer_is_unknown() -> None:
+    async def test(bench: Bench) -> None:
+        start = bench.send_goal()
+        await asked(bench, 1)
+        tell_states(bench, (goal_id(bench), 2))
+        bench.lose_the_bridge()
+        assert (await start).outcome == "unknown"
+        await asyncio.sleep(0)
+        assert (bench.shown.goal, bench.shown.busy) == ("UNKNOWN", False)
+        await bench.actions.stop()
+
+    run(test)
+
+
+def test_a_goal_that_nobody_answers_at_once_waits_for_the_news_of_the_cut() -> None:
+    async def test(bench: Bench) -> None:
+        start = bench.send_goal()
+        await asked(bench, 1)
+        bench.line.asked[0][2].set_result(None)
+        await asyncio.sleep(0.01)
+        bench.lose_the_bridge()
+        assert "connection was cut" in (await start).text
+        await bench.actions.stop()
+
+    run(test)
+
+
+def test_a_result_that_could_not_be_asked_for_is_asked_for_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("app.actions.ASK_AGAIN_S", 0)
+
+    async def test(bench: Bench) -> None:
+        bench.line.refuses = "get_result"
+        start = bench.send_goal()
+        await asked(bench, 1)
+        bench.answer_goal(accepted=True)
+        await start
+        await asyncio.sleep(0.01)
+        assert (bench.shown.goal, bench.shown.stoppable) == ("ACCEPTED", True)
+        bench.line.refuses = ""
+        await asked(bench, 2)
+        bench.line.answer(
+            INTERFACES.action(COUNT).get_result_response, status=4, result={"sequence": []}
+        )
+        await settled(bench)
+        assert [answer.outcome for _, answer in bench.corrected] == ["succeeded"]
+
+    run(test)
+
+
+def test_what_breaks_while_a_goal_is_followed_leaves_it_unknown(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def fails(template: str, message: Any) -> str:
+        raise ZeroDivisionError
+
+    async def test(bench: Bench) -> None:
+        await accepted(bench)
+        monkeypatch.setattr("app.actions.with_fields", fails)
+        bench.line.answer(
+            INTERFACES.action(COUNT).get_result_response, status=4, result={"sequence": []}
+        )
+        await settled(bench)
+        assert (bench.shown.goal, bench.shown.busy) == ("UNKNOWN", False)
+        assert "A fault of the panel's server" in bench.shown.text
+        assert [answer.outcome for _, answer in bench.corrected] == ["unknown"]
+
+    run(test)
+
+
 def test_a_goal_that_nobody_heard_of_is_asked_for_only_for_a_while(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
