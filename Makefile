@@ -3,16 +3,20 @@
 # make check types and style
 # make faults every fault in its long form, and what was measured as a table in the README
 # make soak  an ordinary day for SOAK_S seconds (an hour)
+# make bench  this panel and its rivals side by side (15 minutes); QUICK=1 only shows that it works
+# make bench-setup  what the benchmark's rivals need, into the cache
 # make dev   the panel, taking every change as it is saved
 
 PYTHON ?= python3
 CACHE := $(or $(XDG_CACHE_HOME),$(HOME)/.cache)/operator-panel
 PIP_INSTALL := -m pip install --disable-pip-version-check --quiet --require-hashes -r
 
+BENCH := $(CACHE)/bench
+export BENCH_CACHE := $(BENCH)
 export TEST_BRIDGE := $(CACHE)/bridge/release/test-bridge
 export TEST_ROS_PYTHON := $(CURDIR)/.venv-ros/bin/python
 
-.PHONY: run test check dev wheel faults soak test-parts bridge lock clean
+.PHONY: run test check dev wheel faults soak bench bench-setup test-parts bridge lock clean
 .DELETE_ON_ERROR:
 
 run: .venv/run
@@ -25,8 +29,8 @@ test: test-parts
 	.venv/bin/pytest $(ARGS)
 
 check: .venv/test
-	.venv/bin/ruff check app tests
-	.venv/bin/ruff format --check app tests
+	.venv/bin/ruff check app tests bench
+	.venv/bin/ruff format --check app tests bench
 	.venv/bin/mypy
 
 # FORM=short: as in `make test`.
@@ -64,17 +68,61 @@ bridge: system
 	.venv/bin/python $(PIP_INSTALL) $<
 	touch $@ .venv/run
 
+FOR_ROS := $(PYTHON) -c 'import sys; sys.exit(None if sys.version_info[:2] == (3, 11) else "the ROS 2 wheels of the tests are for Python 3.11: make test PYTHON=python3.11")'
+
 .venv-ros/ready: tests/ros/requirements.lock | system
-	@$(PYTHON) -c 'import sys; sys.exit(None if sys.version_info[:2] == (3, 11) else "the ROS 2 wheels of the tests are for Python 3.11: make test PYTHON=python3.11")'
+	@$(FOR_ROS)
 	$(PYTHON) -m venv .venv-ros
 	.venv-ros/bin/python $(PIP_INSTALL) $<
 	touch $@
+
+# PHASES: some of them, such as `PHASES="down up"`. A quick run leaves the results of the last whole one.
+bench: .venv/test bridge
+	.venv/bin/python -m bench $(if $(QUICK),--results $(BENCH)/quick,--readme README.md) $(PHASES)
+
+# The robot, then the rivals: each in an environment of its own. See bench/README.md.
+bench-setup: system .venv/test bridge $(addprefix $(BENCH)/,robot/ready rosbridge/ready nicegui/ready pages/ready router)
+
+$(BENCH)/robot/ready: tests/ros/requirements.lock tests/requirements.lock | system
+	@$(FOR_ROS)
+	$(PYTHON) -m venv --clear $(@D)
+	$(@D)/bin/python $(PIP_INSTALL) $<
+	sed -n '/^eclipse-zenoh==/,/[^\\]$$/p' tests/requirements.lock >$(@D)/zenoh.lock
+	$(@D)/bin/python $(PIP_INSTALL) $(@D)/zenoh.lock
+	touch $@
+
+$(BENCH)/rosbridge/ready: bench/peers/rosbridge_rs/requirements.lock bench/peers/rosbridge_rs/shims.sh | system
+	@$(FOR_ROS)
+	$(PYTHON) -m venv --clear $(@D)
+	$(@D)/bin/python $(PIP_INSTALL) $<
+	chmod +x $(@D)/lib/python3.11/site-packages/rosbridge_server_rs/rosbridge_server_rs_jazzy
+	sh bench/peers/rosbridge_rs/shims.sh $(@D)
+	touch $@
+
+$(BENCH)/nicegui/ready: bench/peers/nicegui_zenoh/requirements.lock | system
+	$(PYTHON) -m venv --clear $(@D)
+	$(@D)/bin/python $(PIP_INSTALL) $<
+	touch $@
+
+$(BENCH)/pages/ready: bench/peers/package.json bench/peers/package-lock.json bench/peers/bundle.cjs $(wildcard bench/peers/*/page.js)
+	sh tests/system.sh npm
+	mkdir -p $(@D)
+	cp bench/peers/package.json bench/peers/package-lock.json $(@D)
+	npm ci --prefix $(@D) --ignore-scripts --no-audit --no-fund --loglevel=error
+	node bench/peers/bundle.cjs $(@D)
+	touch $@
+
+.PHONY: $(BENCH)/router
+$(BENCH)/router: system
+	nice cargo build --quiet --release --locked --manifest-path bench/peers/router/Cargo.toml --target-dir $@
 
 # The locked versions, anew: needs uv.
 lock:
 	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 pyproject.toml -o deploy/requirements.lock
 	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 pyproject.toml --group test -o tests/requirements.lock
 	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 tests/ros/requirements.in -o tests/ros/requirements.lock
+	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 bench/peers/rosbridge_rs/requirements.in -o bench/peers/rosbridge_rs/requirements.lock
+	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 bench/peers/nicegui_zenoh/requirements.in -o bench/peers/nicegui_zenoh/requirements.lock
 
 clean:
 	rm -rf .venv .venv-ros dist .mypy_cache .ruff_cache

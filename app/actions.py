@@ -51,11 +51,6 @@ class Actions:
                 gone = say("goal_gone", name=goal.widget.action)
                 goal.cut.set_result(gone if bridge else "")
 
-    @property
-    def following(self) -> int:
-        """How many goals' ends are waited for."""
-        return len(self._following)
-
     async def stop(self) -> None:
         """Ends its tasks; goals go on in the robot."""
         tasks = list(self._following)
@@ -72,8 +67,8 @@ class Actions:
         goal_id = uuid.uuid4()
         wrapped = {"goal_id": {"uuid": list(goal_id.bytes)}, "goal": fields}
         payload = self._interfaces.encode(types.send_goal_request, wrapped)
-        if sum(g.widget.action == widget.action for g in self._following.values()) >= MOST_UNANSWERED:
-            return Answer("refused", say("too_many", service=widget.action))
+        if why := self.full(widget.action):
+            return Answer("refused", why)
         query = self._query(widget, "send_goal", payload, widget.timeout_s)
         cut = asyncio.get_running_loop().create_future()
         goal = Goal(widget, press_id, goal_id, cut, corrected)
@@ -88,10 +83,19 @@ class Actions:
         self._show(goal, goal.under_way if runs else goal.came_to(answer))
         return answer
 
+    def full(self, action: str) -> str:
+        """Why no further goal of an action is sent; "" while one may be."""
+        count = sum(goal.widget.action == action for goal in self._following.values())
+        return say("too_many", service=action) if count >= MOST_UNANSWERED else ""
+
+    def stoppable(self, widget: Action) -> Goal | None:
+        """The goal of a widget that can be canceled, if there is one."""
+        goal = self._latest.get(widget.id)
+        return goal if goal is not None and self._robot.progress[widget.id].stoppable else None
+
     async def cancel(self, widget: Action) -> Answer:
         """Asks the robot to cancel the goal that is under way."""
-        goal = self._latest.get(widget.id)
-        if goal is None or not self._robot.progress[widget.id].stoppable:
+        if (goal := self.stoppable(widget)) is None:
             return Answer("refused", say("nothing_to_cancel"))
         request, response = self._interfaces.service(CANCEL)
         stamp = {"sec": 0, "nanosec": 0}
@@ -110,7 +114,8 @@ class Actions:
         return Answer("accepted", say("cancel_sent", time=now))
 
     def hear_feedback(self, action: str, sample: Sample) -> None:
-        """The latest feedback of an action; of another program's goal it is passed over."""
+        """The latest feedback of an action; of another program's goal it is passed over. Whoever
+        calls this shows it when a frame is due."""
         for goal in self._of(action):
             if self._robot.progress[goal.widget.id].stoppable:
                 self._take_feedback(goal, sample)
@@ -152,7 +157,7 @@ class Actions:
             done = math.nan if found is None else float(found) / widget.progress_max
             goal.fraction = min(1.0, max(0.0, done)) if done == done else None  # NaN is no progress
         goal.said = with_fields(widget.feedback, message.feedback)
-        self._show(goal, goal.under_way)
+        self._note(goal, goal.under_way)  # shown with the next frame: a goal may say a lot
 
     def _first_answer(self, goal: Goal, response: str, reply: bytes | None) -> Answer:
         now = clock(time.time())
@@ -262,9 +267,15 @@ class Actions:
         goal.corrected(goal.press_id, answer)
 
     def _show(self, goal: Goal, progress: Progress) -> None:
-        if self._latest.get(goal.widget.id) is goal:
-            self._robot.progress[goal.widget.id] = progress
+        if self._note(goal, progress):
             self._changed()
+
+    def _note(self, goal: Goal, progress: Progress) -> bool:
+        """What its widget will show; False where that shows another goal by now."""
+        latest = self._latest.get(goal.widget.id) is goal
+        if latest:
+            self._robot.progress[goal.widget.id] = progress
+        return latest
 
     def _task(self, goal: Goal) -> None:
         task = asyncio.get_running_loop().create_task(self._follow_to_the_end(goal))

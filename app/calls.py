@@ -75,6 +75,11 @@ class Calls:
         """How many requests of a service the bridge may still hold."""
         return sum(self._robot.key(w.request.service) == key for w in self._open.values())
 
+    def full(self, service: str) -> str:
+        """Why no further request of a service is sent; "" while one may be."""
+        full = self.unanswered(self._robot.key(service)) >= MOST_UNANSWERED
+        return say("too_many", service=service) if full else ""
+
     def follow(self) -> None:
         """After every change of the graph: without a bridge no answer will come."""
         if not self._robot.graph.bridges:
@@ -95,8 +100,8 @@ class Calls:
     async def ask(self, request: Request, press_id: str, corrected: Corrected) -> Answer:
         """Sends a request and waits; `corrected` gets the answer that comes after the time."""
         key = self._robot.key(request.service)
-        if self.unanswered(key) >= MOST_UNANSWERED:
-            return Answer("refused", say("too_many", service=request.service))
+        if why := self.full(request.service):
+            return Answer("refused", why)
         loop = asyncio.get_running_loop()
         query = self._link.query(key, request.payload, request.timeout_s + LATE_S)
         waiting = _Waiting(request, press_id, query, loop.create_future())

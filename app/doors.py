@@ -14,7 +14,7 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.responses import JSONResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-GUARDED_PATHS: Final = frozenset({"/events"})
+GUARDED: Final = re.compile(r"(/robots/[^/]+)?/events/?")  # read by the panel's own pages only
 STARTS: Final = frozenset({"http.response.start", "websocket.http.response.start"})
 POLICY_VIOLATION: Final = 1008
 READING: Final = frozenset({"GET", "HEAD"})
@@ -70,7 +70,7 @@ class Doors:
         if (
             scope["type"] == "http"
             and scope["method"] in READING
-            and scope["path"] not in GUARDED_PATHS
+            and not GUARDED.fullmatch(scope["path"])
         ):
             return None
         site = headers.get("sec-fetch-site", "none")

@@ -22,7 +22,17 @@ from app.panel.check_holds import with_own_fields
 from app.panel.model import Hold, Panel
 from app.panel.template import filled, names_in
 from app.progress import Answer, Outcome
-from app.receipts import LONGEST_LOGGED, By, Cause, Receipt, cause_of, judged, named, receipt_of
+from app.receipts import (
+    LONGEST_LOGGED,
+    By,
+    Cause,
+    Receipt,
+    Witness,
+    cause_of,
+    judged,
+    named,
+    receipt_of,
+)
 from app.robot import Robot
 from app.sentences import clock, say
 
@@ -75,6 +85,7 @@ class Holds:
         checked: Checked,
         take: Callable[[], None],
         changed: Callable[[], None],
+        witness: Witness | None = None,
     ) -> None:
         """`checked` are the values that a template gets of what was entered; `take` takes in what
         has come from the robot; `changed` is called when what the widgets show has changed."""
@@ -85,6 +96,7 @@ class Holds:
         self._way = way
         self._loop = loop
         self._checked = checked
+        self._witness = witness
         self._take = take
         self._changed = changed
         self._widgets = {w.id: w for w in panel.widgets() if isinstance(w, Hold)}
@@ -111,31 +123,19 @@ class Holds:
         self._take()
         self.judge()
         widget, now = self.widget(widget_id), self._loop.time()
-        if self._closed:
-            return self._refused(widget, inputs, by, say("hold_by_stopping"), "interlock")
-        if other := next(
-            (one for one in self._held.values() if one.widget.topic == widget.topic), None
-        ):
-            code = "hold_elsewhere" if other.widget is widget else "hold_same_topic"
-            why = say(code, label=other.widget.label, topic=widget.topic)
-            return self._refused(widget, inputs, by, why, "interlock")
-        if now >= sent + LEASE_S:
-            return self._refused(widget, inputs, by, say("hold_late"), "interlock")
-        if not (verdict := self._verdict(widget, by, now)).permitted:
-            return self._refused(widget, inputs, by, verdict.reason or "", cause_of(verdict))
-        if why := by.doubt():
-            return self._refused(widget, inputs, by, why, "interlock")
+        why, cause = self._ground(widget, sent, by, now)
+        if why:
+            return self._refused(widget, inputs, by, why, cause)
         try:
-            values = self._checked(names_in([widget.message, widget.release]), inputs)
-            fields, last_fields = filled(widget.message, values), filled(widget.release, values)
-            for each in (fields, last_fields):
-                self._interfaces.encode(widget.type, with_own_fields(widget, each, 0, 0))
+            fields, last_fields = self._fields(widget, inputs)
         except (FieldError, InputError) as error:
             return self._refused(widget, inputs, by, f"{error}.", "input")
         lease = Lease.begun(secrets.token_hex(8), widget.period_s, sent, now)
         since = say("hold_since", time=clock(time.time()))
         holding = Holding(widget, lease, by, dict(inputs), fields, last_fields, told, since)
         self._held[widget_id] = holding
+        if self._witness is not None:
+            self._witness.pressed(lease.id, widget.id, named(by.origin), holding.inputs)
         self._robot.held[widget_id] = since
         self._log.info("hold %s of %s by %s with %.*s begins", lease.id, widget_id, named(by.origin),
                 LONGEST_LOGGED, holding.inputs)  # fmt: skip
@@ -143,9 +143,52 @@ class Holds:
         self.step()
         return holding
 
-    def refuse(self, widget_id: str, by: By, why: str, cause: Cause = "interlock") -> Receipt:
-        """A hold that is not even judged."""
-        return self._refused(self.widget(widget_id), {}, by, why, cause)
+    def refuse(
+        self, widget_id: str, by: By, why: str, cause: Cause = "interlock", *, trace: bool = True
+    ) -> Receipt:
+        """A hold that is not even judged; it may leave a trace or none."""
+        widget = self.widget(widget_id)
+        if not trace:
+            return _receipt(widget, {}, why, cause)
+        return self._refused(widget, {}, by, why, cause)
+
+    def refusal(self, widget_id: str, inputs: Mapping[str, Any], sent: float, by: By) -> Receipt | None:
+        """The receipt of a hold that `begin` would refuse now, without a trace; None for others."""
+        self._take()
+        self.judge()
+        widget = self.widget(widget_id)
+        why, cause = self._ground(widget, sent, by, self._loop.time())
+        if not why:
+            try:
+                self._fields(widget, inputs)
+            except (FieldError, InputError) as error:
+                why, cause = f"{error}.", "input"
+        return _receipt(widget, inputs, why, cause) if why else None
+
+    def _ground(self, widget: Hold, sent: float, by: By, now: float) -> tuple[str, Cause]:
+        """Why it may not begin now, "" if it may."""
+        if self._closed:
+            return say("hold_by_stopping"), "interlock"
+        if other := next(
+            (one for one in self._held.values() if one.widget.topic == widget.topic), None
+        ):
+            code = "hold_elsewhere" if other.widget is widget else "hold_same_topic"
+            return say(code, label=other.widget.label, topic=widget.topic), "interlock"
+        if now >= sent + LEASE_S:
+            return say("hold_late"), "interlock"
+        if not (verdict := self._verdict(widget, by, now)).permitted:
+            return verdict.reason or "", cause_of(verdict)
+        return by.doubt(), "interlock"
+
+    def _fields(
+        self, widget: Hold, inputs: Mapping[str, Any]
+    ) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
+        """Of the message and of the one that ends it; FieldError or InputError for bad input."""
+        values = self._checked(names_in([widget.message, widget.release]), inputs)
+        both = filled(widget.message, values), filled(widget.release, values)
+        for each in both:
+            self._interfaces.encode(widget.type, with_own_fields(widget, each, 0, 0))
+        return both
 
     def beat(self, holding: Holding, number: int, sent: float) -> bool:
         """A heartbeat; whether the hold goes on."""
@@ -239,7 +282,10 @@ class Holds:
         self._log.log(level, "hold %s of %s by %s ended after %.3f s and %d messages (%s): %s",
                 holding.lease.id, widget.id, named(holding.by.origin), seconds, holding.messages,
                 code, text)  # fmt: skip
-        holding.told(receipt_of(widget, holding.inputs, holding.lease.id, Answer(outcome, text)))
+        receipt = receipt_of(widget, holding.inputs, holding.lease.id, Answer(outcome, text))
+        if self._witness is not None:
+            self._witness.answered(receipt)
+        holding.told(receipt)
         self._changed()
 
     def _put_last(self, holding: Holding, now: float) -> str:
@@ -256,7 +302,15 @@ class Holds:
     def _refused(
         self, widget: Hold, inputs: Mapping[str, Any], by: By, why: str, cause: Cause
     ) -> Receipt:
-        text = say("refused", why=why, time=clock(time.time()))
+        receipt = _receipt(widget, inputs, why, cause)
         self._log.warning("hold of %s by %s with %.*s: %s", widget.id, named(by.origin),
-                LONGEST_LOGGED, inputs, text)  # fmt: skip
-        return receipt_of(widget, inputs, secrets.token_hex(8), Answer("refused", text), cause)
+                LONGEST_LOGGED, inputs, receipt.reason)  # fmt: skip
+        if self._witness is not None:
+            self._witness.pressed(receipt.id, widget.id, named(by.origin), inputs)
+            self._witness.answered(receipt)
+        return receipt
+
+
+def _receipt(widget: Hold, inputs: Mapping[str, Any], why: str, cause: Cause) -> Receipt:
+    text = say("refused", why=why, time=clock(time.time()))
+    return receipt_of(widget, inputs, secrets.token_hex(8), Answer("refused", text), cause)

@@ -2,18 +2,31 @@
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 from app import keys
 from app.actions import Actions
 from app.confirmations import Confirmations
-from app.link import Changes, Token
+from app.inbox import Changes, Token
+from app.interlocks import Verdict, interlock_verdict
 from app.logs import RobotLog
-from app.panel.model import Panel
+from app.panel.model import Interlock, Panel
 from app.panel.parameter import EVENTS
 from app.parameters import Parameters
 from app.recording import Recorder
 from app.robot import Robot, Sample
+
+
+@dataclass(slots=True)
+class News:
+    """What has changed: `urgent` is a permission or the graph, `came` that there is a bridge where
+    there was none; `values` are the topics (their keys) that said something, and `more` is whatever
+    else can wait for the next frame."""
+
+    urgent: bool = False
+    came: bool = False
+    more: bool = False
+    values: set[str] = field(default_factory=set)
 
 
 class Intake:
@@ -38,27 +51,54 @@ class Intake:
         goals = {robot.key(one): one for one in panel.actions()}
         self._feedback = {keys.feedback(key): one for key, one in goals.items()}
         self._status = {keys.status(key): one for key, one in goals.items()}
-        self._urgent = {robot.key(i.topic) for i in panel.interlocks}
+        self._interlocks = {
+            robot.key(of.topic): [i for i in panel.interlocks if i.topic == of.topic]
+            for of in panel.interlocks
+        }
         self._events = robot.key(EVENTS)
         # What is judged by them is judged by each value that they had, however short.
-        self.watched = self._urgent | {robot.key(one.topic) for one in panel.confirms()}
+        self.watched = self._interlocks.keys() | {robot.key(one.topic) for one in panel.confirms()}
+        self.prompt = self.watched | self._status.keys() | {self._events}
+        self.whole = frozenset() if recorder is None else recorder.keys
         topics = map(robot.key, panel.subscriptions())
         self.keys = [*topics, *self._feedback, *self._status]  # all that is listened to
 
-    def take(self, changes: Changes, show: Callable[[], None]) -> tuple[bool, bool]:
-        """Takes it in; whether it is urgent (permissions, the graph), and whether there is a bridge
-        where there was none. `show` is called at each value that a permission had in between."""
-        urgent = bool(changes.tokens) or not self._urgent.isdisjoint(changes.samples)
+    def take(self, changes: Changes, show: Callable[[], None]) -> News:
+        """Takes it in. `show` is called at each value in between that changed a permission."""
+        news = News(urgent=bool(changes.tokens))
         had_bridge = bool(self._robot.graph.bridges)
         # What permits and forbids comes first, and nothing that fails keeps it from being taken in.
-        ordered = sorted(changes.samples.items(), key=lambda one: one[0] not in self._urgent)
+        ordered = sorted(changes.samples.items(), key=lambda one: one[0] not in self._interlocks)
         for key, sample in ordered:
             for payload in sample.between:
-                self._guarded(key, replace(sample, payload=payload, between=()))
-                if key in self._urgent:
+                if self._changes(key, replace(sample, payload=payload, between=())):
                     show()
+            news.urgent |= self._changes(key, sample)
+            if key in self._feedback or key in self._status or key == self._events:
+                news.more = True
+            else:
+                news.values.add(key)
+        self._record(changes)
+        news.came = self._tokens(changes.tokens, had_bridge)
+        return news
+
+    def _changes(self, key: str, sample: Sample) -> bool:
+        """Takes a sample in; whether a permission is another one by it."""
+        if (interlocks := self._interlocks.get(key)) is None:
             self._guarded(key, sample)
-        return urgent, self._tokens(changes.tokens, had_bridge)
+            return False
+        before = [self._judged(one) for one in interlocks]
+        self._guarded(key, sample)
+        return before != [self._judged(one) for one in interlocks]
+
+    def _judged(self, interlock: Interlock) -> Verdict:
+        verdict = interlock_verdict(interlock, self._robot, time.monotonic())
+        return replace(verdict, until=0.0)
+
+    def _record(self, changes: Changes) -> None:
+        if self._recorder is not None:
+            for key, sample in changes.kept:
+                self._recorder.hear(key, sample)
 
     def _guarded(self, key: str, sample: Sample) -> None:
         try:
@@ -76,8 +116,6 @@ class Intake:
                 self._parameters.hear(sample)
             self._robot.take(key, sample)
             self._confirmations.hear(key)
-            if self._recorder is not None:
-                self._recorder.hear(key, sample)
 
     def _tokens(self, tokens: Mapping[str, Token], had_bridge: bool) -> bool:
         came, now, graph = False, time.monotonic(), self._robot.graph

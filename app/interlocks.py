@@ -48,6 +48,8 @@ def way(robot: Robot, now: float) -> Verdict:
         return locked("bridge_silent")
     if now < robot.settled_at:
         return Verdict(False, "joining", say("joining"), robot.settled_at)
+    if not robot.answers:
+        return locked("bridge_silent")
     return PERMITTED
 
 

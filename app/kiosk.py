@@ -27,6 +27,7 @@ from app.logs import RobotLog
 from app.panel.model import Panel, RobotEntry
 from app.parameters import Parameters
 from app.presses import Presses
+from app.pulse import Pulse
 from app.recording import Recorder, Recordings
 from app.robot import Robot
 from app.rosout import TOPIC, Rosout
@@ -94,6 +95,7 @@ class Kiosk:
             self.board, self.control, operators_log, panel.press_expires_s, others.boots
         )
         self.logbook = Logbook(operators_log, self.robot.name, lambda: self.board.id)
+        self._pulse = Pulse(self.robot, self.link, self.show)
         self.sending = Sending(
             panel,
             self.interfaces,
@@ -103,6 +105,7 @@ class Kiosk:
             self._actions,
             self._confirmations,
             self._parameters,
+            reached=self._pulse.reached,
         )
         self.presses = Presses(
             panel,
@@ -121,6 +124,7 @@ class Kiosk:
             checked=self.sending.checked,
             take=self._take,
             changed=self.show,
+            witness=self._recorder,
         )
         self._intake = Intake(
             panel,
@@ -135,6 +139,7 @@ class Kiosk:
         self._asked = Asked(lambda: self._joining.answered(WITHIN_S))
         self._rosout = Rosout(self.robot, self.interfaces, self.link, self._loop)
         self._renewing: asyncio.Task[None] | None = None
+        self._frame: asyncio.TimerHandle | None = None  # when what waits is taken
         self._lost = False
         self._stopped = False
 
@@ -142,15 +147,25 @@ class Kiosk:
         """Declares everything; whether anybody is there shows later."""
         self._warm_up()
         publish = [self.robot.key(topic) for topic in (*self.panel.publications(), TOPIC)]
-        self.link.start(self._intake.keys, publish, self._intake.watched)
+        listened = self._intake
+        self.link.start(
+            listened.keys,
+            publish,
+            prompt=listened.prompt,
+            watched=listened.watched,
+            whole=listened.whole,
+        )
         self._rosout.start()
         self._joining.start()
+        self._pulse.start()
         self._following.enter_context(self._operators_log.followed(self.show))
 
     async def stop(self) -> None:
         """Ends the streams, takes the session down; leaves no task behind."""
         self.close()
         self._stopped = True
+        if self._frame is not None:
+            self._frame.cancel()
         self._following.close()
         self._rosout.stop()
         self.showing.stop()
@@ -158,6 +173,7 @@ class Kiosk:
         if self._renewing is not None:
             await asyncio.gather(self._renewing, return_exceptions=True)
         await self._asked.stop()
+        await self._pulse.stop()
         await self._joining.stop()
         await self._actions.stop()
         await self._parameters.stop()
@@ -231,12 +247,21 @@ class Kiosk:
 
     # Down.
 
-    def _wake(self) -> None:
-        """On a thread of Zenoh's."""
+    def _wake(self, prompt: bool) -> None:
+        """On a thread of Zenoh's; what is not prompt waits for the next frame."""
         with suppress(RuntimeError):  # the loop is closed: the process ends
-            self._loop.call_soon_threadsafe(self._take)
+            self._loop.call_soon_threadsafe(self._take if prompt else self._take_in_time)
+
+    def _take_in_time(self) -> None:
+        if self.showing.due <= self._loop.time():
+            self._take()
+        elif self._frame is None:
+            self._frame = self._loop.call_at(self.showing.due, self._take)
 
     def _take(self) -> None:
+        if self._frame is not None:
+            self._frame.cancel()
+            self._frame = None
         if self._stopped:
             return
         changes = self.link.drain()
@@ -248,13 +273,15 @@ class Kiosk:
         if came_up:
             self.robot.link_up = True
             self._log.info("Zenoh link up")
-        urgent, came = self._intake.take(changes, self.show)
+        news = self._intake.take(changes, self.show)
         if changes.tokens:
-            self._follow(came)
-        if urgent or came_up:
+            self._follow(news.came)
+        if news.urgent or came_up:
             self.show()
-        else:
+        elif news.more:
             self.showing.soon()
+        elif news.values:
+            self.showing.values(news.values)
 
     def _follow(self, came: bool) -> None:
         """After every change of the graph; `came`: there is a bridge where there was none."""

@@ -1,52 +1,33 @@
-"""The one owner of the Zenoh session: what comes in is kept as a latest value, never queued.
-
-Zenoh calls back on threads of its own. A callback writes into a slot under a lock and wakes the
-event loop at most once; `drain` then takes all that came. Only this module and the simulator
-import zenoh; its errors leave here as LinkError.
+"""The one owner of the Zenoh session. Zenoh calls back on threads of its own; what comes in goes into
+the link's inbox. Only this module and the simulator import zenoh; its errors leave here as LinkError.
 """
 
 import asyncio
-import itertools
 import json
-import threading
-import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+import os
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import zenoh
 from zenoh.ext import HistoryConfig, declare_advanced_subscriber
 from zenoh.handlers import Callback
 
 from app.errors import LinkError, SettingsError
+from app.inbox import NO_KEYS, Changes, Inbox
 from app.keys import TOKENS
-from app.robot import Buffer, Sample
 
 Config = zenoh.Config
 
 ASK_TIMEOUT_S = 2.0
-BETWEEN_MOST = 16  # changes of a watched topic that are kept from one drain to the next
 MOST_QUEUED = 16  # batches; Zenoh takes no more
-DROPPED_AFTER_US = 100_000  # how long a put may wait for room
+BLOCKED_MOST_US = 200_000  # how long a put or a question may wait for room: less than a hold's lease
 
-
-@dataclass(slots=True)
-class Token:
-    """What became of a liveliness token since the last drain; `lost_seq` is 0 if it was never lost."""
-
-    alive: bool
-    lost_seq: int
-
-
-@dataclass(slots=True)
-class Changes:
-    """All that came since the last drain."""
-
-    samples: dict[str, Sample]
-    tokens: dict[str, Token]
-    link_up: bool
+# Zenoh's own setting of its threads, read when its first session opens. By default the thread that
+# waits for the network wakes another one for each message: where one does both, it costs half.
+RUNTIME: Final = "(rx: (handover: net))"
+os.environ.setdefault("ZENOH_RUNTIME", RUNTIME)
 
 
 def config_from(path: Path, connect: Sequence[str] = ()) -> zenoh.Config:
@@ -86,13 +67,14 @@ def _fit(config: zenoh.Config) -> zenoh.Config:
     """What a kiosk needs of any configuration.
 
     No shared memory: Zenoh keeps a segment and its file for each session that was, and a session is
-    renewed at every loss of the link. Room for a burst, and time to send it: two messages and a
-    millisecond, which are Zenoh's own, lose commands in silence on a machine that is busy.
+    renewed at every loss of the link. Room for a burst, as Zenoh's own two messages are few. What finds
+    no room waits for it, which stops the event loop: where that takes too long (5 s are Zenoh's own)
+    the connection is closed, once, and all is locked. Nothing is dropped in silence.
     """
     config.insert_json5("transport/shared_memory/enabled", "false")
     config.insert_json5("transport/link/tx/queue/size/data", str(MOST_QUEUED))
-    wait = "transport/link/tx/queue/congestion_control/drop/wait_before_drop"
-    config.insert_json5(wait, str(DROPPED_AFTER_US))
+    wait = "transport/link/tx/queue/congestion_control/block/wait_before_close"
+    config.insert_json5(wait, str(BLOCKED_MOST_US))
     return config
 
 
@@ -107,26 +89,14 @@ def _translated(doing: str) -> Iterator[None]:
 class Link:
     """A session with its subscribers, publishers and tokens."""
 
-    def __init__(self, config: zenoh.Config, wake: Callable[[], None]) -> None:
-        """Opens at once, whether or not anybody is there; `wake` is called on Zenoh's threads."""
+    def __init__(self, config: zenoh.Config, wake: Callable[[bool], None]) -> None:
+        """Opens at once, whether or not anybody is there; `wake` is the inbox's."""
         self._config = config
-        self._wake_loop = wake
-        self._lock = threading.Lock()
-        self._seq = itertools.count(1)
-        self._session_number = 0
+        self._inbox = Inbox(wake)
         self._subscribe: tuple[str, ...] = ()
         self._publish: tuple[str, ...] = ()
-        self._watched: frozenset[str] = frozenset()
         self._held: dict[str, zenoh.LivelinessToken] | None = {}  # None: between two sessions
-        self._forget()
         self._open()
-
-    def _forget(self) -> None:
-        self._woken = False
-        self._samples: dict[str, Sample] = {}
-        self._stamps: dict[str, zenoh.Timestamp] = {}
-        self._tokens: dict[str, Token] = {}
-        self._transports: set[str] = set()
 
     def _open(self) -> None:
         with _translated("the Zenoh session can't be opened"):
@@ -134,11 +104,17 @@ class Link:
         self.zid = str(self._session.zid())
 
     def start(
-        self, subscribe: Iterable[str], publish: Iterable[str], watched: Iterable[str] = ()
+        self,
+        subscribe: Iterable[str],
+        publish: Iterable[str],
+        *,
+        prompt: Collection[str] = NO_KEYS,
+        watched: Collection[str] = NO_KEYS,
+        whole: Collection[str] = NO_KEYS,
     ) -> None:
-        """Declares everything, once in a session. Of what is `watched` a value that came and went
-        between two drains is kept too."""
-        self._watched = frozenset(watched)
+        """Declares everything, once in a session; what is `prompt`, `watched` and `whole` of it, the
+        inbox says."""
+        self._inbox.expect(prompt, watched, whole)
         self._subscribe, self._publish = tuple(subscribe), tuple(publish)
         self._declare()
 
@@ -151,9 +127,7 @@ class Link:
         it has seen before, also when what it saw was cut off in between.
         """
         held, self._held = self._held, None
-        with self._lock:
-            self._session_number += 1
-            self._forget()
+        self._inbox.renew()
         with suppress(LinkError):
             self.close()
         del held  # a token ends with its object: never under the lock, where Zenoh may call back
@@ -177,30 +151,24 @@ class Link:
     def _publisher(self, key: str) -> zenoh.Publisher:
         return self._session.declare_publisher(
             key,
-            congestion_control=zenoh.CongestionControl.DROP,
+            congestion_control=zenoh.CongestionControl.BLOCK,
             express=True,
             reliability=zenoh.Reliability.RELIABLE,
             allowed_destination=zenoh.Locality.REMOTE,
         )
 
     def _subscriber(self, key: str) -> Any:
+        put = self._inbox.put
         return declare_advanced_subscriber(
             self._session,
             key,
-            self._direct(lambda sample: self._on_sample(key, sample)),
+            self._direct(lambda sample: put(key, sample.payload, sample.timestamp)),
             history=HistoryConfig(detect_late_publishers=True, max_samples=1),
         )
 
     def _direct(self, function: Callable[[Any], None]) -> "Callback[Any]":
         """A handler on the receiving thread, with no thread of its own; deaf once renewed."""
-        number = self._session_number
-
-        def handle(what: Any) -> None:
-            with self._lock:
-                if number == self._session_number:
-                    function(what)
-
-        return Callback(handle, indirect=False)
+        return Callback(self._inbox.guarded(function), indirect=False)
 
     def hold(self, tokens: Iterable[str]) -> None:
         """Holds exactly these liveliness tokens from now on."""
@@ -276,9 +244,8 @@ class Link:
         return answers
 
     def respond(self) -> None:
-        """Returns when neither the lock nor the session stands still; blocks while one does."""
-        with self._lock:
-            pass
+        """Returns when neither the inbox nor the session stands still; blocks while one does."""
+        self._inbox.respond()
         with suppress(zenoh.ZError):  # a session that is being renewed has responded too
             info = self._session.info
             info.peers_zid()
@@ -286,66 +253,17 @@ class Link:
 
     def drain(self) -> Changes:
         """Takes all that came since the last call."""
-        with self._lock:
-            self._woken = False
-            changes = Changes(self._samples, self._tokens, bool(self._transports))
-            self._samples, self._tokens = {}, {}
-        return changes
+        return self._inbox.drain()
 
     def close(self) -> None:
         """Takes everything down; blocks for up to some tenths of a second."""
         with _translated("the Zenoh session did not close cleanly"):
             self._session.close()
 
-    # Below: on Zenoh's threads, under the lock. No work here, and nothing may raise.
-
-    def _on_sample(self, key: str, sample: zenoh.Sample) -> None:
-        stamp = sample.timestamp
-        source = None if stamp is None else str(stamp.get_id())
-        sent = None if stamp is None else stamp.get_time().timestamp()
-        if stamp is not None:
-            last = self._stamps.get(key)
-            if last is not None and last.get_id() == stamp.get_id() and not stamp >= last:
-                return  # history that came after what is newer
-            self._stamps[key] = stamp
-        unseen = self._samples.get(key)
-        skipped = 0 if unseen is None else unseen.skipped + 1
-        self._samples[key] = Sample(
-            sample.payload,
-            next(self._seq),
-            time.monotonic(),
-            time.time(),
-            source,
-            skipped,
-            sent,
-            _between(unseen, sample.payload) if unseen and key in self._watched else (),
-        )
-        self._wake()
+    # Below: on Zenoh's threads, under the inbox's lock. No work here, and nothing may raise.
 
     def _on_token(self, sample: zenoh.Sample) -> None:
-        seq = next(self._seq)
-        token = self._tokens.setdefault(str(sample.key_expr), Token(False, 0))
-        token.alive = sample.kind == zenoh.SampleKind.PUT
-        if not token.alive:
-            token.lost_seq = seq
-        self._wake()
+        self._inbox.token(str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT)
 
     def _on_transport(self, event: zenoh.TransportEvent) -> None:
-        zid = str(event.transport.zid)
-        if event.kind == zenoh.SampleKind.PUT:
-            self._transports.add(zid)
-        else:
-            self._transports.discard(zid)
-        self._wake()
-
-    def _wake(self) -> None:
-        if not self._woken:
-            self._woken = True
-            self._wake_loop()
-
-
-def _between(unseen: Sample, newest: zenoh.ZBytes) -> tuple[Buffer, ...]:
-    """What came before the newest and was not looked at, each change once."""
-    if bytes(unseen.payload) == bytes(newest):
-        return unseen.between
-    return (*unseen.between[1 - BETWEEN_MOST :], unseen.payload)
+        self._inbox.transport(str(event.transport.zid), event.kind == zenoh.SampleKind.PUT)

@@ -30,6 +30,12 @@ class Log(Protocol):
     def add(self, entry: Entry) -> None:
         """Writes it, and nobody waits."""
 
+    def room(self, origin: Origin) -> bool:
+        """Whether a refusal may be an entry; where not, it is left out."""
+
+    def leave_out(self, origin: Origin) -> None:
+        """Counts a refusal that is no entry."""
+
 
 class Noted:
     """One press in the log; `entry` is None where it could not be written and need not be."""
@@ -72,6 +78,8 @@ class Logbook:
 
     def __init__(self, log: Log, robot: str = "", board: Callable[[], str] = str) -> None:
         self._log = log
+        self.room = log.room
+        self.leave_out = log.leave_out
         self._robot = robot
         self._board = board
 

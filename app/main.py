@@ -1,5 +1,8 @@
 """`uvicorn app.main:app`: the only wiring."""
 
+from app.collector import resume
+
+# isort: split
 import asyncio
 import logging
 import secrets
@@ -16,7 +19,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from starlette.exceptions import HTTPException
 from starlette.middleware.gzip import GZipMiddleware
 
-from app import development, logs, simulator
+from app import development, logs, simulator, sockets
 from app.assets import Assets, load_assets
 from app.doors import Doors
 from app.errors import KioskError, PanelError
@@ -27,8 +30,9 @@ from app.metrics import Metrics
 from app.panel import Panel, load_panel
 from app.panel.model import RobotEntry
 from app.recording import Recordings
-from app.routes import control, events, health, holds, pages, presses, static
+from app.routes import control, events, health, holds, pages, press_socket, presses, static
 from app.routes import log as log_routes
+from app.routes.messages import LONGEST
 from app.routes.site import Site, named_robot, on_http_error, on_kiosk_error
 from app.settings import Settings, shipped
 from app.startup import InWords
@@ -36,8 +40,6 @@ from app.systemd import Manager
 from app.watchdog import Watchdog
 
 log = logging.getLogger("kiosk")
-
-LONGEST_BODY = 64 * 1024
 
 
 def create_app(settings: Settings | None = None) -> FastAPI:
@@ -54,7 +56,8 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         async with _logging(settings, panel) as oplog, AsyncExitStack() as opened:
             running = partial(_running, oplog)
             fleet, assets = await opened.enter_async_context(running(settings, panel, fault))
-            site = Site(fleet, assets, _templates(settings.dev), Metrics(), settings.dev, oplog)
+            metrics = Metrics(lambda: oplog.left_out)
+            site = Site(fleet, assets, _templates(settings.dev), metrics, settings.dev, oplog)
             site.metrics.follow(fleet)
             app.state.site = site
             loop = asyncio.get_running_loop()
@@ -69,12 +72,13 @@ def create_app(settings: Settings | None = None) -> FastAPI:
                     await opened.enter_async_context(
                         development.reloading(site, settings, running, opened.pop_all())
                     )
-                watching = asyncio.create_task(watchdog.run())
+                tasks = [asyncio.create_task(work) for work in (watchdog.run(), sockets.narrow())]
                 try:
                     yield
                 finally:
-                    watching.cancel()
-                    await asyncio.gather(watching, return_exceptions=True)
+                    for task in tasks:
+                        task.cancel()
+                    await asyncio.gather(*tasks, return_exceptions=True)
                     watchdog.end()
 
     app = FastAPI(
@@ -83,13 +87,13 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         lifespan=lifespan,
         docs_url=None,  # they load scripts from elsewhere
         redoc_url=None,
-        max_body_size=LONGEST_BODY,
+        max_body_size=LONGEST,
         exception_handlers={KioskError: on_kiosk_error, HTTPException: on_http_error},
     )
     app.add_middleware(GZipMiddleware, minimum_size=500)
     app.add_middleware(Doors, hosts=settings.hosts)
     app.add_middleware(InWords)
-    for routes in (pages, events, presses, control, holds):
+    for routes in (pages, events, presses, press_socket, control, holds):
         app.include_router(routes.router)
         app.include_router(routes.router, prefix="/robots/{robot}", dependencies=[Depends(named_robot)])
     for common in (static, health, log_routes):
@@ -110,12 +114,12 @@ def _first_panel(settings: Settings) -> tuple[Panel, str]:
 @asynccontextmanager
 async def _logging(settings: Settings, panel: Panel) -> AsyncIterator[OperatorLog | Unlogged]:
     """The operator's log, open; FolderInUse where another server has its folder."""
-    oplog: OperatorLog | Unlogged = Unlogged()
-    if panel.log.enabled:
-        mode = settings.mode or panel.mode
-        rules = panel.log
+    mode, rules = settings.mode or panel.mode, panel.log
+    folder = settings.data_folder(mode)
+    oplog: OperatorLog | Unlogged = Unlogged(folder)
+    if rules.enabled:
         limits = Limits(days=rules.days, size_mb=rules.size_mb, required=rules.required)
-        oplog = OperatorLog(settings.data_folder(mode), limits, mode)
+        oplog = OperatorLog(folder, limits, mode)
     await oplog.start()
     try:
         yield oplog
@@ -229,3 +233,4 @@ def _app_or_exit() -> FastAPI:
 
 
 app = _app_or_exit()
+resume()

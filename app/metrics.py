@@ -1,6 +1,6 @@
 """What Prometheus reads at `/metrics`, gathered when it asks."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 from prometheus_client import CollectorRegistry, Counter, Gauge, generate_latest
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
@@ -12,8 +12,10 @@ from app.fleet import Fleet
 class Metrics:
     """Counts of one application, however often its panel is loaded anew."""
 
-    def __init__(self) -> None:
+    def __init__(self, left_out: Callable[[], int] = lambda: 0) -> None:
+        """`left_out` is how many refusals the operator's log only counts."""
         self._registry = CollectorRegistry()
+        self._registry.register(_OfLog(left_out))
         self.presses = Counter(
             "kiosk_presses", "Presses by outcome", ["outcome"], registry=self._registry
         )
@@ -29,6 +31,15 @@ class Metrics:
 
     def text(self) -> bytes:
         return generate_latest(self._registry)
+
+
+class _OfLog(Collector):
+    def __init__(self, left_out: Callable[[], int]) -> None:
+        self._left_out = left_out
+
+    def collect(self) -> Iterator[Metric]:
+        told = "Refused presses that the operator's log only counts"
+        yield CounterMetricFamily("kiosk_refusals_left_out", told, value=self._left_out())
 
 
 class _OfFleet(Collector):

@@ -15,6 +15,7 @@ from functools import partial
 from typing import Any
 
 from app.errors import FieldError, InputError, LinkError, LogError, NotFound
+from app.interlocks import Verdict
 from app.log import Origin
 from app.logbook import Logbook, Noted
 from app.logs import RobotLog
@@ -85,13 +86,19 @@ class Presses:
         """
         widget = self.widget(widget_id)
         known = self._under_way.get(press_id) or self._receipts.get(press_id)
-        if known is None:
+        if known is None and not self._receipts.is_past(press_id):
+            if left_out := self._left_out(widget, inputs, press_id, by):
+                return left_out
             work = self._logged(widget, inputs, press_id, by)
             return await self._once(widget, inputs, press_id, work)
+        if known is None:
+            return await self._again(
+                widget, inputs, press_id, say("press_past", id=press_id), by.origin
+            )
         if (known.widget, known.fingerprint) != (widget_id, fingerprint(inputs)):
-            own_id = f"{press_id:.40}.{secrets.token_hex(4)}"
-            work = self._reused(widget, inputs, press_id, own_id, by.origin)
-            return await self._once(widget, inputs, own_id, work)
+            return await self._again(
+                widget, inputs, press_id, say("press_reused", id=press_id), by.origin
+            )
         if isinstance(known, _UnderWay):
             return await asyncio.shield(known.receipt)
         return known
@@ -101,6 +108,9 @@ class Presses:
         widget = self.widget(widget_id)
         if not isinstance(widget, Action):
             raise NotFound(f'"{widget_id}" is not an action: there is nothing to cancel')
+        if not (self._sending.can_cancel(widget) or self._logbook.room(origin)):
+            answer = Answer("refused", say("nothing_to_cancel"))
+            return self._counted(receipt_of(widget, {}, "", answer, "interlock"), origin)
         noting = asyncio.ensure_future(self._logbook.canceled(widget_id, origin))
         try:
             answer = await self._sending.cancel(widget)  # no disk keeps anybody from stopping a robot
@@ -114,6 +124,29 @@ class Presses:
         cause: Cause = "interlock" if answer.outcome == "refused" else ""
         receipt = receipt_of(widget, {}, "", answer, cause)
         return await _closed(noted, receipt)
+
+    def _left_out(
+        self, widget: Pressed, inputs: Mapping[str, Any], press_id: str, by: By
+    ) -> Receipt | None:
+        """The receipt of a refusal that the log only counts; None for every other press."""
+        if self._logbook.room(by.origin):
+            return None
+        _, why, cause = self._ground(widget, by)
+        sentence = "refused" if why else "not_encoded"
+        if not why:
+            try:
+                why, cause = self._sending.refusal(widget, inputs), "interlock"
+            except (FieldError, InputError) as error:
+                why, cause = str(error), "input"
+        if not why:
+            return None
+        answer = Answer("refused", say(sentence, why=why, time=clock(time.time())))
+        return self._counted(receipt_of(widget, inputs, press_id, answer, cause), by.origin)
+
+    def _counted(self, receipt: Receipt, origin: Origin) -> Receipt:
+        self._logbook.leave_out(origin)
+        self._receipts.keep_left_out(receipt)
+        return receipt
 
     async def _once(
         self,
@@ -161,16 +194,21 @@ class Presses:
                 LONGEST_LOGGED, inputs, receipt.outcome, receipt.reason)  # fmt: skip
         return receipt
 
-    async def _reused(
-        self,
-        widget: Pressed,
-        inputs: Mapping[str, Any],
-        press_id: str,
-        own_id: str,
-        origin: Origin,
+    async def _again(
+        self, widget: Pressed, inputs: Mapping[str, Any], press_id: str, why: str, origin: Origin
     ) -> Receipt:
-        """A press with another one's id is not even judged."""
-        text = say("press_reused", id=press_id)
+        """A press with an id that was used is not even judged; its receipt has an id of its own."""
+        own_id = f"{press_id:.40}.{secrets.token_hex(4)}"
+        if self._logbook.room(origin):
+            return await self._once(
+                widget, inputs, own_id, self._reused(widget, inputs, own_id, why, origin)
+            )
+        refused = receipt_of(widget, inputs, own_id, Answer("refused", why), "input")
+        return self._counted(refused, origin)
+
+    async def _reused(
+        self, widget: Pressed, inputs: Mapping[str, Any], own_id: str, text: str, origin: Origin
+    ) -> Receipt:
         self._receipts.begin(own_id, widget.id, origin, inputs)
         self._log.warning("press %s of %s by %s: %s", own_id, widget.id, named(origin), text)
         why = await self._logbook.refused(widget.id, inputs, own_id, origin, text)
@@ -192,13 +230,10 @@ class Presses:
             now = clock(time.time())
             return receipt(Answer("refused", say(sentence, why=why, time=now)), cause)
 
-        self._catch_up()
-        verdict = judged(widget, by, self._panel, self._robot, self._monotonic())
+        verdict, why, cause = self._ground(widget, by)
         noted.judged(verdict.code)
-        if not verdict.permitted:
-            return refused("refused", verdict.reason or "", cause_of(verdict))
-        if why := by.doubt():
-            return refused("refused", why, "interlock")
+        if why:
+            return refused("refused", why, cause)
         try:
             correct = partial(self._correct, noted)
             answer = await self._sending.send(widget, inputs, press_id, correct)
@@ -209,6 +244,14 @@ class Presses:
         if answer.outcome == "refused":
             return refused("not_encoded", answer.text, "interlock")
         return receipt(answer, "time" if answer.outcome == "timed_out" else "")
+
+    def _ground(self, widget: Pressed, by: By) -> tuple[Verdict, str, Cause]:
+        """The verdict now, and why it may not be sent, "" if it may."""
+        self._catch_up()
+        verdict = judged(widget, by, self._panel, self._robot, self._monotonic())
+        if not verdict.permitted:
+            return verdict, verdict.reason or "", cause_of(verdict)
+        return verdict, by.doubt(), "interlock"
 
 
 @contextmanager

@@ -18,6 +18,7 @@ from app.sentences import say
 Cause = Literal["", "interlock", "input", "link", "log", "time"]
 
 RECEIPTS_KEPT: Final = 1000
+PAST_KEPT: Final = 20_000  # ids of presses whose receipts are not kept any more
 LONGEST_LOGGED: Final = 300
 LONGEST_KEPT: Final = 4000  # characters of all inputs of a press
 NO_WAY: Final = frozenset(
@@ -107,10 +108,16 @@ class Receipts:
     def __init__(self, witness: Witness | None = None) -> None:
         self._witness = witness
         self._receipts: OrderedDict[str, Receipt] = OrderedDict()
+        self._left_out: OrderedDict[str, Receipt] = OrderedDict()
+        self._past: OrderedDict[str, None] = OrderedDict()
 
     def get(self, press_id: str) -> Receipt | None:
         """The receipt of a press, as it is known now."""
-        return self._receipts.get(press_id)
+        return self._receipts.get(press_id) or self._left_out.get(press_id)
+
+    def is_past(self, press_id: str) -> bool:
+        """Whether this press was made, though its receipt is not kept any more."""
+        return press_id in self._past
 
     def begin(self, press_id: str, widget: str, origin: Origin, inputs: Mapping[str, Any]) -> None:
         """A press was made."""
@@ -120,9 +127,20 @@ class Receipts:
     def keep(self, receipt: Receipt) -> None:
         if self._witness is not None:
             self._witness.answered(receipt)
-        self._receipts[receipt.id] = receipt
-        while len(self._receipts) > RECEIPTS_KEPT:
-            self._receipts.popitem(last=False)
+        for press_id in _keep(self._receipts, receipt):
+            self._past[press_id] = None
+        while len(self._past) > PAST_KEPT:
+            self._past.popitem(last=False)
+
+    def keep_left_out(self, receipt: Receipt) -> None:
+        """A refusal that the log only counts: however many these are, they displace no other."""
+        _keep(self._left_out, receipt)
+
+
+def _keep(receipts: OrderedDict[str, Receipt], receipt: Receipt) -> list[str]:
+    """Keeps it, and as many as there is room for; the ids of those that are not kept any more."""
+    receipts[receipt.id] = receipt
+    return [receipts.popitem(last=False)[0] for _ in range(len(receipts) - RECEIPTS_KEPT)]
 
 
 def receipt_of(

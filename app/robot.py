@@ -83,6 +83,7 @@ class Robot:
         self.progress: dict[str, Progress] = {}  # of what widgets have asked, by their ids
         self.parameters: dict[str, Declared] = {}  # what nodes said of them, by their widgets' ids
         self.held: dict[str, str] = {}  # by the ids of hold widgets: since when, in words
+        self.answers = True  # False: its bridges are silent, though nobody knows yet why
         self.seen = Seen({(role, name): (role, self.key(name)) for role, name in ends(panel)})
         self.undecodable: Counter[str] = Counter()
         self._interfaces = interfaces

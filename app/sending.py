@@ -1,7 +1,7 @@
 """What a press is for: its inputs checked, its message, request or goal encoded, and sent."""
 
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Awaitable, Callable, Iterable, Mapping
 from typing import Any, Protocol
 
 from app import declared
@@ -12,7 +12,7 @@ from app.errors import InputError, NotFound
 from app.inputs import checked, typed
 from app.interfaces import Interfaces
 from app.panel.model import Action, Call, Input, Panel, Pressed, Publish
-from app.panel.parameter import Parameter
+from app.panel.parameter import SET, Parameter
 from app.panel.template import filled, inputs_of
 from app.parameters import Parameters
 from app.progress import Answer, Corrected
@@ -25,6 +25,11 @@ class Way(Protocol):
 
     def put(self, key: str, payload: bytes) -> None: ...
     def heard(self, key: str) -> bool: ...
+
+
+async def no_doubt() -> bool:
+    """Where nobody asks whether something arrives."""
+    return True
 
 
 class Sending:
@@ -41,7 +46,10 @@ class Sending:
         confirmations: Confirmations,
         parameters: Parameters,
         monotonic: Callable[[], float] = time.monotonic,
+        reached: Callable[[], Awaitable[bool]] = no_doubt,
     ) -> None:
+        """`reached` tells, later, whether what was sent until now has reached the bridge."""
+        self._reached = reached
         self._widgets = {w.id: w for w in panel.widgets()}
         self._interfaces = interfaces
         self._robot = robot
@@ -88,7 +96,7 @@ class Sending:
                 since = self._monotonic()
                 answer = self._published(widget, fields)
                 if widget.confirm is None:
-                    return answer
+                    return await self._arrived(widget, answer)
                 equals = filled(widget.confirm.equals, values)
                 return await self._confirmations.awaited(
                     widget, equals, press_id, since, answer.text, correct
@@ -102,6 +110,21 @@ class Sending:
             case Parameter():
                 return await self._parameters.set(widget, fields["value"], press_id, correct)
 
+    def refusal(self, widget: Pressed, inputs: Mapping[str, Any]) -> str:
+        """Why `send` would refuse it now, "" if it would not; FieldError or InputError as there."""
+        fields = filled(widget.template, self.checked(inputs_of(widget), inputs))
+        match widget:
+            case Publish():
+                self._interfaces.encode(widget.type, fields)
+            case Call():
+                self._interfaces.encode(self._interfaces.service(widget.type)[0], fields)
+                return self._calls.full(widget.service)
+            case Action():
+                return self._actions.full(widget.action)
+            case Parameter():
+                return self._calls.full(f"{widget.node}/{SET[0]}")
+        return ""
+
     def _published(self, widget: Publish, fields: dict[str, Any]) -> Answer:
         payload = self._interfaces.encode(widget.type, fields)
         key = self._robot.key(widget.topic)
@@ -110,6 +133,13 @@ class Sending:
         sentence = "published" if heard else "sent_to_nobody"
         text = say(sentence, topic=widget.topic, time=clock(time.time()))
         return Answer("published" if heard else "unknown", text)
+
+    async def _arrived(self, widget: Publish, answer: Answer) -> Answer:
+        """What was `published` is on its way until the bridge has answered."""
+        at = clock(time.time())
+        if answer.outcome != "published" or await self._reached():
+            return answer
+        return Answer("unknown", say("sent_unanswered", topic=widget.topic, time=at))
 
     def checked(self, names: Iterable[str], inputs: Mapping[str, Any]) -> dict[str, Any]:
         """The values of the inputs with these ids."""
@@ -127,6 +157,9 @@ class Sending:
                 values[name] = self._parameters.checked(field, inputs[name])
         return values
 
+    def can_cancel(self, widget: Action) -> bool:
+        return self._actions.stoppable(widget) is not None
+
     async def cancel(self, widget: Action) -> Answer:
-        """Asks the robot to cancel the goal of an action widget."""
+        """Asks the robot to cancel the goal of an action widget, if there is one."""
         return await self._actions.cancel(widget)

@@ -14,7 +14,9 @@ ENGLISH: Final[Mapping[str, str]] = {
     "no_bridge_of": "No connection to {name}: Zenoh answers, but no ROS 2 bridge of its namespace.",
     "ending": "The panel's server is ending, or takes a new panel.",
     "joining": "Joining the robot's topics: a moment.",
-    "bridge_silent": "The ROS 2 bridge is connected but does not answer: restart the bridge.",
+    "bridge_silent": (
+        "No connection to the robot: its bridge does not answer. If this stays, restart the bridge."
+    ),
     "wrong_type": "{topic} is {found} on the robot, but this panel is made for {wanted}.",
     "unheard": "Locked: the bridge does not pass on {topic}. If this stays, restart the bridge.",
     "waiting": "Locked: waiting for {topic}.",
@@ -152,8 +154,14 @@ ENGLISH: Final[Mapping[str, str]] = {
     # What came of a press.
     "published": "Sent on {topic} at {time}.",
     "sent_to_nobody": "Sent on {topic} at {time}, but no node is known to listen to it.",
+    "sent_unanswered": (
+        "Sent on {topic} at {time}, but the bridge has not answered since: it is not known whether it "
+        "reaches the robot."
+    ),
     "refused": "Not sent at {time}: {why}",
     "not_encoded": "Not sent at {time}: {why}.",
+    "too_many_presses": "Not sent: {most} presses of this page have had no answer yet.",
+    "press_past": "Not sent again: press {id} was made before; the operator's log has what came of it.",
     "press_reused": "Not sent: the press id {id} was already used for another press.",
     # The operator's log.
     "log_unwritable": "The operator's log can't be written: {why}.",
@@ -162,6 +170,8 @@ ENGLISH: Final[Mapping[str, str]] = {
     "log_closed": "the file is being opened anew",
     "log_slow": "the disk did not take the entry in {seconds} s",
     "log_full_queue": "more is pressed than the disk takes; press again",
+    "log_more_refused": "{count} more refusals from {name} since {since}, each answered as ever.",
+    "others": "others",
     "log_abandoned": "Not sent: the entry was written too late.",
     "log_not_on_disk": "{said} (Not safely in the operator's log: {why}.)",
     "log_ended": "the panel's server ended before it knew",

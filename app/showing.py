@@ -1,4 +1,4 @@
-"""When a robot's state is shown: permissions and the link at once, values so many times a second.
+"""When a robot's state is shown: permissions and the link at once, values as often as the panel says.
 
 Whatever time alone changes (an age, a request for control) is shown when it is due.
 """
@@ -7,18 +7,17 @@ import asyncio
 import math
 import time
 from collections.abc import Callable, Collection, Mapping
-from typing import Final, Protocol
+from dataclasses import replace
+from typing import Protocol
 
 from app.board import Board
 from app.control import Control
 from app.lamps import Lamp
 from app.logbook import Log
-from app.panel.model import Panel
+from app.panel.model import Display, Panel
 from app.robot import Robot
 from app.since import Since
-from app.views import Sight, sight
-
-FRAMES_PER_S: Final = 20.0
+from app.views import Sight, refreshed, sight
 
 
 class Others(Protocol):
@@ -75,10 +74,14 @@ class Showing:
         self._simulated = simulated
         self.fault = fault
         self._since = Since()
-        first = self._sight()
-        self.lamp = first.robot
-        self.board = Board(first.view, revision)
+        self._frame_s = 1 / panel.display_hz
+        self._displays = [(robot.key(w.topic), w) for w in panel.widgets() if isinstance(w, Display)]
+        self._seen = self._sight()
+        self.lamp = self._seen.robot
+        self.board = Board(self._seen.view, revision)
         self._shown_at = 0.0
+        self._spoke: set[str] = set()  # keys of topics that said something since
+        self._whole = False  # whether more than values is to be shown
         self._timer: asyncio.TimerHandle | None = None
         self._stopped = False
 
@@ -90,24 +93,53 @@ class Showing:
 
     def now(self) -> None:
         """Posts the state as of now to the board."""
+        self._whole = True
+        self._frame()
+
+    def soon(self) -> None:
+        """The same when the next frame is due."""
+        self._whole = True
+        self._at(self.due)
+
+    def values(self, keys: Collection[str]) -> None:
+        """Shows what these topics (their keys) said, when the next frame is due."""
+        self._spoke.update(keys)
+        self._at(self.due)
+
+    @property
+    def due(self) -> float:
+        """When (monotonic seconds) the next frame may be shown."""
+        return self._shown_at + self._frame_s
+
+    def _frame(self) -> None:
         if self._stopped:
             return
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
-        self._shown_at = time.monotonic()
+        now = self._shown_at = time.monotonic()
+        whole = self._whole
         self._before()
-        seen = self._sight()
-        if seen.robot != self.lamp:
-            self.lamp = seen.robot
-            self._others.show_but(self._robot)
-            seen = self._sight()
-        self.board.post(seen.view)
-        self._at(min(seen.until, self._control.until))
+        if whole or self._whole or now >= self._seen.rest or not self._seen.well:
+            self._look()
+        else:
+            self._seen = refreshed(self._seen, self._stale(now), self._robot, now)
+        self._whole, self._spoke = False, set()
+        self.board.post(self._seen.view)
+        self._at(self._seen.until)
 
-    def soon(self) -> None:
-        """Shows again when the next frame is due."""
-        self._at(self._shown_at + 1 / FRAMES_PER_S)
+    def _stale(self, now: float) -> list[Display]:
+        """The displays that a topic or time has changed."""
+        untils, spoke = self._seen.displays, self._spoke
+        return [w for key, w in self._displays if key in spoke or untils[w.id] <= now]
+
+    def _look(self) -> None:
+        """Looks at everything anew."""
+        self._seen = self._sight()
+        if self._seen.robot != self.lamp:
+            self.lamp = self._seen.robot
+            self._others.show_but(self._robot)
+            self._seen = self._sight()
 
     def _at(self, when: float) -> None:
         """Shows again at `when` (monotonic seconds), or sooner if that is planned already."""
@@ -116,7 +148,7 @@ class Showing:
                 return
             self._timer.cancel()
         loop = asyncio.get_running_loop()
-        self._timer = None if when == math.inf else loop.call_at(when, self.now)
+        self._timer = None if when == math.inf else loop.call_at(when, self._frame)
 
     def _sight(self) -> Sight:
         faults = (self.fault, self._operators_log.fault, self._recordings_fault())
@@ -130,4 +162,4 @@ class Showing:
             lock=self._operators_log.lock,
             control=self._control.view(),
         )
-        return self._since.dated(seen)
+        return replace(self._since.dated(seen), rest=min(seen.rest, self._control.until))

@@ -5,8 +5,8 @@ nothing.
 """
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from typing import Any, Final, TypedDict
 
 from app.browsers import Browser
@@ -17,7 +17,7 @@ from app.interlocks import Verdict, interlock_verdict, press_verdict, way
 from app.lamps import Lamp, LinkLamp, lamps, summary
 from app.panel.displays import Indicator, Readout
 from app.panel.inputs import Numeric, SelectInput, TextInput, ToggleInput
-from app.panel.model import Action, Call, Hold, Panel, Pressed, Publish
+from app.panel.model import Action, Call, Display, Hold, Panel, Pressed, Publish
 from app.panel.parameter import Parameter
 from app.parameter_display import parameter
 from app.progress import IDLE, Progress
@@ -55,11 +55,22 @@ NO_OTHERS: Final[Mapping[str, Lamp]] = {}
 @dataclass(frozen=True, slots=True)
 class Sight:
     """A view, the robot's lamp on the pages of others, and when (monotonic seconds) time alone would
-    change it."""
+    change what the displays show, by their ids, and the `rest`."""
 
     view: View
     robot: Lamp
-    until: float
+    rest: float
+    displays: Mapping[str, float]
+
+    @property
+    def until(self) -> float:
+        """When time alone would change it."""
+        return min(self.rest, *self.displays.values()) if self.displays else self.rest
+
+    @property
+    def well(self) -> bool:
+        """Whether the robot's nodes are heard: then a value changes what shows it and nothing else."""
+        return self.view["link"]["node"]["state"] == "ok"
 
 
 def sight(
@@ -91,6 +102,7 @@ def sight(
     passable = noted(way(robot, now))
     interlocks = {i.id: noted(interlock_verdict(i, robot, now)) for i in panel.interlocks}
     widgets: dict[str, dict[str, Any]] = {}
+    displays: dict[str, float] = {}
     for widget in panel.widgets():
         match widget:
             case TextInput() | SelectInput() | ToggleInput():
@@ -110,12 +122,8 @@ def sight(
                     "held": bool(holding),
                     "holding": holding,
                 }
-            case Readout():
-                widgets[widget.id], until = readout(widget, robot, now)
-                untils.append(until)
-            case Indicator():
-                widgets[widget.id], until = indicator(widget, robot, now)
-                untils.append(until)
+            case Readout() | Indicator():
+                widgets[widget.id], displays[widget.id] = displayed(widget, robot, now)
     link, until = lamps(panel, robot, passable, verdicts, now)
     untils.append(until)
     view = View(
@@ -128,7 +136,22 @@ def sight(
         robots=dict(robots),
         control=control,
     )
-    return Sight(view, summary(robot.name, link), min(untils))
+    return Sight(view, summary(robot.name, link), min(untils), displays)
+
+
+def refreshed(seen: Sight, displays: Iterable[Display], robot: Robot, now: float) -> Sight:
+    """The same with these displays as of `now`, where nothing else has changed."""
+    widgets, untils = dict(seen.view["widgets"]), dict(seen.displays)
+    for widget in displays:
+        widgets[widget.id], untils[widget.id] = displayed(widget, robot, now)
+    return replace(seen, view={**seen.view, "widgets": widgets}, displays=untils)
+
+
+def displayed(widget: Display, robot: Robot, now: float) -> tuple[dict[str, Any], float]:
+    """Attributes of a display, and when time alone would change them."""
+    if isinstance(widget, Readout):
+        return readout(widget, robot, now)
+    return indicator(widget, robot, now)
 
 
 def as_seen_by(view: View, browser: Browser) -> View:

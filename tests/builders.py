@@ -130,6 +130,7 @@ def sending_of(
     calls: Calls | None = None,
     confirmations: Confirmations | None = None,
     monotonic: Callable[[], float] = lambda: NOW,
+    **more: Any,
 ) -> Sending:
     """What is sent to a robot, with all that is needed for it and a test does not care for."""
     asker = asker or Nobody()
@@ -144,6 +145,7 @@ def sending_of(
         confirmations or Confirmations(robot, lambda: None),
         Parameters(panel, INTERFACES, robot, asker, calls, lambda: None),
         monotonic,
+        **more,
     )
 
 

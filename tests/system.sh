@@ -28,6 +28,7 @@ need faketime has_faketime
 need iproute2 ip -V
 need util-linux nsenter --version
 need python3-venv "${PYTHON:-python3}" -c "import ensurepip"
+[ "$only" != npm ] || need npm npm --version # for the benchmark's rivals alone
 [ -n "$only" ] || command -v cargo >/dev/null || { echo "missing: Rust 1.85 or later (cargo)" >&2; exit 1; }
 
 [ -n "$missing" ] || exit 0

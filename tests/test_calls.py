@@ -452,7 +452,7 @@ def test_a_goal_whose_server_ends_is_unknown_and_asked_for_when_it_is_back() -> 
 
 async def settled(bench: Bench) -> None:
     """Nothing is followed any more."""
-    while bench.actions.following:
+    while bench.actions._following:
         await asyncio.sleep(0.001)
 
 

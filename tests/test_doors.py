@@ -11,6 +11,7 @@ from starlette.types import Receive, Scope, Send
 from app.doors import SECURITY_HEADERS, Doors
 from app.settings import LOOPBACK_HOSTS
 
+GUARDED = [("POST", "/widgets/x"), ("GET", "/events"), ("GET", "/robots/r1/events")]
 HOSTS = (*LOOPBACK_HOSTS, "cell1.local", "10.0.0.7", "[fe80::1]")
 OWN = {"host": "localhost:8000"}
 
@@ -93,7 +94,7 @@ def test_a_host_that_is_no_name_of_the_panel_is_refused(path: str, host: str) ->
         ("[::1]:8000", "http://[::1]:8000"),
     ],
 )
-@pytest.mark.parametrize(("method", "path"), [("POST", "/widgets/x"), ("GET", "/events")])
+@pytest.mark.parametrize(("method", "path"), GUARDED)
 def test_the_panels_own_page_may_press_and_listen(
     method: str, path: str, host: str, origin: str
 ) -> None:
@@ -118,7 +119,7 @@ def test_the_panels_own_page_may_press_and_listen(
         "file://",
     ],
 )
-@pytest.mark.parametrize(("method", "path"), [("POST", "/widgets/x"), ("GET", "/events")])
+@pytest.mark.parametrize(("method", "path"), GUARDED)
 def test_a_page_of_another_origin_may_neither_press_nor_listen(
     method: str, path: str, origin: str
 ) -> None:
@@ -128,7 +129,7 @@ def test_a_page_of_another_origin_may_neither_press_nor_listen(
 
 
 @pytest.mark.parametrize("site", ["cross-site", "same-site", "", "Same-Origin", "other"])
-@pytest.mark.parametrize(("method", "path"), [("POST", "/widgets/x"), ("GET", "/events")])
+@pytest.mark.parametrize(("method", "path"), GUARDED)
 def test_a_page_of_another_site_may_neither_press_nor_listen(method: str, path: str, site: str) -> None:
     answer = asked(method, path, {**OWN, "sec-fetch-site": site})
     assert answer.status_code == 403
@@ -147,7 +148,7 @@ def test_every_method_that_may_change_something_is_guarded(method: str) -> None:
 
 
 @pytest.mark.parametrize("headers", [{}, {"sec-fetch-site": "none"}])
-@pytest.mark.parametrize(("method", "path"), [("POST", "/widgets/x"), ("GET", "/events")])
+@pytest.mark.parametrize(("method", "path"), GUARDED)
 def test_a_program_that_is_no_browser_may_press_and_listen(
     method: str, path: str, headers: Mapping[str, str]
 ) -> None:

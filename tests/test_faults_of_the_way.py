@@ -18,6 +18,7 @@ from tests.parts import TESTS, Server, free_port, until
 
 DELAY_S = 0.3
 LOSS = 0.1
+SEEN_S = 1.0
 LATE_IN_BAD_WEATHER_S = 5.0
 CUTS_S = (1, 5, 30) if LONG else (1, 5)
 
@@ -71,9 +72,10 @@ def test_a_killed_bridge(rig: Rig, server: Server) -> None:
 
 def test_a_frozen_bridge(rig: Rig, server: Server) -> None:
     trial = tried(
-        rig, server, rig.bridge.freeze, rig.bridge.thaw, locks_within_s=3.0, lasts_s=4.0, late_s=5.0
+        rig, server, rig.bridge.freeze, rig.bridge.thaw, locks_within_s=SEEN_S, lasts_s=4.0, late_s=5.0
     )
     assert "No connection to the robot" in trial.reason
+    assert trial.claimed == 0
     recorded("bridge frozen for 4 s", trial)
 
 
@@ -133,14 +135,21 @@ def test_a_cable_that_is_cut(cable: Cable, far_rig: Rig, tmp_path: Path) -> None
                 short_cut(cable, far_rig, server, seconds)
                 continue
             trial = tried(
-                far_rig, server, cable.cut, cable.mend, locks_within_s=3.0, lasts_s=seconds, late_s=3.0
+                far_rig,
+                server,
+                cable.cut,
+                cable.mend,
+                locks_within_s=SEEN_S,
+                lasts_s=seconds,
+                late_s=3.0,
             )
             assert "No connection to the robot" in trial.reason
+            assert trial.claimed == 0
             recorded(f"cable cut for {seconds} s", trial)
 
 
 def short_cut(cable: Cable, rig: Rig, server: Server, seconds: float) -> None:
-    """The pulse is missed at once; the connection itself lasts."""
+    """The pulse is missed at once, and the bridge's answer; the connection itself lasts."""
     trial = tried(
         rig,
         server,
@@ -152,7 +161,8 @@ def short_cut(cable: Cable, rig: Rig, server: Server, seconds: float) -> None:
         interlock="pulsed",
         widget="paced",
     )
-    assert "older than 0.5 s" in trial.reason
+    assert "older than 0.5 s" in trial.reason or "does not answer" in trial.reason
+    assert trial.claimed == 0
     recorded(f"cable cut for {seconds} s (interlock with max_age_s = 0.5)", trial)
 
 

@@ -10,6 +10,7 @@ from app.settings import PACKAGE
 
 # A module imports only from those that stand before it.
 ORDER = (
+    "app.collector",
     "app.errors",
     "app.settings",
     "app.sentences",
@@ -17,6 +18,7 @@ ORDER = (
     "app.logs",
     "app.moments",
     "app.systemd",
+    "app.sockets",
     "app.watchdog",
     "app.keys",
     "app.interfaces.definitions",
@@ -61,6 +63,7 @@ ORDER = (
     "app.log.store",
     "app.log.chain",
     "app.log.reading",
+    "app.log.refusals",
     "app.log.ticket",
     "app.log.syncer",
     "app.log.keeper",
@@ -82,6 +85,7 @@ ORDER = (
     "app.parameter_display",
     "app.views",
     "app.since",
+    "app.heartbeat",
     "app.board",
     "app.confirmations",
     "app.calls",
@@ -105,10 +109,12 @@ ORDER = (
     "app.rosout",
     "app.bridges",
     "app.tokens",
+    "app.inbox",
     "app.link",
     "app.intake",
     "app.joining",
     "app.asked",
+    "app.pulse",
     "app.showing",
     "app.kiosk",
     "app.fleet",
@@ -116,11 +122,13 @@ ORDER = (
     "app.assets",
     "app.doors",
     "app.startup",
+    "app.routes.messages",
     "app.routes.site",
     "app.routes.visitors",
     "app.routes.pages",
     "app.routes.events",
     "app.routes.presses",
+    "app.routes.press_socket",
     "app.routes.control",
     "app.routes.holds",
     "app.routes.health",
@@ -197,7 +205,7 @@ def test_the_interfaces_know_nothing_of_the_panel() -> None:
 
 
 def test_the_link_knows_no_view_and_no_panel() -> None:
-    assert of_project("app.link") <= {"app.errors", "app.keys", "app.robot"}
+    assert of_project("app.link") <= {"app.errors", "app.inbox", "app.keys"}
 
 
 @pytest.mark.parametrize(

@@ -57,10 +57,15 @@ def bridge_silent(robot: Robot) -> None:
     robot.graph.answered({})
 
 
+def bridge_unheard(robot: Robot) -> None:
+    robot.answers = False
+
+
 def joining(robot: Robot) -> None:
     robot.settled_at = NOW + 1
 
 
+SILENT = "No connection to the robot: its bridge does not answer. If this stays, restart the bridge."
 WAYS: list[tuple[Callable[[Robot], None], str, str]] = [
     (no_link, "no_link", "No connection to the robot: its bridge can't be reached."),
     (
@@ -68,11 +73,8 @@ WAYS: list[tuple[Callable[[Robot], None], str, str]] = [
         "no_bridge",
         "No connection to the robot: Zenoh answers, but no ROS 2 bridge is there.",
     ),
-    (
-        bridge_silent,
-        "bridge_silent",
-        "The ROS 2 bridge is connected but does not answer: restart the bridge.",
-    ),
+    (bridge_silent, "bridge_silent", SILENT),
+    (bridge_unheard, "bridge_silent", SILENT),
     (joining, "joining", "Joining the robot's topics: a moment."),
 ]
 

@@ -1,5 +1,9 @@
 """The link alone, between two Zenoh sessions of this process."""
 
+import asyncio
+import signal
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -11,7 +15,7 @@ from zenoh.handlers import Callback
 
 from app import keys
 from app.keys import Qos
-from app.link import Link, config_to
+from app.link import BLOCKED_MOST_US, Link, config_to
 from tests.parts import free_port, until
 
 RENEWALS = 30
@@ -46,7 +50,7 @@ def test_a_session_is_renewed_in_the_middle_of_what_comes_in(
             for token in held:
                 token.undeclare()
 
-    link = Link(config_to(endpoint), lambda: None)
+    link = Link(config_to(endpoint), lambda _: None)
     link.start(["a"], ["b"])
 
     def renew() -> None:
@@ -75,7 +79,7 @@ def test_a_burst_is_not_dropped(peer: tuple[str, zenoh.Session]) -> None:
         heard.append(bytes(sample.payload))
 
     session.declare_subscriber("b", Callback(hear, indirect=False))
-    link = Link(config_to(endpoint), lambda: None)
+    link = Link(config_to(endpoint), lambda _: None)
     link.start([], ["b"])
     until(lambda: link.heard("b"), "the subscriber is known")
     for number in range(BURST):
@@ -85,9 +89,52 @@ def test_a_burst_is_not_dropped(peer: tuple[str, zenoh.Session]) -> None:
     assert heard == [str(number).encode() for number in range(BURST)]
 
 
+LISTENER = """
+import sys, zenoh
+config = zenoh.Config()
+config.insert_json5("listen/endpoints", f'["{sys.argv[1]}"]')
+config.insert_json5("scouting/multicast/enabled", "false")
+session = zenoh.open(config)
+listener = session.declare_subscriber("b", lambda sample: None)
+print("ready", flush=True)
+sys.stdin.read()
+"""
+
+
+def test_a_link_that_takes_nothing_stops_the_loop_once_and_not_for_long() -> None:
+    """A peer that is frozen: the kernel's buffers fill, and then what is sent, and what is asked."""
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    command = [sys.executable, "-c", LISTENER, endpoint]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as peer:
+        assert peer.stdout is not None
+        assert peer.stdout.readline() == b"ready\n"
+        link = Link(config_to(endpoint), lambda urgent: None)
+        link.start([], ["b"])
+        until(lambda: link.heard("b"), "the subscriber is known")
+        peer.send_signal(signal.SIGSTOP)
+        took = []
+        for _ in range(2000):
+            began = time.monotonic()
+            link.put("b", bytes(20_000))
+            took.append(time.monotonic() - began)
+        began = time.monotonic()
+        asyncio.run(asked(link))
+        took.append(time.monotonic() - began)
+        peer.kill()
+        link.close()
+    long = [one for one in took if one > 0.1]
+    assert len(long) == 1, "it waits for room once"
+    assert long[0] < 2 * BLOCKED_MOST_US / 1e6
+
+
+async def asked(link: Link) -> None:
+    """A question is sent, and not waited for."""
+    link.query("b", b"", 0.1).cancel()
+
+
 def test_nothing_is_left_of_the_sessions_that_were(peer: tuple[str, zenoh.Session]) -> None:
     """Zenoh kept a shared memory segment of each: a thousand losses of the link, and no file more."""
-    link = Link(config_to(peer[0]), lambda: None)
+    link = Link(config_to(peer[0]), lambda _: None)
     link.start(["a"], ["b"])
 
     def files() -> int:
@@ -106,7 +153,7 @@ def test_tokens_are_held_by_the_new_session_when_they_are_wanted_again(
     peer: tuple[str, zenoh.Session],
 ) -> None:
     endpoint, session = peer
-    link = Link(config_to(endpoint), lambda: None)
+    link = Link(config_to(endpoint), lambda _: None)
     link.start([], [])
     link.hold(tokens(link.zid, 1))
     link.renew()
@@ -125,7 +172,7 @@ def test_of_a_watched_topic_what_came_and_went_between_two_drains_is_kept(
     peer: tuple[str, zenoh.Session],
 ) -> None:
     endpoint, session = peer
-    link = Link(config_to(endpoint), lambda: None)
+    link = Link(config_to(endpoint), lambda _: None)
     link.start(["a", "b"], [], watched=["a"])
     until(lambda: link.drain().link_up, "a link")
     said = [b"yes", b"no", b"no", b"yes", *(b"%d" % n for n in range(100)), b"yes"]

@@ -88,9 +88,9 @@ def test_a_full_disk_locks_and_opens_again_by_itself(
     page.goto(kiosk.url)
     expect(page.get_by_role("button", name="Publish", exact=True)).to_be_enabled()
     press_until_full(kiosk)
-    refused = kiosk.press("operation", "never sent")
-    assert (refused.status_code, refused.json()["outcome"]) == (503, "refused")
-    assert FULL in refused.json()["reason"]
+    for refused in [kiosk.by(way).press("operation", "never sent") for way in ("post", "socket")]:
+        assert (refused.status_code, refused.json()["outcome"]) == (503, "refused")
+        assert FULL in refused.json()["reason"]
     expect(page.get_by_role("button", name="Publish", exact=True)).to_be_disabled()
     expect(page.locator("#why-operation")).to_contain_text(FULL)
     expect(page.locator("#fault")).to_contain_text(FULL)
@@ -150,14 +150,14 @@ def test_a_log_that_is_switched_off_keeps_nothing(
     assert "switches the operator's log off" in page_text(kiosk, "/log")
     assert kiosk.http.get("/log.csv").status_code == 404
     assert 'href="/log"' not in page_text(kiosk, "/")
-    assert list(kiosk.data.iterdir()) == []
+    assert [file.name for file in kiosk.data.iterdir()] == ["server.lock"]
 
 
 @contextmanager
-def started(data: Path, *options: str) -> Iterator[Process]:
+def started(data: Path, *options: str, **env: str) -> Iterator[Process]:
     """A server that need not answer, and all its workers."""
     command = [sys.executable, "-m", "uvicorn", "app.main:app", "--port", str(free_port()), *options]
-    process = Process(command, {"KIOSK_DATA": str(data)}, cwd=ROOT, start_new_session=True)
+    process = Process(command, {"KIOSK_DATA": str(data), **env}, cwd=ROOT, start_new_session=True)
     try:
         yield process
     finally:
@@ -177,8 +177,10 @@ def test_a_second_server_on_the_folder_does_not_start(demo: Server) -> None:
     assert demo.press("operation", "still here").json()["outcome"] == "published"
 
 
-def test_a_second_worker_does_not_start(tmp_path: Path) -> None:
-    with started(tmp_path, "--workers", "2") as server:
+@pytest.mark.parametrize("log", ["", "[log]\nenabled = false\n"])
+def test_a_second_worker_does_not_start(tmp_path: Path, log: str) -> None:
+    panel = panel_with(tmp_path, log)
+    with started(tmp_path, "--workers", "2", KIOSK_PANEL=panel) as server:
         until(lambda: f"{tmp_path} is in use by process" in server.text, "it is said", within_s=30)
         assert "one worker" in server.text
         assert "Traceback" not in server.text

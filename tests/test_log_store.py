@@ -4,6 +4,7 @@ import sqlite3
 import stat
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,7 @@ from app.log.chain import verify
 from app.log.entry import LONGEST_VALUES, Entry, Origin, as_json, entered, plain
 from app.log.file import NAME, set_aside
 from app.log.folder import LOCK, Folder
+from app.log.keeper import HOUR_S, Steady
 from app.log.reading import Filter, rows
 from app.log.store import DAY_MS, REMOVED_AT_ONCE, Store
 
@@ -260,6 +262,28 @@ def test_only_what_is_old_goes(store: Store, tmp_path: Path) -> None:
     assert store.remove_old(1, 512, threading_gap + DAY_MS - 1)
     assert store.head.count == 11
     assert verify(tmp_path).fault == ""
+
+
+def test_what_was_written_before_the_clock_was_set_is_not_old_by_that(store: Store) -> None:
+    at_1970 = [replace(entered("refused", FROM), at=number) for number in range(1, 4)]
+    store.append(at_1970)
+    fill(store, 1)
+    now = time.time_ns() // 1_000_000
+    assert not store.remove_old(365, 512, now)
+    assert store.head.count == 5
+    assert store.remove_old(365, 512, now + 366 * DAY_MS)  # with what came after them
+    assert store.head.count == 1
+
+
+def test_only_a_clock_that_nobody_set_for_an_hour_makes_anything_old() -> None:
+    clock = Steady()
+    assert not clock.steady(1000.0, 0.0)
+    assert not clock.steady(1000.0 + HOUR_S - 1, HOUR_S - 1)
+    assert clock.steady(1000.0 + HOUR_S + 5, HOUR_S)  # it drifts
+    ahead = 1e9
+    assert not clock.steady(ahead + HOUR_S + 1, HOUR_S + 1)
+    assert not clock.steady(ahead + 2 * HOUR_S, 2 * HOUR_S)
+    assert clock.steady(ahead + 2 * HOUR_S + 2, 2 * HOUR_S + 2)
 
 
 def test_a_large_log_loses_its_oldest_and_its_pages(store: Store, tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from app.errors import FolderInUse, LogCorrupt, LogError
-from app.log import Entry, Filter, Limits, OperatorLog, Origin, entered, keeper, writer
+from app.log import Entry, Filter, Limits, OperatorLog, Origin, entered, folder, keeper, writer
 from app.log.chain import verify
 from app.log.reading import rows
 from app.log.store import Store
@@ -50,6 +50,12 @@ def run(
 async def until_good(log: OperatorLog) -> None:
     async with asyncio.timeout(10):
         while log.fault:
+            await asyncio.sleep(0.01)
+
+
+async def until_commits(disk: "Disk", count: int) -> None:
+    async with asyncio.timeout(10):
+        while disk.commits < count:
             await asyncio.sleep(0.01)
 
 
@@ -174,12 +180,13 @@ def test_a_disk_that_hangs_blocks_no_loop_and_locks(
 def test_a_press_that_nobody_waits_for_any_more_is_closed(tmp_path: Path, disk: Disk) -> None:
     async def work(log: OperatorLog) -> None:
         disk.open.clear()
+        before = disk.commits
         task = asyncio.create_task(log.pressed(pressed(1)))
-        await asyncio.sleep(0.1)
+        await until_commits(disk, before + 1)
         task.cancel()
         await asyncio.gather(task, return_exceptions=True)
         disk.open.set()
-        await asyncio.sleep(0.1)
+        await until_commits(disk, before + 2)
 
     run(tmp_path, work)
     assert kinds(tmp_path)[1:] == [("pressed", "p1", ""), ("closed", "p1", "refused")]
@@ -323,10 +330,10 @@ def test_a_second_log_waits_for_the_first_to_end_and_then_gives_up(
 ) -> None:
     async def work(log: OperatorLog) -> None:
         second = OperatorLog(tmp_path, Limits())
-        monkeypatch.setattr(writer, "HELD_BY_OTHER_S", 0.3)
+        monkeypatch.setattr(folder, "HELD_BY_OTHER_S", 0.3)
         with pytest.raises(FolderInUse, match="is in use by process"):
             await second.start()
-        monkeypatch.setattr(writer, "HELD_BY_OTHER_S", 5.0)
+        monkeypatch.setattr(folder, "HELD_BY_OTHER_S", 5.0)
         starting = asyncio.create_task(second.start())
         await asyncio.sleep(0.2)
         assert not starting.done()

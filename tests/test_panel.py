@@ -174,6 +174,9 @@ def test_an_interlock_and_a_widget_may_have_one_id(load: Load) -> None:
         (tables(log={"size_mb": 1}), "log.size_mb", "greater than or equal to 8"),
         (tables(log={"required": "no"}), "log.required", "valid boolean"),
         (tables(log={"requierd": False}), "log.requierd", 'did you mean "required"?'),
+        (tables(display_hz=0.5), "display_hz", "greater than or equal to 1"),
+        (tables(display_hz=61), "display_hz", "less than or equal to 60"),
+        (tables(display_hz="fast"), "display_hz", "valid number"),
         (tables(mm_per_px=0), "mm_per_px", "greater than 0.02"),
         (tables(mm_per_px="0.2"), "mm_per_px", "valid number"),
         (

@@ -87,6 +87,34 @@ def test_an_input_follows_the_robot_until_it_is_touched(
     expect(entry).to_have_value("22")
 
 
+def test_what_a_dialog_shows_is_what_is_set(
+    cyclone_bridge: Bridge, robot: CycloneRobot, tmp_path: Path, page: Page
+) -> None:
+    """The input follows the robot behind the dialog; the question stays what it was."""
+    panel = Path(panel_file(tmp_path))
+    asked = 'parameter = "limit"\nconfirm_press = true'
+    panel.write_text(panel.read_text().replace('parameter = "limit"', asked))
+    kiosk = live(cyclone_bridge.endpoint, tmp_path, KIOSK_PANEL=str(panel))
+    try:
+        until(lambda: kiosk.widget("limit")["enabled"], "the parameters are read")
+        until(lambda: robot.subscribers(topic="/parameter_events"), "events are heard")
+        robot.set_parameter(name="limit", value=20)
+        page.goto(kiosk.url)
+        entry = widget(page, "limit").get_by_role("spinbutton")
+        expect(entry).to_have_value("20")
+        set_(page, "Limit")
+        dialog = page.get_by_role("dialog")
+        expect(dialog.locator("dd")).to_have_text("20")
+        robot.set_parameter(name="limit", value=21)
+        expect(widget(page, "limit").locator(".value")).to_have_text("21")
+        expect(dialog.locator("dd")).to_have_text("20")
+        dialog.get_by_role("button", name="Limit").click()
+        expect(widget(page, "limit").locator(".result")).to_contain_text("Set to 20")
+        assert robot.parameters()["limit"] == 20
+    finally:
+        kiosk.end()
+
+
 def test_what_is_out_of_range_is_marked_and_refused(
     kiosk: Server, robot: CycloneRobot, page: Page
 ) -> None:

@@ -340,6 +340,10 @@ def test_the_oldest_receipts_are_forgotten() -> None:
     assert bench.receipt("p0") is None
     assert bench.receipt("p1") is not None
     assert bench.receipt(f"p{RECEIPTS_KEPT}") is not None
+    sent = len(bench.way.sent)
+    again = bench.press(press_id="p0")
+    assert "was made before" in again.reason
+    assert (again.outcome, len(bench.way.sent)) == ("refused", sent)
 
 
 @pytest.mark.parametrize(("permitted", "level"), [(True, logging.INFO), (False, logging.WARNING)])

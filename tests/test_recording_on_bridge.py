@@ -11,6 +11,8 @@ from mcap.records import Channel, Message, Schema
 
 from tests.parts import ROOT, Bridge, RosNode, Server, live, until
 from tests.test_codec_on_ros import RosCodec
+from tests.test_holds_in_browser import PANEL
+from tests.test_holds_on_socket import held, opened
 
 LOG = "rcl_interfaces/msg/Log"
 RECORD = "[record]\nbefore_s = 2\nafter_s = 1\n"
@@ -120,6 +122,32 @@ def presses(found: Mapping[str, list[Record]]) -> list[tuple[str, str | None, st
         assert press["who"] == "a program (127.0.0.1)"
         told.append((press["id"], press["outcome"], press["reason"]))
     return told
+
+
+def test_a_hold_is_recorded_from_its_begin_to_its_end(
+    tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    (tmp_path / "jog.toml").write_text(PANEL + RECORD)
+    data = str(tmp_path / "data")
+    kiosk = servers(
+        Server(ROOT, KIOSK_PANEL=str(tmp_path / "jog.toml"), KIOSK_MODE="demo", KIOSK_DATA=data)
+    )
+    until(kiosk.ready, "ready")
+    with opened(kiosk) as socket:
+        assert socket.begin(inputs={"speed": 99})["state"] == "refused"
+    with held(kiosk) as socket:
+        assert socket.beat()["state"] == "held"
+        socket.say(do="end", why="released", lease=socket.lease)
+        ended = socket.hear()
+    until(lambda: files(tmp_path), "the recording is finished")
+    (path,) = files(tmp_path)
+    assert path.name.endswith("Z-jog.mcap")
+    told = presses(records(path))
+    assert [one[1] for one in told[:2]] == [None, "refused"]
+    assert told[-2:] == [
+        (socket.lease, None, None),
+        (socket.lease, ended["outcome"], ended["reason"]),
+    ]
 
 
 def test_a_killed_server_leaves_a_recording_to_the_next_one(

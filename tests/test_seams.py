@@ -10,8 +10,9 @@ import pytest
 from app import kiosk
 from app.browsers import stranger
 from app.calls import with_fields
+from app.inbox import Changes
 from app.intake import Intake
-from app.link import Changes, config_to
+from app.link import config_to
 from app.log import Unlogged
 from app.logs import RobotLog
 from app.panel.model import Panel
@@ -74,7 +75,8 @@ def test_what_fails_at_a_sample_keeps_no_lock_from_closing(caplog: pytest.LogCap
     intake = intake_of(panel, robot, broken)
     feedback = next(key for key in intake.keys if key.endswith("/feedback"))
     changes = Changes({feedback: sample(b""), robot.key(ENABLED): sample(flag(False))}, {}, True)
-    assert intake.take(changes, lambda: None) == (True, False)
+    news = intake.take(changes, lambda: None)
+    assert (news.urgent, news.came) == (True, False)
     assert robot.reading(ENABLED).message.data is False
     assert "was not taken in whole" in caplog.text
 

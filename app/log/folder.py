@@ -3,6 +3,7 @@
 The lock is flock's: the system lets go of it when the process ends, however it ends.
 """
 
+import asyncio
 import fcntl
 import json
 import os
@@ -16,6 +17,8 @@ from typing import Final
 from app.errors import FolderInUse
 
 LOCK: Final = "server.lock"
+HELD_BY_OTHER_S: Final = 5.0  # a server that is started anew waits so long for the old one's lock
+ASKED_AGAIN_S: Final = 0.1
 
 
 class Folder:
@@ -43,6 +46,18 @@ class Folder:
             if fd >= 0:
                 os.close(fd)
         self._sign(self._fd)
+
+    async def hold_soon(self) -> None:
+        """The same, but waits a while for another server to end."""
+        loop = asyncio.get_running_loop()
+        end = loop.time() + HELD_BY_OTHER_S
+        while True:
+            try:
+                return self.hold()
+            except FolderInUse:
+                if loop.time() > end:
+                    raise
+            await asyncio.sleep(ASKED_AGAIN_S)
 
     def release(self) -> None:
         """Lets others have it; the file stays."""

@@ -1,6 +1,7 @@
 """The thread that owns the file of the operator's log: it writes, keeps it small, opens it again."""
 
 import logging
+import math
 import threading
 import time
 from collections import deque
@@ -20,11 +21,26 @@ log = logging.getLogger("kiosk.log")
 
 TRIED_AGAIN_S: Final = (0.5, 1.0, 2.0, 4.0, 8.0)  # the last one again and again
 HOUR_S: Final = 3600.0
+CLOCK_SET_BY_S: Final = 60.0  # what moves it by more is no drift
 QUIET_S: Final = 1.0  # after so long without a press there is time for the file
 WAL_BYTES: Final = 16_000_000  # then it can wait no longer
 CHECKPOINT_S: Final = 5.0  # between two that can't wait: a reader may hold them up
 TIDY_AFTER: Final = 1000  # entries
 MOST_OWED: Final = 1000
+
+
+class Steady:
+    """Whether the wall's clock can be trusted to tell what is old: nobody set it for an hour."""
+
+    def __init__(self) -> None:
+        self._ahead: float | None = None  # of the clock that nobody sets
+        self._since = 0.0
+
+    def steady(self, wall: float, now: float) -> bool:
+        if self._ahead is None or abs(wall - now - self._ahead) > CLOCK_SET_BY_S:
+            self._since = now
+        self._ahead = wall - now
+        return now - self._since >= HOUR_S
 
 
 class Keeper:
@@ -60,6 +76,7 @@ class Keeper:
         self._checkpoint_at = 0.0
         self._since_tidy = 0
         self._fresh_wal = True
+        self._steady = Steady()
         self._ended = False
         self._wake = threading.Condition()
         self._syncer = Syncer(lambda results: self._tell(results, False), self._sync_failed)
@@ -224,7 +241,8 @@ class Keeper:
         if now < self._hourly_at and self._since_tidy < TIDY_AFTER:
             return
         limits = self._limits
-        more = store.remove_old(limits.days, limits.size_mb, time.time_ns() // 1_000_000)
+        days = limits.days if self._steady.steady(time.time(), now) else math.inf
+        more = store.remove_old(days, limits.size_mb, time.time_ns() // 1_000_000)
         self._since_tidy = TIDY_AFTER if more else 0
         self._fresh_wal = self._fresh_wal and not more
         self.head = store.head

@@ -22,6 +22,7 @@ INSERT: Final = f"INSERT INTO entry ({COLUMNS}) VALUES ({', '.join('?' * len(FIE
 REMOVED_AT_ONCE: Final = 1000
 PROBE_BYTES: Final = 256 * 1024
 DAY_MS: Final = 86_400_000
+UNSET_BEFORE_MS: Final = 1_704_067_200_000  # 2024: a clock that says less was never set
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,12 +105,19 @@ class Store:
         return False
 
     def _last_older(self, limit_ms: float) -> int:
-        """The last one before the first that is young enough, of those looked at; 0 for none."""
-        rows = self._db.execute(
+        """The last one before the first that is young enough, of those looked at; 0 for none.
+
+        One that was written before its machine had the time goes with the next that has it.
+        """
+        last = 0
+        for seq, at in self._db.execute(
             "SELECT seq, at FROM entry ORDER BY seq LIMIT ?", (REMOVED_AT_ONCE,)
-        ).fetchall()
-        young = next((seq for seq, at in rows if at >= limit_ms), None)
-        return (rows[-1][0] if rows else 0) if young is None else (young - 1) * (young > rows[0][0])
+        ):
+            if at >= limit_ms:
+                break
+            if at >= UNSET_BEFORE_MS:
+                last = seq
+        return last
 
     def _last_beyond(self, allowed: float) -> int:
         if self.used_bytes() <= allowed:

@@ -1,31 +1,52 @@
 """What stands in the log's place where the panel file switches it off: it keeps nothing."""
 
+import logging
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
-from app.log.entry import Entry
+from app.log.entry import Entry, Origin
+from app.log.folder import Folder
 from app.log.store import Head
+
+log = logging.getLogger("kiosk.log")
 
 
 class Unlogged:
-    """Takes every entry and writes none."""
+    """Takes every entry and writes none; keeps a second server from the folder all the same."""
 
     folder = None
     enabled = False
     fault = ""
     lock = ""
     head: Head | None = None
+    left_out = 0
+
+    def __init__(self, folder: Path | None = None) -> None:
+        self._folder = Folder(folder) if folder else None
 
     async def start(self) -> None:
-        """Nothing has to be opened."""
+        """FolderInUse when another server has the folder: each would send what comes twice."""
+        try:
+            if self._folder is not None:
+                await self._folder.hold_soon()
+        except OSError as error:
+            log.warning("a second server would not be noticed: %s", error)
 
     async def stop(self) -> None:
-        """Nothing has to be closed."""
+        if self._folder is not None:
+            self._folder.release()
 
     @contextmanager
     def followed(self, changed: Callable[[], None]) -> Iterator[None]:
         """There is never anything to be told."""
         yield
+
+    def room(self, origin: Origin) -> bool:
+        return True
+
+    def leave_out(self, origin: Origin) -> None:
+        """It is not counted."""
 
     async def pressed(self, entry: Entry) -> Entry | None:
         return None

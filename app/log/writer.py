@@ -12,16 +12,17 @@ import logging
 import secrets
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from typing import Final
 
-from app.errors import FolderInUse, LogError
-from app.log.entry import Entry
+from app.errors import LogError
+from app.log.entry import Entry, Origin
 from app.log.folder import Folder
 from app.log.keeper import Keeper
 from app.log.reading import Filter, Row, rows
+from app.log.refusals import SUMMED_UP_S, Refusals
 from app.log.store import Head
 from app.log.ticket import Limits, Results, Ticket
 from app.sentences import say
@@ -32,7 +33,6 @@ READERS: Final = 2
 MOST_WAITING: Final = 1000
 PRESSED_WITHIN_S: Final = 2.0  # an entry that takes longer is a press that is not sent
 CLOSED_WITHIN_S: Final = 3.0  # a receipt does not wait longer: it says that it is not on the disk
-HELD_BY_OTHER_S: Final = 5.0  # a server that is started anew waits so long for the old one's lock
 ENDED_WITHIN_S: Final = 10.0
 
 
@@ -47,28 +47,23 @@ class OperatorLog:
         self._readers = ThreadPoolExecutor(READERS, "operators-log-reader")
         self._stuck: set[Ticket] = set()
         self._loop = asyncio.get_running_loop()
+        self._refusals = Refusals()
+        self._telling: asyncio.TimerHandle | None = None
         self._keeper = Keeper(self._folder, limits, secrets.token_hex(4), mode, self._tell)
 
     async def start(self) -> None:
         """Opens the log; FolderInUse when another server has the folder. What else may be wrong is
         its `fault`, and tried again."""
-        end = self._loop.time() + HELD_BY_OTHER_S
-        while True:
-            try:
-                self._folder.hold()
-            except FolderInUse:
-                if self._loop.time() > end:
-                    raise
-                await asyncio.sleep(0.1)
-                continue
-            except OSError:
-                pass  # the keeper meets it again, and says it
-            break
+        with suppress(OSError):  # the keeper meets it again, and says it
+            await self._folder.hold_soon()
         self._keeper.start()
         await self._own(self._keeper.tried.wait)
 
     async def stop(self) -> None:
         """Writes what is waiting, and lets go of the folder."""
+        if self._telling is not None:
+            self._telling.cancel()
+            self._add_left_out()
         await self._own(self._keeper.stop)
         self._readers.shutdown(wait=False, cancel_futures=True)
         self._folder.release()
@@ -131,6 +126,8 @@ class OperatorLog:
 
     async def closed(self, entry: Entry) -> str:
         """Writes what came of a press; returns when that is on the disk, or why it is not."""
+        if entry.outcome == "refused":
+            self._refusals.take(entry)
         try:
             await self._within(self._add(entry), CLOSED_WITHIN_S)
         except LogError as error:
@@ -140,6 +137,33 @@ class OperatorLog:
     def add(self, entry: Entry) -> None:
         """Writes what came of a press, when nobody waits for it."""
         self._add(entry)
+
+    def room(self, origin: Origin) -> bool:
+        """Whether a refusal may be an entry; where not, it is left out."""
+        return self._refusals.room(origin)
+
+    def leave_out(self, origin: Origin) -> None:
+        """Counts a refusal that is no entry; one entry tells of those of a while."""
+        if self._refusals.leave_out(origin):
+            self._tell_left_out_later()
+
+    @property
+    def left_out(self) -> int:
+        """How many refusals are no entries, since the start."""
+        return self._refusals.left_out
+
+    def _tell_left_out_later(self) -> None:
+        self._telling = self._loop.call_later(SUMMED_UP_S, self._tell_left_out)
+
+    def _tell_left_out(self) -> None:
+        if self._why:
+            self._tell_left_out_later()
+        else:
+            self._add_left_out()
+
+    def _add_left_out(self) -> None:
+        for entry in self._refusals.told():
+            self._keeper.add(Ticket(entry, self._loop.create_future()), None)
 
     async def rows(self, wanted: Filter, before: int | None, count: int) -> list[Row]:
         """The newest entries that are wanted before a number; LogError when they can't be read."""

@@ -197,6 +197,7 @@ class Panel(Description):
     interfaces: Annotated[tuple[Folder, ...], Field(strict=False)] = ()
     namespace: Annotated[str, AfterValidator(namespace_of)] = ""
     press_expires_s: Annotated[float, Field(ge=0.5, le=60)] = 2.0
+    display_hz: Annotated[float, Field(ge=1, le=60)] = 20.0
     mm_per_px: Annotated[float, Field(gt=0.02, lt=1)] = 0.22
     control: ControlRules = ControlRules(required=False)
     record: RecordRules | None = None

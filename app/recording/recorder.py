@@ -51,6 +51,11 @@ class Recorder:
         self._under_way: dict[str, str] = {}  # press → who
         self._last = 0.0  # monotonic seconds, of a press or a receipt
 
+    @property
+    def keys(self) -> frozenset[str]:
+        """The keys of the topics that are recorded."""
+        return frozenset(self._channels)
+
     def hear(self, key: str, sample: Sample) -> None:
         """A sample that the kiosk took."""
         if key in self._channels:

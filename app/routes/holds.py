@@ -19,6 +19,7 @@ import secrets
 import time
 from collections.abc import Mapping
 from contextlib import suppress
+from functools import partial
 from typing import Annotated, Any, Final, Literal
 
 from fastapi import APIRouter, WebSocket, WebSocketDisconnect
@@ -33,6 +34,7 @@ from app.kiosk import Kiosk
 from app.leases import sent_at
 from app.logbook import Noted
 from app.receipts import By, Receipt, with_doubt
+from app.routes.messages import LONGEST, json_of
 from app.routes.site import CurrentKiosk, CurrentSite
 from app.routes.visitors import visitor
 from app.sentences import say
@@ -41,7 +43,6 @@ router = APIRouter()
 
 BEGIN_WITHIN_S: Final = 2.0  # from the opening of the socket
 SILENCE_S: Final = 2.0  # a hold is over long before: nobody is there
-LONGEST_MESSAGE: Final = 64 * 1024
 # 4000 + HTTP's
 CLOSE: Final[Mapping[str, int]] = {"interlock": 4409, "input": 4422, "link": 4503, "log": 4503}
 
@@ -114,6 +115,7 @@ class _Session:
         self._ended: asyncio.Future[Receipt] = asyncio.get_running_loop().create_future()
         self._browser = browser
         self._by = kiosk.doubts.by(widget, browser)
+        self._room = kiosk.logbook.room(self._by.origin)
         self._noted: Noted | None = None
         self._next: asyncio.Future[Message] | None = None  # what the browser says next
 
@@ -140,23 +142,26 @@ class _Session:
 
     async def _begun(self, widget: str) -> Receipt | Holding:
         holds, by = self._kiosk.holds, self._by
+        refuse = partial(holds.refuse, widget, trace=self._room)
         try:
             async with asyncio.timeout(BEGIN_WITHIN_S):
                 said = await self._read()
         except TimeoutError:
-            return holds.refuse(widget, by, say("hold_late"))
+            return refuse(by, say("hold_late"))
         if not isinstance(said, Begin):
-            return holds.refuse(widget, by, say("hold_by_nonsense"))
+            return refuse(by, say("hold_by_nonsense"))
         sent = self._sent(said)
         try:
             by = self._by = self._kiosk.doubts.by(widget, self._browser, said.seen)
+            if not self._room and (left_out := holds.refusal(widget, said.inputs, sent, by)):
+                return left_out
             still_held = await self._written(widget, said, by)
         except InputError as error:
-            return holds.refuse(widget, by, f"{error}.", "input")
+            return refuse(by, f"{error}.", "input")
         except LogError as error:
-            return holds.refuse(widget, by, str(error), "log")
+            return refuse(by, str(error), "log")
         if not still_held:
-            return holds.refuse(widget, by, say("hold_late"))
+            return refuse(by, say("hold_late"))
         return holds.begin(widget, said.inputs, sent, by, self._ended.set_result)
 
     async def _written(self, widget: str, said: Begin, by: By) -> bool:
@@ -174,6 +179,9 @@ class _Session:
         """A hold that did not begin, in the operator's log."""
         if self._noted is not None:
             return await self._closed(receipt)
+        if not self._room:
+            self._kiosk.logbook.leave_out(self._by.origin)
+            return receipt
         why = await self._kiosk.logbook.refused(
             receipt.widget, receipt.inputs, receipt.id, self._by.origin, receipt.reason, "hold"
         )
@@ -241,11 +249,9 @@ class _Session:
 
 def _read(text: str) -> Begin | Beat | End | None:
     """A message of a browser's; None for what is none."""
-    if len(text) > LONGEST_MESSAGE:
+    if len(text) > LONGEST:
         return None
     try:
-        given = json.loads(text)
-        json.dumps(given, ensure_ascii=False, allow_nan=False).encode()
-        return _message.validate_python(given)
-    except (ValueError, ValidationError, RecursionError):
+        return _message.validate_python(json_of(text))
+    except (InputError, ValidationError):
         return None

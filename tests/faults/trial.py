@@ -17,12 +17,14 @@ WELL: Final = 20  # presses that come through before and after
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """`locked_s` from the fault to the first lock shown, `opened_s` from the mending to permitted."""
+    """`locked_s` from the fault to the first lock shown, `opened_s` from the mending to permitted;
+    `claimed` are presses between fault and mending of which it was said that they are published."""
 
     locked_s: float
     reason: str
     opened_s: float
     account: Account
+    claimed: int
 
 
 def nothing() -> None:
@@ -62,7 +64,8 @@ def tried(
         return press.answered_at < broken_at - UNDER_WAY_S or press.at > opened_at
 
     account = accounted(presses, lambda: rig.arrivals(widget), whole, late_s)
-    return Trial(locked_s, reason, opened_at - mended_at, account)
+    claimed = sum(p.outcome == "published" and broken_at < p.at < mended_at for p in presses)
+    return Trial(locked_s, reason, opened_at - mended_at, account, claimed)
 
 
 def well(presser: Presser) -> None:

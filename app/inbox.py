@@ -1,0 +1,193 @@
+"""What comes in by a link, kept as latest values: never a queue that grows.
+
+The link's threads put it in under a lock, and do no more than replace what was there; the event loop
+is woken once, until it drains. Knows nothing of Zenoh.
+"""
+
+import itertools
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+from typing import Any, Final, Protocol
+
+from app.robot import Buffer, Sample
+
+BETWEEN_MOST: Final = 16  # changes of a watched topic that are kept from one drain to the next
+KEPT_MOST: Final = 4_000  # samples that are kept whole from one drain to the next, of all topics
+KEPT_BYTES: Final = 32_000_000  # and their bytes
+
+NO_KEYS: Final[frozenset[str]] = frozenset()
+
+
+class Stamp(Protocol):
+    """When a sample was sent, by the clock of who sent it."""
+
+    def __ge__(self, other: Any, /) -> bool: ...
+    def get_id(self) -> Any: ...
+    def get_time(self) -> Any: ...
+
+
+@dataclass(slots=True)
+class Token:
+    """What became of a liveliness token since the last drain; `lost_seq` is 0 if it was never lost."""
+
+    alive: bool
+    lost_seq: int
+
+
+@dataclass(slots=True)
+class Changes:
+    """All that came since the last drain; `kept` has each sample of the topics that are kept whole."""
+
+    samples: dict[str, Sample]
+    tokens: dict[str, Token]
+    link_up: bool
+    kept: Collection[tuple[str, Sample]] = ()
+
+
+@dataclass(slots=True)
+class _Arrived:
+    """A sample as it came; what it says of its source is read when it is drained."""
+
+    payload: Buffer
+    stamp: Stamp | None
+    seq: int
+    at: float
+    wall: float
+    skipped: int = 0
+    between: tuple[Buffer, ...] = ()
+
+    def sample(self) -> Sample:
+        source = sent = None
+        if self.stamp is not None:
+            source, sent = str(self.stamp.get_id()), self.stamp.get_time().timestamp()
+        return Sample(
+            self.payload, self.seq, self.at, self.wall, source, self.skipped, sent, self.between
+        )
+
+
+class Inbox:
+    """What came by the newest session of a link; of the sessions before it, nothing comes in."""
+
+    def __init__(self, wake: Callable[[bool], None]) -> None:
+        """`wake` is called on the link's threads, under the lock: once after a drain, and once more
+        with True when something came that is not to wait for the next frame."""
+        self._wake_loop = wake
+        self._lock = threading.Lock()
+        self._seq = itertools.count(1)
+        self._session = 0
+        self._prompt = self._watched = self._whole = NO_KEYS
+        self._forget()
+
+    def _forget(self) -> None:
+        self._woken = self._hurried = False
+        self._samples: dict[str, _Arrived] = {}
+        self._stamps: dict[str, Stamp] = {}
+        self._tokens: dict[str, Token] = {}
+        self._transports: set[str] = set()
+        self._kept: deque[tuple[str, _Arrived]] = deque()
+        self._kept_bytes = 0
+
+    def expect(self, prompt: Collection[str], watched: Collection[str], whole: Collection[str]) -> None:
+        """What comes of `prompt` topics wakes the loop at once. Of `watched` ones, which are prompt
+        too, a value that came and went between two drains is kept, and of `whole` ones all."""
+        self._prompt, self._watched = frozenset(prompt) | frozenset(watched), frozenset(watched)
+        self._whole = frozenset(whole)
+
+    def renew(self) -> None:
+        """Forgets all: what comes next is of another session."""
+        with self._lock:
+            self._session += 1
+            self._forget()
+
+    def guarded(self, function: Callable[[Any], None]) -> Callable[[Any], None]:
+        """The same, under the lock; it does nothing any more once there is another session."""
+        session = self._session
+
+        def handle(what: Any) -> None:
+            with self._lock:
+                if session == self._session:
+                    function(what)
+
+        return handle
+
+    def respond(self) -> None:
+        """Returns when the lock does not stand still."""
+        with self._lock:
+            pass
+
+    def drain(self) -> Changes:
+        """Takes all that came since the last call."""
+        with self._lock:
+            self._woken = self._hurried = False
+            samples, self._samples = self._samples, {}
+            tokens, self._tokens = self._tokens, {}
+            kept, self._kept, self._kept_bytes = self._kept, deque(), 0
+            link_up = bool(self._transports)
+        return Changes(
+            {key: arrived.sample() for key, arrived in samples.items()},
+            tokens,
+            link_up,
+            [(key, arrived.sample()) for key, arrived in kept],
+        )
+
+    # Below: on the link's threads, under the lock. No work here, and nothing may raise.
+
+    def put(self, key: str, payload: Buffer, stamp: Stamp | None) -> None:
+        """A sample of a topic, unless it is history that came after what is newer."""
+        if stamp is not None:
+            last = self._stamps.get(key)
+            if last is not None and not stamp >= last and last.get_id() == stamp.get_id():
+                return
+            self._stamps[key] = stamp
+        arrived = _Arrived(payload, stamp, next(self._seq), time.monotonic(), time.time())
+        unseen = self._samples.get(key)
+        if unseen is not None:
+            arrived.skipped = unseen.skipped + 1
+            if key in self._watched:
+                arrived.between = _between(unseen, payload)
+        self._samples[key] = arrived
+        if key in self._whole:
+            self._keep(key, arrived)
+        self._wake(key in self._prompt)
+
+    def _keep(self, key: str, arrived: _Arrived) -> None:
+        self._kept.append((key, arrived))
+        self._kept_bytes += len(arrived.payload)
+        while len(self._kept) > KEPT_MOST or (self._kept_bytes > KEPT_BYTES and len(self._kept) > 1):
+            _, oldest = self._kept.popleft()
+            self._kept_bytes -= len(oldest.payload)
+
+    def token(self, key: str, alive: bool) -> None:
+        """A liveliness token came or ended."""
+        seq = next(self._seq)
+        token = self._tokens.setdefault(key, Token(False, 0))
+        token.alive = alive
+        if not alive:
+            token.lost_seq = seq
+        self._wake(True)
+
+    def transport(self, zid: str, up: bool) -> None:
+        """A connection came or ended."""
+        if up:
+            self._transports.add(zid)
+        else:
+            self._transports.discard(zid)
+        self._wake(True)
+
+    def _wake(self, prompt: bool) -> None:
+        if prompt and not self._hurried:
+            self._hurried = self._woken = True
+            self._wake_loop(True)
+        elif not self._woken:
+            self._woken = True
+            self._wake_loop(False)
+
+
+def _between(unseen: _Arrived, newest: Buffer) -> tuple[Buffer, ...]:
+    """What came before the newest and was not looked at, each change once."""
+    if bytes(unseen.payload) == bytes(newest):
+        return unseen.between
+    return (*unseen.between[1 - BETWEEN_MOST :], unseen.payload)

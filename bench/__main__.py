@@ -1,0 +1,177 @@
+"""`python -m bench [PHASE…]`: measures, and writes what was found as JSON, Markdown and a picture.
+
+Each phase keeps its results as it goes, so that one that breaks loses nothing. With `QUICK=1` little
+is measured: that shows that the harness works, and no more.
+"""
+
+import argparse
+import os
+import signal
+import sys
+import time
+import traceback
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict
+from functools import partial
+from pathlib import Path
+from types import FrameType
+from typing import Any, Final
+
+from bench import latency
+from bench.cost import cost
+from bench.growth import Growth
+from bench.kiosk import Kiosk
+from bench.peer import Peer
+from bench.peers import PEERS
+from bench.peers.check import fault_of
+from bench.report import write
+from bench.rig import QUICK, Rig, Sizes
+from bench.stalled import stalled
+from bench.start import start
+from bench.store import Store
+from tests.parts import ROOT
+
+KIOSK: Final = Kiosk()
+SAME_STREAM: Final = ("plain-ws",)  # as another peer's: it differs in how it presses only
+AGAIN: Final = "-again"  # the floor once more, as its own control
+
+Measure = Callable[[Rig, Peer], Mapping[str, Any]]
+
+
+class Run:
+    """The phases, on the peers that are there."""
+
+    def __init__(self, rig: Rig, store: Store, peers: Sequence[Peer]) -> None:
+        self._rig = rig
+        self._store = store
+        self._peers = peers
+        self._rounds = rig.sizes.rounds
+
+    def down(self) -> None:
+        floor = next(peer for peer in self._peers if peer.id == "floor")
+        asked = [(peer.id, peer) for peer in self._peers] + [(floor.id + AGAIN, floor)]
+        self._interleaved("down", asked, latency.down, self._rounds)
+
+    def bridge(self) -> None:
+        """Down again, from rclpy over the real bridge."""
+        with self._rig.bridge() as locator:
+            self._interleaved(
+                "bridge",
+                [(peer.id, peer) for peer in self._peers if peer.robot == "zenoh"],
+                partial(latency.down, over="ros", router=locator),
+                self._rounds,
+            )
+
+    def up(self) -> None:
+        pressed = [(peer.id, peer) for peer in self._peers if peer.button]
+        self._interleaved("up", pressed, latency.up, self._rounds)
+
+    def cost(self) -> None:
+        self._interleaved("cost", self._shown(), cost, self._rig.sizes.cost_rounds)
+
+    def stalled(self) -> None:
+        self._interleaved("stalled", self._shown(), stalled, 1)
+
+    def start(self) -> None:
+        self._interleaved("start", [(peer.id, peer) for peer in self._peers], start, self._rounds)
+
+    def growth(self) -> None:
+        self._store.begin("growth")
+        for axis, measure in Growth(self._rig).axes().items():
+            with timed(f"growth: {axis}"), self._store.faults(f"growth: {axis}"):
+                self._store.add("growth", 0, axis, {"points": measure()})
+
+    def _shown(self) -> list[tuple[str, Peer]]:
+        """Those whose pages show texts, each stream once."""
+        return [(p.id, p) for p in self._peers if p.button and p.id not in SAME_STREAM]
+
+    def _interleaved(
+        self, phase: str, peers: Sequence[tuple[str, Peer]], measure: Measure, rounds: int
+    ) -> None:
+        """Each peer once in a round, and in each round another one first."""
+        self._store.begin(phase)
+        for turn in range(rounds):
+            first = turn * len(peers) // rounds
+            for name, peer in (*peers[first:], *peers[:first]):
+                what = f"{phase}: {name}"
+                with timed(f"{what}, round {turn + 1}"), self._store.faults(what):
+                    self._store.add(phase, turn, name, measure(self._rig, peer))
+
+
+PHASES: Final = ("down", "bridge", "up", "cost", "stalled", "start", "growth")
+
+
+@contextmanager
+def timed(what: str) -> Iterator[None]:
+    """Tells what is measured now, and how long it took."""
+    print(what, end=" ", flush=True)
+    began = time.monotonic()
+    yield
+    print(f"({time.monotonic() - began:.1f} s)", flush=True)
+
+
+def proven(rig: Rig, store: Store, peers: Iterable[Peer]) -> list[Peer]:
+    """The peers that work; of the others, why they are not measured."""
+    found = []
+    for peer in peers:
+        if not peer.installed():
+            store.fault(peer.id, "not installed: `make bench-setup` does it")
+            continue
+        with store.faults(peer.id), rig.running(peer) as server, rig.chromium.blank() as page:
+            if fault := fault_of(peer, server, (), rig.robot, page):
+                store.fault(peer.id, fault)
+            else:
+                found.append(peer)
+    return found
+
+
+@contextmanager
+def ended_like_ctrl_c() -> Iterator[None]:
+    """SIGTERM ends all that was started, as Ctrl-C does."""
+
+    def on_signal(number: int, frame: FrameType | None) -> None:
+        raise KeyboardInterrupt
+
+    previous = signal.signal(signal.SIGTERM, on_signal)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, previous)
+
+
+def main(arguments: Sequence[str]) -> int:
+    quick = os.environ.get("QUICK", "") not in ("", "0")
+    parser = argparse.ArgumentParser(prog="python -m bench", description=__doc__.split("\n")[0])
+    parser.add_argument("phases", nargs="*", metavar="PHASE", help=", ".join(PHASES))
+    parser.add_argument("--peers", help="ids with commas between; this panel and the floor always are")
+    parser.add_argument("--results", type=Path, default=ROOT / "bench", help="folder to write to")
+    parser.add_argument("--readme", type=Path, help="page whose section is written anew")
+    given = parser.parse_args(arguments)
+    if unknown := set(given.phases) - set(PHASES):
+        parser.error(f"no such phase: {', '.join(sorted(unknown))}; there are {', '.join(PHASES)}")
+    wanted = given.peers.split(",") if given.peers else [peer.id for peer in PEERS]
+    rivals = [peer for peer in PEERS if peer.id in (*wanted, "floor")]
+    given.results.mkdir(parents=True, exist_ok=True)
+    store = Store(given.results / "results.json")
+    sizes = QUICK if quick else Sizes()
+    try:
+        with ended_like_ctrl_c(), Rig(sizes) as rig:
+            store.machine(rig.chromium.version, asdict(sizes) | {"quick": quick})
+            run = Run(rig, store, [KIOSK, *proven(rig, store, rivals)])
+            for phase in given.phases or PHASES:
+                getattr(run, phase)()
+    except KeyboardInterrupt:
+        print("ended before its time; what was measured is kept", file=sys.stderr)
+        return 130
+    except Exception:
+        traceback.print_exc()
+        return 1
+    finally:
+        titles = {peer.id: peer.title for peer in (KIOSK, *PEERS)}
+        write(store.results, titles, given.results, given.readme)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,110 @@
+"""What a server and a browser cost: processor time in % of one core, resident memory in MiB."""
+
+import time
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+from urllib.parse import urlsplit
+
+from bench.figures import percentile
+from bench.parts import Asked, Meter, crowd, family, rss_mib
+from bench.peer import Peer, Running
+from bench.rig import Rig
+
+RATES: Final = (0, 100, 1000)
+TOPIC: Final = "/t0"
+WIDE: Final = tuple(f"/t{number}" for number in range(100))
+WIDE_HZ: Final = 50.0
+CROWD_HZ: Final = 10.0
+SIZE: Final = 32  # bytes of a text
+SETTLE_S: Final = 1.0
+
+
+Figures = dict[str, float]
+
+
+def cost(rig: Rig, peer: Peer) -> Figures:
+    """All of one peer."""
+    return single(rig, peer) | wide(rig, peer) | many(rig, peer)
+
+
+def single(rig: Rig, peer: Peer) -> Figures:
+    """One topic and one page: memory at rest, cost of each rate."""
+    topics = (TOPIC,)
+    with rig.running(peer, topics) as server, rig.page(peer, server, peer.robot, topics):
+        time.sleep(SETTLE_S)
+        found = {"rest_mib": rss_mib(family(server.pids))}
+        for hz in RATES:
+            found |= loaded(rig, peer, server, topics, hz, f"{hz}")
+        return found
+
+
+def wide(rig: Rig, peer: Peer) -> Figures:
+    """A hundred topics on one page."""
+    with rig.running(peer, WIDE) as server, rig.page(peer, server, peer.robot, WIDE):
+        time.sleep(SETTLE_S)
+        return loaded(rig, peer, server, WIDE, WIDE_HZ, "wide")
+
+
+def loaded(
+    rig: Rig, peer: Peer, server: Running, topics: Sequence[str], hz: float, name: str
+) -> Figures:
+    """Server and browser while the robot says so much."""
+    if hz:
+        rig.robot("load", ways=[peer.robot], topics=list(topics), hz=hz, size=SIZE)
+        time.sleep(SETTLE_S / 2)
+    servers, browser = Meter(lambda: family(server.pids)), Meter(rig.chromium.pids)
+    time.sleep(rig.sizes.window_s)
+    found = {f"server_{name}": servers.percent(), f"browser_{name}": browser.percent()}
+    rig.robot("quiet")
+    return found
+
+
+def many(rig: Rig, peer: Peer) -> Figures:
+    """Bare streams beside one page, all on one topic; nothing where only a page can attach."""
+    topics = (TOPIC,)
+    with rig.running(peer, topics) as server, rig.page(peer, server, peer.robot, topics):
+        found: Figures = {}
+        if server.bare is None:
+            return found
+        with crowd() as clients:
+            for count in rig.sizes.crowds:
+                join(clients, server, count)
+                figures = crowded(rig, peer.robot, server, clients, count)
+                found |= {f"{name}_{count}": figure for name, figure in figures.items()}
+        return found
+
+
+def join(clients: Asked, server: Running, count: int) -> None:
+    """Makes it so many clients."""
+    assert server.bare is not None
+    page = urlsplit(server.url).port or 80
+    clients(
+        "join",
+        count=count,
+        port=server.bare.port or page,
+        kind=server.bare.kind,
+        path=server.bare.path,
+        say=list(server.bare.say),
+    )
+
+
+def crowded(rig: Rig, way: str, server: Running, clients: Asked, count: int) -> Figures:
+    """All of a crowd at 10 Hz."""
+    time.sleep(SETTLE_S)
+    clients("forget")
+    rig.robot("load", ways=[way], topics=[TOPIC], hz=CROWD_HZ, size=SIZE)
+    meter = Meter(lambda: family(server.pids))
+    time.sleep(rig.sizes.window_s)
+    used = meter.percent()
+    put_at = rig.robot("quiet")[0]
+    time.sleep(SETTLE_S / 2)
+    told: Mapping[str, Any] = clients("came")
+    ms = [(at - put_at[number]) / 1e6 for number, at in told["came"] if number < len(put_at)]
+    return {
+        "p50": percentile(ms, 50),
+        "p99": percentile(ms, 99),
+        "crowd": used,
+        "mib": rss_mib(family(server.pids)),
+        "came": len(ms) / (count * len(put_at)),
+        "cut": told["lost"],
+    }

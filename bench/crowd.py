@@ -1,0 +1,132 @@
+"""Many bare clients in one process: each holds a stream open and notes when numbered texts come.
+
+Driven by JSON lines: one command in, one answer out. Nothing but sockets, so that hundreds of clients
+take little of the machine that they share with what is measured.
+"""
+
+import base64
+import json
+import os
+import re
+import selectors
+import socket
+import sys
+import threading
+import time
+from typing import Any, Final
+
+NUMBER: Final = re.compile(rb"#(\d{9})#")
+WAKE_S: Final = 0.05
+CONNECT_S: Final = 10.0
+RECEIVE: Final = 1 << 18
+
+
+def request(kind: str, host: str, path: str) -> bytes:
+    lines = [f"GET {path} HTTP/1.1", f"Host: {host}"]
+    if kind == "events":
+        lines += ["Accept: text/event-stream"]
+    else:
+        key = base64.b64encode(os.urandom(16)).decode()
+        lines += ["Connection: Upgrade", "Upgrade: websocket", "Sec-WebSocket-Version: 13"]
+        lines += [f"Sec-WebSocket-Key: {key}", f"Origin: http://{host}"]
+    return "\r\n".join([*lines, "", ""]).encode()
+
+
+def frame(text: str) -> bytes:
+    """A client's text frame; masked with zeros, which RFC 6455 permits."""
+    data = text.encode()
+    length = len(data)
+    head = bytes([0x81, 0x80 | length]) if length < 126 else b"\x81\xfe" + length.to_bytes(2, "big")
+    return head + bytes(4) + data
+
+
+class Crowd:
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._selector = selectors.DefaultSelector()
+        self._sockets: list[socket.socket] = []
+        self._came: list[tuple[int, int]] = []  # (number, monotonic ns)
+        self._bytes = 0
+        self._lost = 0
+        threading.Thread(target=self._run, daemon=True).start()
+
+    def join(self, count: int, port: int, kind: str, path: str, say: list[str]) -> int:
+        """Makes it so many clients."""
+        while len(self._sockets) < count:
+            one = socket.create_connection(("127.0.0.1", port), CONNECT_S)
+            one.sendall(request(kind, f"127.0.0.1:{port}", path))
+            head = one.recv(RECEIVE)
+            ok = b" 101 " if kind == "websocket" else b" 200 "
+            if ok not in head.split(b"\r\n", 1)[0]:
+                raise ConnectionError(head[:200].decode(errors="replace"))
+            for text in say:
+                one.sendall(frame(text))
+            one.setblocking(False)
+            with self._lock:
+                self._sockets.append(one)
+                self._selector.register(one, selectors.EVENT_READ, [-1])
+        return len(self._sockets)
+
+    def _run(self) -> None:
+        while True:
+            ready = self._selector.select(WAKE_S)
+            with self._lock:
+                for key, _ in ready:
+                    if key.fd in self._selector.get_map():
+                        self._read(key)
+
+    def _read(self, key: selectors.SelectorKey) -> None:
+        one: Any = key.fileobj
+        try:
+            data = one.recv(RECEIVE)
+        except OSError:
+            data = b""
+        at = time.monotonic_ns()
+        if not data:
+            self._lost += 1
+            self._selector.unregister(one)
+            return
+        self._bytes += len(data)
+        last = key.data
+        for found in NUMBER.findall(data):
+            number = int(found)
+            if number > last[0]:
+                last[0] = number
+                self._came.append((number, at))
+
+    def forget(self) -> None:
+        """Begins anew with what has come and its numbers."""
+        with self._lock:
+            for key in self._selector.get_map().values():
+                key.data[0] = -1
+            self._came, self._bytes = [], 0
+
+    def came(self) -> dict[str, Any]:
+        """(number, when) of all that came to any client; bytes; clients that were cut off."""
+        return {"came": self._came, "bytes": self._bytes, "lost": self._lost}
+
+    def leave(self) -> None:
+        with self._lock:
+            for one in self._sockets:
+                if one in self._selector.get_map():
+                    self._selector.unregister(one)
+                one.close()
+            self._sockets = []
+        self._lost = 0
+        self.forget()
+
+
+def main() -> None:
+    crowd = Crowd()
+    print(json.dumps({"ok": "ready"}), flush=True)
+    for line in sys.stdin:
+        asked = json.loads(line)
+        try:
+            answer: Any = {"ok": getattr(crowd, asked.pop("do"))(**asked)}
+        except Exception as error:  # whatever went wrong is the answer
+            answer = {"error": f"{type(error).__name__}: {error}"}
+        print(json.dumps(answer), flush=True)
+
+
+if __name__ == "__main__":
+    main()

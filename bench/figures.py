@@ -1,0 +1,107 @@
+"""What is made of measured numbers; no I/O."""
+
+import math
+import statistics
+from collections import deque
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+LINEAR_AT_MOST: Final = 1.25  # times what a unit costs at the beginning
+
+
+def percentile(values: Sequence[float], percent: float) -> float:
+    """Between the two nearest values, as numpy does; NaN of none."""
+    if not values:
+        return math.nan
+    ordered = sorted(values)
+    place = (len(ordered) - 1) * percent / 100
+    low = math.floor(place)
+    high = min(low + 1, len(ordered) - 1)
+    return ordered[low] + (ordered[high] - ordered[low]) * (place - low)
+
+
+def median(values: Sequence[float]) -> float:
+    """NaN of none."""
+    return statistics.median(values) if values else math.nan
+
+
+@dataclass(frozen=True)
+class Matched:
+    """Milliseconds from each event that was seen; how many were not."""
+
+    ms: tuple[float, ...]
+    lost: int
+
+
+def toggles_matched(
+    said: Sequence[tuple[float, bool]], seen: Sequence[tuple[float, bool]], slack_ms: float = 0.5
+) -> Matched:
+    """Each change of the robot's to when it showed; times in ms, in order.
+
+    As many are lost as did not show: those after which the next that shows came only when the same had
+    been said again. `slack_ms` is what clocks may differ.
+    """
+    left = deque(seen)
+    found: list[float] = []
+    for turn, (at, value) in enumerate(said):
+        while left and left[0][0] < at - slack_ms:  # of one that was given up
+            left.popleft()
+        missing = len(said) - turn - len(left)
+        again = said[turn + 2][0] if turn + 2 < len(said) else math.inf
+        if not left or (missing > 0 and left[0][0] >= again - slack_ms) or left[0][1] != value:
+            continue
+        found.append(left.popleft()[0] - at)
+    return Matched(tuple(found), len(said) - len(found))
+
+
+def presses_matched(
+    released: Mapping[str, float], heard: Sequence[tuple[float, str]]
+) -> tuple[Matched, int]:
+    """Each press to when the robot heard it (ms), and how often one came again."""
+    first: dict[str, float] = {}
+    for at, text in heard:
+        first.setdefault(text, at)
+    ms = tuple(first[text] - at for text, at in released.items() if text in first)
+    ours = [text for _, text in heard if text in released]
+    return Matched(ms, len(released) - len(ms)), len(ours) - len(set(ours))
+
+
+def shown_after(
+    shown: Sequence[tuple[float, float]], went_on_ns: float, old_s: float
+) -> tuple[float, int]:
+    """Of what a page showed after it went on, as (when it showed, when it was put) in ns: how long
+    before that moment the first was put (ms), and how many were put longer than `old_s` before it."""
+    ages = [went_on_ns - put for at, put in shown if at >= went_on_ns]
+    return (ages[0] / 1e6 if ages else math.nan), sum(age > old_s * 1e9 for age in ages)
+
+
+@dataclass(frozen=True)
+class Slope:
+    """How a cost grows: what one more unit costs over all, in the first and in the second half."""
+
+    per_unit: float
+    first: float
+    second: float
+    linear: bool
+
+
+def slope(points: Sequence[tuple[float, float]], noise: float) -> Slope:
+    """`noise`: what two looks at the same cost may differ by; less than that is no growth.
+
+    Linear or better: the second half of the range costs per unit at most a quarter more than the first,
+    or no more than noise explains.
+    """
+    xs, ys = zip(*sorted(points), strict=True)
+    whole = statistics.linear_regression(xs, ys).slope
+    (x0, y0), (x1, y1) = (xs[0], ys[0]), (xs[-1], ys[-1])
+    middle = min(range(1, len(xs) - 1), key=lambda i: abs(xs[i] - (x0 + x1) / 2))
+    first = (ys[middle] - y0) / (xs[middle] - x0)
+    second = (y1 - ys[middle]) / (x1 - xs[middle])
+    allowed = max(first, 0.0) * LINEAR_AT_MOST + noise / (x1 - xs[middle])
+    return Slope(whole, first, second, second <= allowed)
+
+
+def ratio(ours: float, theirs: float) -> float:
+    """NaN where there is nothing to compare with."""
+    return ours / theirs if theirs and not math.isnan(theirs) else math.nan

@@ -1,0 +1,143 @@
+"""This project as a peer: on its shipped configuration, with the operator's log and an interlock."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, Literal
+
+from bench.parts import COMMAND, ENABLED, ended
+from bench.peer import Bare, Place, Running, until_answers
+from tests.parts import ROOT, free_port, zenoh_file
+
+HEAD: Final = f"""
+title = "Benchmark"
+mode = "live"
+
+[[interlock]]
+id = "operation"
+topic = "{ENABLED}"
+type = "std_msgs/msg/Bool"
+field = "data"
+"""
+PAGE: Final = """
+[[page]]
+id = "operation"
+title = "Operation"
+
+[[page.widget]]
+id = "text"
+kind = "text"
+label = "Message"
+max_length = 80
+"""
+BUTTON: Final = """
+[[page.widget]]
+id = "operation{n}"
+kind = "publish"
+label = "Publish{n}"
+topic = "{topic}"
+type = "std_msgs/msg/String"
+message = {{ data = "{{text}}" }}
+interlock = "operation"
+"""
+READOUT: Final = """
+[[page.widget]]
+id = "{id}"
+kind = "readout"
+label = "{id}"
+topic = "{topic}"
+type = "std_msgs/msg/String"
+"""
+ROBOT: Final = """
+[[robot]]
+id = "{id}"
+name = "{id}"
+namespace = "/{id}"
+connect = ["{locator}"]
+"""
+
+
+@dataclass(frozen=True)
+class Robot:
+    """One of several: its namespace without the slash, and where it listens."""
+
+    id: str
+    locator: str
+
+
+def panel(
+    topics: Sequence[str], buttons: int = 1, widgets: int = 0, robots: Sequence[Robot] = ()
+) -> str:
+    """A panel file with a readout for each topic; with `widgets`, so many of the first topic."""
+
+    def parts() -> Iterator[str]:
+        yield HEAD
+        for robot in robots:
+            yield ROBOT.format(id=robot.id, locator=robot.locator)
+        yield PAGE
+        for n in range(1, buttons + 1):
+            yield BUTTON.format(n=n, topic=COMMAND)
+        for topic in topics:
+            yield READOUT.format(id=topic[1:], topic=topic)
+        for n in range(1, widgets):
+            yield READOUT.format(id=f"more{n}", topic=topics[0])
+
+    return "".join(parts())
+
+
+@dataclass(frozen=True)
+class Kiosk:
+    """`widgets` and `robots`: as a panel has them."""
+
+    id: str = "kiosk"
+    title: str = "this panel"
+    robot: Literal["zenoh", "ros"] = "zenoh"
+    shown: str = '[data-widget="operation1"] button'
+    button: str = '[data-widget^="operation"] button'
+    widgets: int = 0
+    robots: tuple[Robot, ...] = ()
+
+    def installed(self) -> bool:
+        return True
+
+    def start(self, place: Place) -> Running:
+        file = place.folder / "panel.toml"
+        file.write_text(panel(place.topics, place.buttons, self.widgets, self.robots))
+        port = free_port()
+        env = {
+            "KIOSK_PANEL": str(file),
+            "KIOSK_ZENOH": str(zenoh_file(place.folder, place.router)),
+            "KIOSK_DATA": str(place.folder / "data"),
+            "PYTHONPATH": "",
+        }
+        log = place.folder / "kiosk.log"
+        process = _started(
+            [sys.executable, "-m", "uvicorn", "app.main:app", "--port", str(port)], env, log
+        )
+        url = f"http://127.0.0.1:{port}"
+        try:
+            until_answers(f"{url}/healthz", lambda: process.poll() is None)
+        except BaseException as error:
+            ended(process)
+            error.add_note(log.read_text()[-2000:])
+            raise
+        base = f"/robots/{self.robots[0].id}" if self.robots else ""
+        bare = Bare("events", f"{base}/events")
+        return Running(f"{url}{base}/", (process.pid,), lambda: ended(process), bare)
+
+
+def _started(command: Sequence[str], env: dict[str, str], log: Path) -> "subprocess.Popen[bytes]":
+    """In a session of its own: Ctrl-C is the harness's."""
+    with log.open("wb") as out:
+        return subprocess.Popen(
+            command,
+            cwd=ROOT,
+            env={**os.environ, **env},
+            stdin=subprocess.DEVNULL,
+            stdout=out,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+        )

@@ -1,0 +1,73 @@
+"""Down: the robot's put → the DOM has changed. Up: the pointer is released → the robot hears it."""
+
+import random
+import time
+from collections.abc import Sequence
+from typing import Final
+
+from bench.browser import Watched
+from bench.figures import Matched, percentile, presses_matched, toggles_matched
+from bench.peer import Peer
+from bench.rig import Rig
+
+GAP_S: Final = (0.015, 0.025)  # random: no peer's own clock may fall in step with it
+BETWEEN_PRESSES_S: Final = (0.04, 0.06)
+SETTLE_S: Final = 0.4
+BUTTONS: Final = 20  # each takes another press after 0.7 s on this panel's page
+
+
+def down(rig: Rig, peer: Peer, over: str = "", router: str = "") -> dict[str, float]:
+    """One round of one peer; `over` is how the robot speaks where that is not the peer's own way,
+    `router` is where the peer listens then."""
+    way = over or peer.robot
+    with rig.running(peer, router=router) as server, rig.page(peer, server, way) as page:
+        time.sleep(SETTLE_S)
+        rig.warm(way)
+        clock = page.clock()
+        page.watch()
+        said = rig.robot("toggle", way=way, count=rig.sizes.toggles, least_s=GAP_S[0], most_s=GAP_S[1])
+        time.sleep(SETTLE_S)
+        seen = [(clock.ns(at) / 1e6, value) for at, value in page.take("toggles")]
+        matched = toggles_matched([(at / 1e6, value) for at, value in said], seen)
+        return told(matched, clock.doubt_ms)
+
+
+def up(rig: Rig, peer: Peer) -> dict[str, float]:
+    """One round of one peer."""
+    way = peer.robot
+    with rig.running(peer, buttons=BUTTONS) as server, rig.page(peer, server, way) as page:
+        time.sleep(SETTLE_S)
+        clock = page.clock()
+        page.watch()
+        _press(rig, peer, page, ["warm"] * BUTTONS)
+        time.sleep(SETTLE_S)
+        page.take("ups")
+        rig.robot("heard", way=way)
+        texts = [f"press {number}" for number in range(rig.sizes.presses)]
+        pressed = _press(rig, peer, page, texts)
+        time.sleep(SETTLE_S)
+        released = [clock.ns(at) / 1e6 for at in page.take("ups")]
+        heard = [(at / 1e6, text) for at, text in rig.robot("heard", way=way)]
+        matched, twice = presses_matched(dict(zip(pressed, released, strict=True)), heard)
+        return told(matched, clock.doubt_ms) | {"twice": twice, "locked": len(texts) - len(pressed)}
+
+
+def _press(rig: Rig, peer: Peer, page: Watched, texts: Sequence[str]) -> list[str]:
+    """Which were pressed: all but those that found the button locked."""
+    pressed = []
+    for turn, text in enumerate(texts):
+        if page.press(peer.button, turn, text):
+            pressed.append(text)
+        time.sleep(random.uniform(*BETWEEN_PRESSES_S))
+    return pressed
+
+
+def told(matched: Matched, doubt_ms: float) -> dict[str, float]:
+    """The figures of a round; `doubt_ms` is how well the page's clock is known by round trips."""
+    return {
+        "p50": percentile(matched.ms, 50),
+        "p99": percentile(matched.ms, 99),
+        "events": len(matched.ms),
+        "lost": matched.lost,
+        "doubt_ms": doubt_ms,
+    }

@@ -1,0 +1,159 @@
+"""The processes of a run: the robot, the crowd of bare clients, and what processes cost."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Final
+
+from tests.parts import CYCLONE_ON_LOOPBACK, ROOT
+
+CACHE: Final = Path(os.environ.get("BENCH_CACHE") or Path.home() / ".cache/operator-panel/bench")
+ROBOT_PYTHON: Final = Path(os.environ.get("BENCH_ROBOT_PYTHON") or CACHE / "robot/bin/python")
+ENABLED: Final = "/operation_enabled"
+COMMAND: Final = "/operation1"
+TICKS_PER_S: Final = os.sysconf("SC_CLK_TCK")
+ENDS_WITHIN_S: Final = 10.0
+
+
+def of_domain(domain: int) -> dict[str, str]:
+    """The environment of a ROS 2 process: on loopback alone."""
+    return {
+        "ROS_DOMAIN_ID": str(domain),
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+        "RMW_IMPLEMENTATION": "rmw_fastrtps_cpp",
+        "CYCLONEDDS_URI": CYCLONE_ON_LOOPBACK,
+        "RCUTILS_LOGGING_USE_STDOUT": "0",
+    }
+
+
+class Asked:
+    """A process that is asked by JSON lines, in a session of its own: Ctrl-C is the harness's.
+
+    It ends when its stdin does, so it never outlives the harness.
+    """
+
+    def __init__(self, command: Sequence[str], env: dict[str, str] | None = None) -> None:
+        self._process = subprocess.Popen(
+            command,
+            cwd=ROOT,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            env={**{k: v for k, v in os.environ.items() if k != "PYTHONPATH"}, **(env or {})},
+            start_new_session=True,
+        )
+        self._lock = threading.Lock()
+        self.first = self._answer()
+
+    @property
+    def pid(self) -> int:
+        return self._process.pid
+
+    def __call__(self, do: str, **named: Any) -> Any:
+        with self._lock:
+            assert self._process.stdin is not None
+            self._process.stdin.write(json.dumps({"do": do, **named}) + "\n")
+            self._process.stdin.flush()
+            return self._answer()
+
+    def _answer(self) -> Any:
+        assert self._process.stdout is not None
+        line = self._process.stdout.readline()
+        assert line, f"{self._process.args!r} has ended"
+        answer = json.loads(line)
+        assert "error" not in answer, answer["error"]
+        return answer["ok"]
+
+    def end(self) -> None:
+        for pipe in (self._process.stdin, self._process.stdout):
+            if pipe is not None:
+                pipe.close()
+        ended(self._process)
+
+
+def ended(process: "subprocess.Popen[Any]", number: signal.Signals = signal.SIGTERM) -> None:
+    """Ends a process and waits; it is killed if it does not end in time."""
+    if process.poll() is None:
+        process.send_signal(signal.SIGCONT)
+        process.send_signal(number)
+    try:
+        process.wait(ENDS_WITHIN_S)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
+
+
+def robot(domain: int) -> Asked:
+    """See `bench/robot.py`; `first` is its Zenoh locator."""
+    return Asked([str(ROBOT_PYTHON), str(ROOT / "bench/robot.py")], of_domain(domain))
+
+
+@contextmanager
+def crowd() -> Iterator[Asked]:
+    """See `bench/crowd.py`."""
+    mine = Asked([sys.executable, str(ROOT / "bench/crowd.py")])
+    try:
+        yield mine
+    finally:
+        mine.end()
+
+
+def family(pids: Iterable[int]) -> set[int]:
+    """These processes and all that they started."""
+    children: dict[int, list[int]] = {}
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit() and (stat := _stat(int(entry.name))):
+            children.setdefault(int(stat[1]), []).append(int(entry.name))
+    found: set[int] = set()
+    new = set(pids)
+    while new:
+        found |= new
+        new = {child for pid in new for child in children.get(pid, [])} - found
+    return found
+
+
+def cpu_s(pids: Iterable[int]) -> float:
+    """Seconds of processor time that these processes have taken; one that is gone took none."""
+    return sum((int(s[11]) + int(s[12])) / TICKS_PER_S for pid in pids if (s := _stat(pid)))
+
+
+def rss_mib(pids: Iterable[int]) -> float:
+    """Resident memory, shared pages counted in each."""
+    return sum(_status_kib(pid, "VmRSS") for pid in pids) / 1024
+
+
+def _stat(pid: int) -> list[str]:
+    """The fields after the process's name: [1] is the parent, [11] and [12] are processor time."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    except OSError:
+        return []
+
+
+def _status_kib(pid: int, name: str) -> int:
+    try:
+        lines = Path(f"/proc/{pid}/status").read_text().splitlines()
+    except OSError:
+        return 0
+    return next((int(line.split()[1]) for line in lines if line.startswith(name)), 0)
+
+
+class Meter:
+    """Processor time between two looks, in % of one core."""
+
+    def __init__(self, pids: Callable[[], Iterable[int]]) -> None:
+        self._pids = pids
+        self.restart()
+
+    def restart(self) -> None:
+        self._at, self._used = time.monotonic(), cpu_s(self._pids())
+
+    def percent(self) -> float:
+        return 100 * (cpu_s(self._pids()) - self._used) / (time.monotonic() - self._at)

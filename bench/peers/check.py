@@ -1,0 +1,91 @@
+"""Proves a peer before it is measured: its page follows the robot, and the robot hears its button."""
+
+import math
+import time
+from collections.abc import Callable
+from typing import Any, Final
+
+from playwright.sync_api import Page
+
+from bench.peer import Peer, Running
+from tests.parts import until
+
+FOUND_WITHIN_S: Final = 20.0  # nodes find each other, scripts load
+THEN_WITHIN_S: Final = 3.0
+AGAIN_S: Final = 0.5
+
+Robot = Callable[..., Any]  # asked as in `bench/robot.py`: robot("enable", way=…, value=…)
+
+
+def fault_of(peer: Peer, running: Running, topics: tuple[str, ...], robot: Robot, page: Page) -> str:
+    """What does not work of a peer that runs, "" where all does. `page` is a fresh one."""
+    try:
+        page.goto(running.url)
+        _follows(peer, robot, page)
+        if topics:
+            _shows(peer, topics, robot, page)
+        if peer.button:
+            _presses(peer, robot, page)
+    except Exception as fault:  # whatever it is, it is this peer's alone
+        return f"{peer.title}: {fault}"
+    return ""
+
+
+def _follows(peer: Peer, robot: Robot, page: Page) -> None:
+    """The first value may come too early for the peer; of those after it, each is said once."""
+
+    def shows(value: bool) -> bool:
+        return page.locator(peer.shown).first.is_enabled() == value
+
+    def says(value: bool) -> Callable[[], None]:
+        return lambda: robot("enable", way=peer.robot, value=value)
+
+    _done(says(False), lambda: shows(False), "its page is loaded", again_s=AGAIN_S)
+    _done(says(True), lambda: shows(True), "its button is opened", again_s=AGAIN_S)
+    _done(says(False), lambda: shows(False), "its button is locked")
+    _done(says(True), lambda: shows(True), "its button is opened again")
+
+
+def _shows(peer: Peer, topics: tuple[str, ...], robot: Robot, page: Page) -> None:
+    shown = page.locator(",".join(f'[data-topic="{topic}"]' for topic in topics))
+    robot("load", ways=[peer.robot], topics=list(topics), hz=10, size=12)
+    try:
+        until(
+            lambda: sum(text.startswith("#") for text in shown.all_inner_texts()) == len(topics),
+            "all topics are shown",
+            FOUND_WITHIN_S,
+        )
+    finally:
+        robot("quiet")
+
+
+def _presses(peer: Peer, robot: Robot, page: Page) -> None:
+    """The first press may come too early for the robot; the second is heard once."""
+    button = page.locator(peer.button).first
+    heard: list[str] = []
+
+    def has_heard(text: str) -> bool:
+        heard.extend(said for _, said in robot("heard", way=peer.robot))
+        return text in heard
+
+    page.locator("#text").fill("first")
+    _done(button.click, lambda: has_heard("first"), "the robot hears a press", again_s=AGAIN_S)
+    page.locator("#text").fill("second")
+    _done(button.click, lambda: has_heard("second"), "the robot hears the second press")
+    assert heard.count("second") == 1, f"the robot heard one press {heard.count('second')} times"
+
+
+def _done(
+    do: Callable[[], object], seen: Callable[[], bool], what: str, again_s: float = math.inf
+) -> None:
+    """Does it, again from time to time if it may need that, until it is seen."""
+    due = 0.0
+
+    def look() -> bool:
+        nonlocal due
+        if time.monotonic() >= due:
+            due = time.monotonic() + again_s
+            do()
+        return seen()
+
+    until(look, what, THEN_WITHIN_S if math.isinf(again_s) else FOUND_WITHIN_S)

@@ -1,0 +1,36 @@
+"""The plain way: forty lines of Starlette between Zenoh and an event stream."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from bench.peer import Bare, Place, Running
+from bench.peers.parts import serving, uvicorn, with_topics
+from tests.parts import free_port
+
+HERE = Path(__file__).parent
+
+
+@dataclass(frozen=True)
+class Plain:
+    id: str
+    title: str
+    query: str
+    robot: Literal["zenoh", "ros"] = "zenoh"
+    shown: str = "#publish"
+    button: str = "#publish"
+
+    def installed(self) -> bool:
+        return True
+
+    def start(self, place: Place) -> Running:
+        page = place.folder / "page.html"
+        page.write_text(with_topics(HERE / "page.html", place.topics))
+        env = {
+            "BENCH_ROUTER": place.router,
+            "BENCH_TOPICS": " ".join(place.topics),
+            "BENCH_PAGE": str(page),
+        }
+        port = free_port()
+        url = f"http://127.0.0.1:{port}/{self.query}"
+        return serving(uvicorn(HERE, port), env, place, url, Bare("events", "/events"))

@@ -1,0 +1,46 @@
+"""zenoh-ts: Zenoh in the browser, by way of a router with the remote-api plugin."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, Literal
+
+from bench.peer import Place, Running
+from bench.peers.parts import CACHE, ending, started, with_page
+from tests.parts import free_port
+
+HERE: Final = Path(__file__).parent
+ROUTER: Final = CACHE / "router/release/bench-router"
+SCRIPTS: Final = CACHE / "pages/zenoh_ts"
+
+
+@dataclass(frozen=True)
+class ZenohTs:
+    id: str = "zenoh-ts"
+    title: str = "zenoh-ts + remote-api (Rust router)"
+    robot: Literal["zenoh", "ros"] = "zenoh"
+    shown: str = "#publish"
+    button: str = "#publish"
+
+    def installed(self) -> bool:
+        return ROUTER.exists() and SCRIPTS.exists()
+
+    def start(self, place: Place) -> Running:
+        port = free_port()
+        config = place.folder / "router.json5"
+        config.write_text(json.dumps(configuration(place.router, port)))
+        process = started([ROUTER, config], {}, place.folder)
+        page = HERE / "page.html"
+        return with_page(process, port, page, SCRIPTS, place.topics, ending(process.end))
+
+
+def configuration(robot: str, port: int) -> dict[str, object]:
+    """A router between a robot and browsers, and nobody else."""
+    return {
+        "mode": "router",
+        "connect": {"endpoints": [robot]},
+        "listen": {"endpoints": []},
+        "scouting": {"multicast": {"enabled": False}},
+        "plugins_loading": {"enabled": True},
+        "plugins": {"remote_api": {"websocket_port": f"127.0.0.1:{port}"}},
+    }

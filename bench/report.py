@@ -1,0 +1,212 @@
+"""What was measured as Markdown: tables for the README, and all of it beside the results."""
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Final
+
+from bench.figures import ratio
+from bench.picture import picture
+from bench.store import Results, figure
+from bench.targets import FLOOR, FLOOR_AGAIN, Grown, grown, targets
+
+BEGIN: Final = "<!-- bench -->"
+END: Final = "<!-- /bench -->"
+NONE: Final = "–"
+PICTURE: Final = "![Latency of this panel, the floor and its rivals](bench/results.svg)"
+
+Titles = Mapping[str, str]
+Cell = Callable[[str], str]
+
+
+def write(results: Results, titles: Titles, folder: Path, readme: Path | None) -> None:
+    """results.md and results.svg in a folder; the README's section, if it is named."""
+    (folder / "results.svg").write_text(picture(results, titles))
+    (folder / "results.md").write_text(whole(results, titles))
+    if readme is not None:
+        page = readme.read_text()
+        before, begin, rest = page.partition(BEGIN)
+        _, end, after = rest.partition(END)
+        if not begin or not end:
+            raise ValueError(f"{readme} has no section between {BEGIN} and {END}")
+        readme.write_text(f"{before}{BEGIN}\n{section(results, titles)}\n{END}{after}")
+
+
+def section(results: Results, titles: Titles) -> str:
+    """What the README shows."""
+    parts = [PICTURE, main_table(results, titles), targets_table(results), faults(results, titles)]
+    return "\n\n".join(filter(None, [machine(results), *parts]))
+
+
+def whole(results: Results, titles: Titles) -> str:
+    parts = {
+        "Latency and cost": main_table(results, titles),
+        "To reach": targets_table(results),
+        "Many clients": crowd_table(results, titles),
+        "A browser that stands still": stalled_table(results, titles),
+        "Start": start_table(results, titles),
+        "Growth of this panel": growth_table(results),
+        "Not measured": faults(results, titles),
+    }
+    told = [f"## {title}\n\n{part}" for title, part in parts.items() if part]
+    return "\n\n".join(["# Results", machine(results), noise(results), *told]) + "\n"
+
+
+def machine(results: Results) -> str:
+    on, sizes = results.get("machine"), results.get("sizes", {})
+    if not on:
+        return ""
+    quick = "**A quick run: it shows that the harness works, and no more.** " if sizes["quick"] else ""
+    return (
+        f"{quick}{on['cores']} cores ({on['processor']}), {on['system']}, Python {on['python']}, "
+        f"Chromium {on['chromium']}; {sizes['rounds']} interleaved rounds, medians over them. "
+        f"p50 / p99 in ms, processor in % of one core; {NONE}: not there, or not measured."
+    )
+
+
+def noise(results: Results) -> str:
+    """The floor against itself."""
+
+    def down(peer: str, name: str) -> float:
+        return figure(results, "down", peer, name)
+
+    both = [ratio(down(FLOOR_AGAIN, name), down(FLOOR, name)) for name in ("p50", "p99")]
+    if math.isnan(sum(both)):
+        return ""
+    before = results["machine"]["load_before"]
+    return (
+        f"The floor measured twice in each round differs from itself by {both[0]:.2f} × (p50) and "
+        f"{both[1]:.2f} × (p99); the machine's load was {before} when the run began. The pages' clocks "
+        f"are known to {_doubt(results):.2f} ms by round trips."
+    )
+
+
+def _doubt(results: Results) -> float:
+    rounds = results.get("down", {}).get("rounds", [])
+    return max((of["doubt_ms"] for peers in rounds for of in peers.values()), default=math.nan)
+
+
+def main_table(results: Results, titles: Titles) -> str:
+    def of(phase: str, name: str, shape: str = ".2f", per: float = 1.0) -> Cell:
+        return lambda peer: number(figure(results, phase, peer, name) / per, shape)
+
+    def several(*cells: Cell) -> Cell:
+        return lambda peer: slashed(cell(peer) for cell in cells)
+
+    columns: Mapping[str, Cell] = {
+        "put → DOM": several(of("down", "p50"), of("down", "p99")),
+        "ROS put → bridge → DOM": several(of("bridge", "p50"), of("bridge", "p99")),
+        "released → robot": several(of("up", "p50"), of("up", "p99")),
+        "start s": of("start", "answers_s"),
+        "page kB": of("start", "bytes", ".0f", 1000),
+        "page shown ms": of("start", "shown_ms", ".0f"),
+        "memory MiB": of("cost", "rest_mib", ".0f"),
+        "server idle / 100 Hz / 1 kHz": several(
+            *(of("cost", f"server_{hz}", ".1f") for hz in (0, 100, 1000))
+        ),
+        "server 100 × 50 Hz": of("cost", "server_wide", ".0f"),
+        "browser 1 kHz": of("cost", "browser_1000", ".0f"),
+    }
+    return peers_table(columns, titles)
+
+
+def crowd_table(results: Results, titles: Titles) -> str:
+    counts = results.get("sizes", {}).get("crowds", [])
+
+    def at(count: int) -> Cell:
+        def cell(peer: str) -> str:
+            names = {"p50": ".1f", "p99": ".1f", "crowd": ".0f", "mib": ".0f", "came": ".0%"}
+            return slashed(
+                number(figure(results, "cost", peer, f"{name}_{count}"), shape)
+                for name, shape in names.items()
+            )
+
+        return cell
+
+    table = peers_table({f"{count}": at(count) for count in counts}, titles)
+    return table and f"Clients at 10 Hz: p50 / p99 ms / server CPU % / server MiB / came\n\n{table}"
+
+
+def stalled_table(results: Results, titles: Titles) -> str:
+    def of(name: str, shape: str) -> Cell:
+        return lambda peer: number(figure(results, "stalled", peer, name), shape)
+
+    columns = {
+        "server grows, MiB": of("grown_mib", ".1f"),
+        "others before, p50": of("before_p50", ".1f"),
+        "p99": of("before_p99", ".1f"),
+        "meanwhile, p50": of("during_p50", ".1f"),
+        "p99 then": of("during_p99", ".1f"),
+        "first it shows after: put before, ms": of("first_ms", ".0f"),
+        "old ones it shows": of("old", ".0f"),
+    }
+    return peers_table(columns, titles)
+
+
+def start_table(results: Results, titles: Titles) -> str:
+    def of(name: str, shape: str) -> Cell:
+        return lambda peer: number(figure(results, "start", peer, name), shape)
+
+    columns = {
+        "process → HTTP 200, s": of("answers_s", ".2f"),
+        "→ commands reach the robot, s": of("ready_s", ".2f"),
+        "page's answer, ms": of("html_ms", ".1f"),
+        "request → state shown, ms": of("shown_ms", ".0f"),
+        "bytes": of("bytes", ",.0f"),
+    }
+    return peers_table(columns, titles)
+
+
+def growth_table(results: Results) -> str:
+    rows = [
+        [
+            one.axis.text,
+            ", ".join(f"{x:g}" for x in one.xs),
+            ", ".join(f"{y:.1f}" for y in one.cpu),
+            f"{one.cpu_slope.per_unit * one.axis.per:.3g} per {one.axis.unit}",
+            ", ".join(f"{y:.0f}" for y in one.mib),
+            f"{one.mib_slope.per_unit * one.axis.per * 1024:.3g} KiB per {one.axis.unit}",
+            _linear(one),
+        ]
+        for one in grown(results)
+    ]
+    head = ["what grows", "at", "server CPU %", "slope", "MiB", "slope", "linear or better"]
+    return table([head, *rows]) if rows else ""
+
+
+def _linear(one: Grown) -> str:
+    worse = [what for what, of in (("CPU", one.cpu_slope), ("memory", one.mib_slope)) if not of.linear]
+    return f"no: {', '.join(worse)}" if worse else "yes"
+
+
+def targets_table(results: Results) -> str:
+    words = {True: "yes", False: "**no**", None: NONE}
+    rows = [[one.text, one.measured, words[one.reached]] for one in targets(results)]
+    return table([["target", "measured", "reached"], *rows])
+
+
+def faults(results: Results, titles: Titles) -> str:
+    lines = [f"- {titles.get(where, where)}: {what}" for where, what in results["faults"].items()]
+    return "\n".join(lines)
+
+
+def peers_table(columns: Mapping[str, Cell], titles: Titles) -> str:
+    """Those of which there is anything."""
+    rows = [[title, *(cell(peer) for cell in columns.values())] for peer, title in titles.items()]
+    known = [row for row in rows if any(cell.strip(f"{NONE} /") for cell in row[1:])]
+    return table([["", *columns], *known]) if known else ""
+
+
+def table(lines: Sequence[Sequence[str]]) -> str:
+    head, *rows = lines
+    return "\n".join(f"| {' | '.join(line)} |" for line in (head, ["---"] * len(head), *rows))
+
+
+def slashed(cells: Iterable[str]) -> str:
+    """Several figures in a cell; one dash where there is none."""
+    shown = list(cells)
+    return " / ".join(shown) if set(shown) != {NONE} else NONE
+
+
+def number(value: float, shape: str) -> str:
+    return NONE if math.isnan(value) else format(value, shape)

@@ -1,0 +1,125 @@
+"""What all phases of a run share: the robot, the real bridge, Chromium, and where results go."""
+
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Final
+
+from playwright.sync_api import sync_playwright
+
+from bench.browser import Chromium, Watched
+from bench.parts import Asked, robot
+from bench.peer import Peer, Place, Running
+from tests.parts import Bridge
+
+DOMAIN: Final = 97
+SAID_EVERY_S: Final = 0.05
+WARM_TOGGLES: Final = 20
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """How much is measured."""
+
+    rounds: int = 3
+    toggles: int = 170  # of each peer in each round
+    presses: int = 60
+    cost_rounds: int = 1
+    window_s: float = 4.0  # of each look at a cost
+    crowds: tuple[int, ...] = (1, 50, 200, 500)
+    stalled_s: float = 30.0
+    growth_s: float = 1.0
+
+
+QUICK: Final = Sizes(
+    rounds=1,
+    toggles=40,
+    presses=20,
+    window_s=0.7,
+    crowds=(1, 500),
+    stalled_s=4.0,
+    growth_s=0.3,
+)
+
+
+class Rig:
+    """Opened and closed as a context; whatever happens, it ends what it started."""
+
+    def __init__(self, sizes: Sizes) -> None:
+        self.sizes = sizes
+        self.started_s = 0.0
+        self._stack = ExitStack()
+
+    def __enter__(self) -> "Rig":
+        with ExitStack() as stack:
+            self.robot: Asked = robot(DOMAIN)
+            stack.callback(self.robot.end)
+            self._playwright = stack.enter_context(sync_playwright())
+            self.chromium = stack.enter_context(self.another_chromium())
+            self._stack = stack.pop_all()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._stack.__exit__(kind, error, trace)
+
+    @contextmanager
+    def another_chromium(self) -> Iterator[Chromium]:
+        chromium = Chromium(self._playwright)
+        try:
+            yield chromium
+        finally:
+            chromium.close()
+
+    @contextmanager
+    def bridge(self) -> Iterator[str]:
+        """The real bridge, as long as it is needed; its locator."""
+        bridge = Bridge(DOMAIN)
+        bridge.start()
+        try:
+            yield bridge.endpoint
+        finally:
+            bridge.end()
+
+    @contextmanager
+    def running(
+        self, peer: Peer, topics: Sequence[str] = (), router: str = "", buttons: int = 1
+    ) -> Iterator[Running]:
+        """A peer's server, alone: no other gets what the robot says meanwhile."""
+        with tempfile.TemporaryDirectory(prefix=f"bench-{peer.id}-") as folder:
+            place = Place(router or self.robot.first, DOMAIN, Path(folder), tuple(topics), buttons)
+            self.robot("offer", way=peer.robot, topics=list(topics))
+            began = time.monotonic()
+            server = peer.start(place)
+            self.started_s = time.monotonic() - began  # until it answered HTTP
+            try:
+                yield server
+            finally:
+                self.robot("quiet")
+                server.end()
+
+    @contextmanager
+    def page(
+        self, peer: Peer, server: Running, way: str, topics: Sequence[str] = ()
+    ) -> Iterator[Watched]:
+        """Its page, permitted by the robot."""
+        with self.chromium.page(server.url, peer.shown, topics) as page:
+            self.permit(way, page)
+            yield page
+
+    def permit(self, way: str, page: Watched) -> None:
+        self.robot("repeat", way=way, values=[True], period_s=SAID_EVERY_S)
+        shown = page.permitted()
+        self.robot("quiet")
+        assert shown, "its page did not show what the robot permits"
+
+    def warm(self, way: str) -> None:
+        self.robot("toggle", way=way, count=WARM_TOGGLES, least_s=0.01, most_s=0.02)

@@ -1,0 +1,207 @@
+"""The bridges' silence: by a clock that the test sets, on a link that answers when it is told to."""
+
+import asyncio
+from collections.abc import Callable, Coroutine
+from typing import Any
+
+import pytest
+
+from app import keys, pulse
+from app.errors import LinkError
+from app.pulse import EVERY_S, GOOD, LONGEST_S, LOOKED_AT, Pulse, Silence
+from app.robot import Robot
+from tests.builders import BRIDGE, FROM, presses_of, robot_there, small_panel
+
+LAN_S = 0.001
+
+
+def network(silence: Silence, took_s: float, begin: float, count: int) -> float:
+    """Questions of which each is answered after so long; returns when the last one was."""
+    events = [(begin + n * EVERY_S, None) for n in range(count)]
+    heard = [(asked + took_s, asked) for asked, _ in events]
+    for now, asked in sorted([*events, *heard], key=lambda one: one[0]):
+        if asked is None:
+            silence.ask(now)
+        else:
+            silence.hear(asked, now)
+        silence.judge(now)
+    return max(now for now, _ in heard)
+
+
+def test_a_bridge_that_answers_is_not_silent() -> None:
+    silence = Silence()
+    network(silence, LAN_S, 0.0, 100)
+    assert not silence.silent
+
+
+def test_no_answer_is_silence_after_its_limit() -> None:
+    silence = Silence()
+    end = network(silence, LAN_S, 0.0, 10)
+    silence.ask(end)
+    silence.judge(end + silence.limit - 0.01)
+    assert not silence.silent
+    silence.judge(end + silence.limit + LAN_S)
+    assert silence.silent
+
+
+def test_nothing_was_asked_is_no_silence() -> None:
+    """A server that stood still has not asked meanwhile."""
+    silence = Silence()
+    end = network(silence, LAN_S, 0.0, 10)
+    silence.judge(end + 60)
+    assert not silence.silent
+
+
+def test_it_is_over_with_answers_to_what_was_asked_since_and_in_time() -> None:
+    silence = Silence()
+    end = network(silence, LAN_S, 0.0, 10)
+    for n in range(20):
+        silence.ask(end + n * EVERY_S)
+        silence.judge(end + n * EVERY_S)
+    thaw = end + 20 * EVERY_S
+    for n in range(18):  # all that waited comes at once
+        silence.hear(end + n * EVERY_S, thaw)
+    assert silence.silent
+    for n in range(GOOD):
+        assert silence.silent
+        silence.ask(thaw + 1 + n)
+        silence.hear(thaw + 1 + n, thaw + 1 + n + LAN_S)
+    assert not silence.silent
+
+
+def test_a_slow_network_is_silence_until_it_is_known_to_be_slow() -> None:
+    silence = Silence()
+    end = network(silence, LAN_S, 0.0, 50)
+    end = network(silence, 0.7, end, LOOKED_AT // 2)
+    assert silence.silent
+    end = network(silence, 0.7, end, LOOKED_AT + 10)
+    assert not silence.silent
+    network(silence, LAN_S, end, LOOKED_AT)
+    assert silence.limit < pulse.SILENT_S + 0.01
+
+
+class Line:
+    """A link on which each question waits until the test answers it."""
+
+    def __init__(self) -> None:
+        self.asked: list[tuple[str, asyncio.Future[bool]]] = []
+        self.answers = True
+        self.fails = False
+
+    async def ask(self, selector: str, within_s: float = 2.0) -> list[tuple[str, bytes]]:
+        if self.fails:
+            raise LinkError("no session")
+        assert within_s == LONGEST_S
+        answered = asyncio.get_running_loop().create_future()
+        self.asked.append((selector, answered))
+        if self.answers:
+            answered.set_result(True)
+        return [(selector, b"1")] if await answered else []
+
+    def put(self, key: str, payload: bytes) -> None: ...
+
+    def heard(self, key: str) -> bool:
+        return True
+
+
+def run(test: Callable[[Line, Robot, Pulse, list[bool]], Coroutine[Any, Any, None]]) -> None:
+    async def benched() -> None:
+        line, robot = Line(), robot_there(small_panel())
+        told: list[bool] = []
+        mine = Pulse(robot, line, lambda: told.append(robot.answers))
+        mine.start()
+        try:
+            await test(line, robot, mine, told)
+        finally:
+            await mine.stop()
+        assert len(asyncio.all_tasks()) == 1
+
+    asyncio.run(benched())
+
+
+@pytest.fixture(autouse=True)
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pulse, "EVERY_S", 0.02)
+    monkeypatch.setattr(pulse, "SILENT_S", 0.1)
+
+
+async def until(what: Callable[[], object]) -> None:
+    async with asyncio.timeout(5):
+        while not what():
+            await asyncio.sleep(0.005)
+
+
+def test_each_bridge_is_asked_again_and_again() -> None:
+    async def test(line: Line, robot: Robot, mine: Pulse, told: list[bool]) -> None:
+        await until(lambda: len(line.asked) > 5)
+        assert {selector for selector, _ in line.asked} == {keys.version(BRIDGE)}
+        assert (robot.answers, told) == (True, [])
+
+    run(test)
+
+
+def test_silence_is_told_and_its_end() -> None:
+    async def test(line: Line, robot: Robot, mine: Pulse, told: list[bool]) -> None:
+        line.answers = False
+        await until(lambda: not robot.answers)
+        line.answers = True
+        await until(lambda: robot.answers)
+        assert told == [False, True]
+
+    run(test)
+
+
+def test_another_bridge_is_not_the_silent_one() -> None:
+    async def test(line: Line, robot: Robot, mine: Pulse, told: list[bool]) -> None:
+        line.answers = False
+        await until(lambda: not robot.answers)
+        robot.lose()
+        await until(lambda: robot.answers)
+
+    run(test)
+
+
+def test_without_a_session_nothing_is_asked_and_nothing_arrives() -> None:
+    async def test(line: Line, robot: Robot, mine: Pulse, told: list[bool]) -> None:
+        line.fails = True
+        assert not await mine.reached()
+
+    run(test)
+
+
+def test_a_loop_that_stood_still_is_no_silence(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The answer came in time, and was only looked at late."""
+    clock = 0.0
+
+    async def benched() -> None:
+        nonlocal clock
+        line, robot = Line(), robot_there(small_panel())
+        mine = Pulse(robot, line, lambda: None, lambda: clock)
+        line.answers = False
+        mine.start()
+        loop = asyncio.get_running_loop()
+        await until(lambda: line.asked)
+        clock = 3.0
+        loop.call_later(0.1 + 0.01, lambda: line.asked[0][1].set_result(True))  # after the time is up
+        await asyncio.sleep(0.115)
+        assert robot.answers
+        await mine.stop()
+
+    asyncio.run(benched())
+
+
+def test_a_press_is_published_when_the_bridge_has_answered_after_it() -> None:
+    async def test(line: Line, robot: Robot, mine: Pulse, told: list[bool]) -> None:
+        presses = presses_of(small_panel(), robot, line, reached=mine.reached)
+
+        async def press(press_id: str) -> str:
+            receipt = await presses.press("free", {"message": "hi"}, press_id, FROM)
+            return f"{receipt.outcome}: {receipt.reason}"
+
+        assert (await press("p1")).startswith("published: Sent on /free")
+        line.answers = False
+        told_so = await press("p2")
+        assert told_so.startswith("unknown: Sent on /free")
+        assert "has not answered since" in told_so
+
+    run(test)
