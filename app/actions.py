@@ -18,7 +18,7 @@ from app.goals import ACCEPTED, CANCELING, ENDS, UNKNOWN, Goal
 from app.interfaces import Interfaces
 from app.interlocks import SERVER_SETTLE_S
 from app.panel.model import Action
-from app.progress import Answer, Corrected, Progress
+from app.progress import IDLE, Answer, Corrected, Progress
 from app.robot import Robot, Sample, value_of
 from app.sentences import clock, say
 
@@ -88,15 +88,26 @@ class Actions:
         count = sum(goal.widget.action == action for goal in self._following.values())
         return say("too_many", service=action) if count >= MOST_UNANSWERED else ""
 
-    def stoppable(self, widget: Action) -> Goal | None:
-        """The goal of a widget that can be canceled, if there is one."""
-        goal = self._latest.get(widget.id)
-        return goal if goal is not None and self._robot.progress[widget.id].stoppable else None
+    def _stoppable(self, widget: Action, press_id: str) -> Goal | None:
+        latest, shown = self._latest.get(widget.id), self._robot.progress.get(widget.id, IDLE)
+        if not press_id:
+            return latest if shown.stoppable else None
+        if latest is not None and latest.press_id == press_id and shown.busy:
+            return latest
+        followed = (goal for goal in self._following.values() if goal.widget.id == widget.id)
+        return next((goal for goal in followed if goal.press_id == press_id), None)
 
-    async def cancel(self, widget: Action) -> Answer:
-        """Asks the robot to cancel the goal that is under way."""
-        if (goal := self.stoppable(widget)) is None:
-            return Answer("refused", say("nothing_to_cancel"))
+    def over(self, widget: Action, press_id: str) -> str:
+        """Why there is nothing to cancel; "" where there is."""
+        if self._stoppable(widget, press_id) is not None:
+            return ""
+        return say("goal_over" if press_id else "nothing_to_cancel")
+
+    async def cancel(self, widget: Action, press_id: str = "") -> Answer:
+        """Asks the robot to cancel the goal of one press or, without its id, the one that is shown to
+        be under way. LinkError where that could not be sent."""
+        if (goal := self._stoppable(widget, press_id)) is None:
+            return Answer("refused", self.over(widget, press_id))
         request, response = self._interfaces.service(CANCEL)
         stamp = {"sec": 0, "nanosec": 0}
         info = {"goal_id": {"uuid": list(goal.id.bytes)}, "stamp": stamp}

@@ -90,6 +90,7 @@ ENGLISH: Final[Mapping[str, str]] = {
     "robots": "Robots",
     "cancel_sent": "The robot was asked to cancel at {time}.",
     "cancel_refused": "The robot did not cancel it at {time}.",
+    "goal_over": "That goal is over: nothing was canceled.",
     "nothing_to_cancel": "there is nothing under way to cancel",
     "changed_meanwhile": "it changed while you pressed.",
     "expired": "it took {seconds} s to get here: press again.",

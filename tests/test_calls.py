@@ -74,8 +74,9 @@ class Bench:
         request = INTERFACES.encode(f"{TRIGGER}_Request", {})
         return asyncio.create_task(self.calls.call(self.reset, request, press_id, self.correct))
 
-    def send_goal(self) -> "asyncio.Task[Answer]":
-        return asyncio.create_task(self.actions.start(self.count, {"order": 3}, "g1", self.correct))
+    def send_goal(self, press_id: str = "g1") -> "asyncio.Task[Answer]":
+        goal = self.actions.start(self.count, {"order": 3}, press_id, self.correct)
+        return asyncio.create_task(goal)
 
     @property
     def shown(self) -> Progress:
@@ -210,10 +211,10 @@ def test_a_goal_cut_off_is_unknown_until_the_robot_tells_its_result() -> None:
     run(test)
 
 
-def goal_id(bench: Bench) -> bytes:
-    """The id of the goal that was sent, as the robot got it."""
+def goal_id(bench: Bench, number: int = 0) -> bytes:
+    """The id of the goal that was asked for, as the robot got it."""
     request = INTERFACES.action(COUNT).send_goal_request
-    return bytes(INTERFACES.decode(request, bench.line.asked[0][1]).goal_id.uuid)
+    return bytes(INTERFACES.decode(request, bench.line.asked[number][1]).goal_id.uuid)
 
 
 def tell_states(bench: Bench, *states: tuple[bytes, int]) -> None:
@@ -224,12 +225,54 @@ def tell_states(bench: Bench, *states: tuple[bytes, int]) -> None:
     bench.actions.hear_status("/count", sample_of(payload))
 
 
-async def accepted(bench: Bench) -> None:
-    start = bench.send_goal()
-    await asked(bench, 1)
+async def accepted(bench: Bench, press_id: str = "g1") -> None:
+    count = len(bench.line.asked)
+    start = bench.send_goal(press_id)
+    await asked(bench, count + 1)
     bench.answer_goal(accepted=True)
     assert (await start).outcome == "accepted"
-    await asked(bench, 2)
+    await asked(bench, count + 2)
+
+
+async def canceled(bench: Bench, press_id: str, return_code: int = 0) -> bytes:
+    """Cancels the goal of a press; the id of the goal that the robot was asked to cancel."""
+    request, response = INTERFACES.service("action_msgs/srv/CancelGoal")
+    count = len(bench.line.asked)
+    cancel = asyncio.create_task(bench.actions.cancel(bench.count, press_id))
+    await asked(bench, count + 1)
+    bench.line.answer(response, return_code=return_code, goals_canceling=[])
+    assert (await cancel).outcome == ("rejected" if return_code else "accepted")
+    return bytes(INTERFACES.decode(request, bench.line.asked[-1][1]).goal_info.goal_id.uuid)
+
+
+def test_a_late_cancel_does_not_hit_the_next_goal() -> None:
+    async def test(bench: Bench) -> None:
+        await accepted(bench)
+        assert bench.shown.press == "g1"
+        result = INTERFACES.action(COUNT).get_result_response
+        bench.line.answer(result, status=4, result={"sequence": []})
+        await settled(bench)
+        assert bench.shown.press == ""
+        await accepted(bench, "g2")
+        late = await bench.actions.cancel(bench.count, "g1")
+        assert (late.outcome, late.text) == ("refused", "That goal is over: nothing was canceled.")
+        assert bench.shown.goal == "ACCEPTED"
+        assert await canceled(bench, "g2") == goal_id(bench, 2)
+        assert (bench.shown.goal, bench.shown.press) == ("CANCELING", "g2")
+        await bench.actions.stop()
+
+    run(test)
+
+
+def test_a_goal_of_which_nothing_is_heard_can_still_be_canceled_by_its_press() -> None:
+    async def test(bench: Bench) -> None:
+        assert (await bench.send_goal()).outcome == "timed_out"
+        await accepted(bench, "g2")
+        assert await canceled(bench, "g1", return_code=2) == goal_id(bench)
+        assert await canceled(bench, "") == goal_id(bench, 2)
+        await bench.actions.stop()
+
+    run(test)
 
 
 def test_a_goals_state_has_its_ros_name_and_only_goes_on() -> None:
