@@ -112,13 +112,25 @@ def test_what_the_log_locks_is_no_fault_of_a_link() -> None:
 
 @pytest.mark.parametrize("silent_for", [4.9, 5.0])
 def test_a_node_that_stops_talking_is_silent_though_its_token_is_there(silent_for: float) -> None:
-    panel = panel_of(AGED)
+    panel = cell(interlock={"max_age_s": 5.0})
     robot = robot_there(panel)
-    endpoint(robot, "MP", "/heard", TEXT)
-    says(robot, "/heard", "hello", at=NOW)
+    endpoint(robot, "MP", ENABLED, BOOL)
+    permits(robot)
     node = links_of(panel, robot, NOW + silent_for)["node"]
     assert (node["state"], node["text"]) == (("bad", "silent") if silent_for >= 5 else ("ok", "ok"))
-    assert node["reason"].startswith("Nothing new on /heard for 5 s") is (silent_for >= 5)
+    assert node["reason"].startswith("Nothing new on /operation_enabled for 5 s") is (silent_for >= 5)
+
+
+def test_an_old_value_that_is_only_shown_is_no_silence() -> None:
+    panel = panel_of(AGED, GUARDED, MESSAGE, interlock={"max_age_s": 5.0})
+    robot = robot_there(panel)
+    endpoint(robot, "MP", "/heard", TEXT)
+    endpoint(robot, "MP", ENABLED, BOOL)
+    says(robot, "/heard", "hello", at=NOW)
+    permits(robot, at=NOW + 60)
+    seen = sight(panel, robot, NOW + 60)
+    assert seen.view["widgets"]["heard"]["state"] == "old"
+    assert (seen.view["link"]["node"]["state"], seen.view["link"]["node"]["reason"]) == ("ok", "")
 
 
 def test_a_forbidding_interlock_gets_old_too_and_time_shows_it() -> None:
@@ -131,17 +143,17 @@ def test_a_forbidding_interlock_gets_old_too_and_time_shows_it() -> None:
 
 
 def test_the_node_is_not_blamed_for_what_its_bridge_or_a_type_keeps_back() -> None:
-    panel = panel_of(AGED)
+    panel = panel_of(HEARD, interlock={"max_age_s": 5.0})
     robot = robot_there(panel)
-    says(robot, "/heard", "hello", at=NOW)
-    endpoint(robot, "MP", "/heard", BOOL)
+    permits(robot)
+    endpoint(robot, "MP", ENABLED, TEXT)
     assert links_of(panel, robot, NOW + 60)["node"]["text"] == "ok"
 
 
 def test_an_old_value_without_a_publisher_is_no_silence() -> None:
-    panel = panel_of(AGED)
+    panel = panel_of(HEARD, interlock={"max_age_s": 5.0})
     robot = robot_there(panel)
-    says(robot, "/heard", "hello", at=NOW)
+    permits(robot)
     assert links_of(panel, robot, NOW + 60)["node"]["text"] == "no node seen"
 
 
