@@ -32,14 +32,22 @@ NODE: Final = GONE | {
     "getting_ready",
     "parameter_waiting",
     "parameter_silent",
-    "parameter_undeclared",
-    "parameter_mistyped",
     "parameter_unreadable",
-    "parameter_read_only",
-    "parameter_apart",
 }
-# By the operator's own side or the robot's word: no link is to blame.
-NO_LINK: Final = frozenset({"permitted", "forbidden", "busy", "log", "control"})
+# By the operator's own side, the robot's word or what the panel file asks for: no link is to blame.
+NO_LINK: Final = frozenset(
+    {
+        "permitted",
+        "forbidden",
+        "busy",
+        "log",
+        "control",
+        "parameter_undeclared",
+        "parameter_mistyped",
+        "parameter_read_only",
+        "parameter_apart",
+    }
+)
 
 BRIDGE_LAMPS: Final[Mapping[str, tuple[State, str]]] = {
     "no_link": ("bad", "lost"),

@@ -6,10 +6,13 @@ from typing import Any
 
 import pytest
 
+from app.declared import Declared
 from app.interlocks import PERMITTED, Verdict
-from app.keys import Qos, bridge_token
+from app.keys import Qos, bridge_token, server_token
 from app.lamps import BRIDGE, LONGEST_LIST, NO_LINK, NODE, LinkLamp, labels, lamps, locks
 from app.panel.model import Panel
+from app.panel.parameter import DESCRIBE, GET, SET
+from app.panel.ranges import Range
 from app.robot import Robot
 from app.settings import PACKAGE
 from app.views import sight
@@ -35,6 +38,17 @@ from tests.builders import (
 
 GUARDED = {**FREE, "id": "guarded", "label": "Guarded", "topic": "/guarded", "interlock": "operation"}
 AGED = {**HEARD, "max_age_s": 5.0}
+
+
+SPEED = {
+    "id": "speed",
+    "kind": "parameter",
+    "label": "Speed",
+    "node": "/arm",
+    "parameter": "speed",
+    "type": "double",
+    "max": 2.0,
+}
 
 
 def cell(interlock: Table = NOTHING) -> Panel:
@@ -102,6 +116,27 @@ def test_what_the_robot_forbids_is_no_fault_of_a_link() -> None:
     link = links_of(panel, robot)
     assert {lamp["locks"] for lamp in link.values()} == {"Locks nothing."}
     assert {lamp["reason"] for lamp in link.values()} == {""}
+
+
+@pytest.mark.parametrize(
+    ("known", "reason"),
+    [
+        (Declared("live", 1.0, read_only=True), "Read only"),
+        (Declared("undeclared"), "has no parameter speed"),
+        (Declared("mistyped", found="string"), "is string"),
+        (Declared("live", 1.0, range=Range(5.0, 6.0)), "no value is both"),
+    ],
+)
+def test_a_parameter_that_can_not_be_set_is_no_fault_of_a_link(known: Declared, reason: str) -> None:
+    panel = panel_of(SPEED)
+    robot = robot_there(panel)
+    for name, type_name in (GET, DESCRIBE, SET):
+        robot.graph.apply(server_token(BRIDGE_ZID, "SS", f"arm/{name}", type_name), True)
+    robot.parameters["speed"] = known
+    seen = sight(panel, robot, NOW).view
+    assert reason in seen["widgets"]["speed"]["reason"]
+    assert {lamp["locks"] for lamp in seen["link"].values()} == {"Locks nothing."}
+    assert {lamp["reason"] for lamp in seen["link"].values()} == {""}
 
 
 def test_what_the_log_locks_is_no_fault_of_a_link() -> None:
