@@ -13,13 +13,13 @@ from collections.abc import Callable, Iterator
 from typing import Any, Final
 
 from app.calls import CUT_NEWS_S, LATE_S, MOST_UNANSWERED, Asker, with_fields
-from app.errors import DecodeError
+from app.errors import DecodeError, LinkError
 from app.goals import ACCEPTED, CANCELING, ENDS, UNKNOWN, Goal
 from app.interfaces import Interfaces
 from app.interlocks import SERVER_SETTLE_S
 from app.logs import RobotLog
 from app.panel.model import Action
-from app.progress import Answer, Corrected, Progress
+from app.progress import IDLE, Answer, Corrected, Progress
 from app.robot import Robot, Sample, value_of
 from app.sentences import clock, say
 from app.tasks import told
@@ -64,23 +64,26 @@ class Actions:
     async def start(
         self, widget: Action, fields: dict[str, Any], press_id: str, corrected: Corrected
     ) -> Answer:
-        """Sends a goal; `corrected` gets what came of it in the end. FieldError for bad fields."""
+        """Sends a goal; `corrected` gets what came of it in the end. FieldError for bad fields,
+        LinkError where it could not be sent: then nothing is under way."""
         types = self._interfaces.action(widget.type)
         goal_id = uuid.uuid4()
         wrapped = {"goal_id": {"uuid": list(goal_id.bytes)}, "goal": fields}
         payload = self._interfaces.encode(types.send_goal_request, wrapped)
         if why := self.full(widget.action):
             return Answer("refused", why)
+        query = self._query(widget, "send_goal", payload, widget.timeout_s)
         cut = asyncio.get_running_loop().create_future()
         goal = Goal(widget, press_id, goal_id, cut, corrected)
         self._latest[widget.id] = goal
         self._show(goal, Progress(busy=True, text=say("waiting_for_answer")))
-        reply = await self._asked(goal, "send_goal", payload, widget.timeout_s)
+        reply = await self._reply(goal, query)
         answer = self._first_answer(goal, types.send_goal_response, reply)
-        if answer.outcome in ("accepted", "timed_out"):
+        if answer.outcome != "rejected":
             goal.advance(ACCEPTED if answer.outcome == "accepted" else UNKNOWN)
             self._task(goal)
-        self._show(goal, goal.under_way if goal.lives else goal.came_to(answer))
+        runs = goal.lives and not cut.done()
+        self._show(goal, goal.under_way if runs else goal.came_to(answer))
         return answer
 
     def full(self, action: str) -> str:
@@ -88,20 +91,32 @@ class Actions:
         count = sum(goal.widget.action == action for goal in self._following.values())
         return say("too_many", service=action) if count >= MOST_UNANSWERED else ""
 
-    def stoppable(self, widget: Action) -> Goal | None:
-        """The goal of a widget that can be canceled, if there is one."""
-        goal = self._latest.get(widget.id)
-        return goal if goal is not None and self._robot.progress[widget.id].stoppable else None
+    def _stoppable(self, widget: Action, press_id: str) -> Goal | None:
+        latest, shown = self._latest.get(widget.id), self._robot.progress.get(widget.id, IDLE)
+        if not press_id:
+            return latest if shown.stoppable else None
+        if latest is not None and latest.press_id == press_id and shown.busy:
+            return latest
+        followed = (goal for goal in self._following.values() if goal.widget.id == widget.id)
+        return next((goal for goal in followed if goal.press_id == press_id), None)
 
-    async def cancel(self, widget: Action) -> Answer:
-        """Asks the robot to cancel the goal that is under way."""
-        if (goal := self.stoppable(widget)) is None:
-            return Answer("refused", say("nothing_to_cancel"))
+    def over(self, widget: Action, press_id: str) -> str:
+        """Why there is nothing to cancel; "" where there is."""
+        if self._stoppable(widget, press_id) is not None:
+            return ""
+        return say("goal_over" if press_id else "nothing_to_cancel")
+
+    async def cancel(self, widget: Action, press_id: str = "") -> Answer:
+        """Asks the robot to cancel the goal of one press or, without its id, the one that is shown to
+        be under way. LinkError where that could not be sent."""
+        if (goal := self._stoppable(widget, press_id)) is None:
+            return Answer("refused", self.over(widget, press_id))
         request, response = self._interfaces.service(CANCEL)
         stamp = {"sec": 0, "nanosec": 0}
         info = {"goal_id": {"uuid": list(goal.id.bytes)}, "stamp": stamp}
         payload = self._interfaces.encode(request, {"goal_info": info})
-        reply = await self._asked(goal, "cancel_goal", payload, widget.timeout_s)
+        query = self._query(widget, "cancel_goal", payload, widget.timeout_s)
+        reply = await self._reply(goal, query)
         if reply is None:
             return Answer("unknown", say("timed_out", seconds=f"{widget.timeout_s:g}"))
         code = self._decoded(response, reply, "return_code")
@@ -174,16 +189,18 @@ class Actions:
 
     async def _follow_to_the_end(self, goal: Goal) -> None:
         """Waits for the result, over cuts of the connection too: the robot goes on meanwhile."""
-        while (answer := await self._ended(goal)) is None:
+        while True:
             if goal.cut.done():
-                goal.state = UNKNOWN
-                self._tell(goal, Answer("unknown", goal.cut.result() or say("goal_cut")))
+                if goal.lives:
+                    goal.state = UNKNOWN
+                    self._tell(goal, Answer("unknown", goal.cut.result() or say("goal_cut")))
                 await self._until_offered(goal)
                 goal.cut = asyncio.get_running_loop().create_future()
-            elif not goal.known:
+            if answer := await self._ended(goal):
+                break
+            if not (goal.known or goal.cut.done()):
                 return  # it was never heard of: what was said of it stands
-            else:
-                await asyncio.sleep(ASK_AGAIN_S)
+            await asyncio.wait({goal.cut}, timeout=ASK_AGAIN_S)
         self._log.info("press %s: goal %s: %s: %s", goal.press_id, goal.id, answer.outcome, answer.text)
         self._tell(goal, answer)
 
@@ -206,9 +223,8 @@ class Actions:
         types = self._interfaces.action(goal.widget.type)
         request = {"goal_id": {"uuid": list(goal.id.bytes)}}
         payload = self._interfaces.encode(types.get_result_request, request)
-        reply = await self._asked(goal, "get_result", payload, RESULT_S if goal.known else LATE_S)
+        reply = await self._result(goal, payload)
         if reply is None:
-            await asyncio.wait({goal.cut}, timeout=CUT_NEWS_S)  # the news of a cut may follow
             return None
         try:
             message = self._interfaces.decode(types.get_result_response, reply)
@@ -222,13 +238,35 @@ class Actions:
         said = with_fields(goal.widget.result, message.result)
         return Answer(outcome, say(sentence, time=clock(time.time())) + (f": {said}" if said else "."))
 
-    async def _asked(self, goal: Goal, what: str, payload: bytes, timeout_s: float) -> bytes | None:
+    async def _result(self, goal: Goal, payload: bytes) -> bytes | None:
+        """The reply of `get_result`, which is asked for again where Zenoh refuses."""
+        told = False
+        while not goal.cut.done():
+            wait_s = RESULT_S if goal.known else LATE_S
+            try:
+                return await self._reply(goal, self._query(goal.widget, "get_result", payload, wait_s))
+            except LinkError as error:
+                if not told:
+                    log.warning("press %s: %s", goal.press_id, error)
+                told = True
+                await asyncio.wait({goal.cut}, timeout=ASK_AGAIN_S)
+        return None
+
+    def _query(
+        self, widget: Action, what: str, payload: bytes, timeout_s: float
+    ) -> "asyncio.Future[bytes | None]":
+        """Asks a service of the action; LinkError where that could not be sent."""
+        key = f"{self._robot.key(widget.action)}/_action/{what}"
+        return self._link.query(key, payload, timeout_s)
+
+    async def _reply(self, goal: Goal, query: "asyncio.Future[bytes | None]") -> bytes | None:
         """The reply; None when there is none in time, or the bridge went away."""
-        key = f"{self._robot.key(goal.widget.action)}/_action/{what}"
-        query = self._link.query(key, payload, timeout_s)
         ends: set[asyncio.Future[Any]] = {query, goal.cut}
         await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
-        return query.result() if query.done() else None
+        reply = query.result() if query.done() else None
+        if reply is None:
+            await asyncio.wait({goal.cut}, timeout=CUT_NEWS_S)  # the news of a cut may follow
+        return reply
 
     def _decoded(self, type_name: str, reply: bytes, name: str) -> Any:
         try:
@@ -256,4 +294,10 @@ class Actions:
     def _task(self, goal: Goal) -> None:
         task = told(self._follow_to_the_end(goal), self._log, "following a goal failed")
         self._following[task] = goal
-        task.add_done_callback(self._following.pop)
+        task.add_done_callback(self._followed)
+
+    def _followed(self, task: "asyncio.Task[None]") -> None:
+        goal = self._following.pop(task)
+        if not task.cancelled() and task.exception():
+            goal.state = UNKNOWN
+            self._tell(goal, Answer("unknown", say("goal_fault")))

@@ -59,7 +59,7 @@ class Goal:
     def under_way(self) -> Progress:
         sentence = say("goal_canceling" if self.state == CANCELING else "goal_executing")
         text = f"{sentence} {self.said}".strip()
-        return Progress(True, "accepted", text, self.fraction, stoppable=True, goal=self._name)
+        return Progress(True, "accepted", text, self.fraction, True, self._name, self.press_id)
 
     def came_to(self, answer: Answer) -> Progress:
         """What is shown when nothing is awaited any more."""

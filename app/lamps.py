@@ -32,11 +32,7 @@ NODE: Final = GONE | {
     "getting_ready",
     "parameter_waiting",
     "parameter_silent",
-    "parameter_undeclared",
-    "parameter_mistyped",
     "parameter_unreadable",
-    "parameter_read_only",
-    "parameter_apart",
 }
 BRIDGE_LAMPS: Final[Mapping[str, tuple[State, str]]] = {
     "no_link": ("bad", "lost"),
@@ -114,10 +110,11 @@ def _node(
 
 
 def silent(panel: Panel, robot: Robot, now: float) -> tuple[str, float]:
-    """Why a node is taken for silent: its publisher is there by its token, but what it says is older
-    than the panel allows. "" where none is; and when that may change."""
+    """Why a node is taken for silent: its publisher is there by its token, but what it permits is
+    older than the panel allows. "" where none is; and when that may change. What is only shown may
+    be told of events, and looks old by itself."""
     until = math.inf
-    for of in panel.listening():
+    for of in panel.interlocks:
         key, reading = robot.key(of.topic), robot.reading(of.topic)
         heard = reading.status in ("message", "unreadable") and robot.graph.on_robot("MP", key)
         if of.max_age_s is None or not heard:

@@ -103,17 +103,19 @@ class Presses:
             return await asyncio.shield(known.receipt)
         return known
 
-    async def cancel(self, widget_id: str, origin: Origin) -> Receipt:
-        """Asks the robot to cancel the goal of an action widget: anybody may, whoever has control."""
+    async def cancel(self, widget_id: str, origin: Origin, press_id: str = "") -> Receipt:
+        """Asks the robot to cancel the goal of one press or, without its id, the one under way: anybody
+        may, whoever has control, and however late."""
         widget = self.widget(widget_id)
         if not isinstance(widget, Action):
             raise NotFound(f'"{widget_id}" is not an action: there is nothing to cancel')
-        if not (self._sending.can_cancel(widget) or self._logbook.room(origin)):
-            answer = Answer("refused", say("nothing_to_cancel"))
+        if (why := self._sending.over(widget, press_id)) and not self._logbook.room(origin):
+            answer = Answer("refused", why)
             return self._counted(receipt_of(widget, {}, "", answer, "interlock"), origin)
         noting = asyncio.ensure_future(self._logbook.canceled(widget_id, origin))
         try:
-            answer = await self._sending.cancel(widget)  # no disk keeps anybody from stopping a robot
+            # No disk keeps anybody from stopping a robot.
+            answer, cause = await self._canceled(widget, press_id)
         except BaseException:
             (await noting).broke_off("log_broke_off")
             raise
@@ -121,9 +123,16 @@ class Presses:
         self._log.info(
             "cancel of %s by %s: %s: %s", widget_id, named(origin), answer.outcome, answer.text
         )
-        cause: Cause = "interlock" if answer.outcome == "refused" else ""
         receipt = receipt_of(widget, {}, "", answer, cause)
         return await _closed(noted, receipt)
+
+    async def _canceled(self, widget: Action, press_id: str) -> tuple[Answer, Cause]:
+        try:
+            answer = await self._sending.cancel(widget, press_id)
+        except LinkError as error:
+            text = say("not_encoded", why=str(error), time=clock(time.time()))
+            return Answer("refused", text), "link"
+        return answer, "interlock" if answer.outcome == "refused" else ""
 
     def _left_out(
         self, widget: Pressed, inputs: Mapping[str, Any], press_id: str, by: By

@@ -23,7 +23,8 @@ class Progress:
     """`busy` while an answer is awaited; then `outcome` and `text` say what came of it.
 
     `fraction` (0 to 1) is how far an action is, None where it does not say; `stoppable` while a
-    cancel makes sense; `goal` is the goal's state by its name in action_msgs/msg/GoalStatus.
+    cancel makes sense, and then `press` is the id of the press that the goal came from; `goal` is the
+    goal's state by its name in action_msgs/msg/GoalStatus.
     """
 
     busy: bool = False
@@ -32,6 +33,7 @@ class Progress:
     fraction: float | None = None
     stoppable: bool = False
     goal: str = ""
+    press: str = ""
 
 
 IDLE = Progress()

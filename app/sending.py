@@ -157,9 +157,10 @@ class Sending:
                 values[name] = self._parameters.checked(field, inputs[name])
         return values
 
-    def can_cancel(self, widget: Action) -> bool:
-        return self._actions.stoppable(widget) is not None
+    def over(self, widget: Action, press_id: str) -> str:
+        """Why there is no goal to cancel; "" where there is one."""
+        return self._actions.over(widget, press_id)
 
-    async def cancel(self, widget: Action) -> Answer:
-        """Asks the robot to cancel the goal of an action widget, if there is one."""
-        return await self._actions.cancel(widget)
+    async def cancel(self, widget: Action, press_id: str) -> Answer:
+        """Asks the robot to cancel the goal of a press or, without its id, the one under way."""
+        return await self._actions.cancel(widget, press_id)

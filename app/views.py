@@ -172,7 +172,8 @@ def enabled(verdict: Verdict) -> Enabled:
 
 def progress(of: Progress) -> dict[str, Any]:
     """Attributes of a call or an action: `progress` from 0 to 1, None where it is not known; `goal`
-    is the state of an action's goal as ROS names it, "" where there is none."""
+    is the state of an action's goal as ROS names it, `press` the id of the press that a cancel is for,
+    both "" where there is none."""
     return {
         "busy": of.busy,
         "outcome": of.outcome,
@@ -180,4 +181,5 @@ def progress(of: Progress) -> dict[str, Any]:
         "progress": of.fraction,
         "stoppable": of.stoppable,
         "goal": of.goal,
+        "press": of.press,
     }

@@ -9,6 +9,7 @@ import pytest
 from app import keys
 from app.actions import Actions
 from app.calls import LATE_S, MOST_UNANSWERED, Calls
+from app.errors import LinkError
 from app.panel.model import Action, Call, Panel
 from app.progress import Answer, Progress
 from app.robot import Robot, Sample
@@ -26,8 +27,11 @@ class Line:
     def __init__(self) -> None:
         self.asked: list[tuple[str, bytes, asyncio.Future[bytes | None]]] = []
         self.timeouts: list[float] = []
+        self.refuses = ""  # the end of the keys that can't be asked
 
     def query(self, key: str, payload: bytes, timeout_s: float) -> "asyncio.Future[bytes | None]":
+        if self.refuses and key.endswith(self.refuses):
+            raise LinkError(f"can't ask {key}")
         future: asyncio.Future[bytes | None] = asyncio.get_running_loop().create_future()
         self.asked.append((key, payload, future))
         self.timeouts.append(timeout_s)
@@ -74,8 +78,9 @@ class Bench:
         request = INTERFACES.encode(f"{TRIGGER}_Request", {})
         return asyncio.create_task(self.calls.call(self.reset, request, press_id, self.correct))
 
-    def send_goal(self) -> "asyncio.Task[Answer]":
-        return asyncio.create_task(self.actions.start(self.count, {"order": 3}, "g1", self.correct))
+    def send_goal(self, press_id: str = "g1") -> "asyncio.Task[Answer]":
+        goal = self.actions.start(self.count, {"order": 3}, press_id, self.correct)
+        return asyncio.create_task(goal)
 
     @property
     def shown(self) -> Progress:
@@ -210,10 +215,10 @@ def test_a_goal_cut_off_is_unknown_until_the_robot_tells_its_result() -> None:
     run(test)
 
 
-def goal_id(bench: Bench) -> bytes:
-    """The id of the goal that was sent, as the robot got it."""
+def goal_id(bench: Bench, number: int = 0) -> bytes:
+    """The id of the goal that was asked for, as the robot got it."""
     request = INTERFACES.action(COUNT).send_goal_request
-    return bytes(INTERFACES.decode(request, bench.line.asked[0][1]).goal_id.uuid)
+    return bytes(INTERFACES.decode(request, bench.line.asked[number][1]).goal_id.uuid)
 
 
 def tell_states(bench: Bench, *states: tuple[bytes, int]) -> None:
@@ -224,12 +229,54 @@ def tell_states(bench: Bench, *states: tuple[bytes, int]) -> None:
     bench.actions.hear_status("/count", sample_of(payload))
 
 
-async def accepted(bench: Bench) -> None:
-    start = bench.send_goal()
-    await asked(bench, 1)
+async def accepted(bench: Bench, press_id: str = "g1") -> None:
+    count = len(bench.line.asked)
+    start = bench.send_goal(press_id)
+    await asked(bench, count + 1)
     bench.answer_goal(accepted=True)
     assert (await start).outcome == "accepted"
-    await asked(bench, 2)
+    await asked(bench, count + 2)
+
+
+async def canceled(bench: Bench, press_id: str, return_code: int = 0) -> bytes:
+    """Cancels the goal of a press; the id of the goal that the robot was asked to cancel."""
+    request, response = INTERFACES.service("action_msgs/srv/CancelGoal")
+    count = len(bench.line.asked)
+    cancel = asyncio.create_task(bench.actions.cancel(bench.count, press_id))
+    await asked(bench, count + 1)
+    bench.line.answer(response, return_code=return_code, goals_canceling=[])
+    assert (await cancel).outcome == ("rejected" if return_code else "accepted")
+    return bytes(INTERFACES.decode(request, bench.line.asked[-1][1]).goal_info.goal_id.uuid)
+
+
+def test_a_late_cancel_does_not_hit_the_next_goal() -> None:
+    async def test(bench: Bench) -> None:
+        await accepted(bench)
+        assert bench.shown.press == "g1"
+        result = INTERFACES.action(COUNT).get_result_response
+        bench.line.answer(result, status=4, result={"sequence": []})
+        await settled(bench)
+        assert bench.shown.press == ""
+        await accepted(bench, "g2")
+        late = await bench.actions.cancel(bench.count, "g1")
+        assert (late.outcome, late.text) == ("refused", "That goal is over: nothing was canceled.")
+        assert bench.shown.goal == "ACCEPTED"
+        assert await canceled(bench, "g2") == goal_id(bench, 2)
+        assert (bench.shown.goal, bench.shown.press) == ("CANCELING", "g2")
+        await bench.actions.stop()
+
+    run(test)
+
+
+def test_a_goal_of_which_nothing_is_heard_can_still_be_canceled_by_its_press() -> None:
+    async def test(bench: Bench) -> None:
+        assert (await bench.send_goal()).outcome == "timed_out"
+        await accepted(bench, "g2")
+        assert await canceled(bench, "g1", return_code=2) == goal_id(bench)
+        assert await canceled(bench, "") == goal_id(bench, 2)
+        await bench.actions.stop()
+
+    run(test)
 
 
 def test_a_goals_state_has_its_ros_name_and_only_goes_on() -> None:
@@ -282,6 +329,24 @@ def test_another_programs_goal_and_a_rejected_one_have_no_state() -> None:
     run(test)
 
 
+def test_a_goal_that_could_not_be_sent_locks_nothing_and_hides_no_other() -> None:
+    async def test(bench: Bench) -> None:
+        bench.line.refuses = "send_goal"
+        with pytest.raises(LinkError):
+            await bench.send_goal()
+        assert "count" not in bench.robot.progress
+        bench.line.refuses = ""
+        assert (await bench.send_goal()).outcome == "timed_out"
+        bench.line.refuses = "send_goal"
+        with pytest.raises(LinkError):
+            await bench.send_goal()
+        tell_states(bench, (goal_id(bench), 2))
+        assert (bench.shown.goal, bench.shown.stoppable) == ("EXECUTING", True)
+        await bench.actions.stop()
+
+    run(test)
+
+
 def test_a_goal_without_an_answer_is_under_way_when_the_robot_says_so() -> None:
     async def test(bench: Bench) -> None:
         assert (await bench.send_goal()).outcome == "timed_out"
@@ -290,6 +355,99 @@ def test_a_goal_without_an_answer_is_under_way_when_the_robot_says_so() -> None:
         assert (bench.shown.goal, bench.shown.busy) == ("EXECUTING", True)
         assert [answer.outcome for _, answer in bench.corrected] == ["accepted"]
         await bench.actions.stop()
+
+    run(test)
+
+
+def test_a_goal_cut_off_before_its_answer_is_asked_for_when_the_bridge_is_back() -> None:
+    async def test(bench: Bench) -> None:
+        start = bench.send_goal()
+        await asked(bench, 1)
+        bench.lose_the_bridge()
+        assert (await start).outcome == "unknown"
+        assert (bench.shown.goal, bench.shown.busy) == ("UNKNOWN", False)
+        bench.robot.graph.apply(keys.bridge_token(BRIDGE), True)
+        await asked(bench, 2)
+        assert bench.line.asked[1][0].endswith("get_result")
+        tell_states(bench, (goal_id(bench), 2))
+        assert (bench.shown.goal, bench.shown.stoppable) == ("EXECUTING", True)
+        bench.line.answer(
+            INTERFACES.action(COUNT).get_result_response, status=4, result={"sequence": [0, 1]}
+        )
+        await settled(bench)
+        assert bench.shown.text.startswith("Succeeded")
+        assert [answer.outcome for _, answer in bench.corrected] == ["accepted", "succeeded"]
+
+    run(test)
+
+
+def test_a_goal_that_began_and_is_cut_off_before_its_answer_is_unknown() -> None:
+    async def test(bench: Bench) -> None:
+        start = bench.send_goal()
+        await asked(bench, 1)
+        tell_states(bench, (goal_id(bench), 2))
+        bench.lose_the_bridge()
+        assert (await start).outcome == "unknown"
+        await asyncio.sleep(0)
+        assert (bench.shown.goal, bench.shown.busy) == ("UNKNOWN", False)
+        await bench.actions.stop()
+
+    run(test)
+
+
+def test_a_goal_that_nobody_answers_at_once_waits_for_the_news_of_the_cut() -> None:
+    async def test(bench: Bench) -> None:
+        start = bench.send_goal()
+        await asked(bench, 1)
+        bench.line.asked[0][2].set_result(None)
+        await asyncio.sleep(0.01)
+        bench.lose_the_bridge()
+        assert "connection was cut" in (await start).text
+        await bench.actions.stop()
+
+    run(test)
+
+
+def test_a_result_that_could_not_be_asked_for_is_asked_for_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("app.actions.ASK_AGAIN_S", 0)
+
+    async def test(bench: Bench) -> None:
+        bench.line.refuses = "get_result"
+        start = bench.send_goal()
+        await asked(bench, 1)
+        bench.answer_goal(accepted=True)
+        await start
+        await asyncio.sleep(0.01)
+        assert (bench.shown.goal, bench.shown.stoppable) == ("ACCEPTED", True)
+        bench.line.refuses = ""
+        await asked(bench, 2)
+        bench.line.answer(
+            INTERFACES.action(COUNT).get_result_response, status=4, result={"sequence": []}
+        )
+        await settled(bench)
+        assert [answer.outcome for _, answer in bench.corrected] == ["succeeded"]
+
+    run(test)
+
+
+def test_what_breaks_while_a_goal_is_followed_leaves_it_unknown(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def fails(template: str, message: Any) -> str:
+        raise ZeroDivisionError
+
+    async def test(bench: Bench) -> None:
+        await accepted(bench)
+        monkeypatch.setattr("app.actions.with_fields", fails)
+        bench.line.answer(
+            INTERFACES.action(COUNT).get_result_response, status=4, result={"sequence": []}
+        )
+        await settled(bench)
+        assert (bench.shown.goal, bench.shown.busy) == ("UNKNOWN", False)
+        assert "A fault of the panel's server" in bench.shown.text
+        assert [answer.outcome for _, answer in bench.corrected] == ["unknown"]
 
     run(test)
 

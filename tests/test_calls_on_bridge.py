@@ -1,5 +1,6 @@
 """Services and actions of a robot on Cyclone DDS, from the panel, through the real bridge."""
 
+import json
 import signal
 import time
 from collections import Counter
@@ -336,6 +337,53 @@ def test_a_goal_is_canceled_from_the_panel(kiosk: Server, robot: CycloneRobot) -
     until(lambda: kiosk.widget("count")["outcome"] == "canceled", "it was canceled")
     nothing = kiosk.http.post("/widgets/count/cancel")
     assert (nothing.status_code, nothing.json()["outcome"]) == (409, "refused")
+
+
+def cancel(kiosk: Server, **given: Any) -> httpx.Response:
+    return kiosk.http.post("/widgets/count/cancel", json=given)
+
+
+def test_a_cancel_of_a_goal_that_is_over_stops_no_other(kiosk: Server, robot: CycloneRobot) -> None:
+    robot.fibonacci(step_s=0.01)
+    press(kiosk, "count", id="goal-1")
+    until(lambda: kiosk.widget("count")["outcome"] == "succeeded", "the first one is over")
+    robot.fibonacci(step_s=30)
+    press(kiosk, "count", id="goal-2")
+    until(lambda: kiosk.widget("count")["stoppable"], "the second one runs")
+    assert kiosk.widget("count")["press"] == "goal-2"
+    late = cancel(kiosk, press="goal-1", seen="0-1", at="2020-01-01T00:00:00Z", inputs={})
+    assert (late.status_code, late.json()["outcome"]) == (409, "refused")
+    assert late.json()["reason"] == "That goal is over: nothing was canceled."
+    assert cancel(kiosk, press=2).status_code == 422
+    assert robot.requests("/fibonacci/_action/cancel_goal") == []
+    assert cancel(kiosk, press="goal-2", seen="0-1", at="2020-01-01T00:00:00Z").status_code == 200
+    until(lambda: kiosk.widget("count")["outcome"] == "canceled", "it was canceled, however late")
+
+
+def test_a_page_cancels_the_goal_that_it_showed(kiosk: Server, robot: CycloneRobot, page: Page) -> None:
+    robot.fibonacci(step_s=30)
+    page.goto(kiosk.url)
+    button = page.locator('[data-widget="count"]').get_by_role("button", name="Cancel")
+    press(kiosk, "count", id="goal-1")
+    expect(button).to_have_attribute("value", "goal-1")
+    robot.cancel()
+    expect(button).to_be_disabled()
+    press(kiosk, "count", id="goal-2")
+    expect(button).to_have_attribute("value", "goal-2")
+    page.reload()
+    expect(button).to_have_attribute("value", "goal-2")
+    with page.expect_request("**/cancel") as sent:
+        button.click()
+    assert json.loads(sent.value.post_data or "")["press"] == "goal-2"
+    until(lambda: kiosk.widget("count")["outcome"] == "canceled", "canceled")
+    form = {"content-type": "application/x-www-form-urlencoded"}
+    press(kiosk, "count", id="goal-3")
+    until(lambda: kiosk.widget("count")["stoppable"], "another one runs")
+    kiosk.http.post("/widgets/count/cancel", content="_press=goal-2&words=", headers=form)
+    assert kiosk.widget("count")["goal"] == "EXECUTING"
+    kiosk.http.post("/widgets/count/cancel", content="_press=goal-3&words=", headers=form)
+    until(lambda: kiosk.widget("count")["outcome"] == "canceled", "canceled by a form")
+    assert len(robot.requests("/fibonacci/_action/cancel_goal")) == 2
 
 
 @pytest.mark.parametrize(("end", "outcome"), [("abort", "aborted"), ("cancel", "canceled")])

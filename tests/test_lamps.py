@@ -6,10 +6,13 @@ from typing import Any
 
 import pytest
 
+from app.declared import Declared
 from app.interlocks import PERMITTED, Verdict
-from app.keys import Qos, bridge_token
+from app.keys import Qos, bridge_token, server_token
 from app.lamps import BRIDGE, LONGEST_LIST, NODE, LinkLamp, labels, lamps, locks
 from app.panel.model import Panel
+from app.panel.parameter import DESCRIBE, GET, SET
+from app.panel.ranges import Range
 from app.robot import Robot
 from app.settings import PACKAGE
 from app.views import sight
@@ -37,6 +40,17 @@ GUARDED = {**FREE, "id": "guarded", "label": "Guarded", "topic": "/guarded", "in
 AGED = {**HEARD, "max_age_s": 5.0}
 
 
+SPEED = {
+    "id": "speed",
+    "kind": "parameter",
+    "label": "Speed",
+    "node": "/arm",
+    "parameter": "speed",
+    "type": "double",
+    "max": 2.0,
+}
+
+
 def cell(interlock: Table = NOTHING) -> Panel:
     return panel_of(MESSAGE, FREE, GUARDED, HEARD, interlock=interlock)
 
@@ -56,7 +70,19 @@ def codes_of(module: str) -> set[str]:
 
 
 # By the operator's own side or the robot's word: no link is to blame.
-NO_LINK = frozenset({"permitted", "forbidden", "busy", "log", "control"})
+NO_LINK = frozenset(
+    {
+        "permitted",
+        "forbidden",
+        "busy",
+        "log",
+        "control",
+        "parameter_undeclared",
+        "parameter_mistyped",
+        "parameter_read_only",
+        "parameter_apart",
+    }
+)
 
 
 def test_every_verdict_has_its_link_or_none() -> None:
@@ -108,6 +134,27 @@ def test_what_the_robot_forbids_is_no_fault_of_a_link() -> None:
     assert {lamp["reason"] for lamp in link.values()} == {""}
 
 
+@pytest.mark.parametrize(
+    ("known", "reason"),
+    [
+        (Declared("live", 1.0, read_only=True), "Read only"),
+        (Declared("undeclared"), "has no parameter speed"),
+        (Declared("mistyped", found="string"), "is string"),
+        (Declared("live", 1.0, range=Range(5.0, 6.0)), "no value is both"),
+    ],
+)
+def test_a_parameter_that_can_not_be_set_is_no_fault_of_a_link(known: Declared, reason: str) -> None:
+    panel = panel_of(SPEED)
+    robot = robot_there(panel)
+    for name, type_name in (GET, DESCRIBE, SET):
+        robot.graph.apply(server_token(BRIDGE_ZID, "SS", f"arm/{name}", type_name), True)
+    robot.parameters["speed"] = known
+    seen = sight(panel, robot, NOW).view
+    assert reason in seen["widgets"]["speed"]["reason"]
+    assert {lamp["locks"] for lamp in seen["link"].values()} == {"Locks nothing."}
+    assert {lamp["reason"] for lamp in seen["link"].values()} == {""}
+
+
 def test_what_the_log_locks_is_no_fault_of_a_link() -> None:
     panel = cell()
     link = links_of(panel, robot_there(panel), lock="The disk is full.")
@@ -116,13 +163,25 @@ def test_what_the_log_locks_is_no_fault_of_a_link() -> None:
 
 @pytest.mark.parametrize("silent_for", [4.9, 5.0])
 def test_a_node_that_stops_talking_is_silent_though_its_token_is_there(silent_for: float) -> None:
-    panel = panel_of(AGED)
+    panel = cell(interlock={"max_age_s": 5.0})
     robot = robot_there(panel)
-    endpoint(robot, "MP", "/heard", TEXT)
-    says(robot, "/heard", "hello", at=NOW)
+    endpoint(robot, "MP", ENABLED, BOOL)
+    permits(robot)
     node = links_of(panel, robot, NOW + silent_for)["node"]
     assert (node["state"], node["text"]) == (("bad", "silent") if silent_for >= 5 else ("ok", "ok"))
-    assert node["reason"].startswith("Nothing new on /heard for 5 s") is (silent_for >= 5)
+    assert node["reason"].startswith("Nothing new on /operation_enabled for 5 s") is (silent_for >= 5)
+
+
+def test_an_old_value_that_is_only_shown_is_no_silence() -> None:
+    panel = panel_of(AGED, GUARDED, MESSAGE, interlock={"max_age_s": 5.0})
+    robot = robot_there(panel)
+    endpoint(robot, "MP", "/heard", TEXT)
+    endpoint(robot, "MP", ENABLED, BOOL)
+    says(robot, "/heard", "hello", at=NOW)
+    permits(robot, at=NOW + 60)
+    seen = sight(panel, robot, NOW + 60)
+    assert seen.view["widgets"]["heard"]["state"] == "old"
+    assert (seen.view["link"]["node"]["state"], seen.view["link"]["node"]["reason"]) == ("ok", "")
 
 
 def test_a_forbidding_interlock_gets_old_too_and_time_shows_it() -> None:
@@ -135,17 +194,17 @@ def test_a_forbidding_interlock_gets_old_too_and_time_shows_it() -> None:
 
 
 def test_the_node_is_not_blamed_for_what_its_bridge_or_a_type_keeps_back() -> None:
-    panel = panel_of(AGED)
+    panel = panel_of(HEARD, interlock={"max_age_s": 5.0})
     robot = robot_there(panel)
-    says(robot, "/heard", "hello", at=NOW)
-    endpoint(robot, "MP", "/heard", BOOL)
+    permits(robot)
+    endpoint(robot, "MP", ENABLED, TEXT)
     assert links_of(panel, robot, NOW + 60)["node"]["text"] == "ok"
 
 
 def test_an_old_value_without_a_publisher_is_no_silence() -> None:
-    panel = panel_of(AGED)
+    panel = panel_of(HEARD, interlock={"max_age_s": 5.0})
     robot = robot_there(panel)
-    says(robot, "/heard", "hello", at=NOW)
+    permits(robot)
     assert links_of(panel, robot, NOW + 60)["node"]["text"] == "no node seen"
 
 

@@ -393,18 +393,29 @@ def test_the_link_is_told_before_control_and_control_before_an_interlock() -> No
     assert (cause, reason.startswith("Not sent: No connection")) == ("link", True)
 
 
+HOME = {
+    "id": "home",
+    "kind": "action",
+    "label": "Home",
+    "action": "/count",
+    "type": "example_interfaces/action/Fibonacci",
+    "goal": {"order": 1},
+}
+
+
+def test_a_cancel_that_could_not_be_sent_has_a_receipt(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuses(*_: Any) -> None:
+        raise LinkError("can't ask home/_action/cancel_goal: closed")
+
+    bench = Bench(panel_of(HOME))
+    monkeypatch.setattr("app.actions.Actions.cancel", refuses)
+    receipt = bench.cancel("home")
+    assert (receipt.outcome, receipt.cause) == ("refused", "link")
+    assert "can't ask home/_action/cancel_goal" in receipt.reason
+
+
 def test_cancelling_needs_no_control() -> None:
-    home = {
-        **FREE,
-        "id": "home",
-        "kind": "action",
-        "action": "/count",
-        "type": "example_interfaces/action/Fibonacci",
-        "goal": {"order": 1},
-    }
-    for key in ("topic", "message"):
-        home.pop(key)
-    bench = Bench(panel_of(MESSAGE, home))
+    bench = Bench(panel_of(MESSAGE, HOME))
     bench.may_press = lambda _: locked("control_free", robot="the robot")
     assert "Nobody has control" in bench.press("home").reason
     assert bench.cancel("home").reason == "there is nothing under way to cancel"

@@ -51,6 +51,13 @@ class Press(BaseModel):
     at: AwareDatetime | None = None
 
 
+class Cancel(BaseModel):
+    """What a client may post as JSON to cancel: the id of the goal's press; without it, it is the goal
+    under way. What else comes with it is not judged: stopping stays easy."""
+
+    press: str = ""
+
+
 class ReceiptAnswer(BaseModel):
     """What came of a press."""
 
@@ -83,7 +90,7 @@ async def press(widget: str, request: Request, site: CurrentSite, kiosk: Current
     kiosk.presses.widget(widget)
     browser = visitor(request, site)
     body = await request.body()
-    kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
+    kind = _kind(request)
     if kind == "application/json":
         receipt = await pressed(site, kiosk, browser, widget, as_model(Press, json_of(body)))
         return JSONResponse(receipt.as_json(), status_code=STATUS[receipt.cause])
@@ -109,13 +116,27 @@ async def press(widget: str, request: Request, site: CurrentSite, kiosk: Current
     "/widgets/{widget}/cancel",
     response_model=ReceiptAnswer,
     summary="Ask the robot to cancel an action's goal",
-    responses={303: {"description": "a form post"}, 409: {"model": ReceiptAnswer}},
+    responses={
+        303: {"description": "a form post"},
+        409: {"model": ReceiptAnswer, "description": "that goal is over, or none is under way"},
+        503: {"model": ReceiptAnswer, "description": "no way to the robot"},
+    },
+    openapi_extra={
+        "requestBody": {"content": {"application/json": {"schema": Cancel.model_json_schema()}}}
+    },
 )
 async def cancel(widget: str, request: Request, site: CurrentSite, kiosk: CurrentKiosk) -> Response:
     browser = visitor(request, site)
-    receipt = await kiosk.presses.cancel(widget, origin_of(browser))
+    body, kind = await request.body(), _kind(request)
+    form = kind == "application/x-www-form-urlencoded"
+    of = ""
+    if form:
+        of = _form(body).get("_press", "")
+    elif kind == "application/json" and body:
+        of = as_model(Cancel, json_of(body)).press
+    receipt = await kiosk.presses.cancel(widget, origin_of(browser), of)
     _count(site, receipt)
-    if request.headers.get("content-type", "").startswith("application/x-www-form-urlencoded"):
+    if form:
         return RedirectResponse(_page_with(kiosk, receipt), status_code=303)
     return JSONResponse(receipt.as_json(), status_code=STATUS[receipt.cause])
 
@@ -128,6 +149,11 @@ async def pressed(site: Site, kiosk: Kiosk, browser: Browser, widget: str, given
     receipt = await kiosk.presses.press(widget, given.inputs, given.id or secrets.token_hex(8), by)
     _count(site, receipt)
     return receipt
+
+
+def _kind(request: Request) -> str:
+    """What the body is, as its header says."""
+    return request.headers.get("content-type", "").partition(";")[0].strip().lower()
 
 
 def _ask(site: Site, kiosk: Kiosk, widget: str, inputs: dict[str, str]) -> Response:

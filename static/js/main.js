@@ -23,6 +23,10 @@ const SHOW = {
     const cancel = root.querySelector(".cancel");
     if (cancel) cancel.disabled = !value;
   },
+  press: (root, value) => {
+    const cancel = root.querySelector(".cancel");
+    if (cancel) cancel.value = value;
+  },
   held: (root, value) => root.toggleAttribute("data-held", value),
   state: (root, value) => (root.dataset.state = value),
   shape: (root, value) => (root.dataset.shape = value),

@@ -113,6 +113,7 @@ export class Presser {
   #sentences;
   #source;
   #underWay = new Set();
+  #goal = "";
   #down = null; // the button that was open when the pointer went down on it
   #asked = () => {}; // loaded with the page that asks; until then nothing is pressed
   #seen = null;
@@ -125,6 +126,7 @@ export class Presser {
     if (document.querySelector("dialog.ask")) source.load("./ask.js", ({ asked }) => (this.#asked = asked));
     const down = ({ target }) => {
       this.#down = target.closest?.("button:enabled");
+      this.#goal = this.#down?.value; // of a cancel: which one it is for
       this.#seen = source.seen; // what was permitted when the finger came down
       this.#open();
     };
@@ -134,6 +136,7 @@ export class Presser {
       form.addEventListener("click", (event) => {
         const button = event.target.closest("button");
         this.#click = this.#moment(event, event.detail > 0 ? this.#seen : source.seen);
+        if (button?.matches(".cancel")) this.#click.press = event.detail > 0 ? this.#goal : button.value;
         if (button && event.detail > 0 && button !== this.#down) event.preventDefault();
       });
       form.addEventListener("submit", (event) => {
