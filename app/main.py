@@ -39,6 +39,7 @@ from app.watchdog import Watchdog
 log = logging.getLogger("kiosk")
 
 LONGEST_BODY = 64 * 1024
+READ_WITHIN_S = 1.0  # by a browser, when the server ends
 
 
 def create_app(settings: Settings | None = None) -> FastAPI:
@@ -63,14 +64,16 @@ def create_app(settings: Settings | None = None) -> FastAPI:
             def ending() -> None:
                 watchdog.end()
                 site.fleet.close()
+                loop.call_later(READ_WITHIN_S, sockets.hang_up, ports)
 
+            ports: set[int] = set()
             watchdog = _watchdog(site)
             with _on_end(lambda: loop.call_soon_threadsafe(ending)):
                 if settings.dev:
                     await opened.enter_async_context(
                         development.reloading(site, settings, running, opened.pop_all())
                     )
-                tasks = [asyncio.create_task(work) for work in (watchdog.run(), sockets.narrow())]
+                tasks = [asyncio.create_task(work) for work in (watchdog.run(), sockets.narrow(ports))]
                 try:
                     yield
                 finally:
