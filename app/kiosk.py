@@ -1,6 +1,7 @@
 """A running kiosk: one robot with its link, board and presses, and how they are wired.
 
-Down: the link's inbox wakes the loop → `_take` (of values, in time for a frame) → robot → showing → views → board → streams.
+Down: the link's inbox wakes the loop → `_take` (of values, when a frame is due) → robot → showing →
+views → board → streams.
 """
 
 import asyncio
