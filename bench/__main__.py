@@ -58,7 +58,7 @@ class Run:
         with self._rig.bridge() as locator:
             self._interleaved(
                 "bridge",
-                [(peer.id, peer) for peer in self._peers if peer.robot == "zenoh"],
+                [(p.id, p) for p in self._peers if p.robot == "zenoh" and p.id not in SAME_STREAM],
                 partial(latency.down, over="ros", router=locator),
                 self._rounds,
             )

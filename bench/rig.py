@@ -29,10 +29,12 @@ class Sizes:
     toggles: int = 170  # of each peer in each round
     presses: int = 60
     cost_rounds: int = 1
-    window_s: float = 4.0  # of each look at a cost
+    window_s: float = 3.0  # of each look at a cost
     crowds: tuple[int, ...] = (1, 50, 200, 500)
     stalled_s: float = 30.0
+    before_stall_s: float = 3.0
     growth_s: float = 1.0
+    growth_points: tuple[int, ...] = (0, 1, 2, 3)
 
 
 QUICK: Final = Sizes(
@@ -41,8 +43,10 @@ QUICK: Final = Sizes(
     presses=20,
     window_s=0.7,
     crowds=(1, 500),
-    stalled_s=4.0,
+    stalled_s=2.0,
+    before_stall_s=1.0,
     growth_s=0.3,
+    growth_points=(0, 2, 3),
 )
 
 
