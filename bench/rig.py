@@ -98,17 +98,16 @@ class Rig:
         self, peer: Peer, topics: Sequence[str] = (), router: str = "", buttons: int = 1
     ) -> Iterator[Running]:
         """A peer's server, alone: no other gets what the robot says meanwhile."""
-        with tempfile.TemporaryDirectory(prefix=f"bench-{peer.id}-") as folder:
+        with ExitStack() as stack:
+            folder = stack.enter_context(tempfile.TemporaryDirectory(prefix=f"bench-{peer.id}-"))
             place = Place(router or self.robot.first, DOMAIN, Path(folder), tuple(topics), buttons)
             self.robot("offer", way=peer.robot, topics=list(topics))
             began = time.monotonic()
             server = peer.start(place)
             self.started_s = time.monotonic() - began  # until it answered HTTP
-            try:
-                yield server
-            finally:
-                self.robot("quiet")
-                server.end()
+            stack.callback(server.end)
+            stack.callback(self.robot, "quiet")
+            yield server
 
     @contextmanager
     def page(
