@@ -67,11 +67,6 @@ class Sight:
         """When time alone would change it."""
         return min(self.rest, *self.displays.values()) if self.displays else self.rest
 
-    @property
-    def well(self) -> bool:
-        """Whether the robot's nodes are heard: then a value changes what shows it and nothing else."""
-        return self.view["link"]["node"]["state"] == "ok"
-
 
 def sight(
     panel: Panel,
