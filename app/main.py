@@ -27,8 +27,9 @@ from app.metrics import Metrics
 from app.panel import Panel, load_panel
 from app.panel.model import RobotEntry
 from app.recording import Recordings
-from app.routes import control, events, health, holds, pages, presses, static
+from app.routes import control, events, health, holds, pages, press_socket, presses, static
 from app.routes import log as log_routes
+from app.routes.messages import LONGEST
 from app.routes.site import Site, named_robot, on_http_error, on_kiosk_error
 from app.settings import Settings, shipped
 from app.startup import InWords
@@ -36,8 +37,6 @@ from app.systemd import Manager
 from app.watchdog import Watchdog
 
 log = logging.getLogger("kiosk")
-
-LONGEST_BODY = 64 * 1024
 
 
 def create_app(settings: Settings | None = None) -> FastAPI:
@@ -83,13 +82,13 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         lifespan=lifespan,
         docs_url=None,  # they load scripts from elsewhere
         redoc_url=None,
-        max_body_size=LONGEST_BODY,
+        max_body_size=LONGEST,
         exception_handlers={KioskError: on_kiosk_error, HTTPException: on_http_error},
     )
     app.add_middleware(GZipMiddleware, minimum_size=500)
     app.add_middleware(Doors, hosts=settings.hosts)
     app.add_middleware(InWords)
-    for routes in (pages, events, presses, control, holds):
+    for routes in (pages, events, presses, press_socket, control, holds):
         app.include_router(routes.router)
         app.include_router(routes.router, prefix="/robots/{robot}", dependencies=[Depends(named_robot)])
     for common in (static, health, log_routes):

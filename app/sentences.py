@@ -153,6 +153,7 @@ ENGLISH: Final[Mapping[str, str]] = {
     "sent_to_nobody": "Sent on {topic} at {time}, but no node is known to listen to it.",
     "refused": "Not sent at {time}: {why}",
     "not_encoded": "Not sent at {time}: {why}.",
+    "too_many_presses": "Not sent: {most} presses of this page have had no answer yet.",
     "press_reused": "Not sent: the press id {id} was already used for another press.",
     # The operator's log.
     "log_unwritable": "The operator's log can't be written: {why}.",

@@ -85,6 +85,12 @@ def servers() -> Iterator[Callable[[Server], Server]]:
         yield kept
 
 
+@pytest.fixture(params=["post", "socket"])
+def way(request: pytest.FixtureRequest) -> str:
+    """How presses come."""
+    return str(request.param)
+
+
 @pytest.fixture
 def server(bridge: Bridge, node: RosNode, tmp_path: Path) -> Iterator[Server]:
     """A kiosk of the test's own on the shared bridge."""

@@ -3,6 +3,7 @@ its own, on loopback, and each is ended by who started it."""
 
 import json
 import os
+import secrets
 import signal
 import socket
 import subprocess
@@ -17,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import httpx
+from websockets.sync.client import ClientConnection, connect
 
 ROOT = Path(__file__).resolve().parent.parent
 TESTS = ROOT / "tests"
@@ -258,6 +260,7 @@ class Server:
         self._own_data = tempfile.TemporaryDirectory(prefix="kiosk-data-")
         self.data = Path(environment.setdefault("KIOSK_DATA", self._own_data.name))
         self.base = ""
+        self.way = "post"
         self.port = port or free_port()
         self.url = f"http://127.0.0.1:{self.port}"
         self.http = httpx.Client(base_url=self.url, timeout=10, trust_env=False)
@@ -273,6 +276,12 @@ class Server:
         """The same server, asked for one of its robots."""
         one = copy(self)
         one.base = f"/robots/{name}"
+        return one
+
+    def by(self, way: str) -> "Server":
+        """The same server, with its presses by "post" or by "socket"."""
+        one = copy(self)
+        one.way = way
         return one
 
     def answers(self) -> bool:
@@ -295,9 +304,22 @@ class Server:
         return found
 
     def press(self, widget: str, message: str = "", **more: Any) -> httpx.Response:
-        return self.http.post(
-            f"{self.base}/widgets/{widget}", json={"inputs": {"message": message}, **more}
-        )
+        press = {"inputs": {"message": message}, **more}
+        if self.way == "socket":
+            with self.socket() as socket:
+                return socket.press(widget=widget, **press)
+        return self.http.post(f"{self.base}/widgets/{widget}", json=press)
+
+    @contextmanager
+    def socket(self, **headers: str) -> Iterator["PressSocket"]:
+        """A socket for presses, of a client that has the same cookies."""
+        kept = "; ".join(f"{name}={value}" for name, value in self.http.cookies.items())
+        headers = {**({"cookie": kept} if kept else {}), **headers}
+        host = headers.pop("host", f"127.0.0.1:{self.port}")
+        way = socket.create_connection(("127.0.0.1", self.port))
+        url = f"ws://{host}{self.base}/presses"
+        with connect(url, sock=way, additional_headers=headers) as connection:
+            yield PressSocket(connection)
 
     @contextmanager
     def stream(self) -> Iterator["Stream"]:
@@ -310,6 +332,29 @@ class Server:
             return self.process.end(number, timeout_s)
         finally:
             self._own_data.cleanup()
+
+
+class PressSocket:
+    """One socket for presses, spoken by hand."""
+
+    def __init__(self, connection: ClientConnection) -> None:
+        self._connection = connection
+
+    def say(self, text: str | bytes) -> None:
+        self._connection.send(text)
+
+    def hear(self, timeout_s: float = 10) -> dict[str, Any]:
+        said: dict[str, Any] = json.loads(self._connection.recv(timeout_s))
+        return said
+
+    def press(self, **press: Any) -> httpx.Response:
+        """Its answer as that to a post; nothing else may be under way."""
+        self.say(json.dumps({"id": secrets.token_hex(8), **press}))
+        return as_response(self.hear())
+
+
+def as_response(said: dict[str, Any]) -> httpx.Response:
+    return httpx.Response(said.pop("status"), json={k: v for k, v in said.items() if k != "press"})
 
 
 class Stream:

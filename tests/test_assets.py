@@ -15,7 +15,7 @@ def static(tmp_path: Path) -> Path:
     for part in ("css", "js"):
         (folder / part).mkdir(parents=True)
     for layer in (*LAYERS, OWN_PAGE):
-        (folder / "css" / f"{layer}.css").write_text(f"/* {layer} */\n")
+        (folder / "css" / f"{layer}.css").write_text(f"/* Why. */\n  .{layer} {{}}\n")
     (folder / "js/main.js").write_text("main();\n")
     (folder / "js/press.js").write_text("press();\n")
     (folder / "js/notes.txt").write_text("no script\n")
@@ -38,10 +38,14 @@ def test_the_stylesheet_is_its_layers_in_order_with_the_millimetre(
     static: Path, templates: Path
 ) -> None:
     assert loaded(static, templates).files["kiosk.css"].content.decode().splitlines() == [
-        "/* tokens */",
-        "/* base */",
-        "/* layout */",
-        "/* widgets */",
+        "",
+        ".tokens {}",
+        "",
+        ".base {}",
+        "",
+        ".layout {}",
+        "",
+        ".widgets {}",
         ":root{--mm:4.0000px}",
     ]
 
@@ -50,13 +54,13 @@ def test_scripts_keep_their_names(static: Path, templates: Path) -> None:
     files = loaded(static, templates).files
     assert set(files) == {"kiosk.css", "log.css", "main.js", "press.js"}
     assert files["main.js"].content == b"main();\n"
-    assert files["log.css"].content == b"/* log */\n"
+    assert files["log.css"].content == b"\n.log {}\n"
 
 
 def test_scripts_go_out_without_comments_on_the_lines_where_they_were_written(
     static: Path, templates: Path
 ) -> None:
-    (static / "js/main.js").write_text('// Why.\nf("http://a"); // beside\n  // More.\ng();\n')
+    (static / "js/main.js").write_text('// Why.\nf("http://a"); // beside\n  // More.\n  g();\n')
     sent = loaded(static, templates).files["main.js"].content
     assert sent == b'\nf("http://a"); // beside\n\ng();\n'
 

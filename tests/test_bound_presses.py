@@ -1,5 +1,6 @@
 """A press is bound to what its operator saw, and to its time: it is never sent late."""
 
+import json
 import signal
 import threading
 import time
@@ -12,7 +13,7 @@ import httpx
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from tests.parts import Bridge, RosNode, Server, events_in, live, until
+from tests.parts import Bridge, RosNode, Server, as_response, events_in, live, until
 
 HOUR_MS = 3_600_000
 
@@ -42,7 +43,8 @@ def server_time(kiosk: Server, later_s: float = 0.0) -> str:
     return datetime.fromtimestamp(seconds, UTC).isoformat()
 
 
-def test_what_changed_since_it_was_seen_is_not_pressed(kiosk: Server, node: RosNode) -> None:
+def test_what_changed_since_it_was_seen_is_not_pressed(kiosk: Server, node: RosNode, way: str) -> None:
+    kiosk = kiosk.by(way)
     seen = kiosk.snapshot()["id"]
     assert kiosk.press("operation1", "as seen", seen=seen).status_code == 200
     permit(kiosk, node, False)
@@ -62,14 +64,14 @@ def test_what_changed_since_it_was_seen_is_not_pressed(kiosk: Server, node: RosN
     ("later_s", "status", "words"),
     [(0.0, 200, "Sent"), (-1.5, 200, "Sent"), (-2.5, 409, "to get here"), (3.0, 409, "ahead of")],
 )
-def test_a_press_has_its_time(kiosk: Server, later_s: float, status: int, words: str) -> None:
-    answer = kiosk.press("operation", "timed", at=server_time(kiosk, later_s))
+def test_a_press_has_its_time(kiosk: Server, later_s: float, status: int, words: str, way: str) -> None:
+    answer = kiosk.by(way).press("operation", "timed", at=server_time(kiosk, later_s))
     assert (answer.status_code, words in answer.json()["reason"]) == (status, True), answer.json()
 
 
-def test_a_version_that_is_not_there_yet_is_bad_input(kiosk: Server) -> None:
+def test_a_version_that_is_not_there_yet_is_bad_input(kiosk: Server, way: str) -> None:
     boot, _, version = kiosk.snapshot()["id"].partition("-")
-    answer = kiosk.press("operation", "x", seen=f"{boot}-{int(version) + 1000}")
+    answer = kiosk.by(way).press("operation", "x", seen=f"{boot}-{int(version) + 1000}")
     assert answer.status_code == 422
     assert "is not there yet" in answer.json()["error"]
 
@@ -89,18 +91,23 @@ def test_the_time_until_a_press_expires_is_the_panels(
 def test_a_press_that_waited_in_a_stopped_server_is_not_sent(kiosk: Server, node: RosNode) -> None:
     at = server_time(kiosk)
     answers: list[httpx.Response] = []
-    kiosk.process.send(signal.SIGSTOP)
-    try:
-        poster = threading.Thread(
-            target=lambda: answers.append(kiosk.press("operation", "too late", at=at))
-        )
-        poster.start()
-        time.sleep(3)
-    finally:
-        kiosk.process.send(signal.SIGCONT)
-    poster.join(10)
-    (answer,) = answers
-    assert answer.json()["outcome"] == "refused"
+    with kiosk.socket() as socket:
+        kiosk.process.send(signal.SIGSTOP)
+        try:
+            poster = threading.Thread(
+                target=lambda: answers.append(kiosk.press("operation", "too late", at=at))
+            )
+            poster.start()
+            press = {"widget": "operation", "id": "hung", "inputs": {"message": "too late"}, "at": at}
+            socket.say(json.dumps(press))
+            time.sleep(3)
+        finally:
+            kiosk.process.send(signal.SIGCONT)
+        poster.join(10)
+        answers.append(as_response(socket.hear()))
+    assert len(answers) == 2
+    for answer in answers:
+        assert answer.json()["outcome"] == "refused"
     assert "too late" not in node.heard_data("/operation")
 
 

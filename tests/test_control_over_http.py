@@ -9,6 +9,7 @@ from pathlib import Path
 import httpx
 import pytest
 
+from app.routes.visitors import COOKIE
 from tests.parts import ROOT, Server, until
 from tests.test_robots import entry, panel_file
 
@@ -83,6 +84,12 @@ def test_a_press_needs_control(client: Callable[..., Client], kiosk: Server) -> 
     assert (refused.status_code, refused.json()["outcome"]) == (409, "refused")
     assert "Panel 1 (192.0.2.1) has control of the robot." in refused.json()["reason"]
     assert kiosk.press("operation", "no cookie at all").status_code == 409
+    assert kiosk.by("socket").press("operation", "no cookie at all").status_code == 409
+    address = {"x-forwarded-for": "192.0.2.1"}
+    for token, status in ((ann.http.cookies[COOKIE], 200), (bob.http.cookies[COOKIE], 409)):
+        with kiosk.socket(cookie=f"{COOKIE}={token}", **address) as socket:
+            answer = socket.press(widget="operation", inputs={"message": "by socket"})
+            assert answer.status_code == status, answer.json()
     names = ("Panel 1 (192.0.2.1)", "Panel 2 (192.0.2.2)", "a program (127.0.0.1)")
     until(lambda: all(f"by {n} with" in kiosk.process.text for n in names), "the log names each")
 

@@ -203,7 +203,7 @@ def test_a_restarted_server_opens_by_a_fresh_snapshot(
         second.end()
 
 
-def test_a_press_that_gets_no_answer_is_not_known_and_not_repeated(
+def test_a_post_that_gets_no_answer_is_not_known_and_not_repeated(
     server: Server, node: RosNode, page: Page
 ) -> None:
     page.goto(server.url)
@@ -215,6 +215,9 @@ def test_a_press_that_gets_no_answer_is_not_known_and_not_repeated(
         route.abort()
 
     page.route("**/widgets/**", lose)
+    page.route_web_socket("**/presses", lambda socket: socket.close())
+    page.reload()
+    expect(button(page, "Publish")).to_be_enabled()
     button(page, "Publish").click()
     expect(page.locator("#receipt-operation")).to_contain_text("not known whether this was sent")
     page.wait_for_timeout(1500)  # long enough for a retry to show, were there one

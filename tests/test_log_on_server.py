@@ -88,9 +88,9 @@ def test_a_full_disk_locks_and_opens_again_by_itself(
     page.goto(kiosk.url)
     expect(page.get_by_role("button", name="Publish", exact=True)).to_be_enabled()
     press_until_full(kiosk)
-    refused = kiosk.press("operation", "never sent")
-    assert (refused.status_code, refused.json()["outcome"]) == (503, "refused")
-    assert FULL in refused.json()["reason"]
+    for refused in [kiosk.by(way).press("operation", "never sent") for way in ("post", "socket")]:
+        assert (refused.status_code, refused.json()["outcome"]) == (503, "refused")
+        assert FULL in refused.json()["reason"]
     expect(page.get_by_role("button", name="Publish", exact=True)).to_be_disabled()
     expect(page.locator("#why-operation")).to_contain_text(FULL)
     expect(page.locator("#fault")).to_contain_text(FULL)

@@ -99,7 +99,7 @@ def kiosk(robot: Robot, tmp_path: Path) -> Iterator[Server]:
     mine.end()
 
 
-def widget(name: str) -> str:
+def widget(name: str, timeout_s: float = TIMEOUT_S) -> str:
     return f"""
         [[page.widget]]
         id = "{name}"
@@ -107,7 +107,7 @@ def widget(name: str) -> str:
         label = "{name}"
         service = "/{name}"
         type = "{TRIGGER}"
-        timeout_s = {TIMEOUT_S}
+        timeout_s = {timeout_s}
     """
 
 

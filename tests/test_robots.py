@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from playwright.sync_api import Page, expect
+from websockets.exceptions import InvalidStatus
 
 from app.errors import PanelError
 from app.panel import load_panel
@@ -58,6 +59,7 @@ def permitted(server: Server) -> bool:
 def test_ten_robots_hear_each_what_was_pressed_for_it(ten: Server) -> None:
     robots = [ten.robot(f"r{number + 1}") for number in range(MANY)]
     for number, robot in enumerate(robots):
+        robot = robot.by(("post", "socket")[number % 2])
         assert robot.press("operation", f"for {number}").json()["outcome"] == "published"
     for number, robot in enumerate(robots):
         wanted = f"for {number} (/operation)"
@@ -86,11 +88,15 @@ def test_nothing_is_pressed_for_an_unnamed_robot(ten: Server) -> None:
     unknown = ten.robot("r99").press("operation", "whose?")
     assert unknown.status_code == 404
     assert 'no robot "r99"' in unknown.json()["error"]
+    for nobody in (ten, ten.robot("r99")):
+        with pytest.raises(InvalidStatus), nobody.socket():
+            raise AssertionError("it opened")
     for number in range(MANY):
         assert "whose?" not in heard(ten.robot(f"r{number + 1}"))
 
 
-def test_a_press_by_what_another_robots_page_showed_is_refused(ten: Server) -> None:
+def test_a_press_by_what_another_robots_page_showed_is_refused(ten: Server, way: str) -> None:
+    ten = ten.by(way)
     seen = ten.robot("r1").snapshot()["id"]
     answer = ten.robot("r2").press("operation", "not this one", seen=seen)
     assert (answer.status_code, answer.json()["outcome"]) == (409, "refused")

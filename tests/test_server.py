@@ -1,18 +1,22 @@
 """The contract over HTTP, with the demo robot: the server as users start it."""
 
+import json
 import re
+import secrets
 import signal
 import subprocess
 import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from urllib.parse import urlencode
 
 import httpx
 import pytest
 import zenoh
+from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from tests.parts import ROOT, Bridge, Process, RosNode, Server, free_port, live, until
 
@@ -94,22 +98,24 @@ def test_a_press_without_an_id_gets_one(demo: Server) -> None:
     assert receipt["widget"] == "operation"
 
 
-def test_the_same_id_is_the_same_press(demo: Server) -> None:
-    presses = [demo.press("operation", "once only", id="one-press").json() for _ in range(3)]
-    assert presses[0] == presses[1] == presses[2]
+def test_the_same_id_is_the_same_press_whatever_way_it_comes(demo: Server) -> None:
+    ways = ("post", "socket", "post", "socket")
+    presses = [demo.by(w).press("operation", "once only", id="one-press").json() for w in ways]
+    assert presses == [presses[0]] * len(ways)
     assert demo.process.text.count("press one-press of") == 1
 
 
-def test_what_was_seen_before_a_restart_does_not_count(demo: Server) -> None:
-    refused = demo.press("operation", "from an old page", seen="deadbeef-7", id="old-page")
-    again = demo.press("operation", "from an old page", seen="deadbeef-7", id="old-page")
+def test_what_was_seen_before_a_restart_does_not_count(demo: Server, way: str) -> None:
+    demo, own_id = demo.by(way), f"old-page-{way}"
+    refused = demo.press("operation", "from an old page", seen="deadbeef-7", id=own_id)
+    again = demo.press("operation", "from an old page", seen="deadbeef-7", id=own_id)
     assert again.json() == refused.json()
     assert (refused.status_code, refused.json()["outcome"]) == (409, "refused")
     assert "started anew" in refused.json()["reason"]
     assert demo.press("operation", "x", seen=demo.snapshot()["id"]).status_code == 200
 
 
-@pytest.mark.parametrize(
+BAD_BODIES = pytest.mark.parametrize(
     ("body", "names"),
     [
         (b"", "not JSON"),
@@ -130,6 +136,9 @@ def test_what_was_seen_before_a_restart_does_not_count(demo: Server) -> None:
         (b'{"inputs": {"message": "' + b"x" * 81 + b'"}}', "81 characters"),
     ],
 )
+
+
+@BAD_BODIES
 def test_bad_input_is_refused_and_named(demo: Server, body: bytes, names: str) -> None:
     headers = {"content-type": "application/json"}
     answer = demo.http.post("/widgets/operation", content=body, headers=headers)
@@ -137,9 +146,24 @@ def test_bad_input_is_refused_and_named(demo: Server, body: bytes, names: str) -
     assert names in answer.text
 
 
+@BAD_BODIES
+def test_bad_input_on_a_socket_is_named_too_and_loses_nothing(
+    demo: Server, body: bytes, names: str
+) -> None:
+    with demo.socket() as socket:
+        start = f'{{"widget": "operation", "id": "{secrets.token_hex(8)}", "inputs"'.encode()
+        named = body.replace(b'{"inputs"', start, 1)
+        socket.say(named if body == b"\xff\xfe" else named.decode())
+        said = socket.hear()
+        assert said["status"] == 422, said
+        assert names.replace("body", "message").removeprefix("not JSON") in json.dumps(said)
+        assert socket.press(widget="operation", inputs={"message": "x"}).status_code == 200
+
+
 def test_only_what_can_be_pressed_can_be_pressed(demo: Server) -> None:
     for widget in ("nothing", "message", "last_heard"):
         assert demo.press(widget).status_code == 404
+        assert demo.by("socket").press(widget).status_code == 404
     assert demo.http.get("/pages/nothing").status_code == 404
     assert demo.http.get("/nothing").status_code == 404
     assert demo.http.get("/widgets/operation").status_code == 405
@@ -174,9 +198,10 @@ def test_a_large_body_is_refused(demo: Server) -> None:
 
     answer = demo.http.post("/widgets/operation", content=chunks(), headers=headers)
     assert answer.status_code == 413
+    assert demo.by("socket").press("operation", "x" * 70_000).status_code == 413
 
 
-@pytest.mark.parametrize("path", ["/widgets/operation", "/events"])
+@pytest.mark.parametrize("path", ["/widgets/operation", "/events", "/presses"])
 @pytest.mark.parametrize(
     "headers",
     [
@@ -188,6 +213,11 @@ def test_a_large_body_is_refused(demo: Server) -> None:
     ],
 )
 def test_other_sites_are_shut_out(demo: Server, path: str, headers: dict[str, str]) -> None:
+    if path == "/presses":
+        with pytest.raises(InvalidStatus) as refused, demo.socket(**headers):
+            raise AssertionError("it opened")
+        assert refused.value.response.status_code == 403
+        return
     if path == "/events":
         answer = demo.http.get("/events?once=1", headers=headers)
     else:
@@ -231,10 +261,15 @@ def test_openapi_describes_the_paths(demo: Server) -> None:
     assert "409" in paths["/widgets/{widget}"]["post"]["responses"]
 
 
-def test_it_ends_soon_with_fifty_streams_open() -> None:
+def test_it_ends_soon_with_fifty_streams_and_sockets_open() -> None:
     mine = Server(ROOT)
     limits = httpx.Limits(max_connections=60)
-    with httpx.Client(base_url=mine.url, timeout=10, trust_env=False, limits=limits) as many:
+    with ExitStack() as opened:
+        many = opened.enter_context(
+            httpx.Client(base_url=mine.url, timeout=10, trust_env=False, limits=limits)
+        )
+        sockets = [opened.enter_context(mine.socket()) for _ in range(50)]
+        assert sockets[-1].press(widget="operation", inputs={"message": "x"}).status_code == 200
         streams = [many.send(many.build_request("GET", "/events"), stream=True) for _ in range(50)]
         until(lambda: "kiosk_streams 50.0" in mine.http.get("/metrics").text, "50 streams")
         told_at = time.monotonic()
@@ -242,6 +277,9 @@ def test_it_ends_soon_with_fifty_streams_open() -> None:
         assert time.monotonic() - told_at < 3.0
         for stream in streams:
             stream.close()
+        for socket in sockets:
+            with pytest.raises(ConnectionClosed):
+                socket.hear()
     assert "Traceback" not in mine.process.text
 
 
@@ -342,8 +380,9 @@ def test_no_thread_or_task_is_left_behind_by_a_hundred_streams(demo: Server) -> 
     before = threads()
 
     def one() -> None:
-        with demo.http.stream("GET", "/events") as response:
+        with demo.http.stream("GET", "/events") as response, demo.socket() as socket:
             next(response.iter_text())
+            socket.say("junk")
 
     workers = [threading.Thread(target=one) for _ in range(100)]
     for worker in workers:

@@ -33,6 +33,7 @@ from app.kiosk import Kiosk
 from app.leases import sent_at
 from app.logbook import Noted
 from app.receipts import By, Receipt, with_doubt
+from app.routes.messages import LONGEST, json_of
 from app.routes.site import CurrentKiosk, CurrentSite
 from app.routes.visitors import visitor
 from app.sentences import say
@@ -41,7 +42,6 @@ router = APIRouter()
 
 BEGIN_WITHIN_S: Final = 2.0  # from the opening of the socket
 SILENCE_S: Final = 2.0  # a hold is over long before: nobody is there
-LONGEST_MESSAGE: Final = 64 * 1024
 # 4000 + HTTP's
 CLOSE: Final[Mapping[str, int]] = {"interlock": 4409, "input": 4422, "link": 4503, "log": 4503}
 
@@ -241,11 +241,9 @@ class _Session:
 
 def _read(text: str) -> Begin | Beat | End | None:
     """A message of a browser's; None for what is none."""
-    if len(text) > LONGEST_MESSAGE:
+    if len(text) > LONGEST:
         return None
     try:
-        given = json.loads(text)
-        json.dumps(given, ensure_ascii=False, allow_nan=False).encode()
-        return _message.validate_python(given)
-    except (ValueError, ValidationError, RecursionError):
+        return _message.validate_python(json_of(text))
+    except (InputError, ValidationError):
         return None

@@ -1,6 +1,5 @@
 """A press: JSON for the panel's scripts, a form for a browser without them; one module behind."""
 
-import json
 import math
 import re
 import secrets
@@ -10,15 +9,17 @@ from urllib.parse import parse_qsl, quote
 
 from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
-from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, JsonValue, ValidationError
+from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, JsonValue
 
 from app import moments
+from app.browsers import Browser
 from app.doubts import SEEN
 from app.errors import InputError
 from app.kiosk import Kiosk
 from app.logbook import origin_of
 from app.panel.model import Page
 from app.receipts import Receipt
+from app.routes.messages import as_model, json_of
 from app.routes.pages import ask_of
 from app.routes.site import CurrentKiosk, CurrentSite, Site
 from app.routes.visitors import visitor
@@ -84,11 +85,7 @@ async def press(widget: str, request: Request, site: CurrentSite, kiosk: Current
     body = await request.body()
     kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
     if kind == "application/json":
-        given = _json(body)
-        at = given.at.timestamp() if given.at else None
-        by = kiosk.doubts.by(widget, browser, given.seen or "", at)
-        receipt = await kiosk.presses.press(widget, given.inputs, given.id or secrets.token_hex(8), by)
-        _count(site, receipt)
+        receipt = await pressed(site, kiosk, browser, widget, as_model(Press, json_of(body)))
         return JSONResponse(receipt.as_json(), status_code=STATUS[receipt.cause])
     if kind == "application/x-www-form-urlencoded":
         inputs = _form(body)
@@ -121,6 +118,16 @@ async def cancel(widget: str, request: Request, site: CurrentSite, kiosk: Curren
     if request.headers.get("content-type", "").startswith("application/x-www-form-urlencoded"):
         return RedirectResponse(_page_with(kiosk, receipt), status_code=303)
     return JSONResponse(receipt.as_json(), status_code=STATUS[receipt.cause])
+
+
+async def pressed(site: Site, kiosk: Kiosk, browser: Browser, widget: str, given: Press) -> Receipt:
+    """What comes of a press that was given as JSON, by whatever way."""
+    at = given.at.timestamp() if given.at else None
+    kiosk.presses.widget(widget)
+    by = kiosk.doubts.by(widget, browser, given.seen or "", at)
+    receipt = await kiosk.presses.press(widget, given.inputs, given.id or secrets.token_hex(8), by)
+    _count(site, receipt)
+    return receipt
 
 
 def _ask(site: Site, kiosk: Kiosk, widget: str, inputs: dict[str, str]) -> Response:
@@ -167,25 +174,6 @@ def _until(inputs: dict[str, str]) -> float | None:
 
 def _count(site: Site, receipt: Receipt) -> None:
     site.metrics.presses.labels(receipt.outcome).inc()
-
-
-def _json(body: bytes) -> Press:
-    try:
-        given = json.loads(body, parse_constant=_no_constant)
-        json.dumps(given, ensure_ascii=False).encode()  # half a surrogate pair is no text
-        return Press.model_validate(given)
-    except UnicodeEncodeError:
-        raise InputError("the body has half of a surrogate pair, which is not Unicode text") from None
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        place = ".".join(str(step) for step in first["loc"])
-        raise InputError(f"{place or 'the body'}: {first['msg']}") from None
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"the body is not JSON: {error}") from None
-
-
-def _no_constant(name: str) -> float:
-    raise ValueError(f"{name} is not a number of JSON")
 
 
 def _form(body: bytes) -> dict[str, str]:

@@ -96,6 +96,7 @@ function showNotice(notice) {
 
 // The server is gone: what was permitted is no longer known to be.
 function lockAll() {
+  presser.close();
   body.dataset.cut = "";
   control.lost();
   const { lostShort, locksAll, lost, unknown } = body.dataset;
@@ -159,5 +160,5 @@ const source = new Source({
 if (document.querySelector("[data-step]")) source.load("./inputs.js", () => {});
 const holds = document.querySelectorAll('[data-kind="hold"]');
 if (holds.length) source.load("./hold.js", ({ Hold }) => holds.forEach((root) => new Hold(root, source)));
-new Presser(widgets, source, { unsure: body.dataset.unsure, lost: body.dataset.lost });
+const presser = new Presser(widgets, source, { unsure: body.dataset.unsure, lost: body.dataset.lost });
 source.start();

@@ -2,6 +2,8 @@
 const ANSWER_WITHIN_MS = 5000;
 // Two taps of a finger come within this time: the second one is the same press.
 const TAP_AGAIN_MS = 700;
+// A page that nobody touches for so long gives its socket back.
+const UNTOUCHED_MS = 60_000;
 export const ENTRIES = "input:not([type=hidden]), select";
 
 function newId() {
@@ -48,7 +50,60 @@ export function showBounds(root, bounds) {
 
 addEventListener("input", ({ target }) => target.matches?.("[data-entry]") && touched.add(target));
 
+// A socket for presses: a post costs a browser more than all the rest of a press.
+class Line {
+  #socket;
+  #waiting = new Map(); // who waits for the answer to a press
+  #left = false;
+
+  constructor(broke) {
+    this.#socket = new WebSocket(new URL(`${document.body.dataset.base}/presses`, location).href.replace(/^http/, "ws"));
+    this.#socket.onmessage = ({ data }) => {
+      const answer = JSON.parse(data);
+      this.#waiting.get(answer.press)?.resolve(answer);
+    };
+    this.#socket.onclose = () => {
+      for (const { reject } of this.#waiting.values()) reject();
+      broke(this);
+    };
+  }
+
+  // Open, and with nothing in it that did not leave.
+  get free() {
+    return this.#socket.readyState === WebSocket.OPEN && !this.#socket.bufferedAmount;
+  }
+
+  ask(press, answerMs) {
+    return new Promise((resolve, reject) => {
+      this.#waiting.set(press.id, { resolve, reject });
+      setTimeout(reject, answerMs);
+      this.#socket.send(JSON.stringify(press));
+    }).finally(() => {
+      this.#waiting.delete(press.id);
+      if (this.#left) this.leave();
+    });
+  }
+
+  // Nothing more is asked: it closes when the last one has its answer.
+  leave() {
+    this.#left = true;
+    if (!this.#waiting.size) this.#socket.close();
+  }
+}
+
+async function post(url, press, answerMs) {
+  const answer = await fetch(url, {
+    method: "POST",
+    headers: { "Content-Type": "application/json" },
+    body: JSON.stringify(press),
+    signal: AbortSignal.timeout(answerMs),
+  });
+  return { ...(await answer.json()), status: answer.status };
+}
+
 export class Presser {
+  #line = null;
+  #untouched = 0;
   #widgets;
   #sentences;
   #source;
@@ -66,6 +121,7 @@ export class Presser {
     const down = ({ target }) => {
       this.#down = target.closest?.("button:enabled");
       this.#seen = source.seen; // what was permitted when the finger came down
+      this.#open();
     };
     addEventListener("pointerdown", down, true);
     for (const form of document.forms) {
@@ -93,6 +149,24 @@ export class Presser {
     return { seen, at: this.#source.timeOf(event) };
   }
 
+  // From the touch that may become a press, which takes longer than to open it. Without a socket, and
+  // to cancel, a press is posted.
+  #open() {
+    clearTimeout(this.#untouched);
+    this.#untouched = setTimeout(() => this.close(), UNTOUCHED_MS);
+    if (this.#source.streams) this.#line ??= new Line((line) => this.#broke(line));
+  }
+
+  // With the event stream, too: what is under way still gets its answer.
+  close() {
+    this.#line?.leave();
+    this.#line = null;
+  }
+
+  #broke(line) {
+    if (line === this.#line) this.close();
+  }
+
   // A second tap while the first is under way is the same press: it sends nothing.
   async #press(root, button, form, click) {
     const url = button.getAttribute("formaction");
@@ -102,7 +176,9 @@ export class Presser {
     const pause = new Promise((resolve) => setTimeout(resolve, TAP_AGAIN_MS));
     try {
       const answerMs = ANSWER_WITHIN_MS + 1000 * (root.dataset.answerS ?? 0);
-      this.#show(root, await this.#send(url, form, click, answerMs));
+      const line = this.#line?.free && !button.matches(".cancel") ? this.#line : null;
+      const press = { ...this.#given(form), ...click };
+      this.#show(root, await this.#send(root.dataset.widget, line, url, press, answerMs));
       await pause;
     } finally {
       this.#underWay.delete(url);
@@ -110,25 +186,24 @@ export class Presser {
     }
   }
 
-  // Sent once and never again: when no answer comes, it is not known what became of it.
-  async #send(url, form, click, answerMs) {
+  #given(form) {
     const inputs = {};
     for (const input of form.elements) {
       if (input.matches(ENTRIES) && input.closest("[data-widget]")) inputs[input.name] = valueOf(input);
     }
-    const press = { inputs, id: newId(), ...click };
+    return { inputs, id: newId() };
+  }
+
+  // Sent once and never again: when no answer comes, it is not known what became of it.
+  async #send(widget, line, url, press, answerMs) {
     try {
-      const answer = await fetch(url, {
-        method: "POST",
-        headers: { "Content-Type": "application/json" },
-        body: JSON.stringify(press),
-        signal: AbortSignal.timeout(answerMs),
-      });
-      const receipt = await answer.json();
-      return receipt.outcome ? receipt : { outcome: "refused", reason: receipt.error };
+      const { status, error, ...receipt } = await (line?.ask({ widget, ...press }, answerMs) ?? post(url, press, answerMs));
+      if (receipt.outcome) return receipt;
+      if (status !== 500) return { outcome: "refused", reason: error };
     } catch {
-      return { outcome: "unknown", reason: this.#sentences.unsure };
+      if (line) this.#broke(line);
     }
+    return { outcome: "unknown", reason: this.#sentences.unsure };
   }
 
   #show(root, { id, outcome, reason }) {

@@ -37,6 +37,11 @@ export class Source {
     return this.#whole;
   }
 
+  // Whether there is an event stream, and not one snapshot after the other.
+  get streams() {
+    return this.#stream !== null;
+  }
+
   // The id of the last event: what the operator has seen.
   get seen() {
     return this.#seen;

@@ -1,0 +1,38 @@
+"""What a client says as JSON, in a body or on a socket: read with the same care everywhere."""
+
+import json
+from typing import Any, Final, TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from app.errors import InputError
+
+LONGEST: Final = 64 * 1024
+
+Model = TypeVar("Model", bound=BaseModel)
+
+
+def json_of(text: str | bytes, place: str = "the body") -> Any:
+    """What stands in it; InputError for what is not JSON, or has text that is not Unicode."""
+    try:
+        given = json.loads(text, parse_constant=_no_constant)
+        json.dumps(given, ensure_ascii=False).encode()  # half a surrogate pair is no text
+    except UnicodeEncodeError:
+        raise InputError(f"{place} has half of a surrogate pair, which is not Unicode text") from None
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{place} is not JSON: {error}") from None
+    return given
+
+
+def as_model(model: type[Model], given: object, place: str = "the body") -> Model:
+    """The same as a model; InputError names the first fault and its place."""
+    try:
+        return model.model_validate(given)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        where = ".".join(str(step) for step in first["loc"])
+        raise InputError(f"{where or place}: {first['msg']}") from None
+
+
+def _no_constant(name: str) -> float:
+    raise ValueError(f"{name} is not a number of JSON")
