@@ -1,21 +1,21 @@
 """The latest view with a version, and the events that bring a browser from one to another.
 
 There is no queue: a stream remembers the view that it sent last and, whenever it can send, gets
-the difference to the newest. Streams that are equally far share the same prepared bytes.
+the difference to the newest. What is sent is encoded once for all streams: those that are equally
+far share the same bytes, the others those of each event that says all of something.
 """
 
 import asyncio
 import json
 import secrets
-import time
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Final
 
-from fastapi.sse import format_sse_event
-
-from app import moments
-from app.sentences import clock
+from app.heartbeat import Heartbeat
 from app.views import View
+
+# Its text has no line break: it is one line of an event.
+ENCODE: Final = json.JSONEncoder(ensure_ascii=False, separators=(",", ":"), allow_nan=False).encode
 
 
 class Board:
@@ -27,9 +27,10 @@ class Board:
         self.version = 1
         self.view = view
         self.revision = revision
+        self.heartbeat = Heartbeat(self._wake)
         self._changed = asyncio.Event()
         self._prepared: dict[int, bytes] = {}
-        self._snapshot: bytes | None = None
+        self._whole: dict[str, bytes] = {}
         self._turned: dict[str, int] = {}
         self.closed = False
 
@@ -48,7 +49,8 @@ class Board:
                 self._turned[name] = self.version
         self.view = view
         self._prepared = {}
-        self._snapshot = None
+        self._whole = {}
+        self.heartbeat.along()
         self._wake()
 
     def turned(self, widget: str) -> int:
@@ -64,23 +66,14 @@ class Board:
         changed, self._changed = self._changed, asyncio.Event()
         changed.set()
 
-    async def newer(self, version: int, timeout_s: float) -> bool:
-        """Waits for a version after `version` or the end; False if neither came in time."""
-        if self.version > version or self.closed:
-            return True
-        try:
-            async with asyncio.timeout(timeout_s):
-                await self._changed.wait()
-        except TimeoutError:
-            return False
-        return True
+    async def news(self, version: int, beats: int) -> None:
+        """Waits for a version after `version`, a heartbeat after `beats`, or the end."""
+        if not self.closed and (self.version, self.heartbeat.count) == (version, beats):
+            await self._changed.wait()
 
     def snapshot(self) -> bytes:
         """The `snapshot` event: everything that the page shows."""
-        if self._snapshot is None:
-            data = {"id": self.id, "revision": self.revision, **self.view}
-            self._snapshot = self._event("snapshot", data)
-        return self._snapshot
+        return self._all_of("snapshot", {"id": self.id, "revision": self.revision, **self.view})
 
     def since(self, version: int, view: View) -> bytes:
         """The events from a view that was posted as `version` to the newest one."""
@@ -92,44 +85,41 @@ class Board:
     def _difference(self, old: View) -> bytes:
         new = self.view
         events = [
-            self._event(f"{name}-enabled-updated", state)
+            self._all_of(f"{name}-enabled-updated", state)
             for name, state in new["interlocks"].items()
             if old["interlocks"].get(name) != state
         ]
         widgets = {
-            name: changed
+            name: _changed(known, attributes)
             for name, attributes in new["widgets"].items()
-            if (changed := _changed(old["widgets"].get(name, {}), attributes))
+            if (known := old["widgets"].get(name, {})) != attributes
         }
         if widgets:
             events.append(self._event("update", widgets))
         if old["link"] != new["link"]:
-            events.append(self._event("link", new["link"]))
+            events.append(self._all_of("link", new["link"]))
         if old["control"] != new["control"]:
-            events.append(self._event("control", new["control"]))
+            events.append(self._all_of("control", new["control"]))
         if old["notice"] != new["notice"]:
-            events.append(self._event("notice", new["notice"]))
+            events.append(self._all_of("notice", new["notice"]))
         if old["robots"] != new["robots"]:
-            events.append(self._event("robots", new["robots"]))
+            events.append(self._all_of("robots", new["robots"]))
         return b"".join(events)
 
+    def _all_of(self, name: str, data: Mapping[str, Any]) -> bytes:
+        """An event that is the same whatever was sent before."""
+        whole = self._whole.get(name)
+        if whole is None:
+            whole = self._whole[name] = self._event(name, data)
+        return whole
+
     def _event(self, name: str, data: Mapping[str, Any]) -> bytes:
-        text = json.dumps(data, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
-        return format_sse_event(event=name, data_str=text, id=self.id)
-
-
-def beat() -> bytes:
-    """The heartbeat: a page that misses it locks itself. It has no id: nothing has changed.
-
-    `clock` is to be shown; `now` is the server's own time, in milliseconds.
-    """
-    data = {"clock": clock(time.time()), "now": round(moments.now() * 1000)}
-    return format_sse_event(event="beat", data_str=json.dumps(data))
+        return f"event: {name}\ndata: {ENCODE(data)}\nid: {self.id}\n\n".encode()
 
 
 def told(browser: str) -> bytes:
     """Tells a page the id of its browser: it knows by it what `control` means for it."""
-    return format_sse_event(event="browser", data_str=json.dumps({"id": browser}))
+    return f"event: browser\ndata: {ENCODE({'id': browser})}\n\n".encode()
 
 
 def _changed(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:

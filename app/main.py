@@ -16,7 +16,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from starlette.exceptions import HTTPException
 from starlette.middleware.gzip import GZipMiddleware
 
-from app import development, logs, simulator
+from app import development, logs, simulator, sockets
 from app.assets import Assets, load_assets
 from app.doors import Doors
 from app.errors import KioskError, PanelError
@@ -68,12 +68,13 @@ def create_app(settings: Settings | None = None) -> FastAPI:
                     await opened.enter_async_context(
                         development.reloading(site, settings, running, opened.pop_all())
                     )
-                watching = asyncio.create_task(watchdog.run())
+                tasks = [asyncio.create_task(work) for work in (watchdog.run(), sockets.narrow())]
                 try:
                     yield
                 finally:
-                    watching.cancel()
-                    await asyncio.gather(watching, return_exceptions=True)
+                    for task in tasks:
+                        task.cancel()
+                    await asyncio.gather(*tasks, return_exceptions=True)
                     watchdog.end()
 
     app = FastAPI(

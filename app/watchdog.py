@@ -7,22 +7,18 @@ that is away is no failure of the process.
 
 import asyncio
 import logging
-import os
-import socket
 import threading
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import suppress
-from pathlib import Path
+from collections.abc import Callable, Iterable
 from typing import Final, Protocol
 
 from app.sentences import say
+from app.sockets import listening, names
 from app.systemd import Manager, status
 
 log = logging.getLogger("kiosk.watchdog")
 
 STATUS_EVERY_S: Final = 5.0  # where there is no watchdog to ping
 LOOK_EVERY_S: Final = 0.05
-LISTENING_WITHIN_S: Final = 5.0  # a socket that the server was given listened before
 
 
 class Responding(Protocol):
@@ -52,7 +48,7 @@ class Watchdog:
         """Says READY when the server listens, then how it is, for ever."""
         if not self._manager.listens:
             return
-        await _listening()
+        await listening(names())
         self._manager.tell("READY=1")
         while True:
             stuck = await self._standing_still()
@@ -90,23 +86,3 @@ class Watchdog:
     def _alive(self) -> dict[int, threading.Thread]:
         self._asking = {of: thread for of, thread in self._asking.items() if thread.is_alive()}
         return self._asking
-
-
-async def _listening() -> None:
-    """Until there is one more listening socket than before: uvicorn opens its own last."""
-    before = set(_listeners())
-    with suppress(TimeoutError):
-        async with asyncio.timeout(LISTENING_WITHIN_S):
-            while set(_listeners()) <= before:
-                await asyncio.sleep(LOOK_EVERY_S)
-
-
-def _listeners() -> Iterator[str]:
-    """This process's listening sockets, by their names in /proc."""
-    for entry in Path("/proc/self/fd").iterdir():
-        with suppress(OSError):
-            name = os.readlink(entry)
-            if name.startswith("socket:"):
-                with socket.socket(fileno=os.dup(int(entry.name))) as one:
-                    if one.getsockopt(socket.SOL_SOCKET, socket.SO_ACCEPTCONN):
-                        yield name

@@ -2,14 +2,12 @@
 
 import asyncio
 import json
-import re
 from collections.abc import Coroutine
 from typing import Any
 
 import pytest
 
-from app import moments
-from app.board import Board, beat
+from app.board import Board
 from app.robot import Robot
 from app.views import View, sight
 from tests.builders import NOW, permits, robot_there, says, small_panel
@@ -39,8 +37,9 @@ def events(chunk: bytes) -> dict[str, Any]:
     return {name: json.loads(data) for name, data, _ in found}
 
 
-def run(work: Coroutine[Any, Any, bool]) -> bool:
-    return asyncio.run(work)
+def run(work: Coroutine[Any, Any, None]) -> None:
+    """A wait that does not end fails."""
+    asyncio.run(asyncio.wait_for(work, 10))
 
 
 def test_a_snapshot_is_everything_that_the_page_shows(board: Board) -> None:
@@ -143,21 +142,45 @@ def test_no_text_of_the_robots_breaks_the_stream(board: Board, robot: Robot, tex
     assert events(board.since(1, old))["update"]["heard"]["text"] == text
 
 
+def test_what_says_all_of_something_is_encoded_once_for_streams_however_far(
+    board: Board, robot: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    views = [board.view]
+    for word in ("one", "two"):
+        says(robot, "/heard", word)
+        board.post(view_of(robot))
+        views.append(board.view)
+    permits(robot)
+    board.post(view_of(robot))
+    encoded: list[Any] = []
+
+    def encode(data: Any) -> str:
+        encoded.append(data)
+        return json.dumps(data)
+
+    monkeypatch.setattr("app.board.ENCODE", encode)
+    sent = [events(board.since(version, view)) for version, view in enumerate(views, 1)]
+    assert all(one["operation-enabled-updated"] == {"enabled": True, "reason": None} for one in sent)
+    assert all(one["link"] == board.view["link"] for one in sent)
+    assert [one["update"] for one in sent] == encoded[1:2] + encoded[3:]
+    assert len(encoded) == 5  # the permission and the links once, the widgets for each
+
+
 def test_who_is_behind_does_not_wait(board: Board, robot: Robot) -> None:
     permits(robot)
     board.post(view_of(robot))
-    assert run(board.newer(1, 60))
+    run(board.news(1, 0))
 
 
 def test_who_waits_is_woken_by_a_new_view(board: Board, robot: Robot) -> None:
     permits(robot)
     new = view_of(robot)
 
-    async def woken() -> bool:
+    async def woken() -> None:
         asyncio.get_running_loop().call_soon(board.post, new)
-        return await board.newer(1, 60)
+        await board.news(1, 0)
 
-    assert run(woken())
+    run(woken())
     assert board.version == 2
 
 
@@ -165,39 +188,34 @@ def test_all_who_wait_are_woken(board: Board, robot: Robot) -> None:
     permits(robot)
     new = view_of(robot)
 
-    async def woken() -> bool:
+    async def woken() -> None:
         asyncio.get_running_loop().call_soon(board.post, new)
-        return all(await asyncio.gather(*(board.newer(1, 60) for _ in range(5))))
+        await asyncio.gather(*(board.news(1, 0) for _ in range(5)))
 
-    assert run(woken())
+    run(woken())
 
 
-@pytest.mark.parametrize("timeout_s", [0.0, -1.0])
-def test_who_waits_is_told_when_nothing_came(board: Board, timeout_s: float) -> None:
-    assert not run(board.newer(1, timeout_s))
+def test_who_waits_is_woken_by_the_heartbeat(board: Board) -> None:
+    async def woken() -> None:
+        with board.heartbeat.heard():
+            await board.news(1, 0)
+
+    run(woken())
+    assert (board.version, board.heartbeat.count) == (1, 1)
 
 
 def test_the_end_wakes_who_waits(board: Board) -> None:
-    async def woken() -> bool:
+    async def woken() -> None:
         asyncio.get_running_loop().call_soon(board.close)
-        return await board.newer(1, 60)
+        await board.news(1, 0)
 
-    assert run(woken())
+    run(woken())
     assert board.closed
 
 
 def test_after_the_end_nobody_waits(board: Board) -> None:
     board.close()
-    assert run(board.newer(1, 60))
-
-
-def test_the_heartbeat_tells_the_time_and_has_no_id() -> None:
-    before = moments.now()
-    ((name, data, event_id),) = events_in(beat().decode())
-    told = json.loads(data)
-    assert (name, event_id) == ("beat", "")
-    assert re.fullmatch(r"\d\d:\d\d:\d\d", told["clock"])
-    assert round(before * 1000) <= told["now"] <= round(moments.now() * 1000)
+    run(board.news(1, 0))
 
 
 def test_the_board_knows_when_a_lock_has_last_turned(board: Board, robot: Robot) -> None:

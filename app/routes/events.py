@@ -1,29 +1,30 @@
 """The event stream: a snapshot first, then changes, and a heartbeat that never stops."""
 
-import time
-from collections.abc import AsyncIterator
+import asyncio
 from typing import Final
 
 from fastapi import APIRouter, Request
 from fastapi.responses import Response
-from fastapi.sse import EventSourceResponse
+from prometheus_client import Gauge
+from starlette.types import Message, Receive, Scope, Send
 
-from app.board import Board, beat, told
-from app.routes.site import CurrentKiosk, CurrentSite, Site
+from app.board import Board, told
+from app.heartbeat import beat
+from app.routes.site import CurrentKiosk, CurrentSite
 from app.routes.visitors import keep, welcomed
 
 router = APIRouter()
 
-BEAT_S: Final = 0.5  # a page locks itself after 1.75 s without any event
 RECONNECT_MS: Final = 500
 
 HEADERS: Final = {"cache-control": "no-store", "x-accel-buffering": "no"}
+MEDIA_TYPE: Final = "text/event-stream"
 
 
 @router.get(
     "/events",
     response_class=Response,
-    responses={200: {"content": {"text/event-stream": {}}}},
+    responses={200: {"content": {MEDIA_TYPE: {}}}},
     summary="Server-sent events: snapshot, <interlock>-enabled-updated, update, link, control, beat",
 )
 async def events(
@@ -33,32 +34,55 @@ async def events(
     board = kiosk.board
     browser, token = welcomed(request, site) if board.view["control"]["required"] else (None, "")
     first = told(browser.id) if browser else b""
+    answer: Response
     if once:
         all_of_it = board.snapshot() + first + beat()
-        answer = Response(all_of_it, media_type="text/event-stream", headers=HEADERS)
+        answer = Response(all_of_it, media_type=MEDIA_TYPE, headers=HEADERS)
     else:
-        answer = EventSourceResponse(_counted(site, board, first), headers=HEADERS)
+        answer = EventStream(board, first, site.metrics.streams)
     return keep(answer, request, token)
 
 
-async def _counted(site: Site, board: Board, first: bytes) -> AsyncIterator[bytes]:
-    with site.metrics.streams.track_inprogress():
-        async for chunk in stream(board, first):
-            yield chunk
+class EventStream(Response):
+    """What one browser gets, until it goes or the board is closed. It waits while the browser does
+    not read, and then skips to now."""
+
+    media_type = MEDIA_TYPE
+
+    def __init__(self, board: Board, first: bytes, streams: Gauge) -> None:
+        """`first` comes with the snapshot; `streams` counts it while it is open."""
+        self._board = board
+        self._first = first
+        self._streams = streams
+        self.status_code = 200
+        self.background = None
+        self.init_headers(HEADERS)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        await send({"type": "http.response.start", "status": 200, "headers": self.raw_headers})
+        with self._streams.track_inprogress(), self._board.heartbeat.heard():
+            async with asyncio.TaskGroup() as group:
+                # A task of its own: waking it wakes nothing of what the request came through.
+                writing = group.create_task(self._write(send))
+                while (await receive())["type"] != "http.disconnect":
+                    pass
+                writing.cancel()
+
+    async def _write(self, send: Send) -> None:
+        board, heartbeat = self._board, self._board.heartbeat
+        version, view, beats = board.version, board.view, heartbeat.count
+        retry = f"retry: {RECONNECT_MS}\n\n".encode()
+        await send(_body(retry + board.snapshot() + self._first + beat()))
+        while not board.closed:
+            await board.news(version, beats)
+            chunk = board.since(version, view) if board.version > version else b""
+            if heartbeat.count > beats:
+                chunk += heartbeat.event
+            version, view, beats = board.version, board.view, heartbeat.count
+            if chunk:
+                await send(_body(chunk))
+        await send({"type": "http.response.body", "body": b"", "more_body": False})
 
 
-async def stream(board: Board, first: bytes = b"") -> AsyncIterator[bytes]:
-    """What one browser gets; `first` comes with the snapshot. It waits while the browser does not
-    read, and then skips to now."""
-    version, view = board.version, board.view
-    yield f"retry: {RECONNECT_MS}\n\n".encode() + board.snapshot() + first + beat()
-    next_beat = time.monotonic() + BEAT_S
-    while not board.closed:
-        await board.newer(version, next_beat - time.monotonic())
-        if board.version > version:
-            chunk = board.since(version, view)
-            version, view = board.version, board.view
-            yield chunk
-        if not board.closed and time.monotonic() >= next_beat:
-            next_beat = time.monotonic() + BEAT_S
-            yield beat()
+def _body(chunk: bytes) -> Message:
+    return {"type": "http.response.body", "body": chunk, "more_body": True}

@@ -7,7 +7,7 @@ const POLL_MS = 700;
 const OPEN_AGAIN_MS = 3000;
 // A browser opens six connections to one server; pages and presses need some of them.
 const STREAMS_PER_BROWSER = 3;
-const BEATS_KEPT = 8;
+const DRIFT_MS = 0.1; // by which two clocks may go apart from one beat to the next
 const EVENTS = ["snapshot", "update", "link", "notice", "robots", "control", "browser", "beat"];
 const BASE = document.body.dataset.base; // of the robot that this page shows
 
@@ -23,9 +23,10 @@ export class Source {
   #fresh = true; // the page itself is a snapshot, until its time is up
   #whole = true;
   #seen = document.body.dataset.seen;
-  // The server's own time is at least performance.now() plus the largest of these: what comes late
-  // makes one smaller.
-  #offsets = [Number(document.body.dataset.now) - this.#aliveAt];
+  // The server's own time is at least performance.now() plus this: what comes late makes it smaller,
+  // so that the largest counts.
+  #offset = Number(document.body.dataset.now) - this.#aliveAt;
+  #synced = true; // false from a snapshot to the beat behind it, which begins anew
 
   // `handlers` has a function for each event, and `lost`.
   constructor(handlers) {
@@ -49,7 +50,7 @@ export class Source {
 
   // The server's own time of an event here, in RFC 3339.
   timeOf(event) {
-    return new Date(Math.max(...this.#offsets) + event.timeStamp).toISOString();
+    return new Date(this.#offset + event.timeStamp).toISOString();
   }
 
   start() {
@@ -123,7 +124,7 @@ export class Source {
   #listen() {
     this.#stream = new EventSource(`${BASE}/events`);
     for (const name of EVENTS) {
-      this.#stream.addEventListener(name, (event) => this.#got(name, event.data, event.lastEventId));
+      this.#stream.addEventListener(name, (event) => this.#streamed(name, event));
     }
     // Permissions come under the names of their interlocks too; the widgets' own state is in `update`.
     this.#stream.onerror = () => {
@@ -146,7 +147,7 @@ export class Source {
       const text = await answer.text();
       if (turn !== this.#turn) return;
       for (const [, name, data, id] of text.matchAll(/^event: (.*)\ndata: (.*)\n(?:id: (.*)\n)?/gm)) {
-        this.#got(name, data, id, asked);
+        this.#got(name, JSON.parse(data), id, asked);
       }
     } catch {
       if (turn === this.#turn) this.#lose();
@@ -154,12 +155,31 @@ export class Source {
     if (turn === this.#turn) this.#poll = setTimeout(() => this.#open(), POLL_MS);
   }
 
-  #got(name, text, id, at = performance.now()) {
-    if (name === "snapshot") this.#fresh = true;
+  // What has waited on its way, in a buffer of whoever stood still, is not shown, and nothing after
+  // it: a new stream begins with what is so now.
+  #streamed(name, event) {
+    const data = JSON.parse(event.data);
+    const stamp = name === "beat" ? data.now : Infinity;
+    if (!this.#late(stamp)) return this.#got(name, data, event.lastEventId);
+    this.#lose();
+    this.#open();
+  }
+
+  #late(stamp) {
+    const now = performance.now();
+    const silence = now - Math.max(this.#aliveAt, this.#openedAt);
+    if (silence > (this.#fresh ? SILENCE_MS : OPEN_AGAIN_MS)) return true;
+    return this.#synced && this.#offset + now - stamp > SILENCE_MS;
+  }
+
+  #got(name, data, id, at = performance.now()) {
+    if (name === "snapshot") {
+      this.#fresh = true;
+      this.#synced = false;
+    }
     if (!this.#fresh) return; // after a loss only a snapshot says what is so
     this.#aliveAt = at;
-    const data = JSON.parse(text);
-    if (data.now) this.#offsets = [data.now - performance.now(), ...this.#offsets].slice(0, BEATS_KEPT);
+    if (name === "beat") this.#sync(data.now - performance.now());
     if (id) this.#seen = id;
     try {
       this.#on[name](data);
@@ -167,6 +187,11 @@ export class Source {
       this.#lose(); // what can't be shown whole is not shown as if it were
       throw error;
     }
+  }
+
+  #sync(offset) {
+    this.#offset = this.#synced ? Math.max(this.#offset - DRIFT_MS, offset) : offset;
+    this.#synced = true;
   }
 
   // After a silence only a new stream brings a new snapshot, even if the old one speaks again.

@@ -1,0 +1,47 @@
+"""What the server listens on is found, and what it accepts keeps little unread."""
+
+import asyncio
+import socket
+
+from app import sockets
+from app.sockets import SEND_BUFFER
+
+
+def accepted(listening: socket.socket) -> int:
+    """The send buffer of a connection to it."""
+    with socket.create_connection(listening.getsockname()), listening.accept()[0] as one:
+        return one.getsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF)
+
+
+def test_a_listening_socket_is_found_and_no_other() -> None:
+    before = sockets.names()
+    with socket.create_server(("127.0.0.1", 0)) as one:
+        (found,) = sockets.names() - before
+        with socket.create_connection(one.getsockname()):
+            assert sockets.names() == before | {found}
+    assert sockets.names() == before
+
+
+def test_who_waits_for_it_is_told_when_it_listens() -> None:
+    async def work() -> None:
+        waiting = asyncio.create_task(sockets.listening(sockets.names()))
+        await asyncio.sleep(0)
+        assert not waiting.done()
+        with socket.create_server(("127.0.0.1", 0)):
+            await asyncio.wait_for(waiting, 4)
+
+    asyncio.run(work())
+
+
+def test_what_listens_from_now_on_is_narrowed_and_what_listened_before_is_not() -> None:
+    async def work() -> None:
+        with socket.create_server(("127.0.0.1", 0)) as old:
+            wide = accepted(old)
+            narrowing = asyncio.create_task(sockets.narrow())
+            await asyncio.sleep(0)
+            with socket.create_server(("127.0.0.1", 0)) as new:
+                await asyncio.wait_for(narrowing, 4)
+                assert accepted(new) == 2 * SEND_BUFFER < wide
+                assert accepted(old) == wide
+
+    asyncio.run(work())
