@@ -221,6 +221,7 @@ ENGLISH: Final[Mapping[str, str]] = {
     "hold_elsewhere": "held by another browser.",
     "hold_same_topic": "{label} is held, which sends on {topic} too.",
     "hold_late": "the press came too late.",
+    "hold_let_go": "it was let go before it began: hold it longer.",
     "hold_over": "This hold is over: let go and press again.",
     "hold_scripts": "Locked: holding needs the page's scripts.",
     "hold_cut": "The connection to the panel's server was lost while this was held.",

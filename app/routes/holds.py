@@ -11,6 +11,9 @@ had it: so each one's age is known. Without an answer no browser shows that some
     server   {"stamp": 83.0, "state": "held"}
     browser  {"do": "end", "why": "released", "lease": "…", "stamp": 83.0, "after": 12}
     server   {"stamp": 96.4, "state": "ended", "outcome": "published", "reason": "…"}
+
+An end without a lease is that of a browser which has no answer to its begin yet; it may come instead of
+a begin, too, and is answered as any other.
 """
 
 import asyncio
@@ -85,7 +88,7 @@ class Beat(Said):
 
 class End(Said):
     do: Literal["end"]
-    lease: str
+    lease: str = ""
     why: str
 
 
@@ -145,6 +148,8 @@ class _Session:
                 said = await self._read()
         except TimeoutError:
             return holds.refuse(widget, by, say("hold_late"))
+        if isinstance(said, End):
+            return holds.refuse(widget, by, say("hold_let_go"))
         if not isinstance(said, Begin):
             return holds.refuse(widget, by, say("hold_by_nonsense"))
         sent = self._sent(said)
@@ -156,7 +161,7 @@ class _Session:
         except LogError as error:
             return holds.refuse(widget, by, str(error), "log")
         if not still_held:
-            return holds.refuse(widget, by, say("hold_late"))
+            return holds.refuse(widget, by, say("hold_let_go"))
         return holds.begin(widget, said.inputs, sent, by, self._ended.set_result)
 
     async def _written(self, widget: str, said: Begin, by: By) -> bool:
@@ -200,11 +205,11 @@ class _Session:
     def _hear(self, said: Begin | Beat | End | None, holding: Holding) -> bool:
         """Whether the hold goes on after what was said."""
         holds = self._kiosk.holds
-        if said is None or isinstance(said, Begin) or said.lease != holding.lease.id:
-            holds.end(holding, "hold_by_nonsense")
-            return False
-        if isinstance(said, End):
+        if isinstance(said, End) and said.lease in ("", holding.lease.id):
             holds.end(holding, WHYS.get(said.why, "hold_by_nonsense"))
+            return False
+        if not isinstance(said, Beat) or said.lease != holding.lease.id:
+            holds.end(holding, "hold_by_nonsense")
             return False
         return holds.beat(holding, said.number, self._sent(said))
 
