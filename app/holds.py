@@ -20,7 +20,7 @@ from app.leases import LEASE_S, Lease
 from app.logs import RobotLog
 from app.panel.check_holds import with_own_fields
 from app.panel.model import Hold, Panel
-from app.panel.template import filled, names_in
+from app.panel.template import filled, inputs_of, needed
 from app.progress import Answer, Outcome
 from app.receipts import LONGEST_LOGGED, By, Cause, Receipt, cause_of, judged, named, receipt_of
 from app.robot import Robot
@@ -126,7 +126,7 @@ class Holds:
         if why := by.doubt():
             return self._refused(widget, inputs, by, why, "interlock")
         try:
-            values = self._checked(names_in([widget.message, widget.release]), inputs)
+            values = self._checked(inputs_of(widget), inputs)
             fields, last_fields = filled(widget.message, values), filled(widget.release, values)
             for each in (fields, last_fields):
                 self._interfaces.encode(widget.type, with_own_fields(widget, each, 0, 0))
@@ -134,7 +134,7 @@ class Holds:
             return self._refused(widget, inputs, by, f"{error}.", "input")
         lease = Lease.begun(secrets.token_hex(8), widget.period_s, sent, now)
         since = say("hold_since", time=clock(time.time()))
-        holding = Holding(widget, lease, by, dict(inputs), fields, last_fields, told, since)
+        holding = Holding(widget, lease, by, needed(widget, inputs), fields, last_fields, told, since)
         self._held[widget_id] = holding
         self._robot.held[widget_id] = since
         self._log.info("hold %s of %s by %s with %.*s begins", lease.id, widget_id, named(by.origin),
@@ -258,5 +258,5 @@ class Holds:
     ) -> Receipt:
         text = say("refused", why=why, time=clock(time.time()))
         self._log.warning("hold of %s by %s with %.*s: %s", widget.id, named(by.origin),
-                LONGEST_LOGGED, inputs, text)  # fmt: skip
+                LONGEST_LOGGED, needed(widget, inputs), text)  # fmt: skip
         return receipt_of(widget, inputs, secrets.token_hex(8), Answer("refused", text), cause)

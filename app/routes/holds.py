@@ -35,6 +35,7 @@ from app.holds import RELEASED, Holding
 from app.kiosk import Kiosk
 from app.leases import sent_at
 from app.logbook import Noted
+from app.panel.template import needed
 from app.receipts import By, Receipt, with_doubt
 from app.routes.messages import LONGEST, json_of
 from app.routes.site import CurrentKiosk, CurrentSite
@@ -166,8 +167,9 @@ class _Session:
 
     async def _written(self, widget: str, said: Begin, by: By) -> bool:
         """The entry in the log, while the browser is listened to: whether it holds still."""
+        own = needed(self._kiosk.holds.widget(widget), said.inputs)
         writing = asyncio.ensure_future(
-            self._kiosk.logbook.pressed(widget, said.inputs, secrets.token_hex(8), by.origin, "hold")
+            self._kiosk.logbook.pressed(widget, own, secrets.token_hex(8), by.origin, "hold")
         )
         self._next = asyncio.ensure_future(self._received())
         await asyncio.wait({writing, self._next}, return_when=asyncio.FIRST_COMPLETED)

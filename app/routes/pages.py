@@ -127,7 +127,7 @@ def _render(request: Request, site: Site, page: Page) -> Response:
         loaded=moment(wall),
         press_id=secrets.token_hex(8),
         receipt=receipt,
-        inputs=dict(receipt.inputs) if receipt else {},
+        inputs=dict(receipt.entered) if receipt else {},
         words={"base": kiosk.base, "log": say("log_link"), "asks": asks_of(site.fleet.panel, page)}
         | {word: say(word) for word in (*WORDS, *LINK_WORDS)}
         | {act: say(f"control_{act}") for act in CONTROL_ACTS},
