@@ -20,6 +20,7 @@ from app.log.chain import verify
 from app.log.file import NAME
 from app.routes.visitors import COOKIE
 from tests.parts import ROOT, Process, Server, free_port, until
+from tests.test_holds_in_browser import PANEL as HOLDING
 
 FULL = "The operator's log can't be written: no space left on device."
 # A data folder on a disk of its own, which only the server and its children see.
@@ -221,6 +222,17 @@ def test_a_filter_narrows_page_and_csv_alike(demo: Server) -> None:
     ):
         assert [row["press"] for row in as_rows(demo.http.get(f"/log.csv?{query}").text)] == ids
         assert page_text(demo, f"/log?{query}").count("<tr data-kind") == len(ids), query
+
+
+def test_holds_can_be_filtered_by_and_have_their_names(tmp_path: Path) -> None:
+    panel = tmp_path / "jog.toml"
+    panel.write_text(HOLDING)
+    server = Server(ROOT, KIOSK_PANEL=str(panel), KIOSK_MODE="demo")
+    try:
+        until(server.ready, "ready")
+        assert '<option value="jog">Jog</option>' in server.http.get("/log").text
+    finally:
+        server.end()
 
 
 def test_a_bad_filter_is_named(demo: Server) -> None:

@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from app.errors import InputError, NotFound
 from app.log import Filter, OperatorLog, Row
-from app.panel.model import Panel, Pressed
+from app.panel.model import Hold, Panel, Pressed
 from app.routes.site import CurrentSite, Site
 from app.sentences import say
 
@@ -96,7 +96,7 @@ async def page(site: CurrentSite, wanted: Annotated[Wanted, Query()]) -> Respons
         panel=panel,
         wanted=wanted,
         rows=rows,
-        labels={w.id: w.label for w in panel.widgets() if isinstance(w, Pressed)},
+        labels={w.id: w.label for w in panel.widgets() if isinstance(w, Pressed | Hold)},
         outcomes=OUTCOMES,
         off="" if site.log.enabled else say("log_off"),
         banner=site.fleet.first.board.view["notice"]["banner"],
