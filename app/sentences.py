@@ -99,6 +99,8 @@ ENGLISH: Final[Mapping[str, str]] = {
     "no_effect": "{topic} did not show it within {seconds} s: it is not known whether it was done.",
     # Before a command.
     "ask": "{label}: do it?",
+    "ask_on": "{label} on {robot}?",
+    "empty": "(empty)",
     "back": "Back",
     # Who has control.
     "browser": "Panel {number}",

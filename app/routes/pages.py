@@ -11,6 +11,7 @@ from app import moments
 from app.control import Refusal
 from app.control_view import Role, role
 from app.errors import NotFound
+from app.kiosk import Kiosk
 from app.panel.model import Input, Page, Panel, Pressed
 from app.panel.parameter import Parameter
 from app.panel.template import inputs_of
@@ -32,7 +33,7 @@ RELOADED_S = 2.0  # a press on a page that should have reloaded before is one on
 # How long after a page without scripts was due it is still thought to be there.
 GRACE_S = 5
 REFUSALS = get_args(Refusal)
-WORDS = ("cancel", "robots", "control", "set", "back", "hold_cut", "hold_scripts")
+WORDS = ("cancel", "robots", "control", "set", "back", "empty", "hold_cut", "hold_scripts")
 LINK_WORDS = ("links", "link_state", "link_since", "link_locks")
 CONTROL_ACTS = ("take", "ask", "give", "keep", "release", "withdraw")
 
@@ -128,7 +129,7 @@ def _render(request: Request, site: Site, page: Page) -> Response:
         press_id=secrets.token_hex(8),
         receipt=receipt,
         inputs=dict(receipt.entered) if receipt else {},
-        words={"base": kiosk.base, "log": say("log_link"), "asks": asks_of(site.fleet.panel, page)}
+        words={"base": kiosk.base, "log": say("log_link"), "asks": asks_of(kiosk, page)}
         | {word: say(word) for word in (*WORDS, *LINK_WORDS)}
         | {act: say(f"control_{act}") for act in CONTROL_ACTS},
         lost=say("server_lost"),
@@ -148,13 +149,15 @@ def _render(request: Request, site: Site, page: Page) -> Response:
     return keep(HTMLResponse(html, headers={"cache-control": "no-store"}), request, token)
 
 
-def asks_of(panel: Panel, page: Page) -> dict[str, Ask]:
+def asks_of(kiosk: Kiosk, page: Page) -> dict[str, Ask]:
     """What is asked before the presses of a page that ask first."""
     pressed = (w for w in page.widgets if isinstance(w, Pressed) and w.confirm_press)
-    return {widget.id: ask_of(panel, widget) for widget in pressed}
+    return {widget.id: ask_of(kiosk, widget) for widget in pressed}
 
 
-def ask_of(panel: Panel, widget: Pressed) -> Ask:
-    inputs = {w.id: w for w in panel.widgets() if isinstance(w, Input | Parameter)}
-    needed = [inputs[name] for name in inputs_of(widget)]
-    return Ask(sentence=say("ask", label=widget.label), inputs=needed)
+def ask_of(kiosk: Kiosk, widget: Pressed) -> Ask:
+    """With the robot's name, where there are several."""
+    inputs = {w.id: w for w in kiosk.panel.widgets() if isinstance(w, Input | Parameter)}
+    robot = kiosk.entry.name if kiosk.entry else ""
+    sentence = say("ask_on" if robot else "ask", label=widget.label, robot=robot)
+    return Ask(sentence=sentence, inputs=[inputs[name] for name in inputs_of(widget)])
