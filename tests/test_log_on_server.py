@@ -276,6 +276,7 @@ def test_the_page_works_without_scripts(
         page.goto(demo.url)
         page.get_by_role("link", name="Log").click()
         expect(page.get_by_role("heading", name="Operator's log")).to_be_visible()
+        page.get_by_text("Filter", exact=True).click()
         page.get_by_label("Text").fill("turn")
         page.get_by_role("button", name="Show").click()
         expect(page.locator("tbody tr")).to_have_count(50)
@@ -291,6 +292,11 @@ def test_the_page_works_without_scripts(
         assert small == []
         wide = page.evaluate("document.documentElement.scrollWidth - innerWidth")
         assert wide <= 0
+        table = page.locator(".entries")
+        assert table.evaluate("(e) => e.scrollWidth - e.clientWidth") <= 0
+        row = table.locator("tbody tr").first
+        expect(row.locator("td").nth(3)).to_have_text(re.compile("^Message turn"))
+        expect(row.locator("td").nth(5)).to_have_text(re.compile("^publishedSent on"))
     finally:
         context.close()
 
