@@ -10,7 +10,8 @@ from playwright.sync_api import Browser, Page, expect
 from tests.parts import ROOT, Server, until
 from tests.test_in_browser import SIZES
 
-LONG: Final = "Geschwindigkeitsbegrenzungsfreigabe"
+SOFT_HYPHEN: Final = "\u00ad"
+LONG: Final = SOFT_HYPHEN.join(("Geschwindigkeits", "begrenzungs", "freigabe"))
 ROBOT: Final = "Montageroboter Süd"
 PANEL: Final = f"""
 title = "Schweißzelle 3 – Roboterarbeitsplatz"
@@ -67,6 +68,13 @@ type = "std_msgs/msg/String"
 message = {{ data = "{{message}}" }}
 confirm_press = true
 [[page.widget]]
+id = "serial"
+kind = "parameter"
+label = "Seriennummer der Steuerung"
+node = "/system_controller"
+parameter = "serial"
+type = "string"
+[[page.widget]]
 id = "enabled"
 kind = "indicator"
 label = "Betriebsfreigabe"
@@ -82,13 +90,6 @@ label = "Vorschub"
 node = "/system_controller"
 parameter = "speed"
 type = "double"
-[[page.widget]]
-id = "serial"
-kind = "parameter"
-label = "Seriennummer der Steuerung"
-node = "/system_controller"
-parameter = "serial"
-type = "string"
 """
 
 
@@ -174,3 +175,41 @@ def test_without_scripts_it_is_asked_the_same(demo: Server, chromium: Browser) -
     expect(page.get_by_role("heading")).to_have_text(f"{LONG} on {ROBOT}?")
     expect(page.locator("dd")).to_have_text("(empty)")
     context.close()
+
+
+def test_the_first_button_is_seen_without_scrolling(shown: Page) -> None:
+    button = box(shown, '[data-widget="allow"] > button')
+    assert button["y"] + 0.8 * button["height"] <= shown.evaluate("innerHeight")
+    assert box(shown, '[data-widget="n"]')["y"] == box(shown, '[data-widget="speed"]')["y"]
+
+
+def test_what_only_shows_is_no_higher_than_what_it_shows(shown: Page) -> None:
+    low, high = box(shown, '[data-widget="enabled"]'), box(shown, '[data-widget="feed"]')
+    assert low["y"] == high["y"]
+    assert low["height"] < high["height"] / 2
+    expect(shown.locator('[data-widget="serial"] .setting')).to_be_hidden()
+    assert box(shown, '[data-widget="serial"]')["height"] < high["height"] * 0.7
+
+
+# Where in its text a button begins a new line.
+BREAKS: Final = """(button) => {
+  const text = button.firstChild, one = document.createRange(), found = [];
+  let last = null;
+  for (let at = 0; at < text.length; at++) {
+    one.setStart(text, at);
+    one.setEnd(text, at + 1);
+    const place = [...one.getClientRects()].at(-1); // the first one may be the end of the line before
+    if (!place?.width) continue;
+    const { top } = place;
+    if (last !== null && top > last) found.push(at);
+    last = top;
+  }
+  return found;
+}"""
+
+
+def test_a_soft_hyphen_says_where_a_long_word_is_broken(shown: Page) -> None:
+    """No browser needs a dictionary for it."""
+    breaks = shown.locator('[data-widget="allow"] > button').evaluate(BREAKS)
+    assert breaks
+    assert {LONG[at - 1] for at in breaks} <= {SOFT_HYPHEN}
