@@ -4,7 +4,7 @@ const ANSWER_WITHIN_MS = 5000;
 const TAP_AGAIN_MS = 700;
 // A page that nobody touches for so long gives its socket back.
 const UNTOUCHED_MS = 60_000;
-export const ENTRIES = "input:not([type=hidden]), select";
+const ENTRIES = "input:not([type=hidden]), select";
 
 function newId() {
   const bytes = crypto.getRandomValues(new Uint8Array(16));
@@ -13,12 +13,18 @@ function newId() {
 
 // With its type. What is no number (an empty field), or a whole one that is not exact here, goes as it
 // is written: the server says what is wrong.
-export function valueOf(input) {
+function valueOf(input) {
   if (input.type === "checkbox") return input.checked;
   const number = input.type === "number" || input.type === "range";
   if (!number || input.value === "") return input.value;
   const value = Number(input.value);
   return Number.isInteger(value) && !Number.isSafeInteger(value) ? input.value : value;
+}
+
+// All that is entered on the page, by the names of the inputs.
+export function inputsOf(form) {
+  const entries = [...form.elements].filter((input) => input.matches(ENTRIES) && input.closest("[data-widget]"));
+  return Object.fromEntries(entries.map((input) => [input.name, valueOf(input)]));
 }
 
 // The input of a parameter: it shows the robot's value until it is touched, and then what was entered
@@ -177,21 +183,13 @@ export class Presser {
     try {
       const answerMs = ANSWER_WITHIN_MS + 1000 * (root.dataset.answerS ?? 0);
       const line = this.#line?.free && !button.matches(".cancel") ? this.#line : null;
-      const press = { ...this.#given(form), ...click };
+      const press = { inputs: inputsOf(form), id: newId(), ...click };
       this.#show(root, await this.#send(root.dataset.widget, line, url, press, answerMs));
       await pause;
     } finally {
       this.#underWay.delete(url);
       button.removeAttribute("aria-busy");
     }
-  }
-
-  #given(form) {
-    const inputs = {};
-    for (const input of form.elements) {
-      if (input.matches(ENTRIES) && input.closest("[data-widget]")) inputs[input.name] = valueOf(input);
-    }
-    return { inputs, id: newId() };
   }
 
   // Sent once and never again: when no answer comes, it is not known what became of it.
