@@ -16,8 +16,8 @@ from app.inputs import limits
 from app.interlocks import Verdict, interlock_verdict, press_verdict, way
 from app.lamps import Lamp, LinkLamp, lamps, summary
 from app.panel.displays import Indicator, Readout
-from app.panel.inputs import Numeric, SelectInput, TextInput, ToggleInput
-from app.panel.model import Action, Call, Hold, Panel, Pressed, Publish
+from app.panel.inputs import Numeric
+from app.panel.model import Action, Call, Display, Hold, Input, Panel, Pressed, Publish
 from app.panel.parameter import Parameter
 from app.parameter_display import parameter
 from app.progress import IDLE, Progress
@@ -49,6 +49,8 @@ class View(TypedDict):
     control: ControlView
 
 
+Shown = Input | Pressed | Hold | Display
+
 NO_OTHERS: Final[Mapping[str, Lamp]] = {}
 
 
@@ -75,60 +77,53 @@ def sight(
 ) -> Sight:
     """The view at `now` (monotonic seconds); `fault` stands above it, for `lock` nothing can be
     pressed, where they are not ""."""
-    untils = [math.inf]
-
-    verdicts: dict[str, Verdict] = {}
-
-    def judged(widget: Pressed | Hold) -> Verdict:
-        verdict = noted(press_verdict(widget, panel.interlock(widget.interlock), robot, now))
-        verdicts[widget.id] = Verdict(False, "log", lock) if lock else verdict
-        return verdicts[widget.id]
-
-    def noted(verdict: Verdict) -> Verdict:
-        untils.append(verdict.until)
-        return verdict
-
-    passable = noted(way(robot, now))
-    interlocks = {i.id: noted(interlock_verdict(i, robot, now)) for i in panel.interlocks}
-    widgets: dict[str, dict[str, Any]] = {}
-    for widget in panel.widgets():
-        match widget:
-            case TextInput() | SelectInput() | ToggleInput():
-                widgets[widget.id] = {}
-            case Numeric():
-                widgets[widget.id] = {"limits": limits(widget)}
-            case Publish() | Call() | Action() | Parameter():
-                widgets[widget.id] = {**enabled(judged(widget))}
-                if not isinstance(widget, Publish) or widget.confirm:
-                    widgets[widget.id] |= progress(robot.progress.get(widget.id, IDLE))
-                if isinstance(widget, Parameter):
-                    widgets[widget.id] |= parameter(widget, robot)
-            case Hold():
-                holding = robot.held.get(widget.id, "")
-                widgets[widget.id] = {
-                    **enabled(judged(widget)),
-                    "held": bool(holding),
-                    "holding": holding,
-                }
-            case Readout():
-                widgets[widget.id], until = readout(widget, robot, now)
-                untils.append(until)
-            case Indicator():
-                widgets[widget.id], until = indicator(widget, robot, now)
-                untils.append(until)
-    link, until = lamps(panel, robot, passable, verdicts, now)
-    untils.append(until)
+    passable = way(robot, now)
+    interlocks = {i.id: interlock_verdict(i, robot, now) for i in panel.interlocks}
+    commands = [widget for widget in panel.widgets() if isinstance(widget, Pressed | Hold)]
+    verdicts = {w.id: press_verdict(w, panel.interlock(w.interlock), robot, now) for w in commands}
+    told = {w: Verdict(False, "log", lock) for w in verdicts} if lock else verdicts
+    shown = {w.id: _shown(w, robot, now, told) for w in panel.widgets()}
+    link, until = lamps(panel, robot, passable, told, now)
+    banner = say("simulated") if simulated or robot.graph.simulated else ""
     view = View(
         link=link,
         interlocks={i: enabled(verdict) for i, verdict in interlocks.items()},
-        widgets=widgets,
-        notice=Notice(
-            banner=say("simulated") if simulated or robot.graph.simulated else "", fault=fault
-        ),
+        widgets={widget: attributes for widget, (attributes, _) in shown.items()},
+        notice=Notice(banner=banner, fault=fault),
         robots=dict(robots),
         control=control,
     )
+    judged = (passable, *interlocks.values(), *verdicts.values())
+    untils = [until, *(verdict.until for verdict in judged), *(until for _, until in shown.values())]
     return Sight(view, summary(robot.name, link), min(untils))
+
+
+def _shown(
+    widget: Shown, robot: Robot, now: float, verdicts: Mapping[str, Verdict]
+) -> tuple[dict[str, Any], float]:
+    """The attributes of a widget, and when time alone would change them, but for its verdict."""
+    match widget:
+        case Readout():
+            return readout(widget, robot, now)
+        case Indicator():
+            return indicator(widget, robot, now)
+        case Numeric():
+            return {"limits": limits(widget)}, math.inf
+        case Publish() | Call() | Action() | Parameter():
+            return {**enabled(verdicts[widget.id]), **_came(widget, robot)}, math.inf
+        case Hold():
+            holding = robot.held.get(widget.id, "")
+            held = {"held": bool(holding), "holding": holding}
+            return {**enabled(verdicts[widget.id]), **held}, math.inf
+    return {}, math.inf
+
+
+def _came(widget: Pressed, robot: Robot) -> dict[str, Any]:
+    """What came of a press, and what a parameter is."""
+    if isinstance(widget, Publish) and not widget.confirm:
+        return {}
+    came = progress(robot.progress.get(widget.id, IDLE))
+    return came | parameter(widget, robot) if isinstance(widget, Parameter) else came
 
 
 def as_seen_by(view: View, browser: Browser) -> View:
