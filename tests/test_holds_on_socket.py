@@ -214,7 +214,7 @@ def test_who_lets_go_while_the_entry_is_written_holds_nothing(demo: Server) -> N
             db.close()
             said = socket.hear()
             assert (said["state"], said["status"]) == ("refused", 409)
-            assert "too late" in said["reason"]
+            assert "let go before it began" in said["reason"]
             assert socket.closed() == 4409
         assert demo.widget("jog")["held"] is False
 
