@@ -8,7 +8,7 @@ import pytest
 
 from app import keys
 from app.actions import Actions
-from app.calls import LATE_S, MOST_UNANSWERED, Calls
+from app.calls import LATE_S, LONGEST_SAID, MOST_UNANSWERED, Calls
 from app.errors import LinkError
 from app.panel.model import Action, Call, Panel
 from app.progress import Answer, Progress
@@ -18,7 +18,15 @@ from tests.builders import BRIDGE, INTERFACES, panel_of, robot_there
 TRIGGER = "std_srvs/srv/Trigger"
 COUNT = "example_interfaces/action/Fibonacci"
 CALL = {"id": "reset", "kind": "call", "label": "Reset", "service": "/reset", "type": TRIGGER}
-GOAL = {"id": "count", "kind": "action", "label": "Count", "action": "/count", "type": COUNT}
+GOAL = {
+    "id": "count",
+    "kind": "action",
+    "label": "Count",
+    "action": "/count",
+    "type": COUNT,
+    "feedback": "so far {sequence}",
+    "result": "{sequence}",
+}
 
 
 class Line:
@@ -497,6 +505,23 @@ async def settled(bench: Bench) -> None:
     """Nothing is followed any more."""
     while bench.actions._following:
         await asyncio.sleep(0.001)
+
+
+def test_feedback_and_results_of_any_length_are_cut() -> None:
+    async def test(bench: Bench) -> None:
+        types = INTERFACES.action(COUNT)
+        await accepted(bench)
+        long = {"sequence": list(range(300_000))}
+        one = {"goal_id": {"uuid": goal_id(bench)}, "feedback": long}
+        bench.actions.hear_feedback("/count", sample_of(INTERFACES.encode(types.feedback_message, one)))
+        bench.line.answer(types.get_result_response, status=4, result=long)
+        assert bench.shown.text.startswith("Under way. so far [0, 1, 2, ")
+        assert len(bench.shown.text) < 2 * LONGEST_SAID
+        await settled(bench)
+        assert bench.shown.text.endswith("…")
+        assert len(bench.corrected[0][1].text) < 2 * LONGEST_SAID
+
+    run(test)
 
 
 def test_feedback_of_another_programs_goal_is_passed_over() -> None:
