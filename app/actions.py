@@ -17,10 +17,12 @@ from app.errors import DecodeError, LinkError
 from app.goals import ACCEPTED, CANCELING, ENDS, UNKNOWN, Goal
 from app.interfaces import Interfaces
 from app.interlocks import SERVER_SETTLE_S
+from app.logs import RobotLog
 from app.panel.model import Action
 from app.progress import IDLE, Answer, Corrected, Progress
 from app.robot import Robot, Sample, value_of
 from app.sentences import clock, say
+from app.tasks import told
 
 log = logging.getLogger("kiosk.actions")
 
@@ -38,6 +40,7 @@ class Actions:
         """`changed` is called when what the widgets show has changed."""
         self._interfaces = interfaces
         self._robot = robot
+        self._log = RobotLog(log, robot.name)
         self._link = link
         self._changed = changed
         self._latest: dict[str, Goal] = {}  # by widget
@@ -159,7 +162,7 @@ class Actions:
         try:
             message = self._interfaces.decode(types.feedback_message, bytes(sample.payload))
         except DecodeError as error:
-            log.error("%s: %s", widget.action, error)
+            self._log.error("%s: %s", widget.action, error)
             return
         if bytes(message.goal_id.uuid) != goal.id.bytes:
             return
@@ -198,7 +201,7 @@ class Actions:
             if not (goal.known or goal.cut.done()):
                 return  # it was never heard of: what was said of it stands
             await asyncio.wait({goal.cut}, timeout=ASK_AGAIN_S)
-        log.info("press %s: goal %s: %s: %s", goal.press_id, goal.id, answer.outcome, answer.text)
+        self._log.info("press %s: goal %s: %s: %s", goal.press_id, goal.id, answer.outcome, answer.text)
         self._tell(goal, answer)
 
     async def _until_offered(self, goal: Goal) -> None:
@@ -226,7 +229,7 @@ class Actions:
         try:
             message = self._interfaces.decode(types.get_result_response, reply)
         except DecodeError as error:
-            log.error("%s: %s", goal.widget.action, error)
+            self._log.error("%s: %s", goal.widget.action, error)
             return Answer("unknown", say("answer_unreadable", wanted=goal.widget.type))
         goal.state = message.status if message.status in ENDS else UNKNOWN
         if message.status not in ENDS:
@@ -237,15 +240,15 @@ class Actions:
 
     async def _result(self, goal: Goal, payload: bytes) -> bytes | None:
         """The reply of `get_result`, which is asked for again where Zenoh refuses."""
-        told = False
+        refused = False
         while not goal.cut.done():
             wait_s = RESULT_S if goal.known else LATE_S
             try:
                 return await self._reply(goal, self._query(goal.widget, "get_result", payload, wait_s))
             except LinkError as error:
-                if not told:
-                    log.warning("press %s: %s", goal.press_id, error)
-                told = True
+                if not refused:
+                    self._log.warning("press %s: %s", goal.press_id, error)
+                refused = True
                 await asyncio.wait({goal.cut}, timeout=ASK_AGAIN_S)
         return None
 
@@ -269,7 +272,7 @@ class Actions:
         try:
             return getattr(self._interfaces.decode(type_name, reply), name)
         except DecodeError as error:
-            log.error("%s", error)
+            self._log.error("%s", error)
             return None
 
     def _tell(self, goal: Goal, answer: Answer) -> None:
@@ -289,13 +292,12 @@ class Actions:
         return latest
 
     def _task(self, goal: Goal) -> None:
-        task = asyncio.get_running_loop().create_task(self._follow_to_the_end(goal))
+        task = told(self._follow_to_the_end(goal), self._log, "following a goal failed")
         self._following[task] = goal
         task.add_done_callback(self._followed)
 
     def _followed(self, task: "asyncio.Task[None]") -> None:
         goal = self._following.pop(task)
-        if not task.cancelled() and (error := task.exception()):
-            log.error("following a goal failed", exc_info=error)
+        if not task.cancelled() and task.exception():
             goal.state = UNKNOWN
             self._tell(goal, Answer("unknown", say("goal_fault")))

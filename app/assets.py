@@ -1,10 +1,11 @@
-"""The static files, in memory, under a name that changes with their content.
+"""The static files, in memory and packed, under a name that changes with their content.
 
 The stylesheet is the layers of `static/css` in their order, with the panel's millimetres: one
 request instead of four; what only the log's page needs is a file of its own. Scripts keep their names,
 so that modules find each other, and their lines. Comments and what lines are indented by stay here.
 """
 
+import gzip
 import hashlib
 import re
 from dataclasses import dataclass
@@ -22,8 +23,17 @@ MEDIA_TYPES: Final = {".css": "text/css", ".js": "text/javascript"}
 
 @dataclass(frozen=True, slots=True)
 class Asset:
+    """`packed` is the content by gzip, packed once and not for each who asks."""
+
     content: bytes
     media_type: str
+    packed: bytes
+
+
+def asset(content: bytes, suffix: str) -> Asset:
+    """What is sent of the content of a file with this suffix."""
+    sent = LEFT_OUT[suffix].sub(b"", content)
+    return Asset(sent, MEDIA_TYPES[suffix], gzip.compress(sent, mtime=0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,18 +51,14 @@ def load_assets(static: Path, templates: Path, mm_per_px: float) -> Assets:
     """
     layers = [(static / "css" / f"{name}.css").read_bytes() for name in LAYERS]
     millimetre = f":root{{--mm:{1 / mm_per_px:.4f}px}}\n".encode()
-    files = {"kiosk.css": _asset(".css", b"".join([*layers, millimetre]))}
+    files = {"kiosk.css": asset(b"".join([*layers, millimetre]), ".css")}
     own = (static / "css" / f"{OWN_PAGE}.css").read_bytes()
-    files[f"{OWN_PAGE}.css"] = _asset(".css", own)
+    files[f"{OWN_PAGE}.css"] = asset(own, ".css")
     for script in sorted((static / "js").glob("*.js")):
-        files[script.name] = _asset(".js", script.read_bytes())
+        files[script.name] = asset(script.read_bytes(), ".js")
     digest = hashlib.sha256()
-    for name, asset in sorted(files.items()):
-        digest.update(name.encode() + b"\0" + asset.content + b"\0")
+    for name, file in sorted(files.items()):
+        digest.update(name.encode() + b"\0" + file.content + b"\0")
     for template in sorted(templates.glob("*.html")):
         digest.update(template.read_bytes() + b"\0")
     return Assets(files, digest.hexdigest()[:12])
-
-
-def _asset(suffix: str, content: bytes) -> Asset:
-    return Asset(LEFT_OUT[suffix].sub(b"", content), MEDIA_TYPES[suffix])

@@ -14,6 +14,7 @@ from typing import Any, Final, Protocol
 
 from app.errors import DecodeError, FieldError
 from app.interfaces import Interfaces, text_of, value_at
+from app.logs import RobotLog
 from app.panel.model import Call
 from app.panel.template import PLACE
 from app.progress import Answer, Corrected, Progress
@@ -66,6 +67,7 @@ class Calls:
         """`changed` is called when what the widgets show has changed."""
         self._interfaces = interfaces
         self._robot = robot
+        self._log = RobotLog(log, robot.name)
         self._link = link
         self._changed = changed
         self._open: dict[int, _Waiting] = {}
@@ -139,7 +141,9 @@ class Calls:
             return
         asked = waiting.request
         answer = self._read(asked, reply)
-        log.warning("press %s: a late answer: %s: %s", waiting.press_id, answer.outcome, answer.text)
+        self._log.warning(
+            "press %s: a late answer: %s: %s", waiting.press_id, answer.outcome, answer.text
+        )
         corrected(waiting.press_id, answer)
         if self._latest.get(asked.widget) == waiting.press_id:
             self._show(asked, Progress(outcome=answer.outcome, text=answer.text))
@@ -150,7 +154,7 @@ class Calls:
         try:
             response = self._interfaces.decode(response_type, reply)
         except DecodeError as error:
-            log.error("%s: %s", asked.service, error)
+            self._log.error("%s: %s", asked.service, error)
             return Answer("unknown", say("answer_unreadable", wanted=asked.type))
         return asked.read(response)
 

@@ -85,13 +85,16 @@ class Confirmations:
         return Answer("unknown", f"{sent} {say('no_effect', topic=confirm.topic, seconds=limit)}")
 
     def hear(self, key: str) -> None:
-        """After a new sample of a topic."""
+        """After a new sample of a topic: of several presses of a widget it confirms the oldest, for
+        one effect is no proof of two commands."""
+        done: set[str] = set()
         for waiting in [w for w in self._waiting.get(key, []) if not w.confirmed.done()]:
             reading = self._robot.reading(waiting.confirm.topic)
-            if reading.status != "message" or reading.at < waiting.since:
+            if waiting.widget.id in done or reading.status != "message" or reading.at < waiting.since:
                 continue
             if equal(value_of(reading.message, waiting.confirm.field), waiting.equals):
                 waiting.confirmed.set_result(reading.wall)
+                done.add(waiting.widget.id)
 
     def _confirmed(self, waiting: _Waiting) -> Answer:
         self._forget(waiting)

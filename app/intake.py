@@ -85,10 +85,10 @@ class Intake:
     def _changes(self, key: str, sample: Sample) -> bool:
         """Takes a sample in; whether a permission is another one by it."""
         if (interlocks := self._interlocks.get(key)) is None:
-            self._guarded(key, sample)
+            self._guarded(key, sample, self._sample)
             return False
         before = [self._judged(one) for one in interlocks]
-        self._guarded(key, sample)
+        self._guarded(key, sample, self._sample)
         return before != [self._judged(one) for one in interlocks]
 
     def _judged(self, interlock: Interlock) -> Verdict:
@@ -98,11 +98,11 @@ class Intake:
     def _record(self, changes: Changes) -> None:
         if self._recorder is not None:
             for key, sample in changes.kept:
-                self._recorder.hear(key, sample)
+                self._guarded(key, sample, self._recorder.hear)
 
-    def _guarded(self, key: str, sample: Sample) -> None:
+    def _guarded(self, key: str, sample: Sample, take: Callable[[str, Sample], None]) -> None:
         try:
-            self._sample(key, sample)
+            take(key, sample)
         except Exception:
             self._log.exception("a sample of %s was not taken in whole", key)
 

@@ -10,9 +10,9 @@ import asyncio
 import logging
 import math
 import time
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable
 from contextlib import suppress
-from typing import Any, Final
+from typing import Final
 
 from app.bridges import Bridges
 from app.errors import LinkError
@@ -21,10 +21,12 @@ from app.link import Link
 from app.logs import RobotLog
 from app.panel.model import Panel
 from app.robot import Robot
+from app.tasks import told
 from app.tokens import Tokens
 
 log = logging.getLogger("kiosk.joining")
 
+FAILED: Final = "joining the robot's topics failed"
 FRESH_S: Final = 1.0  # waited for a bridge that came while the kiosk ran
 FOUND_S: Final = 0.05  # waited for a bridge that was there when the kiosk started
 FOUND_WITHIN_S: Final = 1.0
@@ -63,7 +65,7 @@ class Joining:
         self._changed = asyncio.Event()
 
     def start(self) -> None:
-        self._asking = self._task(self._ask_regularly())
+        self._asking = told(self._ask_regularly(), self._log, FAILED)
 
     async def stop(self) -> None:
         """Ends its tasks; the tokens go with the session."""
@@ -77,7 +79,7 @@ class Joining:
         if came or not self._robot.graph.bridges:
             self._leave()
         if came:
-            self._joining = self._task(self._join())
+            self._joining = told(self._join(), self._log, FAILED)
         if self._joined:
             self._hold()
             self._changed.set()
@@ -186,13 +188,3 @@ class Joining:
                 await self._changed.wait()
                 await asyncio.sleep(ASK_AGAIN_S)
         self._changed.clear()
-
-    def _task(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:
-        """A task whose failure is logged, not lost."""
-        task = asyncio.get_running_loop().create_task(work)
-        task.add_done_callback(self._tell)
-        return task
-
-    def _tell(self, task: asyncio.Task[None]) -> None:
-        if not task.cancelled() and (error := task.exception()):
-            self._log.error("joining the robot's topics failed", exc_info=error)

@@ -1,6 +1,6 @@
 """A running kiosk: one robot with its link, board and presses, and how they are wired.
 
-Down: a callback of the link wakes the loop → `_take` → robot → showing → views → board → streams.
+Down: the inbox wakes the loop (by values: for a frame) → `_take` → robot → showing → board → streams.
 """
 
 import asyncio

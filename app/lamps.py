@@ -34,21 +34,6 @@ NODE: Final = GONE | {
     "parameter_silent",
     "parameter_unreadable",
 }
-# By the operator's own side, the robot's word or what the panel file asks for: no link is to blame.
-NO_LINK: Final = frozenset(
-    {
-        "permitted",
-        "forbidden",
-        "busy",
-        "log",
-        "control",
-        "parameter_undeclared",
-        "parameter_mistyped",
-        "parameter_read_only",
-        "parameter_apart",
-    }
-)
-
 BRIDGE_LAMPS: Final[Mapping[str, tuple[State, str]]] = {
     "no_link": ("bad", "lost"),
     "no_bridge": ("bad", "absent"),

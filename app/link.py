@@ -14,6 +14,7 @@ import zenoh
 from zenoh.ext import HistoryConfig, declare_advanced_subscriber
 from zenoh.handlers import Callback
 
+from app.attached import attach
 from app.errors import LinkError, SettingsError
 from app.inbox import NO_KEYS, Changes, Inbox
 from app.keys import TOKENS
@@ -168,7 +169,13 @@ class Link:
 
     def _direct(self, function: Callable[[Any], None]) -> "Callback[Any]":
         """A handler on the receiving thread, with no thread of its own; deaf once renewed."""
-        return Callback(self._inbox.guarded(function), indirect=False)
+        take = self._inbox.guarded(function)
+
+        def handle(what: Any) -> None:
+            attach()
+            take(what)
+
+        return Callback(handle, indirect=False)
 
     def hold(self, tokens: Iterable[str]) -> None:
         """Holds exactly these liveliness tokens from now on."""

@@ -19,15 +19,18 @@ from app.declared import UNKNOWN, Declared, Value, checked, declared, name_of, v
 from app.errors import DecodeError
 from app.interfaces import Interfaces, text_of
 from app.interlocks import parameters_offered
+from app.logs import RobotLog
 from app.panel.model import Panel
 from app.panel.parameter import DESCRIBE, EVENT_TYPE, GET, SET, Parameter
 from app.parameter_services import NoAnswer, ParameterServices
 from app.progress import Answer, Corrected
 from app.robot import Robot, Sample
 from app.sentences import clock, say
+from app.tasks import told
 
 log = logging.getLogger("kiosk.parameters")
 
+FAILED: Final = "following a node's parameters failed"
 CONFIRM_S: Final = 3.0  # after which the bridge surely brings the events of a node that appeared
 AGAIN_S: Final = 1.0  # between two readings at least, and before the first try again
 AGAIN_MOST_S: Final = 600.0  # the pause between tries doubles up to this
@@ -67,6 +70,7 @@ class Parameters:
         """`changed` is called when what the widgets show has changed."""
         self._interfaces = interfaces
         self._robot = robot
+        self._log = RobotLog(log, robot.name)
         self._services = ParameterServices(interfaces, robot, link)
         self._calls = calls
         self._changed = changed
@@ -99,8 +103,7 @@ class Parameters:
             if not (offered and self._robot.graph.bridges):
                 self._cut(node)
             elif node.task is None:
-                node.task = asyncio.get_running_loop().create_task(self._follow_node(node))
-                node.task.add_done_callback(_told)
+                node.task = told(self._follow_node(node), self._log, FAILED)
 
     async def stop(self) -> None:
         """Ends its tasks."""
@@ -132,10 +135,10 @@ class Parameters:
         try:
             event = self._interfaces.decode(EVENT_TYPE, bytes(sample.payload))
         except DecodeError as error:
-            log.debug("%s", error)
+            self._log.debug("%s", error)
             return
-        if (told := self._nodes.get(event.node)) and told.task is not None:
-            self._take_event(told, event, sample.wall)
+        if (teller := self._nodes.get(event.node)) and teller.task is not None:
+            self._take_event(teller, event, sample.wall)
 
     def _take_event(self, node: _Node, event: Any, wall: float) -> None:
         redeclared = {one.name for one in (*event.new_parameters, *event.deleted_parameters)}
@@ -183,7 +186,7 @@ class Parameters:
         except NoAnswer:
             return False
         except DecodeError as error:
-            log.error("%s: %s", node.name, error)
+            self._log.error("%s: %s", node.name, error)
             self._learn_all(node, lambda known: Declared("unreadable", wall=time.time()))
             return False
         self._calls.mark_answered(f"{node.name}/{SET[0]}")
@@ -225,7 +228,7 @@ class Parameters:
 
     def _learn(self, widget: Parameter, known: Declared) -> None:
         if known.state == "undeclared" and self._known(widget).state != "undeclared":
-            log.warning("%s has no parameter %s", widget.node, widget.parameter)
+            self._log.warning("%s has no parameter %s", widget.node, widget.parameter)
         self._robot.parameters[widget.id] = known
 
     def _learn_all(self, node: _Node, of: Callable[[Declared], Declared]) -> None:
@@ -235,7 +238,7 @@ class Parameters:
 
     def _silent(self, node: _Node) -> None:
         if any(self._known(widget).state != "silent" for widget in node.widgets):
-            log.warning("%s does not answer when it is asked for its parameters", node.name)
+            self._log.warning("%s does not answer when it is asked for its parameters", node.name)
         self._learn_all(node, lambda known: replace(known, state="silent"))
 
 
@@ -258,8 +261,3 @@ async def _within(event: asyncio.Event, longest_s: float | None) -> None:
             await event.wait()
     except TimeoutError:
         pass
-
-
-def _told(task: "asyncio.Task[None]") -> None:
-    if not task.cancelled() and (error := task.exception()):
-        log.error("following a node's parameters failed", exc_info=error)

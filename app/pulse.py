@@ -18,6 +18,7 @@ from app.bridges import Asker
 from app.errors import LinkError
 from app.logs import RobotLog
 from app.robot import Robot
+from app.tasks import told
 
 log = logging.getLogger("kiosk.pulse")
 
@@ -86,7 +87,7 @@ class Pulse:
         self._asking: asyncio.Task[None] | None = None
 
     def start(self) -> None:
-        self._asking = asyncio.get_running_loop().create_task(self._ask_regularly())
+        self._asking = told(self._ask_regularly(), self._log, "asking the bridges failed")
 
     async def stop(self) -> None:
         """Ends its tasks."""

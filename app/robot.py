@@ -14,6 +14,7 @@ from app.errors import DecodeError, FieldError
 from app.graph import Graph
 from app.interfaces import Interfaces, value_at
 from app.keys import key_of
+from app.logs import RobotLog
 from app.panel.model import Panel, RobotEntry
 from app.progress import Progress
 from app.seen import Seen, ends
@@ -83,6 +84,7 @@ class Robot:
         self.progress: dict[str, Progress] = {}  # of what widgets have asked, by their ids
         self.parameters: dict[str, Declared] = {}  # what nodes said of them, by their widgets' ids
         self.held: dict[str, str] = {}  # by the ids of hold widgets: since when, in words
+        self._log = RobotLog(log, self.name)
         self.answers = True  # False: its bridges are silent, though nobody knows yet why
         self.seen = Seen({(role, name): (role, self.key(name)) for role, name in ends(panel)})
         self.undecodable: Counter[str] = Counter()
@@ -164,7 +166,7 @@ class Robot:
         self.undecodable[key] += 1
         if sample.at - self._logged_at.get(key, -math.inf) >= UNREADABLE_LOG_S:
             self._logged_at[key] = sample.at
-            log.error("/%s: %s (%d so far)", key, error, self.undecodable[key])
+            self._log.error("/%s: %s (%d so far)", key, error, self.undecodable[key])
 
 
 def value_of(message: Any, path: str) -> Any:

@@ -1,5 +1,6 @@
 """The static files in memory: the stylesheet in its order, and a name that changes with any of them."""
 
+import gzip
 from pathlib import Path
 
 import pytest
@@ -68,6 +69,13 @@ def test_scripts_go_out_without_comments_on_the_lines_where_they_were_written(
 def test_no_script_has_a_text_over_several_lines_that_a_comment_could_be_taken_from() -> None:
     for script in (ROOT / "static/js").glob("*.js"):
         assert all(line.count("`") % 2 == 0 for line in script.read_text().splitlines()), script
+
+
+def test_each_file_is_packed_once_and_for_all(static: Path, templates: Path) -> None:
+    first, again = (loaded(static, templates).files for _ in range(2))
+    for name, asset in first.items():
+        assert gzip.decompress(asset.packed) == asset.content
+        assert asset.packed == again[name].packed
 
 
 def test_browsers_are_told_what_a_file_is(static: Path, templates: Path) -> None:

@@ -60,6 +60,29 @@ def test_what_changed_since_it_was_seen_is_not_pressed(kiosk: Server, node: RosN
     assert "changed" not in node.heard_data("/operation1")
 
 
+def test_a_lock_that_blinks_under_a_resting_finger_refuses_the_press(
+    kiosk: Server, node: RosNode, page: Page
+) -> None:
+    """What counts is what was seen when the finger came down."""
+    page.goto(kiosk.url)
+    publish = page.get_by_role("button", name="Publish1", exact=True)
+    expect(publish).to_be_enabled()
+    page.get_by_label("Message").fill("blinked")
+    publish.hover()
+    page.mouse.down()
+    permit(kiosk, node, False)
+    expect(publish).to_be_disabled()
+    permit(kiosk, node, True)
+    expect(publish).to_be_enabled()
+    page.mouse.up()
+    expect(page.locator("#receipt-operation1")).to_contain_text("changed while you pressed")
+    expect(publish).not_to_have_attribute("aria-busy", "true")
+    publish.click()
+    expect(page.locator("#receipt-operation1")).to_contain_text("Sent on /operation1")
+    until(lambda: "blinked" in node.heard_data("/operation1"), "heard")
+    assert node.heard_data("/operation1").count("blinked") == 1
+
+
 @pytest.mark.parametrize(
     ("later_s", "status", "words"),
     [(0.0, 200, "Sent"), (-1.5, 200, "Sent"), (-2.5, 409, "to get here"), (3.0, 409, "ahead of")],

@@ -61,7 +61,8 @@ class Bench:
 
     def __init__(self) -> None:
         self.panel: Panel = panel_of(
-            {**CALL, "timeout_s": 0.05}, {**GOAL, "goal": {"order": 3}, "timeout_s": 0.05}
+            {**CALL, "timeout_s": 0.05},
+            {**GOAL, "goal": {"order": 3}, "progress": "sequence[0]", "timeout_s": 0.05},
         )
         self.robot: Robot = robot_there(self.panel)
         self.robot.graph.apply(keys.server_token(BRIDGE, "SS", "reset", TRIGGER), True)
@@ -69,7 +70,10 @@ class Bench:
         self.line = Line()
         self.corrected: list[tuple[str, Answer]] = []
         self.calls = Calls(INTERFACES, self.robot, self.line, lambda: None)
-        self.actions = Actions(INTERFACES, self.robot, self.line, lambda: None)
+        self.shows: list[Progress] = []  # what an action's widget had when it was to be shown at once
+        self.actions = Actions(
+            INTERFACES, self.robot, self.line, lambda: self.shows.append(self.robot.progress["count"])
+        )
         call, goal = self.panel.widgets()
         assert isinstance(call, Call)
         assert isinstance(goal, Action)
@@ -536,6 +540,27 @@ def test_feedback_of_another_programs_goal_is_passed_over() -> None:
         for payload in (INTERFACES.encode(types.feedback_message, other), b"\xff" * 9):
             bench.actions.hear_feedback("/count", sample_of(payload))
         assert bench.robot.progress["count"] == before
+        await bench.actions.stop()
+
+    run(test)
+
+
+def test_feedback_is_taken_in_and_waits_for_the_next_frame() -> None:
+    async def test(bench: Bench) -> None:
+        types = INTERFACES.action(COUNT)
+        start = bench.send_goal()
+        await asked(bench, 1)
+        bench.answer_goal(True)
+        await start
+        await asked(bench, 2)
+        shows = len(bench.shows)
+        goal_id = INTERFACES.decode(types.get_result_request, bench.line.asked[1][1]).goal_id.uuid
+        for number in range(100):
+            feedback = {"goal_id": {"uuid": goal_id}, "feedback": {"sequence": [number]}}
+            payload = INTERFACES.encode(types.feedback_message, feedback)
+            bench.actions.hear_feedback("/count", sample_of(payload))
+        assert bench.shown.fraction == 0.99
+        assert len(bench.shows) == shows
         await bench.actions.stop()
 
     run(test)

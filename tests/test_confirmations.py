@@ -88,6 +88,43 @@ def test_without_its_effect_it_is_not_known_and_later_corrected() -> None:
     assert (corrected.outcome, shown) == ("confirmed", "confirmed")
 
 
+def test_of_two_commands_and_one_effect_only_what_shows_after_it_confirms() -> None:
+    """The effect of the first came before the second was sent: the second is not known."""
+
+    async def pressed() -> list[Receipt]:
+        desk = Desk(panel_of())
+        first = asyncio.create_task(desk.press())
+        await asyncio.sleep(0)
+        desk.says("on", 100.1)
+        desk.now = 100.2
+        second = asyncio.create_task(desk.press(press_id="p2"))
+        return [await first, await second]
+
+    first, second = asyncio.run(pressed())
+    assert (first.outcome, second.outcome) == ("confirmed", "unknown")
+    assert "did not show it" in second.reason
+
+
+@pytest.mark.parametrize(
+    ("said", "outcomes"),
+    [
+        (["on"], ["confirmed", "unknown"]),
+        (["on", "on"], ["confirmed", "confirmed"]),
+        (["off", "on"], ["confirmed", "unknown"]),
+    ],
+)
+def test_one_effect_confirms_one_of_two_commands(said: list[str], outcomes: list[str]) -> None:
+    async def pressed() -> list[Receipt]:
+        desk = Desk(panel_of())
+        both = [asyncio.create_task(desk.press(press_id=name)) for name in ("p1", "p2")]
+        await asyncio.sleep(0)
+        for number, text in enumerate(said):
+            desk.says(text, 100.1 + number)
+        return [await one for one in both]
+
+    assert [receipt.outcome for receipt in asyncio.run(pressed())] == outcomes
+
+
 def test_nothing_is_waited_for_in_the_long_run(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(confirmations, "LATE_S", 0.05)
 

@@ -245,5 +245,6 @@ def test_the_panels_own_page_and_programs_may_hold(headers: Mapping[str, str]) -
 def test_another_sites_page_and_another_name_may_not_hold(headers: Mapping[str, str]) -> None:
     start, body = wanted_socket(headers, "websocket.http.response")
     assert (start["type"], start["status"]) == ("websocket.http.response.start", 403)
-    assert b"error" in bytes(body["body"])  # type: ignore[call-overload]
+    assert isinstance(body["body"], bytes)
+    assert b"error" in body["body"]
     assert wanted_socket(headers) == [{"type": "websocket.close", "code": 1008, "reason": ""}]

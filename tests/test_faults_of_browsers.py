@@ -1,12 +1,9 @@
 """Browsers that do not read, come in hundreds, or come and go: nobody else is held up."""
 
 import time
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
-import pytest
-
+from tests.faults import fixtures
 from tests.faults.browsers import Browsers, asking, storm, unread
 from tests.faults.presser import Presser, accounted
 from tests.faults.results import ms, record
@@ -15,25 +12,15 @@ from tests.faults.trial import well
 from tests.faults.watch import Watch, answering, came_back, resources
 from tests.parts import Server, until
 
+rig = fixtures.rig
+server = fixtures.server
+
 READS_NOTHING_S = several(10, 60)
 STORM_S = several(5, 30)
 BROWSERS = 200
 UPDATES_PER_S = 200.0
-MOST_UNREAD = 4_000_000  # what the kernel's buffers on both sides hold
+MOST_UNREAD = 400_000  # what the server and the kernel on both sides hold
 MARGIN_MB = 40.0
-
-
-@pytest.fixture(scope="module")
-def rig(domain: int) -> Iterator[Rig]:
-    mine = Rig(domain + 56)
-    yield mine
-    mine.end()
-
-
-@pytest.fixture
-def server(rig: Rig, tmp_path: Path) -> Iterator[Server]:
-    with rig.serving(tmp_path) as mine:
-        yield mine
 
 
 def test_a_browser_that_reads_nothing(rig: Rig, server: Server) -> None:

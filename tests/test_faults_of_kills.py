@@ -2,11 +2,9 @@
 
 import random
 import secrets
-from collections.abc import Iterator
 from pathlib import Path
 
-import pytest
-
+from tests.faults import fixtures
 from tests.faults.kills import Life, kill_at_random_moments
 from tests.faults.presser import accounted
 from tests.faults.results import ms, record
@@ -14,15 +12,10 @@ from tests.faults.rig import Rig, kiosk, several
 from tests.faults.trial import UNDER_WAY_S
 from tests.parts import free_port
 
+rig = fixtures.rig
+
 KILLS = several(10, 200)
 LATE_S = 1.0
-
-
-@pytest.fixture(scope="module")
-def rig(domain: int) -> Iterator[Rig]:
-    mine = Rig(domain + 58)
-    yield mine
-    mine.end()
 
 
 def test_a_server_killed_at_random_moments(rig: Rig, tmp_path: Path) -> None:

@@ -7,18 +7,20 @@ import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any
 
-import pytest
 import zenoh
 
+from tests.faults import fixtures
 from tests.faults.presser import Account, Presser, accounted
 from tests.faults.results import ms, record
 from tests.faults.rig import BOOL, LISTENED_TO, MAX_AGE_S, TEXT, Rig, permitting, several
-from tests.faults.trial import Trial, tried, well
+from tests.faults.trial import recorded, tried, well
 from tests.faults.watch import Resources, Watch, answering, came_back, resources
 from tests.parts import RosNode, Server, until
+
+rig = fixtures.rig
+server = fixtures.server
 
 RESTARTS = several(8, 100)
 FLOOD_S = several(6, 30)
@@ -28,29 +30,6 @@ LONG_MESSAGE = 10_000_000
 GARBAGE = several(3_000, 100_000)
 SHOWN_WITHIN_S = 1.0
 MARGIN_MB = 40.0
-
-
-@pytest.fixture(scope="module")
-def rig(domain: int) -> Iterator[Rig]:
-    mine = Rig(domain + 54)
-    yield mine
-    mine.end()
-
-
-@pytest.fixture
-def server(rig: Rig, tmp_path: Path) -> Iterator[Server]:
-    with rig.serving(tmp_path) as mine:
-        yield mine
-
-
-def recorded(fault: str, trial: Trial) -> None:
-    record(
-        fault,
-        locked=ms(trial.locked_s),
-        presses=trial.account,
-        latest=ms(trial.account.latest_s),
-        after=f"open after {ms(trial.opened_s)}",
-    )
 
 
 def begun_anew(rig: Rig) -> None:

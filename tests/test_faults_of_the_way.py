@@ -8,32 +8,23 @@ from pathlib import Path
 
 import pytest
 
+from tests.faults import fixtures
 from tests.faults.net import ROBOT_IP, Cable
 from tests.faults.presser import Account, Presser, accounted
 from tests.faults.results import ms, record
 from tests.faults.rig import LONG, Rig, several
-from tests.faults.trial import UNDER_WAY_S, Trial, tried, well
+from tests.faults.trial import UNDER_WAY_S, recorded, tried, well
 from tests.faults.watch import Watch, answering
 from tests.parts import TESTS, Server, free_port, until
+
+rig = fixtures.rig
+server = fixtures.server
 
 DELAY_S = 0.3
 LOSS = 0.1
 SEEN_S = 1.0
 LATE_IN_BAD_WEATHER_S = 5.0
 CUTS_S = (1, 5, 30) if LONG else (1, 5)
-
-
-@pytest.fixture(scope="module")
-def rig(domain: int) -> Iterator[Rig]:
-    mine = Rig(domain + 51)
-    yield mine
-    mine.end()
-
-
-@pytest.fixture
-def server(rig: Rig, tmp_path: Path) -> Iterator[Server]:
-    with rig.serving(tmp_path) as mine:
-        yield mine
 
 
 @pytest.fixture
@@ -52,16 +43,6 @@ def far_rig(domain: int, cable: Cable) -> Iterator[Rig]:
         mine = Rig(domain + 53, ROBOT_IP)
     yield mine
     mine.end()
-
-
-def recorded(fault: str, trial: Trial) -> None:
-    record(
-        fault,
-        locked=ms(trial.locked_s),
-        presses=trial.account,
-        latest=ms(trial.account.latest_s),
-        after=f"open after {ms(trial.opened_s)}",
-    )
 
 
 def test_a_killed_bridge(rig: Rig, server: Server) -> None:

@@ -1,12 +1,10 @@
 """The wall clock is set under the running server: nothing that is judged by time notices."""
 
 import time
-from collections.abc import Iterator
 from datetime import datetime
 from pathlib import Path
 
-import pytest
-
+from tests.faults import fixtures
 from tests.faults.clock import Clock
 from tests.faults.presser import Presser, accounted
 from tests.faults.results import ms, record
@@ -15,14 +13,9 @@ from tests.faults.trial import well
 from tests.faults.watch import Watch, answering
 from tests.parts import Server, until
 
+rig = fixtures.rig
+
 HOUR_S = 3600
-
-
-@pytest.fixture(scope="module")
-def rig(domain: int) -> Iterator[Rig]:
-    mine = Rig(domain + 57)
-    yield mine
-    mine.end()
 
 
 def off_s(server: Server) -> float:

@@ -1,7 +1,10 @@
 """The WebSocket of a hold, with the demo robot: who may open it, and what it answers."""
 
+import csv
+import io
 import json
 import signal
+import sqlite3
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,6 +16,7 @@ import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
+from app.log.file import NAME
 from tests.parts import ROOT, Bridge, RosNode, Server, live, until
 from tests.test_holds_in_browser import PANEL, permit
 
@@ -34,7 +38,7 @@ class Socket:
 
     def __init__(self, connection: ClientConnection, seen: str) -> None:
         self._connection = connection
-        self._seen = seen
+        self.seen = seen
         self.number = 0
         self.lease = ""
         self.hear()
@@ -49,7 +53,7 @@ class Socket:
         self._connection.send(json.dumps({"stamp": self.stamp, "after": after, **what}))
 
     def begin(self, **more: Any) -> dict[str, Any]:
-        self.say(do="begin", **{"inputs": {"speed": 0.5}, "seen": self._seen, **more})
+        self.say(do="begin", **{"inputs": {"speed": 0.5}, "seen": self.seen, **more})
         said = self.hear()
         self.lease = said.get("lease", "")
         return said
@@ -147,6 +151,51 @@ def test_what_can_not_be_begun_is_refused(
         assert (said["state"], said["status"]) == ("refused", status)
         assert reason in said["reason"]
         assert socket.closed() == 4000 + status
+
+
+def test_each_refused_hold_is_in_the_log(demo: Server) -> None:
+    """One that was judged has two entries, what could not be judged has one."""
+
+    def refused() -> list[dict[str, str]]:
+        text = demo.http.get("/log.csv?outcome=refused&widget=jog&every=true").text
+        return list(csv.DictReader(io.StringIO(text.removeprefix("\ufeff"))))
+
+    before = len(refused())
+    with opened(demo) as socket:
+        socket.begin(inputs={"speed": 7})
+    with opened(demo) as socket:
+        socket.say(do="beat", lease="x", number=1)
+        socket.hear()
+    new = refused()[: len(refused()) - before]
+    assert [(one["kind"], one["action"], one["outcome"]) for one in new] == [
+        ("refused", "hold", "refused"),
+        ("closed", "hold", "refused"),
+    ]
+    nonsense, judged = new
+    assert "can't be understood" in nonsense["reason"]
+    assert "Speed is 7" in judged["reason"]
+    assert (judged["values"], judged["verdict"]) == ('{"speed": 7}', "input")
+    assert judged["of"] != ""
+    assert nonsense["of"] == ""
+
+
+def test_who_lets_go_while_the_entry_is_written_holds_nothing(demo: Server) -> None:
+    """The disk takes the entry only after the finger was lifted."""
+    for _ in range(TRIES):
+        with opened(demo) as socket:
+            db = sqlite3.connect(demo.data / NAME, isolation_level=None)
+            db.execute("BEGIN IMMEDIATE")
+            socket.say(do="begin", inputs={"speed": 0.5}, seen=socket.seen)
+            socket.say(do="end", why="released", lease="")
+            time.sleep(0.1)
+            assert demo.widget("jog")["held"] is False
+            db.execute("ROLLBACK")
+            db.close()
+            said = socket.hear()
+            assert (said["state"], said["status"]) == ("refused", 409)
+            assert "too late" in said["reason"]
+            assert socket.closed() == 4409
+        assert demo.widget("jog")["held"] is False
 
 
 def test_a_begin_that_was_long_on_its_way_is_refused(demo: Server) -> None:

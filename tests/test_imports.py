@@ -16,6 +16,7 @@ ORDER = (
     "app.sentences",
     "app.browsers",
     "app.logs",
+    "app.tasks",
     "app.moments",
     "app.systemd",
     "app.sockets",
@@ -110,6 +111,7 @@ ORDER = (
     "app.bridges",
     "app.tokens",
     "app.inbox",
+    "app.attached",
     "app.link",
     "app.intake",
     "app.joining",
@@ -122,6 +124,7 @@ ORDER = (
     "app.assets",
     "app.doors",
     "app.startup",
+    "app.direct",
     "app.routes.messages",
     "app.routes.site",
     "app.routes.visitors",
@@ -205,7 +208,7 @@ def test_the_interfaces_know_nothing_of_the_panel() -> None:
 
 
 def test_the_link_knows_no_view_and_no_panel() -> None:
-    assert of_project("app.link") <= {"app.errors", "app.inbox", "app.keys"}
+    assert of_project("app.link") <= {"app.attached", "app.errors", "app.inbox", "app.keys"}
 
 
 @pytest.mark.parametrize(

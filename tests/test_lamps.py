@@ -9,7 +9,7 @@ import pytest
 from app.declared import Declared
 from app.interlocks import PERMITTED, Verdict
 from app.keys import Qos, bridge_token, server_token
-from app.lamps import BRIDGE, LONGEST_LIST, NO_LINK, NODE, LinkLamp, labels, lamps, locks
+from app.lamps import BRIDGE, LONGEST_LIST, NODE, LinkLamp, labels, lamps, locks
 from app.panel.model import Panel
 from app.panel.parameter import DESCRIBE, GET, SET
 from app.panel.ranges import Range
@@ -67,6 +67,22 @@ def codes_of(module: str) -> set[str]:
     made = [c for c in calls if isinstance(c.func, ast.Name) and c.func.id in ("locked", "Verdict")]
     found = {n.value for c in made for a in c.args for n in ast.walk(a) if isinstance(n, ast.Constant)}
     return {code for code in found if isinstance(code, str)}
+
+
+# By the operator's own side or the robot's word: no link is to blame.
+NO_LINK = frozenset(
+    {
+        "permitted",
+        "forbidden",
+        "busy",
+        "log",
+        "control",
+        "parameter_undeclared",
+        "parameter_mistyped",
+        "parameter_read_only",
+        "parameter_apart",
+    }
+)
 
 
 def test_every_verdict_has_its_link_or_none() -> None:

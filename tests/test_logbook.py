@@ -237,6 +237,31 @@ def test_no_log_keeps_anybody_from_canceling() -> None:
     slow(work, panel_of(COUNT, *_message()))
 
 
+def test_a_cancel_does_not_wait_for_the_log() -> None:
+    types = INTERFACES.action("example_interfaces/action/Fibonacci")
+
+    async def work(log: SlowLog, bench: Bench) -> None:
+        bench.robot.graph.apply("@/b1/@ros2_lv/AS/count/example_interfaces§action§Fibonacci", True)
+        log.written.set()
+        press = asyncio.create_task(bench.press("count"))
+        await asyncio.sleep(0.02)
+        accepted = {"accepted": True, "stamp": {"sec": 0, "nanosec": 0}}
+        bench.asked[0].set_result(INTERFACES.encode(types.send_goal_response, accepted))
+        assert (await press).outcome == "accepted"
+        log.written.clear()
+        bench.happened.clear()
+        cancel = asyncio.create_task(bench.presses.cancel("count", KIM))
+        await asyncio.sleep(0.02)
+        assert sorted(bench.happened) == ["sent", "written"]  # its entry is still being written
+        assert not log.written.is_set()
+        bench.asked[-1].set_result(None)
+        log.written.set()
+        assert (await cancel).outcome == "unknown"
+        assert [e.action for e in log.entries if e.kind == "closed"] == ["press", "cancel"]
+
+    slow(work, panel_of(COUNT, *_message()))
+
+
 def test_a_fault_of_the_servers_own_is_closed_as_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
     async def work(log: SlowLog, bench: Bench) -> None:
         log.written.set()

@@ -5,12 +5,15 @@ import logging
 import pytest
 
 from app import keys
+from app.panel.model import RobotEntry
 from app.robot import UNREADABLE_LOG_S, Robot, Sample, value_of
 from tests.builders import (
     BOOL,
     BRIDGE,
     ENABLED,
     INTERFACES,
+    KIOSK,
+    NOW,
     TEXT,
     robot_there,
     says,
@@ -168,3 +171,16 @@ def test_a_value_beyond_the_end_of_a_list_is_none() -> None:
     message = INTERFACES.decode("geometry_msgs/msg/Polygon", payload)
     assert value_of(message, "points[0].y") == 2.0
     assert value_of(message, "points[1].y") is None
+
+
+def test_what_is_logged_of_one_of_several_robots_begins_with_its_name(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    panel = small_panel()
+    entry = RobotEntry(id="r1", name="Robot 1", namespace="/r1")
+    robot = Robot(panel, INTERFACES, KIOSK, entry)
+    robot.take("r1/heard", Sample(b"broken", 1, NOW, NOW, BRIDGE))
+    robot.reading("/heard")
+    (record,) = caplog.records
+    assert record.getMessage().startswith("Robot 1: /r1/heard: ")
+    assert vars(record)["robot"] == "Robot 1"

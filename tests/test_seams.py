@@ -3,7 +3,7 @@
 import asyncio
 import logging
 import time
-from typing import Any
+from typing import Any, ClassVar
 
 import pytest
 
@@ -90,6 +90,52 @@ def test_a_permission_that_blinked_is_shown_in_between() -> None:
     intake.take(blink, lambda: shown.append(robot.reading(ENABLED).message.data))
     assert shown == [True, False]
     assert robot.reading(ENABLED).message.data is True
+
+
+def test_a_permission_that_is_said_again_is_not_urgent() -> None:
+    """A node may say it a hundred times a second: nothing but a change is shown at once."""
+    panel = small_panel(interlock={"max_age_s": 1.0})
+    robot = robot_there(panel)
+    intake = intake_of(panel, robot, Deaf())
+    key = robot.key(ENABLED)
+
+    def said(permitted: bool) -> tuple[bool, set[str]]:
+        news = intake.take(Changes({key: sample(flag(permitted))}, {}, True), lambda: None)
+        return news.urgent, news.values
+
+    assert said(False) == (True, {key})
+    assert said(False) == (False, {key})
+    assert said(True) == (True, {key})
+    assert said(True) == (False, {key})
+    assert robot.reading(ENABLED).message.data is True
+
+
+def test_what_cannot_be_read_as_a_permission_is_urgent() -> None:
+    panel = small_panel()
+    robot = robot_there(panel)
+    permits(robot)
+    intake = intake_of(panel, robot, Deaf())
+    changes = Changes({robot.key(ENABLED): sample(b"broken")}, {}, True)
+    assert intake.take(changes, lambda: None).urgent
+
+
+def test_each_sample_that_is_kept_whole_is_recorded_and_no_other() -> None:
+    class Tape(Deaf):
+        keys = frozenset({"heard"})
+        heard: ClassVar[list[bytes]] = []
+
+        def hear(self, *about: Any) -> None:
+            self.heard.append(about[1].payload)
+
+    panel = small_panel()
+    tape: Any = Tape()
+    deaf: Any = Deaf()
+    log = RobotLog(logging.getLogger("x"), "")
+    intake = Intake(panel, robot_there(panel), deaf, deaf, deaf, tape, log)
+    assert intake.whole == tape.keys
+    kept = [("heard", sample(said)) for said in (b"1", b"2", b"3")]
+    intake.take(Changes({"heard": kept[-1][1]}, {}, True, kept), lambda: None)
+    assert tape.heard == [b"1", b"2", b"3"]
 
 
 def test_a_list_that_is_too_short_is_shown_as_nothing() -> None:

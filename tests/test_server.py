@@ -244,6 +244,10 @@ def test_static_files_are_kept_for_ever_under_their_revision(demo: Server) -> No
     assert answer.status_code == 200
     assert "immutable" in answer.headers["cache-control"]
     assert answer.headers["content-encoding"] == "gzip"
+    plain = demo.http.get(sheet[1], headers={"accept-encoding": "identity"})
+    assert "content-encoding" not in plain.headers
+    assert plain.text == answer.text
+    assert {one.headers["vary"] for one in (answer, plain)} == {"Accept-Encoding"}
     assert demo.http.get("/static/x/../../pyproject.toml").status_code == 404
 
 

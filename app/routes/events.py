@@ -9,6 +9,7 @@ from prometheus_client import Gauge
 from starlette.types import Message, Receive, Scope, Send
 
 from app.board import Board, told
+from app.direct import direct
 from app.heartbeat import beat
 from app.routes.site import CurrentKiosk, CurrentSite
 from app.routes.visitors import keep, welcomed
@@ -63,7 +64,7 @@ class EventStream(Response):
         with self._streams.track_inprogress(), self._board.heartbeat.heard():
             async with asyncio.TaskGroup() as group:
                 # A task of its own: waking it wakes nothing of what the request came through.
-                writing = group.create_task(self._write(send))
+                writing = group.create_task(self._write(direct(scope, send)))
                 while (await receive())["type"] != "http.disconnect":
                     pass
                 writing.cancel()

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from tests.faults.presser import Account, Press, Presser, accounted
+from tests.faults.results import ms, record
 from tests.faults.rig import Rig
 from tests.faults.watch import Watch, answering
 from tests.parts import Server, until
@@ -66,6 +67,17 @@ def tried(
     account = accounted(presses, lambda: rig.arrivals(widget), whole, late_s)
     claimed = sum(p.outcome == "published" and broken_at < p.at < mended_at for p in presses)
     return Trial(locked_s, reason, opened_at - mended_at, account, claimed)
+
+
+def recorded(fault: str, trial: Trial) -> None:
+    """A row of the table."""
+    record(
+        fault,
+        locked=ms(trial.locked_s),
+        presses=trial.account,
+        latest=ms(trial.account.latest_s),
+        after=f"open after {ms(trial.opened_s)}",
+    )
 
 
 def well(presser: Presser) -> None:

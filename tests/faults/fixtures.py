@@ -1,0 +1,25 @@
+"""The rig of a module, on a domain that the one before did not have, and a kiosk on it."""
+
+import itertools
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.faults.rig import Rig
+from tests.parts import Server
+
+_domains = itertools.cycle((51, 54, 56, 57, 58))
+
+
+@pytest.fixture(scope="module")
+def rig(domain: int) -> Iterator[Rig]:
+    mine = Rig(domain + next(_domains))
+    yield mine
+    mine.end()
+
+
+@pytest.fixture
+def server(rig: Rig, tmp_path: Path) -> Iterator[Server]:
+    with rig.serving(tmp_path) as mine:
+        yield mine
