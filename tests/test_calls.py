@@ -528,6 +528,25 @@ def test_feedback_and_results_of_any_length_are_cut() -> None:
     run(test)
 
 
+def test_feedback_and_states_that_can_not_be_read_are_counted_and_fill_no_log(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    async def test(bench: Bench) -> None:
+        await accepted(bench)
+        for number in range(100):
+            garbage = Sample(b"\0\1\0\0\xff", number, number / 10, 0.0, BRIDGE)
+            bench.actions.hear_feedback("/count", garbage)
+            bench.actions.hear_status("/count", garbage)
+        counted = {"count/_action/feedback": 100, "count/_action/status": 100}
+        assert bench.robot.undecodable == counted
+        lines = [line for line in caplog.messages if "_action" in line]
+        assert len(lines) == len(counted)
+        assert bench.shown.goal == "ACCEPTED"
+        await bench.actions.stop()
+
+    run(test)
+
+
 def test_feedback_of_another_programs_goal_is_passed_over() -> None:
     async def test(bench: Bench) -> None:
         types = INTERFACES.action(COUNT)
