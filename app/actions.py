@@ -165,8 +165,9 @@ class Actions:
             return None
 
     def _advanced(self, goal: Goal) -> None:
-        """It has another state; while its first answer or its result is awaited, that will show."""
-        if not goal.lives or goal not in self._following.values():
+        """It has another state; while its first answer or its result is awaited, or its server after a
+        cut, that will show."""
+        if not goal.lives or goal.cut.done() or goal not in self._following.values():
             return
         if not self._robot.progress[goal.widget.id].busy:  # it was not known whether it runs
             goal.corrected(
@@ -206,6 +207,7 @@ class Actions:
                     self._tell(goal, Answer("unknown", goal.cut.result() or say("goal_cut")))
                 await self._until_offered(goal)
                 goal.cut = asyncio.get_running_loop().create_future()
+                self._advanced(goal)
             if answer := await self._ended(goal):
                 break
             if not (goal.known or goal.cut.done()):

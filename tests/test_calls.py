@@ -389,6 +389,22 @@ def test_a_goal_cut_off_before_its_answer_is_asked_for_when_the_bridge_is_back()
     run(test)
 
 
+def test_a_goal_shows_no_state_until_its_server_is_offered_again() -> None:
+    async def test(bench: Bench) -> None:
+        assert (await bench.send_goal()).outcome == "timed_out"
+        bench.lose_the_bridge()
+        await asyncio.sleep(0.01)
+        tell_states(bench, (goal_id(bench), 2))
+        assert (bench.shown.goal, bench.shown.busy) == ("UNKNOWN", False)
+        bench.robot.graph.apply(keys.bridge_token(BRIDGE), True)
+        await asked(bench, 3)
+        assert (bench.shown.goal, bench.shown.stoppable) == ("EXECUTING", True)
+        assert [answer.outcome for _, answer in bench.corrected] == ["accepted"]
+        await bench.actions.stop()
+
+    run(test)
+
+
 def test_a_goal_that_began_and_is_cut_off_before_its_answer_is_unknown() -> None:
     async def test(bench: Bench) -> None:
         start = bench.send_goal()
