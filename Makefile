@@ -76,9 +76,10 @@ FOR_ROS := $(PYTHON) -c 'import sys; sys.exit(None if sys.version_info[:2] == (3
 	.venv-ros/bin/python $(PIP_INSTALL) $<
 	touch $@
 
-# PHASES: some of them, such as `PHASES="down up"`. A quick run leaves the results of the last whole one.
+# ARGS: phases and peers, such as `ARGS="down up --peers plain"`. A quick run leaves the last whole one's
+# results as they are.
 bench: .venv/test bridge
-	.venv/bin/python -m bench $(if $(QUICK),--results $(BENCH)/quick,--readme README.md) $(PHASES)
+	.venv/bin/python -m bench $(if $(QUICK),--results $(BENCH)/quick,--readme README.md) $(ARGS)
 
 # The robot, then the rivals: each in an environment of its own. See bench/README.md.
 bench-setup: system .venv/test bridge $(addprefix $(BENCH)/,robot/ready rosbridge/ready nicegui/ready pages/ready router)

@@ -20,7 +20,7 @@ from app.leases import LEASE_S, Lease
 from app.logs import RobotLog
 from app.panel.check_holds import with_own_fields
 from app.panel.model import Hold, Panel
-from app.panel.template import filled, names_in
+from app.panel.template import filled, inputs_of, needed
 from app.progress import Answer, Outcome
 from app.receipts import (
     LONGEST_LOGGED,
@@ -132,7 +132,7 @@ class Holds:
             return self._refused(widget, inputs, by, f"{error}.", "input")
         lease = Lease.begun(secrets.token_hex(8), widget.period_s, sent, now)
         since = say("hold_since", time=clock(time.time()))
-        holding = Holding(widget, lease, by, dict(inputs), fields, last_fields, told, since)
+        holding = Holding(widget, lease, by, needed(widget, inputs), fields, last_fields, told, since)
         self._held[widget_id] = holding
         if self._witness is not None:
             self._witness.pressed(lease.id, widget.id, named(by.origin), holding.inputs)
@@ -184,7 +184,7 @@ class Holds:
         self, widget: Hold, inputs: Mapping[str, Any]
     ) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
         """Of the message and of the one that ends it; FieldError or InputError for bad input."""
-        values = self._checked(names_in([widget.message, widget.release]), inputs)
+        values = self._checked(inputs_of(widget), inputs)
         both = filled(widget.message, values), filled(widget.release, values)
         for each in both:
             self._interfaces.encode(widget.type, with_own_fields(widget, each, 0, 0))
@@ -304,13 +304,14 @@ class Holds:
     ) -> Receipt:
         receipt = _receipt(widget, inputs, why, cause)
         self._log.warning("hold of %s by %s with %.*s: %s", widget.id, named(by.origin),
-                LONGEST_LOGGED, inputs, receipt.reason)  # fmt: skip
+                LONGEST_LOGGED, receipt.inputs, receipt.reason)  # fmt: skip
         if self._witness is not None:
-            self._witness.pressed(receipt.id, widget.id, named(by.origin), inputs)
+            self._witness.pressed(receipt.id, widget.id, named(by.origin), receipt.inputs)
             self._witness.answered(receipt)
         return receipt
 
 
 def _receipt(widget: Hold, inputs: Mapping[str, Any], why: str, cause: Cause) -> Receipt:
     text = say("refused", why=why, time=clock(time.time()))
-    return receipt_of(widget, inputs, secrets.token_hex(8), Answer("refused", text), cause)
+    own = needed(widget, inputs)
+    return receipt_of(widget, own, secrets.token_hex(8), Answer("refused", text), cause)

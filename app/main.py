@@ -42,6 +42,8 @@ from app.watchdog import Watchdog
 
 log = logging.getLogger("kiosk")
 
+READ_WITHIN_S = 1.0  # by a browser, when the server ends
+
 
 def create_app(settings: Settings | None = None) -> FastAPI:
     """The application; raises KioskError where its settings or its panel are unusable."""
@@ -66,14 +68,16 @@ def create_app(settings: Settings | None = None) -> FastAPI:
             def ending() -> None:
                 watchdog.end()
                 site.fleet.close()
+                loop.call_later(READ_WITHIN_S, sockets.hang_up, ports)
 
+            ports: set[int] = set()
             watchdog = _watchdog(site)
             with _on_end(lambda: loop.call_soon_threadsafe(ending)):
                 if settings.dev:
                     await opened.enter_async_context(
                         development.reloading(site, settings, running, opened.pop_all())
                     )
-                tasks = [asyncio.create_task(work) for work in (watchdog.run(), sockets.narrow())]
+                tasks = [asyncio.create_task(work) for work in (watchdog.run(), sockets.narrow(ports))]
                 try:
                     yield
                 finally:

@@ -20,6 +20,7 @@ from app.log import Origin
 from app.logbook import Logbook, Noted
 from app.logs import RobotLog
 from app.panel.model import Action, Panel, Pressed
+from app.panel.template import needed
 from app.progress import Answer
 from app.receipts import (
     FINE,
@@ -187,9 +188,10 @@ class Presses:
         press_id: str,
         by: By,
     ) -> Receipt:
-        self._receipts.begin(press_id, widget.id, by.origin, inputs)
+        own = needed(widget, inputs)
+        self._receipts.begin(press_id, widget.id, by.origin, own)
         try:
-            noted = await self._logbook.pressed(widget.id, inputs, press_id, by.origin)
+            noted = await self._logbook.pressed(widget.id, own, press_id, by.origin)
         except LogError as error:
             text = say("refused", why=str(error), time=clock(time.time()))
             receipt = receipt_of(widget, inputs, press_id, Answer("refused", text), "log")
@@ -200,7 +202,7 @@ class Presses:
         level = logging.INFO if receipt.outcome in FINE else logging.WARNING
         self._log.log(level, "press %s of %s by %s with %.*s: %s: %s", press_id, widget.id,
                 named(by.origin),
-                LONGEST_LOGGED, inputs, receipt.outcome, receipt.reason)  # fmt: skip
+                LONGEST_LOGGED, own, receipt.outcome, receipt.reason)  # fmt: skip
         return receipt
 
     async def _again(
@@ -218,9 +220,10 @@ class Presses:
     async def _reused(
         self, widget: Pressed, inputs: Mapping[str, Any], own_id: str, text: str, origin: Origin
     ) -> Receipt:
-        self._receipts.begin(own_id, widget.id, origin, inputs)
+        own = needed(widget, inputs)
+        self._receipts.begin(own_id, widget.id, origin, own)
         self._log.warning("press %s of %s by %s: %s", own_id, widget.id, named(origin), text)
-        why = await self._logbook.refused(widget.id, inputs, own_id, origin, text)
+        why = await self._logbook.refused(widget.id, own, own_id, origin, text)
         return with_doubt(receipt_of(widget, inputs, own_id, Answer("refused", text), "input"), why)
 
     def _correct(self, noted: Noted, press_id: str, answer: Answer) -> None:

@@ -4,13 +4,14 @@ import hashlib
 import json
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from typing import Any, Final, Literal, Protocol
 
 from app.interlocks import PERMITTED, Verdict, press_verdict, way
 from app.log import Origin
 from app.panel.model import Hold, Panel, Pressed
+from app.panel.template import needed
 from app.progress import Answer, Outcome
 from app.robot import Robot
 from app.sentences import say
@@ -41,8 +42,8 @@ FINE: Final = frozenset({"published", "confirmed", "accepted", "succeeded"})
 class Receipt:
     """What came of a press; `reason` is a sentence for the operator, `cause` why it was refused.
 
-    `inputs` are those that the press came with, if they are few and short: a page without scripts
-    shows them again. `fingerprint` tells these from any others.
+    `inputs` are those that the widget needs, `entered` all that the press came with, if they are few
+    and short: a page without scripts shows them again. `fingerprint` tells these from any others.
     """
 
     id: str
@@ -53,6 +54,7 @@ class Receipt:
     cause: Cause
     inputs: Mapping[str, Any]
     fingerprint: str
+    entered: Mapping[str, Any] = field(default_factory=dict)
 
     def as_json(self) -> dict[str, str]:
         return {
@@ -152,9 +154,9 @@ def receipt_of(
 ) -> Receipt:
     """What came of a press just now."""
     at = datetime.now(UTC).isoformat(timespec="milliseconds")
-    kept = dict(inputs) if _short(inputs) else {}
+    own, entered = ({**of} if _short(of) else {} for of in (needed(widget, inputs), inputs))
     told = answer.outcome, answer.text, at, cause
-    return Receipt(press_id, widget.id, *told, kept, fingerprint(inputs))
+    return Receipt(press_id, widget.id, *told, own, fingerprint(inputs), entered)
 
 
 def fingerprint(inputs: Mapping[str, Any]) -> str:

@@ -120,7 +120,7 @@ class Showing:
         now = self._shown_at = time.monotonic()
         whole = self._whole
         self._before()
-        if whole or self._whole or now >= self._seen.rest or not self._seen.well:
+        if whole or self._whole or now >= self._seen.rest:
             self._look()
         else:
             self._seen = refreshed(self._seen, self._stale(now), self._robot, now)

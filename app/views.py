@@ -4,7 +4,6 @@ A view is plain JSON values; the browser puts texts and attributes where they be
 nothing.
 """
 
-import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Final, TypedDict
@@ -15,9 +14,9 @@ from app.displays import indicator, readout
 from app.inputs import limits
 from app.interlocks import Verdict, interlock_verdict, press_verdict, way
 from app.lamps import Lamp, LinkLamp, lamps, summary
-from app.panel.displays import Indicator, Readout
-from app.panel.inputs import Numeric, SelectInput, TextInput, ToggleInput
-from app.panel.model import Action, Call, Display, Hold, Panel, Pressed, Publish
+from app.panel.displays import Readout
+from app.panel.inputs import Numeric
+from app.panel.model import Action, Call, Display, Hold, Input, Panel, Pressed, Publish
 from app.panel.parameter import Parameter
 from app.parameter_display import parameter
 from app.progress import IDLE, Progress
@@ -49,6 +48,8 @@ class View(TypedDict):
     control: ControlView
 
 
+Shown = Input | Pressed | Hold | Display
+
 NO_OTHERS: Final[Mapping[str, Lamp]] = {}
 
 
@@ -67,11 +68,6 @@ class Sight:
         """When time alone would change it."""
         return min(self.rest, *self.displays.values()) if self.displays else self.rest
 
-    @property
-    def well(self) -> bool:
-        """Whether the robot's nodes are heard: then a value changes what shows it and nothing else."""
-        return self.view["link"]["node"]["state"] == "ok"
-
 
 def sight(
     panel: Panel,
@@ -86,57 +82,28 @@ def sight(
 ) -> Sight:
     """The view at `now` (monotonic seconds); `fault` stands above it, for `lock` nothing can be
     pressed, where they are not ""."""
-    untils = [math.inf]
-
-    verdicts: dict[str, Verdict] = {}
-
-    def judged(widget: Pressed | Hold) -> Verdict:
-        verdict = noted(press_verdict(widget, panel.interlock(widget.interlock), robot, now))
-        verdicts[widget.id] = Verdict(False, "log", lock) if lock else verdict
-        return verdicts[widget.id]
-
-    def noted(verdict: Verdict) -> Verdict:
-        untils.append(verdict.until)
-        return verdict
-
-    passable = noted(way(robot, now))
-    interlocks = {i.id: noted(interlock_verdict(i, robot, now)) for i in panel.interlocks}
-    widgets: dict[str, dict[str, Any]] = {}
-    displays: dict[str, float] = {}
-    for widget in panel.widgets():
-        match widget:
-            case TextInput() | SelectInput() | ToggleInput():
-                widgets[widget.id] = {}
-            case Numeric():
-                widgets[widget.id] = {"limits": limits(widget)}
-            case Publish() | Call() | Action() | Parameter():
-                widgets[widget.id] = {**enabled(judged(widget))}
-                if not isinstance(widget, Publish) or widget.confirm:
-                    widgets[widget.id] |= progress(robot.progress.get(widget.id, IDLE))
-                if isinstance(widget, Parameter):
-                    widgets[widget.id] |= parameter(widget, robot)
-            case Hold():
-                holding = robot.held.get(widget.id, "")
-                widgets[widget.id] = {
-                    **enabled(judged(widget)),
-                    "held": bool(holding),
-                    "holding": holding,
-                }
-            case Readout() | Indicator():
-                widgets[widget.id], displays[widget.id] = displayed(widget, robot, now)
-    link, until = lamps(panel, robot, passable, verdicts, now)
-    untils.append(until)
+    passable = way(robot, now)
+    interlocks = {i.id: interlock_verdict(i, robot, now) for i in panel.interlocks}
+    commands = [widget for widget in panel.widgets() if isinstance(widget, Pressed | Hold)]
+    verdicts = {w.id: press_verdict(w, panel.interlock(w.interlock), robot, now) for w in commands}
+    told = {w: Verdict(False, "log", lock) for w in verdicts} if lock else verdicts
+    displays = {w.id: displayed(w, robot, now) for w in panel.widgets() if isinstance(w, Display)}
+    link, until = lamps(panel, robot, passable, told, now)
+    banner = say("simulated") if simulated or robot.graph.simulated else ""
     view = View(
         link=link,
         interlocks={i: enabled(verdict) for i, verdict in interlocks.items()},
-        widgets=widgets,
-        notice=Notice(
-            banner=say("simulated") if simulated or robot.graph.simulated else "", fault=fault
-        ),
+        widgets={
+            w.id: displays[w.id][0] if w.id in displays else _shown(w, robot, told)
+            for w in panel.widgets()
+        },
+        notice=Notice(banner=banner, fault=fault),
         robots=dict(robots),
         control=control,
     )
-    return Sight(view, summary(robot.name, link), min(untils), displays)
+    judged = (passable, *interlocks.values(), *verdicts.values())
+    rest = min(until, *(verdict.until for verdict in judged))
+    return Sight(view, summary(robot.name, link), rest, {w: at for w, (_, at) in displays.items()})
 
 
 def refreshed(seen: Sight, displays: Iterable[Display], robot: Robot, now: float) -> Sight:
@@ -152,6 +119,27 @@ def displayed(widget: Display, robot: Robot, now: float) -> tuple[dict[str, Any]
     if isinstance(widget, Readout):
         return readout(widget, robot, now)
     return indicator(widget, robot, now)
+
+
+def _shown(widget: Shown, robot: Robot, verdicts: Mapping[str, Verdict]) -> dict[str, Any]:
+    """The attributes of a widget that is no display."""
+    match widget:
+        case Numeric():
+            return {"limits": limits(widget)}
+        case Publish() | Call() | Action() | Parameter():
+            return {**enabled(verdicts[widget.id]), **_came(widget, robot)}
+        case Hold():
+            holding = robot.held.get(widget.id, "")
+            return {**enabled(verdicts[widget.id]), "held": bool(holding), "holding": holding}
+    return {}
+
+
+def _came(widget: Pressed, robot: Robot) -> dict[str, Any]:
+    """What came of a press, and what a parameter is."""
+    if isinstance(widget, Publish) and not widget.confirm:
+        return {}
+    came = progress(robot.progress.get(widget.id, IDLE))
+    return came | parameter(widget, robot) if isinstance(widget, Parameter) else came
 
 
 def as_seen_by(view: View, browser: Browser) -> View:

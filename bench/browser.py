@@ -18,6 +18,7 @@ VIEWPORT: Final[ViewportSize] = {"width": 1280, "height": 800}
 WITHIN_MS: Final = 15_000
 TEXT_INPUT: Final = "#text, #input-text"
 ROUND_TRIPS: Final = 20
+TEXT_FRAME: Final = 1
 
 # What was shown when, in the page's time. It sees the DOM's changes as the page's own script would.
 WATCH: Final = """([shown, values]) => {
@@ -236,4 +237,6 @@ class Wire:
         self._of[event["requestId"]] = int(event["encodedDataLength"])
 
     def _message(self, event: Any) -> None:
-        self._messages += len(event["response"]["payloadData"])
+        told = event["response"]
+        length = len(told["payloadData"])
+        self._messages += length if told["opcode"] == TEXT_FRAME else length * 3 // 4  # base64

@@ -54,7 +54,11 @@ def loaded(
         time.sleep(SETTLE_S / 2)
     servers, browser = Meter(lambda: family(server.pids)), Meter(rig.chromium.pids)
     time.sleep(rig.sizes.window_s)
-    found = {f"server_{name}": servers.percent(), f"browser_{name}": browser.percent()}
+    found = {
+        f"server_{name}": servers.percent(),
+        f"browser_{name}": browser.percent(),
+        f"rss_{name}": rss_mib(family(server.pids)),
+    }
     rig.robot("quiet")
     return found
 

@@ -51,27 +51,27 @@ class Growth:
             with self._served(Kiosk(), topics) as (server, _):
                 return self._look(count, server, topics, HZ)
 
-        return [one(count) for count in TOPICS]
+        return [one(count) for count in self._some(TOPICS)]
 
     def rate(self) -> Points:
         with self._served(Kiosk(), (TOPIC,)) as (server, _):
-            return [self._look(hz, server, (TOPIC,), hz) for hz in RATES]
+            return [self._look(hz, server, (TOPIC,), hz) for hz in self._some(RATES)]
 
     def size(self) -> Points:
         with self._served(Kiosk(), (TOPIC,)) as (server, _):
-            return [self._look(size, server, (TOPIC,), HZ, size=size) for size in SIZES]
+            return [self._look(size, server, (TOPIC,), HZ, size=size) for size in self._some(SIZES)]
 
     def widgets(self) -> Points:
         def one(count: int) -> Point:
             with self._served(Kiosk(widgets=count), (TOPIC,)) as (server, _):
                 return self._look(count, server, (TOPIC,), HZ)
 
-        return [one(count) for count in WIDGETS]
+        return [one(count) for count in self._some(WIDGETS)]
 
     def clients(self) -> Points:
         points: Points = []
         with self._served(Kiosk(), (TOPIC,)) as (server, clients):
-            for count in CLIENTS:
+            for count in self._some(CLIENTS):
                 join(clients, server, count)
                 points.append(self._look(count, server, (TOPIC,), CLIENTS_HZ))
         return points
@@ -88,9 +88,12 @@ class Growth:
                 return self._look(count, server, (TOPIC,), HZ, ways=ways)
 
         try:
-            return [one(count) for count in ROBOTS]
+            return [one(count) for count in self._some(ROBOTS)]
         finally:
             self._rig.robot("robots", namespaces=[])
+
+    def _some(self, points: Sequence[int]) -> list[int]:
+        return [points[number] for number in self._rig.sizes.growth_points]
 
     @contextmanager
     def _served(self, kiosk: Kiosk, topics: Sequence[str]) -> Iterator[tuple[Running, Asked]]:

@@ -10,13 +10,13 @@ from bench.store import Results, figure
 
 WIDTH: Final = 860
 LEFT: Final = 250  # of the bars: titles stand before it
-RIGHT: Final = 60
+RIGHT: Final = 110  # for the figures
 ROW: Final = 26
 BAR: Final = 14
 HEAD: Final = 46
 GAP: Final = 18
 PANELS: Final = {
-    "down": "Down: the robot's put → the page's DOM has changed (ms)",
+    "down": "Down: the robot's put → the page's DOM has changed (ms; bar: p50, line: to p99)",
     "bridge": "Down from rclpy, over the real bridge (ms)",
     "up": "Up: pointer released → the robot's callback (ms)",
 }

@@ -42,6 +42,7 @@ def whole(results: Results, titles: Titles) -> str:
     parts = {
         "Latency and cost": main_table(results, titles),
         "To reach": targets_table(results),
+        "Load": load_table(results, titles),
         "Many clients": crowd_table(results, titles),
         "A browser that stands still": stalled_table(results, titles),
         "Start": start_table(results, titles),
@@ -76,8 +77,8 @@ def noise(results: Results) -> str:
     before = results["machine"]["load_before"]
     return (
         f"The floor measured twice in each round differs from itself by {both[0]:.2f} × (p50) and "
-        f"{both[1]:.2f} × (p99); the machine's load was {before} when the run began. The pages' clocks "
-        f"are known to {_doubt(results):.2f} ms by round trips."
+        f"{both[1]:.2f} × (p99); the machine's load was {before} when the run began. Chromium's "
+        f"word for its pages' clocks is as round trips tell, within {_doubt(results):.2f} ms."
     )
 
 
@@ -108,6 +109,19 @@ def main_table(results: Results, titles: Titles) -> str:
         "browser 1 kHz": of("cost", "browser_1000", ".0f"),
     }
     return peers_table(columns, titles)
+
+
+def load_table(results: Results, titles: Titles) -> str:
+    def of(load: str) -> Cell:
+        names = {"server": ".1f", "browser": ".1f", "rss": ".0f"}
+        return lambda peer: slashed(
+            number(figure(results, "cost", peer, f"{name}_{load}"), shape)
+            for name, shape in names.items()
+        )
+
+    loads = {"idle": "0", "100 Hz": "100", "1 kHz": "1000", "100 topics × 50 Hz": "wide"}
+    table = peers_table({title: of(load) for title, load in loads.items()}, titles)
+    return table and f"Server CPU % / browser CPU % / server MiB\n\n{table}"
 
 
 def crowd_table(results: Results, titles: Titles) -> str:

@@ -29,10 +29,12 @@ class Sizes:
     toggles: int = 170  # of each peer in each round
     presses: int = 60
     cost_rounds: int = 1
-    window_s: float = 4.0  # of each look at a cost
+    window_s: float = 3.0  # of each look at a cost
     crowds: tuple[int, ...] = (1, 50, 200, 500)
     stalled_s: float = 30.0
+    before_stall_s: float = 3.0
     growth_s: float = 1.0
+    growth_points: tuple[int, ...] = (0, 1, 2, 3)
 
 
 QUICK: Final = Sizes(
@@ -41,8 +43,10 @@ QUICK: Final = Sizes(
     presses=20,
     window_s=0.7,
     crowds=(1, 500),
-    stalled_s=4.0,
+    stalled_s=2.0,
+    before_stall_s=1.0,
     growth_s=0.3,
+    growth_points=(0, 2, 3),
 )
 
 
@@ -94,17 +98,16 @@ class Rig:
         self, peer: Peer, topics: Sequence[str] = (), router: str = "", buttons: int = 1
     ) -> Iterator[Running]:
         """A peer's server, alone: no other gets what the robot says meanwhile."""
-        with tempfile.TemporaryDirectory(prefix=f"bench-{peer.id}-") as folder:
+        with ExitStack() as stack:
+            folder = stack.enter_context(tempfile.TemporaryDirectory(prefix=f"bench-{peer.id}-"))
             place = Place(router or self.robot.first, DOMAIN, Path(folder), tuple(topics), buttons)
             self.robot("offer", way=peer.robot, topics=list(topics))
             began = time.monotonic()
             server = peer.start(place)
             self.started_s = time.monotonic() - began  # until it answered HTTP
-            try:
-                yield server
-            finally:
-                self.robot("quiet")
-                server.end()
+            stack.callback(server.end)
+            stack.callback(self.robot, "quiet")
+            yield server
 
     @contextmanager
     def page(

@@ -16,7 +16,6 @@ from bench.rig import Rig
 LARGE: Final = "/t0"
 SMALL: Final = "/t1"
 LOADS: Final = {LARGE: (100.0, 20_000), SMALL: (250.0, 16)}  # Hz, bytes
-BEFORE_S: Final = 3.0
 AFTER_S: Final = 4.0
 GAP_S: Final = (0.04, 0.06)
 OLD_S: Final = 0.5  # put so long before it went on: old
@@ -36,7 +35,7 @@ def stalled(rig: Rig, peer: Peer) -> dict[str, Any]:
         for topic, (hz, size) in LOADS.items():
             rig.robot("load", ways=[peer.robot], topics=[topic], hz=hz, size=size)
         time.sleep(SETTLE_S)
-        before, _ = _others(rig, peer, other, BEFORE_S, server.pids)
+        before, _ = _others(rig, peer, other, rig.sizes.before_stall_s, server.pids)
         rest_mib = rss_mib(family(server.pids))
         pids = still.pids()
         stack.callback(_signal, pids, signal.SIGCONT)  # before its browser is closed

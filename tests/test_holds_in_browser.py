@@ -60,6 +60,14 @@ BREAKABLE: Final = """
       constructor(url) { super(url); window.stream = this; }
     };
 """
+# A network on which each message takes 45 ms.
+SLOW: Final = """
+    window.WebSocket = class extends WebSocket {
+      set onmessage(hear) { super.onmessage = (event) => setTimeout(() => hear(event), 45); }
+      set onclose(hear) { super.onclose = (event) => setTimeout(() => hear(event), 45); }
+      send(text) { setTimeout(() => this.readyState === WebSocket.OPEN && super.send(text), 45); }
+    };
+"""
 HIDE: Final = """() => {
     Object.defineProperty(document, "hidden", { value: true, configurable: true });
     document.dispatchEvent(new Event("visibilitychange"));
@@ -255,6 +263,31 @@ def test_a_page_that_goes_ends_it(touched: Finger, jogger: RosNode, cause: str) 
     script, code = SCRIPTS[cause]
     soon(cause, measured(touched, jogger, partial(touched.does, script), code))
     assert touched.state is None
+
+
+@pytest.mark.parametrize("tap_ms", [0, 30, 80, 130, 190, 400])
+def test_a_tap_over_a_slow_way_has_its_receipt(
+    chromium: Browser, kiosk: Server, jogger: RosNode, tap_ms: int
+) -> None:
+    """However the finger's lifting meets the server's answers: 45 ms each way."""
+    context = chromium.new_context(has_touch=True)
+    context.add_init_script(SLOW)
+    finger = Finger(context.new_page(), kiosk)
+    for _ in range(TRIES):
+        ends = len(ended(kiosk))
+        finger.down()
+        finger.page.wait_for_timeout(tap_ms)
+        finger.up()
+        receipt = finger.page.locator("#receipt-jog")
+        expect(receipt).not_to_be_empty()
+        said = receipt.inner_text()
+        if "Released at" in said or "let go before it began" in said:
+            break  # else the machine stood still
+    else:
+        raise AssertionError(said)
+    until(lambda: not kiosk.widget("jog")["held"], "no longer held")
+    assert [code for code, _ in ended(kiosk)[ends:]] in ([], ["hold_released"])
+    context.close()
 
 
 def test_lost_permission_ends_it_and_only_a_new_press_begins_again(

@@ -107,6 +107,27 @@ def test_a_hold_is_begun_kept_and_let_go(demo: Server) -> None:
         until(lambda: not demo.widget("jog")["held"], "no longer held")
 
 
+def test_a_hold_is_let_go_by_who_has_no_answer_yet(demo: Server) -> None:
+    for _ in range(TRIES):
+        with opened(demo) as socket:
+            socket.begin()
+            socket.say(do="end", why="released")
+            said = socket.hear()
+            if said["state"] == "ended" and said["outcome"] == "published":
+                assert said["reason"].startswith("Released at")
+                return
+    raise AssertionError(said)
+
+
+def test_who_lets_go_before_a_hold_begins_is_told_that_it_did_not(demo: Server) -> None:
+    with opened(demo) as socket:
+        socket.say(do="end", why="released")
+        said = socket.hear()
+        assert (said["state"], said["status"], said["outcome"]) == ("refused", 409, "refused")
+        assert said["reason"].endswith("it was let go before it began: hold it longer.")
+        assert socket.closed() == 4409
+
+
 def test_a_heartbeat_for_a_hold_that_is_over_is_told_so_and_revives_nothing(demo: Server) -> None:
     with held(demo) as socket:
         time.sleep(0.4)

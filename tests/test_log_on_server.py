@@ -20,6 +20,7 @@ from app.log.chain import verify
 from app.log.file import NAME
 from app.routes.visitors import COOKIE
 from tests.parts import ROOT, Process, Server, free_port, until
+from tests.test_holds_in_browser import PANEL as HOLDING
 
 FULL = "The operator's log can't be written: no space left on device."
 # A data folder on a disk of its own, which only the server and its children see.
@@ -225,6 +226,17 @@ def test_a_filter_narrows_page_and_csv_alike(demo: Server) -> None:
         assert page_text(demo, f"/log?{query}").count("<tr data-kind") == len(ids), query
 
 
+def test_holds_can_be_filtered_by_and_have_their_names(tmp_path: Path) -> None:
+    panel = tmp_path / "jog.toml"
+    panel.write_text(HOLDING)
+    server = Server(ROOT, KIOSK_PANEL=str(panel), KIOSK_MODE="demo")
+    try:
+        until(server.ready, "ready")
+        assert '<option value="jog">Jog</option>' in server.http.get("/log").text
+    finally:
+        server.end()
+
+
 def test_a_bad_filter_is_named(demo: Server) -> None:
     answer = demo.http.get("/log?since=yesterday")
     assert answer.status_code == 422
@@ -266,6 +278,7 @@ def test_the_page_works_without_scripts(
         page.goto(demo.url)
         page.get_by_role("link", name="Log").click()
         expect(page.get_by_role("heading", name="Operator's log")).to_be_visible()
+        page.get_by_text("Filter", exact=True).click()
         page.get_by_label("Text").fill("turn")
         page.get_by_role("button", name="Show").click()
         expect(page.locator("tbody tr")).to_have_count(50)
@@ -281,6 +294,11 @@ def test_the_page_works_without_scripts(
         assert small == []
         wide = page.evaluate("document.documentElement.scrollWidth - innerWidth")
         assert wide <= 0
+        table = page.locator(".entries")
+        assert table.evaluate("(e) => e.scrollWidth - e.clientWidth") <= 0
+        row = table.locator("tbody tr").first
+        expect(row.locator("td").nth(3)).to_have_text(re.compile("^Message turn"))
+        expect(row.locator("td").nth(5)).to_have_text(re.compile("^publishedSent on"))
     finally:
         context.close()
 

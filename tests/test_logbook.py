@@ -13,11 +13,21 @@ from app.errors import LogError
 from app.log import Entry, Filter, Limits, OperatorLog, Origin
 from app.log.reading import rows
 from app.logbook import Log, Logbook
-from app.panel.model import Panel
+from app.panel.model import Hold, Panel
+from app.panel.template import needed
 from app.progress import IDLE
 from app.receipts import By, Receipt
 from app.sentences import say
-from tests.builders import INTERFACES, panel_of, permits, presses_of, robot_there, small_panel
+from tests.builders import (
+    GUARDED,
+    INTERFACES,
+    MESSAGE,
+    panel_of,
+    permits,
+    presses_of,
+    robot_there,
+    small_panel,
+)
 
 KIM = Origin(address="10.0.0.7", browser="b1", who="Kim", seen="boot-7")
 FROM = By(KIM)
@@ -37,6 +47,17 @@ COUNT = {
     "action": "/count",
     "type": "example_interfaces/action/Fibonacci",
     "goal": {"order": 3},
+}
+SPEED = {"id": "speed", "kind": "number", "label": "Speed", "min": 0, "max": 9}
+JOG = {
+    "id": "jog",
+    "kind": "hold",
+    "label": "Jog",
+    "topic": "/jog",
+    "type": "std_msgs/msg/Int32",
+    "message": {"data": "{speed}"},
+    "release": {"data": 0},
+    "interlock": "operation",
 }
 FULL = "The operator's log can't be written: no space left on device."
 
@@ -305,6 +326,24 @@ def test_an_entry_tells_who_what_where_and_by_which_state(tmp_path: Path) -> Non
         assert json.loads(entry.values) == {"message": "hi"}
     assert (closed.outcome, closed.verdict, closed.board) == ("published", "permitted", "board-3")
     assert closed.reason.startswith("Sent on /guarded at ")
+
+
+def test_an_entry_and_a_receipt_have_the_values_of_their_own_press_only(tmp_path: Path) -> None:
+    """A page sends all that is entered on it."""
+    other = {**SPEED, "id": "other"}
+    panel = panel_of(MESSAGE, GUARDED, SPEED, other, JOG)
+
+    async def work(bench: Bench) -> None:
+        assert (await bench.press(message="hi", speed=7, other=3)).inputs == {"message": "hi"}
+        assert (await bench.press(message="", speed=7)).inputs == {"message": ""}  # the id again
+        refused = await bench.press(press_id="p2", message="hi", nothing=3)
+        assert "nothing" in refused.reason
+        assert refused.entered == {"message": "hi", "nothing": 3}
+
+    values = [json.loads(entry.values) for entry in real(tmp_path, work, panel) if not entry.of]
+    assert values == [{"message": "hi"}, {"message": ""}, {"message": "hi"}]
+    jog = next(widget for widget in panel.widgets() if isinstance(widget, Hold))
+    assert needed(jog, {"speed": 7, "message": "hi"}) == {"speed": 7}
 
 
 def test_every_refusal_is_in_the_log(tmp_path: Path) -> None:

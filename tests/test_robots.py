@@ -68,7 +68,7 @@ def test_ten_robots_hear_each_what_was_pressed_for_it(ten: Server) -> None:
 
 def test_a_page_is_of_one_robot_and_leads_to_the_others(ten: Server) -> None:
     html = ten.http.get("/robots/r3/pages/operation").text
-    assert "Robot cell 1 – Robot 3" in html
+    assert "<h1><b>Robot 3</b> <span>Robot cell 1</span></h1>" in html
     assert 'formaction="/robots/r3/widgets/operation"' in html
     assert 'formaction="/widgets/' not in html
     for number in range(1, MANY + 1):
@@ -127,7 +127,7 @@ def test_ten_robots_fit_the_screen(ten: Server, page: Page) -> None:
     assert last is not None
     assert last["y"] + last["height"] < 500
     page.get_by_role("link", name="Robot 7").click()
-    expect(page.locator("h1")).to_have_text("Robot cell 1 – Robot 7")
+    expect(page.locator("h1")).to_have_text("Robot 7 Robot cell 1")
     page.get_by_label("Message").fill("from the screen")
     page.get_by_role("button", name="Publish", exact=True).click()
     expect(page.locator('[data-widget="last_heard"]')).to_contain_text("from the screen (/operation)")

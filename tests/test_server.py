@@ -4,6 +4,7 @@ import json
 import re
 import secrets
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -285,6 +286,18 @@ def test_it_ends_soon_with_fifty_streams_and_sockets_open() -> None:
             with pytest.raises(ConnectionClosed):
                 socket.hear()
     assert "Traceback" not in mine.process.text
+
+
+def test_it_ends_though_somebody_reads_nothing_of_what_they_asked_for() -> None:
+    mine = Server(ROOT)
+    sheet = re.search(r'href="(/static/[^"]+\.css)"', mine.http.get("/").text)
+    assert sheet
+    with socket.socket() as deaf:
+        deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        deaf.connect(("127.0.0.1", mine.port))
+        deaf.sendall(f"GET {sheet[1]} HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n".encode() * 100)
+        until(mine.answers, "it has begun to answer")
+        mine.end(signal.SIGTERM)
 
 
 def test_a_client_that_reads_nothing_holds_up_nobody(demo: Server) -> None:

@@ -8,7 +8,6 @@ from typing import Any
 from hypothesis import given
 from hypothesis import strategies as some
 
-from app import keys
 from app.board import Board
 from app.control import Control
 from app.log import Unlogged
@@ -76,7 +75,7 @@ def test_a_frame_of_values_is_what_a_look_at_everything_would_show(story: list[S
     for topic, word, later in story:
         now += later
         say(robot, topic, word, now)
-        if not seen.well or now >= seen.rest:
+        if now >= seen.rest:
             seen = sight(PANEL, robot, now)
         else:
             stale = [w for w in displays if w.topic == topic or seen.displays[w.id] <= now]
@@ -143,26 +142,6 @@ def test_a_permission_waits_for_no_frame_and_takes_the_values_along() -> None:
         showing.now()
         widgets = showing.board.view["widgets"]
         assert (widgets["guarded"]["enabled"], widgets["heard"]["text"]) == (False, "hello")
-        showing.stop()
-
-    run(shown())
-
-
-def test_where_a_node_is_not_heard_a_value_is_looked_at_with_all_else() -> None:
-    """That a node speaks again is told by its lamp, which a value alone does not change."""
-    panel = panel_of(GUARDED, AGED)
-    robot = there(panel)
-    endpoint(robot, "MP", "/aged", TEXT)
-    says(robot, "/aged", "x", at=time.monotonic() - 60)
-    robot.graph.apply(keys.bridge_token("b2"), False)
-
-    async def shown() -> None:
-        showing = showing_of(panel, robot)
-        assert not sight(panel, robot, time.monotonic()).well
-        says(robot, "/aged", "y", at=time.monotonic())
-        showing.values({robot.key("/aged")})
-        await newer(showing.board, 1)
-        assert showing.board.view["link"]["node"]["state"] == "ok"
         showing.stop()
 
     run(shown())

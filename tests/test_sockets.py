@@ -2,6 +2,9 @@
 
 import asyncio
 import socket
+from contextlib import suppress
+
+import pytest
 
 from app import sockets
 from app.sockets import SEND_BUFFER
@@ -37,11 +40,35 @@ def test_what_listens_from_now_on_is_narrowed_and_what_listened_before_is_not() 
     async def work() -> None:
         with socket.create_server(("127.0.0.1", 0)) as old:
             wide = accepted(old)
-            narrowing = asyncio.create_task(sockets.narrow())
+            ports: set[int] = set()
+            narrowing = asyncio.create_task(sockets.narrow(ports))
             await asyncio.sleep(0)
             with socket.create_server(("127.0.0.1", 0)) as new:
                 await asyncio.wait_for(narrowing, 4)
+                assert ports == {new.getsockname()[1]}
                 assert accepted(new) == 2 * SEND_BUFFER < wide
                 assert accepted(old) == wide
 
     asyncio.run(work())
+
+
+def test_who_reads_nothing_is_cut_off_and_who_has_read_all_is_not() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        port = listening.getsockname()[1]
+        with (
+            socket.create_connection(("127.0.0.1", port)) as deaf,
+            listening.accept()[0] as stuck,
+            socket.create_connection(("127.0.0.1", port)) as _,
+            listening.accept()[0] as idle,
+        ):
+            stuck.setblocking(False)
+            with suppress(BlockingIOError):
+                while stuck.send(bytes(65_536)):
+                    pass
+            sockets.hang_up({port + 1})
+            assert sockets.unsent(stuck)
+            sockets.hang_up({port})
+            with pytest.raises(BrokenPipeError):
+                stuck.send(b"more")
+            assert idle.send(b"still there") == 11
+            assert deaf.fileno() > 0

@@ -12,6 +12,7 @@ MOST: Final = 2.0**53  # beyond this a browser's numbers are not exact
 
 Number = Annotated[float, Field(ge=-MOST, le=MOST)]
 Unit = Annotated[str, Field(max_length=20)]
+Span = Annotated[int, Field(ge=1, le=12)]
 
 
 class TextInput(Placed):
@@ -32,6 +33,7 @@ class Numeric(Placed):
     step: Annotated[Number, Field(gt=0)] = 1.0
     unit: Unit = ""
     default: Number | None = None
+    span: Span = 6
 
     @property
     def whole(self) -> bool:
@@ -97,6 +99,7 @@ class Option(Description):
 
 class SelectInput(Placed):
     kind: Literal["select"]
+    span: Span = 6
     options: Annotated[tuple[Option, ...], Field(strict=False), AfterValidator(some)]
     default: Any = None
 
@@ -113,6 +116,7 @@ class SelectInput(Placed):
 
 class ToggleInput(Placed):
     kind: Literal["toggle"]
+    span: Span = 6
     on: Label = say("on")
     off: Label = say("off")
     default: bool = False

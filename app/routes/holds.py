@@ -11,6 +11,9 @@ had it: so each one's age is known. Without an answer no browser shows that some
     server   {"stamp": 83.0, "state": "held"}
     browser  {"do": "end", "why": "released", "lease": "…", "stamp": 83.0, "after": 12}
     server   {"stamp": 96.4, "state": "ended", "outcome": "published", "reason": "…"}
+
+An end without a lease is that of a browser which has no answer to its begin yet; it may come instead of
+a begin, too, and is answered as any other.
 """
 
 import asyncio
@@ -33,6 +36,7 @@ from app.holds import RELEASED, Holding
 from app.kiosk import Kiosk
 from app.leases import sent_at
 from app.logbook import Noted
+from app.panel.template import needed
 from app.receipts import By, Receipt, with_doubt
 from app.routes.messages import LONGEST, json_of
 from app.routes.site import CurrentKiosk, CurrentSite
@@ -86,7 +90,7 @@ class Beat(Said):
 
 class End(Said):
     do: Literal["end"]
-    lease: str
+    lease: str = ""
     why: str
 
 
@@ -148,6 +152,8 @@ class _Session:
                 said = await self._read()
         except TimeoutError:
             return refuse(by, say("hold_late"))
+        if isinstance(said, End):
+            return refuse(by, say("hold_let_go"))
         if not isinstance(said, Begin):
             return refuse(by, say("hold_by_nonsense"))
         sent = self._sent(said)
@@ -161,13 +167,14 @@ class _Session:
         except LogError as error:
             return refuse(by, str(error), "log")
         if not still_held:
-            return refuse(by, say("hold_late"))
+            return refuse(by, say("hold_let_go"))
         return holds.begin(widget, said.inputs, sent, by, self._ended.set_result)
 
     async def _written(self, widget: str, said: Begin, by: By) -> bool:
         """The entry in the log, while the browser is listened to: whether it holds still."""
+        own = needed(self._kiosk.holds.widget(widget), said.inputs)
         writing = asyncio.ensure_future(
-            self._kiosk.logbook.pressed(widget, said.inputs, secrets.token_hex(8), by.origin, "hold")
+            self._kiosk.logbook.pressed(widget, own, secrets.token_hex(8), by.origin, "hold")
         )
         self._next = asyncio.ensure_future(self._received())
         await asyncio.wait({writing, self._next}, return_when=asyncio.FIRST_COMPLETED)
@@ -208,11 +215,11 @@ class _Session:
     def _hear(self, said: Begin | Beat | End | None, holding: Holding) -> bool:
         """Whether the hold goes on after what was said."""
         holds = self._kiosk.holds
-        if said is None or isinstance(said, Begin) or said.lease != holding.lease.id:
-            holds.end(holding, "hold_by_nonsense")
-            return False
-        if isinstance(said, End):
+        if isinstance(said, End) and said.lease in ("", holding.lease.id):
             holds.end(holding, WHYS.get(said.why, "hold_by_nonsense"))
+            return False
+        if not isinstance(said, Beat) or said.lease != holding.lease.id:
+            holds.end(holding, "hold_by_nonsense")
             return False
         return holds.beat(holding, said.number, self._sent(said))
 

@@ -14,7 +14,8 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from app.errors import InputError, NotFound
 from app.log import Filter, OperatorLog, Row
-from app.panel.model import Panel, Pressed
+from app.panel.model import Hold, Input, Panel, Pressed
+from app.panel.parameter import Parameter
 from app.routes.site import CurrentSite, Site
 from app.sentences import say
 
@@ -74,6 +75,7 @@ class LogContext(TypedDict):
     wanted: Wanted
     rows: list[Row]
     labels: dict[str, str]
+    inputs: dict[str, str]
     outcomes: tuple[str, ...]
     off: str
     banner: str
@@ -96,7 +98,8 @@ async def page(site: CurrentSite, wanted: Annotated[Wanted, Query()]) -> Respons
         panel=panel,
         wanted=wanted,
         rows=rows,
-        labels={w.id: w.label for w in panel.widgets() if isinstance(w, Pressed)},
+        labels={w.id: w.label for w in panel.widgets() if isinstance(w, Pressed | Hold)},
+        inputs={w.id: w.label for w in panel.widgets() if isinstance(w, Input | Parameter)},
         outcomes=OUTCOMES,
         off="" if site.log.enabled else say("log_off"),
         banner=site.fleet.first.board.view["notice"]["banner"],
@@ -169,10 +172,11 @@ def _word(name: str, **about: object) -> str:
 
 
 def _values_of(text: str) -> list[tuple[str, str]]:
-    """The values of an entry as (name, text)."""
+    """The values of an entry as (name, text), but those that are empty."""
     return [
         (name, value if isinstance(value, str) else json.dumps(value, ensure_ascii=False))
         for name, value in json.loads(text).items()
+        if value != ""
     ]
 
 

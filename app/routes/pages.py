@@ -8,9 +8,11 @@ from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse, RedirectResponse, Response
 
 from app import moments
+from app.browsers import Browser
 from app.control import Refusal
 from app.control_view import Role, role
 from app.errors import NotFound
+from app.kiosk import Kiosk
 from app.panel.model import Input, Page, Panel, Pressed
 from app.panel.parameter import Parameter
 from app.panel.template import inputs_of
@@ -27,12 +29,10 @@ router = APIRouter(include_in_schema=True)
 REFRESH_S = 5
 REFRESH_WITH_INPUTS_S = 30
 RELOADED_S = 2.0  # a press on a page that should have reloaded before is one on an old page
-
-
 # How long after a page without scripts was due it is still thought to be there.
 GRACE_S = 5
 REFUSALS = get_args(Refusal)
-WORDS = ("cancel", "robots", "control", "set", "back", "hold_cut", "hold_scripts")
+WORDS = ("cancel", "robots", "control", "set", "back", "empty", "hold_cut", "hold_scripts")
 LINK_WORDS = ("links", "link_state", "link_since", "link_locks")
 CONTROL_ACTS = ("take", "ask", "give", "keep", "release", "withdraw")
 
@@ -105,16 +105,22 @@ def _render(request: Request, site: Site, page: Page) -> Response:
     typed = any(isinstance(widget, Input | Parameter) for widget in page.widgets)
     refresh_s = REFRESH_WITH_INPUTS_S if typed else REFRESH_S
     browser, token = welcomed(request, site)
-    rules = kiosk.control.rules
-    if rules.required:
+    if kiosk.control.rules.required:
         kiosk.control.loaded(browser, refresh_s + GRACE_S, by_hand(request))
         kiosk.show()
-    board = kiosk.board
+    context = _context(request, site, kiosk, page, browser, refresh_s)
+    html = site.templates.get_template("screen.html").render(**context)
+    return keep(HTMLResponse(html, headers={"cache-control": "no-store"}), request, token)
+
+
+def _context(
+    request: Request, site: Site, kiosk: Kiosk, page: Page, browser: Browser, refresh_s: int
+) -> PageContext:
+    board, rules = kiosk.board, kiosk.control.rules
     refusal = request.query_params.get("control", "")
     receipt = kiosk.presses.receipt(request.query_params.get("receipt", ""))
-    refresh_s = REFRESH_WITH_INPUTS_S if typed else REFRESH_S
     now, wall = moments.now(), time.time()
-    context = PageContext(
+    return PageContext(
         site=site,
         panel=site.fleet.panel,
         page=page,
@@ -127,10 +133,8 @@ def _render(request: Request, site: Site, page: Page) -> Response:
         loaded=moment(wall),
         press_id=secrets.token_hex(8),
         receipt=receipt,
-        inputs=dict(receipt.inputs) if receipt else {},
-        words={"base": kiosk.base, "log": say("log_link"), "asks": asks_of(site.fleet.panel, page)}
-        | {word: say(word) for word in (*WORDS, *LINK_WORDS)}
-        | {act: say(f"control_{act}") for act in CONTROL_ACTS},
+        inputs=dict(receipt.entered) if receipt else {},
+        words=_words(kiosk, page),
         lost=say("server_lost"),
         lost_short=say("lost"),
         locks_all=say("locks_all"),
@@ -144,17 +148,24 @@ def _render(request: Request, site: Site, page: Page) -> Response:
         role=role(board.view["control"], browser, rules),
         refused=say(refusal) if refusal and refusal in REFUSALS else "",
     )
-    html = site.templates.get_template("screen.html").render(**context)
-    return keep(HTMLResponse(html, headers={"cache-control": "no-store"}), request, token)
 
 
-def asks_of(panel: Panel, page: Page) -> dict[str, Ask]:
+def _words(kiosk: Kiosk, page: Page) -> dict[str, Any]:
+    """The words of a page by their names in its templates, and what it asks before a press."""
+    own = {"base": kiosk.base, "log": say("log_link"), "asks": asks_of(kiosk, page)}
+    plain = {word: say(word) for word in (*WORDS, *LINK_WORDS)}
+    return own | plain | {act: say(f"control_{act}") for act in CONTROL_ACTS}
+
+
+def asks_of(kiosk: Kiosk, page: Page) -> dict[str, Ask]:
     """What is asked before the presses of a page that ask first."""
     pressed = (w for w in page.widgets if isinstance(w, Pressed) and w.confirm_press)
-    return {widget.id: ask_of(panel, widget) for widget in pressed}
+    return {widget.id: ask_of(kiosk, widget) for widget in pressed}
 
 
-def ask_of(panel: Panel, widget: Pressed) -> Ask:
-    inputs = {w.id: w for w in panel.widgets() if isinstance(w, Input | Parameter)}
-    needed = [inputs[name] for name in inputs_of(widget)]
-    return Ask(sentence=say("ask", label=widget.label), inputs=needed)
+def ask_of(kiosk: Kiosk, widget: Pressed) -> Ask:
+    """With the robot's name, where there are several."""
+    inputs = {w.id: w for w in kiosk.panel.widgets() if isinstance(w, Input | Parameter)}
+    robot = kiosk.entry.name if kiosk.entry else ""
+    sentence = say("ask_on" if robot else "ask", label=widget.label, robot=robot)
+    return Ask(sentence=sentence, inputs=[inputs[name] for name in inputs_of(widget)])

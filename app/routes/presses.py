@@ -162,7 +162,7 @@ def _ask(site: Site, kiosk: Kiosk, widget: str, inputs: dict[str, str]) -> Respo
     html = site.templates.get_template("ask.html").render(
         site=site,
         panel=kiosk.panel,
-        asked=ask_of(kiosk.panel, pressed),
+        asked=ask_of(kiosk, pressed),
         action=f"{kiosk.base}/widgets/{widget}",
         back=f"{kiosk.base}/pages/{_page_of(kiosk, widget).id}",
         fields={
@@ -172,6 +172,7 @@ def _ask(site: Site, kiosk: Kiosk, widget: str, inputs: dict[str, str]) -> Respo
             "_until": str(round(moments.now() + ASKED_S, 3)),
         },
         no=say("back"),
+        empty=say("empty"),
         label=pressed.label,
     )
     return HTMLResponse(html, headers={"cache-control": "no-store"})

@@ -2,7 +2,7 @@
 export function asked(root, form, yes) {
   const dialog = root.querySelector("dialog.ask");
   for (const place of dialog.querySelectorAll("[data-value-of]")) {
-    place.textContent = shown(form.elements[place.dataset.valueOf]);
+    place.textContent = shown(form.elements[place.dataset.valueOf]) || dialog.dataset.empty;
   }
   const answer = (event) => {
     if (event.target.closest(".yes")) yes(event);

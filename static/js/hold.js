@@ -1,11 +1,13 @@
 // A button that acts while it is held. It ends by whatever may mean that nobody holds it any more,
 // and only a new press begins again. What it shows is what the server answered, nothing else.
-import { ENTRIES, valueOf } from "./press.js";
+import { inputsOf } from "./press.js";
 
 // From this page's own thread on purpose: a page that stands still must not keep a hold alive.
 const BEAT_MS = 80;
 // Without an answer for so long the server does not hold any more.
 const SILENCE_MS = 500;
+// The last answer waits for the disk.
+const LAST_ANSWER_MS = 3000;
 const KEYS = [" ", "Enter"];
 
 export class Hold {
@@ -20,7 +22,7 @@ export class Hold {
   #timer = 0;
   #pointer = null;
   #key = null;
-  #waiting = new Set(); // sockets of holds that were let go, whose last answer is not there yet
+  #waiting = new Map(); // socket → why, of holds that were let go and have no last answer yet
 
   constructor(root, source) {
     this.#root = root;
@@ -89,25 +91,19 @@ export class Hold {
     this.#stampedAt = performance.now();
     let begun = false;
     socket.onmessage = ({ data }) => {
-      if (socket !== this.#socket && !this.#waiting.has(socket)) return;
+      const on = socket === this.#socket;
+      if (!on && !this.#waiting.has(socket)) return;
       const said = JSON.parse(data);
       this.#stamp = said.stamp;
       this.#stampedAt = performance.now();
-      if (!begun) this.#say(socket, { do: "begin", inputs: this.#inputs(), seen: this.#source.seen });
+      if (!begun && on) this.#say(socket, { do: "begin", inputs: inputsOf(this.#button.form), seen: this.#source.seen });
+      else if (!begun) this.#say(socket, { do: "end", why: this.#waiting.get(socket) });
       begun = true;
-      if (said.state === "held") this.#held(said);
+      if (said.state === "held") on && this.#held(socket, said);
       else if (said.state) this.#over(socket, said);
     };
     socket.onclose = () => this.#lost(socket);
     this.#timer = setInterval(() => this.#beat(socket), BEAT_MS);
-  }
-
-  #inputs() {
-    const inputs = {};
-    for (const input of this.#button.form.elements) {
-      if (input.matches(ENTRIES) && input.closest("[data-widget]")) inputs[input.name] = valueOf(input);
-    }
-    return inputs;
   }
 
   #say(socket, what) {
@@ -120,9 +116,10 @@ export class Hold {
     else if (this.#lease) this.#say(socket, { do: "beat", number: ++this.#number, lease: this.#lease });
   }
 
-  #held(said) {
-    if (!said.lease || this.#socket === null) return;
+  #held(socket, said) {
+    if (!said.lease) return;
     this.#lease = said.lease;
+    this.#beat(socket); // on a slow way the next one may come too late
     this.#root.dataset.hold = "held";
     this.#button.setAttribute("aria-pressed", "true");
   }
@@ -132,13 +129,13 @@ export class Hold {
     const socket = this.#socket;
     if (!socket) return;
     this.#reset();
-    if (this.#lease) this.#say(socket, { do: "end", why, lease: this.#lease });
-    if (!this.#lease || why === "silence" || why === "leaving") {
+    this.#say(socket, { do: "end", why, lease: this.#lease });
+    if (why === "silence" || why === "leaving") {
       socket.close();
       if (why === "silence") this.#show("unknown", this.#root.dataset.cut);
     } else {
-      this.#waiting.add(socket);
-      setTimeout(() => socket.close(), SILENCE_MS);
+      this.#waiting.set(socket, why);
+      setTimeout(() => socket.close(), LAST_ANSWER_MS);
     }
   }
 

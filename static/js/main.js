@@ -164,5 +164,5 @@ const source = new Source({
 if (document.querySelector("[data-step]")) source.load("./inputs.js", () => {});
 const holds = document.querySelectorAll('[data-kind="hold"]');
 if (holds.length) source.load("./hold.js", ({ Hold }) => holds.forEach((root) => new Hold(root, source)));
-const presser = new Presser(widgets, source, { unsure: body.dataset.unsure, lost: body.dataset.lost });
+const presser = new Presser(widgets, source, { unsure: body.dataset.unsure });
 source.start();

@@ -4,7 +4,7 @@ const ANSWER_WITHIN_MS = 5000;
 const TAP_AGAIN_MS = 700;
 // A page that nobody touches for so long gives its socket back.
 const UNTOUCHED_MS = 60_000;
-export const ENTRIES = "input:not([type=hidden]), select";
+const ENTRIES = "input:not([type=hidden]), select";
 
 function newId() {
   const bytes = crypto.getRandomValues(new Uint8Array(16));
@@ -13,7 +13,7 @@ function newId() {
 
 // With its type. What is no number (an empty field), or a whole one that is not exact here, goes as it
 // is written: the server says what is wrong.
-export function valueOf(input) {
+function valueOf(input) {
   if (input.type === "checkbox") return input.checked;
   const number = input.type === "number" || input.type === "range";
   if (!number || input.value === "") return input.value;
@@ -21,8 +21,9 @@ export function valueOf(input) {
   return Number.isInteger(value) && !Number.isSafeInteger(value) ? input.value : value;
 }
 
-function inputsOf(form) {
-  const entries = [...form.elements].filter((one) => one.matches(ENTRIES) && one.closest("[data-widget]"));
+// All that is entered on the page, by the names of the inputs.
+export function inputsOf(form) {
+  const entries = [...form.elements].filter((input) => input.matches(ENTRIES) && input.closest("[data-widget]"));
   return Object.fromEntries(entries.map((input) => [input.name, valueOf(input)]));
 }
 
