@@ -12,6 +12,7 @@ import uuid
 from collections.abc import Callable, Iterator
 from typing import Any, Final
 
+from app import keys
 from app.calls import CUT_NEWS_S, LATE_S, MOST_UNANSWERED, Asker, with_fields
 from app.errors import DecodeError, LinkError
 from app.goals import ACCEPTED, CANCELING, ENDS, UNKNOWN, Goal
@@ -27,6 +28,7 @@ from app.tasks import told
 log = logging.getLogger("kiosk.actions")
 
 CANCEL: Final = "action_msgs/srv/CancelGoal"
+STATUS: Final = "action_msgs/msg/GoalStatusArray"
 RESULT_S: Final = 86_400.0  # a result is waited for as long as the goal takes
 ASK_AGAIN_S: Final = 1.0
 
@@ -130,25 +132,42 @@ class Actions:
     def hear_feedback(self, action: str, sample: Sample) -> None:
         """The latest feedback of an action; of another program's goal it is passed over. Whoever
         calls this shows it when a frame is due."""
-        for goal in self._of(action):
-            if self._robot.progress[goal.widget.id].stoppable:
-                self._take_feedback(goal, sample)
+        goals = [g for g in self._of(action) if self._robot.progress[g.widget.id].stoppable]
+        if not goals:
+            return
+        types = self._interfaces.action(goals[0].widget.type)  # the server's, which has but one
+        key = keys.feedback(self._robot.key(action))
+        message = self._heard(key, types.feedback_message, sample)
+        for goal in goals:
+            if message is not None and bytes(message.goal_id.uuid) == goal.id.bytes:
+                self._take_feedback(goal, message.feedback)
 
     def hear_status(self, action: str, sample: Sample) -> None:
         """The states of an action's goals; those of other programs are passed over."""
-        for goal in self._of(action):
-            status = self._interfaces.action(goal.widget.type).status
-            found = self._decoded(status, bytes(sample.payload), "status_list")
-            for one in found or ():
-                if bytes(one.goal_info.goal_id.uuid) == goal.id.bytes and goal.advance(one.status):
-                    self._advanced(goal)
+        goals = {goal.id.bytes: goal for goal in self._of(action)}
+        if not goals:
+            return
+        message = self._heard(keys.status(self._robot.key(action)), STATUS, sample)
+        for one in () if message is None else message.status_list:
+            goal = goals.get(bytes(one.goal_info.goal_id.uuid))
+            if goal is not None and goal.advance(one.status):
+                self._advanced(goal)
 
     def _of(self, action: str) -> Iterator[Goal]:
         return (goal for goal in self._latest.values() if goal.widget.action == action)
 
+    def _heard(self, key: str, type_name: str, sample: Sample) -> Any:
+        """A sample's message; None where it can't be read."""
+        try:
+            return self._interfaces.decode(type_name, bytes(sample.payload))
+        except DecodeError as error:
+            self._robot.count_unreadable(key, sample, error)
+            return None
+
     def _advanced(self, goal: Goal) -> None:
-        """It has another state; while its first answer or its result is awaited, that will show."""
-        if not goal.lives or goal not in self._following.values():
+        """It has another state; while its first answer or its result is awaited, or its server after a
+        cut, that will show."""
+        if not goal.lives or goal.cut.done() or goal not in self._following.values():
             return
         if not self._robot.progress[goal.widget.id].busy:  # it was not known whether it runs
             goal.corrected(
@@ -156,21 +175,13 @@ class Actions:
             )
         self._show(goal, goal.under_way)
 
-    def _take_feedback(self, goal: Goal, sample: Sample) -> None:
+    def _take_feedback(self, goal: Goal, feedback: Any) -> None:
         widget = goal.widget
-        types = self._interfaces.action(widget.type)
-        try:
-            message = self._interfaces.decode(types.feedback_message, bytes(sample.payload))
-        except DecodeError as error:
-            self._log.error("%s: %s", widget.action, error)
-            return
-        if bytes(message.goal_id.uuid) != goal.id.bytes:
-            return
         if widget.progress is not None:
-            found = value_of(message.feedback, widget.progress)
+            found = value_of(feedback, widget.progress)
             done = math.nan if found is None else float(found) / widget.progress_max
             goal.fraction = min(1.0, max(0.0, done)) if done == done else None  # NaN is no progress
-        goal.said = with_fields(widget.feedback, message.feedback)
+        goal.said = with_fields(widget.feedback, feedback)
         self._note(goal, goal.under_way)  # shown with the next frame: a goal may say a lot
 
     def _first_answer(self, goal: Goal, response: str, reply: bytes | None) -> Answer:
@@ -196,6 +207,7 @@ class Actions:
                     self._tell(goal, Answer("unknown", goal.cut.result() or say("goal_cut")))
                 await self._until_offered(goal)
                 goal.cut = asyncio.get_running_loop().create_future()
+                self._advanced(goal)
             if answer := await self._ended(goal):
                 break
             if not (goal.known or goal.cut.done()):
@@ -240,15 +252,15 @@ class Actions:
 
     async def _result(self, goal: Goal, payload: bytes) -> bytes | None:
         """The reply of `get_result`, which is asked for again where Zenoh refuses."""
-        told = False
+        refused = False
         while not goal.cut.done():
             wait_s = RESULT_S if goal.known else LATE_S
             try:
                 return await self._reply(goal, self._query(goal.widget, "get_result", payload, wait_s))
             except LinkError as error:
-                if not told:
-                    log.warning("press %s: %s", goal.press_id, error)
-                told = True
+                if not refused:
+                    self._log.warning("press %s: %s", goal.press_id, error)
+                refused = True
                 await asyncio.wait({goal.cut}, timeout=ASK_AGAIN_S)
         return None
 

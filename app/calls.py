@@ -13,7 +13,7 @@ from functools import partial
 from typing import Any, Final, Protocol
 
 from app.errors import DecodeError, FieldError
-from app.interfaces import Interfaces, to_plain, value_at
+from app.interfaces import Interfaces, text_of, value_at
 from app.logs import RobotLog
 from app.panel.model import Call
 from app.panel.template import PLACE
@@ -25,6 +25,7 @@ log = logging.getLogger("kiosk.calls")
 
 CUT_NEWS_S: Final = 0.3
 NOTHING: Final = "—"
+LONGEST_SAID: Final = 500  # characters of one value: every browser gets it, and logs keep it
 LATE_S: Final = 60.0  # how long after its time an answer is still waited for
 MOST_UNANSWERED: Final = 8  # the bridge keeps ten requests of a service
 
@@ -186,12 +187,12 @@ def field_of(
 
 
 def with_fields(template: str, message: Any) -> str:
-    """The template with each `{path}` replaced by that field's value, "—" where a list in the path is
-    too short."""
+    """The template with each `{path}` replaced by that field's value, which is cut where it is long, or
+    by "—" where a list in the path is too short."""
 
     def shown(path: str) -> str:
         try:
-            return str(to_plain(value_at(message, path)))
+            return text_of(value_at(message, path), LONGEST_SAID)
         except FieldError:
             return NOTHING
 

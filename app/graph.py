@@ -59,9 +59,16 @@ class Graph:
             if endpoint.role in ("SS", "AS"):
                 self._since[token_key] = now
         else:
-            self._tokens[endpoint.key].pop(token_key, None)
-            self._since.pop(token_key, None)
+            self._end(endpoint.key, token_key)
         return None
+
+    def _end(self, key: str, token_key: str) -> None:
+        """Of a node that went nothing is kept: many come once and never again."""
+        tokens = self._tokens.get(key, {})
+        tokens.pop(token_key, None)
+        if not tokens:
+            self._tokens.pop(key, None)
+        self._since.pop(token_key, None)
 
     def _bridge(self, zid: str, alive: bool) -> str:
         if alive:

@@ -14,10 +14,10 @@ from functools import partial
 from typing import Any, Final
 
 from app import keys
-from app.calls import Asker, Calls, Request
+from app.calls import LONGEST_SAID, Asker, Calls, Request
 from app.declared import UNKNOWN, Declared, Value, checked, declared, name_of, value_in, wire
 from app.errors import DecodeError
-from app.interfaces import Interfaces
+from app.interfaces import Interfaces, text_of
 from app.interlocks import parameters_offered
 from app.logs import RobotLog
 from app.panel.model import Panel
@@ -250,7 +250,7 @@ def _answer(widget: Parameter, value: Value, response: Any) -> Answer:
     result = response.results[0]
     if result.successful:
         return Answer("succeeded", say("parameter_set", value=widget.written(value), time=now))
-    said = f": {result.reason}" if result.reason else "."
+    said = f": {text_of(result.reason, LONGEST_SAID)}" if result.reason else "."
     return Answer("rejected", say("said_no", time=now) + said)
 
 

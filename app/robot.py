@@ -158,11 +158,12 @@ class Robot:
         try:
             message = self._interfaces.decode(self._types[key], bytes(sample.payload))
         except DecodeError as error:
-            self._count_unreadable(key, sample, error)
+            self.count_unreadable(key, sample, error)
             return Reading("unreadable", None, sample.at, sample.wall)
         return Reading("message", message, sample.at, sample.wall)
 
-    def _count_unreadable(self, key: str, sample: Sample, error: DecodeError) -> None:
+    def count_unreadable(self, key: str, sample: Sample, error: DecodeError) -> None:
+        """Counts a sample that can't be read; logs one of a topic in `UNREADABLE_LOG_S`."""
         self.undecodable[key] += 1
         if sample.at - self._logged_at.get(key, -math.inf) >= UNREADABLE_LOG_S:
             self._logged_at[key] = sample.at

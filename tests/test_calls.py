@@ -8,7 +8,7 @@ import pytest
 
 from app import keys
 from app.actions import Actions
-from app.calls import LATE_S, MOST_UNANSWERED, Calls
+from app.calls import LATE_S, LONGEST_SAID, MOST_UNANSWERED, Calls
 from app.errors import LinkError
 from app.panel.model import Action, Call, Panel
 from app.progress import Answer, Progress
@@ -18,7 +18,15 @@ from tests.builders import BRIDGE, INTERFACES, panel_of, robot_there
 TRIGGER = "std_srvs/srv/Trigger"
 COUNT = "example_interfaces/action/Fibonacci"
 CALL = {"id": "reset", "kind": "call", "label": "Reset", "service": "/reset", "type": TRIGGER}
-GOAL = {"id": "count", "kind": "action", "label": "Count", "action": "/count", "type": COUNT}
+GOAL = {
+    "id": "count",
+    "kind": "action",
+    "label": "Count",
+    "action": "/count",
+    "type": COUNT,
+    "feedback": "so far {sequence}",
+    "result": "{sequence}",
+}
 
 
 class Line:
@@ -381,6 +389,22 @@ def test_a_goal_cut_off_before_its_answer_is_asked_for_when_the_bridge_is_back()
     run(test)
 
 
+def test_a_goal_shows_no_state_until_its_server_is_offered_again() -> None:
+    async def test(bench: Bench) -> None:
+        assert (await bench.send_goal()).outcome == "timed_out"
+        bench.lose_the_bridge()
+        await asyncio.sleep(0.01)
+        tell_states(bench, (goal_id(bench), 2))
+        assert (bench.shown.goal, bench.shown.busy) == ("UNKNOWN", False)
+        bench.robot.graph.apply(keys.bridge_token(BRIDGE), True)
+        await asked(bench, 3)
+        assert (bench.shown.goal, bench.shown.stoppable) == ("EXECUTING", True)
+        assert [answer.outcome for _, answer in bench.corrected] == ["accepted"]
+        await bench.actions.stop()
+
+    run(test)
+
+
 def test_a_goal_that_began_and_is_cut_off_before_its_answer_is_unknown() -> None:
     async def test(bench: Bench) -> None:
         start = bench.send_goal()
@@ -501,6 +525,42 @@ async def settled(bench: Bench) -> None:
     """Nothing is followed any more."""
     while bench.actions._following:
         await asyncio.sleep(0.001)
+
+
+def test_feedback_and_results_of_any_length_are_cut() -> None:
+    async def test(bench: Bench) -> None:
+        types = INTERFACES.action(COUNT)
+        await accepted(bench)
+        long = {"sequence": list(range(300_000))}
+        one = {"goal_id": {"uuid": goal_id(bench)}, "feedback": long}
+        bench.actions.hear_feedback("/count", sample_of(INTERFACES.encode(types.feedback_message, one)))
+        bench.line.answer(types.get_result_response, status=4, result=long)
+        assert bench.shown.text.startswith("Under way. so far [0, 1, 2, ")
+        assert len(bench.shown.text) < 2 * LONGEST_SAID
+        await settled(bench)
+        assert bench.shown.text.endswith("…")
+        assert len(bench.corrected[0][1].text) < 2 * LONGEST_SAID
+
+    run(test)
+
+
+def test_feedback_and_states_that_can_not_be_read_are_counted_and_fill_no_log(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    async def test(bench: Bench) -> None:
+        await accepted(bench)
+        for number in range(100):
+            garbage = Sample(b"\0\1\0\0\xff", number, number / 10, 0.0, BRIDGE)
+            bench.actions.hear_feedback("/count", garbage)
+            bench.actions.hear_status("/count", garbage)
+        counted = {"count/_action/feedback": 100, "count/_action/status": 100}
+        assert bench.robot.undecodable == counted
+        lines = [line for line in caplog.messages if "_action" in line]
+        assert len(lines) == len(counted)
+        assert bench.shown.goal == "ACCEPTED"
+        await bench.actions.stop()
+
+    run(test)
 
 
 def test_feedback_of_another_programs_goal_is_passed_over() -> None:

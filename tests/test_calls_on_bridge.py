@@ -443,6 +443,33 @@ def test_a_node_that_ends_in_the_middle_of_a_goal_leaves_it_unknown_and_the_widg
     until(lambda: kiosk.widget("count")["goal"] == "SUCCEEDED", "another goal is done")
 
 
+def test_a_goal_whose_answer_was_cut_off_is_found_again_and_can_be_canceled(
+    own_cyclone_bridge: Bridge,
+    robots: Callable[..., CycloneRobot],
+    tmp_path: Path,
+    servers: Callable[[Server], Server],
+) -> None:
+    kiosk = servers(live(own_cyclone_bridge.endpoint, tmp_path, KIOSK_PANEL=panel_file(tmp_path)))
+    robot = robots(own_cyclone_bridge.domain)
+    until(lambda: kiosk.widget("count")["enabled"], "offered")
+    robot.fibonacci(step_s=30, answer_goals=False)
+    with ThreadPoolExecutor(1) as pool:
+        waiting = pool.submit(press, kiosk, "count", id="goal-1")
+        until(lambda: robot.goals(), "the robot is at it")
+        own_cyclone_bridge.kill()
+        receipt = waiting.result()
+    assert (receipt.status_code, receipt.json()["outcome"]) == (200, "unknown")
+    until(lambda: kiosk.widget("count")["goal"] == "UNKNOWN", "nothing is heard of it")
+    own_cyclone_bridge.start()
+    until(lambda: kiosk.widget("count")["stoppable"], "it is found again", within_s=30)
+    assert kiosk.widget("count")["goal"] == "EXECUTING"
+    assert press(kiosk, "count", id="goal-1").json()["outcome"] == "accepted"
+    until(lambda: robot.requests("/fibonacci/_action/get_result"), "its end is asked for", within_s=30)
+    assert cancel(kiosk, press="goal-1").status_code == 200
+    until(lambda: kiosk.widget("count")["outcome"] == "canceled", "canceled")
+    assert len(robot.goals()) == 1
+
+
 def test_a_goal_of_more_than_five_seconds_survives_a_reload(
     kiosk: Server, robot: CycloneRobot, page: Page
 ) -> None:

@@ -1,12 +1,15 @@
 """What the tokens say: who is there, whether it answers, and of which type each topic is."""
 
+from collections.abc import Sized
+
 import pytest
 
 from app.graph import Graph, Route
-from app.keys import DEMO_VERSION, Qos, TopicRole, bridge_token, token
+from app.keys import DEMO_VERSION, Qos, TopicRole, bridge_token, server_token, token
 from tests.builders import BOOL, BRIDGE, KIOSK, TEXT
 
 OTHER_KIOSK = "c2"
+TRIGGER = "std_srvs/srv/Trigger"
 
 
 def topic_token(zid: str, role: TopicRole, key: str, type_name: str, qos: Qos | None = None) -> str:
@@ -291,3 +294,15 @@ def test_another_robots_silent_bridge_is_not_this_ones_doubt() -> None:
 def test_without_a_namespace_to_tell_robots_apart_every_bridge_counts(graph: Graph) -> None:
     graph.configured({BRIDGE: "/robot7"})
     assert graph.bridges == {BRIDGE}
+
+
+def test_of_nodes_that_came_and_went_nothing_is_kept(graph: Graph) -> None:
+    def sizes() -> dict[str, int]:
+        return {name: len(one) for name, one in vars(graph).items() if isinstance(one, Sized)}
+
+    before = sizes()
+    for number in range(100):
+        for alive in (True, False, False):
+            graph.apply(topic_token(BRIDGE, "MP", f"node{number}/rosout", TEXT), alive)
+            graph.apply(server_token(BRIDGE, "SS", f"node{number}/reset", TRIGGER), alive)
+    assert sizes() == before

@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, Final
 
@@ -10,7 +10,7 @@ import numpy
 import pytest
 
 from app.errors import DecodeError, FieldError, InterfaceError
-from app.interfaces import DISTROS, Interfaces, interfaces_of, to_plain, value_at
+from app.interfaces import DISTROS, Interfaces, interfaces_of, text_of, to_plain, value_at
 from tests.samples import Samples
 from tests.test_interfaces import garbage
 
@@ -66,6 +66,31 @@ def test_every_kind_of_field_comes_back_as_it_went(cell: Interfaces) -> None:
         payload = cell.encode(EVERYTHING, fields)
         plain = to_plain(cell.decode(EVERYTHING, payload))
         assert json.dumps(plain) == json.dumps(to_plain_fields(fields)), seed
+
+
+def test_a_values_text_is_that_of_its_plain_value(cell: Interfaces) -> None:
+    for seed in range(100):
+        fields = Samples(cell.structures, seed).fields(EVERYTHING)
+        message = cell.decode(EVERYTHING, cell.encode(EVERYTHING, fields))
+        whole = str(to_plain(message))
+        assert text_of(message, len(whole)) == whole, seed
+        assert text_of(message, 100) == whole[:99] + "…", seed
+        for one in cell.structures[EVERYTHING].fields:
+            value = value_at(message, one.name)
+            assert text_of(value, 10**9) == str(to_plain(value)), (seed, one.name)
+
+
+class Endless(list[int]):
+    """A list of which only the beginning may be looked at."""
+
+    def __iter__(self) -> Iterator[int]:
+        yield from range(100)
+        raise AssertionError("read on")
+
+
+def test_a_long_list_is_written_by_its_head_only() -> None:
+    assert text_of(Endless([1] * 1000), 20) == "[0, 1, 2, 3, 4, 5, …"
+    assert text_of("x" * 21, 20) == "x" * 19 + "…"
 
 
 def to_plain_fields(value: Any) -> Any:

@@ -8,7 +8,7 @@ the field.
 from app.interfaces.composition import ActionTypes
 from app.interfaces.definitions import INTEGERS, PLACEHOLDER, Field, Structure, Type
 from app.interfaces.paths import value_at
-from app.interfaces.plain import to_plain
+from app.interfaces.plain import text_of, to_plain
 from app.interfaces.store import DISTROS, Interfaces, interfaces_of
 
 __all__ = [
@@ -21,6 +21,7 @@ __all__ = [
     "Structure",
     "Type",
     "interfaces_of",
+    "text_of",
     "to_plain",
     "value_at",
 ]

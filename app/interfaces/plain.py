@@ -1,7 +1,8 @@
 """Decoded messages as plain values for JSON and the browser."""
 
 import math
-from dataclasses import fields
+from collections.abc import Iterator
+from dataclasses import fields, is_dataclass
 from functools import lru_cache
 from typing import Any, Final
 
@@ -21,19 +22,52 @@ def to_plain(message: Any) -> Any:
     or a browser's numbers can't hold becomes text: integers beyond ±2^53 ("9007199254740993"),
     "NaN", "Infinity" and "-Infinity".
     """
+    if isinstance(message, numpy.generic):  # first: numpy's float64 is a float, too
+        return to_plain(message.item())
     if message is None or isinstance(message, bool | str):
         return message
     if isinstance(message, int):
         return message if -MOST <= message <= MOST else str(message)
     if isinstance(message, float):
         return message if math.isfinite(message) else _unusual(message)
-    if isinstance(message, numpy.generic):
-        return to_plain(message.item())
     if isinstance(message, numpy.ndarray):
         return _array(message)
     if isinstance(message, list | tuple | bytes | bytearray):
         return [to_plain(item) for item in message]
     return {name: to_plain(getattr(message, each)) for each, name in _names(message.__class__)}
+
+
+def text_of(value: Any, most: int) -> str:
+    """A value in a decoded message as `str(to_plain(value))` writes it, cut to `most` characters; what
+    is cut away is not even looked at: a list may have any length."""
+    text = ""
+    for piece in _pieces(value, most) if _nests(value) else [str(to_plain(value))]:
+        text += piece
+        if len(text) > most:
+            return text[: most - 1] + "…"
+    return text
+
+
+def _nests(value: Any) -> bool:
+    return isinstance(value, numpy.ndarray | list | tuple | bytes | bytearray) or is_dataclass(value)
+
+
+def _pieces(value: Any, most: int) -> Iterator[str]:
+    """How a list or a message is written, and what is in it."""
+    if isinstance(value, str):
+        yield repr(value[: most + 1])
+    elif not _nests(value):
+        yield repr(to_plain(value))
+    elif is_dataclass(value):
+        for number, (each, name) in enumerate(_names(value.__class__)):
+            yield f"{', ' if number else '{'}{name!r}: "
+            yield from _pieces(getattr(value, each), most)
+        yield "}" if _names(value.__class__) else "{}"
+    else:
+        for number, item in enumerate(value):
+            yield ", " if number else "["
+            yield from _pieces(item, most)
+        yield "]" if len(value) else "[]"
 
 
 def _unusual(value: float) -> str:

@@ -56,6 +56,7 @@ class Fibonacci:
     def __init__(self, node: Node, name: str = "/fibonacci") -> None:
         self.step_s = 0.05
         self.refuse_cancels = False
+        self.answer_goals = True
         self.keep_s = 10.0
         self._goals: dict[bytes, Goal] = {}
         self._changed = threading.Condition()
@@ -77,10 +78,10 @@ class Fibonacci:
         )
 
     def configure(self, **settings: Any) -> None:
-        """step_s, refuse_cancels, keep_s; running goals take a new step time at once."""
+        """step_s, refuse_cancels, answer_goals, keep_s; running goals take a new step time at once."""
         with self._changed:
             for name, value in settings.items():
-                if name not in ("step_s", "refuse_cancels", "keep_s"):
+                if name not in ("step_s", "refuse_cancels", "answer_goals", "keep_s"):
                     raise ValueError(f"no setting {name}")
                 setattr(self, name, value)
             self._changed.notify_all()
@@ -113,7 +114,8 @@ class Fibonacci:
             if accepted:
                 self._goals[goal.id] = goal
                 self._tell_status()
-        answer(Fibonacci_SendGoal_Response(accepted, Time.at(goal.accepted_ns)))
+        if self.answer_goals:
+            answer(Fibonacci_SendGoal_Response(accepted, Time.at(goal.accepted_ns)))
         if accepted:
             threading.Thread(target=self._execute, args=(goal,), daemon=True).start()
 
