@@ -179,7 +179,9 @@ def test_without_scripts_it_is_asked_the_same(demo: Server, chromium: Browser) -
 
 def test_the_first_button_is_seen_without_scrolling(shown: Page) -> None:
     button = box(shown, '[data-widget="allow"] > button')
-    assert button["y"] + 0.8 * button["height"] <= shown.evaluate("innerHeight")
+    assert button["y"] + 0.7 * button["height"] <= shown.evaluate("innerHeight")
+    toggle = box(shown, '[data-widget="light"] i')
+    assert button["y"] - toggle["y"] - toggle["height"] >= 4 / 0.22 - 1  # millimetres
     assert box(shown, '[data-widget="n"]')["y"] == box(shown, '[data-widget="speed"]')["y"]
 
 
