@@ -8,6 +8,7 @@ import re
 import secrets
 from collections import OrderedDict
 from dataclasses import dataclass
+from functools import lru_cache
 from ipaddress import IPv6Address, ip_address
 from typing import Final
 
@@ -90,6 +91,7 @@ def public_id(token: str) -> str:
     return hashlib.sha256(token.encode()).hexdigest()[:12]
 
 
+@lru_cache(BROWSERS_KEPT)
 def where(address: str) -> tuple[str, bool]:
     """The address as it is shown, and whether it is of this machine."""
     try:

@@ -5,9 +5,10 @@ Kept by topic key, so that asking costs the same however large the robot's graph
 
 import math
 from collections import defaultdict
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from itertools import chain
+from typing import Any, TypeVar, TypeVarTuple
 
 from app.keys import DEMO_VERSION, Direction, Endpoint, Qos, Role, ServerRole, TopicRole, parsed, within
 
@@ -30,6 +31,26 @@ class Route:
     whole: bool = True
 
 
+Of = TypeVarTuple("Of")
+Found = TypeVar("Found")
+
+
+def remembered(look: Callable[["Graph", *Of], Found]) -> Callable[["Graph", *Of], Found]:
+    """What is found is kept until the graph changes: it is asked far more often than that."""
+
+    def asked(graph: "Graph", *of: *Of) -> Found:
+        question = (look, of)
+        found: Found
+        try:
+            found = graph.known[question]
+        except KeyError:
+            found = graph.known[question] = look(graph, *of)
+        return found
+
+    asked.__doc__ = look.__doc__
+    return asked
+
+
 class Graph:
     """The ROS graph behind all bridges; changed by `apply`, `learn` and `answered` only, on the
     event loop."""
@@ -37,6 +58,7 @@ class Graph:
     def __init__(self, own_zid: str = "", namespace: str | None = None) -> None:
         """`namespace` tells this robot's bridges from those of others; None: all are its."""
         self.own_zid = own_zid  # whose tokens are not the robot's
+        self.known: dict[Any, Any] = {}  # see `remembered`
         self._namespace = namespace
         self._bridges: set[str] = set()
         self._fits: dict[str, bool] = {}  # whether a bridge's namespace is the robot's
@@ -52,6 +74,7 @@ class Graph:
         endpoint = parsed(token_key)
         if endpoint is None or endpoint.zid == self.own_zid:
             return None
+        self.known.clear()
         if endpoint.role is None:
             return self._bridge(endpoint.zid, alive)
         if alive:
@@ -82,6 +105,7 @@ class Graph:
     def learn(self, routes: Iterable[Route], nodes: Iterable[Endpoint] = ()) -> None:
         """Takes what the bridges said of their routes, and of the publishers and subscribers of
         the nodes behind them: a route has one type, whatever they have."""
+        self.known.clear()
         self._routes.clear()
         self._nodes.clear()
         for route in routes:
@@ -91,31 +115,37 @@ class Graph:
 
     def answered(self, versions: Mapping[str, str]) -> None:
         """Takes which bridges answered when they were asked, and with which version."""
+        self.known.clear()
         self._answered = versions
 
     def configured(self, namespaces: Mapping[str, str]) -> None:
         """Takes the namespace of each bridge that told it ("" for none)."""
+        self.known.clear()
         for zid, namespace in namespaces.items():
             self._fits[zid] = self._namespace is None or within(self._namespace, namespace)
 
     @property
+    @remembered
     def bridges(self) -> frozenset[str]:
         """Those of this robot; one that has not told its namespace may be, if no other is."""
         told = {zid for zid in self._bridges if self._fits.get(zid)}
         return frozenset(told or self._bridges - self._fits.keys())
 
     @property
+    @remembered
     def silent(self) -> bool:
         """A bridge is there by its token, but did not answer when all were asked."""
         asked = self._answered
         return asked is not None and bool(self.bridges - asked.keys())
 
     @property
+    @remembered
     def simulated(self) -> bool:
         """A bridge that answered is a demo robot's."""
         asked = self._answered or {}
         return any(asked.get(zid) == DEMO_VERSION for zid in self.bridges)
 
+    @remembered
     def _on_robot(self, role: Role, key: str) -> list[Endpoint]:
         tokens = self._tokens.get(key, {}).values()
         return [e for e in tokens if e.role == role and e.zid in self._bridges]
@@ -132,6 +162,7 @@ class Graph:
         """The type of the robot's service or action; None if it offers none of this name now."""
         return next((e.type for e in self._on_robot(role, key)), None)
 
+    @remembered
     def served_since(self, role: ServerRole, key: str) -> float:
         """When (monotonic seconds) the last server of this name came; -inf where there is none."""
         tokens = self._tokens.get(key, {}).items()
@@ -142,6 +173,7 @@ class Graph:
         """Whether the robot's publisher is TRANSIENT_LOCAL; None if it has none now."""
         return next((e.transient_local for e in self._on_robot("MP", key)), None)
 
+    @remembered
     def unheard(self, key: str) -> bool:
         """Whether the robot publishes a topic that its bridge does not read for the panel."""
         publishing = {e.zid for e in self._on_robot("MP", key)}
@@ -150,6 +182,7 @@ class Graph:
             for r in self._routes.get(key, [])
         )
 
+    @remembered
     def wrong_type(self, role: TopicRole, key: str, type_name: str) -> str | None:
         """The other type that this topic has, if it is not what the panel needs for `role`."""
         theirs, others, direction = _COUNTERPARTS[role]
@@ -163,6 +196,7 @@ class Graph:
                 return route.type
         return None
 
+    @remembered
     def wrong_qos(self, role: TopicRole, key: str, qos: Qos) -> str | None:
         """The code of the sentence that says what DDS would not match, for what the panel does.
 

@@ -59,10 +59,10 @@ class _Arrived:
     skipped: int = 0
     between: tuple[Buffer, ...] = ()
 
-    def sample(self) -> Sample:
-        source = sent = None
-        if self.stamp is not None:
-            source, sent = str(self.stamp.get_id()), self.stamp.get_time().timestamp()
+    def sample(self, kept: bool = False) -> Sample:
+        """When it was sent is for what is kept only: to ask a stamp takes its time."""
+        source = None if self.stamp is None else str(self.stamp.get_id())
+        sent = self.stamp.get_time().timestamp() if kept and self.stamp is not None else None
         return Sample(
             self.payload, self.seq, self.at, self.wall, source, self.skipped, sent, self.between
         )
@@ -130,7 +130,7 @@ class Inbox:
             {key: arrived.sample() for key, arrived in samples.items()},
             tokens,
             link_up,
-            [(key, arrived.sample()) for key, arrived in kept],
+            [(key, arrived.sample(kept=True)) for key, arrived in kept],
         )
 
     # Below: on the link's threads, under the lock. No work here, and nothing may raise.

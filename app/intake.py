@@ -8,13 +8,14 @@ from app import keys
 from app.actions import Actions
 from app.confirmations import Confirmations
 from app.inbox import Changes, Token
-from app.interlocks import Verdict, interlock_verdict
+from app.interlocks import interlock_verdict
 from app.logs import RobotLog
-from app.panel.model import Interlock, Panel
+from app.panel.model import Panel
 from app.panel.parameter import EVENTS
 from app.parameters import Parameters
 from app.recording import Recorder
 from app.robot import Robot, Sample
+from app.views import Enabled, enabled
 
 
 @dataclass(slots=True)
@@ -63,17 +64,20 @@ class Intake:
         topics = map(robot.key, panel.subscriptions())
         self.keys = [*topics, *self._feedback, *self._status]  # all that is listened to
 
-    def take(self, changes: Changes, show: Callable[[], None]) -> News:
-        """Takes it in. `show` is called at each value in between that changed a permission."""
+    def take(
+        self, changes: Changes, shown: Callable[[], Mapping[str, Enabled]], show: Callable[[], None]
+    ) -> News:
+        """Takes it in. `shown` are the permissions that are; `show` is called at each value in between
+        that changed one."""
         news = News(urgent=bool(changes.tokens))
         had_bridge = bool(self._robot.graph.bridges)
         # What permits and forbids comes first, and nothing that fails keeps it from being taken in.
         ordered = sorted(changes.samples.items(), key=lambda one: one[0] not in self._interlocks)
         for key, sample in ordered:
             for payload in sample.between:
-                if self._changes(key, replace(sample, payload=payload, between=())):
+                if self._changes(key, replace(sample, payload=payload, between=()), shown()):
                     show()
-            news.urgent |= self._changes(key, sample)
+            news.urgent |= self._changes(key, sample, shown())
             if key in self._feedback or key in self._status or key == self._events:
                 news.more = True
             else:
@@ -82,18 +86,14 @@ class Intake:
         news.came = self._tokens(changes.tokens, had_bridge)
         return news
 
-    def _changes(self, key: str, sample: Sample) -> bool:
-        """Takes a sample in; whether a permission is another one by it."""
-        if (interlocks := self._interlocks.get(key)) is None:
-            self._guarded(key, sample, self._sample)
-            return False
-        before = [self._judged(one) for one in interlocks]
+    def _changes(self, key: str, sample: Sample, shown: Mapping[str, Enabled]) -> bool:
+        """Takes a sample in; whether a permission is another one by it than is shown."""
         self._guarded(key, sample, self._sample)
-        return before != [self._judged(one) for one in interlocks]
-
-    def _judged(self, interlock: Interlock) -> Verdict:
-        verdict = interlock_verdict(interlock, self._robot, time.monotonic())
-        return replace(verdict, until=0.0)
+        now = time.monotonic()
+        return any(
+            enabled(interlock_verdict(one, self._robot, now)) != shown[one.id]
+            for one in self._interlocks.get(key, ())
+        )
 
     def _record(self, changes: Changes) -> None:
         if self._recorder is not None:

@@ -273,7 +273,7 @@ class Kiosk:
         if came_up:
             self.robot.link_up = True
             self._log.info("Zenoh link up")
-        news = self._intake.take(changes, self.show)
+        news = self._intake.take(changes, lambda: self.board.view["interlocks"], self.show)
         if changes.tokens:
             self._follow(news.came)
         if news.urgent or came_up:

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from typing import Final, Literal, TypedDict
 
 from app.interlocks import Verdict, misfit
-from app.panel.model import Hold, Panel, Pressed
+from app.panel.model import Panel
 from app.robot import Robot
 from app.sentences import say
 
@@ -130,8 +130,8 @@ def silent(panel: Panel, robot: Robot, now: float) -> tuple[str, float]:
 
 def labels(panel: Panel, verdicts: Mapping[str, Verdict], codes: frozenset[str]) -> list[str]:
     """The labels of the controls that are locked for one of these codes."""
-    pressed = (w for w in panel.widgets() if isinstance(w, Pressed | Hold))
-    return [w.label for w in pressed if verdicts[w.id].code in codes]
+    locked = {widget for widget, verdict in verdicts.items() if verdict.code in codes}
+    return [w.label for w in panel.widgets() if w.id in locked] if locked else []
 
 
 def locks(names: Sequence[str]) -> str:

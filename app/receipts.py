@@ -36,6 +36,7 @@ NO_WAY: Final = frozenset(
     }
 )
 FINE: Final = frozenset({"published", "confirmed", "accepted", "succeeded"})
+_sorted: Final = json.JSONEncoder(sort_keys=True).encode
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,7 +162,7 @@ def receipt_of(
 
 def fingerprint(inputs: Mapping[str, Any]) -> str:
     """The same for the same inputs only, which are what JSON has."""
-    return hashlib.sha256(json.dumps(inputs, sort_keys=True).encode()).hexdigest()
+    return hashlib.sha256(_sorted(inputs).encode()).hexdigest()
 
 
 def _short(inputs: Mapping[str, Any]) -> bool:

@@ -79,6 +79,7 @@ class Robot:
         self.namespace = entry.namespace if entry else panel.namespace
         self.link_up = False
         self.settled_at = math.inf  # monotonic: when a bridge that came has set up its routes
+        self._keys: dict[str, str] = {}  # of what the panel names
         self._told_apart = entry.namespace if entry else None
         self.graph = Graph(own_zid, self._told_apart)
         self.progress: dict[str, Progress] = {}  # of what widgets have asked, by their ids
@@ -98,7 +99,10 @@ class Robot:
 
     def key(self, topic: str) -> str:
         """The key expression of a topic of this robot."""
-        return key_of(topic, self.namespace)
+        key = self._keys.get(topic)
+        if key is None:
+            key = self._keys[topic] = key_of(topic, self.namespace)
+        return key
 
     def take(self, key: str, sample: Sample) -> None:
         """A newer sample of a topic."""

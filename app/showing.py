@@ -83,6 +83,7 @@ class Showing:
         self._spoke: set[str] = set()  # keys of topics that said something since
         self._whole = False  # whether more than values is to be shown
         self._timer: asyncio.TimerHandle | None = None
+        self._due = math.inf  # monotonic seconds; not every event loop's timers know theirs
         self._stopped = False
 
     def stop(self) -> None:
@@ -144,9 +145,10 @@ class Showing:
     def _at(self, when: float) -> None:
         """Shows again at `when` (monotonic seconds), or sooner if that is planned already."""
         if self._timer is not None:
-            if self._timer.when() <= when:
+            if self._due <= when:
                 return
             self._timer.cancel()
+        self._due = when
         loop = asyncio.get_running_loop()
         self._timer = None if when == math.inf else loop.call_at(when, self._frame)
 

@@ -3,6 +3,7 @@
 import asyncio
 import logging
 import time
+from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import pytest
@@ -18,6 +19,7 @@ from app.logs import RobotLog
 from app.panel.model import Panel
 from app.receipts import LONGEST_KEPT, By
 from app.robot import Robot, Sample
+from app.views import Enabled, sight
 from tests.builders import (
     BOOL,
     BRIDGE,
@@ -67,6 +69,24 @@ def intake_of(panel: Panel, robot: Robot, actions: Any) -> Intake:
     return Intake(panel, robot, actions, deaf, deaf, None, RobotLog(logging.getLogger("x"), ""))
 
 
+class Page:
+    """The permissions as they were last shown."""
+
+    def __init__(self, panel: Panel, robot: Robot) -> None:
+        self._panel = panel
+        self._robot = robot
+        self.said: list[bool] = []
+        self.show()
+
+    def show(self) -> None:
+        self._view = sight(self._panel, self._robot, time.monotonic()).view["interlocks"]
+        if message := self._robot.reading(ENABLED).message:
+            self.said.append(message.data)
+
+    def shown(self) -> Mapping[str, Enabled]:
+        return self._view
+
+
 def test_what_fails_at_a_sample_keeps_no_lock_from_closing(caplog: pytest.LogCaptureFixture) -> None:
     panel = panel_of(COUNT)
     robot = robot_there(panel)
@@ -75,7 +95,8 @@ def test_what_fails_at_a_sample_keeps_no_lock_from_closing(caplog: pytest.LogCap
     intake = intake_of(panel, robot, broken)
     feedback = next(key for key in intake.keys if key.endswith("/feedback"))
     changes = Changes({feedback: sample(b""), robot.key(ENABLED): sample(flag(False))}, {}, True)
-    news = intake.take(changes, lambda: None)
+    page = Page(panel, robot)
+    news = intake.take(changes, page.shown, page.show)
     assert (news.urgent, news.came) == (True, False)
     assert robot.reading(ENABLED).message.data is False
     assert "was not taken in whole" in caplog.text
@@ -85,10 +106,10 @@ def test_a_permission_that_blinked_is_shown_in_between() -> None:
     panel = small_panel()
     robot = robot_there(panel)
     intake = intake_of(panel, robot, Deaf())
-    shown: list[bool] = []
+    page = Page(panel, robot)
     blink = Changes({robot.key(ENABLED): sample(flag(True), flag(True), flag(False))}, {}, True)
-    intake.take(blink, lambda: shown.append(robot.reading(ENABLED).message.data))
-    assert shown == [True, False]
+    intake.take(blink, page.shown, page.show)
+    assert page.said == [True, False]
     assert robot.reading(ENABLED).message.data is True
 
 
@@ -97,10 +118,12 @@ def test_a_permission_that_is_said_again_is_not_urgent() -> None:
     panel = small_panel(interlock={"max_age_s": 1.0})
     robot = robot_there(panel)
     intake = intake_of(panel, robot, Deaf())
-    key = robot.key(ENABLED)
+    key, page = robot.key(ENABLED), Page(panel, robot)
 
     def said(permitted: bool) -> tuple[bool, set[str]]:
-        news = intake.take(Changes({key: sample(flag(permitted))}, {}, True), lambda: None)
+        changes = Changes({key: sample(flag(permitted))}, {}, True)
+        news = intake.take(changes, page.shown, page.show)
+        page.show()
         return news.urgent, news.values
 
     assert said(False) == (True, {key})
@@ -116,7 +139,8 @@ def test_what_cannot_be_read_as_a_permission_is_urgent() -> None:
     permits(robot)
     intake = intake_of(panel, robot, Deaf())
     changes = Changes({robot.key(ENABLED): sample(b"broken")}, {}, True)
-    assert intake.take(changes, lambda: None).urgent
+    page = Page(panel, robot)
+    assert intake.take(changes, page.shown, page.show).urgent
 
 
 def test_each_sample_that_is_kept_whole_is_recorded_and_no_other() -> None:
@@ -131,10 +155,12 @@ def test_each_sample_that_is_kept_whole_is_recorded_and_no_other() -> None:
     tape: Any = Tape()
     deaf: Any = Deaf()
     log = RobotLog(logging.getLogger("x"), "")
-    intake = Intake(panel, robot_there(panel), deaf, deaf, deaf, tape, log)
+    robot = robot_there(panel)
+    intake = Intake(panel, robot, deaf, deaf, deaf, tape, log)
     assert intake.whole == tape.keys
     kept = [("heard", sample(said)) for said in (b"1", b"2", b"3")]
-    intake.take(Changes({"heard": kept[-1][1]}, {}, True, kept), lambda: None)
+    page = Page(panel, robot)
+    intake.take(Changes({"heard": kept[-1][1]}, {}, True, kept), page.shown, page.show)
     assert tape.heard == [b"1", b"2", b"3"]
 
 

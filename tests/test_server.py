@@ -266,8 +266,11 @@ def test_openapi_describes_the_paths(demo: Server) -> None:
     assert "409" in paths["/widgets/{widget}"]["post"]["responses"]
 
 
-def test_it_ends_soon_with_fifty_streams_and_sockets_open() -> None:
-    mine = Server(ROOT)
+def test_it_ends_soon_with_fifty_streams_and_sockets_open(
+    servers: Callable[[Server], Server],
+) -> None:
+    mine = servers(Server(ROOT))
+    until(mine.ready, "ready")
     limits = httpx.Limits(max_connections=60)
     with ExitStack() as opened:
         many = opened.enter_context(

@@ -8,8 +8,9 @@ is the hash of the entry before; the first entry's is the log's genesis, 32 rand
 import hashlib
 import json
 import time
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from operator import attrgetter
 from typing import Any, Final, Literal, Self
 
 Kind = Literal["began", "pressed", "closed", "corrected", "refused", "removed", "resumed"]
@@ -62,14 +63,18 @@ class Entry:
 
     def sealed(self, seq: int, boot: str, prev: str) -> Self:
         """As it stands in the log, after the entry whose hash is `prev`."""
-        placed = replace(self, seq=seq, boot=boot, prev=prev)
-        return replace(placed, hash=placed.computed_hash())
+        values = dict(zip(FIELDS, self.values_in_order(), strict=True))
+        values |= {"seq": seq, "boot": boot, "prev": prev}
+        del values["hash"]
+        return type(self)(**values, hash=_hash(list(values.values())))
 
     def computed_hash(self) -> str:
         """What its hash must be."""
-        values = [getattr(self, name) for name in FIELDS[:-1]]
-        text = json.dumps(values, ensure_ascii=False, separators=(",", ":"))
-        return hashlib.sha256(text.encode()).hexdigest()
+        return _hash(self.values_in_order()[:-1])
+
+    def values_in_order(self) -> tuple[Any, ...]:
+        """The values of all fields, in their order."""
+        return _in_order(self)
 
     def followed(self, kind: Kind, outcome: str, reason: str, **more: str) -> Self:
         """The entry that tells, now, what came of this press."""
@@ -88,6 +93,9 @@ class Entry:
 
 
 FIELDS: Final = tuple(field.name for field in fields(Entry))
+ORIGIN: Final = tuple(field.name for field in fields(Origin))
+_in_order: Final = attrgetter(*FIELDS)
+_as_text: Final = json.JSONEncoder(ensure_ascii=False, separators=(",", ":")).encode
 
 
 def entered(
@@ -95,8 +103,9 @@ def entered(
 ) -> Entry:
     """An entry as of now, with texts that any file and any page can take."""
     at, monotonic = _now()
-    from_whom = asdict(origin) if origin is not None else {}
-    cleaned: dict[str, Any] = {name: plain(text) for name, text in (from_whom | texts).items()}
+    if origin is not None:
+        texts |= {name: getattr(origin, name) for name in ORIGIN}
+    cleaned: dict[str, Any] = {name: plain(text) for name, text in texts.items()}
     return Entry(at=at, monotonic=monotonic, kind=kind, values=as_json(values or {}), **cleaned)
 
 
@@ -116,6 +125,10 @@ def as_json(values: Mapping[str, Any]) -> str:
         cut = {"…": text[:LONGEST_VALUES], "… of": len(text)}
         text = json.dumps(cut, ensure_ascii=False)
     return plain(text, len(text))
+
+
+def _hash(values: Sequence[Any]) -> str:
+    return hashlib.sha256(_as_text(values).encode()).hexdigest()
 
 
 def _now() -> tuple[int, int]:

@@ -24,6 +24,7 @@ HOUR_S: Final = 3600.0
 CLOCK_SET_BY_S: Final = 60.0  # what moves it by more is no drift
 QUIET_S: Final = 1.0  # after so long without a press there is time for the file
 WAL_BYTES: Final = 16_000_000  # then it can wait no longer
+TIDIED_S: Final = 0.1  # between two looks while presses come: each keeps the press from its interpreter
 CHECKPOINT_S: Final = 5.0  # between two that can't wait: a reader may hold them up
 TIDY_AFTER: Final = 1000  # entries
 MOST_OWED: Final = 1000
@@ -74,6 +75,7 @@ class Keeper:
         self._try_at = 0.0
         self._hourly_at = 0.0
         self._checkpoint_at = 0.0
+        self._tidy_at = 0.0
         self._since_tidy = 0
         self._fresh_wal = True
         self._steady = Steady()
@@ -121,8 +123,9 @@ class Keeper:
                 self._broken(self._lost_sync)
             if batch:
                 self._write(batch)
-            if self._store is not None:
+            if self._store is not None and (not batch or time.monotonic() >= self._tidy_at):
                 self._tidy(self._store, quiet=not batch)
+                self._tidy_at = time.monotonic() + TIDIED_S
         self._syncer.end(QUIET_S * 5)
         self._close()
 
@@ -137,8 +140,9 @@ class Keeper:
 
     def _write(self, batch: list[Ticket]) -> None:
         wanted = [ticket for ticket in batch if not ticket.abandoned]
-        given_up = LogError(say("log_abandoned"))
-        self._tell([(ticket, given_up) for ticket in batch if ticket.abandoned], False)
+        if len(wanted) < len(batch):
+            given_up = LogError(say("log_abandoned"))
+            self._tell([(ticket, given_up) for ticket in batch if ticket.abandoned], False)
         if self._store is None:
             self._fail(wanted, LogError(self.fault))
             return

@@ -152,7 +152,7 @@ class Store:
         with in_words():
             self._db.execute("BEGIN IMMEDIATE")
             try:
-                self._db.executemany(INSERT, [[getattr(e, n) for n in FIELDS] for e in sealed])
+                self._db.executemany(INSERT, [entry.values_in_order() for entry in sealed])
                 self._note_undone(sealed)
                 if removed:
                     self._db.execute("DELETE FROM entry WHERE seq <= ?", (removed,))

@@ -185,7 +185,11 @@ class OperatorLog:
             raise
 
     async def _within(self, ticket: Ticket, seconds: float) -> Entry:
-        await asyncio.wait({ticket.done}, timeout=seconds)
+        timer = self._loop.call_later(seconds, ticket.wake)
+        try:
+            await ticket.waiter
+        finally:
+            timer.cancel()
         if not ticket.done.done():
             self._stuck.add(ticket)
             ticket.done.add_done_callback(lambda _: self._unstick(ticket))
@@ -215,7 +219,9 @@ class OperatorLog:
         return ticket
 
     def _tell(self, results: Results, changed: bool) -> None:
-        """On the keeper's threads."""
+        """On the keeper's threads; wakes the loop only where there is something to tell."""
+        if not (results or changed):
+            return
         try:
             self._loop.call_soon_threadsafe(self._told, results, changed)
         except RuntimeError:  # the loop is closed: the process ends
@@ -225,6 +231,7 @@ class OperatorLog:
         for ticket, result in results:
             if not ticket.done.done():
                 ticket.done.set_result(result)
+                ticket.wake()
         if changed:
             self._say_changed()
 

@@ -1,5 +1,6 @@
 """What descriptions are made of: checked names, what every widget has, a topic's QoS."""
 
+from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
@@ -93,6 +94,6 @@ class TopicQos(Description):
     durability: Literal["volatile", "transient_local"] | None = None
     depth: Annotated[int, Field(ge=1, le=10_000)] = 10
 
-    @property
+    @cached_property
     def on_wire(self) -> Qos:
         return Qos(self.reliability == "reliable", self.durability == "transient_local", self.depth)

@@ -15,8 +15,10 @@ Model = TypeVar("Model", bound=BaseModel)
 def json_of(text: str | bytes, place: str = "the body") -> Any:
     """What stands in it; InputError for what is not JSON, or has text that is not Unicode."""
     try:
-        given = json.loads(text, parse_constant=_no_constant)
-        json.dumps(given, ensure_ascii=False).encode()  # half a surrogate pair is no text
+        text = text.decode("utf-8-sig") if isinstance(text, bytes) else text
+        given = _decoder.decode(text)
+        if "\\u" in text:
+            json.dumps(given, ensure_ascii=False).encode()  # half a surrogate pair is no text
     except UnicodeEncodeError:
         raise InputError(f"{place} has half of a surrogate pair, which is not Unicode text") from None
     except (ValueError, RecursionError) as error:
@@ -36,3 +38,6 @@ def as_model(model: type[Model], given: object, place: str = "the body") -> Mode
 
 def _no_constant(name: str) -> float:
     raise ValueError(f"{name} is not a number of JSON")
+
+
+_decoder: Final = json.JSONDecoder(parse_constant=_no_constant)
