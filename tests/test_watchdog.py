@@ -27,7 +27,7 @@ import signal, sys, threading, time, uvicorn
 from app.main import app
 
 def link_stands_still(*_):
-    app.state.site.fleet.first.link._wake_loop = threading.Event().wait
+    app.state.site.fleet.first.link._inbox._wake_loop = lambda _: threading.Event().wait()
 
 def loop_stands_still(*_):
     time.sleep(60)
