@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Browser, Page, Route, expect
 
 from tests import cyclone
 from tests.cyclone import CycloneRobot
@@ -67,6 +67,25 @@ def test_texts_and_switches_are_set(kiosk: Server, robot: CycloneRobot, page: Pa
     set_(page, "Enabled")
     expect(widget(page, "enabled").locator(".value")).to_have_text("Off")
     assert (robot.parameters()["name"], robot.parameters()["enabled"]) == ("grüezi", False)
+
+
+def test_what_the_robot_says_before_the_receipt_is_in_the_input_after_it(
+    kiosk: Server, robot: CycloneRobot, page: Page
+) -> None:
+    limit = widget(page, "limit")
+
+    def late(route: Route) -> None:
+        answer = route.fetch()
+        robot.set_parameter(name="limit", value=44)
+        expect(limit.locator(".value")).to_have_text("44")
+        route.fulfill(response=answer)
+
+    page.route_web_socket("**/presses", lambda socket: socket.close())
+    page.route("**/widgets/limit", late)
+    page.goto(kiosk.url)
+    limit.get_by_role("spinbutton").fill("43")
+    set_(page, "Limit")
+    expect(limit.get_by_role("spinbutton")).to_have_value("44")
 
 
 def test_an_input_follows_the_robot_until_it_is_touched(

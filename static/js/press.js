@@ -30,6 +30,7 @@ export function inputsOf(form) {
 // The input of a parameter: it shows the robot's value until it is touched, and then what was entered
 // until that is set.
 const touched = new WeakSet();
+const said = new WeakMap(); // what the robot said since the last press
 
 function entryOf(root) {
   return root.querySelector("[data-entry]");
@@ -37,6 +38,7 @@ function entryOf(root) {
 
 export function showEntry(root, value) {
   const input = entryOf(root);
+  said.set(input, value);
   if (touched.has(input)) return;
   if (input.type === "checkbox") input.checked = value === true;
   else if (input.value !== value) input.value = value;
@@ -46,6 +48,7 @@ export function showEntry(root, value) {
 function settle(root) {
   const input = entryOf(root);
   if (input) touched.delete(input);
+  if (said.has(input)) showEntry(root, said.get(input));
 }
 
 export function showBounds(root, bounds) {
@@ -144,6 +147,7 @@ export class Presser {
   async #press(root, button, inputs, click) {
     const url = button.getAttribute("formaction");
     if (this.#underWay.has(url)) return;
+    said.delete(entryOf(root));
     this.#underWay.add(url);
     button.setAttribute("aria-busy", "true");
     const pause = new Promise((resolve) => setTimeout(resolve, TAP_AGAIN_MS));
