@@ -27,7 +27,7 @@ class Way(Protocol):
     def heard(self, key: str) -> bool: ...
 
 
-async def no_doubt() -> bool:
+async def taken_for_reached() -> bool:
     """Where nobody asks whether something arrives."""
     return True
 
@@ -46,7 +46,7 @@ class Sending:
         confirmations: Confirmations,
         parameters: Parameters,
         monotonic: Callable[[], float] = time.monotonic,
-        reached: Callable[[], Awaitable[bool]] = no_doubt,
+        reached: Callable[[], Awaitable[bool]] = taken_for_reached,
     ) -> None:
         """`reached` tells, later, whether what was sent until now has reached the bridge."""
         self._reached = reached
