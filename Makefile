@@ -3,7 +3,7 @@
 # make check types and style
 # make faults every fault in its long form, and what was measured as a table in the README
 # make soak  an ordinary day for SOAK_S seconds (an hour)
-# make bench  this panel and its rivals side by side (15 minutes); QUICK=1 only shows that it works
+# make bench  this panel and its rivals side by side (25 minutes); QUICK=1 only shows that it works
 # make bench-setup  what the benchmark's rivals need, into the cache
 # make dev   the panel, taking every change as it is saved
 

@@ -88,7 +88,10 @@ def join(clients: Asked, server: Running, count: int) -> None:
         port=server.bare.port or page,
         kind=server.bare.kind,
         path=server.bare.path,
-        say=list(server.bare.say),
+        say=[said for said in server.bare.say if isinstance(said, str)],
+        say_bytes=[said.hex() for said in server.bare.say if isinstance(said, bytes)],
+        found=server.bare.found,
+        answers=server.bare.answers,
     )
 
 

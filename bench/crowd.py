@@ -5,6 +5,8 @@ take little of the machine that they share with what is measured.
 """
 
 import base64
+import contextlib
+import http.client
 import json
 import os
 import re
@@ -32,12 +34,27 @@ def request(kind: str, host: str, path: str) -> bytes:
     return "\r\n".join([*lines, "", ""]).encode()
 
 
-def frame(text: str) -> bytes:
-    """A client's text frame; masked with zeros, which RFC 6455 permits."""
-    data = text.encode()
+def frame(said: str | bytes) -> bytes:
+    """A client's text or binary frame; masked with zeros, which RFC 6455 permits."""
+    kind, data = (0x81, said.encode()) if isinstance(said, str) else (0x82, said)
     length = len(data)
-    head = bytes([0x81, 0x80 | length]) if length < 126 else b"\x81\xfe" + length.to_bytes(2, "big")
+    head = (
+        bytes([kind, 0x80 | length])
+        if length < 126
+        else bytes([kind, 0xFE]) + length.to_bytes(2, "big")
+    )
     return head + bytes(4) + data
+
+
+def found_in_page(port: int, pattern: str) -> str:
+    """What is found in a page that nobody else gets."""
+    with contextlib.closing(http.client.HTTPConnection("127.0.0.1", port, timeout=CONNECT_S)) as server:
+        server.request("GET", "/")
+        page = server.getresponse().read().decode()
+    found = re.search(pattern, page)
+    if found is None:
+        raise ValueError(f"the page has no {pattern}")
+    return found.group(1)
 
 
 class Crowd:
@@ -48,19 +65,34 @@ class Crowd:
         self._came: list[tuple[int, int]] = []  # (number, monotonic ns)
         self._bytes = 0
         self._lost = 0
+        self._asked = self._answer = b""
         threading.Thread(target=self._run, daemon=True).start()
 
-    def join(self, count: int, port: int, kind: str, path: str, say: list[str]) -> int:
-        """Makes it so many clients."""
+    def join(
+        self,
+        count: int,
+        port: int,
+        kind: str,
+        path: str,
+        say: list[str],
+        say_bytes: list[str],
+        found: str,
+        answers: list[str] | None,
+    ) -> int:
+        """Makes it so many clients; for the rest see `bench.peer.Bare`, `say_bytes` is in hex."""
+        if answers is not None:
+            asked, answer = answers
+            self._asked, self._answer = bytes([0x81, len(asked)]) + asked.encode(), frame(answer)
+        frames = [*map(frame, say), *(frame(bytes.fromhex(said)) for said in say_bytes)]
         while len(self._sockets) < count:
+            own = path.format(id=found_in_page(port, found)) if found else path
             one = socket.create_connection(("127.0.0.1", port), CONNECT_S)
-            one.sendall(request(kind, f"127.0.0.1:{port}", path))
+            one.sendall(request(kind, f"127.0.0.1:{port}", own))
             head = one.recv(RECEIVE)
             ok = b" 101 " if kind == "websocket" else b" 200 "
             if ok not in head.split(b"\r\n", 1)[0]:
                 raise ConnectionError(head[:200].decode(errors="replace"))
-            for text in say:
-                one.sendall(frame(text))
+            one.sendall(b"".join(frames))
             one.setblocking(False)
             with self._lock:
                 self._sockets.append(one)
@@ -87,6 +119,8 @@ class Crowd:
             self._selector.unregister(one)
             return
         self._bytes += len(data)
+        if self._asked and self._asked in data:
+            one.sendall(self._answer)
         last = key.data
         for found in NUMBER.findall(data):
             number = int(found)

@@ -33,9 +33,13 @@ class Bare:
     show the message's text. `port` is of the server that streams, 0 for that of the page."""
 
     kind: Literal["events", "websocket"]
-    path: str
-    say: tuple[str, ...] = ()  # text frames sent first
+    path: str  # with "{id}" for what is found in the page
+    say: tuple[str | bytes, ...] = ()  # text and binary frames sent first
     port: int = 0
+    found: str = ""  # a pattern whose group is the id that each client gets with a page of its own
+    answers: tuple[str, str] | None = (
+        None  # a text frame that the server sends, and what it wants for it
+    )
 
 
 @dataclass(frozen=True)
@@ -45,7 +49,7 @@ class Running:
     url: str  # the page to open
     pids: tuple[int, ...]  # its server processes, for CPU and memory
     end: Callable[[], None]  # ends them all, leaves nothing behind
-    bare: Bare | None = None  # None: only its own page's script can attach
+    bare: Bare | None = None  # None: no client but its page's script
 
 
 class Peer(Protocol):

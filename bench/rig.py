@@ -28,7 +28,7 @@ class Sizes:
     rounds: int = 3
     toggles: int = 170  # of each peer in each round
     presses: int = 60
-    cost_rounds: int = 1
+    cost_rounds: int = 3
     window_s: float = 3.0  # of each look at a cost
     crowds: tuple[int, ...] = (1, 50, 200, 500)
     stalled_s: float = 30.0

@@ -15,7 +15,7 @@ from bench.rig import Rig
 
 LARGE: Final = "/t0"
 SMALL: Final = "/t1"
-LOADS: Final = {LARGE: (100.0, 20_000), SMALL: (250.0, 16)}  # Hz, bytes
+LOADS: Final = {LARGE: (100.0, 20_000), SMALL: (1000.0, 16)}  # Hz, bytes
 AFTER_S: Final = 4.0
 GAP_S: Final = (0.04, 0.06)
 OLD_S: Final = 0.5  # put so long before it went on: old

@@ -4,11 +4,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Literal
 
-from bench.peer import Place, Running
+from bench.peer import Bare, Place, Running
 from bench.peers.parts import CACHE, serving
 from tests.parts import free_port
 
 VENV: Final = CACHE / "nicegui"
+
+# Socket.IO by hand: the page's own handshake is in the query, "40" connects, "2" is asked for a "3".
+SOCKET: Final = (
+    "/_nicegui_ws/socket.io/?client_id={id}&next_message_id=0&implicit_handshake=true"
+    "&document_id=bare&tab_id={id}&EIO=4&transport=websocket"
+)
+BARE: Final = Bare(
+    "websocket", SOCKET, say=("40",), found=r"'client_id': '([0-9a-f-]+)'", answers=("2", "3")
+)
 
 
 @dataclass(frozen=True)
@@ -26,4 +35,4 @@ class NiceGui:
         port = free_port()
         app = Path(__file__).with_name("app.py")
         command: list[str | Path] = [VENV / "bin/python", app, str(port), place.router, *place.topics]
-        return serving(command, {}, place, f"http://127.0.0.1:{port}/", None)
+        return serving(command, {}, place, f"http://127.0.0.1:{port}/", BARE)

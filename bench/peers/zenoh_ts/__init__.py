@@ -1,11 +1,12 @@
 """zenoh-ts: Zenoh in the browser, by way of a router with the remote-api plugin."""
 
 import json
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Literal
 
-from bench.peer import Place, Running
+from bench.peer import Bare, Place, Running
 from bench.peers.parts import CACHE, ending, started, with_page
 from tests.parts import free_port
 
@@ -31,7 +32,17 @@ class ZenohTs:
         config.write_text(json.dumps(configuration(place.router, port)))
         process = started([ROUTER, config], {}, place.folder)
         page = HERE / "page.html"
-        return with_page(process, port, page, SCRIPTS, place.topics, ending(process.end))
+        bare = Bare("websocket", "/", tuple(asked(place.topics)), port)
+        return with_page(process, port, page, SCRIPTS, place.topics, ending(process.end), bare)
+
+
+def asked(topics: Sequence[str]) -> Iterator[bytes]:
+    """What the page's library sends: a session, then a subscriber for each topic (names are short)."""
+    yield b"\x99" + bytes(4)
+    for number, topic in enumerate(topics, 1):
+        key = topic.removeprefix("/").encode()
+        numbers = number.to_bytes(4, "little") * 2
+        yield b"\x82" + numbers + bytes([len(key)]) + key + b"\x02"
 
 
 def configuration(robot: str, port: int) -> dict[str, object]:
