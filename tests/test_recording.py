@@ -175,6 +175,18 @@ def test_what_another_process_still_writes_is_left_alone(tmp_path: Path) -> None
     assert texts(tmp_path) == ["said"]
 
 
+def test_a_clock_that_was_set_back_does_not_make_the_newest_recording_the_oldest(
+    tmp_path: Path,
+) -> None:
+    year = 365 * 86_400.0
+    moments = [time.time() + year + number for number in range(3)] + [time.time()]
+    files = [tmp_path / f"{name_of(moment, '', 'drive')}.mcap" for moment in moments]
+    for file in files:
+        file.write_bytes(bytes(300))
+    Folder(tmp_path, 700).make_room(0)
+    assert [file for file in files if file.exists()] == files[2:]
+
+
 def test_the_oldest_recordings_go_and_nothing_else(tmp_path: Path) -> None:
     for number in range(10):
         (tmp_path / f"2026-{number}.mcap").write_bytes(bytes(MB))
@@ -348,7 +360,6 @@ def test_a_disk_that_takes_nothing_is_told_and_a_press_tries_again(
             await asyncio.sleep(0.01)
         assert "Presses are not recorded: " in cell.recordings.fault
         assert "They work as always." in cell.recordings.fault
-        cell.recorder.stop()
         cell.folder.unlink()
         cell.press("p3")
         cell.recorder.stop()

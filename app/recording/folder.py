@@ -1,18 +1,23 @@
 """The folder of recordings: bounded, and without halves of an earlier start."""
 
 import logging
+import time
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Final
 
 from app.recording.file import SUFFIX, UNFINISHED, recover
 
 log = logging.getLogger("kiosk.recording")
 
 
+AHEAD_S: Final = 60.0  # a file from later than that was written while the clock was wrong
+
+
 def name_of(moment: float, robot: str, widget: str) -> str:
     """A file's name without its ending, sorted by time; `moment` is in seconds since the epoch."""
-    time = datetime.fromtimestamp(moment, UTC).strftime("%Y%m%dT%H%M%S.%f")[:-3] + "Z"
-    return "-".join(filter(None, (time, robot, widget)))
+    at = datetime.fromtimestamp(moment, UTC).strftime("%Y%m%dT%H%M%S.%f")[:-3] + "Z"
+    return "-".join(filter(None, (at, robot, widget)))
 
 
 class Folder:
@@ -36,8 +41,10 @@ class Folder:
         self.make_room(0)
 
     def make_room(self, size: int) -> None:
-        """Removes the oldest recordings until `size` more bytes fit in."""
-        files = sorted(self.path.glob(f"*{SUFFIX}"), key=lambda file: file.name)
+        """Removes the oldest recordings until `size` more bytes fit in. Where the clock was set back,
+        those from the future are taken for the oldest, and what is new stays."""
+        latest = name_of(time.time() + AHEAD_S, "", "")
+        files = sorted(self.path.glob(f"*{SUFFIX}"), key=lambda file: (file.name < latest, file.name))
         sizes = [file.stat().st_size for file in files]
         total = sum(sizes)
         for file, bytes_ in zip(files, sizes, strict=True):

@@ -128,7 +128,8 @@ class Recordings:
 
 
 class Recording:
-    """One file, from the loop's side: everything is handed over. `full`: it takes no more samples."""
+    """One file, from the loop's side: everything is handed over. `full`: it takes no more samples, for
+    the next press begins another one."""
 
     def __init__(
         self,
@@ -142,11 +143,12 @@ class Recording:
         self._room = all_.file_bytes
         self._left_out = 0
         self._file: File | None = None
+        self._given_up = False
         self._begun = all_.hand_over(OVERHEAD, lambda: self._do(lambda: self._open(name, about)))
 
     @property
     def full(self) -> bool:
-        return self._room <= 0 or not self._begun
+        return self._room <= 0 or self._given_up or not self._begun
 
     def add(self, one: Taken) -> None:
         """A sample of a topic."""
@@ -168,6 +170,7 @@ class Recording:
         try:
             work()
         except Exception as error:
+            self._given_up = True
             if self._file is not None:
                 self._file.abandon()
                 self._file = None
