@@ -52,8 +52,10 @@ class Silence:
         """An answer: what was asked before it and is not answered does not count any more."""
         while self._asked and self._asked[0] <= asked:
             self._asked.popleft()
-        self._took.append(now - asked)
         in_time = now - asked <= self.limit
+        # In time, or known to be late: else the loop stood still, which says nothing of the network.
+        if in_time or self.silent:
+            self._took.append(now - asked)
         if self.silent:
             self._good = self._good + 1 if in_time and asked > self._heard_at else 0
             self._heard_at = min(self._heard_at, now)
@@ -119,11 +121,13 @@ class Pulse:
         return task
 
     def _follow(self) -> None:
-        """Of other bridges than before, and of a new session's, nothing is known yet."""
+        """Of other bridges than before, and of a new session's, nothing is known yet; where one stays,
+        so does its silence."""
         bridges = self._robot.graph.bridges if self._robot.link_up else frozenset()
         if bridges != self._bridges:
+            if not bridges & self._bridges:
+                self._silence = Silence()
             self._bridges = bridges
-            self._silence = Silence()
             self._tell()
 
     async def _answered(self) -> bool:

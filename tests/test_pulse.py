@@ -80,12 +80,22 @@ def test_a_slow_network_is_silence_until_it_is_known_to_be_slow() -> None:
     assert silence.limit < pulse.SILENT_S + 0.01
 
 
+def test_a_loop_that_stood_still_is_no_slow_network() -> None:
+    silence = Silence()
+    end = network(silence, LAN_S, 0.0, LOOKED_AT)
+    silence.ask(end)
+    silence.hear(end, end + 2.0)  # nobody judged meanwhile
+    assert not silence.silent
+    assert silence.limit < pulse.SILENT_S + 0.01
+
+
 class Line:
     """A link on which each question waits until the test answers it."""
 
     def __init__(self) -> None:
         self.asked: list[tuple[str, asyncio.Future[bool]]] = []
         self.answers = True
+        self.frozen = ""  # a bridge that does not answer
         self.fails = False
 
     async def ask(self, selector: str, within_s: float = 2.0) -> list[tuple[str, bytes]]:
@@ -94,7 +104,7 @@ class Line:
         assert within_s == LONGEST_S
         answered = asyncio.get_running_loop().create_future()
         self.asked.append((selector, answered))
-        if self.answers:
+        if self.answers and not (self.frozen and selector == keys.version(self.frozen)):
             answered.set_result(True)
         return [(selector, b"1")] if await answered else []
 
@@ -203,5 +213,22 @@ def test_a_press_is_published_when_the_bridge_has_answered_after_it() -> None:
         told_so = await press("p2")
         assert told_so.startswith("unknown: Sent on /free")
         assert "has not answered since" in told_so
+
+    run(test)
+
+
+def test_a_frozen_bridge_stays_silent_when_another_comes_or_goes() -> None:
+    async def test(line: Line, robot: Robot, mine: Pulse, told: list[bool]) -> None:
+        robot.graph.apply(keys.bridge_token("b2"), True)
+        await until(lambda: keys.version("b2") in {selector for selector, _ in line.asked})
+        line.frozen = BRIDGE
+        await until(lambda: told == [False])
+        robot.graph.apply(keys.bridge_token("b2"), False)
+        await asyncio.sleep(5 * pulse.EVERY_S)
+        robot.graph.apply(keys.bridge_token("b3"), True)
+        await asyncio.sleep(5 * pulse.EVERY_S)
+        assert told == [False]
+        line.frozen = ""
+        await until(lambda: told == [False, True])
 
     run(test)
