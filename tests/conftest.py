@@ -1,6 +1,8 @@
 """Fixtures: real parts, started once where they can be shared and ended whatever happens."""
 
 import os
+import shutil
+import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
@@ -29,6 +31,17 @@ def pytest_sessionstart(session: pytest.Session) -> None:
     missing = [str(p) for p in (BRIDGE, ROS_PYTHON, Path(CHROMIUM)) if not Path(p).exists()]
     if missing and not session.config.option.collectonly:
         pytest.exit(f"missing: {', '.join(missing)}; `make test` installs them", returncode=3)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def temporary_files(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Where tests and their processes have their temporary files: what a killed one leaves goes too."""
+    folder = tmp_path_factory.mktemp("tmp", numbered=False)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("TMPDIR", str(folder))
+        patch.setattr(tempfile, "tempdir", str(folder))
+        yield
+    shutil.rmtree(folder)
 
 
 @pytest.fixture(scope="session")

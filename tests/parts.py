@@ -169,6 +169,7 @@ class RosNode:
                 "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
                 "RMW_IMPLEMENTATION": "rmw_fastrtps_cpp",
                 "RCUTILS_LOGGING_USE_STDOUT": "0",
+                "ROS_LOG_DIR": tempfile.gettempdir(),
             },
         )
         assert self._answer() == "ready"
@@ -198,8 +199,18 @@ class RosNode:
         return [message["data"] for message in self.heard(topic)]
 
     def kill(self) -> None:
+        shared = self._shared_memory()
         self._process.kill()
         self._process.wait()
+        for path in shared:
+            path.unlink(missing_ok=True)
+
+    def _shared_memory(self) -> set[Path]:
+        """What Fast DDS would remove when it ends: the files whose lock this process has."""
+        opened = {path.resolve() for path in Path(f"/proc/{self._process.pid}/fd").iterdir()}
+        locks = {path for path in opened if path.match("/dev/shm/fastdds_*_el")}
+        segments = {path.with_name(path.name.removesuffix("_el")) for path in locks}
+        return locks | segments | {path.with_name(f"sem.{path.name}_mutex") for path in segments}
 
     def freeze(self) -> None:
         self._process.send_signal(signal.SIGSTOP)

@@ -179,7 +179,8 @@ def main() -> None:
         with contextlib.suppress(ExternalShutdownException):
             executor.spin()
 
-    threading.Thread(target=spin, daemon=True).start()
+    spinning = threading.Thread(target=spin)
+    spinning.start()
     print(json.dumps({"ok": "ready"}), flush=True)
     for line in sys.stdin:
         request = json.loads(line)
@@ -188,6 +189,9 @@ def main() -> None:
         except Exception as error:  # whatever went wrong is the answer
             answer = {"error": f"{type(error).__name__}: {error}"}
         print(json.dumps(answer), flush=True)
+    rclpy.shutdown()  # ends the spinning too
+    spinning.join()
+    commands.node.destroy_node()
 
 
 if __name__ == "__main__":
