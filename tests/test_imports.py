@@ -91,6 +91,8 @@ ORDER = (
     "app.confirmations",
     "app.calls",
     "app.goals",
+    "app.action_services",
+    "app.following",
     "app.actions",
     "app.parameter_services",
     "app.parameters",
