@@ -102,6 +102,7 @@ ORDER = (
     "app.sending",
     "app.presses",
     "app.leases",
+    "app.hold_messages",
     "app.holds",
     "app.recording.ring",
     "app.recording.file",
