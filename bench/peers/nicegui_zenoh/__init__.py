@@ -1,24 +1,16 @@
 """NiceGUI with a Zenoh subscriber: a page of a Python UI framework."""
 
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, Literal
+from typing import Final
 
-from bench.peer import Place, Running
+from bench.peer import Peer, Place, Running
 from bench.peers.parts import CACHE, serving
 from tests.parts import free_port
 
 VENV: Final = CACHE / "nicegui"
 
 
-@dataclass(frozen=True)
-class NiceGui:
-    id: str = "nicegui"
-    title: str = "NiceGUI + Zenoh"
-    robot: Literal["zenoh", "ros"] = "zenoh"
-    shown: str = "button.publish"
-    button: str = "button.publish"
-
+class NiceGui(Peer):
     def installed(self) -> bool:
         return (VENV / "ready").exists()
 
