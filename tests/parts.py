@@ -29,6 +29,15 @@ BRIDGE = Path(
 )
 ROS_PYTHON = Path(os.environ.get("TEST_ROS_PYTHON") or ROOT / ".venv-ros/bin/python")
 CHROMIUM = "/usr/bin/chromium"
+CHROMIUM_FLAGS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
 
 # Bridge and nodes find each other on loopback only, whatever else is on this machine's network.
 CYCLONE_ON_LOOPBACK = (
