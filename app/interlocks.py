@@ -28,7 +28,10 @@ class Verdict:
     until: float = math.inf
 
 
-PERMITTED = Verdict(True)
+PERMITTED: Final = Verdict(True)
+NO_WAY: Final = frozenset(
+    {"no_link", "no_bridge", "no_bridge_of", "bridge_silent", "joining"}
+)  # of `way`
 
 # What comes so soon after joining may be a latched value of any age, sent again.
 HISTORY_S: Final = 1.0
