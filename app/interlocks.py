@@ -29,9 +29,8 @@ class Verdict:
 
 
 PERMITTED: Final = Verdict(True)
-NO_WAY: Final = frozenset(
-    {"no_link", "no_bridge", "no_bridge_of", "bridge_silent", "joining"}
-)  # of `way`
+# The codes of `way`.
+NO_WAY: Final = frozenset({"no_link", "no_bridge", "no_bridge_of", "bridge_silent", "joining"})
 
 # What comes so soon after joining may be a latched value of any age, sent again.
 HISTORY_S: Final = 1.0
