@@ -1,11 +1,10 @@
 """Action goals: sent, followed by their feedback, canceled, and known to the end.
 
 A goal belongs to the robot, not to a browser: it goes on when a page is closed and shows in every
-one. Wire format: ROS 2's `<action>/_action/…` services and topics (design.ros2.org, "Actions").
+one. Wire format: ROS 2's `<action>/_action/…` topics (design.ros2.org, "Actions").
 """
 
 import asyncio
-import logging
 import math
 import time
 import uuid
@@ -13,24 +12,18 @@ from collections.abc import Callable, Iterator
 from typing import Any, Final
 
 from app import keys
-from app.calls import CUT_NEWS_S, LATE_S, MOST_UNANSWERED, Asker, with_fields
-from app.errors import DecodeError, LinkError
-from app.goals import ACCEPTED, CANCELING, ENDS, UNKNOWN, Goal
+from app.action_services import ActionServices
+from app.calls import MOST_UNANSWERED, Asker, with_fields
+from app.errors import DecodeError
+from app.following import Following
+from app.goals import ACCEPTED, CANCELING, UNKNOWN, Goal
 from app.interfaces import Interfaces
-from app.interlocks import SERVER_SETTLE_S
-from app.logs import RobotLog
 from app.panel.model import Action
 from app.progress import IDLE, Answer, Corrected, Progress
 from app.robot import Robot, Sample, value_of
 from app.sentences import clock, say
-from app.tasks import told
 
-log = logging.getLogger("kiosk.actions")
-
-CANCEL: Final = "action_msgs/srv/CancelGoal"
 STATUS: Final = "action_msgs/msg/GoalStatusArray"
-RESULT_S: Final = 86_400.0  # a result is waited for as long as the goal takes
-ASK_AGAIN_S: Final = 1.0
 
 
 class Actions:
@@ -42,55 +35,48 @@ class Actions:
         """`changed` is called when what the widgets show has changed."""
         self._interfaces = interfaces
         self._robot = robot
-        self._log = RobotLog(log, robot.name)
-        self._link = link
         self._changed = changed
+        self._services = ActionServices(interfaces, robot, link)
+        self._following = Following(self._services, robot, back=self._advanced, tell=self._tell)
         self._latest: dict[str, Goal] = {}  # by widget
-        self._following: dict[asyncio.Task[None], Goal] = {}
 
     def follow(self) -> None:
         """After every change of the graph: of a goal whose server is gone nothing more is heard."""
         bridge = bool(self._robot.graph.bridges)
-        for goal in (*self._latest.values(), *self._following.values()):
-            if not goal.cut.done() and not (bridge and self._offered(goal.widget)):
+        for goal in (*self._latest.values(), *self._following.goals):
+            if not goal.cut.done() and not (bridge and self._services.offered(goal.widget)):
                 gone = say("goal_gone", name=goal.widget.action)
                 goal.cut.set_result(gone if bridge else "")
 
     async def stop(self) -> None:
         """Ends its tasks; goals go on in the robot."""
-        tasks = list(self._following)
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
+        await self._following.stop()
 
     async def start(
         self, widget: Action, fields: dict[str, Any], press_id: str, corrected: Corrected
     ) -> Answer:
         """Sends a goal; `corrected` gets what came of it in the end. FieldError for bad fields,
         LinkError where it could not be sent: then nothing is under way."""
-        types = self._interfaces.action(widget.type)
         goal_id = uuid.uuid4()
-        wrapped = {"goal_id": {"uuid": list(goal_id.bytes)}, "goal": fields}
-        payload = self._interfaces.encode(types.send_goal_request, wrapped)
+        request = self._services.goal_request(widget, goal_id, fields)
         if why := self.full(widget.action):
             return Answer("refused", why)
-        query = self._query(widget, "send_goal", payload, widget.timeout_s)
+        query = self._services.send_goal(widget, request)
         cut = asyncio.get_running_loop().create_future()
         goal = Goal(widget, press_id, goal_id, cut, corrected)
         self._latest[widget.id] = goal
         self._show(goal, Progress(busy=True, text=say("waiting_for_answer")))
-        reply = await self._reply(goal, query)
-        answer = self._first_answer(goal, types.send_goal_response, reply)
+        answer = self._first_answer(goal, await self._services.reply(goal, query))
         if answer.outcome != "rejected":
             goal.advance(ACCEPTED if answer.outcome == "accepted" else UNKNOWN)
-            self._task(goal)
+            self._following.begin(goal)
         runs = goal.lives and not cut.done()
         self._show(goal, goal.under_way if runs else goal.came_to(answer))
         return answer
 
     def full(self, action: str) -> str:
         """Why no further goal of an action is sent; "" while one may be."""
-        count = sum(goal.widget.action == action for goal in self._following.values())
+        count = sum(goal.widget.action == action for goal in self._following.goals)
         return say("too_many", service=action) if count >= MOST_UNANSWERED else ""
 
     def _stoppable(self, widget: Action, press_id: str) -> Goal | None:
@@ -99,7 +85,7 @@ class Actions:
             return latest if shown.stoppable else None
         if latest is not None and latest.press_id == press_id and shown.busy:
             return latest
-        followed = (goal for goal in self._following.values() if goal.widget.id == widget.id)
+        followed = (goal for goal in self._following.goals if goal.widget.id == widget.id)
         return next((goal for goal in followed if goal.press_id == press_id), None)
 
     def over(self, widget: Action, press_id: str) -> str:
@@ -113,17 +99,11 @@ class Actions:
         be under way. LinkError where that could not be sent."""
         if (goal := self._stoppable(widget, press_id)) is None:
             return Answer("refused", self.over(widget, press_id))
-        request, response = self._interfaces.service(CANCEL)
-        stamp = {"sec": 0, "nanosec": 0}
-        info = {"goal_id": {"uuid": list(goal.id.bytes)}, "stamp": stamp}
-        payload = self._interfaces.encode(request, {"goal_info": info})
-        query = self._query(widget, "cancel_goal", payload, widget.timeout_s)
-        reply = await self._reply(goal, query)
+        reply = await self._services.reply(goal, self._services.cancel_goal(goal))
         if reply is None:
             return Answer("unknown", say("timed_out", seconds=f"{widget.timeout_s:g}"))
-        code = self._decoded(response, reply, "return_code")
         now = clock(time.time())
-        if code != 0:
+        if self._services.return_code(widget, reply) != 0:
             return Answer("rejected", say("cancel_refused", time=now))
         if goal.advance(CANCELING) and self._robot.progress[widget.id].busy:
             self._show(goal, goal.under_way)
@@ -167,7 +147,7 @@ class Actions:
     def _advanced(self, goal: Goal) -> None:
         """It has another state; while its first answer or its result is awaited, or its server after a
         cut, that will show."""
-        if not goal.lives or goal.cut.done() or goal not in self._following.values():
+        if not goal.lives or goal.cut.done() or goal not in self._following.goals:
             return
         if not self._robot.progress[goal.widget.id].busy:  # it was not known whether it runs
             goal.corrected(
@@ -184,10 +164,10 @@ class Actions:
         goal.said = with_fields(widget.feedback, feedback)
         self._note(goal, goal.under_way)  # shown with the next frame: a goal may say a lot
 
-    def _first_answer(self, goal: Goal, response: str, reply: bytes | None) -> Answer:
+    def _first_answer(self, goal: Goal, reply: bytes | None) -> Answer:
         now = clock(time.time())
         if reply is not None:
-            accepted = self._decoded(response, reply, "accepted")
+            accepted = self._services.accepted(goal.widget, reply)
             if accepted is True:
                 return Answer("accepted", say("goal_accepted", time=now))
             if accepted is False:
@@ -197,95 +177,6 @@ class Actions:
             return Answer("unknown", goal.cut.result() or say("call_cut"))
         seconds = f"{goal.widget.timeout_s:g}"
         return Answer("timed_out", say("timed_out", seconds=seconds) + say("cyclone_hint"))
-
-    async def _follow_to_the_end(self, goal: Goal) -> None:
-        """Waits for the result, over cuts of the connection too: the robot goes on meanwhile."""
-        while True:
-            if goal.cut.done():
-                if goal.lives:
-                    goal.state = UNKNOWN
-                    self._tell(goal, Answer("unknown", goal.cut.result() or say("goal_cut")))
-                await self._until_offered(goal)
-                goal.cut = asyncio.get_running_loop().create_future()
-                self._advanced(goal)
-            if answer := await self._ended(goal):
-                break
-            if not (goal.known or goal.cut.done()):
-                return  # it was never heard of: what was said of it stands
-            await asyncio.wait({goal.cut}, timeout=ASK_AGAIN_S)
-        self._log.info("press %s: goal %s: %s: %s", goal.press_id, goal.id, answer.outcome, answer.text)
-        self._tell(goal, answer)
-
-    async def _until_offered(self, goal: Goal) -> None:
-        key = self._robot.key(goal.widget.action)
-        while not (
-            self._offered(goal.widget)
-            and time.monotonic() >= self._robot.graph.served_since("AS", key) + SERVER_SETTLE_S
-        ):
-            await asyncio.sleep(ASK_AGAIN_S)
-
-    def _offered(self, widget: Action) -> bool:
-        return self._robot.graph.server_type("AS", self._robot.key(widget.action)) == widget.type
-
-    async def _ended(self, goal: Goal) -> Answer | None:
-        """What came of it; None where nothing more is heard, or nobody answered.
-
-        One that the robot is not known to have is asked for not much longer than a call.
-        """
-        types = self._interfaces.action(goal.widget.type)
-        request = {"goal_id": {"uuid": list(goal.id.bytes)}}
-        payload = self._interfaces.encode(types.get_result_request, request)
-        reply = await self._result(goal, payload)
-        if reply is None:
-            return None
-        try:
-            message = self._interfaces.decode(types.get_result_response, reply)
-        except DecodeError as error:
-            self._log.error("%s: %s", goal.widget.action, error)
-            return Answer("unknown", say("answer_unreadable", wanted=goal.widget.type))
-        goal.state = message.status if message.status in ENDS else UNKNOWN
-        if message.status not in ENDS:
-            return Answer("unknown", say("goal_lost"))
-        outcome, sentence = ENDS[message.status]
-        said = with_fields(goal.widget.result, message.result)
-        return Answer(outcome, say(sentence, time=clock(time.time())) + (f": {said}" if said else "."))
-
-    async def _result(self, goal: Goal, payload: bytes) -> bytes | None:
-        """The reply of `get_result`, which is asked for again where Zenoh refuses."""
-        refused = False
-        while not goal.cut.done():
-            wait_s = RESULT_S if goal.known else LATE_S
-            try:
-                return await self._reply(goal, self._query(goal.widget, "get_result", payload, wait_s))
-            except LinkError as error:
-                if not refused:
-                    self._log.warning("press %s: %s", goal.press_id, error)
-                refused = True
-                await asyncio.wait({goal.cut}, timeout=ASK_AGAIN_S)
-        return None
-
-    def _query(
-        self, widget: Action, what: str, payload: bytes, timeout_s: float
-    ) -> "asyncio.Future[bytes | None]":
-        """Asks a service of the action; LinkError where that could not be sent."""
-        key = f"{self._robot.key(widget.action)}/_action/{what}"
-        return self._link.query(key, payload, timeout_s)
-
-    async def _reply(self, goal: Goal, query: "asyncio.Future[bytes | None]") -> bytes | None:
-        """The reply; None when there is none in time, or the bridge went away."""
-        ends: set[asyncio.Future[Any]] = {query, goal.cut}
-        await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
-        reply = query.result() if query.done() else None
-        if reply is None:
-            await asyncio.wait({goal.cut}, timeout=CUT_NEWS_S)  # the news of a cut may follow
-        return reply
-
-    def _decoded(self, type_name: str, reply: bytes, name: str) -> Any:
-        try:
-            return getattr(self._interfaces.decode(type_name, reply), name)
-        except DecodeError as error:
-            self._log.error("%s", error)
-            return None
 
     def _tell(self, goal: Goal, answer: Answer) -> None:
         """What came of it, or that it is not known any more: to the widget and the receipt."""
@@ -302,14 +193,3 @@ class Actions:
         if latest:
             self._robot.progress[goal.widget.id] = progress
         return latest
-
-    def _task(self, goal: Goal) -> None:
-        task = told(self._follow_to_the_end(goal), self._log, "following a goal failed")
-        self._following[task] = goal
-        task.add_done_callback(self._followed)
-
-    def _followed(self, task: "asyncio.Task[None]") -> None:
-        goal = self._following.pop(task)
-        if not task.cancelled() and task.exception():
-            goal.state = UNKNOWN
-            self._tell(goal, Answer("unknown", say("goal_fault")))

@@ -14,7 +14,7 @@ from app.robot import Robot
 MISSES_ALLOWED: Final = 1
 
 
-class Asker(Protocol):
+class AdminSpace(Protocol):
     """What is needed of the link: (key, payload) of each answer to a query."""
 
     async def ask(self, selector: str, within_s: float = ...) -> list[tuple[str, bytes]]: ...
@@ -23,7 +23,7 @@ class Asker(Protocol):
 class Bridges:
     """Asks the bridges of one robot; what they say goes into its graph."""
 
-    def __init__(self, robot: Robot, link: Asker) -> None:
+    def __init__(self, robot: Robot, link: AdminSpace) -> None:
         self._robot = robot
         self._link = link
         self.missed = 0  # askings in a row that a bridge did not answer

@@ -4,6 +4,7 @@ Pure, but for its clocks: acts and signs of life come in, a verdict for each pre
 browser that is not heard of loses what it held or asked for; that is checked before everything else.
 """
 
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -189,7 +190,7 @@ class Control:
     def _due(self) -> float:
         """When the request goes through by itself: the holder has the whole time from its begin."""
         if not self._holder or not self._asker:
-            return float("inf")
+            return math.inf
         return max(self._holder.since, self._asker.since) + self.rules.takeover_after_s
 
     def _parties(self, browser: Browser) -> list[_Party]:

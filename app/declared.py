@@ -41,7 +41,6 @@ WHOLE: Final = re.compile(r"\s*[+-]?[0-9]{1,19}\s*", re.ASCII)
 State = Literal["waiting", "live", "cut", "silent", "missing", "undeclared", "mistyped", "unreadable"]
 Value = bool | int | float | str
 
-
 OPEN: Final = Range()
 
 

@@ -9,18 +9,18 @@ import asyncio
 import logging
 import secrets
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Final, Protocol
+from typing import Any, Final, NamedTuple, Protocol
 
 from app.errors import FieldError, InputError, LinkError, NotFound
-from app.interfaces import INTEGERS, Interfaces
-from app.interlocks import Verdict, way
+from app.hold_messages import Checked, Filled, HoldMessages, Way
+from app.interfaces import Interfaces
+from app.interlocks import Verdict
 from app.leases import LEASE_S, Lease
 from app.logs import RobotLog
-from app.panel.check_holds import with_own_fields
 from app.panel.model import Hold, Panel
-from app.panel.template import filled, inputs_of, needed
+from app.panel.template import needed
 from app.progress import Answer, Outcome
 from app.receipts import (
     LONGEST_LOGGED,
@@ -40,14 +40,6 @@ log = logging.getLogger("kiosk.holds")
 
 RELEASED: Final = "hold_released"
 
-Checked = Callable[[Iterable[str], Mapping[str, Any]], dict[str, Any]]
-
-
-class Way(Protocol):
-    """What a hold needs of the link."""
-
-    def put(self, key: str, payload: bytes) -> None: ...
-
 
 class Clock(Protocol):
     """What a hold needs of the event loop; `time` is in monotonic seconds."""
@@ -64,11 +56,17 @@ class Holding:
     lease: Lease
     by: By
     inputs: Mapping[str, Any]
-    fields: Mapping[str, Any]
-    last_fields: Mapping[str, Any]
+    filled: Filled
     told: Callable[[Receipt], None]
     since: str
-    messages: int = 0
+    sent: int = 0
+
+
+class _Refusal(NamedTuple):
+    """Why a hold may not begin: a sentence, and its receipt's cause."""
+
+    why: str
+    cause: Cause
 
 
 class Holds:
@@ -90,18 +88,15 @@ class Holds:
         """`checked` are the values that a template gets of what was entered; `take` takes in what
         has come from the robot; `changed` is called when what the widgets show has changed."""
         self._panel = panel
-        self._interfaces = interfaces
         self._robot = robot
         self._log = RobotLog(log, robot.name)
-        self._way = way
         self._loop = loop
-        self._checked = checked
+        self._messages = HoldMessages(interfaces, robot, way, checked)
         self._witness = witness
         self._take = take
         self._changed = changed
         self._widgets = {w.id: w for w in panel.widgets() if isinstance(w, Hold)}
         self._held: dict[str, Holding] = {}
-        self._counts = dict.fromkeys(self._widgets, 0)
         self._timer: asyncio.TimerHandle | None = None
         self._closed = False
 
@@ -123,16 +118,12 @@ class Holds:
         self._take()
         self.judge()
         widget, now = self.widget(widget_id), self._loop.time()
-        why, cause = self._ground(widget, sent, by, now)
-        if why:
-            return self._refused(widget, inputs, by, why, cause)
-        try:
-            fields, last_fields = self._fields(widget, inputs)
-        except (FieldError, InputError) as error:
-            return self._refused(widget, inputs, by, f"{error}.", "input")
+        ready = self._ready(widget, inputs, sent, by, now)
+        if isinstance(ready, _Refusal):
+            return self._refused(widget, inputs, by, ready)
         lease = Lease.begun(secrets.token_hex(8), widget.period_s, sent, now)
         since = say("hold_since", time=clock(time.time()))
-        holding = Holding(widget, lease, by, needed(widget, inputs), fields, last_fields, told, since)
+        holding = Holding(widget, lease, by, needed(widget, inputs), ready, told, since)
         self._held[widget_id] = holding
         if self._witness is not None:
             self._witness.pressed(lease.id, widget.id, named(by.origin), holding.inputs)
@@ -148,22 +139,28 @@ class Holds:
     ) -> Receipt:
         """A hold that is not even judged; it may leave a trace or none."""
         widget = self.widget(widget_id)
-        if not trace:
-            return _receipt(widget, {}, why, cause)
-        return self._refused(widget, {}, by, why, cause)
+        refusal = _Refusal(why, cause)
+        return self._refused(widget, {}, by, refusal) if trace else _receipt(widget, {}, refusal)
 
     def refusal(self, widget_id: str, inputs: Mapping[str, Any], sent: float, by: By) -> Receipt | None:
         """The receipt of a hold that `begin` would refuse now, without a trace; None for others."""
         self._take()
         self.judge()
         widget = self.widget(widget_id)
-        why, cause = self._ground(widget, sent, by, self._loop.time())
-        if not why:
-            try:
-                self._fields(widget, inputs)
-            except (FieldError, InputError) as error:
-                why, cause = f"{error}.", "input"
-        return _receipt(widget, inputs, why, cause) if why else None
+        ready = self._ready(widget, inputs, sent, by, self._loop.time())
+        return _receipt(widget, inputs, ready) if isinstance(ready, _Refusal) else None
+
+    def _ready(
+        self, widget: Hold, inputs: Mapping[str, Any], sent: float, by: By, now: float
+    ) -> Filled | _Refusal:
+        """What it would publish if it began now, or why it may not."""
+        why, cause = self._ground(widget, sent, by, now)
+        if why:
+            return _Refusal(why, cause)
+        try:
+            return self._messages.filled(widget, inputs)
+        except (FieldError, InputError) as error:
+            return _Refusal(f"{error}.", "input")
 
     def _ground(self, widget: Hold, sent: float, by: By, now: float) -> tuple[str, Cause]:
         """Why it may not begin now, "" if it may."""
@@ -179,16 +176,6 @@ class Holds:
         if not (verdict := self._verdict(widget, by, now)).permitted:
             return verdict.reason or "", cause_of(verdict)
         return by.doubt(), "interlock"
-
-    def _fields(
-        self, widget: Hold, inputs: Mapping[str, Any]
-    ) -> tuple[Mapping[str, Any], Mapping[str, Any]]:
-        """Of the message and of the one that ends it; FieldError or InputError for bad input."""
-        values = self._checked(inputs_of(widget), inputs)
-        both = filled(widget.message, values), filled(widget.release, values)
-        for each in both:
-            self._interfaces.encode(widget.type, with_own_fields(widget, each, 0, 0))
-        return both
 
     def beat(self, holding: Holding, number: int, sent: float) -> bool:
         """A heartbeat; whether the hold goes on."""
@@ -251,27 +238,17 @@ class Holds:
 
     def _send(self, holding: Holding) -> None:
         try:
-            self._put(holding.widget, holding.fields, holding.widget.deadline_ms)
+            self._messages.put(holding.widget, holding.filled)
         except LinkError as error:
             self._end(holding, "link", f"{error}.")
         else:
-            holding.messages += 1
-
-    def _put(self, widget: Hold, fields: Mapping[str, Any], deadline_ms: int) -> None:
-        count = self._counts[widget.id] + 1
-        if widget.counter_field is not None:
-            kind = self._interfaces.field_type(widget.type, widget.counter_field)
-            count %= INTEGERS[kind][1] + 1
-        whole = with_own_fields(widget, fields, deadline_ms, count)
-        payload = self._interfaces.encode(widget.type, whole)
-        self._way.put(self._robot.key(widget.topic), payload)
-        self._counts[widget.id] = count
+            holding.sent += 1
 
     def _end(self, holding: Holding, code: str, why: str) -> None:
         widget, now = holding.widget, self._loop.time()
         del self._held[widget.id]
         del self._robot.held[widget.id]
-        unsaid = self._put_last(holding, now)
+        unsaid = self._messages.put_last(widget, holding.filled, now)
         seconds = now - holding.lease.begun_at
         at = clock(time.time())
         sentence = RELEASED if code == RELEASED else "hold_ended"
@@ -280,7 +257,7 @@ class Holds:
         outcome: Outcome = "unknown" if unsaid else "published" if code == RELEASED else "aborted"
         level = logging.INFO if outcome == "published" else logging.WARNING
         self._log.log(level, "hold %s of %s by %s ended after %.3f s and %d messages (%s): %s",
-                holding.lease.id, widget.id, named(holding.by.origin), seconds, holding.messages,
+                holding.lease.id, widget.id, named(holding.by.origin), seconds, holding.sent,
                 code, text)  # fmt: skip
         receipt = receipt_of(widget, holding.inputs, holding.lease.id, Answer(outcome, text))
         if self._witness is not None:
@@ -288,21 +265,8 @@ class Holds:
         holding.told(receipt)
         self._changed()
 
-    def _put_last(self, holding: Holding, now: float) -> str:
-        """The message that ends it, if there is any way now, be it in doubt: one stop too many harms
-        nobody. Why it was not sent, or ""."""
-        if not self._robot.link_up or not self._robot.graph.bridges:
-            return way(self._robot, now).reason or ""
-        try:
-            self._put(holding.widget, holding.last_fields, 0)
-        except LinkError as error:
-            return f"{error}."
-        return ""
-
-    def _refused(
-        self, widget: Hold, inputs: Mapping[str, Any], by: By, why: str, cause: Cause
-    ) -> Receipt:
-        receipt = _receipt(widget, inputs, why, cause)
+    def _refused(self, widget: Hold, inputs: Mapping[str, Any], by: By, refusal: _Refusal) -> Receipt:
+        receipt = _receipt(widget, inputs, refusal)
         self._log.warning("hold of %s by %s with %.*s: %s", widget.id, named(by.origin),
                 LONGEST_LOGGED, receipt.inputs, receipt.reason)  # fmt: skip
         if self._witness is not None:
@@ -311,7 +275,7 @@ class Holds:
         return receipt
 
 
-def _receipt(widget: Hold, inputs: Mapping[str, Any], why: str, cause: Cause) -> Receipt:
-    text = say("refused", why=why, time=clock(time.time()))
+def _receipt(widget: Hold, inputs: Mapping[str, Any], refusal: _Refusal) -> Receipt:
+    text = say("refused", why=refusal.why, time=clock(time.time()))
     own = needed(widget, inputs)
-    return receipt_of(widget, own, secrets.token_hex(8), Answer("refused", text), cause)
+    return receipt_of(widget, own, secrets.token_hex(8), Answer("refused", text), refusal.cause)

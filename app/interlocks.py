@@ -28,7 +28,9 @@ class Verdict:
     until: float = math.inf
 
 
-PERMITTED = Verdict(True)
+PERMITTED: Final = Verdict(True)
+# The codes of `way`.
+NO_WAY: Final = frozenset({"no_link", "no_bridge", "no_bridge_of", "bridge_silent", "joining"})
 
 # What comes so soon after joining may be a latched value of any age, sent again.
 HISTORY_S: Final = 1.0

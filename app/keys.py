@@ -12,7 +12,6 @@ from typing import Any, Final, Literal
 TOKENS: Final = "@/*/@ros2_lv/**"  # every liveliness token of every bridge and kiosk
 VERSION: Final = "@/*/ros2/version"  # answered by a bridge whose main loop runs
 ROUTES: Final = "@/*/ros2/route/topic/**"  # a bridge's routes: JSON with `ros2_type`
-
 CONFIG: Final = "@/*/ros2/config"  # a bridge's configuration: JSON with its `namespace`
 NODES: Final = "@/*/ros2/node/**"  # the nodes behind a bridge: JSON with their topics and types
 DEMO_VERSION: Final = '"demo robot"'  # how the demo robot answers for its version

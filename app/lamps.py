@@ -8,16 +8,14 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Final, Literal, TypedDict
 
-from app.interlocks import Verdict, misfit
+from app.interlocks import NO_WAY, Verdict, misfit
 from app.panel.model import Panel
 from app.robot import Robot
 from app.sentences import say
 
 State = Literal["ok", "wait", "bad"]
 
-BRIDGE: Final = frozenset(
-    {"no_link", "no_bridge", "no_bridge_of", "bridge_silent", "joining", "unheard"}
-)
+BRIDGE: Final = NO_WAY | {"unheard"}
 GONE: Final = frozenset({"no_publisher", "no_service", "no_parameters"})
 NODE: Final = GONE | {
     "waiting",

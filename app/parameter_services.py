@@ -1,7 +1,8 @@
 """Asking a node for its parameters: ROS 2's services `get_parameters` and `describe_parameters`."""
 
 import asyncio
-from collections.abc import Callable, Sequence
+from collections.abc import Awaitable, Callable, Sequence
+from functools import partial
 from typing import Any, Final
 
 from app.calls import Asker
@@ -34,35 +35,17 @@ class ParameterServices:
         NoAnswer when it does not answer in time, which `silent` tells at once; DecodeError for what
         is no answer.
         """
-        descriptors = await self._each(node, DESCRIBE, names, "descriptors", silent)
-        return descriptors, await self._each(node, GET, names, "values", silent)
-
-    async def _each(
-        self,
-        node: str,
-        service: tuple[str, str],
-        names: Sequence[str],
-        part: str,
-        silent: Callable[[], None],
-    ) -> dict[str, Any]:
-        """What a node answers by name: where one of several is not declared, rclcpp answers none."""
-        found = await self._ask(node, service, names, part, silent)
-        if len(found) == len(names):
-            return dict(zip(names, found, strict=True))
-        if len(names) == 1:
-            return {}
-        each: dict[str, Any] = {}
-        for name in names:
-            each |= await self._each(node, service, [name], part, silent)
-        return each
+        ask = partial(self._ask, node, silent)
+        descriptors = await _each(partial(ask, DESCRIBE, "descriptors"), names)
+        return descriptors, await _each(partial(ask, GET, "values"), names)
 
     async def _ask(
         self,
         node: str,
-        service: tuple[str, str],
-        names: Sequence[str],
-        part: str,
         silent: Callable[[], None],
+        service: tuple[str, str],
+        part: str,
+        names: Sequence[str],
     ) -> list[Any]:
         request, response = self._interfaces.service(service[1])
         payload = self._interfaces.encode(request, {"names": list(names)})
@@ -82,3 +65,18 @@ class ParameterServices:
             raise NoAnswer(f"{key} did not answer")
         answer: list[Any] = getattr(self._interfaces.decode(response, reply), part)
         return answer
+
+
+async def _each(
+    ask: Callable[[Sequence[str]], Awaitable[list[Any]]], names: Sequence[str]
+) -> dict[str, Any]:
+    """What a node answers by name: where one of several is not declared, rclcpp answers none."""
+    found = await ask(names)
+    if len(found) == len(names):
+        return dict(zip(names, found, strict=True))
+    if len(names) == 1:
+        return {}
+    each: dict[str, Any] = {}
+    for name in names:
+        each |= await _each(ask, [name])
+    return each

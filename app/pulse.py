@@ -14,7 +14,7 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from app import keys
-from app.bridges import Asker
+from app.bridges import AdminSpace
 from app.errors import LinkError
 from app.logs import RobotLog
 from app.robot import Robot
@@ -72,7 +72,7 @@ class Pulse:
     def __init__(
         self,
         robot: Robot,
-        link: Asker,
+        link: AdminSpace,
         changed: Callable[[], None],
         monotonic: Callable[[], float] = time.monotonic,
     ) -> None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from typing import Any, Final, Literal, Protocol
 
-from app.interlocks import PERMITTED, Verdict, press_verdict, way
+from app.interlocks import NO_WAY, PERMITTED, Verdict, press_verdict, way
 from app.log import Origin
 from app.panel.model import Hold, Panel, Pressed
 from app.panel.template import needed
@@ -22,19 +22,7 @@ RECEIPTS_KEPT: Final = 1000
 PAST_KEPT: Final = 20_000  # ids of presses whose receipts are not kept any more
 LONGEST_LOGGED: Final = 300
 LONGEST_KEPT: Final = 4000  # characters of all inputs of a press
-NO_WAY: Final = frozenset(
-    {
-        "no_link",
-        "no_bridge",
-        "no_bridge_of",
-        "bridge_silent",
-        "joining",
-        "no_service",
-        "no_parameters",
-        "getting_ready",
-        "ending",
-    }
-)
+OUT_OF_REACH: Final = NO_WAY | {"no_service", "no_parameters", "getting_ready", "ending"}
 FINE: Final = frozenset({"published", "confirmed", "accepted", "succeeded"})
 _sorted: Final = json.JSONEncoder(sort_keys=True).encode
 
@@ -95,7 +83,7 @@ def cause_of(verdict: Verdict) -> Cause:
     """Why a receipt says that a verdict refused it."""
     if verdict.code == "log":
         return "log"
-    return "link" if verdict.code in NO_WAY else "interlock"
+    return "link" if verdict.code in OUT_OF_REACH else "interlock"
 
 
 class Witness(Protocol):

@@ -25,6 +25,9 @@ ENGLISH: Final[Mapping[str, str]] = {
     "no_publisher": "Locked: no node of the robot publishes {topic}.",
     "unreadable": "Locked: {topic} can't be read: what arrives is not {wanted}.",
     "forbidden": "The robot does not permit {name}.",
+    "no_service": "Locked: the robot does not offer {name} now.",
+    "getting_ready": "Locked: the robot has just begun to offer {name}; getting ready.",
+    "busy": "Under way: waiting for the robot.",
     # QoS that DDS would not match: the robot's and the panel's.
     "publishes_best_effort": "The robot publishes {topic} best effort; this panel asks for reliable.",
     "publishes_volatile": "The robot publishes {topic} volatile; this panel asks for transient local.",
@@ -32,6 +35,9 @@ ENGLISH: Final[Mapping[str, str]] = {
     "asks_for_transient_local": (
         "The robot asks for {topic} transient local; this panel publishes it volatile."
     ),
+    # What a page says by itself, without its server.
+    "server_lost": "There is no connection to the panel's server.",
+    "server_unsure": "No answer from the panel's server: it is not known whether this was sent.",
     # Parameters: why one is locked, what is shown of it, what came of setting it.
     "no_parameters": "Locked: the robot does not offer the parameters of {node} now.",
     "parameter_waiting": "Locked: waiting for {node} to tell its {name}.",
@@ -60,11 +66,6 @@ ENGLISH: Final[Mapping[str, str]] = {
     "any_number": "a number",
     "any_whole": "a whole number",
     "no_text": "{label} must be text of {most} characters at most, not {given}",
-    "server_lost": "There is no connection to the panel's server.",
-    "server_unsure": "No answer from the panel's server: it is not known whether this was sent.",
-    "no_service": "Locked: the robot does not offer {name} now.",
-    "getting_ready": "Locked: the robot has just begun to offer {name}; getting ready.",
-    "busy": "Under way: waiting for the robot.",
     # What came of a call or a goal.
     "waiting_for_answer": "Sent; waiting for the robot's answer.",
     "answered": "Done at {time}",
@@ -87,11 +88,11 @@ ENGLISH: Final[Mapping[str, str]] = {
     "goal_fault": "A fault of the panel's server: what came of it is not known.",
     "goal_gone": "The robot no longer offers {name}: what came of it is not known.",
     "cancel": "Cancel",
-    "robots": "Robots",
     "cancel_sent": "The robot was asked to cancel at {time}.",
     "cancel_refused": "The robot did not cancel it at {time}.",
     "goal_over": "That goal is over: nothing was canceled.",
     "nothing_to_cancel": "there is nothing under way to cancel",
+    # Why a press is no longer what was meant.
     "changed_meanwhile": "it changed while you pressed.",
     "expired": "it took {seconds} s to get here: press again.",
     "ahead": "its time is ahead of the panel's server: load the page again.",
@@ -235,9 +236,9 @@ ENGLISH: Final[Mapping[str, str]] = {
     "hold_same_topic": "{label} is held, which sends on {topic} too.",
     "hold_late": "the press came too late.",
     "hold_let_go": "it was let go before it began: hold it longer.",
-    "hold_over": "This hold is over: let go and press again.",
     "hold_scripts": "Locked: holding needs the page's scripts.",
     "hold_cut": "The connection to the panel's server was lost while this was held.",
+    # Recordings.
     "not_recorded": "Presses are not recorded: {why}. They work as always.",
     # What the service manager is told.
     "ready": "Ready: commands can reach the robot.",
@@ -248,6 +249,7 @@ ENGLISH: Final[Mapping[str, str]] = {
     "server": "Server",
     "bridge": "Bridge",
     "robot": "Robot",
+    "robots": "Robots",
     "simulated": "SIMULATED ROBOT",
     "ok": "ok",
     "lost": "no connection",

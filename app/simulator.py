@@ -9,12 +9,10 @@ connects.
 import json
 import signal
 import sys
-import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any, Final
 
 import zenoh
@@ -29,6 +27,7 @@ from app.interfaces import Interfaces, interfaces_of
 from app.keys import Qos
 
 ENDPOINT: Final = "tcp/127.0.0.1:7447"
+ANY_PORT: Final = "tcp/127.0.0.1:0"
 STEP_S: Final = 0.1
 LATCHED: Final = Qos(transient_local=True, depth=1)
 OF_EVENTS: Final = Qos(depth=1000)  # rmw_qos_profile_parameter_events
@@ -68,6 +67,14 @@ class Simulator:
         self._ends.set()
         self._thread.join()
         self._session.close()
+
+    @property
+    def endpoint(self) -> str:
+        """Where it listens, with the port that the system chose for `ANY_PORT`."""
+        for told in self._session.get(f"@/{self._session.zid()}/peer"):
+            if told.ok is not None:
+                return str(json.loads(told.ok.payload.to_bytes())["locators"][0])
+        raise zenoh.ZError("the session does not tell where it listens")
 
     def _key(self, topic: str) -> str:
         return keys.key_of(topic, self._namespace)
@@ -224,6 +231,8 @@ def _listening(endpoint: str) -> zenoh.Config:
         "scouting/multicast/enabled": "false",
         "scouting/gossip/enabled": "false",
         "timestamping/enabled": "true",
+        "transport/shared_memory/enabled": "false",  # its file stays when the process is killed
+        "adminspace/enabled": "true",  # it tells the port
     }.items():
         config.insert_json5(place, value)
     return config
@@ -235,11 +244,12 @@ def _payload(query: zenoh.Query) -> bytes:
 
 @contextmanager
 def in_process(namespace: str, distro: str) -> Iterator[str]:
-    """A demo robot for this process alone; yields the endpoint to connect to."""
-    with tempfile.TemporaryDirectory(prefix="demo-robot-") as folder:
-        endpoint = f"unixsock-stream/{Path(folder) / 'zenoh'}"
-        with Simulator(endpoint, namespace, distro):
-            yield endpoint
+    """A demo robot of this process's own; yields the endpoint to connect to.
+
+    That is a port, as a process that is killed leaves none: of a socket's file the folder would stay.
+    """
+    with Simulator(ANY_PORT, namespace, distro) as robot:
+        yield robot.endpoint
 
 
 def main(arguments: list[str]) -> int:

@@ -6,9 +6,10 @@ from typing import Any, Final
 from urllib.parse import urlsplit
 
 from bench.figures import percentile
-from bench.parts import Asked, Meter, crowd, family, rss_mib
+from bench.parts import Meter, crowd, family, rss_mib
 from bench.peer import Peer, Running
 from bench.rig import Rig
+from tests.commanded import Commanded
 
 RATES: Final = (0, 100, 1000)
 TOPIC: Final = "/t0"
@@ -78,7 +79,7 @@ def many(rig: Rig, peer: Peer) -> Figures:
         return found
 
 
-def join(clients: Asked, server: Running, count: int) -> None:
+def join(clients: Commanded, server: Running, count: int) -> None:
     """Makes it so many clients."""
     assert server.bare is not None
     page = urlsplit(server.url).port or 80
@@ -95,7 +96,7 @@ def join(clients: Asked, server: Running, count: int) -> None:
     )
 
 
-def crowded(rig: Rig, way: str, server: Running, clients: Asked, count: int) -> Figures:
+def crowded(rig: Rig, way: str, server: Running, clients: Commanded, count: int) -> Figures:
     """All of a crowd at 10 Hz."""
     time.sleep(SETTLE_S)
     clients("forget")

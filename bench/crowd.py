@@ -1,21 +1,22 @@
 """Many bare clients in one process: each holds a stream open and notes when numbered texts come.
 
-Driven by JSON lines: one command in, one answer out. Nothing but sockets, so that hundreds of clients
-take little of the machine that they share with what is measured.
+Driven by JSON lines, see `tests/ros/commands.py`. Nothing but sockets, so that hundreds of clients take
+little of the machine that they share with what is measured.
 """
 
 import base64
 import contextlib
 import http.client
-import json
+
 import os
 import re
 import selectors
 import socket
-import sys
 import threading
 import time
 from typing import Any, Final
+
+from tests.ros.commands import obey
 
 NUMBER: Final = re.compile(rb"#(\d{9})#")
 WAKE_S: Final = 0.05
@@ -150,17 +151,5 @@ class Crowd:
         self.forget()
 
 
-def main() -> None:
-    crowd = Crowd()
-    print(json.dumps({"ok": "ready"}), flush=True)
-    for line in sys.stdin:
-        asked = json.loads(line)
-        try:
-            answer: Any = {"ok": getattr(crowd, asked.pop("do"))(**asked)}
-        except Exception as error:  # whatever went wrong is the answer
-            answer = {"error": f"{type(error).__name__}: {error}"}
-        print(json.dumps(answer), flush=True)
-
-
 if __name__ == "__main__":
-    main()
+    obey(Crowd())

@@ -7,9 +7,10 @@ from typing import Final
 
 from bench.cost import join
 from bench.kiosk import Kiosk, Robot
-from bench.parts import Asked, Meter, crowd, family, rss_mib
+from bench.parts import Meter, crowd, family, rss_mib
 from bench.peer import Running
 from bench.rig import Rig
+from tests.commanded import Commanded
 
 HZ: Final = 20.0
 SIZE: Final = 32
@@ -96,7 +97,7 @@ class Growth:
         return [points[number] for number in self._rig.sizes.growth_points]
 
     @contextmanager
-    def _served(self, kiosk: Kiosk, topics: Sequence[str]) -> Iterator[tuple[Running, Asked]]:
+    def _served(self, kiosk: Kiosk, topics: Sequence[str]) -> Iterator[tuple[Running, Commanded]]:
         with self._rig.running(kiosk, topics) as server, crowd() as clients:
             join(clients, server, 1)
             time.sleep(JOINED_S)

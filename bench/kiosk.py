@@ -6,10 +6,10 @@ import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, Literal
+from typing import Final
 
 from bench.parts import COMMAND, ENABLED, ended
-from bench.peer import Bare, Place, Running, until_answers
+from bench.peer import Bare, Peer, Place, Running, until_answers
 from tests.parts import ROOT, free_port, zenoh_file
 
 HEAD: Final = f"""
@@ -89,19 +89,15 @@ def panel(
 
 
 @dataclass(frozen=True)
-class Kiosk:
+class Kiosk(Peer):
     """`widgets` and `robots`: as a panel has them."""
 
     id: str = "kiosk"
     title: str = "this panel"
-    robot: Literal["zenoh", "ros"] = "zenoh"
     shown: str = '[data-widget="operation1"] button'
     button: str = '[data-widget^="operation"] button'
     widgets: int = 0
     robots: tuple[Robot, ...] = ()
-
-    def installed(self) -> bool:
-        return True
 
     def start(self, place: Place) -> Running:
         file = place.folder / "panel.toml"

@@ -1,17 +1,16 @@
 """The processes of a run: the robot, the crowd of bare clients, and what processes cost."""
 
-import json
 import os
 import signal
 import subprocess
 import sys
-import threading
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
+from tests.commanded import Commanded
 from tests.parts import CYCLONE_ON_LOOPBACK, ROOT
 
 CACHE: Final = Path(os.environ.get("BENCH_CACHE") or Path.home() / ".cache/operator-panel/bench")
@@ -33,51 +32,6 @@ def of_domain(domain: int) -> dict[str, str]:
     }
 
 
-class Asked:
-    """A process that is asked by JSON lines, in a session of its own: Ctrl-C is the harness's.
-
-    It ends when its stdin does, so it never outlives the harness.
-    """
-
-    def __init__(self, command: Sequence[str], env: dict[str, str] | None = None) -> None:
-        self._process = subprocess.Popen(
-            command,
-            cwd=ROOT,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-            env={**{k: v for k, v in os.environ.items() if k != "PYTHONPATH"}, **(env or {})},
-            start_new_session=True,
-        )
-        self._lock = threading.Lock()
-        self.first = self._answer()
-
-    @property
-    def pid(self) -> int:
-        return self._process.pid
-
-    def __call__(self, do: str, **named: Any) -> Any:
-        with self._lock:
-            assert self._process.stdin is not None
-            self._process.stdin.write(json.dumps({"do": do, **named}) + "\n")
-            self._process.stdin.flush()
-            return self._answer()
-
-    def _answer(self) -> Any:
-        assert self._process.stdout is not None
-        line = self._process.stdout.readline()
-        assert line, f"{self._process.args!r} has ended"
-        answer = json.loads(line)
-        assert "error" not in answer, answer["error"]
-        return answer["ok"]
-
-    def end(self) -> None:
-        for pipe in (self._process.stdin, self._process.stdout):
-            if pipe is not None:
-                pipe.close()
-        ended(self._process)
-
-
 def ended(process: "subprocess.Popen[Any]", number: signal.Signals = signal.SIGTERM) -> None:
     """Ends a process and waits; it is killed if it does not end in time."""
     if process.poll() is None:
@@ -90,15 +44,20 @@ def ended(process: "subprocess.Popen[Any]", number: signal.Signals = signal.SIGT
         process.wait()
 
 
-def robot(domain: int) -> Asked:
+def commanded(python: str | Path, module: str, env: Mapping[str, str]) -> Commanded:
+    """A part of the benchmark in a session of its own: Ctrl-C is the harness's."""
+    return Commanded([python, "-m", module], env, cwd=ROOT, start_new_session=True)
+
+
+def robot(domain: int) -> Commanded:
     """See `bench/robot.py`; `first` is its Zenoh locator."""
-    return Asked([str(ROBOT_PYTHON), str(ROOT / "bench/robot.py")], of_domain(domain))
+    return commanded(ROBOT_PYTHON, "bench.robot", of_domain(domain))
 
 
 @contextmanager
-def crowd() -> Iterator[Asked]:
+def crowd() -> Iterator[Commanded]:
     """See `bench/crowd.py`."""
-    mine = Asked([sys.executable, str(ROOT / "bench/crowd.py")])
+    mine = commanded(sys.executable, "bench.crowd", {})
     try:
         yield mine
     finally:

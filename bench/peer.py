@@ -8,10 +8,11 @@ shows as the text of an element with `data-topic="<name>"`.
 import time
 import urllib.error
 import urllib.request
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, Literal, Protocol
+from typing import Final, Literal
 
 POLLED_EVERY_S: Final = 0.005
 
@@ -52,25 +53,25 @@ class Running:
     bare: Bare | None = None  # None: no client but its page's script
 
 
-class Peer(Protocol):
-    """A peer; `robot` is how the robot's process reaches it."""
+@dataclass(frozen=True)
+class Peer(ABC):
+    """A peer; `robot` is how the robot's process reaches it.
 
-    @property
-    def id(self) -> str: ...
-    @property
-    def title(self) -> str: ...
-    @property
-    def robot(self) -> Literal["zenoh", "ros"]: ...
-    @property
-    def shown(self) -> str:
-        """CSS selector of the element whose `disabled` follows /operation_enabled."""
+    `shown` is the CSS selector of the element whose `disabled` follows /operation_enabled; `button` is
+    that of the button (or of several like it, pressed in turn) that publishes on /operation1, "" for a
+    page without one.
+    """
 
-    @property
-    def button(self) -> str:
-        """CSS selector of the button (or of several like it, pressed in turn) that publishes on
-        /operation1; "" for a page without one."""
+    id: str
+    title: str
+    robot: Literal["zenoh", "ros"] = "zenoh"
+    shown: str = "#publish"
+    button: str = "#publish"
 
-    def installed(self) -> bool: ...
+    def installed(self) -> bool:
+        return True
+
+    @abstractmethod
     def start(self, place: Place) -> Running:
         """Returns as soon as it answers HTTP."""
 

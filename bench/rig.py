@@ -12,7 +12,7 @@ from typing import Final
 from playwright.sync_api import sync_playwright
 
 from bench.browser import Chromium, Watched
-from bench.parts import Asked, robot
+from bench.parts import robot
 from bench.peer import Peer, Place, Running
 from tests.parts import Bridge
 
@@ -60,7 +60,7 @@ class Rig:
 
     def __enter__(self) -> "Rig":
         with ExitStack() as stack:
-            self.robot: Asked = robot(DOMAIN)
+            self.robot = robot(DOMAIN)
             stack.callback(self.robot.end)
             self._playwright = stack.enter_context(sync_playwright())
             self.chromium = stack.enter_context(self.another_chromium())

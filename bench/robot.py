@@ -1,15 +1,13 @@
 """The robot of all peers: one process that speaks Zenoh as a bridge would, and ROS 2 as a node.
 
-Driven by JSON lines as `tests/ros/node.py` is: one command in, one answer out. It runs in an
-environment of its own, with rclpy and eclipse-zenoh. Times are CLOCK_MONOTONIC in nanoseconds, the
-same clock in all processes of a machine.
+Driven by JSON lines, see `tests/ros/commands.py`. It runs in an environment of its own, with rclpy and
+eclipse-zenoh. Times are CLOCK_MONOTONIC in nanoseconds, the same clock in all processes of a machine.
 """
 
 import contextlib
 import json
 import random
 import socket
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -21,6 +19,8 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.qos import QoSProfile
 from std_msgs.msg import Bool, String
 from zenoh.handlers import Callback
+
+from tests.ros.commands import obey
 
 ENABLED: Final = "/operation_enabled"
 COMMAND: Final = "/operation1"
@@ -290,14 +290,7 @@ def listening(locator: str) -> zenoh.Config:
 
 def main() -> None:
     robot = Robot()
-    print(json.dumps({"ok": robot.locator}), flush=True)
-    for line in sys.stdin:
-        request = json.loads(line)
-        try:
-            answer: Any = {"ok": getattr(robot, request.pop("do"))(**request)}
-        except Exception as error:  # whatever went wrong is the answer
-            answer = {"error": f"{type(error).__name__}: {error}"}
-        print(json.dumps(answer), flush=True)
+    obey(robot, robot.locator)
     robot.close()
 
 

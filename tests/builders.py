@@ -49,6 +49,14 @@ HEARD: Final[Table] = {
     "topic": "/heard",
     "type": TEXT,
 }
+COUNT: Final[Table] = {
+    "id": "count",
+    "kind": "action",
+    "label": "Count",
+    "action": "/count",
+    "type": "example_interfaces/action/Fibonacci",
+    "goal": {"order": 3},
+}
 
 
 def panel_of(*widgets: Table, interlock: Table = NOTHING, **more: Any) -> Panel:

@@ -1,27 +1,33 @@
 """Fixtures: real parts, started once where they can be shared and ended whatever happens."""
 
 import os
+import shutil
+import tempfile
+import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
+import zenoh
 from playwright.sync_api import Browser, Page, sync_playwright
 
-from tests.parts import BRIDGE, CHROMIUM, ROS_PYTHON, Bridge, RosNode, Server, live
+from tests.parts import (
+    BRIDGE,
+    CHROMIUM,
+    CHROMIUM_FLAGS,
+    ROOT,
+    ROS_PYTHON,
+    Bridge,
+    RosNode,
+    Server,
+    free_port,
+    live,
+    until,
+)
 
 # Of this run alone: ROS 2's domains 0 to 101 work on every system.
 FIRST_DOMAIN = 2 + os.getpid() % 40
-
-CHROMIUM_FLAGS = [
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-]
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:
@@ -29,6 +35,17 @@ def pytest_sessionstart(session: pytest.Session) -> None:
     missing = [str(p) for p in (BRIDGE, ROS_PYTHON, Path(CHROMIUM)) if not Path(p).exists()]
     if missing and not session.config.option.collectonly:
         pytest.exit(f"missing: {', '.join(missing)}; `make test` installs them", returncode=3)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def temporary_files(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Where tests and their processes have their temporary files: what a killed one leaves goes too."""
+    folder = tmp_path_factory.mktemp("tmp", numbered=False)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("TMPDIR", str(folder))
+        patch.setattr(tempfile, "tempdir", str(folder))
+        yield
+    shutil.rmtree(folder)
 
 
 @pytest.fixture(scope="session")
@@ -97,6 +114,36 @@ def server(bridge: Bridge, node: RosNode, tmp_path: Path) -> Iterator[Server]:
     mine = live(bridge.endpoint, tmp_path)
     yield mine
     mine.end()
+
+
+@pytest.fixture(scope="module")
+def demo() -> Iterator[Server]:
+    """A kiosk with the shipped panel, on the robot that it simulates."""
+    mine = Server(ROOT)
+    until(mine.ready, "ready")
+    yield mine
+    mine.end()
+
+
+@pytest.fixture
+def peer() -> Iterator[tuple[str, zenoh.Session]]:
+    """An endpoint and the session that listens there."""
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    config = zenoh.Config()
+    config.insert_json5("listen/endpoints", f'["{endpoint}"]')
+    config.insert_json5("scouting/multicast/enabled", "false")
+    with zenoh.open(config) as session:
+        yield endpoint, session
+
+
+@pytest.fixture
+def utc(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """The server's zone is UTC."""
+    monkeypatch.setenv("TZ", "UTC")
+    time.tzset()
+    yield
+    monkeypatch.undo()
+    time.tzset()
 
 
 # Of one module: while Playwright runs, so does an event loop of its own in this thread.

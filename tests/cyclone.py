@@ -5,16 +5,16 @@ A test file takes the fixtures by name: `robot = cyclone.robot`, and with it wha
 
 import json
 import os
-import subprocess
-import threading
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
+from functools import partial
 from typing import Any
 
 import pytest
 import zenoh
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+from tests.commanded import Commanded
 from tests.parts import ROS_PYTHON, TESTS, Bridge, until
 
 NODE = "cyclone_robot"
@@ -109,62 +109,24 @@ def decoded(type_name: str, payload: bytes) -> Any:
     return TYPES.deserialize_cdr(payload, type_name)
 
 
-class CycloneRobot:
-    """A node on Cyclone DDS in its own environment; see `tests/ros/cyclone_robot.py`."""
+class CycloneRobot(Commanded):
+    """A node on Cyclone DDS in its own environment; see `tests/ros/cyclone_robot.py`.
+
+    Ended, it takes leave, and the bridge forgets it at once.
+    """
 
     def __init__(self, domain: int, lease_s: float = 10) -> None:
-        self._domain = domain
-        self._lease_s = lease_s
-        self._lock = threading.Lock()
-        self.start()
-
-    def start(self) -> None:
-        """The program anew, knowing nothing of what it did before."""
-        self._process = subprocess.Popen(
-            [str(ROS_PYTHON), str(TESTS / "ros/cyclone_robot.py"), NODE],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-            env={
-                **{k: v for k, v in os.environ.items() if k != "PYTHONPATH"},
-                "ROS_DOMAIN_ID": str(self._domain),
-                "CYCLONEDDS_URI": CYCLONE.format(lease_s=self._lease_s),
-            },
+        super().__init__(
+            [ROS_PYTHON, TESTS / "ros/cyclone_robot.py", NODE],
+            {"ROS_DOMAIN_ID": str(domain), "CYCLONEDDS_URI": CYCLONE.format(lease_s=lease_s)},
         )
-        assert self._answer() == "ready"
 
     def __getattr__(self, name: str) -> Callable[..., Any]:
-        def do(**arguments: Any) -> Any:
-            with self._lock:
-                assert self._process.stdin is not None
-                self._process.stdin.write(json.dumps({"do": name, **arguments}) + "\n")
-                self._process.stdin.flush()
-                return self._answer()
-
-        return do
-
-    def _answer(self) -> Any:
-        assert self._process.stdout is not None
-        line = self._process.stdout.readline()
-        assert line, "the robot died"
-        answer = json.loads(line)
-        assert "error" not in answer, answer["error"]
-        return answer["ok"]
+        return partial(self, name)
 
     def requests(self, service: str) -> list[Any]:
         """What the robot executed on a service."""
         return [call["request"] for call in self.calls(service=service)]
-
-    def kill(self) -> None:
-        self._process.kill()
-        self.end()
-
-    def end(self) -> None:
-        """It takes leave, and the bridge forgets it at once; after a kill, it only tidies up."""
-        for pipe in (self._process.stdin, self._process.stdout):
-            if pipe is not None:
-                pipe.close()
-        self._process.wait(10)
 
 
 class Client:

@@ -20,6 +20,8 @@ from typing import Any
 import httpx
 from websockets.sync.client import ClientConnection, connect
 
+from tests.commanded import Commanded
+
 ROOT = Path(__file__).resolve().parent.parent
 TESTS = ROOT / "tests"
 BRIDGE = Path(
@@ -27,6 +29,15 @@ BRIDGE = Path(
 )
 ROS_PYTHON = Path(os.environ.get("TEST_ROS_PYTHON") or ROOT / ".venv-ros/bin/python")
 CHROMIUM = "/usr/bin/chromium"
+CHROMIUM_FLAGS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
 
 # Bridge and nodes find each other on loopback only, whatever else is on this machine's network.
 CYCLONE_ON_LOOPBACK = (
@@ -153,69 +164,43 @@ class Bridge:
             self._process.end()
 
 
-class RosNode:
+class RosNode(Commanded):
     """A real rclpy node in its own environment; see `tests/ros/node.py` for what it can do."""
 
     def __init__(self, domain: int, name: str = "system_controller") -> None:
-        self._lock = threading.Lock()
-        self._process = subprocess.Popen(
-            [str(ROS_PYTHON), str(TESTS / "ros/node.py"), name],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-            env={
-                **{k: v for k, v in os.environ.items() if k != "PYTHONPATH"},
+        super().__init__(
+            [ROS_PYTHON, TESTS / "ros/node.py", name],
+            {
                 "ROS_DOMAIN_ID": str(domain),
                 "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
                 "RMW_IMPLEMENTATION": "rmw_fastrtps_cpp",
                 "RCUTILS_LOGGING_USE_STDOUT": "0",
+                "ROS_LOG_DIR": tempfile.gettempdir(),
             },
         )
-        assert self._answer() == "ready"
 
     def __getattr__(self, name: str) -> Callable[..., Any]:
         def do(*arguments: Any, **named: Any) -> Any:
-            names = ORDERS[name]
-            with self._lock:
-                assert self._process.stdin is not None
-                request = {"do": name, **dict(zip(names, arguments, strict=False)), **named}
-                self._process.stdin.write(json.dumps(request) + "\n")
-                self._process.stdin.flush()
-                return self._answer()
+            return self(name, **dict(zip(ORDERS[name], arguments, strict=False)), **named)
 
         return do
-
-    def _answer(self) -> Any:
-        assert self._process.stdout is not None
-        line = self._process.stdout.readline()
-        assert line, "the ROS node died"
-        answer = json.loads(line)
-        assert "error" not in answer, answer["error"]
-        return answer["ok"]
 
     def heard_data(self, topic: str) -> list[Any]:
         """The `data` field of all that a subscription heard."""
         return [message["data"] for message in self.heard(topic)]
 
     def kill(self) -> None:
-        self._process.kill()
-        self._process.wait()
+        shared = self._shared_memory()
+        super().kill()
+        for path in shared:
+            path.unlink(missing_ok=True)
 
-    def freeze(self) -> None:
-        self._process.send_signal(signal.SIGSTOP)
-
-    def thaw(self) -> None:
-        self._process.send_signal(signal.SIGCONT)
-
-    def end(self) -> None:
-        self.thaw()
-        for pipe in (self._process.stdin, self._process.stdout):
-            if pipe is not None:
-                pipe.close()
-        try:
-            self._process.wait(10)
-        except subprocess.TimeoutExpired:
-            self.kill()
+    def _shared_memory(self) -> set[Path]:
+        """What Fast DDS would remove when it ends: the files whose lock this process has."""
+        opened = {path.resolve() for path in Path(f"/proc/{self.pid}/fd").iterdir()}
+        locks = {path for path in opened if path.match("/dev/shm/fastdds_*_el")}
+        segments = {path.with_name(path.name.removesuffix("_el")) for path in locks}
+        return locks | segments | {path.with_name(f"sem.{path.name}_mutex") for path in segments}
 
 
 def has_heard(node: RosNode, topic: str, count: int) -> bool:

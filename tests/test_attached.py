@@ -3,7 +3,6 @@
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
 from types import SimpleNamespace
 
 import pytest
@@ -13,7 +12,7 @@ from zenoh.handlers import Callback
 from app import attached
 from app.attached import attach
 from app.link import config_to
-from tests.parts import ROOT, free_port, until
+from tests.parts import ROOT, until
 
 LEAVING = """
 import sys
@@ -23,17 +22,6 @@ link.start(["a"], [])
 while not link.drain().samples:
     pass
 """
-
-
-@pytest.fixture
-def peer() -> Iterator[tuple[str, zenoh.Session]]:
-    """An endpoint and the session that listens there."""
-    endpoint = f"tcp/127.0.0.1:{free_port()}"
-    config = zenoh.Config()
-    config.insert_json5("listen/endpoints", f'["{endpoint}"]')
-    config.insert_json5("scouting/multicast/enabled", "false")
-    with zenoh.open(config) as session:
-        yield endpoint, session
 
 
 def test_an_attached_thread_keeps_what_is_its_own(peer: tuple[str, zenoh.Session]) -> None:

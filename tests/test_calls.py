@@ -435,7 +435,7 @@ def test_a_goal_that_nobody_answers_at_once_waits_for_the_news_of_the_cut() -> N
 def test_a_result_that_could_not_be_asked_for_is_asked_for_again(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("app.actions.ASK_AGAIN_S", 0)
+    monkeypatch.setattr("app.following.ASK_AGAIN_S", 0)
 
     async def test(bench: Bench) -> None:
         bench.line.refuses = "get_result"
@@ -464,7 +464,7 @@ def test_what_breaks_while_a_goal_is_followed_leaves_it_unknown(
 
     async def test(bench: Bench) -> None:
         await accepted(bench)
-        monkeypatch.setattr("app.actions.with_fields", fails)
+        monkeypatch.setattr("app.following.with_fields", fails)
         bench.line.answer(
             INTERFACES.action(COUNT).get_result_response, status=4, result={"sequence": []}
         )
@@ -479,7 +479,7 @@ def test_what_breaks_while_a_goal_is_followed_leaves_it_unknown(
 def test_a_goal_that_nobody_heard_of_is_asked_for_only_for_a_while(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("app.actions.CUT_NEWS_S", 0)
+    monkeypatch.setattr("app.action_services.CUT_NEWS_S", 0)
 
     async def test(bench: Bench) -> None:
         for number in range(MOST_UNANSWERED):
@@ -523,7 +523,7 @@ def test_a_goal_whose_server_ends_is_unknown_and_asked_for_when_it_is_back() -> 
 
 async def settled(bench: Bench) -> None:
     """Nothing is followed any more."""
-    while bench.actions._following:
+    while bench.actions._following.goals:
         await asyncio.sleep(0.001)
 
 

@@ -123,6 +123,14 @@ def kiosk(cyclone_bridge: Bridge, robot: CycloneRobot, tmp_path: Path) -> Iterat
     mine.end()
 
 
+@pytest.fixture
+def own_kiosk(own_cyclone_bridge: Bridge, tmp_path: Path) -> Iterator[Server]:
+    """A kiosk behind a bridge that the test may end."""
+    mine = live(own_cyclone_bridge.endpoint, tmp_path, KIOSK_PANEL=panel_file(tmp_path))
+    yield mine
+    mine.end()
+
+
 def uuid_of(octets: bytes) -> Any:
     return TYPES.types["unique_identifier_msgs/msg/UUID"](np.frombuffer(octets, dtype=np.uint8))
 
@@ -259,25 +267,23 @@ def press_alone(kiosk: Server, widget: str) -> httpx.Response:
 
 
 def test_a_robot_that_has_just_come_gets_the_first_call(
+    own_kiosk: Server,
     own_cyclone_bridge: Bridge,
     robots: Callable[..., CycloneRobot],
-    tmp_path: Path,
-    servers: Callable[[Server], Server],
 ) -> None:
-    kiosk = servers(live(own_cyclone_bridge.endpoint, tmp_path, KIOSK_PANEL=panel_file(tmp_path)))
-    until(lambda: "does not offer" in (kiosk.widget("add")["reason"] or ""), "joined, and no robot")
+    until(lambda: "does not offer" in (own_kiosk.widget("add")["reason"] or ""), "joined, and no robot")
     for number in range(3):
-        with kiosk.stream() as stream:
+        with own_kiosk.stream() as stream:
             stream.next("snapshot")
             robot = robots(own_cyclone_bridge.domain)
             reasons = list(reasons_of("add", stream))
-        receipt = press(kiosk, "add", id=f"first-{number}")
+        receipt = press(own_kiosk, "add", id=f"first-{number}")
         assert receipt.json()["outcome"] == "succeeded", receipt.json()
         assert len(reasons) == 1
         assert "getting ready" in reasons[0]
         assert len(robot.requests("/add_two_ints")) == 1
         robot.end()
-        until(lambda: not kiosk.widget("add")["enabled"], "the robot is gone")
+        until(lambda: not own_kiosk.widget("add")["enabled"], "the robot is gone")
 
 
 def reasons_of(widget: str, stream: Stream) -> Iterator[str]:
@@ -291,19 +297,17 @@ def reasons_of(widget: str, stream: Stream) -> Iterator[str]:
 
 
 def test_a_bridge_lost_while_waiting_leaves_it_unknown(
+    own_kiosk: Server,
     own_cyclone_bridge: Bridge,
     own_client: Client,
     robots: Callable[..., CycloneRobot],
-    tmp_path: Path,
-    servers: Callable[[Server], Server],
 ) -> None:
     robot = robots(own_cyclone_bridge.domain)
     served(robot, own_client)
-    kiosk = servers(live(own_cyclone_bridge.endpoint, tmp_path, KIOSK_PANEL=panel_file(tmp_path)))
-    until(lambda: kiosk.widget("slow")["enabled"], "offered")
+    until(lambda: own_kiosk.widget("slow")["enabled"], "offered")
     robot.answer_slow(seconds=None)
     with ThreadPoolExecutor(1) as pool:
-        waiting = pool.submit(press, kiosk, "slow")
+        waiting = pool.submit(press, own_kiosk, "slow")
         until(lambda: robot.requests("/slow"), "the robot is at it")
         own_cyclone_bridge.kill()
         receipt = waiting.result()
@@ -421,52 +425,48 @@ def test_another_clients_goal_is_not_shown_as_ours(
 
 
 def test_a_node_that_ends_in_the_middle_of_a_goal_leaves_it_unknown_and_the_widget_usable(
+    own_kiosk: Server,
     own_cyclone_bridge: Bridge,
     robots: Callable[..., CycloneRobot],
-    tmp_path: Path,
-    servers: Callable[[Server], Server],
 ) -> None:
-    kiosk = servers(live(own_cyclone_bridge.endpoint, tmp_path, KIOSK_PANEL=panel_file(tmp_path)))
     robot = robots(own_cyclone_bridge.domain)
-    until(lambda: kiosk.widget("count")["enabled"], "offered")
+    until(lambda: own_kiosk.widget("count")["enabled"], "offered")
     robot.fibonacci(step_s=30)
-    assert press(kiosk, "count", id="goal-1").json()["outcome"] == "accepted"
+    assert press(own_kiosk, "count", id="goal-1").json()["outcome"] == "accepted"
     robot.end()
-    until(lambda: kiosk.widget("count")["goal"] == "UNKNOWN", "it is not known any more")
-    assert "no longer offers /fibonacci" in kiosk.widget("count")["result"]
-    assert press(kiosk, "count", id="goal-1").json()["outcome"] == "unknown"
+    until(lambda: own_kiosk.widget("count")["goal"] == "UNKNOWN", "it is not known any more")
+    assert "no longer offers /fibonacci" in own_kiosk.widget("count")["result"]
+    assert press(own_kiosk, "count", id="goal-1").json()["outcome"] == "unknown"
     robot = robots(own_cyclone_bridge.domain)
-    until(lambda: "no longer knows this goal" in kiosk.widget("count")["result"], "asked for again")
-    until(lambda: kiosk.widget("count")["enabled"], "offered again")
+    until(lambda: "no longer knows this goal" in own_kiosk.widget("count")["result"], "asked for again")
+    until(lambda: own_kiosk.widget("count")["enabled"], "offered again")
     robot.fibonacci(step_s=0.01)
-    assert press(kiosk, "count").json()["outcome"] == "accepted"
-    until(lambda: kiosk.widget("count")["goal"] == "SUCCEEDED", "another goal is done")
+    assert press(own_kiosk, "count").json()["outcome"] == "accepted"
+    until(lambda: own_kiosk.widget("count")["goal"] == "SUCCEEDED", "another goal is done")
 
 
 def test_a_goal_whose_answer_was_cut_off_is_found_again_and_can_be_canceled(
+    own_kiosk: Server,
     own_cyclone_bridge: Bridge,
     robots: Callable[..., CycloneRobot],
-    tmp_path: Path,
-    servers: Callable[[Server], Server],
 ) -> None:
-    kiosk = servers(live(own_cyclone_bridge.endpoint, tmp_path, KIOSK_PANEL=panel_file(tmp_path)))
     robot = robots(own_cyclone_bridge.domain)
-    until(lambda: kiosk.widget("count")["enabled"], "offered")
+    until(lambda: own_kiosk.widget("count")["enabled"], "offered")
     robot.fibonacci(step_s=30, answer_goals=False)
     with ThreadPoolExecutor(1) as pool:
-        waiting = pool.submit(press, kiosk, "count", id="goal-1")
+        waiting = pool.submit(press, own_kiosk, "count", id="goal-1")
         until(lambda: robot.goals(), "the robot is at it")
         own_cyclone_bridge.kill()
         receipt = waiting.result()
     assert (receipt.status_code, receipt.json()["outcome"]) == (200, "unknown")
-    until(lambda: kiosk.widget("count")["goal"] == "UNKNOWN", "nothing is heard of it")
+    until(lambda: own_kiosk.widget("count")["goal"] == "UNKNOWN", "nothing is heard of it")
     own_cyclone_bridge.start()
-    until(lambda: kiosk.widget("count")["stoppable"], "it is found again", within_s=30)
-    assert kiosk.widget("count")["goal"] == "EXECUTING"
-    assert press(kiosk, "count", id="goal-1").json()["outcome"] == "accepted"
+    until(lambda: own_kiosk.widget("count")["stoppable"], "it is found again", within_s=30)
+    assert own_kiosk.widget("count")["goal"] == "EXECUTING"
+    assert press(own_kiosk, "count", id="goal-1").json()["outcome"] == "accepted"
     until(lambda: robot.requests("/fibonacci/_action/get_result"), "its end is asked for", within_s=30)
-    assert cancel(kiosk, press="goal-1").status_code == 200
-    until(lambda: kiosk.widget("count")["outcome"] == "canceled", "canceled")
+    assert cancel(own_kiosk, press="goal-1").status_code == 200
+    until(lambda: own_kiosk.widget("count")["outcome"] == "canceled", "canceled")
     assert len(robot.goals()) == 1
 
 

@@ -5,8 +5,7 @@ Definitions come twice: from the packages' own files, as a robot's would, and bu
 
 import base64
 import json
-import os
-import subprocess
+import tempfile
 from collections.abc import Iterator, Mapping
 from functools import cache
 from typing import Any, Final
@@ -15,6 +14,7 @@ import pytest
 
 from app.interfaces import interfaces_of, to_plain
 from app.interfaces.packages import read_folders
+from tests.commanded import Commanded
 from tests.parts import ROS_PYTHON, TESTS
 from tests.samples import Edge, Samples
 
@@ -32,44 +32,24 @@ ONLY_IDL: Final = {
 }
 
 
-class RosCodec:
+class RosCodec(Commanded):
     """`tests/ros/codec.py` in its own environment."""
 
     def __init__(self) -> None:
-        self._process = subprocess.Popen(
-            [str(ROS_PYTHON), str(TESTS / "ros/codec.py")],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-            env={
-                **{k: v for k, v in os.environ.items() if k != "PYTHONPATH"},
+        super().__init__(
+            [ROS_PYTHON, TESTS / "ros/codec.py"],
+            {
                 "ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF",
                 "RMW_IMPLEMENTATION": "rmw_fastrtps_cpp",
+                "ROS_LOG_DIR": tempfile.gettempdir(),
             },
         )
 
-    def ask(self, do: str, **about: Any) -> Any:
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        self._process.stdin.write(json.dumps({"do": do, **about}) + "\n")
-        self._process.stdin.flush()
-        line = self._process.stdout.readline()
-        assert line, "the ROS codec died"
-        answer = json.loads(line)
-        assert "error" not in answer, (answer["error"], about)
-        return answer["ok"]
-
     def encode(self, type_name: str, fields: Mapping[str, Any]) -> bytes:
-        return base64.b64decode(self.ask("encode", type=type_name, fields=fields))
+        return base64.b64decode(self("encode", type=type_name, fields=fields))
 
     def decode(self, type_name: str, data: bytes) -> Any:
-        return self.ask("decode", type=type_name, data=base64.b64encode(data).decode())
-
-    def end(self) -> None:
-        for pipe in (self._process.stdin, self._process.stdout):
-            if pipe is not None:
-                pipe.close()
-        self._process.wait(10)
+        return self("decode", type=type_name, data=base64.b64encode(data).decode())
 
 
 @pytest.fixture(scope="module")
@@ -168,12 +148,12 @@ def test_type_hashes_are_those_of_the_packages() -> None:
 
 def test_type_hashes_are_those_of_publishers(ros: RosCodec) -> None:
     messages = [name for name in TYPES if "/msg/" in name]
-    assert ros.ask("hashes", types=messages) == {name: OF_ROBOT.type_hash(name) for name in messages}
+    assert ros("hashes", types=messages) == {name: OF_ROBOT.type_hash(name) for name in messages}
 
 
 @pytest.mark.parametrize("type_name", TYPES)
 def test_constants_and_defaults_are_those_of_ros(ros: RosCodec, type_name: str) -> None:
-    described = ros.ask("describe", type=type_name)
+    described = ros("describe", type=type_name)
     assert same(dict(OF_ROBOT.constants(type_name)), described["constants"])
     defaults = {one.name for one in OF_ROBOT.structures[type_name].fields if one.default is not None}
     said = {name: value for name, value in described["defaults"].items() if name not in defaults}

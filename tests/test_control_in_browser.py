@@ -11,8 +11,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, Error, Page, expect
 
-from tests.conftest import CHROMIUM_FLAGS
-from tests.parts import CHROMIUM, ROOT, Server, until
+from tests.parts import CHROMIUM, CHROMIUM_FLAGS, ROOT, Server, until
 from tests.test_control_over_http import control_panel
 
 IDLE_S = 4.0

@@ -531,7 +531,7 @@ class Orders(RuleBasedStateMachine):
         assert len(self.all) - len(self.bench.receipts) in (0, 1)
         runs = [run for run in _split(points) if run]
         assert len(runs) == len(self.all)
-        counts = [holding.messages for holding in self.all]
+        counts = [holding.sent for holding in self.all]
         assert [run.count(MOVES) for run in runs] == counts
 
     @invariant()

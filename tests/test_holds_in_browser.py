@@ -18,8 +18,17 @@ from typing import Any, Final
 import pytest
 from playwright.sync_api import Browser, Error, Page, Route, expect
 
-from tests.conftest import CHROMIUM_FLAGS
-from tests.parts import CHROMIUM, Bridge, RosNode, Server, free_port, has_heard, live, until
+from tests.parts import (
+    CHROMIUM,
+    CHROMIUM_FLAGS,
+    Bridge,
+    RosNode,
+    Server,
+    free_port,
+    has_heard,
+    live,
+    until,
+)
 
 PANEL: Final = """
 title = "Jog"

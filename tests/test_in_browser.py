@@ -3,7 +3,6 @@
 import re
 import signal
 import time
-from collections.abc import Iterator
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
@@ -12,7 +11,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, Page, Request, Route, expect
 
-from tests.parts import ROOT, Bridge, RosNode, Server, has_heard, live, until
+from tests.parts import Bridge, RosNode, Server, has_heard, live, until
 
 TEXTS = [
     "",
@@ -30,14 +29,6 @@ TELL_WHEN_LOCKED = """() => new MutationObserver(() => window.lockedAt ??= Date.
     document.querySelector('[data-lamp="server"]'), { attributes: true },
 )"""
 LATE_S = 1.0  # by which a busy machine runs a page's timer late
-
-
-@pytest.fixture(scope="module")
-def demo() -> Iterator[Server]:
-    mine = Server(ROOT)
-    until(mine.ready, "ready")
-    yield mine
-    mine.end()
 
 
 def button(page: Page, name: str) -> Any:

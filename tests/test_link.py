@@ -6,10 +6,8 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
-import pytest
 import zenoh
 from zenoh.handlers import Callback
 
@@ -20,17 +18,6 @@ from tests.parts import free_port, until
 
 RENEWALS = 30
 BURST = 500
-
-
-@pytest.fixture
-def peer() -> Iterator[tuple[str, zenoh.Session]]:
-    """An endpoint and the session that listens there."""
-    endpoint = f"tcp/127.0.0.1:{free_port()}"
-    config = zenoh.Config()
-    config.insert_json5("listen/endpoints", f'["{endpoint}"]')
-    config.insert_json5("scouting/multicast/enabled", "false")
-    with zenoh.open(config) as session:
-        yield endpoint, session
 
 
 def tokens(zid: str, count: int) -> list[str]:

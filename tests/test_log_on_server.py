@@ -28,14 +28,6 @@ SMALL_DISK = ["unshare", "--mount", "sh", "-c"]
 MOUNT = 'mount -t tmpfs -o size=2m tmpfs "$KIOSK_DATA" && exec "$@"'
 
 
-@pytest.fixture(scope="module")
-def demo() -> Iterator[Server]:
-    mine = Server(ROOT)
-    until(mine.ready, "ready")
-    yield mine
-    mine.end()
-
-
 def panel_with(folder: Path, tables: str) -> str:
     """The shipped panel with more in it."""
     path = folder / "panel.toml"

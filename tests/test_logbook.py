@@ -19,6 +19,7 @@ from app.progress import IDLE
 from app.receipts import By, Receipt
 from app.sentences import say
 from tests.builders import (
+    COUNT,
     GUARDED,
     INTERFACES,
     MESSAGE,
@@ -39,14 +40,6 @@ SET = {
     "type": "std_srvs/srv/SetBool",
     "request": {"data": True},
     "timeout_s": 0.05,
-}
-COUNT = {
-    "id": "count",
-    "kind": "action",
-    "label": "Count",
-    "action": "/count",
-    "type": "example_interfaces/action/Fibonacci",
-    "goal": {"order": 3},
 }
 SPEED = {"id": "speed", "kind": "number", "label": "Speed", "min": 0, "max": 9}
 JOG = {

@@ -43,10 +43,20 @@ def test_a_press_reaches_the_robot_with_its_text_intact(
     assert node.heard_data("/operation")[before:] == [text]
 
 
+def arrives(server: Server, node: RosNode) -> bool:
+    """Whether a press gets to the node; nothing of it is on its way any more."""
+    before = len(node.heard("/operation"))
+    if server.press("operation", "there?").json()["outcome"] != "published":
+        return False
+    until(partial(has_heard, node, "/operation", before + 1), "the robot heard it")
+    return True
+
+
 @pytest.fixture(scope="module")
 def shared_server(bridge: Bridge, node: RosNode, tmp_path_factory: pytest.TempPathFactory) -> object:
     mine = live(bridge.endpoint, tmp_path_factory.mktemp("shared"))
     until(mine.ready, "ready")
+    until(partial(arrives, mine, node), "the bridge knows what the node listens to", every_s=0.1)
     yield mine
     mine.end()
 

@@ -18,11 +18,10 @@ from app.logbook import Logbook
 from app.presses import Presses
 from app.receipts import RECEIPTS_KEPT, By, Receipt
 from app.robot import Robot
-from tests.builders import panel_of, permits, presses_of, robot_there, small_panel
+from tests.builders import COUNT, panel_of, permits, presses_of, robot_there, small_panel
 from tests.parts import ROOT, Server, until
 from tests.test_holds_in_browser import PANEL
 from tests.test_holds_on_socket import opened
-from tests.test_logbook import COUNT
 
 KIM = Origin(address="10.0.0.7", browser="b1", who="Panel 1")
 LEE = Origin(address="10.0.0.8", browser="b2", who="Panel 2")

@@ -23,6 +23,7 @@ from app.views import Enabled, sight
 from tests.builders import (
     BOOL,
     BRIDGE,
+    COUNT,
     ENABLED,
     FROM,
     INTERFACES,
@@ -34,15 +35,6 @@ from tests.builders import (
     small_panel,
 )
 from tests.test_presses import Bench, Way
-
-COUNT = {
-    "id": "count",
-    "kind": "action",
-    "label": "Count",
-    "action": "/count",
-    "type": "example_interfaces/action/Fibonacci",
-    "goal": {"order": 3},
-}
 
 
 def flag(value: bool) -> bytes:

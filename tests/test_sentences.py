@@ -1,15 +1,17 @@
 """The sentences: every code that the program uses is there, and ages read as operators say them."""
 
 import ast
+import re
 from collections.abc import Iterator
 from string import Formatter
 
 import pytest
 
 from app.sentences import ENGLISH, age, say
-from app.settings import PACKAGE
+from app.settings import PACKAGE, shipped
 
 SPEAKERS = ("say", "locked", "refused")  # functions whose first argument is a code
+PREFIXES = ("control_", "lamp_", "log_page_")  # of codes that are put together
 
 
 def spoken() -> Iterator[tuple[str, str, frozenset[str]]]:
@@ -40,6 +42,14 @@ def test_every_sentence_gets_all_that_it_is_about() -> None:
         (where, code) for where, code, names in spoken() if not needed(code) <= names | {"why", "time"}
     ]
     assert lacking == []
+
+
+def test_every_sentence_is_said_somewhere() -> None:
+    sources = [path for path in PACKAGE.rglob("*.py") if path.name != "sentences.py"]
+    sources += [path for name in ("templates", "static") for path in shipped(name).rglob("*.*")]
+    words = set(re.findall(r"\w+", "\n".join(path.read_text() for path in sources)))
+    ends = {code: code.removeprefix(next(filter(code.startswith, PREFIXES), "")) for code in ENGLISH}
+    assert [code for code, end in ends.items() if not words & {code, end}] == []
 
 
 def test_a_sentence_is_filled_in() -> None:

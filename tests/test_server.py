@@ -365,6 +365,19 @@ def test_the_demo_robot_as_a_program_of_its_own_can_not_be_mistaken(
         robot.end()
 
 
+def test_a_killed_demo_server_leaves_nothing_but_its_data(tmp_path: Path) -> None:
+    temporary = tmp_path / "temporary"
+    temporary.mkdir()
+    kiosk = Server(ROOT, TMPDIR=str(temporary), KIOSK_DATA=str(tmp_path / "data"))
+    try:
+        until(kiosk.ready, "ready")
+        shared = Path(f"/proc/{kiosk.process.pid}/maps").read_text()
+    finally:
+        kiosk.end(signal.SIGKILL)
+    assert list(temporary.iterdir()) == []
+    assert "/dev/shm/" not in shared  # a file there stays too
+
+
 def test_bytes_that_are_no_message_lock_and_are_counted(
     own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:

@@ -1,8 +1,5 @@
 """Since when each link is as it is, by a clock that the test sets."""
 
-import time
-from collections.abc import Iterator
-
 import pytest
 
 from app.keys import bridge_token
@@ -13,14 +10,7 @@ from tests.builders import BRIDGE, NOW, TEXT, endpoint, robot_there, small_panel
 DAY_S = 86_400.0
 
 
-@pytest.fixture(autouse=True)
-def utc(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """The server's zone is UTC."""
-    monkeypatch.setenv("TZ", "UTC")
-    time.tzset()
-    yield
-    monkeypatch.undo()
-    time.tzset()
+pytestmark = pytest.mark.usefixtures("utc")
 
 
 class Seen:

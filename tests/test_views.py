@@ -1,8 +1,7 @@
 """What the page shows of the robot: lights, permissions, readouts, and when time changes them."""
 
 import math
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -33,16 +32,6 @@ PANEL = small_panel()
 @pytest.fixture
 def robot() -> Robot:
     return robot_there(PANEL)
-
-
-@pytest.fixture
-def utc(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """The server's zone is UTC."""
-    monkeypatch.setenv("TZ", "UTC")
-    time.tzset()
-    yield
-    monkeypatch.undo()
-    time.tzset()
 
 
 def view_of(robot: Robot, now: float = NOW, **more: Any) -> View:

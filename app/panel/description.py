@@ -65,6 +65,7 @@ def some(given: tuple[Any, ...]) -> tuple[Any, ...]:
 ID: Final = r"^[a-z][a-z0-9_]{0,63}$"
 Id = Annotated[str, Field(pattern=ID)]
 Label = Annotated[str, Field(min_length=1, max_length=120)]
+Span = Annotated[int, Field(ge=1, le=12)]
 Topic = Annotated[str, AfterValidator(_topic), Field(max_length=255)]
 Type = Annotated[str, AfterValidator(_type)]
 ServiceType = Annotated[str, AfterValidator(_service)]
@@ -84,7 +85,7 @@ class Placed(Description):
 
     id: Id
     label: Label
-    span: Annotated[int, Field(ge=1, le=12)] = 12
+    span: Span = 12
 
 
 class TopicQos(Description):

@@ -10,6 +10,7 @@ from app.panel.description import (
     Label,
     Placed,
     Seconds,
+    Span,
     Topic,
     TopicQos,
     Type,
@@ -65,4 +66,4 @@ class Indicator(Placed):
     states: Annotated[tuple[LampState, ...], Field(strict=False), AfterValidator(some)]
     max_age_s: Seconds | None = None
     qos: TopicQos = TopicQos()
-    span: Annotated[int, Field(ge=1, le=12)] = 4
+    span: Span = 4

@@ -5,14 +5,13 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, Field
 
-from app.panel.description import Description, Label, Placed, some
+from app.panel.description import Description, Label, Placed, Span, some
 from app.sentences import say
 
 MOST: Final = 2.0**53  # beyond this a browser's numbers are not exact
 
 Number = Annotated[float, Field(ge=-MOST, le=MOST)]
 Unit = Annotated[str, Field(max_length=20)]
-Span = Annotated[int, Field(ge=1, le=12)]
 
 
 class TextInput(Placed):
@@ -25,7 +24,19 @@ class TextInput(Placed):
         return "text"
 
 
-class Numeric(Placed):
+class Stepped(Placed):
+    """What has − and + beside it."""
+
+    @property
+    def less(self) -> str:
+        return say("less", label=self.label)
+
+    @property
+    def more(self) -> str:
+        return say("more", label=self.label)
+
+
+class Numeric(Stepped):
     """A number with limits; whole numbers, if its lowest and its step are whole."""
 
     min: Number
@@ -47,14 +58,6 @@ class Numeric(Placed):
     def attributes(self) -> dict[str, str]:
         """Limits and step as HTML has them."""
         return {"min": digits(self.min), "max": digits(self.max), "step": digits(self.step)}
-
-    @property
-    def less(self) -> str:
-        return say("less", label=self.label)
-
-    @property
-    def more(self) -> str:
-        return say("more", label=self.label)
 
     def typed(self, value: float) -> int | float:
         """A value of this input, as a message takes it."""

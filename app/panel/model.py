@@ -16,6 +16,7 @@ from app.panel.description import (
     Placed,
     Seconds,
     ServiceType,
+    Span,
     Topic,
     TopicQos,
     Type,
@@ -69,7 +70,7 @@ class Publish(Placed):
     confirm: Confirm | None = None
     one_shot: bool = False
     confirm_press: bool = False
-    span: Annotated[int, Field(ge=1, le=12)] = 4
+    span: Span = 4
 
     @property
     def template(self) -> dict[str, Any]:
@@ -93,7 +94,7 @@ class Hold(Placed):
     deadline_field: FieldPath | None = None
     counter_field: FieldPath | None = None
     qos: TopicQos = TopicQos()
-    span: Annotated[int, Field(ge=1, le=12)] = 4
+    span: Span = 4
 
     @property
     def period_s(self) -> float:
@@ -119,7 +120,7 @@ class Call(Placed):
     message: FieldPath | None = None
     answer: str = ""
     confirm_press: bool = False
-    span: Annotated[int, Field(ge=1, le=12)] = 4
+    span: Span = 4
 
     @property
     def template(self) -> dict[str, Any]:
@@ -141,7 +142,7 @@ class Action(Placed):
     feedback: str = ""
     result: str = ""
     confirm_press: bool = False
-    span: Annotated[int, Field(ge=1, le=12)] = 6
+    span: Span = 6
 
     @property
     def template(self) -> dict[str, Any]:

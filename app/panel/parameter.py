@@ -5,8 +5,8 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import AfterValidator, Field
 
 from app.keys import TOPIC
-from app.panel.description import Id, Placed, Seconds
-from app.panel.inputs import Number, Unit
+from app.panel.description import Id, Label, Seconds, Span
+from app.panel.inputs import Number, Stepped, Unit
 from app.panel.ranges import decimal
 from app.sentences import say
 
@@ -27,7 +27,7 @@ def _node(given: str) -> str:
     return given
 
 
-class Parameter(Placed):
+class Parameter(Stepped):
     """A parameter of a node; `min`, `max` and `step` narrow what the node describes.
 
     It is its own input: a press sets the value that comes under the widget's id.
@@ -41,12 +41,12 @@ class Parameter(Placed):
     min: Number | None = None
     max: Number | None = None
     step: Annotated[Number, Field(gt=0)] | None = None
-    on: Annotated[str, Field(min_length=1, max_length=120)] = say("on")
-    off: Annotated[str, Field(min_length=1, max_length=120)] = say("off")
+    on: Label = say("on")
+    off: Label = say("off")
     interlock: Id | None = None
     timeout_s: Seconds = 5.0
     confirm_press: bool = False
-    span: Annotated[int, Field(ge=1, le=12)] = 6
+    span: Span = 6
 
     @property
     def numeric(self) -> bool:
@@ -55,14 +55,6 @@ class Parameter(Placed):
     @property
     def template(self) -> dict[str, Any]:
         return {"value": f"{{{self.id}}}"}
-
-    @property
-    def less(self) -> str:
-        return say("less", label=self.label)
-
-    @property
-    def more(self) -> str:
-        return say("more", label=self.label)
 
     @property
     def press(self) -> str:

@@ -10,10 +10,10 @@ from bench.peers.rosbridge_rs import RosbridgeRs
 from bench.peers.zenoh_ts import ZenohTs
 
 PEERS: Final[tuple[Peer, ...]] = (
-    Floor(),
-    Plain("plain", "plain way, press by fetch", ""),
-    Plain("plain-ws", "plain way, press by WebSocket", "?websocket"),
-    RosbridgeRs(),
-    NiceGui(),
-    ZenohTs(),
+    Floor("floor", "raw event stream (floor)", button=""),
+    Plain("plain", "plain way, press by fetch"),
+    Plain("plain-ws", "plain way, press by WebSocket", query="?websocket"),
+    RosbridgeRs("rosbridge-rs", "rosbridge-server-rs + roslib", robot="ros"),
+    NiceGui("nicegui", "NiceGUI + Zenoh", shown="button.publish", button="button.publish"),
+    ZenohTs("zenoh-ts", "zenoh-ts + remote-api (Rust router)"),
 )

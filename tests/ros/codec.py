@@ -1,18 +1,17 @@
-"""ROS 2's own codec (rclpy, the type support of rmw_fastrtps), driven by JSON lines.
+"""ROS 2's own codec (rclpy, the type support of rmw_fastrtps), driven by JSON lines: see `commands.py`.
 
-One request in: `{"do": "encode", "type": …, "fields": …}`, `"decode"` with base64 `"data"`,
-`"describe"`, or `"hashes"` with `"types"`. One answer out: `{"ok": …}` or `{"error": …}`.
-Fields are plain JSON values, NaN and Infinity as Python's json has them; a byte is a number.
+Bytes are in base64. Fields are plain JSON values, NaN and Infinity as Python's json has them; a byte
+is a number.
 """
 
 import base64
-import json
-import sys
 from importlib import import_module
+from types import SimpleNamespace
 from typing import Any
 
 import numpy
 import rclpy
+from commands import obey
 from rclpy.serialization import deserialize_message, serialize_message
 from rosidl_parser.definition import AbstractNestedType, Array, BasicType, NamespacedType
 
@@ -99,18 +98,7 @@ def hashes(types: list[str]) -> dict[str, str]:
     return found
 
 
-COMMANDS = {"encode": encode, "decode": decode, "describe": describe, "hashes": hashes}
-
-
-def main() -> None:
-    for line in sys.stdin:
-        request = json.loads(line)
-        try:
-            answer: Any = {"ok": COMMANDS[request.pop("do")](**request)}
-        except Exception as error:  # whatever went wrong is the answer
-            answer = {"error": f"{error.__class__.__name__}: {error}"}
-        print(json.dumps(answer), flush=True)
-
+COMMANDS = SimpleNamespace(encode=encode, decode=decode, describe=describe, hashes=hashes)
 
 if __name__ == "__main__":
-    main()
+    obey(COMMANDS)

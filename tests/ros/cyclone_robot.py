@@ -1,17 +1,17 @@
-"""A robot on Cyclone DDS for the tests, driven by JSON lines: one command in, one answer out.
+"""A robot on Cyclone DDS for the tests, driven by JSON lines: see `commands.py`.
 
 It is a true DDS peer of the bridge, without ROS 2: services, an action, parameters and topics, on
 the wire as rmw_cyclonedds writes them. It runs in an environment of its own, with `cyclonedds` and
-nothing of the kiosk. Answers are `{"ok": …}` or `{"error": …}`. Unlike a node of rmw_cyclonedds, it
-drops a request that is too short for its type.
+nothing of the kiosk. Unlike a node of rmw_cyclonedds, it drops a request that is too short for its
+type.
 """
 
-import json
 import os
 import sys
 import threading
 from typing import Any
 
+from commands import obey
 from cyclone_action import ABORTED, CANCELED, Fibonacci
 from cyclone_node import Answer, Node, publishers, qos_of, subscribers
 from cyclone_parameters import Parameters
@@ -166,14 +166,7 @@ class Commands:
 
 def main() -> None:
     commands = Commands(sys.argv[1], int(os.environ["ROS_DOMAIN_ID"]))
-    print(json.dumps({"ok": "ready"}), flush=True)
-    for line in sys.stdin:
-        request = json.loads(line)
-        try:
-            answer: Any = {"ok": getattr(commands, request.pop("do"))(**request)}
-        except Exception as error:  # whatever went wrong is the answer
-            answer = {"error": f"{type(error).__name__}: {error}"}
-        print(json.dumps(answer), flush=True)
+    obey(commands)
     commands.close()
 
 

@@ -1,11 +1,10 @@
-"""A ROS 2 node (rclpy) for the tests, driven by JSON lines: one command in, one answer out.
+"""A ROS 2 node (rclpy) for the tests, driven by JSON lines: see `commands.py`.
 
-It runs in an environment of its own, with rclpy and nothing of the kiosk.
-Answers are `{"ok": …}` or `{"error": …}`; what a subscription hears is kept until `heard` asks.
+It runs in an environment of its own, with rclpy and nothing of the kiosk. What a subscription hears is
+kept until `heard` asks.
 """
 
 import contextlib
-import json
 import sys
 import threading
 import time
@@ -13,6 +12,7 @@ from importlib import import_module
 from typing import Any
 
 import rclpy
+from commands import obey
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import RCLError
@@ -179,15 +179,12 @@ def main() -> None:
         with contextlib.suppress(ExternalShutdownException):
             executor.spin()
 
-    threading.Thread(target=spin, daemon=True).start()
-    print(json.dumps({"ok": "ready"}), flush=True)
-    for line in sys.stdin:
-        request = json.loads(line)
-        try:
-            answer: Any = {"ok": getattr(commands, request.pop("do"))(**request)}
-        except Exception as error:  # whatever went wrong is the answer
-            answer = {"error": f"{type(error).__name__}: {error}"}
-        print(json.dumps(answer), flush=True)
+    spinning = threading.Thread(target=spin)
+    spinning.start()
+    obey(commands)
+    rclpy.shutdown()  # ends the spinning too
+    spinning.join()
+    commands.node.destroy_node()
 
 
 if __name__ == "__main__":

@@ -1,25 +1,13 @@
 """The floor: a raw event stream. Nothing that shows a robot's topic in a browser does less."""
 
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
-from bench.peer import Place, Running
+from bench.peer import Peer, Place, Running
 from bench.peers.parts import serving, uvicorn
 from tests.parts import free_port
 
 
-@dataclass(frozen=True)
-class Floor:
-    id: str = "floor"
-    title: str = "raw event stream (floor)"
-    robot: Literal["zenoh", "ros"] = "zenoh"
-    shown: str = "#publish"
-    button: str = ""
-
-    def installed(self) -> bool:
-        return True
-
+class Floor(Peer):
     def start(self, place: Place) -> Running:
         port = free_port()
         command = uvicorn(Path(__file__).parent, port)

@@ -1,10 +1,9 @@
 """NiceGUI with a Zenoh subscriber: a page of a Python UI framework."""
 
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, Literal
+from typing import Final
 
-from bench.peer import Bare, Place, Running
+from bench.peer import Bare, Peer, Place, Running
 from bench.peers.parts import CACHE, serving
 from tests.parts import free_port
 
@@ -20,14 +19,7 @@ BARE: Final = Bare(
 )
 
 
-@dataclass(frozen=True)
-class NiceGui:
-    id: str = "nicegui"
-    title: str = "NiceGUI + Zenoh"
-    robot: Literal["zenoh", "ros"] = "zenoh"
-    shown: str = "button.publish"
-    button: str = "button.publish"
-
+class NiceGui(Peer):
     def installed(self) -> bool:
         return (VENV / "ready").exists()
 

@@ -2,9 +2,8 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
-from bench.peer import Bare, Place, Running
+from bench.peer import Bare, Peer, Place, Running
 from bench.peers.parts import serving, uvicorn, with_topics
 from tests.parts import free_port
 
@@ -12,16 +11,10 @@ HERE = Path(__file__).parent
 
 
 @dataclass(frozen=True)
-class Plain:
-    id: str
-    title: str
-    query: str
-    robot: Literal["zenoh", "ros"] = "zenoh"
-    shown: str = "#publish"
-    button: str = "#publish"
+class Plain(Peer):
+    """`query` of its page's address says by what way it presses."""
 
-    def installed(self) -> bool:
-        return True
+    query: str = ""
 
     def start(self, place: Place) -> Running:
         page = place.folder / "page.html"

@@ -3,11 +3,10 @@
 import json
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, Literal
+from typing import Final
 
-from bench.peer import Bare, Place, Running
+from bench.peer import Bare, Peer, Place, Running
 from bench.peers.parts import CACHE, started, with_page
 from tests.parts import Process, free_port
 
@@ -18,14 +17,7 @@ PROGRAM: Final = PACKAGES / "rosbridge_server_rs/rosbridge_server_rs_jazzy"
 SCRIPTS: Final = CACHE / "pages/rosbridge_rs"
 
 
-@dataclass(frozen=True)
-class RosbridgeRs:
-    id: str = "rosbridge-rs"
-    title: str = "rosbridge-server-rs + roslib"
-    robot: Literal["zenoh", "ros"] = "ros"
-    shown: str = "#publish"
-    button: str = "#publish"
-
+class RosbridgeRs(Peer):
     def installed(self) -> bool:
         return (VENV / "ready").exists() and SCRIPTS.exists()
 

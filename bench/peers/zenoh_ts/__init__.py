@@ -2,11 +2,10 @@
 
 import json
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, Literal
+from typing import Final
 
-from bench.peer import Bare, Place, Running
+from bench.peer import Bare, Peer, Place, Running
 from bench.peers.parts import CACHE, ending, started, with_page
 from tests.parts import free_port
 
@@ -15,14 +14,7 @@ ROUTER: Final = CACHE / "router/release/bench-router"
 SCRIPTS: Final = CACHE / "pages/zenoh_ts"
 
 
-@dataclass(frozen=True)
-class ZenohTs:
-    id: str = "zenoh-ts"
-    title: str = "zenoh-ts + remote-api (Rust router)"
-    robot: Literal["zenoh", "ros"] = "zenoh"
-    shown: str = "#publish"
-    button: str = "#publish"
-
+class ZenohTs(Peer):
     def installed(self) -> bool:
         return ROUTER.exists() and SCRIPTS.exists()
 

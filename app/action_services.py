@@ -1,0 +1,92 @@
+"""The services of an action server, by which a goal is sent, canceled and asked for its result.
+
+Wire format: ROS 2's `<action>/_action/…` services (design.ros2.org, "Actions").
+"""
+
+import asyncio
+import logging
+import uuid
+from typing import Any, Final
+
+from app.calls import CUT_NEWS_S, Asker
+from app.errors import DecodeError
+from app.goals import Goal
+from app.interfaces import Interfaces
+from app.logs import RobotLog
+from app.panel.model import Action
+from app.robot import Robot
+
+log = logging.getLogger("kiosk.actions")
+
+CANCEL: Final = "action_msgs/srv/CancelGoal"
+
+Query = asyncio.Future[bytes | None]
+
+
+class ActionServices:
+    """Those of one robot. What asks gives LinkError where that could not be sent; what reads a reply
+    gives None for one that can't be read."""
+
+    def __init__(self, interfaces: Interfaces, robot: Robot, link: Asker) -> None:
+        self._interfaces = interfaces
+        self._robot = robot
+        self._log = RobotLog(log, robot.name)
+        self._link = link
+
+    def offered(self, widget: Action) -> bool:
+        """Whether the robot offers a widget's action, with just its type."""
+        return self._robot.graph.server_type("AS", self._robot.key(widget.action)) == widget.type
+
+    def goal_request(self, widget: Action, goal_id: uuid.UUID, fields: dict[str, Any]) -> bytes:
+        """What `send_goal` sends; FieldError for bad fields."""
+        wrapped = {"goal_id": {"uuid": list(goal_id.bytes)}, "goal": fields}
+        return self._interfaces.encode(self._interfaces.action(widget.type).send_goal_request, wrapped)
+
+    def send_goal(self, widget: Action, request: bytes) -> Query:
+        return self._ask(widget, "send_goal", request, widget.timeout_s)
+
+    def cancel_goal(self, goal: Goal) -> Query:
+        request, _ = self._interfaces.service(CANCEL)
+        stamp = {"sec": 0, "nanosec": 0}
+        info = {"goal_id": {"uuid": list(goal.id.bytes)}, "stamp": stamp}
+        payload = self._interfaces.encode(request, {"goal_info": info})
+        return self._ask(goal.widget, "cancel_goal", payload, goal.widget.timeout_s)
+
+    def get_result(self, goal: Goal, timeout_s: float) -> Query:
+        request = self._interfaces.action(goal.widget.type).get_result_request
+        payload = self._interfaces.encode(request, {"goal_id": {"uuid": list(goal.id.bytes)}})
+        return self._ask(goal.widget, "get_result", payload, timeout_s)
+
+    def _ask(self, widget: Action, service: str, payload: bytes, timeout_s: float) -> Query:
+        key = f"{self._robot.key(widget.action)}/_action/{service}"
+        return self._link.query(key, payload, timeout_s)
+
+    async def reply(self, goal: Goal, query: Query) -> bytes | None:
+        """The reply; None when there is none in time, or the bridge went away."""
+        ends: set[asyncio.Future[Any]] = {query, goal.cut}
+        await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
+        reply = query.result() if query.done() else None
+        if reply is None:
+            await asyncio.wait({goal.cut}, timeout=CUT_NEWS_S)  # the news of a cut may follow
+        return reply
+
+    def accepted(self, widget: Action, reply: bytes) -> bool | None:
+        """What `send_goal` answered."""
+        message = self._decoded(widget, self._interfaces.action(widget.type).send_goal_response, reply)
+        return None if message is None else bool(message.accepted)
+
+    def return_code(self, widget: Action, reply: bytes) -> int | None:
+        """What `cancel_goal` answered."""
+        message = self._decoded(widget, self._interfaces.service(CANCEL)[1], reply)
+        return None if message is None else int(message.return_code)
+
+    def result(self, widget: Action, reply: bytes) -> Any:
+        """What `get_result` answered: a message with `status` and `result`."""
+        return self._decoded(widget, self._interfaces.action(widget.type).get_result_response, reply)
+
+    def _decoded(self, widget: Action, type_name: str, reply: bytes) -> Any:
+        try:
+            return self._interfaces.decode(type_name, reply)
+        except DecodeError as error:
+            self._log.error("%s: %s", widget.action, error)
+            return None

@@ -1,0 +1,124 @@
+"""Goals are followed to their ends, over cuts of the connection too: the robot goes on meanwhile."""
+
+import asyncio
+import logging
+import time
+from collections.abc import Callable, Collection
+from typing import Final
+
+from app.action_services import ActionServices
+from app.calls import LATE_S, with_fields
+from app.errors import LinkError
+from app.goals import ENDS, UNKNOWN, Goal
+from app.interlocks import SERVER_SETTLE_S
+from app.logs import RobotLog
+from app.progress import Answer
+from app.robot import Robot
+from app.sentences import clock, say
+from app.tasks import told
+
+log = logging.getLogger("kiosk.actions")
+
+RESULT_S: Final = 86_400.0  # a result is waited for as long as the goal takes
+ASK_AGAIN_S: Final = 1.0
+
+
+class Following:
+    """The goals of one robot whose ends are not known yet, each with a task of its own."""
+
+    def __init__(
+        self,
+        services: ActionServices,
+        robot: Robot,
+        *,
+        back: Callable[[Goal], None],
+        tell: Callable[[Goal, Answer], None],
+    ) -> None:
+        """`tell` gets what came of a goal, or that it is not known any more; `back` is called when the
+        server of a goal that was cut off is offered again."""
+        self._services = services
+        self._robot = robot
+        self._log = RobotLog(log, robot.name)
+        self._back = back
+        self._tell = tell
+        self._goals: dict[asyncio.Task[None], Goal] = {}
+
+    @property
+    def goals(self) -> Collection[Goal]:
+        return self._goals.values()
+
+    def begin(self, goal: Goal) -> None:
+        """Follows a goal from now on."""
+        task = told(self._follow(goal), self._log, "following a goal failed")
+        self._goals[task] = goal
+        task.add_done_callback(self._ended)
+
+    async def stop(self) -> None:
+        """Ends the tasks; goals go on in the robot."""
+        tasks = list(self._goals)
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+    def _ended(self, task: "asyncio.Task[None]") -> None:
+        goal = self._goals.pop(task)
+        if not task.cancelled() and task.exception():
+            goal.state = UNKNOWN
+            self._tell(goal, Answer("unknown", say("goal_fault")))
+
+    async def _follow(self, goal: Goal) -> None:
+        while True:
+            if goal.cut.done():
+                if goal.lives:
+                    goal.state = UNKNOWN
+                    self._tell(goal, Answer("unknown", goal.cut.result() or say("goal_cut")))
+                await self._until_offered(goal)
+                goal.cut = asyncio.get_running_loop().create_future()
+                self._back(goal)
+            if answer := await self._end(goal):
+                break
+            if not (goal.known or goal.cut.done()):
+                return  # it was never heard of: what was said of it stands
+            await asyncio.wait({goal.cut}, timeout=ASK_AGAIN_S)
+        self._log.info("press %s: goal %s: %s: %s", goal.press_id, goal.id, answer.outcome, answer.text)
+        self._tell(goal, answer)
+
+    async def _until_offered(self, goal: Goal) -> None:
+        key = self._robot.key(goal.widget.action)
+        while not (
+            self._services.offered(goal.widget)
+            and time.monotonic() >= self._robot.graph.served_since("AS", key) + SERVER_SETTLE_S
+        ):
+            await asyncio.sleep(ASK_AGAIN_S)
+
+    async def _end(self, goal: Goal) -> Answer | None:
+        """What came of it; None where nothing more is heard, or nobody answered."""
+        reply = await self._result(goal)
+        if reply is None:
+            return None
+        message = self._services.result(goal.widget, reply)
+        if message is None:
+            return Answer("unknown", say("answer_unreadable", wanted=goal.widget.type))
+        goal.state = message.status if message.status in ENDS else UNKNOWN
+        if message.status not in ENDS:
+            return Answer("unknown", say("goal_lost"))
+        outcome, sentence = ENDS[message.status]
+        said = with_fields(goal.widget.result, message.result)
+        return Answer(outcome, say(sentence, time=clock(time.time())) + (f": {said}" if said else "."))
+
+    async def _result(self, goal: Goal) -> bytes | None:
+        """The reply of `get_result`, which is asked for again where Zenoh refuses.
+
+        One that the robot is not known to have is asked for not much longer than a call.
+        """
+        refused = False
+        while not goal.cut.done():
+            try:
+                query = self._services.get_result(goal, RESULT_S if goal.known else LATE_S)
+                return await self._services.reply(goal, query)
+            except LinkError as error:
+                if not refused:
+                    self._log.warning("press %s: %s", goal.press_id, error)
+                refused = True
+                await asyncio.wait({goal.cut}, timeout=ASK_AGAIN_S)
+        return None

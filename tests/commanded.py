@@ -1,0 +1,78 @@
+"""A process that is driven by JSON lines: one command in, one answer out, as `tests/ros/commands.py`
+has it."""
+
+import json
+import os
+import signal
+import subprocess
+import threading
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+ENDS_WITHIN_S: Final = 10.0
+
+
+class Commanded:
+    """`first` is what it says when it is ready. It ends when its stdin does, and so never outlives who
+    started it."""
+
+    def __init__(self, command: Sequence[str | Path], env: Mapping[str, str], **options: Any) -> None:
+        inherited = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+        self._command = [str(part) for part in command]
+        self._options: dict[str, Any] = {"env": {**inherited, **env}, **options}
+        self._lock = threading.Lock()
+        self.start()
+
+    def start(self) -> None:
+        """The program, and after its end the program anew."""
+        self._process: subprocess.Popen[str] = subprocess.Popen(
+            self._command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            **self._options,
+        )
+        self.first = self._answer()
+
+    @property
+    def pid(self) -> int:
+        return self._process.pid
+
+    def __call__(self, do: str, **named: Any) -> Any:
+        """The answer; an AssertionError has what went wrong there."""
+        with self._lock:
+            assert self._process.stdin is not None
+            self._process.stdin.write(json.dumps({"do": do, **named}) + "\n")
+            self._process.stdin.flush()
+            return self._answer()
+
+    def _answer(self) -> Any:
+        assert self._process.stdout is not None
+        line = self._process.stdout.readline()
+        assert line, f"{self._process.args!r} has ended"
+        answer = json.loads(line)
+        assert "error" not in answer, answer["error"]
+        return answer["ok"]
+
+    def freeze(self) -> None:
+        self._process.send_signal(signal.SIGSTOP)
+
+    def thaw(self) -> None:
+        self._process.send_signal(signal.SIGCONT)
+
+    def kill(self) -> None:
+        self._process.kill()
+        self.end()
+
+    def end(self) -> None:
+        """Lets it end and waits; it is killed if it does not end in time."""
+        self.thaw()
+        for pipe in (self._process.stdin, self._process.stdout):
+            if pipe is not None:
+                pipe.close()
+        try:
+            self._process.wait(ENDS_WITHIN_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
