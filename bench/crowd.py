@@ -7,7 +7,6 @@ little of the machine that they share with what is measured.
 import base64
 import contextlib
 import http.client
-
 import os
 import re
 import selectors
