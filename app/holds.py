@@ -10,7 +10,7 @@ import logging
 import secrets
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final, NamedTuple, Protocol
 
 from app.errors import FieldError, InputError, LinkError, NotFound
@@ -113,15 +113,17 @@ class Holds:
         sent: float,
         by: By,
         told: Callable[[Receipt], None],
+        hold_id: str = "",
     ) -> Receipt | Holding:
-        """Begins to publish, or says why not. `sent` is when the browser asked, at the latest."""
+        """Begins to publish, or says why not. `sent` is when the browser asked, at the latest; a hold
+        without an id gets one."""
         self._take()
         self.judge()
         widget, now = self.widget(widget_id), self._loop.time()
         ready = self._ready(widget, inputs, sent, by, now)
         if isinstance(ready, _Refusal):
-            return self._refused(widget, inputs, by, ready)
-        lease = Lease.begun(secrets.token_hex(8), widget.period_s, sent, now)
+            return self._refused(widget, inputs, by, ready, hold_id)
+        lease = Lease.begun(hold_id or secrets.token_hex(8), widget.period_s, sent, now)
         since = say("hold_since", time=clock(time.time()))
         holding = Holding(widget, lease, by, needed(widget, inputs), ready, told, since)
         self._held[widget_id] = holding
@@ -135,12 +137,21 @@ class Holds:
         return holding
 
     def refuse(
-        self, widget_id: str, by: By, why: str, cause: Cause = "interlock", *, trace: bool = True
+        self,
+        widget_id: str,
+        by: By,
+        why: str,
+        cause: Cause = "interlock",
+        *,
+        hold_id: str = "",
+        trace: bool = True,
     ) -> Receipt:
         """A hold that is not even judged; it may leave a trace or none."""
         widget = self.widget(widget_id)
         refusal = _Refusal(why, cause)
-        return self._refused(widget, {}, by, refusal) if trace else _receipt(widget, {}, refusal)
+        if trace:
+            return self._refused(widget, {}, by, refusal, hold_id)
+        return _receipt(widget, {}, refusal, hold_id)
 
     def refusal(self, widget_id: str, inputs: Mapping[str, Any], sent: float, by: By) -> Receipt | None:
         """The receipt of a hold that `begin` would refuse now, without a trace; None for others."""
@@ -191,12 +202,25 @@ class Holds:
         if self._on(holding):
             self._end(holding, code, say(code) if code != RELEASED else "")
 
+    def end_all(self, code: str) -> None:
+        """Ends all that is going on."""
+        for holding in list(self._held.values()):
+            self.end(holding, code)
+        self._plan()
+
     def close(self) -> None:
         """Ends all for good."""
         self._closed = True
-        for holding in list(self._held.values()):
-            self.end(holding, "hold_by_stopping")
-        self._plan()
+        self.end_all("hold_by_stopping")
+
+    def doubted(self, receipt: Receipt) -> Receipt:
+        """The receipt of a hold whose last message is not known to have reached the bridge."""
+        doubt = say("hold_unanswered")
+        self._log.warning("hold %s of %s:%s", receipt.id, receipt.widget, doubt)
+        receipt = replace(receipt, outcome="unknown", reason=receipt.reason + doubt)
+        if self._witness is not None:
+            self._witness.answered(receipt)
+        return receipt
 
     def judge(self) -> None:
         """Ends what has lost its ground: after every change, and before anything goes on."""
@@ -265,8 +289,10 @@ class Holds:
         holding.told(receipt)
         self._changed()
 
-    def _refused(self, widget: Hold, inputs: Mapping[str, Any], by: By, refusal: _Refusal) -> Receipt:
-        receipt = _receipt(widget, inputs, refusal)
+    def _refused(
+        self, widget: Hold, inputs: Mapping[str, Any], by: By, refusal: _Refusal, hold_id: str
+    ) -> Receipt:
+        receipt = _receipt(widget, inputs, refusal, hold_id)
         self._log.warning("hold of %s by %s with %.*s: %s", widget.id, named(by.origin),
                 LONGEST_LOGGED, receipt.inputs, receipt.reason)  # fmt: skip
         if self._witness is not None:
@@ -275,7 +301,8 @@ class Holds:
         return receipt
 
 
-def _receipt(widget: Hold, inputs: Mapping[str, Any], refusal: _Refusal) -> Receipt:
+def _receipt(widget: Hold, inputs: Mapping[str, Any], refusal: _Refusal, hold_id: str = "") -> Receipt:
     text = say("refused", why=refusal.why, time=clock(time.time()))
     own = needed(widget, inputs)
-    return receipt_of(widget, own, secrets.token_hex(8), Answer("refused", text), refusal.cause)
+    own_id = hold_id or secrets.token_hex(8)
+    return receipt_of(widget, own, own_id, Answer("refused", text), refusal.cause)

@@ -126,6 +126,8 @@ class Intake:
                 self._robot.cut(zid, token.lost_seq)
                 self._log.warning("bridge %s lost", zid)
                 had_bridge = had_bridge and bool(graph.bridges)
+            if token.lost_seq and token.alive:
+                self._robot.follow_publishers(token.lost_seq)  # gone, be it for a moment
             if token.alive and (zid := graph.apply(key, True, now)):
                 self._log.info("bridge %s found", zid)
                 came = True

@@ -96,6 +96,7 @@ class Kiosk:
         )
         self.logbook = Logbook(operators_log, self.robot.name, lambda: self.board.id)
         self._pulse = Pulse(self.robot, self.link, self.show)
+        self.reached = self._pulse.reached
         self.sending = Sending(
             panel,
             self.interfaces,
@@ -135,7 +136,7 @@ class Kiosk:
             self._recorder,
             self._log,
         )
-        self._joining = Joining(panel, self.interfaces, self.robot, self.link, self.show, self.renew)
+        self._joining = Joining(panel, self.interfaces, self.robot, self.link, self.show, self._heal)
         self._asked = Asked(lambda: self._joining.answered(WITHIN_S))
         self._rosout = Rosout(self.robot, self.interfaces, self.link, self._loop)
         self._renewing: asyncio.Task[None] | None = None
@@ -210,6 +211,11 @@ class Kiosk:
         if not self.way.permitted or await self._asked.answers():
             return self.way
         return locked("bridge_silent") if self.way.permitted else self.way
+
+    def _heal(self) -> None:
+        """A new session though there is a way: what is held gets its last message by the old one."""
+        self.holds.end_all("hold_by_renewal")
+        self.renew()
 
     def renew(self) -> None:
         """A new Zenoh session: until it is joined, nobody is known to be there."""

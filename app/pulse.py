@@ -85,6 +85,7 @@ class Pulse:
         self._silence = Silence()
         self._bridges: frozenset[str] = frozenset()
         self._questions: set[asyncio.Task[bool]] = set()
+        self._awaited: set[asyncio.Task[bool]] = set()  # by who wants to know whether something arrived
         self._silenced: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self._asking: asyncio.Task[None] | None = None
 
@@ -92,7 +93,9 @@ class Pulse:
         self._asking = told(self._ask_regularly(), self._log, "asking the bridges failed")
 
     async def stop(self) -> None:
-        """Ends its tasks."""
+        """Ends its tasks; what was sent to the end gets the time for an answer."""
+        if self._awaited:
+            await asyncio.wait(self._awaited, timeout=self._silence.limit)
         tasks: list[asyncio.Task[Any]] = [*self._questions]
         if self._asking is not None:
             tasks.append(self._asking)
@@ -104,6 +107,8 @@ class Pulse:
         """Whether all that was sent until now has reached the bridges: they answer what they are asked
         after it, and there is no silence before. It takes as long as the way there and back."""
         question = self._ask()
+        self._awaited.add(question)
+        question.add_done_callback(self._awaited.discard)
         ends: set[asyncio.Future[Any]] = {question, self._silenced}
         await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
         return question.done() and not question.cancelled() and question.result()

@@ -115,16 +115,17 @@ class Robot:
             if sample.seq < seq and sample.source in (bridge, None):
                 self._cut(key, sample)
 
-    def follow_publishers(self) -> None:
-        """After every change of the graph: where a publisher is required, what it said goes with
-        it, and its successor has to say it again."""
+    def follow_publishers(self, before: float = math.inf) -> None:
+        """After every change of the graph: where a publisher is required, what it said (`before` this
+        number of a sample) goes with it, and its successor has to say it again."""
         self.seen.follow(self.graph)
         for key in self._required:
             if self.graph.on_robot("MP", key):
                 self._published.add(key)
             elif key in self._published:
                 self._published.discard(key)
-                if sample := self._samples.get(key):
+                sample = self._samples.get(key)
+                if sample is not None and sample.seq < before:
                     self._cut(key, sample)
 
     def lose(self) -> None:

@@ -90,7 +90,10 @@ ENGLISH: Final[Mapping[str, str]] = {
     "cancel": "Cancel",
     "cancel_sent": "The robot was asked to cancel at {time}.",
     "cancel_refused": "The robot did not cancel it at {time}.",
-    "goal_over": "That goal is over: nothing was canceled.",
+    "goal_over": (
+        "That goal is over, or of before this server's start and perhaps still under way: nothing was"
+        " canceled."
+    ),
     "nothing_to_cancel": "there is nothing under way to cancel",
     # Why a press is no longer what was meant.
     "changed_meanwhile": "it changed while you pressed.",
@@ -217,6 +220,11 @@ ENGLISH: Final[Mapping[str, str]] = {
     "hold_released": "Released at {time}, after {seconds} s.",
     "hold_ended": "Ended at {time}, after {seconds} s: {why} Let go and press again.",
     "hold_unsaid": " The message that ends it was not sent: {why}",
+    "hold_unanswered": (
+        " The bridge did not answer after that: it is not known whether the robot got the message that"
+        " ends it."
+    ),
+    "hold_by_renewal": "the bridge no longer passes on a topic: the connection to it is made anew.",
     "hold_by_cancel": "the screen took the touch away.",
     "hold_by_sliding": "the finger slid off the button.",
     "hold_by_second": "a second finger touched the screen.",

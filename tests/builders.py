@@ -88,11 +88,12 @@ def endpoint(
     zid: str = BRIDGE,
     alive: bool = True,
     qos: Qos | None = None,
-) -> None:
-    """A publisher ("MP") or subscriber ("MS") appears behind a bridge, or ends."""
+) -> str:
+    """A publisher ("MP") or subscriber ("MS") appears behind a bridge, or ends; its token."""
     type_hash = INTERFACES.type_hash(type_name)
     token = keys.token(zid, role, robot.key(topic), type_name, qos or Qos(), type_hash)
     robot.graph.apply(token, alive)
+    return token
 
 
 def says(

@@ -267,7 +267,8 @@ def test_a_late_cancel_does_not_hit_the_next_goal() -> None:
         assert bench.shown.press == ""
         await accepted(bench, "g2")
         late = await bench.actions.cancel(bench.count, "g1")
-        assert (late.outcome, late.text) == ("refused", "That goal is over: nothing was canceled.")
+        assert late.outcome == "refused"
+        assert late.text.startswith("That goal is over, or of before this server's start")
         assert bench.shown.goal == "ACCEPTED"
         assert await canceled(bench, "g2") == goal_id(bench, 2)
         assert (bench.shown.goal, bench.shown.press) == ("CANCELING", "g2")

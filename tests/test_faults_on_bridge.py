@@ -1,5 +1,6 @@
 """What happens when the real bridge or node breaks: locked in time, opened by what the robot says."""
 
+import signal
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -201,6 +202,29 @@ def test_a_successor_of_a_required_publisher_has_to_say_it_again(
     own_node.advertise("/operation_enabled", "std_msgs/msg/Bool")
     until(lambda: "no node" not in kiosk.widget("operation1")["reason"], "the successor is seen")
     assert not permitted(kiosk)
+
+
+def test_a_successor_that_came_while_the_server_stood_still_has_to_say_it_again(
+    own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    own_node.advertise("/operation_enabled", "std_msgs/msg/Bool")
+    kiosk = servers(strict(own_bridge, tmp_path, "require_publisher = true"))
+
+    def says_so() -> bool:
+        own_node.publish("/operation_enabled", {"data": True})
+        return permitted(kiosk)
+
+    until(says_so, "permitted", within_s=15, every_s=0.2)
+    kiosk.process.send(signal.SIGSTOP)
+    own_node.withdraw("/operation_enabled")
+    time.sleep(0.5)
+    own_node.advertise("/operation_enabled", "std_msgs/msg/Bool")
+    time.sleep(0.5)
+    kiosk.process.send(signal.SIGCONT)
+    until(lambda: not permitted(kiosk), "the permission went with its publisher")
+    time.sleep(1.0)
+    assert "waiting for a new /operation_enabled" in kiosk.widget("operation1")["reason"]
+    until(says_so, "permitted by the successor", within_s=15, every_s=0.2)
 
 
 def test_an_old_latched_value_is_no_fresh_one(

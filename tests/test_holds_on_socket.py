@@ -6,7 +6,7 @@ import json
 import signal
 import sqlite3
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from socket import create_connection
@@ -105,6 +105,8 @@ def test_a_hold_is_begun_kept_and_let_go(demo: Server) -> None:
         said = socket.hear()
         assert (said["state"], said["widget"], said["id"]) == ("ended", "jog", socket.lease)
         until(lambda: not demo.widget("jog")["held"], "no longer held")
+    log = csv.DictReader(io.StringIO(demo.http.get("/log.csv?every=true").text.removeprefix("\ufeff")))
+    assert {"pressed", "closed"} == {entry["kind"] for entry in log if entry["press"] == said["id"]}
 
 
 def test_a_hold_is_let_go_by_who_has_no_answer_yet(demo: Server) -> None:
@@ -303,6 +305,26 @@ def test_a_lost_bridge_ends_it_and_what_could_not_be_said_is_not_said_later(
         assert set(xs) == {0.5}
     finally:
         server.end()
+
+
+def test_a_release_that_may_not_have_reached_the_bridge_is_not_published(
+    own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    panel = tmp_path / "jog.toml"
+    panel.write_text(PANEL)
+    kiosk = servers(live(own_bridge.endpoint, tmp_path, KIOSK_PANEL=str(panel)))
+    own_node.advertise("/operation_enabled", "std_msgs/msg/Bool", durability="transient_local", depth=1)
+    own_node.publish("/operation_enabled", {"data": True})
+    with held(kiosk) as socket:
+        socket.beat()
+        own_bridge.freeze()
+        socket.say(do="end", why="released", lease=socket.lease)
+        said = socket.hear()
+        own_bridge.thaw()
+    assert (said["state"], said["outcome"]) == ("ended", "unknown")
+    assert said["reason"].startswith("Released at")
+    assert "it is not known whether the robot got the message that ends it" in said["reason"]
+    assert said["reason"] in kiosk.http.get("/log.csv").text
 
 
 def test_a_server_that_stood_still_has_ended_it_when_it_wakes(demo: Server) -> None:

@@ -1,6 +1,7 @@
 """Where one part meets another: what fails in one must not make another act on a doubt."""
 
 import asyncio
+import itertools
 import logging
 import time
 from collections.abc import Mapping
@@ -8,16 +9,18 @@ from typing import Any, ClassVar
 
 import pytest
 
-from app import kiosk
+from app import kiosk, simulator
 from app.browsers import stranger
 from app.calls import with_fields
-from app.inbox import Changes
+from app.holds import Holding
+from app.inbox import Changes, Token
 from app.intake import Intake
+from app.interlocks import interlock_verdict
 from app.link import config_to
 from app.log import Unlogged
 from app.logs import RobotLog
 from app.panel.model import Panel
-from app.receipts import LONGEST_KEPT, By
+from app.receipts import LONGEST_KEPT, By, Receipt
 from app.robot import Robot, Sample
 from app.views import Enabled, sight
 from tests.builders import (
@@ -26,14 +29,17 @@ from tests.builders import (
     COUNT,
     ENABLED,
     FROM,
+    HEARD,
     INTERFACES,
     NOW,
+    endpoint,
     panel_of,
     permits,
     presses_of,
     robot_there,
     small_panel,
 )
+from tests.test_holds import HALF, JOG, POINT, SPEED
 from tests.test_presses import Bench, Way
 
 
@@ -54,6 +60,7 @@ class Broken:
 
 class Deaf:
     def hear(self, *_: object) -> None: ...
+    def lose(self, *_: object) -> None: ...
 
 
 def intake_of(panel: Panel, robot: Robot, actions: Any) -> Intake:
@@ -230,6 +237,60 @@ def test_a_link_that_is_lost_while_it_is_renewed_is_renewed_again(
 
     asyncio.run(lost())
     assert len(renewals) == 4
+
+
+def test_a_publisher_that_was_replaced_between_two_turns_has_to_say_it_again() -> None:
+    panel = small_panel({"require_publisher": True})
+    robot = robot_there(panel)
+    interlock = panel.interlocks[0]
+    token = endpoint(robot, "MP", ENABLED, BOOL)
+    robot.follow_publishers()
+    permits(robot)
+    intake = intake_of(panel, robot, Deaf())
+    page = Page(panel, robot)
+    key = robot.key(ENABLED)
+    old, new = Sample(flag(True), 6, NOW, NOW, BRIDGE), Sample(flag(True), 8, NOW, NOW, BRIDGE)
+    for said, permitted in ((old, False), (new, True)):
+        intake.take(Changes({key: said}, {token: Token(True, 7)}, True), page.shown, page.show)
+        robot.follow_publishers()
+        assert interlock_verdict(interlock, robot, NOW).permitted is permitted
+
+
+def test_a_kiosk_that_gives_its_session_up_ends_what_is_held_before(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    async def scene() -> None:
+        panel = panel_of(SPEED, JOG, {**HEARD, "topic": "/last_heard"}, mode="demo")
+        with simulator.in_process("", panel.distro) as there:
+            one = kiosk.Kiosk(panel, config_to(there), "r1", Unlogged())
+            await one.start()
+            sent: list[float] = []
+            put = one.link.put
+
+            def noted(key: str, payload: bytes) -> None:
+                if key == "jog":
+                    sent.append(INTERFACES.decode(POINT, payload).x)
+                put(key, payload)
+
+            monkeypatch.setattr(one.link, "put", noted)
+            ended: list[Receipt] = []
+            async with asyncio.timeout(20):
+                while not one.board.view["widgets"]["jog"]["enabled"]:
+                    await asyncio.sleep(0.05)
+                hold = one.holds.begin("jog", HALF, time.monotonic(), FROM, ended.append)
+                assert isinstance(hold, Holding)
+                lost = one.robot.key("/last_heard")
+                monkeypatch.setattr(type(one.robot.graph), "unheard", lambda _, key: key == lost)
+                for number in itertools.count(1):
+                    if ended:
+                        break
+                    one.holds.beat(hold, number, time.monotonic())
+                    await asyncio.sleep(0.05)
+            assert sent[-1] == 0.0
+            assert "the connection to it is made anew" in ended[0].reason
+            await one.stop()
+
+    asyncio.run(scene())
 
 
 def test_who_ends_or_takes_a_new_panel_sends_nothing_more() -> None:

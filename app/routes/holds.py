@@ -118,9 +118,11 @@ class _Session:
         self._opened_at = time.monotonic()
         self._ended: asyncio.Future[Receipt] = asyncio.get_running_loop().create_future()
         self._browser = browser
+        self._id = secrets.token_hex(8)  # of the hold: in the log, its receipt and its recording
         self._by = kiosk.doubts.by(widget, browser)
         self._room = kiosk.logbook.room(self._by.origin)
         self._noted: Noted | None = None
+        self._receipt: Receipt | None = None  # of its end, when all of it is known
         self._next: asyncio.Future[Message] | None = None  # what the browser says next
 
     async def run(self, widget: str) -> Receipt:
@@ -142,11 +144,11 @@ class _Session:
         finally:
             self._kiosk.holds.end(begun, "hold_by_closing")
             await asyncio.gather(telling, return_exceptions=True)
-        return self._ended.result()
+        return self._receipt or self._ended.result()
 
     async def _begun(self, widget: str) -> Receipt | Holding:
         holds, by = self._kiosk.holds, self._by
-        refuse = partial(holds.refuse, widget, trace=self._room)
+        refuse = partial(holds.refuse, widget, hold_id=self._id, trace=self._room)
         try:
             async with asyncio.timeout(BEGIN_WITHIN_S):
                 said = await self._read()
@@ -168,13 +170,13 @@ class _Session:
             return refuse(by, str(error), "log")
         if not still_held:
             return refuse(by, say("hold_let_go"))
-        return holds.begin(widget, said.inputs, sent, by, self._ended.set_result)
+        return holds.begin(widget, said.inputs, sent, by, self._ended.set_result, self._id)
 
     async def _written(self, widget: str, said: Begin, by: By) -> bool:
         """The entry in the log, while the browser is listened to: whether it holds still."""
         own = needed(self._kiosk.holds.widget(widget), said.inputs)
         writing = asyncio.ensure_future(
-            self._kiosk.logbook.pressed(widget, own, secrets.token_hex(8), by.origin, "hold")
+            self._kiosk.logbook.pressed(widget, own, self._id, by.origin, "hold")
         )
         self._next = asyncio.ensure_future(self._received())
         await asyncio.wait({writing, self._next}, return_when=asyncio.FIRST_COMPLETED)
@@ -208,8 +210,8 @@ class _Session:
                 if self._hear(said, holding):
                     self._kiosk.control.touch(self._browser)
                     await self._say(state="held")
-                elif isinstance(said, Beat) and self._ended.done():
-                    await self._say(state="ended", **self._ended.result().as_json())
+                elif isinstance(said, Beat) and self._receipt is not None:
+                    await self._say(state="ended", **self._receipt.as_json())
         await self._close(1000)
 
     def _hear(self, said: Begin | Beat | End | None, holding: Holding) -> bool:
@@ -241,7 +243,10 @@ class _Session:
 
     async def _tell(self) -> None:
         """The end, as soon as it is there, whatever ended it; then the browser may close."""
-        receipt = await self._closed(await asyncio.shield(self._ended))
+        receipt = await asyncio.shield(self._ended)
+        if receipt.outcome != "unknown" and not await self._kiosk.reached():
+            receipt = self._kiosk.holds.doubted(receipt)
+        self._receipt = receipt = await self._closed(receipt)
         with suppress(WebSocketDisconnect, RuntimeError):
             await self._say(state="ended", **receipt.as_json())
 
