@@ -87,7 +87,8 @@ def test_a_press_leaves_once_within_its_event_and_then_shows(shown: Page, by: st
         shown.wait_for_timeout(300)  # it is open
     began = shown.evaluate("Date.now()")
     make(shown, by)
-    expect(receipt(shown)).to_contain_text("Sent on /operation at")
+    shown.wait_for_function("() => left.length")
+    expect(receipt(shown)).to_contain_text("Sent on /operation at", timeout=10_000)
     (press,) = shown.evaluate("left")
     assert press["by"] == way
     assert press["during"] == ("submit" if by == "submit" else "click")
