@@ -1,6 +1,6 @@
 // A button that acts while it is held. It ends by whatever may mean that nobody holds it any more,
 // and only a new press begins again. What it shows is what the server answered, nothing else.
-import { inputsOf } from "./press.js";
+import { entered } from "./press.js";
 
 // From this page's own thread on purpose: a page that stands still must not keep a hold alive.
 const BEAT_MS = 80;
@@ -96,7 +96,7 @@ export class Hold {
       const said = JSON.parse(data);
       this.#stamp = said.stamp;
       this.#stampedAt = performance.now();
-      if (!begun && on) this.#say(socket, { do: "begin", inputs: inputsOf(this.#button.form), seen: this.#source.seen });
+      if (!begun && on) this.#say(socket, { do: "begin", inputs: entered(), seen: this.#source.seen });
       else if (!begun) this.#say(socket, { do: "end", why: this.#waiting.get(socket) });
       begun = true;
       if (said.state === "held") on && this.#held(socket, said);

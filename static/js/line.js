@@ -22,11 +22,12 @@ export class Line {
     return this.#socket.readyState === WebSocket.OPEN && !this.#socket.bufferedAmount;
   }
 
+  // The press leaves at once; no answer comes before this returns.
   ask(press, answerMs) {
+    this.#socket.send(JSON.stringify(press));
     return new Promise((resolve, reject) => {
       this.#waiting.set(press.id, { resolve, reject });
       setTimeout(reject, answerMs);
-      this.#socket.send(JSON.stringify(press));
     }).finally(() => {
       this.#waiting.delete(press.id);
       if (this.#left) this.leave();

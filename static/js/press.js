@@ -4,7 +4,6 @@ const ANSWER_WITHIN_MS = 5000;
 const TAP_AGAIN_MS = 700;
 // A page that nobody touches for so long gives its socket back.
 const UNTOUCHED_MS = 60_000;
-const ENTRIES = "input:not([type=hidden]), select";
 
 function newId() {
   const bytes = crypto.getRandomValues(new Uint8Array(16));
@@ -21,9 +20,11 @@ function valueOf(input) {
   return Number.isInteger(value) && !Number.isSafeInteger(value) ? input.value : value;
 }
 
+// They stay in place: none comes or goes while the page is there.
+const entries = [...document.querySelectorAll("[data-widget] :is(input:not([type=hidden]), select)")];
+
 // All that is entered on the page, by the names of the inputs.
-export function inputsOf(form) {
-  const entries = [...form.elements].filter((input) => input.matches(ENTRIES) && input.closest("[data-widget]"));
+export function entered() {
   return Object.fromEntries(entries.map((input) => [input.name, valueOf(input)]));
 }
 
@@ -80,7 +81,8 @@ export class Presser {
   #down = null; // the button that was open when the pointer went down on it
   #asked = () => {}; // loaded with the page that asks; until then nothing is pressed
   #seen = null;
-  #click = null; // when the last click was, in the server's time, and what was seen then
+  #id = newId(); // of the next press
+  #buttons = new Map(); // those that press, with the widgets that they are of
 
   constructor(widgets, source, sentences) {
     this.#widgets = widgets;
@@ -94,26 +96,34 @@ export class Presser {
       this.#open();
     };
     addEventListener("pointerdown", down, true);
+    for (const root of widgets.values()) {
+      for (const button of root.querySelectorAll("[type=submit]")) this.#buttons.set(button, root);
+    }
     for (const form of document.forms) {
-      // A button that opened under a resting finger was not pressed.
+      // A click presses at once: a browser takes its time to submit a form.
       form.addEventListener("click", (event) => {
         const button = event.target.closest("button");
-        this.#click = this.#moment(event, event.detail > 0 ? this.#seen : source.seen);
-        if (button?.matches(".cancel")) this.#click.press = event.detail > 0 ? this.#goal : button.value;
+        // A button that opened under a resting finger was not pressed.
         if (button && event.detail > 0 && button !== this.#down) event.preventDefault();
+        else if (this.#buttons.has(button)) this.#pressed(event, button);
       });
-      form.addEventListener("submit", (event) => {
-        event.preventDefault();
-        const root = event.submitter?.closest("[data-widget]");
-        if (!root || event.submitter.disabled) return;
-        const inputs = inputsOf(form); // as they are now: a dialog asks for these, whatever comes meanwhile
-        if (event.submitter.classList.contains("cancel") || !root.querySelector("dialog.ask")) {
-          this.#press(root, event.submitter, inputs, this.#click);
-        } else {
-          this.#asked(root, form, (yes) => this.#press(root, event.submitter, inputs, this.#moment(yes)));
-        }
-      });
+      // By a program, which may ask for it without a click.
+      form.addEventListener("submit", (event) => this.#pressed(event, event.submitter));
     }
+  }
+
+  // By a pointer, a key or a program: only a pointer has come down before.
+  #pressed(event, button) {
+    event.preventDefault();
+    const root = this.#buttons.get(button);
+    if (!root || button.disabled) return;
+    const touched = event.detail > 0;
+    const click = this.#moment(event, touched ? this.#seen : this.#source.seen);
+    const cancel = button.matches(".cancel");
+    if (cancel) click.press = touched ? this.#goal : button.value;
+    const inputs = entered(); // as they are now: a dialog asks for these, whatever comes meanwhile
+    if (cancel || !root.querySelector("dialog.ask")) this.#press(root, button, inputs, click);
+    else this.#asked(root, button.form, (yes) => this.#press(root, button, inputs, this.#moment(yes)));
   }
 
   // What was seen at an event, and when that was, in the server's time.
@@ -147,15 +157,17 @@ export class Presser {
   async #press(root, button, inputs, click) {
     const url = button.getAttribute("formaction");
     if (this.#underWay.has(url)) return;
-    said.delete(entryOf(root));
     this.#underWay.add(url);
-    button.setAttribute("aria-busy", "true");
-    const pause = new Promise((resolve) => setTimeout(resolve, TAP_AGAIN_MS));
     try {
       const answerMs = ANSWER_WITHIN_MS + 1000 * (root.dataset.answerS ?? 0);
       const line = this.#line?.free && !button.matches(".cancel") ? this.#line : null;
-      const press = { inputs, id: newId(), ...click };
-      this.#show(root, await this.#send(root.dataset.widget, line, url, press, answerMs));
+      const answer = this.#send(root.dataset.widget, line, url, { inputs, id: this.#id, ...click }, answerMs);
+      // It has left; all that can wait comes after.
+      this.#id = newId();
+      said.delete(entryOf(root));
+      button.setAttribute("aria-busy", "true");
+      const pause = new Promise((resolve) => setTimeout(resolve, TAP_AGAIN_MS));
+      this.#show(root, await answer);
       await pause;
     } finally {
       this.#underWay.delete(url);
