@@ -57,7 +57,7 @@ export class Source {
     document.addEventListener("visibilitychange", () => (document.hidden ? this.#rest() : this.#open()));
     addEventListener("pagehide", () => this.#rest());
     addEventListener("pageshow", (event) => event.persisted && this.#open());
-    setInterval(() => this.#watch(), CHECK_MS);
+    setTimeout(() => this.#watch(), CHECK_MS);
     if (document.hidden) this.#rest();
     else this.#open();
   }
@@ -197,7 +197,9 @@ export class Source {
   // After a silence only a new stream brings a new snapshot, even if the old one speaks again.
   #watch() {
     const now = performance.now();
-    if (document.hidden || now - this.#aliveAt <= SILENCE_MS) return;
+    const left = this.#aliveAt + SILENCE_MS - now;
+    setTimeout(() => this.#watch(), left > 0 ? left : CHECK_MS);
+    if (document.hidden || left > 0) return;
     const fresh = this.#fresh;
     this.#lose();
     if (fresh || now - this.#openedAt > OPEN_AGAIN_MS) this.#open();
