@@ -112,7 +112,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
 def _first_panel(settings: Settings) -> tuple[Panel, str]:
     """The panel, or in development an empty one that shows what is wrong with the file."""
     try:
-        return load_panel(settings.panel, settings.data_folder("live")), ""
+        return load_panel(settings.panel, lambda of: settings.data_folder(settings.mode or of.mode)), ""
     except PanelError as error:
         if not settings.dev:
             raise

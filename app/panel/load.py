@@ -4,7 +4,7 @@ import copy
 import hashlib
 import re
 import tomllib
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Final, get_args
@@ -28,10 +28,10 @@ NEEDED: Final[Mapping[str | int, str]] = {
 }
 
 
-def load_panel(path: Path, kept: Path | None = None) -> Panel:
+def load_panel(path: Path, kept: Callable[[Panel], Path | None] = lambda _: None) -> Panel:
     """The checked panel; PanelError has every fault, `unreadable` where it is not even TOML.
 
-    `kept` is a folder in which what was read of the distribution may be kept for the next start.
+    `kept` says in which folder what is read of the distribution may be kept for the next start.
     """
     try:
         data = path.read_bytes()
@@ -47,7 +47,7 @@ def load_panel(path: Path, kept: Path | None = None) -> Panel:
         faults += map(_fault, error.errors())
         faults += _faults_of_the_rest(tables, error, path.parent)
     else:
-        read_distribution(panel.distro, kept)
+        read_distribution(panel.distro, kept(panel))
         faults += _faults_with_types(panel)
     if faults:
         raise PanelError(str(path), tuple(faults))
