@@ -1,5 +1,6 @@
 """`uvicorn app.main:app`: the only wiring."""
 
+from app import unread  # noqa: F401
 from app.collector import resume
 
 # isort: split
@@ -77,7 +78,8 @@ def create_app(settings: Settings | None = None) -> FastAPI:
                     await opened.enter_async_context(
                         development.reloading(site, settings, running, opened.pop_all())
                     )
-                tasks = [asyncio.create_task(work) for work in (watchdog.run(), sockets.narrow(ports))]
+                works = (watchdog.run(), sockets.narrow(ports), pages.compiled(site.templates))
+                tasks = [asyncio.create_task(work) for work in works]
                 try:
                     yield
                 finally:
@@ -110,7 +112,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
 def _first_panel(settings: Settings) -> tuple[Panel, str]:
     """The panel, or in development an empty one that shows what is wrong with the file."""
     try:
-        return load_panel(settings.panel), ""
+        return load_panel(settings.panel, lambda of: settings.data_folder(settings.mode or of.mode)), ""
     except PanelError as error:
         if not settings.dev:
             raise

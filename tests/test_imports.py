@@ -10,6 +10,7 @@ from app.settings import PACKAGE
 
 # A module imports only from those that stand before it.
 ORDER = (
+    "app.unread",
     "app.collector",
     "app.errors",
     "app.settings",
@@ -23,6 +24,7 @@ ORDER = (
     "app.watchdog",
     "app.keys",
     "app.interfaces.definitions",
+    "app.interfaces.formats",
     "app.interfaces.scalars",
     "app.interfaces.literals",
     "app.interfaces.composition",
@@ -32,8 +34,13 @@ ORDER = (
     "app.interfaces.plain",
     "app.interfaces.hashes",
     "app.interfaces.values",
+    "app.interfaces.decoding",
+    "app.interfaces.encoding",
     "app.interfaces.codec",
     "app.interfaces.text",
+    "app.interfaces.kept",
+    "app.interfaces.stock",
+    "app.interfaces.distributions",
     "app.interfaces.store",
     "app.interfaces",
     "app.panel.description",

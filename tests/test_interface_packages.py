@@ -10,8 +10,8 @@ import pytest
 from app.errors import FieldError, InterfaceError
 from app.interfaces import DISTROS, Interfaces, interfaces_of
 from app.interfaces.definitions import Type
+from app.interfaces.distributions import BUILTIN
 from app.interfaces.packages import read_folders
-from app.interfaces.store import BUILTIN
 
 Make = Callable[[Mapping[str, str]], Path]
 

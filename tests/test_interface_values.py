@@ -2,6 +2,7 @@
 
 import json
 import math
+from array import array
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, Final
@@ -250,10 +251,9 @@ def test_a_byte_has_all_of_its_values() -> None:
         (None, None),
         ("text", "text"),
         (b"\0\xff", [0, 255]),
-        (numpy.array([1, 2**63], numpy.uint64), [1, "9223372036854775808"]),
-        (numpy.array([1.5, math.nan]), [1.5, "NaN"]),
-        (numpy.array([True, False]), [True, False]),
-        (numpy.uint64(2**60), str(2**60)),
+        (memoryview(array("Q", [1, 2**63])), [1, "9223372036854775808"]),
+        (memoryview(array("f", [1.5, math.nan])), [1.5, "NaN"]),
+        (memoryview(b"\0\xff"), [0, 255]),
         ([], []),
     ],
 )

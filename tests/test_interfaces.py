@@ -5,10 +5,9 @@ import random
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-import numpy
 import pytest
 from rosbags.interfaces import Nodetype
-from rosbags.typesys import get_typestore
+from rosbags.typesys import Stores, get_typestore
 
 from app.errors import DecodeError, FieldError, InterfaceError
 from app.interfaces import DISTROS, INTEGERS, PLACEHOLDER, interfaces_of
@@ -24,7 +23,7 @@ class Sample:
     """Fields for any type, each value unlike the last, at the edges of its range."""
 
     def __init__(self, distro: str) -> None:
-        self._definitions = get_typestore(DISTROS[distro]).fielddefs
+        self._definitions = get_typestore(Stores(f"ros2_{distro}")).fielddefs
         self._turn = 0
         self.types = tuple(self._definitions)
 
@@ -59,7 +58,7 @@ def fields_of(value: Any, like: Any) -> Any:
     """The fields of a decoded message that are in `like`, as plain values."""
     if isinstance(like, Mapping):
         return {name: fields_of(getattr(value, name), inner) for name, inner in like.items()}
-    if isinstance(value, numpy.ndarray):
+    if isinstance(value, memoryview):
         return value.tolist()
     if isinstance(like, list):
         return [fields_of(item, inner) for item, inner in zip(value, like, strict=True)]

@@ -1,15 +1,15 @@
 """ROS 2 interfaces without ROS: definitions, checked values, CDR and type hashes.
 
-The definitions of messages and the codec are rosbags' (`rosbags.typesys`, `rosbags.serde`); what
-it has not is here: services, actions, packages from files, defaults, wstrings and checks that name
-the field.
+The definitions of messages are rosbags' (`rosbags.typesys`); what it has not is here: services,
+actions, packages from files, defaults, and the codec with checks that name the field.
 """
 
 from app.interfaces.composition import ActionTypes
 from app.interfaces.definitions import INTEGERS, PLACEHOLDER, Field, Structure, Type
+from app.interfaces.distributions import DISTROS, read_distribution
 from app.interfaces.paths import value_at
 from app.interfaces.plain import text_of, to_plain
-from app.interfaces.store import DISTROS, Interfaces, interfaces_of
+from app.interfaces.store import Interfaces, interfaces_of
 
 __all__ = [
     "DISTROS",
@@ -21,6 +21,7 @@ __all__ = [
     "Structure",
     "Type",
     "interfaces_of",
+    "read_distribution",
     "text_of",
     "to_plain",
     "value_at",

@@ -6,8 +6,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final, Literal
 
-from rosbags.interfaces import Nodetype
-
 INTEGERS: Final[Mapping[str, tuple[int, int]]] = {
     **{f"int{bits}": (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) for bits in (8, 16, 32, 64)},
     **{f"uint{bits}": (0, 2**bits - 1) for bits in (8, 16, 32, 64)},
@@ -102,25 +100,3 @@ class Definitions:
 
     def described(self, name: str) -> Structure | None:
         return self.structures.get(name) or self.wholes.get(name)
-
-
-def from_store(name: str, definition: Any) -> Structure:
-    """A structure out of rosbags' nested tuples: ([(name, type, value)…], [(field, type)…])."""
-    constants, fields = definition
-    return Structure(
-        name,
-        tuple(Field(each, _type(described)) for each, described in fields if each != PLACEHOLDER),
-        {each: value for each, _, value in constants},
-        constant_types={each: kind for each, kind, _ in constants},
-    )
-
-
-def _type(described: Any) -> Type:
-    kind, detail = described
-    if kind == Nodetype.NAME:
-        return Type(detail)
-    if kind == Nodetype.BASE:
-        return Type(*detail)
-    inner, size = detail
-    many: Literal["array", "sequence"] = "array" if kind == Nodetype.ARRAY else "sequence"
-    return replace(_type(inner), many=many, size=size)

@@ -31,8 +31,9 @@ def read_folders(folders: Sequence[Path]) -> Definitions:
             hint = "".join(f"; {idl_hint(file)}" for file in list(idl_only([folder]).values())[:1])
             raise InterfaceError(f"{folder} {why}{hint}", folder)
         for package in packages:
+            name = _name(package)
             for file in _files(package):
-                _add(found, _read(file, _name(package)))
+                _add(found, _read(file, name))
     return found
 
 

@@ -24,7 +24,7 @@ def steps(path: str) -> tuple[str | int, ...]:
 
 
 def value_at(message: Any, path: str) -> Any:
-    """The value at a path of a decoded message: a number, a text, a message, a list or an array.
+    """The value at a path of a decoded message: a number, a text, a message or a list.
 
     FieldError where a list is shorter than the path's index; the path must be one of the type's
     (`Interfaces.field_type` says).
@@ -37,4 +37,4 @@ def value_at(message: Any, path: str) -> Any:
             at = at[step]
         else:
             raise FieldError(path, f"there is no [{step}]: the list has {len(at)} elements now")
-    return at.item() if hasattr(at, "dtype") and at.ndim == 0 else at
+    return at

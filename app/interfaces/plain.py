@@ -6,13 +6,11 @@ from dataclasses import fields, is_dataclass
 from functools import lru_cache
 from typing import Any, Final
 
-import numpy
-
 from app.interfaces.definitions import PLACEHOLDER
 
 # JavaScript's numbers are doubles: beyond this, neighbouring integers become one.
 MOST: Final = 2**53
-EIGHT_BYTES: Final = 8
+UNEVEN: Final = frozenset("fdqQ")  # lists whose elements may be what JSON or a browser can't hold
 
 
 def to_plain(message: Any) -> Any:
@@ -22,16 +20,14 @@ def to_plain(message: Any) -> Any:
     or a browser's numbers can't hold becomes text: integers beyond ±2^53 ("9007199254740993"),
     "NaN", "Infinity" and "-Infinity".
     """
-    if isinstance(message, numpy.generic):  # first: numpy's float64 is a float, too
-        return to_plain(message.item())
     if message is None or isinstance(message, bool | str):
         return message
     if isinstance(message, int):
         return message if -MOST <= message <= MOST else str(message)
     if isinstance(message, float):
         return message if math.isfinite(message) else _unusual(message)
-    if isinstance(message, numpy.ndarray):
-        return _array(message)
+    if isinstance(message, memoryview):
+        return _numbers(message)
     if isinstance(message, list | tuple | bytes | bytearray):
         return [to_plain(item) for item in message]
     return {name: to_plain(getattr(message, each)) for each, name in _names(message.__class__)}
@@ -49,7 +45,7 @@ def text_of(value: Any, most: int) -> str:
 
 
 def _nests(value: Any) -> bool:
-    return isinstance(value, numpy.ndarray | list | tuple | bytes | bytearray) or is_dataclass(value)
+    return isinstance(value, memoryview | list | tuple | bytes | bytearray) or is_dataclass(value)
 
 
 def _pieces(value: Any, most: int) -> Iterator[str]:
@@ -74,14 +70,10 @@ def _unusual(value: float) -> str:
     return "NaN" if math.isnan(value) else "Infinity" if value > 0 else "-Infinity"
 
 
-def _array(values: "numpy.ndarray[Any, Any]") -> list[Any]:
+def _numbers(values: "memoryview[Any]") -> list[Any]:
     """All at once where every element is plain as it is."""
-    listed: list[Any] = values.tolist()
-    if values.dtype.kind == "f" and not numpy.isfinite(values).all():
-        return [to_plain(item) for item in listed]
-    if values.dtype.kind in "iu" and values.dtype.itemsize == EIGHT_BYTES:
-        return [to_plain(item) for item in listed]
-    return listed
+    listed = values.tolist()
+    return [to_plain(item) for item in listed] if values.format in UNEVEN else listed
 
 
 @lru_cache(4096)

@@ -5,15 +5,13 @@ import reprlib
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
-import numpy
-
 from app.errors import FieldError
 from app.interfaces.definitions import INTEGERS, Type
 
 Check = Callable[[Any], Any]  # what came → what is sent; FieldError with "" or "[3]" as its field
 
 FLOAT_MAX: Final[Mapping[str, float]] = {
-    "float32": float(numpy.finfo(numpy.float32).max),
+    "float32": (2 - 2**-23) * 2.0**127,
     "float64": math.inf,
 }
 
@@ -38,15 +36,14 @@ def scalar_check(kind: Type) -> Check:
 
 
 def _plain(given: Any) -> Any:
-    """A NumPy scalar as Python's own."""
-    return given.item() if isinstance(given, numpy.generic) else given
+    """A scalar of an array library as Python's own."""
+    return given.item() if hasattr(given, "item") else given
 
 
 def _bool(given: Any) -> bool:
-    if given is True or given is False:
-        return bool(given)
-    if isinstance(given, numpy.bool_):
-        return bool(given)
+    value = _plain(given)
+    if value is True or value is False:
+        return bool(value)
     raise FieldError("", f"must be true or false, not {shown(given)}")
 
 

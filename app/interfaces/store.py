@@ -1,21 +1,18 @@
 """The ROS 2 interfaces that a panel may name, and their values to and from CDR bytes."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from difflib import get_close_matches
-from functools import cache, lru_cache
+from functools import lru_cache
 from pathlib import Path
-from typing import Any, Final
-
-from rosbags.typesys import Stores, get_typestore
+from typing import Any
 
 from app.errors import DecodeError, InterfaceError
-from app.interfaces.codec import Codec, widened
+from app.interfaces.codec import Codec
 from app.interfaces.composition import ActionTypes, action_types
-from app.interfaces.definitions import Definitions, Structure, Type, from_store
+from app.interfaces.definitions import Structure, Type
+from app.interfaces.distributions import read_distribution
 from app.interfaces.hashes import type_hash
 from app.interfaces.packages import (
-    available,
     complete,
     idl_hint,
     idl_only,
@@ -26,25 +23,6 @@ from app.interfaces.paths import steps
 from app.interfaces.scalars import Check
 from app.interfaces.text import definition_text
 from app.interfaces.values import field_check, message_check
-
-DISTROS: Final[Mapping[str, Stores]] = {
-    "humble": Stores.ROS2_HUMBLE,
-    "iron": Stores.ROS2_IRON,
-    "jazzy": Stores.ROS2_JAZZY,
-    "kilted": Stores.ROS2_KILTED,
-}
-
-# Definitions beside rosbags' messages: services, actions, and packages that it lacks.
-BUILTIN: Final = Path(__file__).parent / "builtin"
-
-# rosbags drops the defaults of its messages; these are all that they have in ROS.
-DEFAULTS: Final[Mapping[str, Mapping[str, Any]]] = {
-    "geometry_msgs/msg/Quaternion": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0},
-    "rcl_interfaces/msg/ParameterDescriptor": {"read_only": False, "dynamic_typing": False},
-    "sensor_msgs/msg/NavSatStatus": {"status": -2},
-    "type_description_interfaces/msg/FieldType": {"type_id": 0},
-}
-NO_DEFAULTS: Final = {"humble": "sensor_msgs/msg/NavSatStatus", "iron": "sensor_msgs/msg/NavSatStatus"}
 
 
 class Interfaces:
@@ -57,7 +35,7 @@ class Interfaces:
     def __init__(self, distro: str = "jazzy", folders: Sequence[Path] = ()) -> None:
         """`folders` are packages, or have packages in them (a workspace's `share`); what they
         define goes before the distribution's. InterfaceError names the file that can't be used."""
-        known = _distribution(distro)
+        known = read_distribution(distro)
         self._distro = distro
         self._unread = idl_only(folders)
         self._definitions = known | complete(read_folders(folders), known, self._unread)
@@ -122,7 +100,7 @@ class Interfaces:
         """The message as XCDR1 bytes with their encapsulation header (00 01 00 00).
 
         Every field without a default must be there, and each must fit its definition: else
-        FieldError, which names it. Numeric lists may be NumPy arrays, 8-bit unsigned ones `bytes`.
+        FieldError, which names it. Lists may be NumPy arrays, those of 8-bit unsigned numbers `bytes`.
         """
         check = self._checks.get(type_name) or self._check(type_name)
         return self._codec.serialize(check(fields), type_name)
@@ -139,12 +117,12 @@ class Interfaces:
             self.require(type_name)
             structure = self._structures[type_name]
             checks = [self._field_check(one.type) for one in structure.fields]
-            make = self._codec.prepare(type_name)
+            make = self._codec.message_class(type_name)
             self._checks[type_name] = message_check(structure, make, checks)
         return self._checks[type_name]
 
     def _field_check(self, kind: Type) -> Check:
-        return field_check(kind, self._check, widened)
+        return field_check(kind, self._check)
 
     def _named(self, at: Type, name: str, path: str) -> Type:
         inner = self._structures[at.name].fields if at.nested and at.many == "one" else ()
@@ -182,28 +160,8 @@ def _indexed(at: Type, index: int, path: str) -> Type:
     return at.element
 
 
-@cache
-def _builtin() -> Definitions:
-    return read_folders([BUILTIN])
-
-
-@cache
-def _distribution(distro: str) -> Definitions:
-    """What every robot of a distribution has."""
-    stock = Definitions()
-    for name, definition in get_typestore(DISTROS[distro]).fielddefs.items():
-        defaults = {} if NO_DEFAULTS.get(distro) == name else DEFAULTS.get(name, {})
-        structure = from_store(name, definition)
-        fields = (replace(one, default=defaults.get(one.name)) for one in structure.fields)
-        stock.structures[name] = replace(structure, fields=tuple(fields))
-    return available(_builtin(), stock) | stock
-
-
 def interfaces_of(distro: str, folders: Sequence[Path] = ()) -> Interfaces:
-    """The one instance for a distribution and folders, read anew only when a file has changed.
-
-    Reading all definitions of a distribution takes a tenth of a second.
-    """
+    """The one instance for a distribution and folders, read anew only when a file has changed."""
     return _made(distro, tuple(folders), stamp(folders))
 
 

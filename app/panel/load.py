@@ -4,7 +4,7 @@ import copy
 import hashlib
 import re
 import tomllib
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Final, get_args
@@ -12,7 +12,7 @@ from typing import Any, Final, get_args
 from pydantic import BaseModel, ValidationError
 
 from app.errors import Fault, InterfaceError, PanelError
-from app.interfaces import interfaces_of
+from app.interfaces import interfaces_of, read_distribution
 from app.panel.check import faults_in
 from app.panel.constants import resolved
 from app.panel.description import ID
@@ -28,8 +28,11 @@ NEEDED: Final[Mapping[str | int, str]] = {
 }
 
 
-def load_panel(path: Path) -> Panel:
-    """The checked panel; PanelError has every fault, `unreadable` where it is not even TOML."""
+def load_panel(path: Path, kept: Callable[[Panel], Path | None] = lambda _: None) -> Panel:
+    """The checked panel; PanelError has every fault, `unreadable` where it is not even TOML.
+
+    `kept` says in which folder what is read of the distribution may be kept for the next start.
+    """
     try:
         data = path.read_bytes()
         tables = tomllib.loads(data.decode())
@@ -44,6 +47,7 @@ def load_panel(path: Path) -> Panel:
         faults += map(_fault, error.errors())
         faults += _faults_of_the_rest(tables, error, path.parent)
     else:
+        read_distribution(panel.distro, kept(panel))
         faults += _faults_with_types(panel)
     if faults:
         raise PanelError(str(path), tuple(faults))

@@ -1,11 +1,13 @@
 """The pages, rendered on the server from the same view that feeds the events."""
 
+import asyncio
 import secrets
 import time
 from typing import Any, TypedDict, get_args
 
 from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse, RedirectResponse, Response
+from jinja2 import Environment
 
 from app import moments
 from app.browsers import Browser
@@ -35,6 +37,12 @@ REFUSALS = get_args(Refusal)
 WORDS = ("cancel", "robots", "control", "set", "back", "empty", "hold_cut", "hold_scripts")
 LINK_WORDS = ("links", "link_state", "link_since", "link_locks")
 CONTROL_ACTS = ("take", "ask", "give", "keep", "release", "withdraw")
+
+
+# What a page is made of, and how long after the start it is compiled: when the port is open, and while
+# the link settles, which is waiting. Otherwise the first page takes that time.
+TEMPLATES = ("base.html", "_widgets.html", "_control.html", "screen.html")
+COMPILED_AFTER_S = 0.1
 
 
 class PageContext(TypedDict):
@@ -83,6 +91,14 @@ async def named_page(page: str, request: Request, site: CurrentSite) -> Response
     if found is None:
         raise NotFound(f'there is no page "{page}"')
     return _render(request, site, found)
+
+
+async def compiled(templates: Environment) -> None:
+    """Makes the first page as quick as the next."""
+    await asyncio.sleep(COMPILED_AFTER_S)
+    for name in TEMPLATES:
+        templates.get_template(name)
+        await asyncio.sleep(0)
 
 
 class Ask(TypedDict):

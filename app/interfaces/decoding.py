@@ -1,0 +1,167 @@
+"""From CDR bytes to values. What is no such message raises ValueError or `struct.error`.
+
+A reader is made once per structure and byte order, as nested closures. Lists of numbers are views of
+what came, not copies: an image costs no more than its header.
+"""
+
+import sys
+from array import array
+from collections.abc import Callable, Sequence
+from struct import Struct, unpack_from
+from typing import Any, Final, Literal
+
+from app.interfaces.definitions import Field, Type
+from app.interfaces.formats import FORMATS, LENGTH, SIZES, is_number, runs
+
+Order = Literal["<", ">"]  # little-endian, big-endian; as `struct` names them
+Read = Callable[["memoryview[int]", int], tuple[Any, int]]  # bytes, where → value, where it ends
+Step = Callable[["memoryview[int]", int, list[Any]], int]  # the same; the values are added to a list
+
+NATIVE: Final[Order] = "<" if sys.byteorder == "little" else ">"
+LAST_UNIT: Final = 0xFFFF  # of UTF-16
+SHORTEST_TEXT: Final = LENGTH + 1
+
+
+def message_reader(
+    fields: Sequence[Field], make: Callable[..., Any], order: Order, nested: Callable[[str], Read]
+) -> Read:
+    """Reads a whole structure; `nested` finds the reader of another one."""
+    steps = [_step(run, order, nested) for run in runs(fields)]
+
+    def read(data: "memoryview[int]", at: int) -> tuple[Any, int]:
+        values: list[Any] = []
+        for step in steps:
+            at = step(data, at, values)
+        return make(*values), at
+
+    return read
+
+
+def _step(run: Sequence[Field], order: Order, nested: Callable[[str], Read]) -> Step:
+    kind = run[0].type
+    if is_number(kind) and kind.many == "one":
+        return _numbers([one.type for one in run], order)
+    read = _field(kind, order, nested)
+
+    def one(data: "memoryview[int]", at: int, values: list[Any]) -> int:
+        value, at = read(data, at)
+        values.append(value)
+        return at
+
+    return one
+
+
+def _numbers(kinds: Sequence[Type], order: Order) -> Step:
+    size = SIZES[kinds[0].name]
+    form = Struct(order + "".join(FORMATS[kind.name] for kind in kinds))
+
+    def numbers(data: "memoryview[int]", at: int, values: list[Any]) -> int:
+        at = _aligned(at, size)
+        values += form.unpack_from(data, at)
+        return at + form.size
+
+    return numbers
+
+
+def _field(kind: Type, order: Order, nested: Callable[[str], Read]) -> Read:
+    if is_number(kind):
+        return _many_numbers(kind, order)
+    text = _text if kind.name == "string" else _wide_text
+    one = nested(kind.name) if kind.nested else text(order)
+    return one if kind.many == "one" else _many(kind, one, order)
+
+
+def _many(kind: Type, read: Read, order: Order) -> Read:
+    count = _count(kind, order)
+    least = SHORTEST_TEXT if kind.name == "string" else 1
+
+    def many(data: "memoryview[int]", at: int) -> tuple[Any, int]:
+        length, at = count(data, at)
+        _require(data, at, length * least)
+        values = []
+        for _ in range(length):
+            value, at = read(data, at)
+            values.append(value)
+        return values, at
+
+    return many
+
+
+def _many_numbers(kind: Type, order: Order) -> Read:
+    count = _count(kind, order)
+    form, size = FORMATS[kind.name], SIZES[kind.name]
+
+    def many(data: "memoryview[int]", at: int) -> tuple[Any, int]:
+        length, at = count(data, at)
+        at = _aligned(at, size) if length else at
+        end = at + length * size
+        _require(data, at, length * size)
+        return _viewed(data[at:end], form, order), end
+
+    return many
+
+
+def _viewed(data: "memoryview[int]", form: str, order: Order) -> Any:
+    if form == "?":
+        return [byte != 0 for byte in data]
+    if order == NATIVE:
+        return data.cast(form)  # type: ignore[call-overload]
+    turned = array(form, data.tobytes())
+    turned.byteswap()
+    return memoryview(turned)
+
+
+def _count(kind: Type, order: Order) -> Read:
+    """How many elements come: as many as an array has, or as it says before a sequence."""
+    if kind.many == "array":
+        return lambda _, at: (kind.size, at)
+    return _length(order)
+
+
+def _length(order: Order) -> Read:
+    form = Struct(f"{order}I")
+
+    def length(data: "memoryview[int]", at: int) -> tuple[int, int]:
+        at = _aligned(at, LENGTH)
+        return form.unpack_from(data, at)[0], at + LENGTH
+
+    return length
+
+
+def _text(order: Order) -> Read:
+    """Of a "string": UTF-8 with a NUL at its end, which counts."""
+    length = _length(order)
+
+    def text(data: "memoryview[int]", at: int) -> tuple[str, int]:
+        size, at = length(data, at)
+        end = at + size
+        if not size or end > len(data) or data[end - 1]:
+            raise ValueError(f"a text of {size} bytes at {at} is cut off or has no end")
+        return str(data[at : end - 1], "utf-8"), end
+
+    return text
+
+
+def _wide_text(order: Order) -> Read:
+    """Of a "wstring": a count of UTF-16 units, each in four bytes, no terminator and no byte order
+    mark (so do rmw_fastrtps and rmw_cyclonedds; source: rosidl_typesupport_fastrtps, and tried)."""
+    length = _length(order)
+
+    def text(data: "memoryview[int]", at: int) -> tuple[str, int]:
+        count, at = length(data, at)
+        _require(data, at, count * LENGTH)
+        units = unpack_from(f"{order}{count}I", data, at)
+        if any(unit > LAST_UNIT for unit in units):
+            raise ValueError("a wstring has a unit beyond UTF-16's")
+        return array("H", units).tobytes().decode(f"utf-16-{sys.byteorder[0]}e"), at + count * LENGTH
+
+    return text
+
+
+def _aligned(at: int, size: int) -> int:
+    return (at + size - 1) & -size
+
+
+def _require(data: "memoryview[int]", at: int, size: int) -> None:
+    if size > len(data) - at:
+        raise ValueError(f"{size} bytes at {at} are more than there are")

@@ -1,0 +1,61 @@
+"""What every robot of a distribution has: rosbags' messages, and definitions shipped here."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any, Final
+
+from app.interfaces import kept
+from app.interfaces.definitions import Definitions, Structure
+from app.interfaces.packages import available, read_folders
+
+DISTROS: Final = ("humble", "iron", "jazzy", "kilted")
+
+# Definitions beside rosbags' messages: services, actions, and packages that it lacks.
+BUILTIN: Final = Path(__file__).parent / "builtin"
+
+# rosbags drops the defaults of its messages; these are all that they have in ROS.
+DEFAULTS: Final[Mapping[str, Mapping[str, Any]]] = {
+    "geometry_msgs/msg/Quaternion": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0},
+    "rcl_interfaces/msg/ParameterDescriptor": {"read_only": False, "dynamic_typing": False},
+    "sensor_msgs/msg/NavSatStatus": {"status": -2},
+    "type_description_interfaces/msg/FieldType": {"type_id": 0},
+}
+NO_DEFAULTS: Final = {"humble": "sensor_msgs/msg/NavSatStatus", "iron": "sensor_msgs/msg/NavSatStatus"}
+
+_read: dict[str, Definitions] = {}
+
+
+@cache
+def _builtin() -> Definitions:
+    return read_folders([BUILTIN])
+
+
+def read_distribution(distro: str, folder: Path | None = None) -> Definitions:
+    """What every robot of a distribution has: read once, and kept for the next start in `folder`."""
+    if distro not in _read:
+        messages = _with_defaults(distro, _messages(distro, folder))
+        stock = Definitions(messages)
+        _read[distro] = available(_builtin(), stock) | stock
+    return _read[distro]
+
+
+def _messages(distro: str, folder: Path | None) -> dict[str, Structure]:
+    messages = kept.read(folder, distro) if folder else None
+    if messages is None:
+        from app.interfaces.stock import messages_of  # see there
+
+        messages = messages_of(distro)
+        if folder:
+            kept.write(folder, distro, messages)
+    return messages
+
+
+def _with_defaults(distro: str, messages: Mapping[str, Structure]) -> dict[str, Structure]:
+    found = dict(messages)
+    for name, defaults in DEFAULTS.items():
+        if name in found and NO_DEFAULTS.get(distro) != name:
+            fields = (replace(one, default=defaults.get(one.name)) for one in found[name].fields)
+            found[name] = replace(found[name], fields=tuple(fields))
+    return found

@@ -1,0 +1,47 @@
+"""How numbers lie in CDR: the form of each base type, and the fields that can be taken at once.
+
+Each number begins at a multiple of its own size, counted from behind the four bytes of the
+encapsulation header; XCDR1, as ROS 2 sends it (OMG DDS-XTypes 1.3, 7.4.1).
+"""
+
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import groupby
+from struct import calcsize
+from typing import Any, Final
+
+from app.interfaces.definitions import Field, Type
+
+# As `struct`, `array` and `memoryview` name them; one byte that is no number is one from 0 to 255.
+FORMATS: Final[Mapping[str, str]] = {
+    "bool": "?",
+    "int8": "b",
+    "int16": "h",
+    "int32": "i",
+    "int64": "q",
+    "uint8": "B",
+    "uint16": "H",
+    "uint32": "I",
+    "uint64": "Q",
+    "float32": "f",
+    "float64": "d",
+    **dict.fromkeys(("byte", "char", "octet"), "B"),
+}
+SIZES: Final[Mapping[str, int]] = {name: calcsize(f"<{form}") for name, form in FORMATS.items()}
+HEADER: Final = 4  # bytes
+LENGTH: Final = 4  # bytes of the count before a text or a sequence
+
+
+def runs(fields: Iterable[Field]) -> Iterator[list[Field]]:
+    """The fields in their order; neighbours that are single numbers of one size are together."""
+
+    def size(one: Field) -> Any:
+        return SIZES.get(one.type.name) if one.type.many == "one" else None
+
+    for each, group in groupby(fields, size):
+        together = list(group)
+        yield from [together] if each else ([one] for one in together)
+
+
+def is_number(kind: Type) -> bool:
+    """A number or a bool, or a list of them."""
+    return kind.name in FORMATS

@@ -1,0 +1,38 @@
+"""The messages of a distribution, as rosbags has them: to import this takes as long as a tenth of the
+server's start, so it is done only where what was read before is not kept (`kept`)."""
+
+from dataclasses import replace
+from typing import Any, Literal
+
+from rosbags.interfaces import Nodetype
+from rosbags.typesys import Stores, get_typestore
+
+from app.interfaces.definitions import PLACEHOLDER, Field, Structure, Type
+
+
+def messages_of(distro: str) -> dict[str, Structure]:
+    """By name, without defaults: rosbags drops them."""
+    definitions = get_typestore(Stores(f"ros2_{distro}")).fielddefs
+    return {name: _structure(name, definition) for name, definition in definitions.items()}
+
+
+def _structure(name: str, definition: Any) -> Structure:
+    """Out of rosbags' nested tuples: ([(name, type, value)…], [(field, type)…])."""
+    constants, fields = definition
+    return Structure(
+        name,
+        tuple(Field(each, _type(described)) for each, described in fields if each != PLACEHOLDER),
+        {each: value for each, _, value in constants},
+        constant_types={each: kind for each, kind, _ in constants},
+    )
+
+
+def _type(described: Any) -> Type:
+    kind, detail = described
+    if kind == Nodetype.NAME:
+        return Type(detail)
+    if kind == Nodetype.BASE:
+        return Type(*detail)
+    inner, size = detail
+    many: Literal["array", "sequence"] = "array" if kind == Nodetype.ARRAY else "sequence"
+    return replace(_type(inner), many=many, size=size)
