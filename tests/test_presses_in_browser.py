@@ -1,12 +1,15 @@
 """How a press leaves the page: with its click, whoever made that, and before the page shows it."""
 
+import csv
+import io
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from datetime import datetime
+from pathlib import Path
 from typing import Any, Final
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Browser, Page, Route, expect
 
 from tests.parts import ROOT, Server, until
 
@@ -32,6 +35,8 @@ PROGRAMS: Final = {
     "dispatched click": f"(button) => button.dispatchEvent({CLICK})",
     "submit": "(button) => button.form.requestSubmit(button)",
 }
+DOUBLE_TAP_MS: Final = 150
+TAP_AGAIN_MS: Final = 700
 MADE_BY: Final = ("mouse", "finger", "Enter", "Space", *PROGRAMS)
 
 
@@ -142,9 +147,159 @@ def test_where_the_script_did_not_come_a_press_is_a_form(demo: Server, page: Pag
     page.route("**/press.js", lambda route: route.abort())
     page.goto(demo.url)
     expect(publish(page)).to_be_enabled()
+    page.wait_for_timeout(TAP_AGAIN_MS)  # a form that comes sooner is a second tap
     page.get_by_label("Message").fill("by form")
     with page.expect_navigation():
         publish(page).click()
     expect(receipt(page)).to_contain_text("Sent on /operation at")
     expect(page.get_by_label("Message")).to_have_value("by form")
     until(lambda: "by form" in demo.widget("last_heard")["text"], "the robot has it")
+
+
+HEAD: Final = """
+title = "Cell"
+mode = "demo"
+[[page]]
+id = "main"
+title = "Main"
+"""
+WIDE: Final = """
+[[page.widget]]
+id = "go{n}"
+kind = "publish"
+label = "Start {n}"
+topic = "/operation{topic}"
+type = "std_msgs/msg/String"
+message = {{ data = "x" }}
+confirm_press = {asks}
+span = 12
+"""
+
+
+def many_buttons(folder: Path, asks: bool) -> Server:
+    """So many that there is one wherever a dialog or another page has its own."""
+    file = folder / "panel.toml"
+    kind = str(asks).lower()
+    topics = ("", "1", "2", "", "", "", "", "")
+    file.write_text(
+        HEAD + "".join(WIDE.format(n=n, topic=topic, asks=kind) for n, topic in enumerate(topics, 1))
+    )
+    return Server(ROOT, KIOSK_PANEL=str(file))
+
+
+def pressed(server: Server) -> int:
+    """How many presses are in the operator's log."""
+    text = server.http.get("/log.csv?every=true").text.removeprefix("\ufeff")
+    return sum(entry["kind"] == "pressed" for entry in csv.DictReader(io.StringIO(text)))
+
+
+def start(page: Page, number: int) -> Any:
+    return page.get_by_role("button", name=f"Start {number}", exact=True)
+
+
+def double_tap(page: Page, x: float, y: float) -> None:
+    page.mouse.click(x, y)
+    page.wait_for_timeout(DOUBLE_TAP_MS)
+    page.mouse.click(x, y)
+    page.wait_for_timeout(TAP_AGAIN_MS)
+
+
+@pytest.fixture
+def without_scripts(chromium: Browser) -> Iterator[Page]:
+    context = chromium.new_context(java_script_enabled=False)
+    yield context.new_page()
+    context.close()
+
+
+def test_a_key_that_is_held_down_is_one_press(
+    tmp_path: Path, servers: Callable[[Server], Server], page: Page
+) -> None:
+    mine = servers(many_buttons(tmp_path, asks=False))
+    until(mine.ready, "ready")
+    page.goto(mine.url)
+    start(page, 1).focus()
+    for _ in range(60):  # two seconds of a keyboard's repeats
+        page.keyboard.down("Enter")
+        page.wait_for_timeout(33)
+    page.keyboard.up("Enter")
+    expect(start(page, 1)).not_to_have_attribute("aria-busy", "true")
+    assert pressed(mine) == 1
+    start(page, 1).press("Enter")
+    until(lambda: pressed(mine) == 2, "a second press of the key is a second one")
+
+
+def test_the_second_tap_of_a_press_that_asks_is_no_answer(
+    tmp_path: Path, servers: Callable[[Server], Server], page: Page
+) -> None:
+    mine = servers(many_buttons(tmp_path, asks=True))
+    until(mine.ready, "ready")
+    page.goto(mine.url)
+    start(page, 3).click()
+    dialog = page.get_by_role("dialog")
+    yes = dialog.locator(".yes").bounding_box()
+    assert yes is not None
+    dialog.locator(".no").click()
+    x, y = yes["x"] + yes["width"] / 2, yes["y"] + yes["height"] / 2
+    below = start(page, 5).bounding_box()
+    assert below is not None
+    page.mouse.wheel(0, below["y"] + below["height"] / 2 - y)
+    until(lambda: abs(middle(page, 5) - y) < 20, "a button is where the dialog has its answer")
+    double_tap(page, x, y)
+    expect(dialog).to_be_visible()
+    assert pressed(mine) == 0
+    page.mouse.click(x, y)
+    until(lambda: pressed(mine) == 1, "a tap that comes later is an answer")
+
+
+def middle(page: Page, number: int) -> float:
+    box = start(page, number).bounding_box()
+    assert box is not None
+    return float(box["y"] + box["height"] / 2)
+
+
+def test_without_scripts_too(
+    tmp_path: Path, servers: Callable[[Server], Server], without_scripts: Page
+) -> None:
+    page, mine = without_scripts, servers(many_buttons(tmp_path, asks=True))
+    until(mine.ready, "ready")
+    page.goto(mine.url)
+    page.wait_for_timeout(TAP_AGAIN_MS)
+    start(page, 1).click()
+    yes = page.locator(".yes").bounding_box()
+    assert yes is not None
+    x, y = yes["x"] + 5, yes["y"] + 5
+    double_tap(page, x, y)  # the first one comes before anybody can have read the question
+    expect(page.locator(".yes")).to_be_visible()
+    assert pressed(mine) == 0
+    page.mouse.click(x, y)
+    until(lambda: pressed(mine) == 1, "a tap that comes later is an answer")
+
+
+def test_without_scripts_a_double_tap_is_one_press_and_its_receipt_stays(
+    tmp_path: Path, servers: Callable[[Server], Server], without_scripts: Page
+) -> None:
+    page, mine = without_scripts, servers(many_buttons(tmp_path, asks=False))
+    until(mine.ready, "ready")
+    page.goto(mine.url)
+    page.wait_for_timeout(TAP_AGAIN_MS)
+    box = start(page, 1).bounding_box()
+    assert box is not None
+    double_tap(page, box["x"] + 20, box["y"] + 20)
+    expect(page.locator("#receipt-go1")).to_contain_text("Sent on /operation at")
+    assert pressed(mine) == 1
+    page.mouse.click(box["x"] + 20, box["y"] + 20)
+    until(lambda: pressed(mine) == 2, "a later one is another press")
+
+
+def test_what_a_gateway_says_is_no_refusal(shown: Page) -> None:
+    """The server may have sent it all the same."""
+
+    def times_out(route: Route) -> None:
+        route.fetch()
+        route.fulfill(status=504, json={"message": "The upstream server is timing out"})
+
+    shown.route("**/line.js", lambda route: route.abort())
+    shown.route("**/widgets/*", times_out)
+    publish(shown).click()
+    expect(receipt(shown)).to_have_attribute("data-outcome", "unknown")
+    expect(receipt(shown)).to_contain_text("not known")

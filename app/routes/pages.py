@@ -69,6 +69,7 @@ class PageContext(TypedDict):
     unsure: str
     refresh_s: int
     now: int
+    since: float
     until: float
     browser: str
     over: bool
@@ -158,6 +159,7 @@ def _context(
         unsure=say("server_unsure"),
         refresh_s=refresh_s,
         now=round(now * 1000),
+        since=round(now, 3),
         until=round(now + refresh_s + RELOADED_S, 3),
         browser=browser.id,
         over=rules.local and browser.local,

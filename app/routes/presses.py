@@ -28,6 +28,7 @@ from app.sentences import say
 router = APIRouter()
 
 CONFIRMED: Final = "_confirmed"  # a form's field: the server has asked, and this is the yes
+TAP_AGAIN_S: Final = 0.7  # as the page's scripts have it
 ASKED_S: Final = 30.0  # the answer is a press, and no later one
 PRESS_ID: Final = r"^[A-Za-z0-9_.:-]{1,64}$"
 STATUS: Final[Mapping[str, int]] = {
@@ -96,8 +97,12 @@ async def press(widget: str, request: Request, site: CurrentSite, kiosk: Current
         return JSONResponse(receipt.as_json(), status_code=STATUS[receipt.cause])
     if kind == "application/x-www-form-urlencoded":
         inputs = _form(body)
-        if kiosk.presses.widget(widget).confirm_press and inputs.pop(CONFIRMED, "") != "yes":
-            return _ask(site, kiosk, widget, inputs)
+        again, last = _is_second_tap(inputs), inputs.pop("_last", "")
+        if kiosk.presses.widget(widget).confirm_press:
+            if inputs.pop(CONFIRMED, "") != "yes" or again:
+                return _ask(site, kiosk, widget, inputs)
+        elif again:
+            return RedirectResponse(_page_after(kiosk, widget, last), status_code=303)
         # One rendered page has one id for all its buttons, and each button is a press of its own.
         page_id = inputs.pop("_id", secrets.token_hex(8))
         if not re.fullmatch(PRESS_ID, page_id):
@@ -106,7 +111,7 @@ async def press(widget: str, request: Request, site: CurrentSite, kiosk: Current
         by = kiosk.doubts.by(widget, browser, inputs.pop("_seen", ""), _until(inputs))
         receipt = await kiosk.presses.press(widget, kiosk.sending.typed(inputs), press_id, by)
         _count(site, receipt)
-        return RedirectResponse(_page_with(kiosk, receipt), status_code=303)
+        return RedirectResponse(_page_after(kiosk, widget, receipt.id), status_code=303)
     raise InputError(
         f'a press is "application/json" or "application/x-www-form-urlencoded", not "{kind}"'
     )
@@ -137,7 +142,7 @@ async def cancel(widget: str, request: Request, site: CurrentSite, kiosk: Curren
     receipt = await kiosk.presses.cancel(widget, origin_of(browser), of)
     _count(site, receipt)
     if form:
-        return RedirectResponse(_page_with(kiosk, receipt), status_code=303)
+        return RedirectResponse(_page_after(kiosk, widget, receipt.id), status_code=303)
     return JSONResponse(receipt.as_json(), status_code=STATUS[receipt.cause])
 
 
@@ -170,6 +175,7 @@ def _ask(site: Site, kiosk: Kiosk, widget: str, inputs: dict[str, str]) -> Respo
             CONFIRMED: "yes",
             "_seen": kiosk.board.id,
             "_until": str(round(moments.now() + ASKED_S, 3)),
+            "_since": str(round(moments.now(), 3)),
         },
         no=say("back"),
         empty=say("empty"),
@@ -187,16 +193,28 @@ def _until(inputs: dict[str, str]) -> float | None:
 
     It can't say when it was pressed, but a page that does not reload itself is none to press on.
     """
-    given = inputs.pop("_until", None)
+    until = _moment(inputs, "_until")
+    return until if until is None else min(until, moments.now())
+
+
+def _is_second_tap(inputs: dict[str, str]) -> bool:
+    """Whether a page without scripts is pressed sooner than anybody reads it: by the second tap of what
+    brought it. Scripts tell by themselves."""
+    since = _moment(inputs, "_since")
+    return since is not None and moments.now() - since < TAP_AGAIN_S
+
+
+def _moment(inputs: dict[str, str], name: str) -> float | None:
+    given = inputs.pop(name, None)
     if given is None:
         return None
     try:
-        until = float(given)
+        moment = float(given)
     except ValueError:
-        until = math.nan
-    if not math.isfinite(until):
-        raise InputError(f'_until: "{given:.40}" is not that of a page')
-    return min(until, moments.now())
+        moment = math.nan
+    if not math.isfinite(moment):
+        raise InputError(f'{name}: "{given:.40}" is not that of a page')
+    return moment
 
 
 def _count(site: Site, receipt: Receipt) -> None:
@@ -219,7 +237,7 @@ def _form(body: bytes) -> dict[str, str]:
     return inputs
 
 
-def _page_with(kiosk: Kiosk, receipt: Receipt) -> str:
-    """Where the receipt is shown: on the page of its widget."""
-    page = _page_of(kiosk, receipt.widget)
-    return f"{kiosk.base}/pages/{page.id}?receipt={quote(receipt.id)}"
+def _page_after(kiosk: Kiosk, widget: str, receipt_id: str) -> str:
+    """The page of a widget, with a receipt if there is one."""
+    page = f"{kiosk.base}/pages/{_page_of(kiosk, widget).id}"
+    return f"{page}?receipt={quote(receipt_id)}" if receipt_id else page

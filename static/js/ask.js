@@ -1,15 +1,25 @@
+const TAP_AGAIN_MS = 700;
+
 // A press that asks first: what will be done, with which values. Its "yes" is the press.
 export function asked(root, form, yes) {
   const dialog = root.querySelector("dialog.ask");
   for (const place of dialog.querySelectorAll("[data-value-of]")) {
     place.textContent = shown(form.elements[place.dataset.valueOf]) || dialog.dataset.empty;
   }
+  const button = dialog.querySelector(".yes");
   const answer = (event) => {
     if (event.target.closest(".yes")) yes(event);
     if (event.target.closest("button")) dialog.close();
   };
+  // The second tap of the press that asks is no answer.
+  button.disabled = true;
+  const opening = setTimeout(() => (button.disabled = false), TAP_AGAIN_MS);
   dialog.addEventListener("click", answer);
-  dialog.addEventListener("close", () => dialog.removeEventListener("click", answer), { once: true });
+  const over = () => {
+    clearTimeout(opening);
+    dialog.removeEventListener("click", answer);
+  };
+  dialog.addEventListener("close", over, { once: true });
   dialog.showModal();
 }
 

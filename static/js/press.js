@@ -96,6 +96,9 @@ export class Presser {
       this.#open();
     };
     addEventListener("pointerdown", down, true);
+    // A key that is held down is one press.
+    const repeated = (event) => event.repeat && event.target.closest?.("button") && event.preventDefault();
+    addEventListener("keydown", repeated, true);
     for (const root of widgets.values()) {
       for (const button of root.querySelectorAll("[type=submit]")) this.#buttons.set(button, root);
     }
@@ -180,7 +183,7 @@ export class Presser {
     try {
       const { status, error, ...receipt } = await (line?.ask({ widget, ...press }, answerMs) ?? post(url, press, answerMs));
       if (receipt.outcome) return receipt;
-      if (status !== 500) return { outcome: "refused", reason: error };
+      if (status < 500 && error) return { outcome: "refused", reason: error };
     } catch {
       if (line) this.#broke(line);
     }
