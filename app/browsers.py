@@ -56,10 +56,11 @@ class Browsers:
     def seen(self, token: str, address: str) -> Browser:
         """The browser with this token, now at this address."""
         address, local = where(address)
-        old = self._known.get(token)
-        kept = old is not None and old.local == local
-        number = old.number if old is not None and kept else self._free_number(local)
-        browser = self._known[token] = Browser(public_id(token), address, local, number)
+        browser = self._known.get(token)
+        if browser is None or (browser.address, browser.local) != (address, local):
+            kept = browser is not None and browser.local == local
+            number = browser.number if browser is not None and kept else self._free_number(local)
+            browser = self._known[token] = Browser(public_id(token), address, local, number)
         self._known.move_to_end(token)
         while len(self._known) > BROWSERS_KEPT:
             self._known.popitem(last=False)

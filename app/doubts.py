@@ -19,6 +19,7 @@ from app.sentences import say
 
 AHEAD_S: Final = 1.0  # a press can't be from later than now, but for rounding and drift
 SEEN: Final = r"^[0-9a-f]{1,32}-[0-9]{1,18}$"  # <boot>-<version>, an event's id
+_is_seen: Final = re.compile(SEEN).fullmatch
 
 
 class Doubts:
@@ -61,7 +62,7 @@ class Doubts:
 
     def _check(self, seen: str) -> None:
         boot, _, version = seen.partition("-")
-        if not re.fullmatch(SEEN, seen):
+        if not _is_seen(seen):
             raise InputError(f'seen: "{seen:.60}" is not the id of an event')
         if boot == self._board.boot and int(version) > self._board.version:
             newest = self._board.id

@@ -20,7 +20,6 @@ from app.log import Origin
 from app.logbook import Logbook, Noted
 from app.logs import RobotLog
 from app.panel.model import Action, Panel, Pressed
-from app.panel.template import needed
 from app.progress import Answer
 from app.receipts import (
     FINE,
@@ -50,8 +49,12 @@ class _UnderWay:
     """A press whose receipt is not there yet."""
 
     widget: str
-    fingerprint: str
+    inputs: Mapping[str, Any]
     receipt: "asyncio.Future[Receipt]"
+
+    @property
+    def fingerprint(self) -> str:
+        return fingerprint(self.inputs)
 
 
 class Presses:
@@ -167,7 +170,7 @@ class Presses:
     ) -> Receipt:
         """Does the work of a press, while others of the same id wait for its receipt."""
         loop = asyncio.get_running_loop()
-        under_way = _UnderWay(widget.id, fingerprint(inputs), loop.create_future())
+        under_way = _UnderWay(widget.id, inputs, loop.create_future())
         self._under_way[press_id] = under_way
         try:
             receipt = await work
@@ -188,7 +191,7 @@ class Presses:
         press_id: str,
         by: By,
     ) -> Receipt:
-        own = needed(widget, inputs)
+        own = self._sending.needed(widget, inputs)
         self._receipts.begin(press_id, widget.id, by.origin, own)
         try:
             noted = await self._logbook.pressed(widget.id, own, press_id, by.origin)
@@ -220,7 +223,7 @@ class Presses:
     async def _reused(
         self, widget: Pressed, inputs: Mapping[str, Any], own_id: str, text: str, origin: Origin
     ) -> Receipt:
-        own = needed(widget, inputs)
+        own = self._sending.needed(widget, inputs)
         self._receipts.begin(own_id, widget.id, origin, own)
         self._log.warning("press %s of %s by %s: %s", own_id, widget.id, named(origin), text)
         why = await self._logbook.refused(widget.id, own, own_id, origin, text)

@@ -51,6 +51,7 @@ class Sending:
         """`reached` tells, later, whether what was sent until now has reached the bridge."""
         self._reached = reached
         self._widgets = {w.id: w for w in panel.widgets()}
+        self._needs = {id: inputs_of(w) for id, w in self._widgets.items() if isinstance(w, Pressed)}
         self._interfaces = interfaces
         self._robot = robot
         self._way = way
@@ -77,6 +78,10 @@ class Sending:
             return declared.typed(field, text)
         return typed(field, text) if isinstance(field, Input) else text
 
+    def needed(self, widget: Pressed, inputs: Mapping[str, Any]) -> dict[str, Any]:
+        """Of all that came with a press, the inputs that it needs."""
+        return {name: inputs[name] for name in self._needs[widget.id] if name in inputs}
+
     async def send(
         self,
         widget: Pressed,
@@ -89,7 +94,7 @@ class Sending:
         Until it is sent nothing here waits. FieldError or InputError for bad input, LinkError where
         it could not be sent.
         """
-        values = self.checked(inputs_of(widget), inputs)
+        values = self.checked(self._needs[widget.id], inputs)
         fields = filled(widget.template, values)
         match widget:
             case Publish():
@@ -112,7 +117,7 @@ class Sending:
 
     def refusal(self, widget: Pressed, inputs: Mapping[str, Any]) -> str:
         """Why `send` would refuse it now, "" if it would not; FieldError or InputError as there."""
-        fields = filled(widget.template, self.checked(inputs_of(widget), inputs))
+        fields = filled(widget.template, self.checked(self._needs[widget.id], inputs))
         match widget:
             case Publish():
                 self._interfaces.encode(widget.type, fields)

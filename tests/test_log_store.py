@@ -1,10 +1,12 @@
 """The operator's log as a file: what is appended stays, in a chain that shows every change."""
 
+import hashlib
+import json
 import sqlite3
 import stat
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -54,6 +56,14 @@ def test_an_entry_is_read_as_it_was_written(store: Store, tmp_path: Path) -> Non
     )  # fmt: skip
     assert abs(found.at - time.time() * 1000) < 5000
     assert found.hash == found.computed_hash()
+
+
+def test_a_hash_can_be_computed_by_whoever_reads_the_file(store: Store, tmp_path: Path) -> None:
+    (written,) = store.append([entered("refused", FROM, {"text": 'ä"\n'}, reason='Nein: "ö"\\')])
+    with closing(sqlite3.connect(tmp_path / NAME)) as db:
+        *row, digest = db.execute("SELECT * FROM entry").fetchone()
+    text = json.dumps(row, ensure_ascii=False, separators=(",", ":"))
+    assert digest == written.hash == hashlib.sha256(text.encode()).hexdigest()
 
 
 def test_an_outcome_tells_which_press_it_is_of(store: Store, tmp_path: Path) -> None:
@@ -137,12 +147,9 @@ def inserts_well_made(db: sqlite3.Connection) -> None:
     for seq in range(20, 4, -1):
         db.execute("UPDATE entry SET seq = ? WHERE seq = ?", (seq + 1, seq))
     forged = pressed(99).sealed(5, "boot1", last)
-    names = [name for name in Entry.__slots__]
-    marks = ", ".join("?" * len(names))
-    columns = ", ".join(f'"{name}"' for name in names)
-    db.execute(
-        f"INSERT INTO entry ({columns}) VALUES ({marks})", [getattr(forged, name) for name in names]
-    )
+    marks = ", ".join("?" * len(forged))
+    columns = ", ".join(f'"{name}"' for name in Entry._fields)
+    db.execute(f"INSERT INTO entry ({columns}) VALUES ({marks})", forged)
 
 
 def changes_the_genesis(db: sqlite3.Connection) -> None:
@@ -266,7 +273,7 @@ def test_only_what_is_old_goes(store: Store, tmp_path: Path) -> None:
 
 
 def test_what_was_written_before_the_clock_was_set_is_not_old_by_that(store: Store) -> None:
-    at_1970 = [replace(entered("refused", FROM), at=number) for number in range(1, 4)]
+    at_1970 = [entered("refused", FROM)._replace(at=number) for number in range(1, 4)]
     store.append(at_1970)
     fill(store, 1)
     now = time.time_ns() // 1_000_000

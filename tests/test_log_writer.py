@@ -13,6 +13,7 @@ from app.log import Entry, Filter, Limits, OperatorLog, Origin, entered, folder,
 from app.log.chain import verify
 from app.log.reading import rows
 from app.log.store import Store
+from app.log.ticket import Results
 from tests.parts import until
 
 FREE = Limits(required=False)
@@ -187,6 +188,27 @@ def test_a_press_that_nobody_waits_for_any_more_is_closed(tmp_path: Path, disk: 
         await asyncio.gather(task, return_exceptions=True)
         disk.open.set()
         await until_commits(disk, before + 2)
+
+    run(tmp_path, work)
+    assert kinds(tmp_path)[1:] == [("pressed", "p1", ""), ("closed", "p1", "refused")]
+
+
+def test_a_press_that_is_called_away_as_it_was_written_is_closed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    presses: list[asyncio.Task[Entry | None]] = []
+    told = OperatorLog._told
+
+    def told_too_late(log: OperatorLog, results: Results, changed: bool) -> None:
+        told(log, results, changed)
+        for press in presses:
+            press.cancel()
+
+    async def work(log: OperatorLog) -> None:
+        monkeypatch.setattr(OperatorLog, "_told", told_too_late)
+        presses.append(asyncio.create_task(log.pressed(pressed(1))))
+        (cancelled,) = await asyncio.gather(*presses, return_exceptions=True)
+        assert isinstance(cancelled, asyncio.CancelledError)
 
     run(tmp_path, work)
     assert kinds(tmp_path)[1:] == [("pressed", "p1", ""), ("closed", "p1", "refused")]

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from app.errors import LogError
-from app.log.entry import FIELDS, Entry
+from app.log.entry import Entry
 from app.log.file import in_words, read_only
 from app.log.store import COLUMNS
 
@@ -41,7 +41,7 @@ def verify(folder: Path, noted: str = "") -> Verified:
 def _entries(db: sqlite3.Connection) -> Iterator[Entry]:
     for row in db.execute(f"SELECT {COLUMNS} FROM entry ORDER BY seq"):
         try:
-            yield Entry(**dict(zip(FIELDS, row, strict=True)))
+            yield Entry(*row)
         except (TypeError, ValueError) as error:
             raise LogError(f"the file has what is no entry: {error}") from error
 

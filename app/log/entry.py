@@ -8,10 +8,9 @@ is the hash of the entry before; the first entry's is the log's genesis, 32 rand
 import hashlib
 import json
 import time
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
-from operator import attrgetter
-from typing import Any, Final, Literal, Self
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any, Final, Literal, NamedTuple, Self
 
 Kind = Literal["began", "pressed", "closed", "corrected", "refused", "removed", "resumed"]
 
@@ -30,8 +29,7 @@ class Origin:
     seen: str = ""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Entry:
+class Entry(NamedTuple):
     """`at` is milliseconds since 1970 (UTC); `monotonic` microseconds on a clock that nobody sets,
     which counts within one `boot` of the server; `of` the number of the press that it tells of.
 
@@ -39,9 +37,9 @@ class Entry:
     view at that moment. `seq`, `boot`, `prev` and `hash` are there once it is written.
     """
 
-    seq: int = 0
+    seq: int
     at: int
-    boot: str = ""
+    boot: str
     monotonic: int
     kind: Kind
     of: int | None = None
@@ -61,26 +59,19 @@ class Entry:
     prev: str = ""
     hash: str = ""
 
-    def sealed(self, seq: int, boot: str, prev: str) -> Self:
+    def sealed(self, seq: int, boot: str, prev: str) -> "Entry":
         """As it stands in the log, after the entry whose hash is `prev`."""
-        values = dict(zip(FIELDS, self.values_in_order(), strict=True))
-        values |= {"seq": seq, "boot": boot, "prev": prev}
-        del values["hash"]
-        return type(self)(**values, hash=_hash(list(values.values())))
+        row = (seq, self.at, boot, *self[MONOTONIC:PREV], prev)
+        return Entry._make((*row, _hash(row)))
 
     def computed_hash(self) -> str:
         """What its hash must be."""
-        return _hash(self.values_in_order()[:-1])
-
-    def values_in_order(self) -> tuple[Any, ...]:
-        """The values of all fields, in their order."""
-        return _in_order(self)
+        return _hash(self[:-1])
 
     def followed(self, kind: Kind, outcome: str, reason: str, **more: str) -> Self:
         """The entry that tells, now, what came of this press."""
         at, monotonic = _now()
-        return replace(
-            self,
+        return self._replace(
             seq=0,
             at=at,
             monotonic=monotonic,
@@ -92,10 +83,12 @@ class Entry:
         )
 
 
-FIELDS: Final = tuple(field.name for field in fields(Entry))
+FIELDS: Final = Entry._fields
+MONOTONIC: Final = FIELDS.index("monotonic")
+PREV: Final = FIELDS.index("prev")
 ORIGIN: Final = tuple(field.name for field in fields(Origin))
-_in_order: Final = attrgetter(*FIELDS)
 _as_text: Final = json.JSONEncoder(ensure_ascii=False, separators=(",", ":")).encode
+_as_json: Final = json.JSONEncoder(ensure_ascii=False, allow_nan=False).encode
 
 
 def entered(
@@ -106,11 +99,13 @@ def entered(
     if origin is not None:
         texts |= {name: getattr(origin, name) for name in ORIGIN}
     cleaned: dict[str, Any] = {name: plain(text) for name, text in texts.items()}
-    return Entry(at=at, monotonic=monotonic, kind=kind, values=as_json(values or {}), **cleaned)
+    return Entry(0, at, "", monotonic, kind, values=as_json(values or {}), **cleaned)
 
 
 def plain(text: str, longest: int = LONGEST_TEXT) -> str:
     """A text that is Unicode, without NUL, and not too long; what was cut ends in "…"."""
+    if len(text) <= longest and text.isprintable():
+        return text
     cut = text if len(text) <= longest else text[: longest - 1] + "…"
     return cut.replace("\0", "\\0").encode("utf-8", "backslashreplace").decode()
 
@@ -118,7 +113,7 @@ def plain(text: str, longest: int = LONGEST_TEXT) -> str:
 def as_json(values: Mapping[str, Any]) -> str:
     """The values of a press; too long ones as `{"…": "<their first 2000 characters>", …}`."""
     try:
-        text = json.dumps(values, ensure_ascii=False, allow_nan=False)
+        text = _as_json(values)
     except (TypeError, ValueError):
         text = json.dumps({"…": repr(values)}, ensure_ascii=False)
     if len(text) > LONGEST_VALUES:
@@ -127,8 +122,8 @@ def as_json(values: Mapping[str, Any]) -> str:
     return plain(text, len(text))
 
 
-def _hash(values: Sequence[Any]) -> str:
-    return hashlib.sha256(_as_text(values).encode()).hexdigest()
+def _hash(row: tuple[Any, ...]) -> str:
+    return hashlib.sha256(_as_text(row).encode()).hexdigest()
 
 
 def _now() -> tuple[int, int]:

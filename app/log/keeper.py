@@ -2,6 +2,7 @@
 
 import logging
 import math
+import queue
 import threading
 import time
 from collections import deque
@@ -64,7 +65,7 @@ class Keeper:
         self.fault = ""
         self.head: Head | None = None
         self.tried = threading.Event()
-        self._queue: deque[Ticket] = deque()
+        self._queue: queue.SimpleQueue[Ticket | None] = queue.SimpleQueue()  # None only wakes
         self._owed: deque[Entry] = deque(maxlen=MOST_OWED)
         self._store: Store | None = None
         self._began = False
@@ -80,7 +81,6 @@ class Keeper:
         self._fresh_wal = True
         self._steady = Steady()
         self._ended = False
-        self._wake = threading.Condition()
         self._syncer = Syncer(lambda results: self._tell(results, False), self._sync_failed)
         self._thread = threading.Thread(target=self._run, name="operators-log", daemon=True)
 
@@ -92,18 +92,15 @@ class Keeper:
 
     def stop(self, timeout_s: float) -> None:
         """Writes what is waiting, and closes the file; gives up after the time."""
-        with self._wake:
-            self._ended = True
-            self._wake.notify()
+        self._ended = True
+        self._queue.put(None)
         self._thread.join(timeout_s)
 
     def add(self, ticket: Ticket, most: int | None) -> bool:
         """Takes it, unless as many as `most` are waiting already."""
-        with self._wake:
-            if most is not None and len(self._queue) >= most:
-                return False
-            self._queue.append(ticket)
-            self._wake.notify()
+        if most is not None and self._queue.qsize() >= most:
+            return False
+        self._queue.put(ticket)
         return True
 
     # On the keeper's thread.
@@ -114,11 +111,8 @@ class Keeper:
             if self._store is None and time.monotonic() >= self._try_at:
                 self._open()
                 self.tried.set()
-            with self._wake:
-                self._wake.wait_for(self._must_do, self._idle_s())
-                batch = list(self._queue)
-                self._queue.clear()
-                ended = self._ended
+            batch = self._next()
+            ended = self._ended and not self._queue.qsize()
             if self._lost_sync is not None:
                 self._broken(self._lost_sync)
             if batch:
@@ -129,8 +123,14 @@ class Keeper:
         self._syncer.end(QUIET_S * 5)
         self._close()
 
-    def _must_do(self) -> bool:
-        return bool(self._queue or self._ended or self._lost_sync)
+    def _next(self) -> list[Ticket]:
+        """All that waits, as soon as there is something to do; none where that is no writing."""
+        try:
+            waiting = [self._queue.get(timeout=self._idle_s())]
+        except queue.Empty:
+            return []
+        waiting += [self._queue.get() for _ in range(self._queue.qsize())]
+        return [ticket for ticket in waiting if ticket is not None]
 
     def _idle_s(self) -> float:
         if self._store is None:
@@ -275,9 +275,8 @@ class Keeper:
     def _sync_failed(self, results: Results) -> None:
         """What is not known to be on the disk is not known to be in the log."""
         self._tell(results, False)
-        with self._wake:
-            self._lost_sync = next(error for _, error in results if isinstance(error, LogError))
-            self._wake.notify()
+        self._lost_sync = next(error for _, error in results if isinstance(error, LogError))
+        self._queue.put(None)
 
 
 def _ended(entry: Entry, answered: bool) -> Entry:

@@ -69,7 +69,7 @@ def rows(folder: Path, wanted: Filter, before: int | None, count: int) -> list[R
         raise
     finally:
         db.close()
-    return [Row(Entry(**dict(zip(FIELDS, row[:-1], strict=True))), row[-1]) for row in found]
+    return [Row(Entry(*row[:-1]), row[-1]) for row in found]
 
 
 def _query(wanted: Filter, before: int | None, count: int) -> tuple[str, dict[str, Any]]:

@@ -83,7 +83,7 @@ class Store:
                 " ORDER BY seq",
                 (self._boot,),
             ).fetchall()
-        return [Entry(**dict(zip(FIELDS, row, strict=True))) for row in rows]
+        return [Entry(*row) for row in rows]
 
     def answered(self, seq: int) -> bool:
         """Whether a press that is not done has an outcome already."""
@@ -152,7 +152,7 @@ class Store:
         with in_words():
             self._db.execute("BEGIN IMMEDIATE")
             try:
-                self._db.executemany(INSERT, [entry.values_in_order() for entry in sealed])
+                self._db.executemany(INSERT, sealed)
                 self._note_undone(sealed)
                 if removed:
                     self._db.execute("DELETE FROM entry WHERE seq <= ?", (removed,))

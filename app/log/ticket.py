@@ -1,7 +1,7 @@
 """What is handed to the operator's log, and the rules that it follows."""
 
 import asyncio
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from app.errors import LogError
 from app.log.entry import Entry
@@ -16,22 +16,18 @@ class Limits:
     required: bool = True
 
 
-def _future() -> "asyncio.Future[None]":
-    return asyncio.get_running_loop().create_future()
-
-
 @dataclass(slots=True, eq=False)
 class Ticket:
-    """An entry to be written; `done` gets it as it stands in the file, or why it could not be.
+    """An entry to be written; `result` is the one that stands in the file, or why there is none.
 
-    That of a press is done when it is committed, any other when it is on the disk. `waiter` is for who
+    That of a press is there when it is committed, any other when it is on the disk. `waiter` is for who
     waits for that, and may be called away.
     """
 
     entry: Entry
-    done: "asyncio.Future[Entry | LogError]"
+    waiter: "asyncio.Future[None]"
+    result: Entry | LogError | None = None
     abandoned: bool = False
-    waiter: "asyncio.Future[None]" = field(default_factory=_future)
 
     def wake(self) -> None:
         """Whoever waits waits no longer."""

@@ -95,8 +95,9 @@ class OperatorLog:
 
     @property
     def _why(self) -> str:
-        slow = say("log_slow", seconds=f"{PRESSED_WITHIN_S:g}")
-        return self._keeper.fault or (slow if self._stuck else "")
+        if self._stuck and not self._keeper.fault:
+            return say("log_slow", seconds=f"{PRESSED_WITHIN_S:g}")
+        return self._keeper.fault
 
     @property
     def lock(self) -> str:
@@ -181,7 +182,7 @@ class OperatorLog:
             return await self._within(ticket, PRESSED_WITHIN_S)
         except BaseException:
             ticket.abandoned = True
-            ticket.done.add_done_callback(self._close_abandoned)
+            self._close_abandoned(ticket)
             raise
 
     async def _within(self, ticket: Ticket, seconds: float) -> Entry:
@@ -190,25 +191,18 @@ class OperatorLog:
             await ticket.waiter
         finally:
             timer.cancel()
-        if not ticket.done.done():
+        if ticket.result is None:
             self._stuck.add(ticket)
-            ticket.done.add_done_callback(lambda _: self._unstick(ticket))
             self._say_changed()
             raise LogError(say("log_slow", seconds=f"{seconds:g}"))
-        result = ticket.done.result()
-        if isinstance(result, LogError):
-            raise result
-        return result
+        if isinstance(ticket.result, LogError):
+            raise ticket.result
+        return ticket.result
 
-    def _unstick(self, ticket: Ticket) -> None:
-        self._stuck.discard(ticket)
-        self._say_changed()
-
-    def _close_abandoned(self, done: "asyncio.Future[Entry | LogError]") -> None:
-        """A press that nobody waited for any more was written all the same."""
-        entry = done.result() if not done.cancelled() else None
-        if isinstance(entry, Entry):
-            self._add(entry.followed("closed", "refused", say("log_abandoned")))
+    def _close_abandoned(self, ticket: Ticket) -> None:
+        """A press that nobody waits for any more may have been written all the same."""
+        if isinstance(ticket.result, Entry):
+            self._add(ticket.result.followed("closed", "refused", say("log_abandoned")))
 
     def _add(self, entry: Entry) -> Ticket:
         """Hands it to the keeper. Only what starts a press is turned away when too much waits: what
@@ -229,9 +223,13 @@ class OperatorLog:
 
     def _told(self, results: Results, changed: bool) -> None:
         for ticket, result in results:
-            if not ticket.done.done():
-                ticket.done.set_result(result)
-                ticket.wake()
+            ticket.result = result
+            ticket.wake()
+            if ticket.abandoned:
+                self._close_abandoned(ticket)
+            if ticket in self._stuck:
+                self._stuck.discard(ticket)
+                changed = True
         if changed:
             self._say_changed()
 

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
+from functools import lru_cache
 from string import Formatter
 from typing import Any, Final
 
@@ -104,8 +105,9 @@ def names_in(templates: Iterable[Any]) -> list[str]:
     return list(dict.fromkeys(name for template in templates for _, name in named(template)))
 
 
-def _parts(text: str, where: str) -> list[tuple[str, str | None]]:
-    """[(literal text, input id after it or None), …]"""
+@lru_cache(1000)
+def _parts(text: str, where: str) -> tuple[tuple[str, str | None], ...]:
+    """((literal text, input id after it or None), …)"""
     try:
         parsed = list(Formatter().parse(text))
     except ValueError as error:
@@ -113,4 +115,4 @@ def _parts(text: str, where: str) -> list[tuple[str, str | None]]:
     for _, name, format_spec, conversion in parsed:
         if name is not None and (not name.isidentifier() or format_spec or conversion):
             raise FieldError(where, f'"{text}": between braces stands the id of an input, alone')
-    return [(literal, name) for literal, name, _, _ in parsed]
+    return tuple((literal, name) for literal, name, _, _ in parsed)

@@ -25,7 +25,7 @@ from app.errors import InputError, KioskError
 from app.routes.messages import LONGEST, as_model, json_of
 from app.routes.presses import PRESS_ID, STATUS, Press, pressed
 from app.routes.site import CurrentKiosk, CurrentSite, Site
-from app.routes.visitors import visitor
+from app.routes.visitors import caller
 from app.sentences import say
 
 log = logging.getLogger("kiosk.presses")
@@ -53,11 +53,12 @@ async def presses(socket: WebSocket, site: CurrentSite, kiosk: CurrentKiosk) -> 
 class _Session:
     """One socket and what is pressed on it; it knows no more of the page than each press says."""
 
-    __slots__ = ("_site", "_socket", "_under_way")
+    __slots__ = ("_caller", "_site", "_socket", "_under_way")
 
     def __init__(self, socket: WebSocket, site: Site) -> None:
         self._socket = socket
         self._site = site
+        self._caller = caller(socket)
         self._under_way: set[asyncio.Task[None]] = set()
 
     async def run(self) -> None:
@@ -94,7 +95,7 @@ class _Session:
         site, socket = self._site, self._socket
         try:
             kiosk = site.fleet.kiosk(socket.path_params.get("robot"))
-            receipt = await pressed(site, kiosk, visitor(socket, site), said.widget, said)
+            receipt = await pressed(site, kiosk, self._caller.seen(site), said.widget, said)
         except KioskError as error:
             await self._answer(said.id, error.status, error=str(error))
         except Exception:

@@ -1,6 +1,7 @@
 """Which browser asks: a cookie that the server gives it, never in a path."""
 
 import re
+from dataclasses import dataclass
 from typing import Final
 
 from fastapi import Request
@@ -15,11 +16,29 @@ KEPT_S: Final = 365 * 86_400
 OTHER_SITES: Final = frozenset({"cross-site", "same-site"})
 
 
-def visitor(request: HTTPConnection, site: Site) -> Browser:
-    """The browser by its cookie; without one, or with one that is none of ours, a stranger."""
+@dataclass(frozen=True, slots=True)
+class Caller:
+    """Who asks, as long as a connection lasts; `token` is "" without a cookie, or with none of ours."""
+
+    token: str
+    address: str
+
+    def seen(self, site: Site) -> Browser:
+        """The browser that this is now; without a token a stranger."""
+        if not self.token:
+            return stranger(self.address)
+        return site.browsers.seen(self.token, self.address)
+
+
+def caller(request: HTTPConnection) -> Caller:
     token = request.cookies.get(COOKIE, "")
     address = request.client.host if request.client else ""
-    return site.browsers.seen(token, address) if TOKEN.fullmatch(token) else stranger(address)
+    return Caller(token if TOKEN.fullmatch(token) else "", address)
+
+
+def visitor(request: HTTPConnection, site: Site) -> Browser:
+    """The browser by its cookie; without one, or with one that is none of ours, a stranger."""
+    return caller(request).seen(site)
 
 
 def welcomed(request: Request, site: Site) -> tuple[Browser, str]:
