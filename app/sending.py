@@ -98,11 +98,11 @@ class Sending:
         fields = filled(widget.template, values)
         match widget:
             case Publish():
+                if widget.confirm is None:
+                    return await self._arrived(widget, self._published(widget, fields))
+                equals = filled(widget.confirm.equals, values)
                 since = self._monotonic()
                 answer = self._published(widget, fields)
-                if widget.confirm is None:
-                    return await self._arrived(widget, answer)
-                equals = filled(widget.confirm.equals, values)
                 return await self._confirmations.awaited(
                     widget, equals, press_id, since, answer.text, correct
                 )

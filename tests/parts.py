@@ -22,6 +22,7 @@ from websockets.sync.client import ClientConnection, connect
 
 from tests.commanded import Commanded
 
+TAP_AGAIN_MS = 700  # what a page without scripts sends sooner is a second tap
 ROOT = Path(__file__).resolve().parent.parent
 TESTS = ROOT / "tests"
 BRIDGE = Path(

@@ -13,7 +13,7 @@ import httpx
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from tests.parts import Bridge, RosNode, Server, as_response, events_in, live, until
+from tests.parts import TAP_AGAIN_MS, Bridge, RosNode, Server, as_response, events_in, live, until
 
 HOUR_MS = 3_600_000
 
@@ -200,6 +200,7 @@ def test_without_scripts_a_page_that_is_too_old_presses_nothing(
     page = context.new_page()
     page.goto(kiosk.url)
     html = page.content()
+    page.wait_for_timeout(TAP_AGAIN_MS)
     page.get_by_label("Message").fill("fresh")
     page.get_by_role("button", name="Publish", exact=True).click()
     expect(page.locator("#receipt-operation")).to_contain_text("Sent")

@@ -18,7 +18,7 @@ from app.receipts import Receipt
 from app.robot import Robot
 from tests.builders import BOOL, FREE, FROM, HEARD, MESSAGE, presses_of, robot_there, says
 from tests.builders import panel_of as panel_with
-from tests.parts import ROOT, Server, until
+from tests.parts import ROOT, TAP_AGAIN_MS, Server, until
 from tests.test_presses import Way
 
 CONFIRM = {"topic": "/heard", "field": "data", "equals": "{message}", "within_s": 0.2}
@@ -290,6 +290,7 @@ def test_without_scripts_the_server_asks(asking: Server, chromium: Browser) -> N
     assert asking.widget("go")["outcome"] == ""
     page.get_by_label("Message").fill("by form")
     page.get_by_role("button", name="Start").click()
+    page.wait_for_timeout(TAP_AGAIN_MS)
     page.get_by_role("button", name="Start").click()
     expect(page.locator('[data-widget="go"] .result')).to_contain_text("Confirmed by /last_heard")
     context.close()

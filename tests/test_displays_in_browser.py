@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from tests.parts import Bridge, RosNode, Server, has_heard, live, until
+from tests.parts import TAP_AGAIN_MS, Bridge, RosNode, Server, has_heard, live, until
 
 PANEL = """
 title = "Robot cell 1"
@@ -232,18 +232,22 @@ def test_without_scripts_the_same_values_arrive(
     before = {topic: len(robot.heard(topic)) for topic in TOPICS}
     page.get_by_label("Speed (m/s)").fill("0.7")
     page.get_by_label("Mode").select_option(label="Until stopped")
+    page.wait_for_timeout(TAP_AGAIN_MS)
     press(page, "Drive")
     expect(page.locator("#receipt-drive")).to_contain_text("Sent on /test_drive")
     (twist,) = heard(robot, "/test_drive", before["/test_drive"])
     assert (twist["linear"]["x"], twist["angular"]["z"]) == (0.7, 15.0)
     expect(page.get_by_label("Speed (m/s)")).to_have_value("0.7")
     expect(page.get_by_label("Mode")).to_have_value("-1")
+    page.wait_for_timeout(TAP_AGAIN_MS)
     press(page, "Light")
     assert heard(robot, "/test_light", before["/test_light"]) == [{"data": False}]
     page.get_by_label("Work light").check()
+    page.wait_for_timeout(TAP_AGAIN_MS)
     press(page, "Light")
     assert heard(robot, "/test_light", before["/test_light"] + 1) == [{"data": True}]
     expect(page.get_by_label("Work light")).to_be_checked()
+    page.wait_for_timeout(TAP_AGAIN_MS)
     press(page, "Choose")
     assert heard(robot, "/test_mode", before["/test_mode"]) == [{"data": -1}]
     context.close()

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, Page, Request, Route, expect
 
-from tests.parts import Bridge, RosNode, Server, has_heard, live, until
+from tests.parts import TAP_AGAIN_MS, Bridge, RosNode, Server, has_heard, live, until
 
 TEXTS = [
     "",
@@ -106,6 +106,7 @@ def test_without_scripts_a_press_is_a_form(server: Server, node: RosNode, chromi
     page = context.new_page()
     page.goto(server.url)
     before = len(node.heard("/operation"))
+    page.wait_for_timeout(TAP_AGAIN_MS)
     page.get_by_label("Message").fill("no script 日本語")
     button(page, "Publish").click()
     expect(page.locator("#receipt-operation")).to_contain_text("Sent on /operation at")
@@ -128,6 +129,7 @@ def test_enter_in_an_input_presses_nothing(server: Server, node: RosNode, chromi
         context = chromium.new_context(java_script_enabled=scripts)
         page = context.new_page()
         page.goto(server.url)
+        page.wait_for_timeout(TAP_AGAIN_MS)
         page.get_by_label("Message").fill("oops")
         page.get_by_label("Message").press("Enter")
         button(page, "Publish").click()
