@@ -80,26 +80,44 @@ def interlock_verdict(interlock: Interlock, robot: Robot, now: float) -> Verdict
     return Verdict(True, until=stale_at)
 
 
-def publish_verdict(
-    publish: Published, interlock: Interlock | None, robot: Robot, now: float
+def press_verdict(
+    widget: Pressed | Hold, interlock: Interlock | None, robot: Robot, now: float
 ) -> Verdict:
-    """Whether a message may be published: a way, the right type, and the interlock."""
-    passable = way(robot, now)
+    """Whether a widget may be pressed: a way, nothing of its own against it, and the interlock."""
+    permission = PERMITTED if interlock is None else interlock_verdict(interlock, robot, now)
+    return command_verdict(widget, way(robot, now), permission, robot, now)
+
+
+def command_verdict(
+    widget: Pressed | Hold, passable: Verdict, permission: Verdict, robot: Robot, now: float
+) -> Verdict:
+    """The same by verdicts that are known: of the way, and of the widget's interlock."""
     if not passable.permitted:
         return passable
+    return _against(widget, robot, now) or permission
+
+
+def _against(widget: Pressed | Hold, robot: Robot, now: float) -> Verdict | None:
+    match widget:
+        case Publish() | Hold():
+            return against_publishing(widget, robot)
+        case Parameter():
+            return against_setting(widget, robot)
+    return against_calling(widget, robot, now)
+
+
+def against_publishing(publish: Published, robot: Robot) -> Verdict | None:
+    """Why a message may not be published: another type, or the last one's effect is awaited."""
     if doubt := misfit("MP", publish, robot):
         return doubt
     if isinstance(publish, Publish) and publish.one_shot and robot.progress.get(publish.id, IDLE).busy:
         return locked("busy")
-    return PERMITTED if interlock is None else interlock_verdict(interlock, robot, now)
+    return None
 
 
-def call_verdict(call: Call | Action, interlock: Interlock | None, robot: Robot, now: float) -> Verdict:
-    """Whether a service may be called or a goal be sent: the server is there with its type, no
-    answer is awaited, and the interlock permits."""
-    passable = way(robot, now)
-    if not passable.permitted:
-        return passable
+def against_calling(call: Call | Action, robot: Robot, now: float) -> Verdict | None:
+    """Why a service may not be called or a goal not be sent: its server is not there with its type,
+    or an answer is awaited."""
     role, name = served(call)
     key = robot.key(name)
     found = robot.graph.server_type(role, key)
@@ -110,24 +128,17 @@ def call_verdict(call: Call | Action, interlock: Interlock | None, robot: Robot,
     ready_at = robot.graph.served_since(role, key) + SERVER_SETTLE_S
     if now < ready_at:
         return Verdict(False, "getting_ready", say("getting_ready", name=name), ready_at)
-    if robot.progress.get(call.id, IDLE).busy:
-        return locked("busy")
-    return PERMITTED if interlock is None else interlock_verdict(interlock, robot, now)
+    return locked("busy") if robot.progress.get(call.id, IDLE).busy else None
 
 
-def parameter_verdict(of: Parameter, interlock: Interlock | None, robot: Robot, now: float) -> Verdict:
-    """Whether a parameter may be set: its node is there, has told what may be set, no answer is
-    awaited, and the interlock permits."""
-    passable = way(robot, now)
-    if not passable.permitted:
-        return passable
+def against_setting(of: Parameter, robot: Robot) -> Verdict | None:
+    """Why a parameter may not be set: its node is not there or has not told what may be set, or an
+    answer is awaited."""
     if doubt := parameters_offered(of.node, robot) or unsettable(
         of, robot.parameters.get(of.id, UNKNOWN)
     ):
         return doubt
-    if robot.progress.get(of.id, IDLE).busy:
-        return locked("busy")
-    return PERMITTED if interlock is None else interlock_verdict(interlock, robot, now)
+    return locked("busy") if robot.progress.get(of.id, IDLE).busy else None
 
 
 def parameters_offered(node: str, robot: Robot) -> Verdict | None:
@@ -167,18 +178,6 @@ def unsettable(of: Parameter, known: Declared) -> Verdict | None:
 def served(call: Call | Action) -> tuple[ServerRole, str]:
     """What serves a call or an action, and by which name."""
     return ("SS", call.service) if isinstance(call, Call) else ("AS", call.action)
-
-
-def press_verdict(
-    widget: Pressed | Hold, interlock: Interlock | None, robot: Robot, now: float
-) -> Verdict:
-    """Whether a widget may be pressed."""
-    match widget:
-        case Publish() | Hold():
-            return publish_verdict(widget, interlock, robot, now)
-        case Parameter():
-            return parameter_verdict(widget, interlock, robot, now)
-    return call_verdict(widget, interlock, robot, now)
 
 
 def misfit(role: TopicRole, of: Interlock | Published | Display, robot: Robot) -> Verdict | None:

@@ -7,7 +7,6 @@ import asyncio
 import math
 import time
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import replace
 from typing import Protocol
 
 from app.board import Board
@@ -75,7 +74,7 @@ class Showing:
         self.fault = fault
         self._since = Since()
         self._frame_s = 1 / panel.display_hz
-        self._displays = [(robot.key(w.topic), w) for w in panel.widgets() if isinstance(w, Display)]
+        self._displays = [(robot.key(w.topic), w) for w in panel.displays]
         self._seen = self._sight()
         self.lamp = self._seen.robot
         self.board = Board(self._seen.view, revision)
@@ -163,5 +162,7 @@ class Showing:
             fault="\n".join(filter(None, faults)),
             lock=self._operators_log.lock,
             control=self._control.view(),
+            control_until=self._control.until,
         )
-        return replace(self._since.dated(seen), rest=min(seen.rest, self._control.until))
+        seen.view["link"] = self._since.dated(seen.view["link"])
+        return seen
