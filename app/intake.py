@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from app import keys
 from app.actions import Actions
@@ -74,7 +74,7 @@ class Intake:
         ordered = sorted(changes.samples.items(), key=lambda one: one[0] not in self._interlocks)
         for key, sample in ordered:
             for payload in sample.between:
-                if self._changes(key, replace(sample, payload=payload, between=()), shown()):
+                if self._changes(key, sample._replace(payload=payload, between=()), shown()):
                     show()
             news.urgent |= self._changes(key, sample, shown())
             if key in self._feedback or key in self._status or key == self._events:

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from app.declared import UNKNOWN, Declared, allowed, limits_text, own_range
-from app.keys import ServerRole, TopicRole
+from app.graph import Graph, remembered
+from app.keys import Qos, ServerRole, TopicRole
 from app.panel.model import Action, Call, Display, Hold, Interlock, Pressed, Publish, Published
 from app.panel.parameter import DESCRIBE, GET, SET, Parameter
 from app.progress import IDLE
@@ -61,8 +62,6 @@ def interlock_verdict(interlock: Interlock, robot: Robot, now: float) -> Verdict
     topic, key = interlock.topic, robot.key(interlock.topic)
     if doubt := misfit("MS", interlock, robot):
         return doubt
-    if robot.graph.unheard(key):
-        return locked("unheard", topic=topic)
     if interlock.require_publisher and not robot.graph.on_robot("MP", key):
         return locked("no_publisher", topic=topic)
     reading = robot.reading(topic)
@@ -182,13 +181,20 @@ def served(call: Call | Action) -> tuple[ServerRole, str]:
 
 def misfit(role: TopicRole, of: Interlock | Published | Display, robot: Robot) -> Verdict | None:
     """Why a topic can't be trusted, by what the graph shows: another type, a QoS that DDS would
-    not match. `role` is what the panel does with it: publish ("MP") or listen ("MS")."""
-    key = robot.key(of.topic)
-    if found := robot.graph.wrong_type(role, key, of.type):
-        return locked("wrong_type", topic=of.topic, found=found, wanted=of.type)
-    if code := robot.graph.wrong_qos(role, key, of.qos.on_wire):
-        return locked(code, topic=of.topic)
-    return None
+    not match, a bridge that does not pass it on. `role` is what the panel does with it: publish ("MP")
+    or listen ("MS")."""
+    return _misfit(robot.graph, role, robot.key(of.topic), of.topic, of.type, of.qos.on_wire)
+
+
+@remembered
+def _misfit(
+    graph: Graph, role: TopicRole, key: str, topic: str, type_name: str, qos: Qos
+) -> Verdict | None:
+    if found := graph.wrong_type(role, key, type_name):
+        return locked("wrong_type", topic=topic, found=found, wanted=type_name)
+    if code := graph.wrong_qos(role, key, qos):
+        return locked(code, topic=topic)
+    return locked("unheard", topic=topic) if role == "MS" and graph.unheard(key) else None
 
 
 def locked(code: str, **about: object) -> Verdict:

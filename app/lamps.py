@@ -123,7 +123,7 @@ def silent(panel: Panel, robot: Robot, now: float) -> tuple[str, float]:
         key, reading = robot.key(of.topic), robot.reading(of.topic)
         if reading.status not in ("message", "unreadable") or not robot.graph.on_robot("MP", key):
             continue
-        if robot.graph.unheard(key) or misfit("MS", of, robot):
+        if misfit("MS", of, robot):
             continue
         stale_at = reading.at + of.max_age_s
         if now >= stale_at:
