@@ -6,6 +6,7 @@ reason an operator reads.
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
 
 from app.declared import UNKNOWN, Declared, allowed, limits_text, own_range
@@ -197,5 +198,7 @@ def _misfit(
     return locked("unheard", topic=topic) if role == "MS" and graph.unheard(key) else None
 
 
-def locked(code: str, **about: object) -> Verdict:
+@lru_cache(maxsize=256)
+def locked(code: str, **about: str | None) -> Verdict:
+    """The verdict for a sentence; the same one again for the same."""
     return Verdict(False, code, say(code, **about))

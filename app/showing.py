@@ -152,7 +152,8 @@ class Showing:
         self._timer = None if when == math.inf else loop.call_at(when, self._frame)
 
     def _sight(self) -> Sight:
-        faults = (self.fault, self._operators_log.fault, self._recordings_fault())
+        unlogged = self._operators_log.fault
+        faults = (self.fault, unlogged, self._recordings_fault())
         seen = sight(
             self._panel,
             self._robot,
@@ -160,7 +161,7 @@ class Showing:
             robots=self._others.lamps(),
             simulated=self._simulated,
             fault="\n".join(filter(None, faults)),
-            lock=self._operators_log.lock,
+            lock=self._operators_log.lock if unlogged else "",
             control=self._control.view(),
             control_until=self._control.until,
         )
