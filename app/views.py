@@ -6,8 +6,7 @@ nothing.
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from typing import Any, Final, TypedDict
+from typing import Any, Final, NamedTuple, TypedDict
 
 from app.browsers import Browser
 from app.control_view import NO_CONTROL, ControlView
@@ -54,8 +53,7 @@ Shown = Input | Pressed | Hold | Display
 NO_OTHERS: Final[Mapping[str, Lamp]] = {}
 
 
-@dataclass(frozen=True, slots=True)
-class Sight:
+class Sight(NamedTuple):
     """A view, the robot's lamp on the pages of others, and when (monotonic seconds) time alone would
     change what the displays show, by their ids, and the `rest`."""
 
