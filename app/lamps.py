@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import Final, Literal, TypedDict
 
-from app.interlocks import Verdict, misfit
+from app.interlocks import PERMITTED, Verdict, misfit
 from app.panel.model import Panel
 from app.robot import Robot
 from app.sentences import say
@@ -152,7 +152,7 @@ def locks(names: Sequence[str]) -> str:
 
 
 def _first(verdicts: Mapping[str, Verdict], codes: frozenset[str]) -> Verdict:
-    return next((v for v in verdicts.values() if v.code in codes), Verdict(True))
+    return next((v for v in verdicts.values() if v.code in codes), PERMITTED)
 
 
 def _gone(names: Sequence[str]) -> str:
