@@ -6,16 +6,20 @@ far share the same bytes, the others those of each event that says all of someth
 """
 
 import asyncio
-import json
 import secrets
 from collections.abc import Mapping
+from functools import partial
 from typing import Any, Final
+
+from pydantic_core import to_json
 
 from app.heartbeat import Heartbeat
 from app.views import View
 
-# Its text has no line break: it is one line of an event.
-ENCODE: Final = json.JSONEncoder(ensure_ascii=False, separators=(",", ":"), allow_nan=False).encode
+# Its text has no line break: it is one line of an event. What is no number is null.
+ENCODE: Final = partial(to_json, inf_nan_mode="null")
+
+Events = dict[str, Mapping[str, Any]]  # the data of each by its name, in their order
 
 
 class Board:
@@ -28,7 +32,8 @@ class Board:
         self.view = view
         self.revision = revision
         self.heartbeat = Heartbeat(self._wake)
-        self._changed = asyncio.Event()
+        self._waiting: list[asyncio.Future[None]] = []
+        self._news: Events = {}  # from the view before to this one
         self._prepared: dict[int, bytes] = {}
         self._whole: dict[str, bytes] = {}
         self._turned: dict[str, int] = {}
@@ -41,13 +46,14 @@ class Board:
 
     def post(self, view: View) -> None:
         """A view as of now; nothing happens if it is the same as before."""
-        if view == self.view:
+        news = difference(self.view, view)
+        if not news:
             return
         self.version += 1
-        for name, attributes in view["widgets"].items():
-            if attributes.get("enabled") != self.view["widgets"].get(name, {}).get("enabled"):
-                self._turned[name] = self.version
-        self.view = view
+        for widget, changed in news.get("update", {}).items():
+            if "enabled" in changed:
+                self._turned[widget] = self.version
+        self.view, self._news = view, news
         self._prepared = {}
         self._whole = {}
         self.heartbeat.along()
@@ -63,13 +69,17 @@ class Board:
         self._wake()
 
     def _wake(self) -> None:
-        changed, self._changed = self._changed, asyncio.Event()
-        changed.set()
+        waiting, self._waiting = self._waiting, []
+        for one in waiting:
+            if not one.done():  # whose stream has ended meanwhile
+                one.set_result(None)
 
     async def news(self, version: int, beats: int) -> None:
         """Waits for a version after `version`, a heartbeat after `beats`, or the end."""
         if not self.closed and (self.version, self.heartbeat.count) == (version, beats):
-            await self._changed.wait()
+            waiting = asyncio.get_running_loop().create_future()
+            self._waiting.append(waiting)
+            await waiting
 
     def snapshot(self) -> bytes:
         """The `snapshot` event: everything that the page shows."""
@@ -79,32 +89,13 @@ class Board:
         """The events from a view that was posted as `version` to the newest one."""
         prepared = self._prepared.get(version)
         if prepared is None:
-            prepared = self._prepared[version] = self._difference(view)
+            latest = version == self.version - 1
+            news = self._news if latest else difference(view, self.view)
+            prepared = self._prepared[version] = b"".join(
+                self._event(name, data) if name == "update" else self._all_of(name, data)
+                for name, data in news.items()
+            )
         return prepared
-
-    def _difference(self, old: View) -> bytes:
-        new = self.view
-        events = [
-            self._all_of(f"{name}-enabled-updated", state)
-            for name, state in new["interlocks"].items()
-            if old["interlocks"].get(name) != state
-        ]
-        widgets = {
-            name: _changed(known, attributes)
-            for name, attributes in new["widgets"].items()
-            if (known := old["widgets"].get(name, {})) != attributes
-        }
-        if widgets:
-            events.append(self._event("update", widgets))
-        if old["link"] != new["link"]:
-            events.append(self._all_of("link", new["link"]))
-        if old["control"] != new["control"]:
-            events.append(self._all_of("control", new["control"]))
-        if old["notice"] != new["notice"]:
-            events.append(self._all_of("notice", new["notice"]))
-        if old["robots"] != new["robots"]:
-            events.append(self._all_of("robots", new["robots"]))
-        return b"".join(events)
 
     def _all_of(self, name: str, data: Mapping[str, Any]) -> bytes:
         """An event that is the same whatever was sent before."""
@@ -114,12 +105,37 @@ class Board:
         return whole
 
     def _event(self, name: str, data: Mapping[str, Any]) -> bytes:
-        return f"event: {name}\ndata: {ENCODE(data)}\nid: {self.id}\n\n".encode()
+        return b"event: %b\ndata: %b\nid: %b\n\n" % (name.encode(), ENCODE(data), self.id.encode())
 
 
 def told(browser: str) -> bytes:
     """Tells a page the id of its browser: it knows by it what `control` means for it."""
-    return f"event: browser\ndata: {ENCODE({'id': browser})}\n\n".encode()
+    return b"event: browser\ndata: %b\n\n" % ENCODE({"id": browser})
+
+
+def difference(old: View, new: View) -> Events:
+    """What brings a browser from one view to another: nothing where they are the same."""
+    events: Events = {
+        f"{name}-enabled-updated": state
+        for name, state in new["interlocks"].items()
+        if old["interlocks"].get(name) != state
+    }
+    widgets = {
+        name: _changed(known, attributes)
+        for name, attributes in new["widgets"].items()
+        if (known := old["widgets"].get(name, {})) != attributes
+    }
+    if widgets:
+        events["update"] = widgets
+    if old["link"] != new["link"]:
+        events["link"] = new["link"]
+    if old["control"] != new["control"]:
+        events["control"] = new["control"]
+    if old["notice"] != new["notice"]:
+        events["notice"] = new["notice"]
+    if old["robots"] != new["robots"]:
+        events["robots"] = new["robots"]
+    return events
 
 
 def _changed(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from datetime import UTC, datetime
 from typing import Final, Literal
 
 from app.browsers import Browser
-from app.control_view import ControlView, control_view
+from app.control_view import NO_CONTROL, ControlView, control_view
 from app.interlocks import PERMITTED, Verdict, locked
 from app.panel.control import ControlRules
 from app.sentences import say
@@ -76,7 +76,9 @@ class Control:
 
     @property
     def until(self) -> float:
-        """When time alone would change who has control."""
+        """When time alone would change who has control, where a panel asks for it."""
+        if not self.rules.required:
+            return float("inf")
         times = [party.alive_until for party in (self._holder, self._asker) if party]
         return min([*times, self._due()])
 
@@ -182,6 +184,8 @@ class Control:
 
     def view(self) -> ControlView:
         """What the pages show."""
+        if not self.rules.required:
+            return NO_CONTROL
         return control_view(self.rules, self._robot, self.holder, self.asker, self._since)
 
     def _over(self, browser: Browser) -> bool:

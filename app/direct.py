@@ -6,9 +6,17 @@ browser. What begins an answer goes through all of them: they see its headers.
 
 from typing import Final
 
+from fastapi import FastAPI
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 KEY: Final = "panel.send"
+
+
+class Application(FastAPI):
+    """With that layer around all others: FastAPI has some of its own around those that are added."""
+
+    def build_middleware_stack(self) -> ASGIApp:
+        return Direct(super().build_middleware_stack())
 
 
 class Direct:

@@ -34,8 +34,6 @@ def look(widget: Readout | Indicator, robot: Robot, now: float) -> Look:
     topic = widget.topic
     if doubt := misfit("MS", widget, robot):
         return Look("unreadable", doubt.reason or "")
-    if robot.graph.unheard(robot.key(topic)):
-        return Look("unreadable", say("unheard", topic=topic))
     reading = robot.reading(topic)
     if reading.status == "unreadable":
         return Look("unreadable", say("readout_unreadable", topic=topic, wanted=widget.type))

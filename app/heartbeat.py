@@ -11,7 +11,9 @@ from app import moments
 from app.sentences import clock
 
 BEAT_S: Final = 0.5  # a page locks itself after 1.75 s without any event
-EARLY_S: Final = 0.1  # a beat that is so nearly due goes with what is sent anyway
+# A beat that is so nearly due goes with what is sent anyway: more than the pause of what is sent ten
+# times a second, where it would come to all streams just before that, and keep it waiting.
+EARLY_S: Final = 0.15
 
 
 class Heartbeat:

@@ -130,7 +130,7 @@ class Inbox:
             {key: arrived.sample() for key, arrived in samples.items()},
             tokens,
             link_up,
-            [(key, arrived.sample(kept=True)) for key, arrived in kept],
+            [(key, arrived.sample(kept=True)) for key, arrived in kept] if kept else (),
         )
 
     # Below: on the link's threads, under the lock. No work here, and nothing may raise.

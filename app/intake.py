@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from app import keys
 from app.actions import Actions
@@ -10,11 +10,11 @@ from app.confirmations import Confirmations
 from app.inbox import Changes, Token
 from app.interlocks import interlock_verdict
 from app.logs import RobotLog
-from app.panel.model import Panel
+from app.panel.model import Interlock, Panel
 from app.panel.parameter import EVENTS
 from app.parameters import Parameters
 from app.recording import Recorder
-from app.robot import Robot, Sample
+from app.robot import Robot, Sample, value_of
 from app.views import Enabled, enabled
 
 
@@ -70,12 +70,11 @@ class Intake:
         """Takes it in. `shown` are the permissions that are; `show` is called at each value in between
         that changed one."""
         news = News(urgent=bool(changes.tokens))
-        had_bridge = bool(self._robot.graph.bridges)
         # What permits and forbids comes first, and nothing that fails keeps it from being taken in.
         ordered = sorted(changes.samples.items(), key=lambda one: one[0] not in self._interlocks)
         for key, sample in ordered:
             for payload in sample.between:
-                if self._changes(key, replace(sample, payload=payload, between=()), shown()):
+                if self._changes(key, sample._replace(payload=payload, between=()), shown()):
                     show()
             news.urgent |= self._changes(key, sample, shown())
             if key in self._feedback or key in self._status or key == self._events:
@@ -83,17 +82,26 @@ class Intake:
             else:
                 news.values.add(key)
         self._record(changes)
-        news.came = self._tokens(changes.tokens, had_bridge)
+        news.came = self._tokens(changes.tokens)
         return news
 
     def _changes(self, key: str, sample: Sample, shown: Mapping[str, Enabled]) -> bool:
-        """Takes a sample in; whether a permission is another one by it than is shown."""
+        """Takes a sample in; whether a permission may be another one by it than is shown. What says
+        something else is not judged here: it will be, when all is looked at."""
+        interlocks = self._interlocks.get(key, ())
+        before = [self._said(one) for one in interlocks]
         self._guarded(key, sample, self._sample)
+        if before != [self._said(one) for one in interlocks]:
+            return True
         now = time.monotonic()
         return any(
-            enabled(interlock_verdict(one, self._robot, now)) != shown[one.id]
-            for one in self._interlocks.get(key, ())
+            enabled(interlock_verdict(one, self._robot, now)) != shown[one.id] for one in interlocks
         )
+
+    def _said(self, interlock: Interlock) -> bool:
+        """Whether the last of a topic can be read, and permits."""
+        reading = self._robot.reading(interlock.topic)
+        return reading.status == "message" and value_of(reading.message, interlock.field) is True
 
     def _record(self, changes: Changes) -> None:
         if self._recorder is not None:
@@ -117,8 +125,12 @@ class Intake:
             self._robot.take(key, sample)
             self._confirmations.hear(key)
 
-    def _tokens(self, tokens: Mapping[str, Token], had_bridge: bool) -> bool:
+    def _tokens(self, tokens: Mapping[str, Token]) -> bool:
+        """Takes them in; whether there is a bridge where there was none."""
+        if not tokens:
+            return False
         came, now, graph = False, time.monotonic(), self._robot.graph
+        had_bridge = bool(graph.bridges)
         for key, token in tokens.items():
             if token.lost_seq:
                 self._parameters.lose(key)

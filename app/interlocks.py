@@ -6,10 +6,12 @@ reason an operator reads.
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
 
 from app.declared import UNKNOWN, Declared, allowed, limits_text, own_range
-from app.keys import ServerRole, TopicRole
+from app.graph import Graph, remembered
+from app.keys import Qos, ServerRole, TopicRole
 from app.panel.model import Action, Call, Display, Hold, Interlock, Pressed, Publish, Published
 from app.panel.parameter import DESCRIBE, GET, SET, Parameter
 from app.progress import IDLE
@@ -63,8 +65,6 @@ def interlock_verdict(interlock: Interlock, robot: Robot, now: float) -> Verdict
     topic, key = interlock.topic, robot.key(interlock.topic)
     if doubt := misfit("MS", interlock, robot):
         return doubt
-    if robot.graph.unheard(key):
-        return locked("unheard", topic=topic)
     if interlock.require_publisher and not robot.graph.on_robot("MP", key):
         return locked("no_publisher", topic=topic)
     reading = robot.reading(topic)
@@ -82,26 +82,44 @@ def interlock_verdict(interlock: Interlock, robot: Robot, now: float) -> Verdict
     return Verdict(True, until=stale_at)
 
 
-def publish_verdict(
-    publish: Published, interlock: Interlock | None, robot: Robot, now: float
+def press_verdict(
+    widget: Pressed | Hold, interlock: Interlock | None, robot: Robot, now: float
 ) -> Verdict:
-    """Whether a message may be published: a way, the right type, and the interlock."""
-    passable = way(robot, now)
+    """Whether a widget may be pressed: a way, nothing of its own against it, and the interlock."""
+    permission = PERMITTED if interlock is None else interlock_verdict(interlock, robot, now)
+    return command_verdict(widget, way(robot, now), permission, robot, now)
+
+
+def command_verdict(
+    widget: Pressed | Hold, passable: Verdict, permission: Verdict, robot: Robot, now: float
+) -> Verdict:
+    """The same by verdicts that are known: of the way, and of the widget's interlock."""
     if not passable.permitted:
         return passable
+    return _against(widget, robot, now) or permission
+
+
+def _against(widget: Pressed | Hold, robot: Robot, now: float) -> Verdict | None:
+    match widget:
+        case Publish() | Hold():
+            return against_publishing(widget, robot)
+        case Parameter():
+            return against_setting(widget, robot)
+    return against_calling(widget, robot, now)
+
+
+def against_publishing(publish: Published, robot: Robot) -> Verdict | None:
+    """Why a message may not be published: another type, or the last one's effect is awaited."""
     if doubt := misfit("MP", publish, robot):
         return doubt
     if isinstance(publish, Publish) and publish.one_shot and robot.progress.get(publish.id, IDLE).busy:
         return locked("busy")
-    return PERMITTED if interlock is None else interlock_verdict(interlock, robot, now)
+    return None
 
 
-def call_verdict(call: Call | Action, interlock: Interlock | None, robot: Robot, now: float) -> Verdict:
-    """Whether a service may be called or a goal be sent: the server is there with its type, no
-    answer is awaited, and the interlock permits."""
-    passable = way(robot, now)
-    if not passable.permitted:
-        return passable
+def against_calling(call: Call | Action, robot: Robot, now: float) -> Verdict | None:
+    """Why a service may not be called or a goal not be sent: its server is not there with its type,
+    or an answer is awaited."""
     role, name = served(call)
     key = robot.key(name)
     found = robot.graph.server_type(role, key)
@@ -112,24 +130,17 @@ def call_verdict(call: Call | Action, interlock: Interlock | None, robot: Robot,
     ready_at = robot.graph.served_since(role, key) + SERVER_SETTLE_S
     if now < ready_at:
         return Verdict(False, "getting_ready", say("getting_ready", name=name), ready_at)
-    if robot.progress.get(call.id, IDLE).busy:
-        return locked("busy")
-    return PERMITTED if interlock is None else interlock_verdict(interlock, robot, now)
+    return locked("busy") if robot.progress.get(call.id, IDLE).busy else None
 
 
-def parameter_verdict(of: Parameter, interlock: Interlock | None, robot: Robot, now: float) -> Verdict:
-    """Whether a parameter may be set: its node is there, has told what may be set, no answer is
-    awaited, and the interlock permits."""
-    passable = way(robot, now)
-    if not passable.permitted:
-        return passable
+def against_setting(of: Parameter, robot: Robot) -> Verdict | None:
+    """Why a parameter may not be set: its node is not there or has not told what may be set, or an
+    answer is awaited."""
     if doubt := parameters_offered(of.node, robot) or unsettable(
         of, robot.parameters.get(of.id, UNKNOWN)
     ):
         return doubt
-    if robot.progress.get(of.id, IDLE).busy:
-        return locked("busy")
-    return PERMITTED if interlock is None else interlock_verdict(interlock, robot, now)
+    return locked("busy") if robot.progress.get(of.id, IDLE).busy else None
 
 
 def parameters_offered(node: str, robot: Robot) -> Verdict | None:
@@ -171,28 +182,25 @@ def served(call: Call | Action) -> tuple[ServerRole, str]:
     return ("SS", call.service) if isinstance(call, Call) else ("AS", call.action)
 
 
-def press_verdict(
-    widget: Pressed | Hold, interlock: Interlock | None, robot: Robot, now: float
-) -> Verdict:
-    """Whether a widget may be pressed."""
-    match widget:
-        case Publish() | Hold():
-            return publish_verdict(widget, interlock, robot, now)
-        case Parameter():
-            return parameter_verdict(widget, interlock, robot, now)
-    return call_verdict(widget, interlock, robot, now)
-
-
 def misfit(role: TopicRole, of: Interlock | Published | Display, robot: Robot) -> Verdict | None:
     """Why a topic can't be trusted, by what the graph shows: another type, a QoS that DDS would
-    not match. `role` is what the panel does with it: publish ("MP") or listen ("MS")."""
-    key = robot.key(of.topic)
-    if found := robot.graph.wrong_type(role, key, of.type):
-        return locked("wrong_type", topic=of.topic, found=found, wanted=of.type)
-    if code := robot.graph.wrong_qos(role, key, of.qos.on_wire):
-        return locked(code, topic=of.topic)
-    return None
+    not match, a bridge that does not pass it on. `role` is what the panel does with it: publish ("MP")
+    or listen ("MS")."""
+    return _misfit(robot.graph, role, robot.key(of.topic), of.topic, of.type, of.qos.on_wire)
 
 
-def locked(code: str, **about: object) -> Verdict:
+@remembered
+def _misfit(
+    graph: Graph, role: TopicRole, key: str, topic: str, type_name: str, qos: Qos
+) -> Verdict | None:
+    if found := graph.wrong_type(role, key, type_name):
+        return locked("wrong_type", topic=topic, found=found, wanted=type_name)
+    if code := graph.wrong_qos(role, key, qos):
+        return locked(code, topic=topic)
+    return locked("unheard", topic=topic) if role == "MS" and graph.unheard(key) else None
+
+
+@lru_cache(maxsize=256)
+def locked(code: str, **about: str | None) -> Verdict:
+    """The verdict for a sentence; the same one again for the same."""
     return Verdict(False, code, say(code, **about))

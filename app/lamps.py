@@ -6,9 +6,10 @@ by its verdict's code.
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from typing import Final, Literal, TypedDict
 
-from app.interlocks import NO_WAY, Verdict, misfit
+from app.interlocks import NO_WAY, PERMITTED, Verdict, misfit
 from app.panel.model import Panel
 from app.robot import Robot
 from app.sentences import say
@@ -71,9 +72,9 @@ def lamps(
     bridge_reason = passable.reason or _first(verdicts, BRIDGE).reason or ""
     node_state, node_text, node_reason = _node(robot, passable, verdicts, silence)
     links = {
-        "server": _link("server", "ok", "ok", "", []),
-        "bridge": _link("bridge", state, text, bridge_reason, labels(panel, verdicts, BRIDGE)),
-        "node": _link("robot", node_state, node_text, node_reason, labels(panel, verdicts, NODE)),
+        "server": _link("server", "ok", "ok", ""),
+        "bridge": _link("bridge", state, text, bridge_reason, *labels(panel, verdicts, BRIDGE)),
+        "node": _link("robot", node_state, node_text, node_reason, *labels(panel, verdicts, NODE)),
     }
     return links, until
 
@@ -84,7 +85,9 @@ def summary(name: str, link: Mapping[str, Lamp]) -> Lamp:
     return Lamp(name=name, state=shown["state"], text=shown["text"])
 
 
-def _link(name: str, state: State, text: str, reason: str, locked: Sequence[str]) -> LinkLamp:
+@lru_cache(maxsize=64)
+def _link(name: str, state: State, text: str, reason: str, *locked: str) -> LinkLamp:
+    """The same lamp, which nobody changes, until it is another one."""
     return LinkLamp(
         name=say(name), state=state, text=say(text), since="", locks=locks(locked), reason=reason
     )
@@ -113,11 +116,12 @@ def silent(panel: Panel, robot: Robot, now: float) -> tuple[str, float]:
     be told of events, and looks old by itself."""
     until = math.inf
     for of in panel.interlocks:
-        key, reading = robot.key(of.topic), robot.reading(of.topic)
-        heard = reading.status in ("message", "unreadable") and robot.graph.on_robot("MP", key)
-        if of.max_age_s is None or not heard:
+        if of.max_age_s is None:
             continue
-        if robot.graph.unheard(key) or misfit("MS", of, robot):
+        key, reading = robot.key(of.topic), robot.reading(of.topic)
+        if reading.status not in ("message", "unreadable") or not robot.graph.on_robot("MP", key):
+            continue
+        if misfit("MS", of, robot):
             continue
         stale_at = reading.at + of.max_age_s
         if now >= stale_at:
@@ -129,7 +133,7 @@ def silent(panel: Panel, robot: Robot, now: float) -> tuple[str, float]:
 def labels(panel: Panel, verdicts: Mapping[str, Verdict], codes: frozenset[str]) -> list[str]:
     """The labels of the controls that are locked for one of these codes."""
     locked = {widget for widget, verdict in verdicts.items() if verdict.code in codes}
-    return [w.label for w in panel.widgets() if w.id in locked] if locked else []
+    return [w.label for w in panel.commands if w.id in locked]
 
 
 def locks(names: Sequence[str]) -> str:
@@ -146,7 +150,7 @@ def locks(names: Sequence[str]) -> str:
 
 
 def _first(verdicts: Mapping[str, Verdict], codes: frozenset[str]) -> Verdict:
-    return next((v for v in verdicts.values() if v.code in codes), Verdict(True))
+    return next((v for v in verdicts.values() if v.code in codes), PERMITTED)
 
 
 def _gone(names: Sequence[str]) -> str:

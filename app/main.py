@@ -22,7 +22,7 @@ from starlette.middleware.gzip import GZipMiddleware
 
 from app import development, logs, simulator, sockets
 from app.assets import Assets, load_assets
-from app.direct import Direct
+from app.direct import Application
 from app.doors import Doors
 from app.errors import KioskError, PanelError
 from app.fleet import Fleet
@@ -88,7 +88,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
                     await asyncio.gather(*tasks, return_exceptions=True)
                     watchdog.end()
 
-    app = FastAPI(
+    app = Application(
         title="Operator panel",
         summary="The HTTP interface of a robot cell's touch panel.",
         lifespan=lifespan,
@@ -100,7 +100,6 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.add_middleware(GZipMiddleware, minimum_size=500)
     app.add_middleware(Doors, hosts=settings.hosts)
     app.add_middleware(InWords)
-    app.add_middleware(Direct)
     for routes in (pages, events, presses, press_socket, control, holds):
         app.include_router(routes.router)
         app.include_router(routes.router, prefix="/robots/{robot}", dependencies=[Depends(named_robot)])

@@ -7,7 +7,7 @@ import logging
 import math
 from collections import Counter
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol
+from typing import Any, Literal, NamedTuple, Protocol
 
 from app.declared import Declared
 from app.errors import DecodeError, FieldError
@@ -31,8 +31,7 @@ class Buffer(Protocol):
     def __len__(self) -> int: ...
 
 
-@dataclass(frozen=True, slots=True)
-class Sample:
+class Sample(NamedTuple):
     """One message as it came: `at` monotonic seconds, `wall` seconds since the epoch.
 
     `source` is the zid of the bridge that sent it (from its timestamp), None if it did not say;

@@ -3,7 +3,7 @@ went though their bridge stayed."""
 
 from collections.abc import Iterator, Mapping
 
-from app.graph import Graph
+from app.graph import Graph, remembered
 from app.keys import Role
 from app.panel.model import Action, Call, Panel
 from app.panel.parameter import DESCRIBE, GET, SET
@@ -33,27 +33,38 @@ class Seen:
 
     def __init__(self, needed: Mapping[End, End]) -> None:
         """`needed`: (role, ROS name) → (role, key expression)."""
-        self._needed = needed
-        self._behind: dict[End, frozenset[str]] = {}
+        self.needed = needed
+        self.behind: dict[End, frozenset[str]] = {}
 
     def follow(self, graph: Graph) -> None:
         """After every change of the graph."""
-        for end, (role, key) in self._needed.items():
+        for end, (role, key) in self.needed.items():
             if bridges := graph.behind(role, key):
-                self._behind[end] = bridges
+                self.behind[end] = bridges
+        graph.known.clear()  # what was found with what was behind them before
 
     def forget(self) -> None:
         """The link was lost: what is seen after it is seen for the first time."""
-        self._behind.clear()
+        self.behind.clear()
 
     def any(self, graph: Graph) -> bool:
         """Whether a node is there that the panel talks with."""
-        return any(graph.on_robot(role, key) for role, key in self._needed.values())
+        return _any(graph, self)
 
     def gone(self, graph: Graph) -> list[str]:
         """The ROS names of what was there and is not, while its bridge is."""
-        return [
-            end[1]
-            for end, bridges in self._behind.items()
-            if bridges & graph.bridges and not graph.on_robot(*self._needed[end])
-        ]
+        return _gone(graph, self)
+
+
+@remembered
+def _any(graph: Graph, seen: Seen) -> bool:
+    return any(graph.on_robot(role, key) for role, key in seen.needed.values())
+
+
+@remembered
+def _gone(graph: Graph, seen: Seen) -> list[str]:
+    return [
+        end[1]
+        for end, bridges in seen.behind.items()
+        if bridges & graph.bridges and not graph.on_robot(*seen.needed[end])
+    ]

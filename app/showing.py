@@ -7,7 +7,6 @@ import asyncio
 import math
 import time
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import replace
 from typing import Protocol
 
 from app.board import Board
@@ -75,7 +74,7 @@ class Showing:
         self.fault = fault
         self._since = Since()
         self._frame_s = 1 / panel.display_hz
-        self._displays = [(robot.key(w.topic), w) for w in panel.widgets() if isinstance(w, Display)]
+        self._displays = [(robot.key(w.topic), w) for w in panel.displays]
         self._seen = self._sight()
         self.lamp = self._seen.robot
         self.board = Board(self._seen.view, revision)
@@ -153,7 +152,8 @@ class Showing:
         self._timer = None if when == math.inf else loop.call_at(when, self._frame)
 
     def _sight(self) -> Sight:
-        faults = (self.fault, self._operators_log.fault, self._recordings_fault())
+        unlogged = self._operators_log.fault
+        faults = (self.fault, unlogged, self._recordings_fault())
         seen = sight(
             self._panel,
             self._robot,
@@ -161,7 +161,9 @@ class Showing:
             robots=self._others.lamps(),
             simulated=self._simulated,
             fault="\n".join(filter(None, faults)),
-            lock=self._operators_log.lock,
+            lock=self._operators_log.lock if unlogged else "",
             control=self._control.view(),
+            control_until=self._control.until,
         )
-        return replace(self._since.dated(seen), rest=min(seen.rest, self._control.until))
+        seen.view["link"] = self._since.dated(seen.view["link"])
+        return seen

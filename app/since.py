@@ -1,12 +1,10 @@
 """Since when each link to the robot is as it is."""
 
 import time
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Mapping
 
 from app.lamps import LinkLamp
 from app.sentences import moment
-from app.views import Sight
 
 BROWSERS_OWN = "server"  # each browser knows for itself since when it is connected
 
@@ -18,13 +16,17 @@ class Since:
         """`wall` gives seconds since the epoch."""
         self._wall = wall
         self._began: dict[str, tuple[tuple[str, str], str]] = {}
+        self._seen: Mapping[str, LinkLamp] = {}
+        self._dated: dict[str, LinkLamp] = {}
 
-    def dated(self, seen: Sight) -> Sight:
-        """The same, with `since` for the links that the server knows of."""
-        link = {name: self._dated(name, lamp) for name, lamp in seen.view["link"].items()}
-        return replace(seen, view={**seen.view, "link": link})
+    def dated(self, links: Mapping[str, LinkLamp]) -> dict[str, LinkLamp]:
+        """The same, with `since` for those that the server knows of."""
+        if links != self._seen:
+            self._seen = links
+            self._dated = {name: self._of(name, lamp) for name, lamp in links.items()}
+        return self._dated
 
-    def _dated(self, name: str, lamp: LinkLamp) -> LinkLamp:
+    def _of(self, name: str, lamp: LinkLamp) -> LinkLamp:
         if name == BROWSERS_OWN:
             return lamp
         state = (lamp["state"], lamp["text"])

@@ -4,15 +4,15 @@ A view is plain JSON values; the browser puts texts and attributes where they be
 nothing.
 """
 
+import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
-from typing import Any, Final, TypedDict
+from typing import Any, Final, NamedTuple, TypedDict
 
 from app.browsers import Browser
 from app.control_view import NO_CONTROL, ControlView
 from app.displays import indicator, readout
 from app.inputs import limits
-from app.interlocks import Verdict, interlock_verdict, press_verdict, way
+from app.interlocks import PERMITTED, Verdict, command_verdict, interlock_verdict, way
 from app.lamps import Lamp, LinkLamp, lamps, summary
 from app.panel.displays import Readout
 from app.panel.inputs import Numeric
@@ -53,8 +53,7 @@ Shown = Input | Pressed | Hold | Display
 NO_OTHERS: Final[Mapping[str, Lamp]] = {}
 
 
-@dataclass(frozen=True, slots=True)
-class Sight:
+class Sight(NamedTuple):
     """A view, the robot's lamp on the pages of others, and when (monotonic seconds) time alone would
     change what the displays show, by their ids, and the `rest`."""
 
@@ -79,15 +78,20 @@ def sight(
     fault: str = "",
     lock: str = "",
     control: ControlView = NO_CONTROL,
+    control_until: float = math.inf,
 ) -> Sight:
     """The view at `now` (monotonic seconds); `fault` stands above it, for `lock` nothing can be
-    pressed, where they are not ""."""
+    pressed, where they are not "". Time alone would change `control` at `control_until`."""
     passable = way(robot, now)
     interlocks = {i.id: interlock_verdict(i, robot, now) for i in panel.interlocks}
-    commands = [widget for widget in panel.widgets() if isinstance(widget, Pressed | Hold)]
-    verdicts = {w.id: press_verdict(w, panel.interlock(w.interlock), robot, now) for w in commands}
+    verdicts = {
+        w.id: command_verdict(
+            w, passable, interlocks[w.interlock] if w.interlock else PERMITTED, robot, now
+        )
+        for w in panel.commands
+    }
     told = {w: Verdict(False, "log", lock) for w in verdicts} if lock else verdicts
-    displays = {w.id: displayed(w, robot, now) for w in panel.widgets() if isinstance(w, Display)}
+    displays = {w.id: displayed(w, robot, now) for w in panel.displays}
     link, until = lamps(panel, robot, passable, told, now)
     banner = say("simulated") if simulated or robot.graph.simulated else ""
     view = View(
@@ -102,7 +106,7 @@ def sight(
         control=control,
     )
     judged = (passable, *interlocks.values(), *verdicts.values())
-    rest = min(until, *(verdict.until for verdict in judged))
+    rest = min(until, control_until, *(verdict.until for verdict in judged))
     return Sight(view, summary(robot.name, link), rest, {w: at for w, (_, at) in displays.items()})
 
 
@@ -111,7 +115,7 @@ def refreshed(seen: Sight, displays: Iterable[Display], robot: Robot, now: float
     widgets, untils = dict(seen.view["widgets"]), dict(seen.displays)
     for widget in displays:
         widgets[widget.id], untils[widget.id] = displayed(widget, robot, now)
-    return replace(seen, view={**seen.view, "widgets": widgets}, displays=untils)
+    return Sight({**seen.view, "widgets": widgets}, seen.robot, seen.rest, untils)
 
 
 def displayed(widget: Display, robot: Robot, now: float) -> tuple[dict[str, Any], float]:

@@ -154,9 +154,9 @@ def test_what_says_all_of_something_is_encoded_once_for_streams_however_far(
     board.post(view_of(robot))
     encoded: list[Any] = []
 
-    def encode(data: Any) -> str:
+    def encode(data: Any) -> bytes:
         encoded.append(data)
-        return json.dumps(data)
+        return json.dumps(data).encode()
 
     monkeypatch.setattr("app.board.ENCODE", encode)
     sent = [events(board.since(version, view)) for version, view in enumerate(views, 1)]

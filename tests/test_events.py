@@ -8,10 +8,11 @@ from typing import Any
 
 import pytest
 from prometheus_client import CollectorRegistry, Gauge
+from starlette.responses import Response
 from starlette.types import Message, Receive, Scope, Send
 
 from app.board import Board
-from app.direct import Direct
+from app.direct import Application, Direct, direct
 from app.robot import Robot
 from app.routes.events import EventStream
 from app.views import View, sight
@@ -220,5 +221,28 @@ def test_its_body_goes_past_the_layers_and_its_begin_through_them() -> None:
         assert through == ["http.response.start"]
         assert len(client.events("snapshot")) == 1
         assert scope == SCOPE
+
+    run(work)
+
+
+def test_none_of_the_applications_own_layers_is_between_a_body_and_the_server() -> None:
+    async def work() -> None:
+        found: list[Send] = []
+
+        class Asking(Response):
+            async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+                found.extend((direct(scope, send), send))
+                await super().__call__(scope, receive, send)
+
+        app = Application(max_body_size=1000)
+        app.add_route("/", lambda _: Asking())
+        client = Client()
+        scope = {"type": "http", "method": "GET", "path": "/", "query_string": b"", "headers": []}
+        server = client.send
+        await app(scope, client.receive, server)
+        own, wrapped = found
+        assert own is server
+        assert wrapped is not server
+        assert client.got[0]["status"] == 200
 
     run(work)

@@ -8,9 +8,8 @@ import pytest
 from app.interlocks import (
     SERVER_SETTLE_S,
     Verdict,
-    call_verdict,
     interlock_verdict,
-    publish_verdict,
+    press_verdict,
     way,
 )
 from app.keys import Qos, bridge_token, server_token
@@ -90,7 +89,7 @@ def test_without_a_way_to_the_robot_everything_is_locked(
     robot: Robot, broken: Callable[[Robot], None], code: str, reason: str
 ) -> None:
     broken(robot)
-    for verdict in (way(robot, NOW), verdict_of(robot), publish_verdict(free(), None, robot, NOW)):
+    for verdict in (way(robot, NOW), verdict_of(robot), press_verdict(free(), None, robot, NOW)):
         assert (verdict.permitted, verdict.code, verdict.reason) == (False, code, reason)
 
 
@@ -199,12 +198,12 @@ def test_a_publisher_that_ended_locks_where_one_is_asked_for(robot: Robot) -> No
 
 
 def test_a_publish_without_an_interlock_needs_a_way_only() -> None:
-    assert publish_verdict(free(), None, robot_there(small_panel()), NOW).permitted
+    assert press_verdict(free(), None, robot_there(small_panel()), NOW).permitted
 
 
 def test_a_publish_to_a_topic_of_another_type_is_locked(robot: Robot) -> None:
     endpoint(robot, "MS", "/free", BOOL)
-    verdict = publish_verdict(free(), None, robot, NOW)
+    verdict = press_verdict(free(), None, robot, NOW)
     assert (verdict.code, verdict.reason) == (
         "wrong_type",
         "/free is std_msgs/msg/Bool on the robot, but this panel is made for std_msgs/msg/String.",
@@ -213,9 +212,9 @@ def test_a_publish_to_a_topic_of_another_type_is_locked(robot: Robot) -> None:
 
 def test_a_publish_has_the_verdict_of_its_interlock(robot: Robot) -> None:
     interlock = Interlock(id="operation", topic=ENABLED)
-    assert publish_verdict(free(), interlock, robot, NOW).permitted
+    assert press_verdict(free(), interlock, robot, NOW).permitted
     permits(robot, False)
-    assert publish_verdict(free(), interlock, robot, NOW).code == "forbidden"
+    assert press_verdict(free(), interlock, robot, NOW).code == "forbidden"
 
 
 @pytest.mark.parametrize("permitted", [True, False])
@@ -245,7 +244,7 @@ def test_a_permission_that_is_published_best_effort_locks_a_panel_that_asks_for_
 def test_a_subscriber_that_would_not_hear_locks_a_press() -> None:
     robot = robot_there(small_panel())
     endpoint(robot, "MS", "/free", TEXT, qos=Qos(transient_local=True))
-    verdict = publish_verdict(free(), None, robot, NOW)
+    verdict = press_verdict(free(), None, robot, NOW)
     assert (
         verdict.reason == "The robot asks for /free transient local; this panel publishes it volatile."
     )
@@ -256,16 +255,16 @@ def test_a_service_that_has_just_come_is_not_called_yet() -> None:
     robot = robot_there(small_panel())
     call = Call(id="reset", kind="call", label="Reset", service="/reset", type="std_srvs/srv/Trigger")
     token = server_token(BRIDGE, "SS", "reset", call.type)
-    assert call_verdict(call, None, robot, NOW).code == "no_service"
+    assert press_verdict(call, None, robot, NOW).code == "no_service"
     robot.graph.apply(token, True, NOW)
-    verdict = call_verdict(call, None, robot, NOW)
+    verdict = press_verdict(call, None, robot, NOW)
     assert (verdict.permitted, verdict.code, verdict.reason, verdict.until) == (
         False,
         "getting_ready",
         "Locked: the robot has just begun to offer /reset; getting ready.",
         NOW + SERVER_SETTLE_S,
     )
-    assert call_verdict(call, None, robot, NOW + SERVER_SETTLE_S).permitted
+    assert press_verdict(call, None, robot, NOW + SERVER_SETTLE_S).permitted
     robot.graph.apply(token, False)
     robot.graph.apply(token, True, NOW + 9)  # another node of this name
-    assert call_verdict(call, None, robot, NOW + 9).code == "getting_ready"
+    assert press_verdict(call, None, robot, NOW + 9).code == "getting_ready"

@@ -1,6 +1,7 @@
 """The descriptions that a panel file becomes. What a key means is in the README."""
 
 from collections.abc import Iterator, Mapping
+from functools import cached_property
 from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, Field
@@ -213,6 +214,15 @@ class Panel(Description):
         for page in self.pages:
             yield from page.widgets
 
+    @cached_property
+    def commands(self) -> "tuple[Pressed | Hold, ...]":
+        """All that can be pressed."""
+        return tuple(w for w in self.widgets() if isinstance(w, Pressed | Hold))
+
+    @cached_property
+    def displays(self) -> "tuple[Display, ...]":
+        return tuple(w for w in self.widgets() if isinstance(w, Display))
+
     def page(self, page_id: str) -> Page | None:
         return next((page for page in self.pages if page.id == page_id), None)
 
@@ -234,7 +244,7 @@ class Panel(Description):
     def listening(self) -> Iterator[Interlock | Display]:
         """All that shows or judges what a topic says."""
         yield from self.interlocks
-        yield from (w for w in self.widgets() if isinstance(w, Display))
+        yield from self.displays
 
     def actions(self) -> dict[str, str]:
         """Action → type of all that the panel may send goals to."""

@@ -2,7 +2,7 @@
 
 from collections import deque
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 from app.robot import Sample
@@ -24,7 +24,7 @@ def taken(key: str, sample: Sample) -> Taken:
     """A large payload is not copied: who writes it turns it into bytes."""
     length = len(sample.payload)
     if length < COPIED:
-        sample = replace(sample, payload=bytes(sample.payload))
+        sample = sample._replace(payload=bytes(sample.payload))
     return Taken(key, sample, length + OVERHEAD)
 
 
