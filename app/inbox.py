@@ -12,9 +12,10 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Any, Final, Protocol
 
-from app.robot import Buffer, Sample
+from app.robot import Buffer, Passed, Sample
 
-BETWEEN_MOST: Final = 16  # changes of a watched topic that are kept from one drain to the next
+BETWEEN_MOST: Final = 256  # changes of a watched topic that are kept from one drain to the next
+BETWEEN_BYTES: Final = 1_000_000  # and their bytes
 KEPT_MOST: Final = 4_000  # samples that are kept whole from one drain to the next, of all topics
 KEPT_BYTES: Final = 32_000_000  # and their bytes
 
@@ -47,6 +48,25 @@ class Changes:
     kept: Collection[tuple[str, Sample]] = ()
 
 
+class _Between:
+    """What came of a topic before the newest and was not looked at, each change once; of too many the
+    newest."""
+
+    __slots__ = ("_bytes", "overrun", "values")
+
+    def __init__(self) -> None:
+        self.values: deque[Passed] = deque()
+        self.overrun = False
+        self._bytes = 0
+
+    def add(self, one: "_Arrived") -> None:
+        self.values.append(Passed(one.payload, one.at, one.wall))
+        self._bytes += len(one.payload)
+        while len(self.values) > BETWEEN_MOST or (self._bytes > BETWEEN_BYTES and len(self.values) > 1):
+            self._bytes -= len(self.values.popleft().payload)
+            self.overrun = True
+
+
 @dataclass(slots=True)
 class _Arrived:
     """A sample as it came; what it says of its source is read when it is drained."""
@@ -57,15 +77,16 @@ class _Arrived:
     at: float
     wall: float
     skipped: int = 0
-    between: tuple[Buffer, ...] = ()
+    between: _Between | None = None
 
     def sample(self, kept: bool = False) -> Sample:
         """When it was sent is for what is kept only: to ask a stamp takes its time."""
         source = None if self.stamp is None else str(self.stamp.get_id())
         sent = self.stamp.get_time().timestamp() if kept and self.stamp is not None else None
-        return Sample(
-            self.payload, self.seq, self.at, self.wall, source, self.skipped, sent, self.between
-        )
+        sample = Sample(self.payload, self.seq, self.at, self.wall, source, self.skipped, sent)
+        if self.between is None:
+            return sample
+        return sample._replace(between=tuple(self.between.values), overrun=self.between.overrun)
 
 
 class Inbox:
@@ -186,8 +207,10 @@ class Inbox:
             self._wake_loop(False)
 
 
-def _between(unseen: _Arrived, newest: Buffer) -> tuple[Buffer, ...]:
-    """What came before the newest and was not looked at, each change once."""
-    if bytes(unseen.payload) == bytes(newest):
-        return unseen.between
-    return (*unseen.between[1 - BETWEEN_MOST :], unseen.payload)
+def _between(unseen: _Arrived, newest: Buffer) -> _Between | None:
+    """What is between the last that was looked at and the newest."""
+    between = unseen.between
+    if bytes(unseen.payload) != bytes(newest):
+        between = between or _Between()
+        between.add(unseen)
+    return between

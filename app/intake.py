@@ -73,8 +73,12 @@ class Intake:
         # What permits and forbids comes first, and nothing that fails keeps it from being taken in.
         ordered = sorted(changes.samples.items(), key=lambda one: one[0] not in self._interlocks)
         for key, sample in ordered:
-            for payload in sample.between:
-                if self._changes(key, sample._replace(payload=payload, between=()), shown()):
+            if sample.overrun and key in self._interlocks:
+                self._robot.doubt(key)
+                show()
+            for payload, at, wall in sample.between:
+                passed = sample._replace(payload=payload, at=at, wall=wall, between=())
+                if self._changes(key, passed, shown()):
                     show()
             news.urgent |= self._changes(key, sample, shown())
             if key in self._feedback or key in self._status or key == self._events:

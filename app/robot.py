@@ -31,13 +31,22 @@ class Buffer(Protocol):
     def __len__(self) -> int: ...
 
 
+class Passed(NamedTuple):
+    """A payload that came and went before anybody looked, and when: see `Sample`."""
+
+    payload: Buffer
+    at: float
+    wall: float
+
+
 class Sample(NamedTuple):
     """One message as it came: `at` monotonic seconds, `wall` seconds since the epoch.
 
     `source` is the zid of the bridge that sent it (from its timestamp), None if it did not say;
     `seq` orders samples and losses of bridges as this session saw them; `skipped` is how many came
     just before it that nobody looked at; `sent` is the timestamp of its sender's clock, in seconds
-    since the epoch; `between` are other payloads that came and went unseen, for watched topics.
+    since the epoch; `between` are other payloads that came and went unseen, for watched topics, and
+    `overrun` says that there were more before these, of which nobody knows what they said.
     """
 
     payload: Buffer
@@ -47,7 +56,8 @@ class Sample(NamedTuple):
     source: str | None
     skipped: int = 0
     sent: float | None = None
-    between: tuple[Buffer, ...] = ()
+    between: tuple[Passed, ...] = ()
+    overrun: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,6 +136,11 @@ class Robot:
                 sample = self._samples.get(key)
                 if sample is not None and sample.seq < before:
                     self._cut(key, sample)
+
+    def doubt(self, key: str) -> None:
+        """It is not known what a topic said last."""
+        if sample := self._samples.get(key):
+            self._cut(key, sample)
 
     def lose(self) -> None:
         """The link is lost: nobody is known to be there, and nothing that came says what is so."""

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from app.inbox import BETWEEN_MOST, KEPT_BYTES, KEPT_MOST, Inbox
+from app.inbox import BETWEEN_BYTES, BETWEEN_MOST, KEPT_BYTES, KEPT_MOST, Inbox
 
 
 class Sent:
@@ -103,11 +103,25 @@ def test_history_that_comes_after_what_is_newer_is_passed_over(inbox: Inbox) -> 
 def test_of_a_watched_topic_each_change_in_between_is_kept(inbox: Inbox) -> None:
     for said in (b"yes", b"no", b"no", b"yes"):
         inbox.put("permit", said, None)
-    assert inbox.drain().samples["permit"].between == (b"yes", b"no")
-    for number in range(100):
+    sample = inbox.drain().samples["permit"]
+    assert ([one.payload for one in sample.between], sample.overrun) == ([b"yes", b"no"], False)
+    assert sorted(one.at for one in sample.between) == [one.at for one in sample.between]
+    assert sample.between[-1].at <= sample.at
+
+
+def test_of_too_many_changes_it_is_said_that_some_are_not_known(inbox: Inbox) -> None:
+    for number in range(BETWEEN_MOST + 1):
         inbox.put("permit", b"%d" % number, None)
-    between = inbox.drain().samples["permit"].between
-    assert between == tuple(b"%d" % number for number in range(99 - BETWEEN_MOST, 99))
+    assert not inbox.drain().samples["permit"].overrun
+    for number in range(BETWEEN_MOST + 2):
+        inbox.put("permit", b"%d" % number, None)
+    sample = inbox.drain().samples["permit"]
+    assert [one.payload for one in sample.between] == [b"%d" % n for n in range(1, BETWEEN_MOST + 1)]
+    assert sample.overrun
+    for number in range(5):
+        inbox.put("permit", b"%d" % number * (BETWEEN_BYTES // 2), None)
+    sample = inbox.drain().samples["permit"]
+    assert (len(sample.between), sample.overrun) == (2, True)
 
 
 def test_what_is_kept_whole_has_every_sample_in_order(inbox: Inbox) -> None:

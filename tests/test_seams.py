@@ -21,7 +21,7 @@ from app.log import Unlogged
 from app.logs import RobotLog
 from app.panel.model import Panel
 from app.receipts import LONGEST_KEPT, By, Receipt
-from app.robot import Robot, Sample
+from app.robot import Passed, Robot, Sample
 from app.views import Enabled, sight
 from tests.builders import (
     BOOL,
@@ -48,7 +48,8 @@ def flag(value: bool) -> bytes:
 
 
 def sample(payload: bytes, *between: bytes) -> Sample:
-    return Sample(payload, 9, NOW, NOW, BRIDGE, between=between)
+    passed = tuple(Passed(one, NOW, NOW) for one in between)
+    return Sample(payload, 9, NOW, NOW, BRIDGE, between=passed)
 
 
 class Broken:
@@ -110,6 +111,24 @@ def test_a_permission_that_blinked_is_shown_in_between() -> None:
     intake.take(blink, page.shown, page.show)
     assert page.said == [True, False]
     assert robot.reading(ENABLED).message.data is True
+
+
+def test_of_what_a_permission_said_too_fast_to_be_kept_nothing_is_taken_for_true() -> None:
+    panel = small_panel()
+    robot = robot_there(panel)
+    permits(robot)
+    page = Page(panel, robot)
+    shown: list[bool] = []
+
+    def show() -> None:
+        page.show()
+        shown.append(page.shown()["operation"]["enabled"])
+
+    overrun = sample(flag(True), flag(True))._replace(overrun=True)
+    intake_of(panel, robot, Deaf()).take(
+        Changes({robot.key(ENABLED): overrun}, {}, True), page.shown, show
+    )
+    assert shown == [False, True]
 
 
 def test_a_permission_that_is_said_again_is_not_urgent() -> None:
