@@ -209,14 +209,20 @@ def _templates(dev: bool) -> Environment:
 def _on_end(end: Callable[[], object]) -> Iterator[None]:
     """Calls `end` as soon as the process is told to end, before whoever listened for that.
 
-    uvicorn waits for open streams before it runs the lifespan's end: they must end first.
+    uvicorn waits for open streams before it runs the lifespan's end: they must end first. A terminal
+    that closes ends it in the same order; started by nohup, it goes on.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    previous = {n: signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM)}
+    previous = {n: signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    if previous[signal.SIGHUP] is not signal.SIG_DFL:
+        del previous[signal.SIGHUP]
 
     def on_signal(number: int, frame: FrameType | None) -> None:
+        if number == signal.SIGHUP:
+            signal.raise_signal(signal.SIGTERM)
+            return
         end()
         then = previous[signal.Signals(number)]
         if callable(then):
