@@ -32,7 +32,7 @@ class Board:
         self.view = view
         self.revision = revision
         self.heartbeat = Heartbeat(self._wake)
-        self._waiting: list[asyncio.Future[None]] = []
+        self._changed = asyncio.Event()
         self._news: Events = {}  # from the view before to this one
         self._prepared: dict[int, bytes] = {}
         self._whole: dict[str, bytes] = {}
@@ -69,17 +69,13 @@ class Board:
         self._wake()
 
     def _wake(self) -> None:
-        waiting, self._waiting = self._waiting, []
-        for one in waiting:
-            if not one.done():  # whose stream has ended meanwhile
-                one.set_result(None)
+        changed, self._changed = self._changed, asyncio.Event()
+        changed.set()
 
     async def news(self, version: int, beats: int) -> None:
         """Waits for a version after `version`, a heartbeat after `beats`, or the end."""
         if not self.closed and (self.version, self.heartbeat.count) == (version, beats):
-            waiting = asyncio.get_running_loop().create_future()
-            self._waiting.append(waiting)
-            await waiting
+            await self._changed.wait()
 
     def snapshot(self) -> bytes:
         """The `snapshot` event: everything that the page shows."""
