@@ -186,7 +186,7 @@ def test_each_of_two_robots_has_its_own_bridge_permission_and_presses(
     assert first.press("operation1", "late").status_code == 503
     assert kiosk.http.get("/readyz").json()["robots"] == {"r1": "no_link", "r2": "permitted"}
     bridges[0].start()
-    until(lambda: "waiting" in (first.widget("operation1")["reason"] or ""), "joined again", 20)
+    until(kiosk.ready, "joined again", 20)
     assert second.widget("operation1")["enabled"]
     assert nodes[0].heard_data("/operation1") == ["one"]
 
