@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, Error, Page, expect
 
-from tests.parts import CHROMIUM, CHROMIUM_FLAGS, ROOT, Server, until
+from tests.parts import CHROMIUM, CHROMIUM_FLAGS, ROOT, TAP_AGAIN_MS, Server, until
 from tests.test_control_over_http import control_panel
 
 IDLE_S = 4.0
@@ -250,6 +250,7 @@ def test_without_scripts_forms_do_the_same(kiosk: Server, opens: Opens) -> None:
     locked_by(first, "Nobody has control of the robot")
     tap(first, "Take control")
     expect(bar(first)).to_contain_text("This panel has control")
+    first.wait_for_timeout(TAP_AGAIN_MS)
     sends(first)
     second.reload()
     locked_by(second, "Panel 1 (192.0.2.1) has control of the robot.")
@@ -259,6 +260,7 @@ def test_without_scripts_forms_do_the_same(kiosk: Server, opens: Opens) -> None:
     tap(first, "Give")
     locked_by(first, "Panel 2 (192.0.2.2) has control of the robot.")
     second.reload()
+    second.wait_for_timeout(TAP_AGAIN_MS)
     sends(second)
     tap(second, "Give up control")
     locked_by(second, "Nobody has control of the robot")

@@ -338,17 +338,27 @@ def test_a_server_that_stood_still_has_ended_it_when_it_wakes(demo: Server) -> N
         assert "the panel's server stood still" in said["reason"]
 
 
-def test_a_terminal_that_closes_ends_it_as_any_end_of_the_server(tmp_path: Path) -> None:
+@pytest.fixture
+def at_a_terminal() -> Iterator[None]:
+    """The tests themselves may run under nohup, which what they start would inherit."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    yield
+    signal.signal(signal.SIGHUP, before)
+
+
+@pytest.mark.usefixtures("at_a_terminal")
+def test_a_terminal_that_closes_ends_it_as_any_end_of_the_server(
+    tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
     panel = tmp_path / "jog.toml"
     panel.write_text(PANEL)
-    mine = Server(ROOT, KIOSK_PANEL=str(panel), KIOSK_MODE="demo")
+    mine = servers(Server(ROOT, KIOSK_PANEL=str(panel), KIOSK_MODE="demo"))
     until(mine.ready, "ready")
     with held(mine) as socket:
         mine.process.send(signal.SIGHUP)
         said = socket.beat_until_it_ends()
     assert said["outcome"] == "aborted"
     assert "the panel's server stops" in said["reason"]
-    mine.end()
 
 
 def test_a_new_panel_ends_what_is_held_by_the_old_one(tmp_path: Path) -> None:
