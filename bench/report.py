@@ -164,6 +164,7 @@ def start_table(results: Results, titles: Titles) -> str:
     columns = {
         "process → HTTP 200, s": of("answers_s", ".2f"),
         "→ commands reach the robot, s": of("ready_s", ".2f"),
+        "the first time, s": of("first_ready_s", ".2f"),
         "page's answer, ms": of("html_ms", ".1f"),
         "request → state shown, ms": of("shown_ms", ".0f"),
         "bytes": of("bytes", ",.0f"),

@@ -50,6 +50,13 @@ QUICK: Final = Sizes(
 )
 
 
+@contextmanager
+def scratch(peer: Peer) -> Iterator[Path]:
+    """A folder for a peer, removed in the end."""
+    with tempfile.TemporaryDirectory(prefix=f"bench-{peer.id}-") as folder:
+        yield Path(folder)
+
+
 class Rig:
     """Opened and closed as a context; whatever happens, it ends what it started."""
 
@@ -95,12 +102,18 @@ class Rig:
 
     @contextmanager
     def running(
-        self, peer: Peer, topics: Sequence[str] = (), router: str = "", buttons: int = 1
+        self,
+        peer: Peer,
+        topics: Sequence[str] = (),
+        router: str = "",
+        buttons: int = 1,
+        folder: Path | None = None,
     ) -> Iterator[Running]:
-        """A peer's server, alone: no other gets what the robot says meanwhile."""
+        """A peer's server, alone: no other gets what the robot says meanwhile. Without a `folder` it
+        has a new one."""
         with ExitStack() as stack:
-            folder = stack.enter_context(tempfile.TemporaryDirectory(prefix=f"bench-{peer.id}-"))
-            place = Place(router or self.robot.first, DOMAIN, Path(folder), tuple(topics), buttons)
+            folder = folder or stack.enter_context(scratch(peer))
+            place = Place(router or self.robot.first, DOMAIN, folder, tuple(topics), buttons)
             self.robot("offer", way=peer.robot, topics=list(topics))
             began = time.monotonic()
             server = peer.start(place)
