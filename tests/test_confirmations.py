@@ -2,6 +2,7 @@
 
 import asyncio
 import itertools
+import logging
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,11 +13,26 @@ from playwright.sync_api import Browser, Page, expect
 from app import confirmations
 from app.confirmations import Confirmations, equal
 from app.errors import PanelError
+from app.inbox import Changes
+from app.intake import Intake
+from app.logs import RobotLog
 from app.panel import load_panel
 from app.panel.model import Panel
 from app.receipts import Receipt
-from app.robot import Robot
-from tests.builders import BOOL, FREE, FROM, HEARD, MESSAGE, presses_of, robot_there, says
+from app.robot import Passed, Robot, Sample
+from tests.builders import (
+    BOOL,
+    BRIDGE,
+    FREE,
+    FROM,
+    HEARD,
+    INTERFACES,
+    MESSAGE,
+    TEXT,
+    presses_of,
+    robot_there,
+    says,
+)
 from tests.builders import panel_of as panel_with
 from tests.parts import ROOT, TAP_AGAIN_MS, Server, until
 from tests.test_presses import Way
@@ -69,6 +85,35 @@ def test_a_command_is_confirmed_by_what_comes_after_it() -> None:
     receipt = asyncio.run(pressed())
     assert receipt.outcome == "confirmed"
     assert receipt.reason.startswith("Confirmed by /heard at ")
+
+
+def test_what_came_unseen_confirms_by_when_it_came() -> None:
+    """All in one turn: of what came and went before the newest, only what is later than the command."""
+
+    async def pressed(came_at: float) -> Receipt:
+        panel = panel_of()
+        desk = Desk(panel)
+        deaf: Any = object()
+        intake = Intake(
+            panel,
+            desk.robot,
+            deaf,
+            desk.confirmations,
+            deaf,
+            None,
+            RobotLog(logging.getLogger("x"), ""),
+        )
+        press = asyncio.create_task(desk.press())
+        await asyncio.sleep(0)
+        on, off = (INTERFACES.encode(TEXT, {"data": text}) for text in ("on", "off"))
+        between = (Passed(on, came_at, came_at),)
+        newest = Sample(off, 9, 100.2, 100.2, BRIDGE, between=between)
+        changes = Changes({desk.robot.key("/heard"): newest}, {}, link_up=True)
+        intake.take(changes, dict, lambda: None)
+        return await press
+
+    outcomes = [asyncio.run(pressed(came_at)).outcome for came_at in (99.9, 100.1)]
+    assert outcomes == ["unknown", "confirmed"]
 
 
 def test_without_its_effect_it_is_not_known_and_later_corrected() -> None:
