@@ -1,6 +1,5 @@
 """`uvicorn app.main:app`: the only wiring."""
 
-from app import unread  # noqa: F401
 from app.collector import resume
 
 # isort: split

@@ -10,7 +10,6 @@ from app.settings import PACKAGE
 
 # A module imports only from those that stand before it.
 ORDER = (
-    "app.unread",
     "app.collector",
     "app.errors",
     "app.settings",

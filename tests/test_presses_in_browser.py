@@ -39,14 +39,6 @@ DOUBLE_TAP_MS: Final = 150
 MADE_BY: Final = ("mouse", "finger", "Enter", "Space", *PROGRAMS)
 
 
-@pytest.fixture(scope="module")
-def demo() -> Iterator[Server]:
-    mine = Server(ROOT)
-    until(mine.ready, "ready")
-    yield mine
-    mine.end()
-
-
 @pytest.fixture
 def shown(demo: Server, page: Page) -> Page:
     """Its page, that notes what leaves."""
@@ -207,12 +199,25 @@ def without_scripts(chromium: Browser) -> Iterator[Page]:
     context.close()
 
 
-def test_a_key_that_is_held_down_is_one_press(
-    tmp_path: Path, servers: Callable[[Server], Server], page: Page
-) -> None:
-    mine = servers(many_buttons(tmp_path, asks=False))
-    until(mine.ready, "ready")
-    page.goto(mine.url)
+Opens = Callable[[Page, bool], Server]
+
+
+@pytest.fixture
+def opens(tmp_path: Path, servers: Callable[[Server], Server]) -> Opens:
+    """Opens a page of many buttons that ask or do not, long enough ago to be read."""
+
+    def opened(page: Page, asks: bool) -> Server:
+        mine = servers(many_buttons(tmp_path, asks))
+        until(mine.ready, "ready")
+        page.goto(mine.url)
+        page.wait_for_timeout(TAP_AGAIN_MS)
+        return mine
+
+    return opened
+
+
+def test_a_key_that_is_held_down_is_one_press(opens: Opens, page: Page) -> None:
+    mine = opens(page, False)
     start(page, 1).focus()
     for _ in range(60):  # two seconds of a keyboard's repeats
         page.keyboard.down("Enter")
@@ -224,12 +229,8 @@ def test_a_key_that_is_held_down_is_one_press(
     until(lambda: pressed(mine) == 2, "a second press of the key is a second one")
 
 
-def test_the_second_tap_of_a_press_that_asks_is_no_answer(
-    tmp_path: Path, servers: Callable[[Server], Server], page: Page
-) -> None:
-    mine = servers(many_buttons(tmp_path, asks=True))
-    until(mine.ready, "ready")
-    page.goto(mine.url)
+def test_the_second_tap_of_a_press_that_asks_is_no_answer(opens: Opens, page: Page) -> None:
+    mine = opens(page, True)
     start(page, 3).click()
     dialog = page.get_by_role("dialog")
     yes = dialog.locator(".yes").bounding_box()
@@ -253,13 +254,8 @@ def middle(page: Page, number: int) -> float:
     return float(box["y"] + box["height"] / 2)
 
 
-def test_without_scripts_too(
-    tmp_path: Path, servers: Callable[[Server], Server], without_scripts: Page
-) -> None:
-    page, mine = without_scripts, servers(many_buttons(tmp_path, asks=True))
-    until(mine.ready, "ready")
-    page.goto(mine.url)
-    page.wait_for_timeout(TAP_AGAIN_MS)
+def test_without_scripts_too(opens: Opens, without_scripts: Page) -> None:
+    page, mine = without_scripts, opens(without_scripts, True)
     start(page, 1).click()
     yes = page.locator(".yes").bounding_box()
     assert yes is not None
@@ -272,12 +268,9 @@ def test_without_scripts_too(
 
 
 def test_without_scripts_a_double_tap_is_one_press_and_its_receipt_stays(
-    tmp_path: Path, servers: Callable[[Server], Server], without_scripts: Page
+    opens: Opens, without_scripts: Page
 ) -> None:
-    page, mine = without_scripts, servers(many_buttons(tmp_path, asks=False))
-    until(mine.ready, "ready")
-    page.goto(mine.url)
-    page.wait_for_timeout(TAP_AGAIN_MS)
+    page, mine = without_scripts, opens(without_scripts, False)
     box = start(page, 1).bounding_box()
     assert box is not None
     double_tap(page, box["x"] + 20, box["y"] + 20)

@@ -101,11 +101,12 @@ def _many_numbers(kind: Type, order: Order) -> Read:
     return many
 
 
-def _viewed(data: "memoryview[int]", form: str, order: Order) -> Any:
+def _viewed(data: "memoryview[int]", form: Any, order: Order) -> Any:
+    """A list of numbers as `struct` names their format."""
     if form == "?":
         return [byte != 0 for byte in data]
     if order == NATIVE:
-        return data.cast(form)  # type: ignore[call-overload]
+        return data.cast(form)
     turned = array(form, data.tobytes())
     turned.byteswap()
     return memoryview(turned)

@@ -1,4 +1,4 @@
-const TAP_AGAIN_MS = 700;
+import { TAP_AGAIN_MS } from "./press.js";
 
 // A press that asks first: what will be done, with which values. Its "yes" is the press.
 export function asked(root, form, yes) {

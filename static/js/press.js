@@ -1,7 +1,7 @@
 // A press: on release, once, with an id of its own; its receipt is shown where it was pressed.
 const ANSWER_WITHIN_MS = 5000;
 // Two taps of a finger come within this time: the second one is the same press.
-const TAP_AGAIN_MS = 700;
+export const TAP_AGAIN_MS = 700;
 // A page that nobody touches for so long gives its socket back.
 const UNTOUCHED_MS = 60_000;
 
