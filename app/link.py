@@ -23,6 +23,7 @@ Config = zenoh.Config
 
 ASK_TIMEOUT_S = 2.0
 MOST_QUEUED = 16  # batches; Zenoh takes no more
+COPIED_MOST = 16_384  # bytes of a sample
 BLOCKED_MOST_US = 200_000  # how long a put or a question may wait for room: less than a hold's lease
 
 # Zenoh's own setting of its threads, read when its first session opens. By default the thread that
@@ -85,6 +86,12 @@ def _translated(doing: str) -> Iterator[None]:
         yield
     except zenoh.ZError as error:
         raise LinkError(f"{doing}: {error}") from error
+
+
+def _own(payload: zenoh.ZBytes) -> bytes | zenoh.ZBytes:
+    """A payload that may be kept for long: a small one is a part of what the network was read into,
+    and would keep all of that, so that the next message has to be read into another."""
+    return payload if len(payload) > COPIED_MOST else payload.to_bytes()
 
 
 class Link:
@@ -163,7 +170,7 @@ class Link:
         return declare_advanced_subscriber(
             self._session,
             key,
-            self._direct(lambda sample: put(key, sample.payload, sample.timestamp)),
+            self._direct(lambda sample: put(key, _own(sample.payload), sample.timestamp)),
             history=HistoryConfig(detect_late_publishers=True, max_samples=1),
         )
 

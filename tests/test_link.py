@@ -6,6 +6,7 @@ import subprocess
 import sys
 import threading
 import time
+from functools import partial
 from pathlib import Path
 
 import zenoh
@@ -14,10 +15,16 @@ from zenoh.handlers import Callback
 from app import keys
 from app.keys import Qos
 from app.link import BLOCKED_MOST_US, Link, config_to
+from app.robot import Sample
 from tests.parts import free_port, until
 
 RENEWALS = 30
 BURST = 500
+
+
+def resident_kb() -> int:
+    status = Path("/proc/self/status").read_text()
+    return next(int(line.split()[1]) for line in status.splitlines() if line.startswith("VmRSS"))
 
 
 def tokens(zid: str, count: int) -> list[str]:
@@ -178,3 +185,27 @@ def test_of_a_watched_topic_what_came_and_went_between_two_drains_is_kept(
     time.sleep(0.5)
     assert [bytes(one.payload) for one in link.drain().samples["a"].between] == [b"yes", b"no"]
     link.close()
+
+
+def test_a_small_message_does_not_keep_all_that_it_was_read_with(
+    peer: tuple[str, zenoh.Session],
+) -> None:
+    """The latest of each topic stays for long: each kept a buffer of 64 kB, of which some was used."""
+    endpoint, session = peer
+    topics = [f"topic{number}" for number in range(300)]
+    link = Link(config_to(endpoint), lambda _: None)
+    link.start(topics, [])
+    until(lambda: link.drain().link_up, "a link")
+    before = resident_kb()
+    kept: dict[str, Sample] = {}
+
+    def came() -> int:
+        kept.update(link.drain().samples)
+        return len(kept)
+
+    for number, topic in enumerate(topics, 1):  # each in a message of its own
+        session.put(topic, b"small")
+        until(partial(lambda wanted: came() == wanted, number), f"{topic} came")
+    grown_kb = resident_kb() - before
+    link.close()
+    assert grown_kb < len(topics) * 4
