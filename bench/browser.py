@@ -112,6 +112,15 @@ class Watched:
             return True
         return False
 
+    def followed(self) -> None:
+        """Waits until each topic shows a numbered text of the robot's."""
+        for topic in self._topics:
+            self.page.wait_for_function(
+                "(value) => document.querySelector(value)?.textContent.startsWith('#')",
+                arg=value_of(topic),
+                timeout=WITHIN_MS,
+            )
+
     def watch(self) -> None:
         self.page.evaluate(WATCH, [self._shown, [value_of(topic) for topic in self._topics]])
 

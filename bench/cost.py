@@ -9,6 +9,7 @@ from bench.figures import percentile
 from bench.parts import Meter, crowd, family, rss_mib
 from bench.peer import Peer, Running
 from bench.rig import Rig
+from bench.unattended import Unattended
 from tests.commanded import Commanded
 
 RATES: Final = (0, 100, 1000)
@@ -31,33 +32,39 @@ def cost(rig: Rig, peer: Peer) -> Figures:
 def single(rig: Rig, peer: Peer) -> Figures:
     """One topic and one page: memory at rest, cost of each rate."""
     topics = (TOPIC,)
-    with rig.running(peer, topics) as server, rig.page(peer, server, peer.robot, topics):
+    with rig.running(peer, topics) as server, rig.unattended(peer, server, topics) as browser:
         time.sleep(SETTLE_S)
         found = {"rest_mib": rss_mib(family(server.pids))}
         for hz in RATES:
-            found |= loaded(rig, peer, server, topics, hz, f"{hz}")
+            found |= loaded(rig, peer, server, browser, topics, hz, f"{hz}")
         return found
 
 
 def wide(rig: Rig, peer: Peer) -> Figures:
     """A hundred topics on one page."""
-    with rig.running(peer, WIDE) as server, rig.page(peer, server, peer.robot, WIDE):
+    with rig.running(peer, WIDE) as server, rig.unattended(peer, server, WIDE) as browser:
         time.sleep(SETTLE_S)
-        return loaded(rig, peer, server, WIDE, WIDE_HZ, "wide")
+        return loaded(rig, peer, server, browser, WIDE, WIDE_HZ, "wide")
 
 
 def loaded(
-    rig: Rig, peer: Peer, server: Running, topics: Sequence[str], hz: float, name: str
+    rig: Rig,
+    peer: Peer,
+    server: Running,
+    browser: Unattended,
+    topics: Sequence[str],
+    hz: float,
+    name: str,
 ) -> Figures:
     """Server and browser while the robot says so much."""
     if hz:
         rig.robot("load", ways=[peer.robot], topics=list(topics), hz=hz, size=SIZE)
         time.sleep(SETTLE_S / 2)
-    servers, browser = Meter(lambda: family(server.pids)), Meter(rig.chromium.pids)
+    servers, shown = Meter(lambda: family(server.pids)), Meter(browser.pids)
     time.sleep(rig.sizes.window_s)
     found = {
         f"server_{name}": servers.percent(),
-        f"browser_{name}": browser.percent(),
+        f"browser_{name}": shown.percent(),
         f"rss_{name}": rss_mib(family(server.pids)),
     }
     rig.robot("quiet")

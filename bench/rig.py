@@ -14,6 +14,7 @@ from playwright.sync_api import sync_playwright
 from bench.browser import Chromium, Watched
 from bench.parts import robot
 from bench.peer import Peer, Place, Running
+from bench.unattended import Unattended
 from tests.parts import Bridge
 
 DOMAIN: Final = 97
@@ -130,6 +131,26 @@ class Rig:
         with self.chromium.page(server.url, peer.shown, topics) as page:
             self.permit(way, page)
             yield page
+
+    @contextmanager
+    def unattended(
+        self, peer: Peer, server: Running, topics: Sequence[str] = ()
+    ) -> Iterator[Unattended]:
+        """A browser of its own with its page, permitted by the robot; where the robot has said
+        something meanwhile, the page has to show that in the end."""
+        with tempfile.TemporaryDirectory(
+            prefix="bench-chromium-", ignore_cleanup_errors=True
+        ) as profile:
+            browser = Unattended(self._playwright, Path(profile))
+            try:
+                with browser.attached() as page:
+                    page.goto(server.url)
+                    self.permit(peer.robot, Watched(page, peer.shown))
+                yield browser
+                with browser.attached() as page:
+                    Watched(page, peer.shown, topics).followed()
+            finally:
+                browser.close()
 
     def permit(self, way: str, page: Watched) -> None:
         self.robot("repeat", way=way, values=[True], period_s=SAID_EVERY_S)
