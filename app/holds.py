@@ -6,39 +6,29 @@ a hold ends, it is not sent at all.
 """
 
 import asyncio
-import logging
 import secrets
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
-from typing import Any, Final, NamedTuple, Protocol
+from typing import Any, Protocol
 
 from app.errors import FieldError, InputError, LinkError, NotFound
 from app.hold_messages import Checked, Filled, HoldMessages, Way
+from app.hold_receipts import RELEASED, Holding, HoldReceipts, Refusal, refused
 from app.interfaces import Interfaces
 from app.interlocks import Verdict
 from app.leases import LEASE_S, Lease
-from app.logs import RobotLog
 from app.panel.model import Hold, Panel
 from app.panel.template import needed
-from app.progress import Answer, Outcome
 from app.receipts import (
-    LONGEST_LOGGED,
     By,
     Cause,
     Receipt,
     Witness,
     cause_of,
     judged,
-    named,
-    receipt_of,
 )
 from app.robot import Robot
 from app.sentences import clock, say
-
-log = logging.getLogger("kiosk.holds")
-
-RELEASED: Final = "hold_released"
 
 
 class Clock(Protocol):
@@ -46,27 +36,6 @@ class Clock(Protocol):
 
     def time(self) -> float: ...
     def call_at(self, when: float, callback: Callable[[], object]) -> asyncio.TimerHandle: ...
-
-
-@dataclass(slots=True, eq=False)
-class Holding:
-    """A hold that is going on; `told` gets its receipt when it ends, whatever ends it."""
-
-    widget: Hold
-    lease: Lease
-    by: By
-    inputs: Mapping[str, Any]
-    filled: Filled
-    told: Callable[[Receipt], None]
-    since: str
-    sent: int = 0
-
-
-class _Refusal(NamedTuple):
-    """Why a hold may not begin: a sentence, and its receipt's cause."""
-
-    why: str
-    cause: Cause
 
 
 class Holds:
@@ -89,10 +58,10 @@ class Holds:
         has come from the robot; `changed` is called when what the widgets show has changed."""
         self._panel = panel
         self._robot = robot
-        self._log = RobotLog(log, robot.name)
         self._loop = loop
         self._messages = HoldMessages(interfaces, robot, way, checked)
-        self._witness = witness
+        self._receipts = HoldReceipts(robot.name, witness)
+        self.doubted = self._receipts.doubted
         self._take = take
         self._changed = changed
         self._widgets = {w.id: w for w in panel.widgets() if isinstance(w, Hold)}
@@ -121,17 +90,14 @@ class Holds:
         self.judge()
         widget, now = self.widget(widget_id), self._loop.time()
         ready = self._ready(widget, inputs, sent, by, now)
-        if isinstance(ready, _Refusal):
-            return self._refused(widget, inputs, by, ready, hold_id)
+        if isinstance(ready, Refusal):
+            return self._receipts.refused(widget, inputs, by, ready, hold_id)
         lease = Lease.begun(hold_id or secrets.token_hex(8), widget.period_s, sent, now)
         since = say("hold_since", time=clock(time.time()))
         holding = Holding(widget, lease, by, needed(widget, inputs), ready, told, since)
         self._held[widget_id] = holding
-        if self._witness is not None:
-            self._witness.pressed(lease.id, widget.id, named(by.origin), holding.inputs)
         self._robot.held[widget_id] = since
-        self._log.info("hold %s of %s by %s with %.*s begins", lease.id, widget_id, named(by.origin),
-                LONGEST_LOGGED, holding.inputs)  # fmt: skip
+        self._receipts.began(holding)
         self._changed()
         self.step()
         return holding
@@ -148,10 +114,10 @@ class Holds:
     ) -> Receipt:
         """A hold that is not even judged; it may leave a trace or none."""
         widget = self.widget(widget_id)
-        refusal = _Refusal(why, cause)
+        refusal = Refusal(why, cause)
         if trace:
-            return self._refused(widget, {}, by, refusal, hold_id)
-        return _receipt(widget, {}, refusal, hold_id)
+            return self._receipts.refused(widget, {}, by, refusal, hold_id)
+        return refused(widget, {}, refusal, hold_id)
 
     def refusal(self, widget_id: str, inputs: Mapping[str, Any], sent: float, by: By) -> Receipt | None:
         """The receipt of a hold that `begin` would refuse now, without a trace; None for others."""
@@ -159,19 +125,19 @@ class Holds:
         self.judge()
         widget = self.widget(widget_id)
         ready = self._ready(widget, inputs, sent, by, self._loop.time())
-        return _receipt(widget, inputs, ready) if isinstance(ready, _Refusal) else None
+        return refused(widget, inputs, ready) if isinstance(ready, Refusal) else None
 
     def _ready(
         self, widget: Hold, inputs: Mapping[str, Any], sent: float, by: By, now: float
-    ) -> Filled | _Refusal:
+    ) -> Filled | Refusal:
         """What it would publish if it began now, or why it may not."""
         why, cause = self._ground(widget, sent, by, now)
         if why:
-            return _Refusal(why, cause)
+            return Refusal(why, cause)
         try:
             return self._messages.filled(widget, inputs)
         except (FieldError, InputError) as error:
-            return _Refusal(f"{error}.", "input")
+            return Refusal(f"{error}.", "input")
 
     def _ground(self, widget: Hold, sent: float, by: By, now: float) -> tuple[str, Cause]:
         """Why it may not begin now, "" if it may."""
@@ -212,15 +178,6 @@ class Holds:
         """Ends all for good."""
         self._closed = True
         self.end_all("hold_by_stopping")
-
-    def doubted(self, receipt: Receipt) -> Receipt:
-        """The receipt of a hold whose last message is not known to have reached the bridge."""
-        doubt = say("hold_unanswered")
-        self._log.warning("hold %s of %s:%s", receipt.id, receipt.widget, doubt)
-        receipt = replace(receipt, outcome="unknown", reason=receipt.reason + doubt)
-        if self._witness is not None:
-            self._witness.answered(receipt)
-        return receipt
 
     def judge(self) -> None:
         """Ends what has lost its ground: after every change, and before anything goes on."""
@@ -273,36 +230,6 @@ class Holds:
         del self._held[widget.id]
         del self._robot.held[widget.id]
         unsaid = self._messages.put_last(widget, holding.filled, now)
-        seconds = now - holding.lease.begun_at
-        at = clock(time.time())
-        sentence = RELEASED if code == RELEASED else "hold_ended"
-        text = say(sentence, time=at, seconds=f"{seconds:.1f}", why=why)
-        text += say("hold_unsaid", why=unsaid) if unsaid else ""
-        outcome: Outcome = "unknown" if unsaid else "published" if code == RELEASED else "aborted"
-        level = logging.INFO if outcome == "published" else logging.WARNING
-        self._log.log(level, "hold %s of %s by %s ended after %.3f s and %d messages (%s): %s",
-                holding.lease.id, widget.id, named(holding.by.origin), seconds, holding.sent,
-                code, text)  # fmt: skip
-        receipt = receipt_of(widget, holding.inputs, holding.lease.id, Answer(outcome, text))
-        if self._witness is not None:
-            self._witness.answered(receipt)
+        receipt = self._receipts.ended(holding, now - holding.lease.begun_at, code, why, unsaid)
         holding.told(receipt)
         self._changed()
-
-    def _refused(
-        self, widget: Hold, inputs: Mapping[str, Any], by: By, refusal: _Refusal, hold_id: str
-    ) -> Receipt:
-        receipt = _receipt(widget, inputs, refusal, hold_id)
-        self._log.warning("hold of %s by %s with %.*s: %s", widget.id, named(by.origin),
-                LONGEST_LOGGED, receipt.inputs, receipt.reason)  # fmt: skip
-        if self._witness is not None:
-            self._witness.pressed(receipt.id, widget.id, named(by.origin), receipt.inputs)
-            self._witness.answered(receipt)
-        return receipt
-
-
-def _receipt(widget: Hold, inputs: Mapping[str, Any], refusal: _Refusal, hold_id: str = "") -> Receipt:
-    text = say("refused", why=refusal.why, time=clock(time.time()))
-    own = needed(widget, inputs)
-    own_id = hold_id or secrets.token_hex(8)
-    return receipt_of(widget, own, own_id, Answer("refused", text), refusal.cause)

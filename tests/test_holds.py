@@ -12,7 +12,8 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 
 from app import keys
 from app.errors import LinkError, NotFound
-from app.holds import RELEASED, Holding, Holds
+from app.hold_receipts import RELEASED, Holding
+from app.holds import Holds
 from app.leases import AHEAD_S, LEASE_S, Lease, sent_at
 from app.panel.model import Panel
 from app.receipts import Receipt

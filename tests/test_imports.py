@@ -109,6 +109,7 @@ ORDER = (
     "app.presses",
     "app.leases",
     "app.hold_messages",
+    "app.hold_receipts",
     "app.holds",
     "app.recording.ring",
     "app.recording.file",

@@ -12,7 +12,7 @@ import pytest
 from app import kiosk, simulator
 from app.browsers import stranger
 from app.calls import with_fields
-from app.holds import Holding
+from app.hold_receipts import Holding
 from app.inbox import Changes, Token
 from app.intake import Intake
 from app.interlocks import interlock_verdict

@@ -32,7 +32,7 @@ from starlette.types import Message
 from app.browsers import Browser
 from app.doubts import SEEN
 from app.errors import InputError, LogError
-from app.holds import RELEASED, Holding
+from app.hold_receipts import RELEASED, Holding
 from app.kiosk import Kiosk
 from app.leases import sent_at
 from app.logbook import Noted
