@@ -13,6 +13,7 @@ from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import AsyncExitStack, ExitStack, asynccontextmanager, contextmanager
 from functools import partial
 from types import FrameType
+from typing import TYPE_CHECKING
 
 from fastapi import Depends, FastAPI
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
@@ -30,7 +31,6 @@ from app.log import Limits, OperatorLog, Unlogged
 from app.metrics import Metrics
 from app.panel import Panel, load_panel
 from app.panel.model import RobotEntry
-from app.recording import Recordings
 from app.routes import control, events, health, holds, pages, press_socket, presses, static
 from app.routes import log as log_routes
 from app.routes.messages import LONGEST
@@ -39,6 +39,9 @@ from app.settings import Settings, shipped
 from app.startup import InWords
 from app.systemd import Manager
 from app.watchdog import Watchdog
+
+if TYPE_CHECKING:
+    from app.recording import Recordings
 
 log = logging.getLogger("kiosk")
 
@@ -185,10 +188,12 @@ def _watchdog(site: Site) -> Watchdog:
     )
 
 
-def _recordings(settings: Settings, panel: Panel, demo: bool) -> Recordings | None:
-    """Where the panel asks for them."""
+def _recordings(settings: Settings, panel: Panel, demo: bool) -> "Recordings | None":
+    """Where the panel asks for them: nobody else reads what writes them."""
     if panel.record is None:
         return None
+    from app.recording import Recordings
+
     folder = settings.data_folder("demo" if demo else "live") / "recordings"
     return Recordings(folder, panel.record.max_mb, len(panel.robots) or 1)
 
