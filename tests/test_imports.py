@@ -130,6 +130,7 @@ ORDER = (
     "app.kiosk",
     "app.fleet",
     "app.metrics",
+    "app.exposition",
     "app.assets",
     "app.doors",
     "app.startup",
