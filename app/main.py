@@ -20,7 +20,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from starlette.exceptions import HTTPException
 from starlette.middleware.gzip import GZipMiddleware
 
-from app import development, logs, simulator, sockets
+from app import development, heap, logs, simulator, sockets
 from app.assets import Assets, load_assets
 from app.direct import Application
 from app.doors import Doors
@@ -80,7 +80,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
                     await opened.enter_async_context(
                         development.reloading(site, settings, running, opened.pop_all())
                     )
-                works = (watchdog.run(), sockets.narrow(ports), pages.compiled(site.templates))
+                works = (watchdog.run(), sockets.narrow(ports), _made_ready(site.templates))
                 tasks = [asyncio.create_task(work) for work in works]
                 try:
                     yield
@@ -177,6 +177,12 @@ async def _running(
             await fleet.stop()
             if recordings is not None:
                 await asyncio.to_thread(recordings.stop)
+
+
+async def _made_ready(templates: Environment) -> None:
+    """What can wait until the port is open."""
+    await pages.compiled(templates)
+    heap.trim()  # a compiler leaves much behind
 
 
 def _watchdog(site: Site) -> Watchdog:

@@ -17,6 +17,7 @@ ORDER = (
     "app.browsers",
     "app.logs",
     "app.tasks",
+    "app.heap",
     "app.moments",
     "app.systemd",
     "app.sockets",
