@@ -78,11 +78,19 @@ FOR_ROS := $(PYTHON) -c 'import sys; sys.exit(None if sys.version_info[:2] == (3
 
 # ARGS: phases and peers, such as `ARGS="down up --peers plain"`. A quick run leaves the last whole one's
 # results as they are.
-bench: .venv/test bridge
+bench: .venv/test bridge $(BENCH)/kiosk/ready
+	rm -rf $(BENCH)/kiosk/dist
+	.venv/bin/python -m build --wheel --no-isolation --outdir $(BENCH)/kiosk/dist >/dev/null
+	$(BENCH)/kiosk/bin/python -m pip install --disable-pip-version-check --quiet --no-deps --force-reinstall $(BENCH)/kiosk/dist/*.whl
 	.venv/bin/python -m bench $(if $(QUICK),--results $(BENCH)/quick,--readme README.md) $(ARGS)
 
-# The robot, then the rivals: each in an environment of its own. See bench/README.md.
-bench-setup: system .venv/test bridge $(addprefix $(BENCH)/,robot/ready rosbridge/ready nicegui/ready pages/ready router)
+# This panel, the robot, then the rivals: each in an environment of its own. See bench/README.md.
+bench-setup: system .venv/test bridge $(addprefix $(BENCH)/,kiosk/ready robot/ready rosbridge/ready nicegui/ready pages/ready router)
+
+$(BENCH)/kiosk/ready: deploy/requirements.lock
+	$(PYTHON) -m venv --clear $(@D)
+	$(@D)/bin/python $(PIP_INSTALL) $<
+	touch $@
 
 $(BENCH)/robot/ready: tests/ros/requirements.lock tests/requirements.lock | system
 	@$(FOR_ROS)

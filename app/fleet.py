@@ -6,6 +6,7 @@ page shows how the others are.
 
 import asyncio
 from collections.abc import Callable, Collection, Mapping
+from typing import TYPE_CHECKING
 
 from app.errors import NotFound
 from app.kiosk import Kiosk
@@ -13,9 +14,11 @@ from app.lamps import Lamp
 from app.link import Config
 from app.logbook import Log
 from app.panel.model import Panel, RobotEntry
-from app.recording import Recordings
 from app.robot import Robot
 from app.sentences import say
+
+if TYPE_CHECKING:
+    from app.recording import Recordings
 
 ConfigOf = Callable[[RobotEntry | None], Config]
 
@@ -30,7 +33,7 @@ class Fleet:
         revision: str,
         operators_log: Log,
         *,
-        recordings: Recordings | None = None,
+        recordings: "Recordings | None" = None,
         simulated: bool = False,
         fault: str = "",
     ) -> None:

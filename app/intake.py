@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from app import keys
 from app.actions import Actions
@@ -13,9 +14,11 @@ from app.logs import RobotLog
 from app.panel.model import Interlock, Panel
 from app.panel.parameter import EVENTS
 from app.parameters import Parameters
-from app.recording import Recorder
 from app.robot import Robot, Sample, value_of
 from app.views import Enabled, enabled
+
+if TYPE_CHECKING:
+    from app.recording import Recorder
 
 
 @dataclass(slots=True)
@@ -40,7 +43,7 @@ class Intake:
         actions: Actions,
         confirmations: Confirmations,
         parameters: Parameters,
-        recorder: Recorder | None,
+        recorder: "Recorder | None",
         log: RobotLog,
     ) -> None:
         self._robot = robot

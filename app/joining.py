@@ -28,8 +28,7 @@ log = logging.getLogger("kiosk.joining")
 
 FAILED: Final = "joining the robot's topics failed"
 FRESH_S: Final = 1.0  # waited for a bridge that came while the kiosk ran
-FOUND_S: Final = 0.05  # waited for a bridge that was there when the kiosk started
-FOUND_WITHIN_S: Final = 1.0
+FOUND_WITHIN_S: Final = 1.0  # then it was there before: its answers come after all its tokens
 SETTLE_S: Final = 0.2  # from the tokens to routes that carry the first message
 SETTLE_MOST_S: Final = 2.0  # where a listener is not reached by then, a press tells so
 ASK_EVERY_S: Final = 5.0
@@ -114,8 +113,8 @@ class Joining:
             self._log.warning("%s", error)
 
     async def _join(self) -> None:
-        found = time.monotonic() - self._started_at < FOUND_WITHIN_S
-        await asyncio.sleep(FOUND_S if found else FRESH_S)
+        if time.monotonic() - self._started_at >= FOUND_WITHIN_S:
+            await asyncio.sleep(FRESH_S)
         await self._ask_until_answered()
         if not self._robot.graph.bridges:
             return  # those that answered are other robots'

@@ -7,7 +7,7 @@ import asyncio
 import logging
 import time
 from contextlib import ExitStack, suppress
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from app.actions import Actions
 from app.asked import WITHIN_S, Asked
@@ -28,11 +28,13 @@ from app.panel.model import Panel, RobotEntry
 from app.parameters import Parameters
 from app.presses import Presses
 from app.pulse import Pulse
-from app.recording import Recorder, Recordings
 from app.robot import Robot
 from app.rosout import TOPIC, Rosout
 from app.sending import Sending
 from app.showing import Alone, Others, Showing
+
+if TYPE_CHECKING:
+    from app.recording import Recorder, Recordings
 
 log = logging.getLogger("kiosk")
 
@@ -52,7 +54,7 @@ class Kiosk:
         *,
         entry: RobotEntry | None = None,
         others: Others = ALONE,
-        recordings: Recordings | None = None,
+        recordings: "Recordings | None" = None,
         simulated: bool = False,
         fault: str = "",
     ) -> None:
@@ -190,10 +192,12 @@ class Kiosk:
         self.holds.close()
         self.board.close()
 
-    def _recording(self, recordings: Recordings | None) -> Recorder | None:
+    def _recording(self, recordings: "Recordings | None") -> "Recorder | None":
         """What records around presses, where the panel asks for it."""
         if recordings is None or self.panel.record is None:
             return None
+        from app.recording import Recorder
+
         recordings.follow(self.show)
         name = self.entry.id if self.entry else ""
         rules = self.panel.record

@@ -13,13 +13,14 @@ from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import AsyncExitStack, ExitStack, asynccontextmanager, contextmanager
 from functools import partial
 from types import FrameType
+from typing import TYPE_CHECKING
 
 from fastapi import Depends, FastAPI
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from starlette.exceptions import HTTPException
 from starlette.middleware.gzip import GZipMiddleware
 
-from app import development, logs, simulator, sockets
+from app import development, heap, logs, simulator, sockets
 from app.assets import Assets, load_assets
 from app.direct import Application
 from app.doors import Doors
@@ -30,7 +31,6 @@ from app.log import Limits, OperatorLog, Unlogged
 from app.metrics import Metrics
 from app.panel import Panel, load_panel
 from app.panel.model import RobotEntry
-from app.recording import Recordings
 from app.routes import control, events, health, holds, pages, press_socket, presses, static
 from app.routes import log as log_routes
 from app.routes.messages import LONGEST
@@ -39,6 +39,9 @@ from app.settings import Settings, shipped
 from app.startup import InWords
 from app.systemd import Manager
 from app.watchdog import Watchdog
+
+if TYPE_CHECKING:
+    from app.recording import Recordings
 
 log = logging.getLogger("kiosk")
 
@@ -77,7 +80,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
                     await opened.enter_async_context(
                         development.reloading(site, settings, running, opened.pop_all())
                     )
-                works = (watchdog.run(), sockets.narrow(ports), pages.compiled(site.templates))
+                works = (watchdog.run(), sockets.narrow(ports), _made_ready(site.templates))
                 tasks = [asyncio.create_task(work) for work in works]
                 try:
                     yield
@@ -176,6 +179,12 @@ async def _running(
                 await asyncio.to_thread(recordings.stop)
 
 
+async def _made_ready(templates: Environment) -> None:
+    """What can wait until the port is open."""
+    await pages.compiled(templates)
+    heap.trim()  # a compiler leaves much behind
+
+
 def _watchdog(site: Site) -> Watchdog:
     """What tells the service manager of the robots that the site has at the time."""
     return Watchdog(
@@ -185,10 +194,12 @@ def _watchdog(site: Site) -> Watchdog:
     )
 
 
-def _recordings(settings: Settings, panel: Panel, demo: bool) -> Recordings | None:
-    """Where the panel asks for them."""
+def _recordings(settings: Settings, panel: Panel, demo: bool) -> "Recordings | None":
+    """Where the panel asks for them: nobody else reads what writes them."""
     if panel.record is None:
         return None
+    from app.recording import Recordings
+
     folder = settings.data_folder("demo" if demo else "live") / "recordings"
     return Recordings(folder, panel.record.max_mb, len(panel.robots) or 1)
 

@@ -2,13 +2,14 @@
 
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from typing import Any, Final
 from urllib.parse import urlsplit
 
 from bench.figures import percentile
 from bench.parts import Meter, crowd, family, rss_mib
 from bench.peer import Peer, Running
-from bench.rig import Rig
+from bench.rig import Rig, scratch
 from bench.unattended import Unattended
 from tests.commanded import Commanded
 
@@ -30,9 +31,14 @@ def cost(rig: Rig, peer: Peer) -> Figures:
 
 
 def single(rig: Rig, peer: Peer) -> Figures:
-    """One topic and one page: memory at rest, cost of each rate."""
+    """One topic and one page, at the second start in a folder: memory at rest, cost of each rate."""
     topics = (TOPIC,)
-    with rig.running(peer, topics) as server, rig.unattended(peer, server, topics) as browser:
+    with ExitStack() as stack:
+        folder = stack.enter_context(scratch(peer))
+        with rig.running(peer, topics, folder=folder):
+            pass
+        server = stack.enter_context(rig.running(peer, topics, folder=folder))
+        browser = stack.enter_context(rig.unattended(peer, server, topics))
         time.sleep(SETTLE_S)
         found = {"rest_mib": rss_mib(family(server.pids))}
         for hz in RATES:

@@ -1,16 +1,15 @@
-"""This project as a peer: on its shipped configuration, with the operator's log and an interlock."""
+"""This project as a peer: its wheel as it is shipped, with the operator's log and an interlock."""
 
 import os
 import subprocess
-import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from bench.parts import COMMAND, ENABLED, ended
+from bench.parts import COMMAND, ENABLED, KIOSK_PYTHON, ended
 from bench.peer import Bare, Peer, Place, Running, until_answers
-from tests.parts import ROOT, free_port, zenoh_file
+from tests.parts import free_port, zenoh_file
 
 HEAD: Final = f"""
 title = "Benchmark"
@@ -111,7 +110,7 @@ class Kiosk(Peer):
         }
         log = place.folder / "kiosk.log"
         process = _started(
-            [sys.executable, "-m", "uvicorn", "app.main:app", "--port", str(port)], env, log
+            [KIOSK_PYTHON, "-m", "uvicorn", "app.main:app", "--port", str(port)], env, log
         )
         url = f"http://127.0.0.1:{port}"
         try:
@@ -125,12 +124,14 @@ class Kiosk(Peer):
         return Running(f"{url}{base}/", (process.pid,), lambda: ended(process), bare)
 
 
-def _started(command: Sequence[str], env: dict[str, str], log: Path) -> "subprocess.Popen[bytes]":
+def _started(
+    command: Sequence[str | Path], env: dict[str, str], log: Path
+) -> "subprocess.Popen[bytes]":
     """In a session of its own: Ctrl-C is the harness's."""
     with log.open("wb") as out:
         return subprocess.Popen(
             command,
-            cwd=ROOT,
+            cwd=log.parent,  # not the checkout: its modules would be read before the installed ones
             env={**os.environ, **env},
             stdin=subprocess.DEVNULL,
             stdout=out,

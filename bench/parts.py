@@ -14,6 +14,7 @@ from tests.commanded import Commanded
 from tests.parts import CYCLONE_ON_LOOPBACK, ROOT
 
 CACHE: Final = Path(os.environ.get("BENCH_CACHE") or Path.home() / ".cache/operator-panel/bench")
+KIOSK_PYTHON: Final = CACHE / "kiosk/bin/python"
 ROBOT_PYTHON: Final = Path(os.environ.get("BENCH_ROBOT_PYTHON") or CACHE / "robot/bin/python")
 ENABLED: Final = "/operation_enabled"
 COMMAND: Final = "/operation1"

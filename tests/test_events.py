@@ -7,12 +7,12 @@ from contextlib import asynccontextmanager, suppress
 from typing import Any
 
 import pytest
-from prometheus_client import CollectorRegistry, Gauge
 from starlette.responses import Response
 from starlette.types import Message, Receive, Scope, Send
 
 from app.board import Board
 from app.direct import Application, Direct, direct
+from app.metrics import Open
 from app.robot import Robot
 from app.routes.events import EventStream
 from app.views import View, sight
@@ -66,12 +66,11 @@ class Bench:
     def __init__(self) -> None:
         self.robot = robot_there(PANEL)
         self.board = Board(view_of(self.robot), "r1")
-        self.streams = Gauge("streams", "Open", registry=CollectorRegistry())
+        self.streams = Open()
 
     @property
-    def open(self) -> float:
-        (metric,) = self.streams.collect()
-        return metric.samples[0].value
+    def open(self) -> int:
+        return self.streams.count
 
     def says(self, text: str) -> None:
         says(self.robot, "/heard", text)

@@ -1,6 +1,9 @@
 """Imports go one way, from what knows nothing to what wires all; Zenoh has two doors."""
 
 import ast
+import os
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -17,6 +20,7 @@ ORDER = (
     "app.browsers",
     "app.logs",
     "app.tasks",
+    "app.heap",
     "app.moments",
     "app.systemd",
     "app.sockets",
@@ -131,6 +135,7 @@ ORDER = (
     "app.kiosk",
     "app.fleet",
     "app.metrics",
+    "app.exposition",
     "app.assets",
     "app.doors",
     "app.startup",
@@ -210,6 +215,13 @@ def test_only_the_link_and_the_simulator_speak_zenoh() -> None:
 
 def test_the_simulator_knows_nothing_of_the_server() -> None:
     assert of_project("app.simulator") <= KNOWN_TO_THE_SIMULATOR
+
+
+def test_a_start_reads_no_library_that_most_kiosks_never_need(tmp_path: Path) -> None:
+    env = {**os.environ, "KIOSK_DATA": str(tmp_path)}
+    code = "import sys, app.main; print(*sys.modules)"
+    read = subprocess.check_output([sys.executable, "-c", code], cwd=PACKAGE.parent, env=env, text=True)
+    assert {"mcap", "prometheus_client"} & set(read.split()) == set()
 
 
 def test_the_interfaces_know_nothing_of_the_panel() -> None:

@@ -5,6 +5,7 @@ from collections.abc import Callable
 
 from prometheus_client.parser import text_string_to_metric_families
 
+from app.exposition import exposition
 from app.fleet import Fleet
 from app.keys import bridge_token
 from app.kiosk import Kiosk
@@ -21,7 +22,7 @@ NOWHERE = "tcp/127.0.0.1:1"
 
 def read(metrics: Metrics) -> Samples:
     """(name, values of its labels) → value; the one robot of these panels has no name."""
-    families = text_string_to_metric_families(metrics.text().decode())
+    families = text_string_to_metric_families(exposition(metrics)[0].decode())
     samples = [sample for family in families for sample in family.samples]
     found = {(s.name, tuple(s.labels.values())): s.value for s in samples}
     assert len(found) == len(samples), "a sample is there twice"
@@ -79,7 +80,7 @@ def test_samples_that_were_not_their_type_are_counted_by_key() -> None:
 def test_presses_are_counted_by_outcome() -> None:
     metrics = Metrics()
     for outcome in ("published", "published", "refused"):
-        metrics.presses.labels(outcome).inc()
+        metrics.pressed(outcome)
     samples = read(metrics)
     assert samples["kiosk_presses_total", ("published",)] == 2
     assert samples["kiosk_presses_total", ("refused",)] == 1
@@ -87,7 +88,7 @@ def test_presses_are_counted_by_outcome() -> None:
 
 def test_open_streams_are_counted() -> None:
     metrics = Metrics()
-    with metrics.streams.track_inprogress(), metrics.streams.track_inprogress():
+    with metrics.streams.another(), metrics.streams.another():
         assert read(metrics)["kiosk_streams", ()] == 2
     assert read(metrics)["kiosk_streams", ()] == 0
 
@@ -98,7 +99,7 @@ def test_counts_go_on_when_the_panel_is_loaded_anew() -> None:
         for _ in range(2):
             fleet = nowhere()
             metrics.follow(fleet)
-            metrics.presses.labels("published").inc()
+            metrics.pressed("published")
             await fleet.stop()
         fleet.first.robot.link_up = True
         return read(metrics)
@@ -110,5 +111,5 @@ def test_counts_go_on_when_the_panel_is_loaded_anew() -> None:
 
 def test_two_applications_count_for_themselves() -> None:
     one, other = Metrics(), Metrics()
-    one.presses.labels("published").inc()
+    one.pressed("published")
     assert ("kiosk_presses_total", ("published",)) not in read(other)

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 import zenoh
 
+from app.link import config_to
 from tests.parts import ROOT, Bridge, RosNode, Server, has_heard, live, until
 
 TEXTS = [
@@ -158,6 +159,9 @@ def test_a_transient_local_value_arrives_whoever_starts_first(
 def test_fifty_starts_fifty_first_presses_received(
     bridge: Bridge, node: RosNode, tmp_path: Path
 ) -> None:
+    with zenoh.open(config_to(bridge.endpoint)) as other:
+        subscriber = "@/*/@ros2_lv/MS/operation/**"
+        until(lambda: list(other.liveliness().get(subscriber)), "the bridge knows the node")
     before = len(node.heard("/operation"))
     for number in range(50):
         kiosk = live(bridge.endpoint, tmp_path)

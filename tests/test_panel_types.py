@@ -288,6 +288,7 @@ def test_a_parameter_has_one_type_in_a_panel() -> None:
         ({"node": "arm"}, "is not the absolute name of a ROS 2 node: it must be like /arm"),
         ({"type": "float"}, "'bool', 'integer', 'double' or 'string'"),
         ({"parameter": "a b"}, "should match pattern"),
+        ({"parameter": "a" * 256}, "at most 255 characters"),
         ({"step": 0}, "greater than 0"),
     ],
 )

@@ -35,7 +35,7 @@ class Parameter(Stepped):
 
     kind: Literal["parameter"]
     node: Annotated[str, AfterValidator(_node), Field(max_length=200)]
-    parameter: Annotated[str, Field(pattern=r"^[^\s\x00-\x1f]{1,255}$")]
+    parameter: Annotated[str, Field(pattern=r"^[^\s\x00-\x1f]+$", max_length=255)]
     type: Literal["bool", "integer", "double", "string"]
     unit: Unit = ""
     min: Number | None = None

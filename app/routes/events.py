@@ -5,12 +5,12 @@ from typing import Final
 
 from fastapi import APIRouter, Request
 from fastapi.responses import Response
-from prometheus_client import Gauge
 from starlette.types import Message, Receive, Scope, Send
 
 from app.board import Board, told
 from app.direct import direct
 from app.heartbeat import beat
+from app.metrics import Open
 from app.routes.site import CurrentKiosk, CurrentSite
 from app.routes.visitors import keep, welcomed
 
@@ -50,7 +50,7 @@ class EventStream(Response):
 
     media_type = MEDIA_TYPE
 
-    def __init__(self, board: Board, first: bytes, streams: Gauge) -> None:
+    def __init__(self, board: Board, first: bytes, streams: Open) -> None:
         """`first` comes with the snapshot; `streams` counts it while it is open."""
         self._board = board
         self._first = first
@@ -61,7 +61,7 @@ class EventStream(Response):
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         await send({"type": "http.response.start", "status": 200, "headers": self.raw_headers})
-        with self._streams.track_inprogress(), self._board.heartbeat.heard():
+        with self._streams.another(), self._board.heartbeat.heard():
             async with asyncio.TaskGroup() as group:
                 # A task of its own: waking it wakes nothing of what the request came through.
                 writing = group.create_task(self._write(direct(scope, send)))

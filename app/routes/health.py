@@ -1,11 +1,12 @@
 """For who watches the kiosk: is it up, can commands reach the robot, how much of what."""
 
 import asyncio
+from collections.abc import Callable
 
 from fastapi import APIRouter
 from fastapi.responses import JSONResponse, Response
-from prometheus_client import CONTENT_TYPE_LATEST
 
+from app.metrics import Metrics
 from app.routes.site import CurrentSite
 
 router = APIRouter()
@@ -30,4 +31,13 @@ async def readyz(site: CurrentSite) -> Response:
 
 @router.get("/metrics", summary="Prometheus text format")
 async def metrics(site: CurrentSite) -> Response:
-    return Response(site.metrics.text(), media_type=CONTENT_TYPE_LATEST)
+    exposition = await asyncio.to_thread(_exposition)
+    text, media_type = exposition(site.metrics)
+    return Response(text, media_type=media_type)
+
+
+def _exposition() -> Callable[[Metrics], tuple[bytes, str]]:
+    """Read when it is first asked for, on a thread: it takes a while, and most kiosks never need it."""
+    from app.exposition import exposition
+
+    return exposition

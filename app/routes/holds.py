@@ -106,7 +106,7 @@ async def hold(socket: WebSocket, widget: str, site: CurrentSite, kiosk: Current
     session = _Session(socket, kiosk, widget, visitor(socket, site))
     with suppress(WebSocketDisconnect):
         receipt = await session.run(widget)
-        site.metrics.presses.labels(receipt.outcome).inc()
+        site.metrics.pressed(receipt.outcome)
 
 
 class _Session:

@@ -41,7 +41,16 @@ CONTROL_ACTS = ("take", "ask", "give", "keep", "release", "withdraw")
 
 # What a page is made of, and how long after the start it is compiled: when the port is open, and while
 # the link settles, which is waiting. Otherwise the first page takes that time.
-TEMPLATES = ("base.html", "_widgets.html", "_control.html", "screen.html")
+# Small ones: what a compiler takes for one, the next takes again, and the loop turns in between.
+TEMPLATES = (
+    "base.html",
+    "_inputs.html",
+    "_commands.html",
+    "_parameter.html",
+    "_displays.html",
+    "_control.html",
+    "screen.html",
+)
 COMPILED_AFTER_S = 0.1
 
 

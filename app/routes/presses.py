@@ -218,7 +218,7 @@ def _moment(inputs: dict[str, str], name: str) -> float | None:
 
 
 def _count(site: Site, receipt: Receipt) -> None:
-    site.metrics.presses.labels(receipt.outcome).inc()
+    site.metrics.pressed(receipt.outcome)
 
 
 def _form(body: bytes) -> dict[str, str]:

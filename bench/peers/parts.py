@@ -6,7 +6,6 @@ import mimetypes
 import os
 import socket
 import subprocess
-import sys
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -19,6 +18,7 @@ from tests.parts import Process, until
 PEERS: Final = Path(__file__).resolve().parent
 # As bench/parts.py has it, and the Makefile.
 CACHE: Final = Path(os.environ.get("BENCH_CACHE") or Path.home() / ".cache/operator-panel/bench")
+KIOSK_PYTHON: Final = CACHE / "kiosk/bin/python"
 TOPICS_HERE: Final = "<!-- topics -->"
 
 
@@ -46,7 +46,7 @@ def uvicorn(app: Path, port: int) -> list[str | Path]:
     """The server of an `app.py`, in the kiosk's own environment. A stream that a browser left open
     keeps it a second at most."""
     options = ["--port", str(port), "--log-level", "warning", "--timeout-graceful-shutdown", "1"]
-    return [sys.executable, "-m", "uvicorn", "--app-dir", app, *options, "app:app"]
+    return [KIOSK_PYTHON, "-m", "uvicorn", "--app-dir", app, *options, "app:app"]
 
 
 def with_topics(page: Path, topics: Sequence[str]) -> str:
