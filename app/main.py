@@ -96,6 +96,8 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         max_body_size=LONGEST,
         exception_handlers={KioskError: on_kiosk_error, HTTPException: on_http_error},
     )
+    if settings.dev:
+        app.add_exception_handler(Exception, development.on_error)
     app.add_middleware(GZipMiddleware, minimum_size=500)
     app.add_middleware(Doors, hosts=settings.hosts)
     app.add_middleware(InWords)

@@ -66,6 +66,17 @@ def test_a_panel_with_a_fault_keeps_the_old_one_and_shows_the_fault(
     expect(fault).to_be_hidden()
 
 
+@pytest.mark.parametrize("fault", ["{% endblok %}", "{{ page.titel }}", "{{ 1 + words }}"])
+def test_a_template_with_a_fault_is_told_and_the_page_comes_back_by_itself(
+    checkout: Checkout, page: Page, fault: str
+) -> None:
+    page.goto(checkout.server.url)
+    checkout.edit("templates/screen.html", "<main>", f"<main>{fault}")
+    expect(page.locator("body")).to_contain_text("templates/screen.html")
+    checkout.edit("templates/screen.html", f"<main>{fault}", "<main>")
+    expect(page.get_by_role("button", name="Publish1")).to_be_visible()
+
+
 def test_it_starts_with_a_faulty_panel_and_shows_the_fault(tmp_path: Path, page: Page) -> None:
     panel = tmp_path / "panel.toml"
     panel.write_text('title = "Half a panel"\n')
