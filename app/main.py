@@ -144,7 +144,8 @@ async def _running(
 ) -> AsyncIterator[tuple[Fleet, Assets]]:
     """The robots that the panel is for: the real ones, or demo robots of its own."""
     demo = (settings.mode or panel.mode) == "demo"
-    assets = load_assets(shipped("static"), shipped("templates"), panel.mm_per_px)
+    kinds = {widget.kind for widget in panel.widgets()}
+    assets = load_assets(shipped("static"), shipped("templates"), panel.mm_per_px, kinds)
     revision = f"{panel.revision}-{assets.revision}"
     if settings.dev:
         revision += f"-{secrets.token_hex(4)}"  # whatever was changed, pages load anew

@@ -172,6 +172,14 @@ def test_every_answer_has_the_security_headers(host: str) -> None:
     assert "unsafe" not in headers["content-security-policy"]
 
 
+@pytest.mark.parametrize("media_type", ["text/css", "text/javascript", "text/event-stream"])
+def test_what_is_no_document_has_those_that_are_not_about_documents(media_type: str) -> None:
+    headers = asked("GET", "/", OWN, PlainTextResponse("in", media_type=media_type)).headers
+    assert headers["x-content-type-options"] == "nosniff"
+    assert headers["cross-origin-resource-policy"] == "same-origin"
+    assert "content-security-policy" not in headers
+
+
 def test_an_answer_may_set_a_security_header_itself() -> None:
     own = PlainTextResponse("in", headers={"referrer-policy": "no-referrer"})
     assert asked("GET", "/", OWN, own).headers.get_list("referrer-policy") == ["no-referrer"]
