@@ -41,8 +41,8 @@ def demo() -> Iterator[Server]:
 
 
 def test_demo_mode_shows_its_banner_on_every_page(demo: Server) -> None:
-    for path in ("/", "/pages/operation"):
-        assert "SIMULATED ROBOT" in demo.http.get(path).text
+    for path in ("/", "/pages/operation", "/log", "/nothing"):
+        assert "SIMULATED ROBOT" in demo.http.get(path, headers={"accept": "text/html"}).text
     assert demo.snapshot()["notice"]["banner"] == "SIMULATED ROBOT"
 
 
