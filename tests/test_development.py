@@ -2,6 +2,7 @@
 
 import shutil
 import signal
+import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -9,6 +10,8 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from tests.parts import ROOT, Server
+
+RELOAD = ["--reload", "--reload-dir", "app"]
 
 
 class Checkout:
@@ -22,7 +25,7 @@ class Checkout:
         self.server = Server(
             folder,
             KIOSK_DEV="1",
-            options=["--reload", "--reload-dir", "app"],
+            options=RELOAD,
         )
 
     def edit(self, name: str, old: str, new: str) -> None:
@@ -30,6 +33,14 @@ class Checkout:
         text = path.read_text()
         assert old in text
         path.write_text(text.replace(old, new))
+
+
+def test_make_dev_serves_as_these_tests_do() -> None:
+    made = subprocess.run(
+        ["make", "--dry-run", "dev"], cwd=ROOT, capture_output=True, text=True, check=True
+    ).stdout
+    assert "KIOSK_DEV=1" in made
+    assert made.rstrip().endswith(f"uvicorn app.main:app {' '.join(RELOAD)}")
 
 
 @pytest.fixture

@@ -202,6 +202,13 @@ def test_a_large_body_is_refused(demo: Server) -> None:
     assert demo.by("socket").press("operation", "x" * 70_000).status_code == 413
 
 
+def test_it_listens_on_one_address_of_this_machine_alone(demo: Server) -> None:
+    socket.create_connection(("127.0.0.1", demo.port)).close()
+    for other in ("127.0.0.2", "::1"):
+        with pytest.raises(OSError, match=r"refused|assign"):
+            socket.create_connection((other, demo.port))
+
+
 @pytest.mark.parametrize("path", ["/widgets/operation", "/events", "/presses"])
 @pytest.mark.parametrize(
     "headers",
