@@ -69,7 +69,7 @@ class Doors:
 
     def _refusal(self, scope: Scope) -> str | None:
         headers = Headers(scope=scope)
-        host = headers.get("host", "").lower()
+        host = ",".join(headers.getlist("host")).lower()  # two are none of its names
         if _without_port(host) not in self._hosts:
             return f'"{host}" is not a name of this panel: KIOSK_HOSTS lists the names it answers to'
         if (
@@ -78,12 +78,12 @@ class Doors:
             and not GUARDED.fullmatch(scope["path"])
         ):
             return None
-        site = headers.get("sec-fetch-site", "none")
-        if site not in OWN_SITE:
-            return f"a page of another site ({site}) asked for this"
-        origin = headers.get("origin")
-        if origin is not None and _host_of(origin) != host:
-            return f'a page of "{origin}" asked for this'
+        for site in headers.getlist("sec-fetch-site"):
+            if site not in OWN_SITE:
+                return f"a page of another site ({site}) asked for this"
+        for origin in headers.getlist("origin"):
+            if _host_of(origin) != host:
+                return f'a page of "{origin}" asked for this'
         return None
 
 

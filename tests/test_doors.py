@@ -13,11 +13,12 @@ from app.settings import LOOPBACK_HOSTS
 
 GUARDED = [("POST", "/widgets/x"), ("GET", "/events"), ("GET", "/robots/r1/events")]
 HOSTS = (*LOOPBACK_HOSTS, "cell1.local", "10.0.0.7", "[fe80::1]")
+Named = Mapping[str, str] | list[tuple[str, str]]
 OWN = {"host": "localhost:8000"}
 
 
 def asked(
-    method: str, path: str, headers: Mapping[str, str], answer: PlainTextResponse | None = None
+    method: str, path: str, headers: Named, answer: PlainTextResponse | None = None
 ) -> httpx.Response:
     """What comes back through the doors; inside, everything is answered with "in"."""
 
@@ -30,7 +31,7 @@ def asked(
     return asyncio.run(ask())
 
 
-def let_in(method: str, path: str, headers: Mapping[str, str]) -> bool:
+def let_in(method: str, path: str, headers: Named) -> bool:
     answer = asked(method, path, headers)
     assert (answer.status_code, answer.text == "in") in ((200, True), (403, False))
     return answer.status_code == 200
@@ -139,6 +140,20 @@ def test_a_page_of_another_site_may_neither_press_nor_listen(method: str, path: 
 def test_an_own_origin_does_not_excuse_another_site() -> None:
     headers = {**OWN, "origin": "http://localhost:8000", "sec-fetch-site": "cross-site"}
     assert not let_in("POST", "/widgets/x", headers)
+
+
+@pytest.mark.parametrize(
+    "more",
+    [("host", "evil.example"), ("origin", "http://evil.example"), ("sec-fetch-site", "cross-site")],
+)
+def test_a_header_that_comes_twice_hides_nothing(more: tuple[str, str]) -> None:
+    own = [
+        ("host", "localhost:8000"),
+        ("origin", "http://localhost:8000"),
+        ("sec-fetch-site", "same-origin"),
+    ]
+    assert let_in("POST", "/widgets/x", own)
+    assert not let_in("POST", "/widgets/x", [*own, more])
 
 
 @pytest.mark.parametrize("method", ["POST", "PUT", "PATCH", "DELETE", "OPTIONS"])
