@@ -184,7 +184,7 @@ def test_what_nobody_hears_is_unknown_and_says_so(
 
 def test_logs_are_in_ros_format_and_on_rosout(server: Server, node: RosNode) -> None:
     until(server.ready, "ready")
-    until(lambda: node.endpoints("/rosout"), "a publisher of /rosout")
+    until(partial(arrives, server, node), "the bridge knows what the node listens to", every_s=0.1)
     line = re.compile(r"\[(INFO|WARN|ERROR|FATAL)\] \[\d{10}\.\d{9}\] \[web_ui\]: .+|  .*")
     assert all(line.fullmatch(text) for text in server.process.lines)
     server.press("operation", "for the log")
