@@ -1,7 +1,8 @@
 """The static files, in memory and packed, under a name that changes with their content.
 
-The stylesheet is the layers of `static/css` in their order, with the panel's millimetres: one
-request instead of four; what only the log's page needs is a file of its own. Scripts keep their names,
+The stylesheet is the layers of `static/css` in their order, with what the panel's kinds of widgets need
+and its millimetres: one request instead of five; what only the log's page needs is a file of its own.
+Scripts keep their names,
 so that modules find each other, and their lines. Comments, what lines are indented by and what only
 sets styles apart stay here.
 """
@@ -9,11 +10,13 @@ sets styles apart stay here.
 import gzip
 import hashlib
 import re
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 LAYERS: Final = ("tokens", "base", "layout", "widgets")
+OF_KINDS: Final = {"entries": frozenset({"number", "slider", "toggle", "parameter"})}
 OWN_PAGE: Final = "log"
 LEFT_OUT: Final = {
     ".css": re.compile(rb"/\*.*?\*/|^\s+|(?<=[:;,{}])\s+|\s+(?=[{}])", re.DOTALL | re.MULTILINE),
@@ -45,12 +48,14 @@ class Assets:
     revision: str
 
 
-def load_assets(static: Path, templates: Path, mm_per_px: float) -> Assets:
+def load_assets(static: Path, templates: Path, mm_per_px: float, kinds: Collection[str]) -> Assets:
     """Reads `static`, and `templates` for the revision only.
 
-    `mm_per_px` (millimetres per CSS pixel) gives the sizes of buttons.
+    `mm_per_px` (millimetres per CSS pixel) gives the sizes of buttons; `kinds` are those of the panel's
+    widgets.
     """
-    layers = [(static / "css" / f"{name}.css").read_bytes() for name in LAYERS]
+    needed = [name for name, of in OF_KINDS.items() if not of.isdisjoint(kinds)]
+    layers = [(static / "css" / f"{name}.css").read_bytes() for name in (*LAYERS, *needed)]
     millimetre = f":root{{--mm:{1 / mm_per_px:.4f}px}}\n".encode()
     files = {"kiosk.css": asset(b"".join([*layers, millimetre]), ".css")}
     own = (static / "css" / f"{OWN_PAGE}.css").read_bytes()

@@ -2,14 +2,19 @@
 static files.
 
 Python files are uvicorn's to watch (`--reload`). A panel file with a fault keeps the old panel on
-the screen, with the fault above it.
+the screen, with the fault above it. A page that can't be made, for a fault in its template, says so
+and comes by itself when that is mended.
 """
 
 import asyncio
 import logging
+import traceback
 from collections.abc import AsyncIterator, Callable
 from contextlib import AbstractAsyncContextManager, AsyncExitStack, asynccontextmanager, suppress
 from pathlib import Path
+
+from starlette.requests import Request
+from starlette.responses import PlainTextResponse, Response
 
 from app.assets import Assets
 from app.errors import KioskError, PanelError
@@ -25,6 +30,8 @@ EMPTY_PANEL = Panel.model_validate(
 )
 
 SUFFIXES = (".html", ".css", ".js", ".msg", ".srv", ".action")
+
+TRY_AGAIN = {"refresh": "1"}  # seconds
 
 Running = Callable[[Settings, Panel], AbstractAsyncContextManager[tuple[Fleet, Assets]]]
 
@@ -43,6 +50,12 @@ async def reloading(
         with suppress(asyncio.CancelledError):
             await task
         await reloader.opened.aclose()
+
+
+async def on_error(request: Request, error: Exception) -> Response:
+    """What went wrong, for who develops; a page is asked for again until it comes."""
+    told = "".join(traceback.format_exception(error))
+    return PlainTextResponse(told, 500, headers=TRY_AGAIN if request.method == "GET" else None)
 
 
 class _Reloader:

@@ -5,6 +5,7 @@ the link's inbox. Only this module and the simulator import zenoh; its errors le
 import asyncio
 import json
 import os
+import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -24,6 +25,7 @@ Config = zenoh.Config
 ASK_TIMEOUT_S = 2.0
 MOST_QUEUED = 16  # batches; Zenoh takes no more
 COPIED_MOST = 16_384  # bytes of a sample
+IN_ITS_SOURCE: Final = re.compile(r" at \S+\.rs:\d+\.?")  # where in Zenoh an error was made
 BLOCKED_MOST_US = 200_000  # how long a put or a question may wait for room: less than a hold's lease
 
 # Zenoh's own setting of its threads, read when its first session opens. By default the thread that
@@ -38,14 +40,15 @@ def config_from(path: Path, connect: Sequence[str] = ()) -> zenoh.Config:
     try:
         config = zenoh.Config.from_file(path)
     except zenoh.ZError as error:
-        raise SettingsError(f"{path} is not a usable Zenoh configuration: {error}") from error
+        raise SettingsError(f"{path} is not a usable Zenoh configuration: {_said(error)}") from error
     if connect:
         try:
             config.insert_json5("connect/endpoints", json.dumps(list(connect)))
         except zenoh.ZError as error:
             endpoints = ", ".join(connect)
             raise SettingsError(
-                f"{endpoints}: can't connect there, a Zenoh endpoint is like tcp/robot1:7447: {error}"
+                f"{endpoints}: can't connect there, a Zenoh endpoint is like tcp/robot1:7447: "
+                f"{_said(error)}"
             ) from error
     return _fit(config)
 
@@ -80,12 +83,16 @@ def _fit(config: zenoh.Config) -> zenoh.Config:
     return config
 
 
+def _said(error: zenoh.ZError) -> str:
+    return IN_ITS_SOURCE.sub("", str(error))
+
+
 @contextmanager
 def _translated(doing: str) -> Iterator[None]:
     try:
         yield
     except zenoh.ZError as error:
-        raise LinkError(f"{doing}: {error}") from error
+        raise LinkError(f"{doing}: {_said(error)}") from error
 
 
 def _own(payload: zenoh.ZBytes) -> bytes | zenoh.ZBytes:

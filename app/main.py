@@ -99,6 +99,8 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         max_body_size=LONGEST,
         exception_handlers={KioskError: on_kiosk_error, HTTPException: on_http_error},
     )
+    if settings.dev:
+        app.add_exception_handler(Exception, development.on_error)
     app.add_middleware(GZipMiddleware, minimum_size=500)
     app.add_middleware(Doors, hosts=settings.hosts)
     app.add_middleware(InWords)
@@ -145,7 +147,8 @@ async def _running(
 ) -> AsyncIterator[tuple[Fleet, Assets]]:
     """The robots that the panel is for: the real ones, or demo robots of its own."""
     demo = (settings.mode or panel.mode) == "demo"
-    assets = load_assets(shipped("static"), shipped("templates"), panel.mm_per_px)
+    kinds = {widget.kind for widget in panel.widgets()}
+    assets = load_assets(shipped("static"), shipped("templates"), panel.mm_per_px, kinds)
     revision = f"{panel.revision}-{assets.revision}"
     if settings.dev:
         revision += f"-{secrets.token_hex(4)}"  # whatever was changed, pages load anew

@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from app.assets import LAYERS, OWN_PAGE, Assets, load_assets
+from app.assets import LAYERS, OF_KINDS, OWN_PAGE, Assets, load_assets
+from app.panel.model import KINDS
 from app.settings import shipped
 from tests.parts import ROOT
 
@@ -15,7 +16,7 @@ def static(tmp_path: Path) -> Path:
     folder = tmp_path / "static"
     for part in ("css", "js"):
         (folder / part).mkdir(parents=True)
-    for layer in (*LAYERS, OWN_PAGE):
+    for layer in (*LAYERS, *OF_KINDS, OWN_PAGE):
         style = f".{layer} a :is(b, i) {{\n    top: 0;\n  }}\n"
         (folder / "css" / f"{layer}.css").write_text(f"/* Why. */\n  {style}")
     (folder / "js/main.js").write_text("main();\n")
@@ -32,8 +33,8 @@ def templates(tmp_path: Path) -> Path:
     return folder
 
 
-def loaded(static: Path, templates: Path, mm_per_px: float = 0.25) -> Assets:
-    return load_assets(static, templates, mm_per_px)
+def loaded(static: Path, templates: Path, mm_per_px: float = 0.25, *kinds: str) -> Assets:
+    return load_assets(static, templates, mm_per_px, kinds)
 
 
 def test_the_stylesheet_is_its_layers_in_order_with_the_millimetre(
@@ -42,6 +43,18 @@ def test_the_stylesheet_is_its_layers_in_order_with_the_millimetre(
     layers = "".join(f"\n.{layer} a :is(b,i){{top:0;}}" for layer in LAYERS)
     sent = loaded(static, templates).files["kiosk.css"].content.decode()
     assert sent == f"{layers}:root{{--mm:4.0000px}}"
+
+
+@pytest.mark.parametrize(
+    ("kinds", "needed"),
+    [((), False), (("text", "publish", "select"), False)]
+    + [((kind,), True) for kind in ("number", "slider", "toggle", "parameter")],
+)
+def test_the_stylesheet_has_what_the_panels_widgets_need(
+    static: Path, templates: Path, kinds: tuple[str, ...], needed: bool
+) -> None:
+    sent = loaded(static, templates, 0.25, *kinds).files["kiosk.css"].content.decode()
+    assert (".entries a" in sent) is needed
 
 
 def test_scripts_keep_their_names(static: Path, templates: Path) -> None:
@@ -104,14 +117,14 @@ def test_another_screen_is_a_new_revision(static: Path, templates: Path) -> None
 
 
 def test_the_shipped_files_are_complete() -> None:
-    assets = load_assets(shipped("static"), shipped("templates"), 0.22)
+    assets = load_assets(shipped("static"), shipped("templates"), 0.22, ())
     assert "main.js" in assets.files
     style = assets.files["kiosk.css"].content.decode()
     assert style.index("@layer tokens{") < style.index("@layer base{") < style.index("@layer widgets{")
 
 
 def test_no_shipped_file_loads_anything_from_elsewhere() -> None:
-    assets = load_assets(shipped("static"), shipped("templates"), 0.22)
+    assets = load_assets(shipped("static"), shipped("templates"), 0.22, KINDS)
     for name, asset in assets.files.items():
         assert b"http:" not in asset.content, name
         assert b"https:" not in asset.content, name

@@ -2,6 +2,7 @@
 
 import shutil
 import signal
+import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -9,6 +10,8 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from tests.parts import ROOT, Server
+
+RELOAD = ["--reload", "--reload-dir", "app"]
 
 
 class Checkout:
@@ -22,7 +25,7 @@ class Checkout:
         self.server = Server(
             folder,
             KIOSK_DEV="1",
-            options=["--reload", "--reload-dir", "app"],
+            options=RELOAD,
         )
 
     def edit(self, name: str, old: str, new: str) -> None:
@@ -30,6 +33,14 @@ class Checkout:
         text = path.read_text()
         assert old in text
         path.write_text(text.replace(old, new))
+
+
+def test_make_dev_serves_as_these_tests_do() -> None:
+    made = subprocess.run(
+        ["make", "--dry-run", "dev"], cwd=ROOT, capture_output=True, text=True, check=True
+    ).stdout
+    assert "KIOSK_DEV=1" in made
+    assert made.rstrip().endswith(f"uvicorn app.main:app {' '.join(RELOAD)}")
 
 
 @pytest.fixture
@@ -64,6 +75,17 @@ def test_a_panel_with_a_fault_keeps_the_old_one_and_shows_the_fault(
     assert checkout.server.press("operation", "still works").status_code == 200
     checkout.edit("app/panel.toml", 'kind = "readuot"', 'kind = "readout"')
     expect(fault).to_be_hidden()
+
+
+@pytest.mark.parametrize("fault", ["{% endblok %}", "{{ page.titel }}", "{{ 1 + words }}"])
+def test_a_template_with_a_fault_is_told_and_the_page_comes_back_by_itself(
+    checkout: Checkout, page: Page, fault: str
+) -> None:
+    page.goto(checkout.server.url)
+    checkout.edit("templates/screen.html", "<main>", f"<main>{fault}")
+    expect(page.locator("body")).to_contain_text("templates/screen.html")
+    checkout.edit("templates/screen.html", f"<main>{fault}", "<main>")
+    expect(page.get_by_role("button", name="Publish1")).to_be_visible()
 
 
 def test_it_starts_with_a_faulty_panel_and_shows_the_fault(tmp_path: Path, page: Page) -> None:

@@ -13,11 +13,12 @@ from app.settings import LOOPBACK_HOSTS
 
 GUARDED = [("POST", "/widgets/x"), ("GET", "/events"), ("GET", "/robots/r1/events")]
 HOSTS = (*LOOPBACK_HOSTS, "cell1.local", "10.0.0.7", "[fe80::1]")
+Named = Mapping[str, str] | list[tuple[str, str]]
 OWN = {"host": "localhost:8000"}
 
 
 def asked(
-    method: str, path: str, headers: Mapping[str, str], answer: PlainTextResponse | None = None
+    method: str, path: str, headers: Named, answer: PlainTextResponse | None = None
 ) -> httpx.Response:
     """What comes back through the doors; inside, everything is answered with "in"."""
 
@@ -30,7 +31,7 @@ def asked(
     return asyncio.run(ask())
 
 
-def let_in(method: str, path: str, headers: Mapping[str, str]) -> bool:
+def let_in(method: str, path: str, headers: Named) -> bool:
     answer = asked(method, path, headers)
     assert (answer.status_code, answer.text == "in") in ((200, True), (403, False))
     return answer.status_code == 200
@@ -141,6 +142,20 @@ def test_an_own_origin_does_not_excuse_another_site() -> None:
     assert not let_in("POST", "/widgets/x", headers)
 
 
+@pytest.mark.parametrize(
+    "more",
+    [("host", "evil.example"), ("origin", "http://evil.example"), ("sec-fetch-site", "cross-site")],
+)
+def test_a_header_that_comes_twice_hides_nothing(more: tuple[str, str]) -> None:
+    own = [
+        ("host", "localhost:8000"),
+        ("origin", "http://localhost:8000"),
+        ("sec-fetch-site", "same-origin"),
+    ]
+    assert let_in("POST", "/widgets/x", own)
+    assert not let_in("POST", "/widgets/x", [*own, more])
+
+
 @pytest.mark.parametrize("method", ["POST", "PUT", "PATCH", "DELETE", "OPTIONS"])
 def test_every_method_that_may_change_something_is_guarded(method: str) -> None:
     assert let_in(method, "/", OWN)
@@ -170,6 +185,14 @@ def test_every_answer_has_the_security_headers(host: str) -> None:
     assert {name: headers.get(name) for name in SECURITY_HEADERS} == SECURITY_HEADERS
     assert "frame-ancestors 'none'" in headers["content-security-policy"]
     assert "unsafe" not in headers["content-security-policy"]
+
+
+@pytest.mark.parametrize("media_type", ["text/css", "text/javascript", "text/event-stream"])
+def test_what_is_no_document_has_those_that_are_not_about_documents(media_type: str) -> None:
+    headers = asked("GET", "/", OWN, PlainTextResponse("in", media_type=media_type)).headers
+    assert headers["x-content-type-options"] == "nosniff"
+    assert headers["cross-origin-resource-policy"] == "same-origin"
+    assert "content-security-policy" not in headers
 
 
 def test_an_answer_may_set_a_security_header_itself() -> None:

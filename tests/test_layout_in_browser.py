@@ -172,7 +172,8 @@ def test_without_scripts_it_is_asked_the_same(demo: Server, chromium: Browser) -
     if take.is_visible():
         take.click()
     page.locator('[data-widget="allow"] > button').click()
-    expect(page.get_by_role("heading")).to_have_text(f"{LONG} on {ROBOT}?")
+    expect(page.get_by_role("heading", level=2)).to_have_text(f"{LONG} on {ROBOT}?")
+    expect(page.get_by_text("SIMULATED ROBOT")).to_be_visible()
     expect(page.locator("dd")).to_have_text("(empty)")
     context.close()
 

@@ -1,6 +1,7 @@
 """The link alone, between two Zenoh sessions of this process."""
 
 import asyncio
+import re
 import signal
 import subprocess
 import sys
@@ -9,12 +10,14 @@ import time
 from functools import partial
 from pathlib import Path
 
+import pytest
 import zenoh
 from zenoh.handlers import Callback
 
 from app import keys
+from app.errors import SettingsError
 from app.keys import Qos
-from app.link import BLOCKED_MOST_US, Link, config_to
+from app.link import BLOCKED_MOST_US, Link, config_from, config_to
 from app.robot import Sample
 from tests.parts import free_port, until
 
@@ -29,6 +32,22 @@ def resident_kb() -> int:
 
 def tokens(zid: str, count: int) -> list[str]:
     return [keys.token(zid, "MP", f"topic{n}", "std_msgs/msg/String", Qos(), "") for n in range(count)]
+
+
+@pytest.mark.parametrize(
+    ("content", "why"),
+    [(None, "No such file or directory"), ('{ mode: "pear" }', "unknown variant `pear`"), ("{", "1:2")],
+)
+def test_a_configuration_that_can_not_be_used_is_told_in_the_users_terms(
+    tmp_path: Path, content: str | None, why: str
+) -> None:
+    path = tmp_path / "zenoh.json5"
+    if content is not None:
+        path.write_text(content)
+    with pytest.raises(SettingsError, match=re.escape(why)) as caught:
+        config_from(path)
+    assert str(path) in str(caught.value)
+    assert ".rs:" not in str(caught.value)
 
 
 def test_a_session_is_renewed_in_the_middle_of_what_comes_in(

@@ -1,14 +1,14 @@
 """The reference system on the real parts: bridge, rclpy nodes, the server as users start it."""
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 
 import pytest
 import zenoh
 
-from app.link import config_to
 from tests.parts import ROOT, Bridge, RosNode, Server, has_heard, live, until
 
 TEXTS = [
@@ -53,13 +53,24 @@ def arrives(server: Server, node: RosNode) -> bool:
     return True
 
 
+@contextmanager
+def known(bridge: Bridge, node: RosNode, folder: Path) -> Iterator[Server]:
+    """A kiosk on a bridge that knows what the node listens to."""
+    mine = live(bridge.endpoint, folder)
+    try:
+        until(mine.ready, "ready")
+        until(partial(arrives, mine, node), "the bridge knows what the node listens to", every_s=0.1)
+        yield mine
+    finally:
+        mine.end()
+
+
 @pytest.fixture(scope="module")
-def shared_server(bridge: Bridge, node: RosNode, tmp_path_factory: pytest.TempPathFactory) -> object:
-    mine = live(bridge.endpoint, tmp_path_factory.mktemp("shared"))
-    until(mine.ready, "ready")
-    until(partial(arrives, mine, node), "the bridge knows what the node listens to", every_s=0.1)
-    yield mine
-    mine.end()
+def shared_server(
+    bridge: Bridge, node: RosNode, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Server]:
+    with known(bridge, node, tmp_path_factory.mktemp("shared")) as mine:
+        yield mine
 
 
 def test_the_graph_has_the_topic_before_the_first_press(server: Server, node: RosNode) -> None:
@@ -157,22 +168,22 @@ def test_a_transient_local_value_arrives_whoever_starts_first(
 
 
 def test_fifty_starts_fifty_first_presses_received(
-    bridge: Bridge, node: RosNode, tmp_path: Path
+    own_bridge: Bridge, own_node: RosNode, tmp_path: Path
 ) -> None:
-    with zenoh.open(config_to(bridge.endpoint)) as other:
-        subscriber = "@/*/@ros2_lv/MS/operation/**"
-        until(lambda: list(other.liveliness().get(subscriber)), "the bridge knows the node")
-    before = len(node.heard("/operation"))
-    for number in range(50):
-        kiosk = live(bridge.endpoint, tmp_path)
+    own_node.subscribe("/operation", "std_msgs/msg/String")
+    texts = [f"first {number}" for number in range(50)]
+    with known(own_bridge, own_node, tmp_path):
+        pass
+    before = len(own_node.heard("/operation"))
+    for number, text in enumerate(texts):
+        kiosk = live(own_bridge.endpoint, tmp_path)
         try:
             until(kiosk.ready, "ready", every_s=0.001)
-            assert kiosk.press("operation", f"first {number}").json()["outcome"] == "published"
-            heard = before + number + 1
-            until(partial(has_heard, node, "/operation", heard), "heard", 5)
+            assert kiosk.press("operation", text).json()["outcome"] == "published"
+            until(partial(has_heard, own_node, "/operation", before + number + 1), "heard", 5)
         finally:
             kiosk.end()
-    assert node.heard_data("/operation")[before:] == [f"first {n}" for n in range(50)]
+    assert own_node.heard_data("/operation")[before:] == texts
 
 
 def test_what_nobody_hears_is_unknown_and_says_so(
@@ -188,7 +199,7 @@ def test_what_nobody_hears_is_unknown_and_says_so(
 
 def test_logs_are_in_ros_format_and_on_rosout(server: Server, node: RosNode) -> None:
     until(server.ready, "ready")
-    until(lambda: node.endpoints("/rosout"), "a publisher of /rosout")
+    until(partial(arrives, server, node), "the bridge knows what the node listens to", every_s=0.1)
     line = re.compile(r"\[(INFO|WARN|ERROR|FATAL)\] \[\d{10}\.\d{9}\] \[web_ui\]: .+|  .*")
     assert all(line.fullmatch(text) for text in server.process.lines)
     server.press("operation", "for the log")

@@ -266,7 +266,7 @@ def test_an_interlock_and_a_widget_may_have_one_id(load: Load) -> None:
             'no interlock "other"; there is operation',
         ),
         (with_widget(1, interlock="Other"), f"{BUTTON}.interlock", '"Other" is not an id'),
-        (with_widget(1, message="hello"), f"{BUTTON}.message", "valid dictionary"),
+        (with_widget(1, message="hello"), f"{BUTTON}.message", "must be a table, like { field ="),
         (
             with_widget(1, message={}),
             f"{BUTTON}.message.data",
@@ -469,7 +469,8 @@ def test_types_are_those_of_the_robots_distribution(load: Load, distro: str) -> 
         (b"title = ", "at end of document"),
         (b"[[page]\n", "line 1"),
         (b"title = 'a'\ntitle = 'b'\n", "overwrite"),
-        (b"\xff\xfe", "utf-8"),
+        (b"\xff\xfe", "byte 0xff at line 1 is not UTF-8: save the file as UTF-8"),
+        (b"a = 1\nb = '\xfc'\n", "byte 0xfc at line 2 is not UTF-8"),
     ],
 )
 def test_what_is_no_toml_is_unreadable(tmp_path: Path, data: bytes, reason: str) -> None:
@@ -479,6 +480,17 @@ def test_what_is_no_toml_is_unreadable(tmp_path: Path, data: bytes, reason: str)
         load_panel(path)
     assert caught.value.unreadable
     assert [fault.place for fault in caught.value.faults] == [""]
+
+
+def test_an_unknown_field_is_no_fault_of_the_input_in_it(load: Load) -> None:
+    found = faults(load, with_widget(1, message={"date": "{message}"}))
+    assert found == {f"{BUTTON}.message.date": "unknown field; std_msgs/msg/String has data"}
+
+
+def test_a_mark_of_the_byte_order_is_no_fault(tmp_path: Path) -> None:
+    path = tmp_path / "cell.toml"
+    path.write_text((PACKAGE / "panel.toml").read_text(), encoding="utf-8-sig")
+    assert load_panel(path).title == "Robot cell 1"
 
 
 @pytest.mark.parametrize(("name", "reason"), [("none.toml", "No such file"), (".", "Is a directory")])

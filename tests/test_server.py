@@ -41,8 +41,8 @@ def demo() -> Iterator[Server]:
 
 
 def test_demo_mode_shows_its_banner_on_every_page(demo: Server) -> None:
-    for path in ("/", "/pages/operation"):
-        assert "SIMULATED ROBOT" in demo.http.get(path).text
+    for path in ("/", "/pages/operation", "/log", "/nothing"):
+        assert "SIMULATED ROBOT" in demo.http.get(path, headers={"accept": "text/html"}).text
     assert demo.snapshot()["notice"]["banner"] == "SIMULATED ROBOT"
 
 
@@ -202,6 +202,13 @@ def test_a_large_body_is_refused(demo: Server) -> None:
     assert demo.by("socket").press("operation", "x" * 70_000).status_code == 413
 
 
+def test_it_listens_on_one_address_of_this_machine_alone(demo: Server) -> None:
+    socket.create_connection(("127.0.0.1", demo.port)).close()
+    for other in ("127.0.0.2", "::1"):
+        with pytest.raises(OSError, match=r"refused|assign"):
+            socket.create_connection((other, demo.port))
+
+
 @pytest.mark.parametrize("path", ["/widgets/operation", "/events", "/presses"])
 @pytest.mark.parametrize(
     "headers",
@@ -281,10 +288,11 @@ def test_it_ends_soon_with_fifty_streams_and_sockets_open(
         streams = [many.send(many.build_request("GET", "/events"), stream=True) for _ in range(50)]
         until(lambda: "kiosk_streams 50.0" in mine.http.get("/metrics").text, "50 streams")
         told_at = time.monotonic()
-        mine.end(signal.SIGTERM)
-        assert time.monotonic() - told_at < 3.0
+        mine.process.send(signal.SIGTERM)
         for stream in streams:
-            stream.close()
+            stream.read()  # to its end, which is in order
+        assert time.monotonic() - told_at < 1.0
+        mine.process.wait(3)
         for socket in sockets:
             with pytest.raises(ConnectionClosed):
                 socket.hear()

@@ -26,11 +26,17 @@ def test_an_installed_wheel_serves_from_any_folder(tmp_path: Path) -> None:
         until(mine.ready, "ready")
         html = mine.http.get("/").text
         assert "Publish1" in html
-        (sheet,) = [part for part in html.split('"') if part.endswith("kiosk.css")]
-        assert mine.http.get(sheet).status_code == 200
+        files = [part for part in html.split('"') if part.startswith("/static/")]
+        assert len(files) >= 4
+        assert {mine.http.get(file).status_code for file in files} == {200}
         assert mine.press("operation", "from a wheel").json()["outcome"] == "published"
     finally:
         mine.end()
+    live = Server(elsewhere, python=str(python), KIOSK_MODE="live")
+    try:  # by the zenoh.json5 that is in it
+        assert "No connection to the robot" in live.widget("operation")["reason"]
+    finally:
+        live.end()
     check = subprocess.run(
         [str(python), "-m", "app.check"], cwd=elsewhere, capture_output=True, text=True, check=False
     )

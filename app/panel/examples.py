@@ -89,8 +89,8 @@ def _message(
         return error.message
     try:
         field = interfaces.field_type(type_name, error.field)
-    except InterfaceError:
-        return f'input "{names[0]}" gives {values[names[0]]!r}: {error.message}'
+    except InterfaceError:  # what is written there is no field
+        return error.message
     if written != f"{{{names[0]}}}":
         return error.message if _why(error) else f'"{written}" makes text; the field is {field}'
     one = inputs[names[0]]

@@ -35,10 +35,9 @@ def load_panel(path: Path, kept: Callable[[Panel], Path | None] = lambda _: None
     """
     try:
         data = path.read_bytes()
-        tables = tomllib.loads(data.decode())
+        tables = tomllib.loads(data.decode("utf-8-sig"))  # some editors begin a file with a mark
     except (OSError, ValueError, RecursionError) as error:
-        reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-        raise PanelError(str(path), (Fault("", reason),), unreadable=True) from error
+        raise PanelError(str(path), (Fault("", _unreadable(error)),), unreadable=True) from error
     revision = hashlib.sha256(data).hexdigest()[:12]
     faults = [Fault("revision", "unknown key")] if tables.pop("revision", None) is not None else []
     try:
@@ -52,6 +51,16 @@ def load_panel(path: Path, kept: Callable[[Panel], Path | None] = lambda _: None
     if faults:
         raise PanelError(str(path), tuple(faults))
     return resolved(panel, interfaces_of(panel.distro, panel.interfaces))
+
+
+def _unreadable(error: Exception) -> str:
+    match error:
+        case OSError(strerror=str(reason)):
+            return reason
+        case UnicodeDecodeError(object=data, start=at):
+            line = data.count(b"\n", 0, at) + 1
+            return f"byte {data[at]:#04x} at line {line} is not UTF-8: save the file as UTF-8"
+    return str(error)
 
 
 def _faults_with_types(panel: Panel, faulty: Collection[str] = ()) -> Iterator[Fault]:
@@ -169,6 +178,8 @@ def _message(error: Any, model: type[BaseModel], location: tuple[str | int, ...]
             return f'"{error["input"]}" is not how names of constants start: it must be like STATUS_'
         case "tuple_type":
             return f"must be a list of tables: write [[{'.'.join(map(str, _names(location)))}]]"
+        case "dict_type":
+            return f'must be a table, like {{ field = "value" }}, not {error["input"]!r}'
         case "missing" if model is Hold and location[-1] in NEEDED:
             return f"is missing: {NEEDED[location[-1]]}"
         case "missing":

@@ -102,7 +102,7 @@ async def page(site: CurrentSite, wanted: Annotated[Wanted, Query()]) -> Respons
         inputs={w.id: w.label for w in panel.widgets() if isinstance(w, Input | Parameter)},
         outcomes=OUTCOMES,
         off="" if site.log.enabled else say("log_off"),
-        banner=site.fleet.first.board.view["notice"]["banner"],
+        banner=site.banner,
         fault=site.log.fault,
         older=wanted.query(rows[-1].entry.seq) if more else "",
         newest=wanted.query() if wanted.before else "",

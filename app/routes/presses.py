@@ -167,6 +167,7 @@ def _ask(site: Site, kiosk: Kiosk, widget: str, inputs: dict[str, str]) -> Respo
     html = site.templates.get_template("ask.html").render(
         site=site,
         panel=kiosk.panel,
+        banner=kiosk.board.view["notice"]["banner"],
         asked=ask_of(kiosk, pressed),
         action=f"{kiosk.base}/widgets/{widget}",
         back=f"{kiosk.base}/pages/{_page_of(kiosk, widget).id}",

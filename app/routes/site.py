@@ -30,6 +30,12 @@ class Site:
     log: OperatorLog | Unlogged
     browsers: Browsers = field(default_factory=Browsers)
 
+    @property
+    def banner(self) -> str:
+        """What stands above a page of no robot: that one is simulated."""
+        banners = (kiosk.board.view["notice"]["banner"] for kiosk in self.fleet.kiosks)
+        return next(filter(None, banners), "")
+
 
 def site_of(request: HTTPConnection) -> Site:
     site: Site = request.app.state.site
