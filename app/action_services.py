@@ -19,6 +19,7 @@ from app.robot import Robot
 log = logging.getLogger("kiosk.actions")
 
 CANCEL: Final = "action_msgs/srv/CancelGoal"
+NO_SUCH_GOAL: Final = frozenset({2, 3})  # its ERROR_UNKNOWN_GOAL_ID, ERROR_GOAL_TERMINATED
 
 Query = asyncio.Future[bytes | None]
 
@@ -62,8 +63,8 @@ class ActionServices:
         return self._link.query(key, payload, timeout_s)
 
     async def reply(self, goal: Goal, query: Query) -> bytes | None:
-        """The reply; None when there is none in time, or the bridge went away."""
-        ends: set[asyncio.Future[Any]] = {query, goal.cut}
+        """The reply; None when there is none in time, or the bridge went away meanwhile."""
+        ends: set[asyncio.Future[Any]] = {query} if goal.cut.done() else {query, goal.cut}
         await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
         reply = query.result() if query.done() else None
         if reply is None:

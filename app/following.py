@@ -78,7 +78,10 @@ class Following:
             if answer := await self._end(goal):
                 break
             if not (goal.known or goal.cut.done()):
-                return  # it was never heard of: what was said of it stands
+                if not goal.doubt:
+                    return  # it was never heard of: what was said of it stands
+                answer = Answer("unknown", say("goal_silent", seconds=f"{LATE_S:g}"))
+                break
             await asyncio.wait({goal.cut}, timeout=ASK_AGAIN_S)
         self._log.info("press %s: goal %s: %s: %s", goal.press_id, goal.id, answer.outcome, answer.text)
         self._tell(goal, answer)
@@ -101,8 +104,9 @@ class Following:
             return Answer("unknown", say("answer_unreadable", wanted=goal.widget.type))
         goal.state = message.status if message.status in ENDS else UNKNOWN
         if message.status not in ENDS:
-            return Answer("unknown", say("goal_lost"))
-        outcome, sentence = ENDS[message.status]
+            return Answer("unknown", say("goal_lost") if goal.known else say("goal_not_there"))
+        outcome, seen, asked = ENDS[message.status]
+        sentence = asked if goal.doubt else seen
         said = with_fields(goal.widget.result, message.result)
         return Answer(outcome, say(sentence, time=clock(time.time())) + (f": {said}" if said else "."))
 

@@ -15,13 +15,21 @@ from app.sentences import say
 
 UNKNOWN: Final = 0
 ACCEPTED: Final = 1
+EXECUTING: Final = 2
 CANCELING: Final = 3
 NAMES: Final = ("UNKNOWN", "ACCEPTED", "EXECUTING", "CANCELING", "SUCCEEDED", "CANCELED", "ABORTED")
-ENDS: Final[Mapping[int, tuple[Outcome, str]]] = {
-    4: ("succeeded", "goal_succeeded"),
-    5: ("canceled", "goal_canceled"),
-    6: ("aborted", "goal_aborted"),
+# The outcome, and the sentences for an end that was seen and for one that was asked for later.
+ENDS: Final[Mapping[int, tuple[Outcome, str, str]]] = {
+    4: ("succeeded", "goal_succeeded", "goal_had_succeeded"),
+    5: ("canceled", "goal_canceled", "goal_had_been_canceled"),
+    6: ("aborted", "goal_aborted", "goal_had_been_aborted"),
 }
+
+
+def goal_id(entry: str) -> uuid.UUID:
+    """That of the goal of the press whose entry in the operator's log has this hash, so that the log is
+    enough to ask for it; a random one where there is no entry."""
+    return uuid.UUID(entry[:32]) if entry else uuid.uuid4()
 
 
 @dataclass(slots=True)
@@ -30,6 +38,7 @@ class Goal:
     whether the robot ever had it.
 
     `cut` is done when nothing more is heard of it: with a sentence, or "" for a lost connection.
+    `doubt` is the sentence for a goal of before the server's start, until something is heard of it.
     """
 
     widget: Action
@@ -39,6 +48,7 @@ class Goal:
     corrected: Callable[[str, Answer], None]
     state: int | None = None
     known: bool = False
+    doubt: str = ""
     said: str = ""
     fraction: float | None = None
 
@@ -60,6 +70,12 @@ class Goal:
         sentence = say("goal_canceling" if self.state == CANCELING else "goal_executing")
         text = f"{sentence} {self.said}".strip()
         return Progress(True, "accepted", text, self.fraction, True, self._name, self.press_id)
+
+    @property
+    def in_doubt(self) -> Progress:
+        """What is shown of a goal of before the server's start: it may be under way."""
+        stoppable, press = not self.cut.done(), self.press_id
+        return Progress(True, "unknown", self.doubt, None, stoppable, NAMES[UNKNOWN], press)
 
     def came_to(self, answer: Answer) -> Progress:
         """What is shown when nothing is awaited any more."""
