@@ -5,6 +5,7 @@ Wire format: ROS 2's `<action>/_action/…` services (design.ros2.org, "Actions"
 
 import asyncio
 import logging
+import time
 import uuid
 from typing import Any, Final
 
@@ -14,7 +15,9 @@ from app.goals import Goal
 from app.interfaces import Interfaces
 from app.logs import RobotLog
 from app.panel.model import Action
+from app.progress import Answer
 from app.robot import Robot
+from app.sentences import clock, say
 
 log = logging.getLogger("kiosk.actions")
 
@@ -71,10 +74,21 @@ class ActionServices:
             await asyncio.wait({goal.cut}, timeout=CUT_NEWS_S)  # the news of a cut may follow
         return reply
 
-    def accepted(self, widget: Action, reply: bytes) -> bool | None:
-        """What `send_goal` answered."""
-        message = self._decoded(widget, self._interfaces.action(widget.type).send_goal_response, reply)
-        return None if message is None else bool(message.accepted)
+    def first_answer(self, goal: Goal, reply: bytes | None) -> Answer:
+        """What `send_goal` answered, or why it did not."""
+        widget, now = goal.widget, clock(time.time())
+        if reply is not None:
+            response = self._interfaces.action(widget.type).send_goal_response
+            message = self._decoded(widget, response, reply)
+            if message is None:
+                return Answer("unknown", say("answer_unreadable", wanted=widget.type))
+            if message.accepted:
+                return Answer("accepted", say("goal_accepted", time=now))
+            return Answer("rejected", say("goal_rejected", time=now))
+        if goal.cut.done():
+            return Answer("unknown", goal.cut.result() or say("call_cut"))
+        seconds = f"{widget.timeout_s:g}"
+        return Answer("timed_out", say("timed_out", seconds=seconds) + say("cyclone_hint"))
 
     def return_code(self, widget: Action, reply: bytes) -> int | None:
         """What `cancel_goal` answered."""

@@ -5,21 +5,20 @@ one. Wire format: ROS 2's `<action>/_action/…` topics (design.ros2.org, "Actio
 """
 
 import asyncio
-import math
 import time
 from collections.abc import Callable, Iterator
 from typing import Any, Final
 
 from app import keys
 from app.action_services import NO_SUCH_GOAL, ActionServices
-from app.calls import MOST_UNANSWERED, Asker, with_fields
+from app.calls import MOST_UNANSWERED, Asker
 from app.errors import DecodeError
 from app.following import Following
 from app.goals import ACCEPTED, CANCELING, EXECUTING, UNKNOWN, Goal, goal_id
 from app.interfaces import Interfaces
 from app.panel.model import Action
 from app.progress import IDLE, Answer, Corrected, Progress
-from app.robot import Robot, Sample, value_of
+from app.robot import Robot, Sample
 from app.sentences import clock, say
 
 STATUS: Final = "action_msgs/msg/GoalStatusArray"
@@ -73,7 +72,7 @@ class Actions:
         goal = Goal(widget, press_id, own_id, cut, corrected)
         self._latest[widget.id] = goal
         self._show(goal, Progress(busy=True, text=say("waiting_for_answer")))
-        answer = self._first_answer(goal, await self._services.reply(goal, query))
+        answer = self._services.first_answer(goal, await self._services.reply(goal, query))
         if answer.outcome != "rejected":
             goal.advance(ACCEPTED if answer.outcome == "accepted" else UNKNOWN)
             self._following.begin(goal)
@@ -185,29 +184,10 @@ class Actions:
             goal.corrected(goal.press_id, answer)
 
     def _take_feedback(self, goal: Goal, feedback: Any) -> None:
-        widget = goal.widget
-        if widget.progress is not None:
-            found = value_of(feedback, widget.progress)
-            done = math.nan if found is None else float(found) / widget.progress_max
-            goal.fraction = min(1.0, max(0.0, done)) if done == done else None  # NaN is no progress
-        goal.said = with_fields(widget.feedback, feedback)
+        goal.hear(feedback)
         if goal.doubt and goal.advance(EXECUTING):
             self._advanced(goal)
         self._note(goal, goal.under_way)  # shown with the next frame: a goal may say a lot
-
-    def _first_answer(self, goal: Goal, reply: bytes | None) -> Answer:
-        now = clock(time.time())
-        if reply is not None:
-            accepted = self._services.accepted(goal.widget, reply)
-            if accepted is True:
-                return Answer("accepted", say("goal_accepted", time=now))
-            if accepted is False:
-                return Answer("rejected", say("goal_rejected", time=now))
-            return Answer("unknown", say("answer_unreadable", wanted=goal.widget.type))
-        if goal.cut.done():
-            return Answer("unknown", goal.cut.result() or say("call_cut"))
-        seconds = f"{goal.widget.timeout_s:g}"
-        return Answer("timed_out", say("timed_out", seconds=seconds) + say("cyclone_hint"))
 
     def _tell(self, goal: Goal, answer: Answer) -> None:
         """What came of it, or that it is not known any more: to the widget and the receipt."""

@@ -69,7 +69,7 @@ class Following:
     async def _follow(self, goal: Goal) -> None:
         while True:
             if goal.cut.done():
-                if goal.lives:
+                if goal.lives and not goal.doubt:
                     goal.state = UNKNOWN
                     self._tell(goal, Answer("unknown", goal.cut.result() or say("goal_cut")))
                 await self._until_offered(goal)

@@ -4,13 +4,16 @@ States and their order: action_msgs/msg/GoalStatus.
 """
 
 import asyncio
+import math
 import uuid
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
+from app.calls import with_fields
 from app.panel.model import Action
 from app.progress import Answer, Outcome, Progress
+from app.robot import value_of
 from app.sentences import say
 
 UNKNOWN: Final = 0
@@ -59,6 +62,15 @@ class Goal:
         self.state = state
         self.known = self.known or state != UNKNOWN
         return True
+
+    def hear(self, feedback: Any) -> None:
+        """Takes a feedback: what it says, and how far the goal is."""
+        widget = self.widget
+        if widget.progress is not None:
+            found = value_of(feedback, widget.progress)
+            done = math.nan if found is None else float(found) / widget.progress_max
+            self.fraction = min(1.0, max(0.0, done)) if done == done else None  # NaN is no progress
+        self.said = with_fields(widget.feedback, feedback)
 
     @property
     def lives(self) -> bool:

@@ -117,8 +117,9 @@ def test_a_second_kill_loses_it_no_more_than_the_first(
     robot.fibonacci(step_s=30)
     with_a_goal(start).end(signal.SIGKILL)
     for _ in range(2):
-        found_again(start()).end(signal.SIGKILL)
-        assert told(tmp_path)[-1] == ("corrected", "accepted")
+        again = found_again(start())
+        until(lambda: told(tmp_path)[-1] == ("corrected", "accepted"), "logged")
+        again.end(signal.SIGKILL)
     last = found_again(start())
     assert cancel(last, press="goal-1").json()["outcome"] == "accepted"
     until(lambda: last.widget("count")["outcome"] == "canceled", "canceled by its press")
