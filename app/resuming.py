@@ -80,7 +80,7 @@ class Resuming:
         self._show(IDLE)
         final = {say("goal_lost"), say("goal_not_there")}
         for unended, noted in found:
-            if unended.last.reason not in final:
+            if unended.reason not in final:
                 self._resume(unended, noted)
         return True
 

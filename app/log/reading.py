@@ -16,7 +16,6 @@ from app.log.file import in_words, read_only
 LONGEST_SEARCH_S: Final = 5.0
 STEPS_BETWEEN_LOOKS: Final = 10_000
 MOST_LOOKED_AT: Final = 20_000  # entries, from the newest back
-OPEN: Final = frozenset({"", "accepted", "unknown", "timed_out"})  # outcomes after which more may come
 
 # What has become more by now is told by a later entry.
 DONE: Final = "(e.kind <> 'pressed' OR e.seq IN (SELECT seq FROM undone))"
@@ -57,14 +56,15 @@ class Row:
     pressed_at: int | None
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True)
 class Unended:
-    """A press of which the log has no end: its entry, the last one that tells of it (itself where none
-    does), and whether what it was for was `accepted` once."""
+    """A press of which the log has no end: its entry, what was told of it last ("" where nothing was),
+    and whether what it was for was `accepted` once."""
 
     press: Entry
-    last: Entry
-    accepted: bool = False
+    outcome: str
+    reason: str
+    accepted: bool
 
 
 def rows(folder: Path, wanted: Filter, before: int | None, count: int) -> list[Row]:
@@ -77,21 +77,23 @@ def unended(folder: Path, robot: str, widgets: Collection[str], since: int) -> l
     """Presses of these widgets of a robot, not before `since` (ms), of which the end is not known; the
     newest first. LogError."""
     names = {f"widget{number}": widget for number, widget in enumerate(widgets)}
-    columns = ", ".join(f'"{name}"' for name in FIELDS)
-    query = (
-        f"SELECT {columns} FROM entry WHERE seq > (SELECT max(seq) FROM entry) - {MOST_LOOKED_AT}"
-        " AND kind IN ('pressed', 'closed', 'corrected') AND action = 'press' AND robot = :robot"
-        f" AND widget IN ({', '.join(f':{name}' for name in names)}) ORDER BY seq"
-    )
-    presses: dict[int | None, Unended] = {}
-    for row in _found(folder, query, {"robot": robot, **names}):
-        entry = Entry(*row)
-        if entry.kind == "pressed" and entry.at >= since:
-            presses[entry.seq] = Unended(entry, entry)
-        elif press := presses.get(entry.of):
-            press.last = entry
-            press.accepted |= entry.outcome == "accepted"
-    return [one for one in reversed(presses.values()) if one.last.outcome in OPEN]
+    columns = ", ".join(f'p."{name}"' for name in FIELDS)
+    query = f"""
+        WITH recent AS (
+          SELECT * FROM entry
+          WHERE seq > (SELECT max(seq) FROM entry) - {MOST_LOOKED_AT} AND action = 'press'
+            AND robot = :robot AND widget IN ({", ".join(f":{name}" for name in names)})
+        ), told AS (
+          SELECT of, max(seq) AS last, max(outcome = 'accepted') AS accepted FROM recent GROUP BY of
+        )
+        SELECT {columns}, ifnull(l.outcome, '') AS said, ifnull(l.reason, ''), ifnull(t.accepted, 0)
+        FROM recent p LEFT JOIN told t ON t.of = p.seq LEFT JOIN entry l ON l.seq = t.last
+        WHERE p.kind = 'pressed' AND p.at >= :since
+          AND said IN ('', 'accepted', 'unknown', 'timed_out')
+        ORDER BY p.seq DESC
+    """
+    found = _found(folder, query, {"robot": robot, "since": since, **names})
+    return [Unended(Entry(*row[:-3]), row[-3], row[-2], bool(row[-1])) for row in found]
 
 
 def _found(folder: Path, query: str, values: Mapping[str, Any]) -> list[Any]:
