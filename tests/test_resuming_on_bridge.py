@@ -70,11 +70,12 @@ def entries_of(folder: Path, press_id: str) -> list[Entry]:
 BROKEN_OFF = [("pressed", ""), ("closed", "accepted"), ("corrected", "unknown")]
 
 
-def test_after_a_kill_a_goal_is_followed_to_its_end(
-    start: Start, robot: CycloneRobot, tmp_path: Path
+@pytest.mark.parametrize("by", [signal.SIGKILL, signal.SIGTERM])
+def test_after_a_restart_a_goal_is_followed_to_its_end(
+    start: Start, robot: CycloneRobot, tmp_path: Path, by: signal.Signals
 ) -> None:
     robot.fibonacci(step_s=30)
-    with_a_goal(start).end(signal.SIGKILL)
+    with_a_goal(start).end(by)
     again = start()
     shown = again.widget("count")
     assert (shown["busy"], shown["enabled"], shown["press"]) == (True, False, "goal-1")
