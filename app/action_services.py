@@ -95,6 +95,12 @@ class ActionServices:
         message = self._decoded(widget, self._interfaces.service(CANCEL)[1], reply)
         return None if message is None else int(message.return_code)
 
+    def why_silent(self, widget: Action) -> str:
+        """Why `cancel_goal` did not answer."""
+        if self.offered(widget):
+            return say("timed_out", seconds=f"{widget.timeout_s:g}")
+        return say("cancel_unheard", name=widget.action)
+
     def result(self, widget: Action, reply: bytes) -> Any:
         """What `get_result` answered: a message with `status` and `result`."""
         return self._decoded(widget, self._interfaces.action(widget.type).get_result_response, reply)

@@ -115,10 +115,8 @@ class Actions:
         if (goal := self._stoppable(widget, press_id)) is None:
             return Answer("refused", self.over(widget, press_id))
         reply = await self._services.reply(goal, self._services.cancel_goal(goal))
-        if reply is None and not self._services.offered(widget):
-            return Answer("unknown", say("cancel_unheard", name=widget.action))
         if reply is None:
-            return Answer("unknown", say("timed_out", seconds=f"{widget.timeout_s:g}"))
+            return Answer("unknown", self._services.why_silent(widget))
         now = clock(time.time())
         code = self._services.return_code(widget, reply)
         if code in NO_SUCH_GOAL and goal.doubt and not goal.cut.done():
