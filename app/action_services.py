@@ -5,6 +5,7 @@ Wire format: ROS 2's `<action>/_action/…` services (design.ros2.org, "Actions"
 
 import asyncio
 import logging
+import time
 import uuid
 from typing import Any, Final
 
@@ -14,11 +15,14 @@ from app.goals import Goal
 from app.interfaces import Interfaces
 from app.logs import RobotLog
 from app.panel.model import Action
+from app.progress import Answer
 from app.robot import Robot
+from app.sentences import clock, say
 
 log = logging.getLogger("kiosk.actions")
 
 CANCEL: Final = "action_msgs/srv/CancelGoal"
+NO_SUCH_GOAL: Final = frozenset({2, 3})  # its ERROR_UNKNOWN_GOAL_ID, ERROR_GOAL_TERMINATED
 
 Query = asyncio.Future[bytes | None]
 
@@ -62,23 +66,40 @@ class ActionServices:
         return self._link.query(key, payload, timeout_s)
 
     async def reply(self, goal: Goal, query: Query) -> bytes | None:
-        """The reply; None when there is none in time, or the bridge went away."""
-        ends: set[asyncio.Future[Any]] = {query, goal.cut}
+        """The reply; None when there is none in time, or the bridge went away meanwhile."""
+        ends: set[asyncio.Future[Any]] = {query} if goal.cut.done() else {query, goal.cut}
         await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
         reply = query.result() if query.done() else None
         if reply is None:
             await asyncio.wait({goal.cut}, timeout=CUT_NEWS_S)  # the news of a cut may follow
         return reply
 
-    def accepted(self, widget: Action, reply: bytes) -> bool | None:
-        """What `send_goal` answered."""
-        message = self._decoded(widget, self._interfaces.action(widget.type).send_goal_response, reply)
-        return None if message is None else bool(message.accepted)
+    def first_answer(self, goal: Goal, reply: bytes | None) -> Answer:
+        """What `send_goal` answered, or why it did not."""
+        widget, now = goal.widget, clock(time.time())
+        if reply is not None:
+            response = self._interfaces.action(widget.type).send_goal_response
+            message = self._decoded(widget, response, reply)
+            if message is None:
+                return Answer("unknown", say("answer_unreadable", wanted=widget.type))
+            if message.accepted:
+                return Answer("accepted", say("goal_accepted", time=now))
+            return Answer("rejected", say("goal_rejected", time=now))
+        if goal.cut.done():
+            return Answer("unknown", goal.cut.result() or say("call_cut"))
+        seconds = f"{widget.timeout_s:g}"
+        return Answer("timed_out", say("timed_out", seconds=seconds) + say("cyclone_hint"))
 
     def return_code(self, widget: Action, reply: bytes) -> int | None:
         """What `cancel_goal` answered."""
         message = self._decoded(widget, self._interfaces.service(CANCEL)[1], reply)
         return None if message is None else int(message.return_code)
+
+    def why_silent(self, widget: Action) -> str:
+        """Why `cancel_goal` did not answer."""
+        if self.offered(widget):
+            return say("timed_out", seconds=f"{widget.timeout_s:g}")
+        return say("cancel_unheard", name=widget.action)
 
     def result(self, widget: Action, reply: bytes) -> Any:
         """What `get_result` answered: a message with `status` and `result`."""

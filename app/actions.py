@@ -5,22 +5,20 @@ one. Wire format: ROS 2's `<action>/_action/…` topics (design.ros2.org, "Actio
 """
 
 import asyncio
-import math
 import time
-import uuid
 from collections.abc import Callable, Iterator
 from typing import Any, Final
 
 from app import keys
-from app.action_services import ActionServices
-from app.calls import MOST_UNANSWERED, Asker, with_fields
+from app.action_services import NO_SUCH_GOAL, ActionServices
+from app.calls import MOST_UNANSWERED, Asker
 from app.errors import DecodeError
 from app.following import Following
-from app.goals import ACCEPTED, CANCELING, UNKNOWN, Goal
+from app.goals import ACCEPTED, CANCELING, EXECUTING, UNKNOWN, Goal, goal_id
 from app.interfaces import Interfaces
 from app.panel.model import Action
 from app.progress import IDLE, Answer, Corrected, Progress
-from app.robot import Robot, Sample, value_of
+from app.robot import Robot, Sample
 from app.sentences import clock, say
 
 STATUS: Final = "action_msgs/msg/GoalStatusArray"
@@ -47,32 +45,49 @@ class Actions:
             if not goal.cut.done() and not (bridge and self._services.offered(goal.widget)):
                 gone = say("goal_gone", name=goal.widget.action)
                 goal.cut.set_result(gone if bridge else "")
+                if goal.doubt:
+                    self._note(goal, goal.in_doubt)
 
     async def stop(self) -> None:
         """Ends its tasks; goals go on in the robot."""
         await self._following.stop()
 
     async def start(
-        self, widget: Action, fields: dict[str, Any], press_id: str, corrected: Corrected
+        self,
+        widget: Action,
+        fields: dict[str, Any],
+        press_id: str,
+        corrected: Corrected,
+        entry: str = "",
     ) -> Answer:
-        """Sends a goal; `corrected` gets what came of it in the end. FieldError for bad fields,
-        LinkError where it could not be sent: then nothing is under way."""
-        goal_id = uuid.uuid4()
-        request = self._services.goal_request(widget, goal_id, fields)
+        """Sends a goal; `corrected` gets what came of it in the end, `entry` is the hash of the press's
+        entry in the operator's log. FieldError for bad fields, LinkError where it could not be sent:
+        then nothing is under way."""
+        own_id = goal_id(entry)
+        request = self._services.goal_request(widget, own_id, fields)
         if why := self.full(widget.action):
             return Answer("refused", why)
         query = self._services.send_goal(widget, request)
         cut = asyncio.get_running_loop().create_future()
-        goal = Goal(widget, press_id, goal_id, cut, corrected)
+        goal = Goal(widget, press_id, own_id, cut, corrected)
         self._latest[widget.id] = goal
         self._show(goal, Progress(busy=True, text=say("waiting_for_answer")))
-        answer = self._first_answer(goal, await self._services.reply(goal, query))
+        answer = self._services.first_answer(goal, await self._services.reply(goal, query))
         if answer.outcome != "rejected":
             goal.advance(ACCEPTED if answer.outcome == "accepted" else UNKNOWN)
             self._following.begin(goal)
         runs = goal.lives and not cut.done()
         self._show(goal, goal.under_way if runs else goal.came_to(answer))
         return answer
+
+    def resume(self, goal: Goal) -> None:
+        """Follows a goal of before the server's start, whose `cut` is done. Its widget shows it, unless
+        it has a later one."""
+        if any(goal.id == one.id for one in (*self._latest.values(), *self._following.goals)):
+            return
+        self._latest.setdefault(goal.widget.id, goal)
+        self._following.begin(goal)
+        self._show(goal, goal.in_doubt)
 
     def full(self, action: str) -> str:
         """Why no further goal of an action is sent; "" while one may be."""
@@ -101,11 +116,15 @@ class Actions:
             return Answer("refused", self.over(widget, press_id))
         reply = await self._services.reply(goal, self._services.cancel_goal(goal))
         if reply is None:
-            return Answer("unknown", say("timed_out", seconds=f"{widget.timeout_s:g}"))
+            return Answer("unknown", self._services.why_silent(widget))
         now = clock(time.time())
-        if self._services.return_code(widget, reply) != 0:
+        code = self._services.return_code(widget, reply)
+        if code in NO_SUCH_GOAL and goal.doubt and not goal.cut.done():
+            goal.cut.set_result("")  # its end is asked for anew
+        if code != 0:
             return Answer("rejected", say("cancel_refused", time=now))
-        if goal.advance(CANCELING) and self._robot.progress[widget.id].busy:
+        if goal.advance(CANCELING) and (goal.doubt or self._robot.progress[widget.id].busy):
+            self._find(goal)
             self._show(goal, goal.under_way)
         return Answer("accepted", say("cancel_sent", time=now))
 
@@ -147,39 +166,30 @@ class Actions:
     def _advanced(self, goal: Goal) -> None:
         """It has another state; while its first answer or its result is awaited, or its server after a
         cut, that will show."""
-        if not goal.lives or goal.cut.done() or goal not in self._following.goals:
+        if goal.cut.done() or goal not in self._following.goals:
             return
-        if not self._robot.progress[goal.widget.id].busy:  # it was not known whether it runs
-            goal.corrected(
-                goal.press_id, Answer("accepted", say("goal_accepted", time=clock(time.time())))
-            )
-        self._show(goal, goal.under_way)
+        if goal.lives:
+            self._find(goal)
+            self._show(goal, goal.under_way)
+        elif goal.doubt:
+            self._show(goal, goal.in_doubt)
+
+    def _find(self, goal: Goal) -> None:
+        """It is under way; where that was not known, it is told."""
+        if goal.doubt or not self._robot.progress[goal.widget.id].busy:
+            goal.doubt = ""
+            answer = Answer("accepted", say("goal_found", time=clock(time.time())))
+            goal.corrected(goal.press_id, answer)
 
     def _take_feedback(self, goal: Goal, feedback: Any) -> None:
-        widget = goal.widget
-        if widget.progress is not None:
-            found = value_of(feedback, widget.progress)
-            done = math.nan if found is None else float(found) / widget.progress_max
-            goal.fraction = min(1.0, max(0.0, done)) if done == done else None  # NaN is no progress
-        goal.said = with_fields(widget.feedback, feedback)
+        goal.hear(feedback)
+        if goal.doubt and goal.advance(EXECUTING):
+            self._advanced(goal)
         self._note(goal, goal.under_way)  # shown with the next frame: a goal may say a lot
-
-    def _first_answer(self, goal: Goal, reply: bytes | None) -> Answer:
-        now = clock(time.time())
-        if reply is not None:
-            accepted = self._services.accepted(goal.widget, reply)
-            if accepted is True:
-                return Answer("accepted", say("goal_accepted", time=now))
-            if accepted is False:
-                return Answer("rejected", say("goal_rejected", time=now))
-            return Answer("unknown", say("answer_unreadable", wanted=goal.widget.type))
-        if goal.cut.done():
-            return Answer("unknown", goal.cut.result() or say("call_cut"))
-        seconds = f"{goal.widget.timeout_s:g}"
-        return Answer("timed_out", say("timed_out", seconds=seconds) + say("cyclone_hint"))
 
     def _tell(self, goal: Goal, answer: Answer) -> None:
         """What came of it, or that it is not known any more: to the widget and the receipt."""
+        goal.doubt = ""
         self._show(goal, goal.came_to(answer))
         goal.corrected(goal.press_id, answer)
 

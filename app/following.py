@@ -69,7 +69,7 @@ class Following:
     async def _follow(self, goal: Goal) -> None:
         while True:
             if goal.cut.done():
-                if goal.lives:
+                if goal.lives and not goal.doubt:
                     goal.state = UNKNOWN
                     self._tell(goal, Answer("unknown", goal.cut.result() or say("goal_cut")))
                 await self._until_offered(goal)
@@ -78,7 +78,10 @@ class Following:
             if answer := await self._end(goal):
                 break
             if not (goal.known or goal.cut.done()):
-                return  # it was never heard of: what was said of it stands
+                if not goal.doubt:
+                    return  # it was never heard of: what was said of it stands
+                answer = Answer("unknown", say("goal_silent", seconds=f"{LATE_S:g}"))
+                break
             await asyncio.wait({goal.cut}, timeout=ASK_AGAIN_S)
         self._log.info("press %s: goal %s: %s: %s", goal.press_id, goal.id, answer.outcome, answer.text)
         self._tell(goal, answer)
@@ -101,8 +104,9 @@ class Following:
             return Answer("unknown", say("answer_unreadable", wanted=goal.widget.type))
         goal.state = message.status if message.status in ENDS else UNKNOWN
         if message.status not in ENDS:
-            return Answer("unknown", say("goal_lost"))
-        outcome, sentence = ENDS[message.status]
+            return Answer("unknown", say("goal_lost") if goal.known else say("goal_not_there"))
+        outcome, seen, asked = ENDS[message.status]
+        sentence = asked if goal.doubt else seen
         said = with_fields(goal.widget.result, message.result)
         return Answer(outcome, say(sentence, time=clock(time.time())) + (f": {said}" if said else "."))
 

@@ -4,24 +4,35 @@ States and their order: action_msgs/msg/GoalStatus.
 """
 
 import asyncio
+import math
 import uuid
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
+from app.calls import with_fields
 from app.panel.model import Action
 from app.progress import Answer, Outcome, Progress
+from app.robot import value_of
 from app.sentences import say
 
 UNKNOWN: Final = 0
 ACCEPTED: Final = 1
+EXECUTING: Final = 2
 CANCELING: Final = 3
 NAMES: Final = ("UNKNOWN", "ACCEPTED", "EXECUTING", "CANCELING", "SUCCEEDED", "CANCELED", "ABORTED")
-ENDS: Final[Mapping[int, tuple[Outcome, str]]] = {
-    4: ("succeeded", "goal_succeeded"),
-    5: ("canceled", "goal_canceled"),
-    6: ("aborted", "goal_aborted"),
+# The outcome, and the sentences for an end that was seen and for one that was asked for later.
+ENDS: Final[Mapping[int, tuple[Outcome, str, str]]] = {
+    4: ("succeeded", "goal_succeeded", "goal_had_succeeded"),
+    5: ("canceled", "goal_canceled", "goal_had_been_canceled"),
+    6: ("aborted", "goal_aborted", "goal_had_been_aborted"),
 }
+
+
+def goal_id(entry: str) -> uuid.UUID:
+    """That of the goal of the press whose entry in the operator's log has this hash, so that the log is
+    enough to ask for it; a random one where there is no entry."""
+    return uuid.UUID(entry[:32]) if entry else uuid.uuid4()
 
 
 @dataclass(slots=True)
@@ -30,6 +41,7 @@ class Goal:
     whether the robot ever had it.
 
     `cut` is done when nothing more is heard of it: with a sentence, or "" for a lost connection.
+    `doubt` is the sentence for a goal of before the server's start, until something is heard of it.
     """
 
     widget: Action
@@ -39,6 +51,7 @@ class Goal:
     corrected: Callable[[str, Answer], None]
     state: int | None = None
     known: bool = False
+    doubt: str = ""
     said: str = ""
     fraction: float | None = None
 
@@ -50,6 +63,15 @@ class Goal:
         self.known = self.known or state != UNKNOWN
         return True
 
+    def hear(self, feedback: Any) -> None:
+        """Takes a feedback: what it says, and how far the goal is."""
+        widget = self.widget
+        if widget.progress is not None:
+            found = value_of(feedback, widget.progress)
+            done = math.nan if found is None else float(found) / widget.progress_max
+            self.fraction = min(1.0, max(0.0, done)) if done == done else None  # NaN is no progress
+        self.said = with_fields(widget.feedback, feedback)
+
     @property
     def lives(self) -> bool:
         """Whether the robot is known to be at it."""
@@ -60,6 +82,12 @@ class Goal:
         sentence = say("goal_canceling" if self.state == CANCELING else "goal_executing")
         text = f"{sentence} {self.said}".strip()
         return Progress(True, "accepted", text, self.fraction, True, self._name, self.press_id)
+
+    @property
+    def in_doubt(self) -> Progress:
+        """What is shown of a goal of before the server's start: it may be under way."""
+        stoppable, press = not self.cut.done(), self.press_id
+        return Progress(True, "unknown", self.doubt, None, stoppable, NAMES[UNKNOWN], press)
 
     def came_to(self, answer: Answer) -> Progress:
         """What is shown when nothing is awaited any more."""

@@ -130,7 +130,10 @@ def against_calling(call: Call | Action, robot: Robot, now: float) -> Verdict | 
     ready_at = robot.graph.served_since(role, key) + SERVER_SETTLE_S
     if now < ready_at:
         return Verdict(False, "getting_ready", say("getting_ready", name=name), ready_at)
-    return locked("busy") if robot.progress.get(call.id, IDLE).busy else None
+    known = robot.progress.get(call.id, IDLE)
+    if not known.busy:
+        return None
+    return locked("perhaps_busy") if known.outcome == "unknown" else locked("busy")
 
 
 def against_setting(of: Parameter, robot: Robot) -> Verdict | None:

@@ -28,6 +28,7 @@ from app.panel.model import Panel, RobotEntry
 from app.parameters import Parameters
 from app.presses import Presses
 from app.pulse import Pulse
+from app.resuming import Resuming
 from app.robot import Robot
 from app.rosout import TOPIC, Rosout
 from app.sending import Sending
@@ -97,6 +98,7 @@ class Kiosk:
             self.board, self.control, operators_log, panel.press_expires_s, others.boots
         )
         self.logbook = Logbook(operators_log, self.robot.name, lambda: self.board.id)
+        self._resuming = Resuming(panel, self.robot, self.logbook, self._actions, self.show)
         self._pulse = Pulse(self.robot, self.link, self.show)
         self.reached = self._pulse.reached
         self.sending = Sending(
@@ -148,6 +150,7 @@ class Kiosk:
 
     async def start(self) -> None:
         """Declares everything; whether anybody is there shows later."""
+        await self._resuming.start()
         self._warm_up()
         publish = [self.robot.key(topic) for topic in (*self.panel.publications(), TOPIC)]
         listened = self._intake
@@ -178,6 +181,7 @@ class Kiosk:
         await self._asked.stop()
         await self._pulse.stop()
         await self._joining.stop()
+        await self._resuming.stop()
         await self._actions.stop()
         await self._parameters.stop()
         if self._recorder is not None:

@@ -1,12 +1,13 @@
 """What a press writes into the operator's log, and what it needs of that log."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from contextlib import AbstractContextManager
 from typing import Any, Protocol
 
 from app.browsers import Browser
 from app.errors import LogError
 from app.log.entry import Entry, Origin, entered
+from app.log.reading import Unended
 from app.progress import Answer
 from app.sentences import say
 
@@ -36,6 +37,10 @@ class Log(Protocol):
     def leave_out(self, origin: Origin) -> None:
         """Counts a refusal that is no entry."""
 
+    async def unended(self, robot: str, widgets: Collection[str], since: int) -> list[Unended]:
+        """Presses of these widgets, not before `since` (ms), of which the end is not known, the newest
+        first; LogError when that can't be read (yet)."""
+
 
 class Noted:
     """One press in the log; `entry` is None where it could not be written and need not be."""
@@ -49,6 +54,11 @@ class Noted:
         self._fault = fault
         self._judged = {"verdict": "", "board": ""}
         self.corrected_to: Answer | None = None
+
+    @property
+    def hash(self) -> str:
+        """That of the press's entry: no other has it; "" where there is none."""
+        return self._entry.hash if self._entry else ""
 
     def judged(self, verdict: str) -> None:
         """By which verdict, and by which version of the board: the one that there is now."""
@@ -104,6 +114,16 @@ class Logbook:
         except LogError as error:
             return Noted(self._log, None, self._board, str(error))
         return Noted(self._log, written, self._board, self._log.fault)
+
+    @property
+    def unneeded(self) -> bool:
+        """Whether presses go on though the log can't be written."""
+        return bool(self._log.fault) and not self._log.lock
+
+    async def unended(self, widgets: Collection[str], since: int) -> list[tuple[Unended, Noted]]:
+        """Presses whose end the log does not know, as `Log` has it, each with what corrects it."""
+        found = await self._log.unended(self._robot, widgets, since)
+        return [(one, Noted(self._log, one.press, self._board)) for one in found]
 
     async def refused(
         self,

@@ -251,7 +251,7 @@ class Presses:
             return refused("refused", why, cause)
         try:
             correct = partial(self._correct, noted)
-            answer = await self._sending.send(widget, inputs, press_id, correct)
+            answer = await self._sending.send(widget, inputs, press_id, correct, noted.hash)
         except (FieldError, InputError) as error:
             return refused("not_encoded", str(error), "input")
         except LinkError as error:

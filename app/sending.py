@@ -88,8 +88,10 @@ class Sending:
         inputs: Mapping[str, Any],
         press_id: str,
         correct: Corrected,
+        entry: str = "",
     ) -> Answer:
-        """Sends, and waits for what comes of it; `correct` gets what is known later.
+        """Sends, and waits for what comes of it; `correct` gets what is known later. `entry` is the
+        hash of the press's entry in the operator's log.
 
         Until it is sent nothing here waits. FieldError or InputError for bad input, LinkError where
         it could not be sent.
@@ -111,7 +113,7 @@ class Sending:
                 payload = self._interfaces.encode(request, fields)
                 return await self._calls.call(widget, payload, press_id, correct)
             case Action():
-                return await self._actions.start(widget, fields, press_id, correct)
+                return await self._actions.start(widget, fields, press_id, correct, entry)
             case Parameter():
                 return await self._parameters.set(widget, fields["value"], press_id, correct)
 

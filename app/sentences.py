@@ -28,6 +28,7 @@ ENGLISH: Final[Mapping[str, str]] = {
     "no_service": "Locked: the robot does not offer {name} now.",
     "getting_ready": "Locked: the robot has just begun to offer {name}; getting ready.",
     "busy": "Under way: waiting for the robot.",
+    "perhaps_busy": "Locked: a goal of before the server's start may still be under way.",
     # QoS that DDS would not match: the robot's and the panel's.
     "publishes_best_effort": "The robot publishes {topic} best effort; this panel asks for reliable.",
     "publishes_volatile": "The robot publishes {topic} volatile; this panel asks for transient local.",
@@ -84,12 +85,23 @@ ENGLISH: Final[Mapping[str, str]] = {
     "goal_canceled": "Canceled at {time}",
     "goal_aborted": "The robot aborted it at {time}",
     "goal_lost": "The robot no longer knows this goal: what came of it is not known.",
+    "goal_not_there": "The robot does not know this goal: it did not get it, or knows it no longer.",
+    "goal_silent": "The robot told nothing of this goal for {seconds} s: what came of it is not known.",
+    "goal_in_doubt": "A goal of {time} may still be under way: it was sent before this server's start.",
+    "goal_found": "Found under way at {time}.",
+    "goal_had_succeeded": "Succeeded, by {time}",
+    "goal_had_been_canceled": "Canceled, by {time}",
+    "goal_had_been_aborted": "Aborted by the robot, by {time}",
+    "goals_unread": "Whether a goal of before this server's start is under way is not known: {why}",
     "goal_cut": "The connection was cut: the robot may still be doing it.",
     "goal_fault": "A fault of the panel's server: what came of it is not known.",
     "goal_gone": "The robot no longer offers {name}: what came of it is not known.",
     "cancel": "Cancel",
     "cancel_sent": "The robot was asked to cancel at {time}.",
     "cancel_refused": "The robot did not cancel it at {time}.",
+    "cancel_unheard": (
+        "The robot does not offer {name} now: it is not known whether it was asked to cancel."
+    ),
     "goal_over": (
         "That goal is over, or of before this server's start and perhaps still under way: nothing was"
         " canceled."

@@ -107,6 +107,7 @@ ORDER = (
     "app.parameter_services",
     "app.parameters",
     "app.logbook",
+    "app.resuming",
     "app.receipts",
     "app.doubts",
     "app.sending",

@@ -2,7 +2,7 @@
 
 import asyncio
 import json
-from collections.abc import Callable, Coroutine, Iterator
+from collections.abc import Callable, Collection, Coroutine, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from app.errors import LogError
-from app.log import Entry, Filter, Limits, OperatorLog, Origin
+from app.log import Entry, Filter, Limits, OperatorLog, Origin, Unended
 from app.log.reading import rows
 from app.logbook import Log, Logbook
 from app.panel.model import Hold, Panel
@@ -93,6 +93,9 @@ class SlowLog:
 
     def leave_out(self, origin: Origin) -> None:
         raise AssertionError("there is room for all")
+
+    async def unended(self, robot: str, widgets: Collection[str], since: int) -> list[Unended]:
+        return []
 
     def _kept(self, entry: Entry) -> Entry:
         self.entries.append(entry.sealed(len(self.entries) + 1, "boot", ""))

@@ -4,6 +4,7 @@ Each call is one short read on a connection of its own: a slow reader keeps noth
 """
 
 import time
+from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -14,6 +15,7 @@ from app.log.file import in_words, read_only
 
 LONGEST_SEARCH_S: Final = 5.0
 STEPS_BETWEEN_LOOKS: Final = 10_000
+MOST_LOOKED_AT: Final = 20_000  # entries, from the newest back
 
 # What has become more by now is told by a later entry.
 DONE: Final = "(e.kind <> 'pressed' OR e.seq IN (SELECT seq FROM undone))"
@@ -54,22 +56,59 @@ class Row:
     pressed_at: int | None
 
 
+@dataclass(frozen=True, slots=True)
+class Unended:
+    """A press of which the log has no end: its entry, what was told of it last ("" where nothing was),
+    and whether what it was for was `accepted` once."""
+
+    press: Entry
+    outcome: str
+    reason: str
+    accepted: bool
+
+
 def rows(folder: Path, wanted: Filter, before: int | None, count: int) -> list[Row]:
     """The newest `count` entries before the number `before`, the newest first; LogError."""
     query, values = _query(wanted, before, count)
+    return [Row(Entry(*row[:-1]), row[-1]) for row in _found(folder, query, values)]
+
+
+def unended(folder: Path, robot: str, widgets: Collection[str], since: int) -> list[Unended]:
+    """Presses of these widgets of a robot, not before `since` (ms), of which the end is not known; the
+    newest first. LogError."""
+    names = {f"widget{number}": widget for number, widget in enumerate(widgets)}
+    columns = ", ".join(f'p."{name}"' for name in FIELDS)
+    query = f"""
+        WITH recent AS (
+          SELECT * FROM entry
+          WHERE seq > (SELECT max(seq) FROM entry) - {MOST_LOOKED_AT} AND action = 'press'
+            AND robot = :robot AND widget IN ({", ".join(f":{name}" for name in names)})
+        ), told AS (
+          SELECT of, max(seq) AS last, max(outcome = 'accepted') AS accepted FROM recent GROUP BY of
+        )
+        SELECT {columns}, ifnull(l.outcome, '') AS said, ifnull(l.reason, ''), ifnull(t.accepted, 0)
+        FROM recent p LEFT JOIN told t ON t.of = p.seq LEFT JOIN entry l ON l.seq = t.last
+        WHERE p.kind = 'pressed' AND p.at >= :since
+          AND said IN ('', 'accepted', 'unknown', 'timed_out')
+        ORDER BY p.seq DESC
+    """
+    found = _found(folder, query, {"robot": robot, "since": since, **names})
+    return [Unended(Entry(*row[:-3]), row[-3], row[-2], bool(row[-1])) for row in found]
+
+
+def _found(folder: Path, query: str, values: Mapping[str, Any]) -> list[Any]:
     db = read_only(folder)
     end = time.monotonic() + LONGEST_SEARCH_S
     db.set_progress_handler(lambda: time.monotonic() > end, STEPS_BETWEEN_LOOKS)
     try:
         with in_words():
-            found = db.execute(query, values).fetchall()
+            return db.execute(query, values).fetchall()
     except LogError as error:
         if time.monotonic() > end:
             raise LogError("the search took too long: give a shorter time") from error
         raise
     finally:
         db.close()
-    return [Row(Entry(*row[:-1]), row[-1]) for row in found]
 
 
 def _query(wanted: Filter, before: int | None, count: int) -> tuple[str, dict[str, Any]]:

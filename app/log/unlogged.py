@@ -1,12 +1,13 @@
 """What stands in the log's place where the panel file switches it off: it keeps nothing."""
 
 import logging
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from app.log.entry import Entry, Origin
 from app.log.folder import Folder
+from app.log.reading import Unended
 from app.log.store import Head
 
 log = logging.getLogger("kiosk.log")
@@ -47,6 +48,9 @@ class Unlogged:
 
     def leave_out(self, origin: Origin) -> None:
         """It is not counted."""
+
+    async def unended(self, robot: str, widgets: Collection[str], since: int) -> list[Unended]:
+        return []
 
     async def pressed(self, entry: Entry) -> Entry | None:
         return None

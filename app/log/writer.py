@@ -10,18 +10,18 @@ another. Neither ever blocks the event loop.
 import asyncio
 import logging
 import secrets
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import Final, TypeVar
 
 from app.errors import LogError
 from app.log.entry import Entry, Origin
 from app.log.folder import Folder
 from app.log.keeper import Keeper
-from app.log.reading import Filter, Row, rows
+from app.log.reading import Filter, Row, Unended, rows, unended
 from app.log.refusals import SUMMED_UP_S, Refusals
 from app.log.store import Head
 from app.log.ticket import Limits, Results, Ticket
@@ -34,6 +34,8 @@ MOST_WAITING: Final = 1000
 PRESSED_WITHIN_S: Final = 2.0  # an entry that takes longer is a press that is not sent
 CLOSED_WITHIN_S: Final = 3.0  # a receipt does not wait longer: it says that it is not on the disk
 ENDED_WITHIN_S: Final = 10.0
+
+Read = TypeVar("Read")
 
 
 class OperatorLog:
@@ -168,7 +170,16 @@ class OperatorLog:
 
     async def rows(self, wanted: Filter, before: int | None, count: int) -> list[Row]:
         """The newest entries that are wanted before a number; LogError when they can't be read."""
-        read = partial(rows, self.folder, wanted, before, count)
+        return await self._read(partial(rows, self.folder, wanted, before, count))
+
+    async def unended(self, robot: str, widgets: Collection[str], since: int) -> list[Unended]:
+        """Presses of these widgets, not before `since` (ms), of which the end is not known, the newest
+        first; LogError when that can't be read, or what was cut off is not closed yet."""
+        if self.head is None:
+            raise LogError(say("log_unreadable", why=self._why or say("log_closed")))
+        return await self._read(partial(unended, self.folder, robot, widgets, since))
+
+    async def _read(self, read: Callable[[], Read]) -> Read:
         try:
             return await self._loop.run_in_executor(self._readers, read)
         except LogError as error:
