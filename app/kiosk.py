@@ -15,7 +15,7 @@ from app.calls import Calls
 from app.confirmations import Confirmations
 from app.control import Control
 from app.doubts import Doubts
-from app.errors import KioskError, LinkError
+from app.errors import LinkError
 from app.holds import Holds
 from app.intake import Intake
 from app.interfaces import interfaces_of
@@ -151,7 +151,9 @@ class Kiosk:
     async def start(self) -> None:
         """Declares everything; whether anybody is there shows later."""
         await self._resuming.start()
-        self._warm_up()
+        self.interfaces.prepare(
+            {*self.panel.subscriptions().values(), *self.panel.publications().values()}
+        )
         publish = [self.robot.key(topic) for topic in (*self.panel.publications(), TOPIC)]
         listened = self._intake
         self.link.start(
@@ -251,13 +253,6 @@ class Kiosk:
         """A fault of the panel file, shown on every page; "" takes it away."""
         self.showing.fault = text
         self.show()
-
-    def _warm_up(self) -> None:
-        """The first use of a type compiles its codec: now, not at the first press."""
-        for type_name in {*self.panel.subscriptions().values(), *self.panel.publications().values()}:
-            self.interfaces.type_hash(type_name)
-            with suppress(KioskError):
-                self.interfaces.decode(type_name, b"\0\1\0\0")
 
     # Down.
 

@@ -1,6 +1,5 @@
 """Fixtures: real parts, started once where they can be shared and ended whatever happens."""
 
-import os
 import shutil
 import tempfile
 import time
@@ -12,6 +11,7 @@ import pytest
 import zenoh
 from playwright.sync_api import Browser, Page, sync_playwright
 
+from tests.domains import FIRST
 from tests.parts import (
     BRIDGE,
     CHROMIUM,
@@ -25,9 +25,6 @@ from tests.parts import (
     live,
     until,
 )
-
-# Of this run alone: ROS 2's domains 0 to 101 work on every system.
-FIRST_DOMAIN = 2 + os.getpid() % 40
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:
@@ -50,7 +47,7 @@ def temporary_files(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 
 @pytest.fixture(scope="session")
 def domain() -> int:
-    return FIRST_DOMAIN
+    return FIRST
 
 
 @pytest.fixture(scope="session")
@@ -76,7 +73,7 @@ def node(domain: int, bridge: Bridge) -> Iterator[RosNode]:
 @pytest.fixture
 def own_bridge(domain: int) -> Iterator[Bridge]:
     """A bridge on a domain of its own, to be ended, frozen and started at will."""
-    mine = Bridge(domain + 50)
+    mine = Bridge(domain + 1)
     mine.start()
     yield mine
     mine.end()

@@ -4,7 +4,6 @@ A test file takes the fixtures by name: `robot = cyclone.robot`, and with it wha
 """
 
 import json
-import os
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from functools import partial
@@ -15,12 +14,10 @@ import zenoh
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from tests.commanded import Commanded
+from tests.domains import CYCLONE as DOMAINS
 from tests.parts import ROS_PYTHON, TESTS, Bridge, until
 
 NODE = "cyclone_robot"
-
-# Of this run alone, and not the domains of conftest's bridges.
-FIRST_DOMAIN = 92 + 2 * (os.getpid() % 4)
 
 # On loopback and without multicast, like the bridge; `lease` is after how long of silence others
 # hold a killed robot for gone (by default 10 s).
@@ -216,7 +213,7 @@ def served(robot: CycloneRobot, client: Client) -> None:
 @pytest.fixture(scope="session")
 def cyclone_bridge() -> Iterator[Bridge]:
     """The bridge that these tests share; who ends a bridge takes `own_cyclone_bridge`."""
-    shared = Bridge(FIRST_DOMAIN)
+    shared = Bridge(DOMAINS[0])
     shared.start()
     yield shared
     shared.end()
@@ -224,7 +221,7 @@ def cyclone_bridge() -> Iterator[Bridge]:
 
 @pytest.fixture
 def own_cyclone_bridge() -> Iterator[Bridge]:
-    mine = Bridge(FIRST_DOMAIN + 1)
+    mine = Bridge(DOMAINS[1])
     mine.start()
     yield mine
     mine.end()

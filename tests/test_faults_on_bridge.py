@@ -129,7 +129,7 @@ def test_what_changed_while_the_bridge_was_frozen_is_what_counts(
 def test_it_starts_without_a_bridge_and_keeps_trying(
     domain: int, tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:
-    late = Bridge(domain + 52)
+    late = Bridge(domain + 3)
     kiosk = servers(live(late.endpoint, tmp_path))
     assert "No connection to the robot" in kiosk.widget("operation")["reason"]
     assert "bridge" in kiosk.http.get("/readyz").json()["reason"]

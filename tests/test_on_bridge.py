@@ -255,7 +255,7 @@ def test_another_type_on_the_robot_locks_and_says_which(
 
 
 def test_a_namespaced_robot(domain: int, tmp_path: Path, servers: Callable[[Server], Server]) -> None:
-    named = Bridge(domain + 51, namespace="/robot1")
+    named = Bridge(domain + 2, namespace="/robot1")
     named.start()
     robot = RosNode(named.domain)
     try:

@@ -139,7 +139,7 @@ def two(
     domain: int, tmp_path: Path, servers: Callable[[Server], Server]
 ) -> Iterator[tuple[Server, list[Bridge], list[RosNode]]]:
     """Two robots, each on a domain of its own behind a bridge of its own."""
-    bridges = [Bridge(domain + 53 + n, f"/robot{n + 1}") for n in range(2)]
+    bridges = [Bridge(domain + 4 + n, f"/robot{n + 1}") for n in range(2)]
     nodes = []
     try:
         for bridge in bridges:
@@ -229,7 +229,7 @@ def test_one_bridge_may_carry_robots_with_namespaces_of_their_own(
 def test_a_bridge_with_another_namespace_is_not_this_robots(
     domain: int, tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:
-    other = Bridge(domain + 53, "/robot2")
+    other = Bridge(domain + 4, "/robot2")
     other.start()
     try:
         path = panel_file(tmp_path, entry(1), entry(2))

@@ -1,13 +1,14 @@
 """The ROS 2 interfaces that a panel may name, and their values to and from CDR bytes."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from difflib import get_close_matches
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from app.errors import DecodeError, InterfaceError
-from app.interfaces.codec import Codec
+from app.interfaces.codec import LITTLE_ENDIAN, Codec
 from app.interfaces.composition import ActionTypes, action_types
 from app.interfaces.definitions import Structure, Type
 from app.interfaces.distributions import read_distribution
@@ -111,6 +112,13 @@ class Interfaces:
             return self._codec.deserialize(data, type_name)
         except Exception as error:  # whatever arrived, it must not stop the panel
             raise DecodeError(f"{len(data)} bytes are not a {type_name}: {error}") from error
+
+    def prepare(self, type_names: Iterable[str]) -> None:
+        """The first use of a type compiles its codec: now, not at the first press."""
+        for type_name in type_names:
+            self.type_hash(type_name)
+            with suppress(DecodeError):
+                self.decode(type_name, LITTLE_ENDIAN)
 
     def _check(self, type_name: str) -> Check:
         if type_name not in self._checks:

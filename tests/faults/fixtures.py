@@ -9,7 +9,7 @@ import pytest
 from tests.faults.rig import Rig
 from tests.parts import Server
 
-_domains = itertools.cycle((51, 54, 56, 57, 58))
+_domains = itertools.cycle((2, 5, 6, 7, 8))
 
 
 @pytest.fixture(scope="module")
