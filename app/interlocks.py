@@ -32,7 +32,9 @@ class Verdict:
 
 PERMITTED: Final = Verdict(True)
 # The codes of `way`.
-NO_WAY: Final = frozenset({"no_link", "no_bridge", "no_bridge_of", "bridge_silent", "joining"})
+NO_WAY: Final = frozenset(
+    {"no_link", "no_bridge", "no_bridge_of", "bridge_silent", "joining", "catching_up"}
+)
 
 # What comes so soon after joining may be a latched value of any age, sent again.
 HISTORY_S: Final = 1.0
@@ -54,6 +56,8 @@ def way(robot: Robot, now: float) -> Verdict:
         return Verdict(False, "joining", say("joining"), robot.settled_at)
     if not robot.answers:
         return locked("bridge_silent")
+    if not robot.caught_up:
+        return locked("catching_up")
     return PERMITTED
 
 

@@ -273,6 +273,7 @@ class Kiosk:
             self._frame = None
         if self._stopped:
             return
+        self._pulse.look()
         changes = self.link.drain()
         if self.robot.link_up and not changes.link_up:
             self._log.warning("Zenoh link lost")

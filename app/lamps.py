@@ -39,6 +39,7 @@ BRIDGE_LAMPS: Final[Mapping[str, tuple[State, str]]] = {
     "no_bridge_of": ("bad", "absent"),
     "bridge_silent": ("bad", "silent"),
     "joining": ("wait", "pending"),
+    "catching_up": ("wait", "pausing"),
     "permitted": ("ok", "ok"),
 }
 

@@ -2,7 +2,8 @@
 their silence, long before Zenoh's lease is over, and whatever lease the bridge is configured with.
 
 A question goes the way of a command, behind all that was sent before: its answer tells that this
-reached the bridge.
+reached the bridge. And it comes behind all that the bridge had sent: after a standstill of the event
+loop it tells that what the robot said meanwhile is taken in.
 """
 
 import asyncio
@@ -25,6 +26,7 @@ log = logging.getLogger("kiosk.pulse")
 EVERY_S: Final = 0.2
 SILENT_S: Final = 0.4  # without an answer, beside the time that the network takes
 TURN_S: Final = 0.02  # given to an answer that came while the loop stood still
+STOOD_STILL_S: Final = 0.4  # so late to ask: what has come meanwhile is still on its way through
 GOOD: Final = 2  # answers in time to what was asked after a silence: the bridge's news came before
 LOOKED_AT: Final = 10  # answers
 LONGEST_S: Final = 2.5  # a question is not waited for any longer
@@ -88,6 +90,9 @@ class Pulse:
         self._awaited: set[asyncio.Task[bool]] = set()  # by who wants to know whether something arrived
         self._silenced: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self._asking: asyncio.Task[None] | None = None
+        self._asked_at = math.inf  # the last time
+        self._behind = 0  # answers, to what was asked `_behind_since`, until all is taken in
+        self._behind_since = 0.0
 
     def start(self) -> None:
         self._asking = told(self._ask_regularly(), self._log, "asking the bridges failed")
@@ -113,12 +118,36 @@ class Pulse:
         await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
         return question.done() and not question.cancelled() and question.result()
 
+    def look(self) -> None:
+        """Before anything is judged: whether the event loop stood still, and so may know nothing of
+        what the robot has said meanwhile."""
+        now = self._monotonic()
+        if now - self._asked_at < EVERY_S + STOOD_STILL_S:
+            return
+        if not self._behind:
+            self._log.warning("the event loop stood still for %.1f s", now - self._asked_at)
+        self._behind, self._behind_since = GOOD, now
+        self._catch_up(False)
+
+    def _hear(self, asked: float) -> None:
+        """An answer came: what the bridge sent before it is taken in, when the next one is there."""
+        if self._behind and asked >= self._behind_since:
+            self._behind, self._behind_since = self._behind - 1, self._monotonic()
+            self._catch_up(not self._behind)
+
+    def _catch_up(self, done: bool) -> None:
+        if done != self._robot.caught_up:
+            self._robot.caught_up = done
+            self._changed()
+
     async def _ask_regularly(self) -> None:
         while True:
             self._ask()
             await asyncio.sleep(EVERY_S)
 
     def _ask(self) -> "asyncio.Task[bool]":
+        self.look()
+        self._asked_at = self._monotonic()
         self._follow()
         task = asyncio.get_running_loop().create_task(self._answered())
         self._questions.add(task)
@@ -154,6 +183,7 @@ class Pulse:
         if answered:
             silence.hear(asked, self._monotonic())
             self._tell()
+            self._hear(asked)
         return answered
 
     async def _all(self, bridges: frozenset[str]) -> bool:

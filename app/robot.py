@@ -96,6 +96,7 @@ class Robot:
         self.held: dict[str, str] = {}  # by the ids of hold widgets: since when, in words
         self._log = RobotLog(log, self.name)
         self.answers = True  # False: its bridges are silent, though nobody knows yet why
+        self.caught_up = True  # False: the event loop stood still, and may not know what came meanwhile
         self.seen = Seen({(role, name): (role, self.key(name)) for role, name in ends(panel)})
         self.undecodable: Counter[str] = Counter()
         self._interfaces = interfaces

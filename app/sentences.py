@@ -14,6 +14,7 @@ ENGLISH: Final[Mapping[str, str]] = {
     "no_bridge_of": "No connection to {name}: Zenoh answers, but no ROS 2 bridge of its namespace.",
     "ending": "The panel's server is ending, or takes a new panel.",
     "joining": "Joining the robot's topics: a moment.",
+    "catching_up": "The panel's server stood still: it takes in what the robot said meanwhile.",
     "bridge_silent": (
         "No connection to the robot: its bridge does not answer. If this stays, restart the bridge."
     ),
@@ -278,6 +279,7 @@ ENGLISH: Final[Mapping[str, str]] = {
     "silent": "no answer",
     "no_node": "no node seen",
     "pending": "joining",
+    "pausing": "catching up",
     "node_silent": "silent",
     # Its links: what each locks, why the robot's nodes are not heard and what helps.
     "links": "The way to the robot",

@@ -3,12 +3,17 @@
 import signal
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Final
+
+import pytest
 
 from tests.parts import ROOT, Bridge, RosNode, Server, Stream, live, until
 
 ENABLED = "operation-enabled-updated"
 FREEZES = 5
+LONG: Final = 400_000  # bytes of a message
 
 
 def speaking(node: RosNode, value: bool = True) -> None:
@@ -225,6 +230,43 @@ def test_a_successor_that_came_while_the_server_stood_still_has_to_say_it_again(
     time.sleep(1.0)
     assert "waiting for a new /operation_enabled" in kiosk.widget("operation1")["reason"]
     until(says_so, "permitted by the successor", within_s=15, every_s=0.2)
+
+
+@pytest.mark.parametrize("waiting", [12, 60])
+def test_what_the_robot_forbids_while_the_server_stands_still_counts_behind_all_that_waits(
+    own_bridge: Bridge,
+    own_node: RosNode,
+    tmp_path: Path,
+    servers: Callable[[Server], Server],
+    waiting: int,
+) -> None:
+    """Of 60 long messages not all find room on the way, and the permission comes last."""
+    own_node.advertise("/last_heard", "std_msgs/msg/String")
+    own_node.advertise("/operation_enabled", "std_msgs/msg/Bool")
+    own_node.subscribe("/operation1", "std_msgs/msg/String")
+    kiosk = servers(live(own_bridge.endpoint, tmp_path))
+
+    def says_so() -> bool:
+        own_node.publish("/operation_enabled", {"data": True})
+        return permitted(kiosk)
+
+    until(says_so, "permitted", within_s=15, every_s=0.2)
+    until(lambda: own_node.subscribers("/last_heard"), "the bridge listens", within_s=15)
+    with ThreadPoolExecutor(1) as hand:
+        kiosk.process.send(signal.SIGSTOP)
+        for _ in range(waiting):
+            own_node.publish_long("/last_heard", LONG)
+        own_node.publish("/operation_enabled", {"data": False})
+        time.sleep(0.7)
+        press = hand.submit(kiosk.press, "operation1", "forbidden")
+        time.sleep(0.1)
+        kiosk.process.send(signal.SIGCONT)
+        assert press.result().json()["outcome"] == "refused"
+    until(kiosk.ready, "ready again", within_s=15)
+    time.sleep(0.5)
+    assert not permitted(kiosk)
+    assert own_node.heard("/operation1") == []
+    until(says_so, "permitted anew", within_s=15, every_s=0.2)
 
 
 def test_an_old_latched_value_is_no_fresh_one(

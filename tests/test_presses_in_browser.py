@@ -229,23 +229,56 @@ def test_a_key_that_is_held_down_is_one_press(opens: Opens, page: Page) -> None:
     until(lambda: pressed(mine) == 2, "a second press of the key is a second one")
 
 
-def test_the_second_tap_of_a_press_that_asks_is_no_answer(opens: Opens, page: Page) -> None:
-    mine = opens(page, True)
+def over_a_button(page: Page, answer: str) -> tuple[float, float]:
+    """Where the dialog has an answer, and the page a button."""
     start(page, 3).click()
     dialog = page.get_by_role("dialog")
-    yes = dialog.locator(".yes").bounding_box()
-    assert yes is not None
+    box = dialog.locator(answer).bounding_box()
+    assert box is not None
     dialog.locator(".no").click()
-    x, y = yes["x"] + yes["width"] / 2, yes["y"] + yes["height"] / 2
-    below = start(page, 5).bounding_box()
-    assert below is not None
-    page.mouse.wheel(0, below["y"] + below["height"] / 2 - y)
+    page.wait_for_timeout(TAP_AGAIN_MS)
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.mouse.wheel(0, middle(page, 5) - y)
     until(lambda: abs(middle(page, 5) - y) < 20, "a button is where the dialog has its answer")
+    return x, y
+
+
+def test_the_second_tap_of_a_press_that_asks_is_no_answer(opens: Opens, page: Page) -> None:
+    mine = opens(page, True)
+    x, y = over_a_button(page, ".yes")
     double_tap(page, x, y)
-    expect(dialog).to_be_visible()
+    expect(page.get_by_role("dialog")).to_be_visible()
     assert pressed(mine) == 0
     page.mouse.click(x, y)
     until(lambda: pressed(mine) == 1, "a tap that comes later is an answer")
+
+
+@pytest.mark.parametrize(("answer", "presses"), [(".yes", 1), (".no", 0)])
+def test_the_second_tap_of_an_answer_presses_nothing_below(
+    opens: Opens, page: Page, answer: str, presses: int
+) -> None:
+    mine = opens(page, True)
+    x, y = over_a_button(page, answer)
+    page.mouse.click(x, y)
+    page.wait_for_timeout(TAP_AGAIN_MS)
+    double_tap(page, x, y)
+    expect(page.get_by_role("dialog")).not_to_be_visible()
+    assert pressed(mine) == presses
+    page.mouse.click(x, y)
+    expect(page.get_by_role("dialog")).to_be_visible()  # a later tap is a press
+
+
+def test_an_answer_that_opens_under_a_resting_finger_is_not_given(opens: Opens, page: Page) -> None:
+    mine = opens(page, True)
+    start(page, 1).click()
+    yes = page.get_by_role("dialog").locator(".yes")
+    yes.hover(force=True)
+    page.mouse.down()
+    expect(yes).to_be_enabled()
+    page.mouse.up()
+    expect(yes).to_be_visible()
+    yes.click()
+    until(lambda: pressed(mine) == 1, "a tap on the open answer is one")
 
 
 def middle(page: Page, number: int) -> float:

@@ -8,6 +8,7 @@ import pytest
 
 from app import keys, pulse
 from app.errors import LinkError
+from app.interlocks import way
 from app.pulse import EVERY_S, GOOD, LONGEST_S, LOOKED_AT, Pulse, Silence
 from app.robot import Robot
 from tests.builders import BRIDGE, FROM, presses_of, robot_there, small_panel
@@ -232,3 +233,49 @@ def test_a_frozen_bridge_stays_silent_when_another_comes_or_goes() -> None:
         await until(lambda: told == [False, True])
 
     run(test)
+
+
+def test_after_a_standstill_all_that_waited_is_taken_in_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What was asked before it is answered before what waited; so is what was asked at its end."""
+    monkeypatch.setattr(pulse, "STOOD_STILL_S", 0.1)
+    clock = 0.0
+
+    async def benched() -> None:
+        nonlocal clock
+        line, robot = Line(), robot_there(small_panel())
+        told: list[str] = []
+
+        def tell() -> None:
+            told.append(way(robot, clock).code)
+
+        mine = Pulse(robot, line, tell, lambda: clock)
+        line.answers = False
+        mine.start()
+
+        async def asked(count: int) -> None:
+            await until(lambda: len(line.asked) >= count)
+
+        def answer(number: int) -> None:
+            line.asked[number - 1][1].set_result(True)
+
+        await asked(1)
+        clock += 0.1
+        mine.look()
+        assert robot.caught_up
+        clock += 3.0
+        mine.look()  # as it is before each press is judged
+        before = len(line.asked)
+        assert told == ["catching_up"]
+        answer(1)
+        await asked(before + 1)
+        answer(before + 1)
+        await asked(before + 2)
+        assert not robot.caught_up
+        clock += 0.01
+        later = len(line.asked)
+        await asked(later + 1)
+        answer(later + 1)
+        await until(lambda: robot.caught_up)
+        await mine.stop()
+
+    asyncio.run(benched())

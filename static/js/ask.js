@@ -1,5 +1,7 @@
 import { TAP_AGAIN_MS } from "./press.js";
 
+let closing = 0;
+
 // A press that asks first: what will be done, with which values. Its "yes" is the press.
 export function asked(root, form, yes) {
   const dialog = root.querySelector("dialog.ask");
@@ -8,6 +10,7 @@ export function asked(root, form, yes) {
   }
   const button = dialog.querySelector(".yes");
   const answer = (event) => {
+    if (event.defaultPrevented) return; // it was not open when the finger came down
     if (event.target.closest(".yes")) yes(event);
     if (event.target.closest("button")) dialog.close();
   };
@@ -18,7 +21,11 @@ export function asked(root, form, yes) {
   const over = () => {
     clearTimeout(opening);
     dialog.removeEventListener("click", answer);
+    // The second tap of an answer is no press of what is below.
+    closing = setTimeout(() => delete document.body.dataset.asks, TAP_AGAIN_MS);
   };
+  clearTimeout(closing);
+  document.body.dataset.asks = "";
   dialog.addEventListener("close", over, { once: true });
   dialog.showModal();
 }

@@ -104,12 +104,13 @@ export class Presser {
     }
     for (const form of document.forms) {
       // A click presses at once: a browser takes its time to submit a form.
-      form.addEventListener("click", (event) => {
+      const click = (event) => {
         const button = event.target.closest("button");
         // A button that opened under a resting finger was not pressed.
         if (button && event.detail > 0 && button !== this.#down) event.preventDefault();
         else if (this.#buttons.has(button)) this.#pressed(event, button);
-      });
+      };
+      form.addEventListener("click", click, true);
       // By a program, which may ask for it without a click.
       form.addEventListener("submit", (event) => this.#pressed(event, event.submitter));
     }
