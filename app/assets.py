@@ -2,9 +2,8 @@
 
 The stylesheet is the layers of `static/css` in their order, with what the panel's kinds of widgets need
 and its millimetres: one request instead of five; what only the log's page needs is a file of its own.
-Scripts keep their names,
-so that modules find each other, and their lines. Comments, what lines are indented by and what only
-sets styles apart stay here.
+Scripts keep their names, so that modules find each other, and their lines. Comments, what lines are
+indented by and what only sets styles apart stay here.
 """
 
 import gzip

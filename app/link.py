@@ -3,6 +3,7 @@ the link's inbox. Only this module and the simulator import zenoh; its errors le
 """
 
 import asyncio
+import atexit
 import json
 import os
 import re
@@ -117,6 +118,7 @@ class Link:
         with _translated("the Zenoh session can't be opened"):
             self._session = zenoh.open(self._config)
         self.zid = str(self._session.zid())
+        atexit.register(self._leave)
 
     def start(
         self,
@@ -278,8 +280,14 @@ class Link:
 
     def close(self) -> None:
         """Takes everything down; blocks for up to some tenths of a second."""
+        atexit.unregister(self._leave)
         with _translated("the Zenoh session did not close cleanly"):
             self._session.close()
+
+    def _leave(self) -> None:
+        """Whoever ends without closing it: an interpreter that ends must not be called into."""
+        with suppress(LinkError):
+            self.close()
 
     # Below: on Zenoh's threads, under the inbox's lock. No work here, and nothing may raise.
 

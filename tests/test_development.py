@@ -1,5 +1,6 @@
 """`make dev`: what is saved takes effect, and a fault in the panel file keeps the old panel."""
 
+import os
 import shutil
 import signal
 import subprocess
@@ -37,7 +38,14 @@ class Checkout:
 
 def test_make_dev_serves_as_these_tests_do() -> None:
     made = subprocess.run(
-        ["make", "--dry-run", "dev"], cwd=ROOT, capture_output=True, text=True, check=True
+        ["make", "--dry-run", "--no-print-directory", "dev"],
+        cwd=ROOT,
+        env={
+            name: value for name, value in os.environ.items() if name not in ("MAKEFLAGS", "MAKELEVEL")
+        },
+        capture_output=True,
+        text=True,
+        check=True,
     ).stdout
     assert "KIOSK_DEV=1" in made
     assert made.rstrip().endswith(f"uvicorn app.main:app {' '.join(RELOAD)}")

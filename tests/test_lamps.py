@@ -75,6 +75,7 @@ NO_LINK = frozenset(
         "permitted",
         "forbidden",
         "busy",
+        "perhaps_busy",
         "log",
         "control",
         "parameter_undeclared",
