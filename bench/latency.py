@@ -20,14 +20,21 @@ def down(rig: Rig, peer: Peer, over: str = "", router: str = "") -> dict[str, fl
     """One round of one peer; `over` is how the robot speaks where that is not the peer's own way,
     `router` is where the peer listens then."""
     way = over or peer.robot
-    with rig.running(peer, router=router) as server, rig.page(peer, server, way) as page:
+    with (
+        rig.running(peer, router=router) as server,
+        rig.unattended(peer, server, way=way) as browser,
+    ):
+        with browser.attached() as page:
+            watched = Watched(page, peer.shown)
+            rig.warm(way)
+            clock = watched.clock()
+            watched.watch()
         time.sleep(SETTLE_S)
-        rig.warm(way)
-        clock = page.clock()
-        page.watch()
         said = rig.robot("toggle", way=way, count=rig.sizes.toggles, least_s=GAP_S[0], most_s=GAP_S[1])
         time.sleep(SETTLE_S)
-        seen = [(clock.ns(at) / 1e6, value) for at, value in page.take("toggles")]
+        with browser.attached() as page:
+            toggles = Watched(page, peer.shown).take("toggles")
+        seen = [(clock.ns(at) / 1e6, value) for at, value in toggles]
         matched = toggles_matched([(at / 1e6, value) for at, value in said], seen)
         return told(matched, clock.doubt_ms)
 

@@ -134,10 +134,10 @@ class Rig:
 
     @contextmanager
     def unattended(
-        self, peer: Peer, server: Running, topics: Sequence[str] = ()
+        self, peer: Peer, server: Running, topics: Sequence[str] = (), way: str = ""
     ) -> Iterator[Unattended]:
-        """A browser of its own with its page, permitted by the robot; where the robot has said
-        something meanwhile, the page has to show that in the end."""
+        """A browser of its own with its page, permitted by the robot, which speaks `way` if that is not
+        the peer's own. What it says of `topics` meanwhile, the page has to show in the end."""
         with tempfile.TemporaryDirectory(
             prefix="bench-chromium-", ignore_cleanup_errors=True
         ) as profile:
@@ -145,7 +145,7 @@ class Rig:
             try:
                 with browser.attached() as page:
                     page.goto(server.url)
-                    self.permit(peer.robot, Watched(page, peer.shown))
+                    self.permit(way or peer.robot, Watched(page, peer.shown))
                 yield browser
                 with browser.attached() as page:
                     Watched(page, peer.shown, topics).followed()
