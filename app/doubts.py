@@ -60,6 +60,13 @@ class Doubts:
             lambda: self._doubt(widget, seen, at),
         )
 
+    def late(self, at: float) -> str:
+        """Why what was touched at this moment (the server's own time) is not done now; "" if it is."""
+        age = moments.now() - at
+        if age > self._expires_s:
+            return say("expired", seconds=f"{age:.1f}")
+        return say("ahead") if age < -AHEAD_S else ""
+
     def _check(self, seen: str) -> None:
         boot, _, version = seen.partition("-")
         if not _is_seen(seen):
@@ -82,7 +89,4 @@ class Doubts:
             return say("seen_on_another" if boot in self._boots() else "seen_before_restart")
         if boot and int(version) < self._board.turned(widget):
             return say("changed_meanwhile")
-        age = 0.0 if at is None else moments.now() - at
-        if age > self._expires_s:
-            return say("expired", seconds=f"{age:.1f}")
-        return say("ahead") if age < -AHEAD_S else ""
+        return "" if at is None else self.late(at)

@@ -17,6 +17,8 @@ from tests.test_control_over_http import control_panel
 IDLE_S = 4.0
 FIRST, SECOND = "192.0.2.1", "192.0.2.2"
 
+NOBODY = "Nobody has control of the robot: take control first."
+
 Opens = Callable[..., Page]
 
 
@@ -103,9 +105,25 @@ def test_the_panel_at_the_cell_has_control_at_once(kiosk: Server, opens: Opens) 
     sends(cell)
 
 
+def test_a_touch_that_a_stopped_server_finds_late_takes_no_control(kiosk: Server, opens: Opens) -> None:
+    page = opens(FIRST)
+    locked_by(page, NOBODY)
+    kiosk.process.send(signal.SIGSTOP)
+    try:
+        with page.expect_response("**/control/take") as answered:
+            button(page, "Take control").click()
+            page.wait_for_timeout(3000)
+            kiosk.process.send(signal.SIGCONT)
+        assert answered.value.status == 409
+    finally:
+        kiosk.process.send(signal.SIGCONT)
+    locked_by(page, NOBODY)
+    take(page)
+
+
 def test_taking_looking_on_asking_keeping_and_giving(kiosk: Server, opens: Opens) -> None:
     first, second = opens(FIRST), opens(SECOND)
-    locked_by(first, "Nobody has control of the robot: take control first.")
+    locked_by(first, NOBODY)
     take(first)
     sends(first)
     locked_by(second, "Panel 1 (192.0.2.1) has control of the robot.")

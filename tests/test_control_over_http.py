@@ -4,6 +4,7 @@ the cell come as through a proxy, which says where from."""
 import re
 import time
 from collections.abc import Callable, Iterator
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import httpx
@@ -113,6 +114,19 @@ def test_asking_granting_and_giving_up(client: Callable[..., Client], kiosk: Ser
     assert bob.control("release").json()["done"]
     assert kiosk.snapshot()["control"]["holder"] == ""
     assert bob.press().status_code == 409
+
+
+def test_what_was_touched_long_ago_is_not_done_any_more(client: Callable[..., Client]) -> None:
+    """A server that stood still takes in later what was touched meanwhile."""
+    late = client()
+    long_ago = (datetime.now(UTC) - timedelta(seconds=4)).isoformat()
+    answer = late.control("take", at=long_ago)
+    assert (answer.status_code, answer.json()["done"]) == (409, False)
+    assert "s to get here: press again." in answer.json()["reason"]
+    assert answer.json()["control"]["holder"] == ""
+    assert late.control("take", at=datetime.now(UTC).isoformat()).json()["done"]
+    assert late.control("release", at=long_ago).json()["done"]
+    assert late.control("take", at="yesterday").status_code == 422
 
 
 def test_a_denied_request(client: Callable[..., Client]) -> None:

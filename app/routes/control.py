@@ -6,7 +6,7 @@ from urllib.parse import parse_qsl
 
 from fastapi import APIRouter, Request
 from fastapi.responses import JSONResponse, RedirectResponse, Response
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, ValidationError
 
 from app.browsers import Browser
 from app.control import LIFE_S, Refusal
@@ -26,12 +26,14 @@ FORM_LIFE_S: Final = 35.0
 
 
 class Acting(BaseModel):
-    """`to` is the id of who asks, for `give` and `keep`: the request that the operator saw."""
+    """`to` is the id of who asks, for `give` and `keep`: the request that the operator saw; `at` is
+    when it was touched, in the server's own time."""
 
     model_config = ConfigDict(extra="forbid")
 
     to: Annotated[str, Field(pattern=r"^[0-9a-f]{0,12}$")] = ""
     page: Annotated[str, Field(pattern=ID)] | None = None
+    at: AwareDatetime | None = None
 
 
 class Here(BaseModel):
@@ -84,16 +86,18 @@ async def act(act: str, request: Request, site: CurrentSite, kiosk: CurrentKiosk
     _, token = welcomed(request, site)  # without a cookie nothing is done yet, the next time it is
     form = _kind(request) == FORM
     given = _read(Acting, await _sent(request))
-    refusal = _done(kiosk, act, browser, given.to, FORM_LIFE_S if form else LIFE_S)
+    reason = "" if form or given.at is None else _late(kiosk, act, given.at.timestamp())
+    refusal = "" if reason else _done(kiosk, act, browser, given.to, FORM_LIFE_S if form else LIFE_S)
+    reason = say(refusal) if refusal else reason
     kiosk.show()
     if form:
         page = kiosk.panel.page(given.page or "") or kiosk.panel.pages[0]
         query = f"?control={refusal}" if refusal else ""
         answer: Response = RedirectResponse(f"{kiosk.base}/pages/{page.id}{query}", status_code=303)
     else:
-        body = {"done": not refusal, "reason": say(refusal) if refusal else "", "browser": browser.id}
+        body = {"done": not reason, "reason": reason, "browser": browser.id}
         content = body | {"control": kiosk.control.view()}
-        answer = JSONResponse(content, status_code=409 if refusal else 200)
+        answer = JSONResponse(content, status_code=409 if reason else 200)
     return keep(answer, request, token)
 
 
@@ -116,6 +120,11 @@ def _done(kiosk: Kiosk, act: str, browser: Browser, to: str, life_s: float) -> R
         case "release":
             return control.release(browser)
     raise NotFound(f'there is no "/control/{act:.40}": there is take, ask, give, keep, release, here')
+
+
+def _late(kiosk: Kiosk, act: str, at: float) -> str:
+    """Why what was touched then is not done any more; giving up is never too late."""
+    return "" if act == "release" else kiosk.doubts.late(at)
 
 
 def _kind(request: Request) -> str:

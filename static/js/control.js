@@ -16,15 +16,18 @@ export class Control {
   #to = ""; // who asked when the finger went down
   #busy = false;
   #showAgain;
+  #timeOf;
 
-  // `showAgain` gets (widget id, attributes) where a lock has changed.
-  constructor(bar, showAgain) {
+  // `showAgain` gets (widget id, attributes) where a lock has changed; `timeOf` gives the server's own
+  // time of an event.
+  constructor(bar, showAgain, timeOf) {
     this.#bar = bar;
+    this.#timeOf = timeOf;
     this.#showAgain = showAgain;
     for (const kind of ["pointerdown", "keydown"]) addEventListener(kind, () => this.#touch(), true);
     this.#bar.addEventListener("submit", (event) => {
       event.preventDefault();
-      this.#act(event.submitter);
+      this.#act(event.submitter, this.#timeOf(event));
     });
   }
 
@@ -117,7 +120,7 @@ export class Control {
   }
 
   // A second tap is the same act: it must not meet the button that came in its place.
-  async #act(button) {
+  async #act(button, at) {
     if (this.#busy || button.disabled) return;
     this.#busy = true;
     this.#bar.setAttribute("aria-busy", "true");
@@ -125,7 +128,7 @@ export class Control {
     const said = this.#bar.querySelector(".refused");
     try {
       const act = button.getAttribute("formaction").split("/").at(-1);
-      const answer = await (await this.#post(act, { to: this.#to })).json();
+      const answer = await (await this.#post(act, { to: this.#to, at })).json();
       said.textContent = answer.reason ?? answer.error;
     } catch {
       said.textContent = document.body.dataset.unsure;

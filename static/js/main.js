@@ -59,7 +59,7 @@ function showWidget(id, attributes) {
 const bar = document.getElementById("control");
 const nothing = () => {};
 const control = bar
-  ? new (await import("./control.js")).Control(bar, showWidget)
+  ? new (await import("./control.js")).Control(bar, showWidget, (event) => source.timeOf(event))
   : { over: (_, attributes) => attributes, link: nothing, show: nothing, lost: nothing, beat: nothing };
 
 function showWidgets(changes) {
