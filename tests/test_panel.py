@@ -208,6 +208,11 @@ def test_an_interlock_and_a_widget_may_have_one_id(load: Load) -> None:
         ),
         (tables(interlock=[{**INTERLOCK, "max_age_s": 0}]), "interlock[0].max_age_s", "greater than 0"),
         (
+            tables(interlock=[{**INTERLOCK, "qos": {"reliability": "best_effort"}}]),
+            "interlock[0].max_age_s",
+            "is missing: of a best-effort topic any message may be lost, the one that forbids too",
+        ),
+        (
             tables(interlock=[{**INTERLOCK, "require_publisher": 1}]),
             "interlock[0].require_publisher",
             "valid boolean, not 1",

@@ -1,6 +1,7 @@
 """What can be wrong in a panel file whose shape is right: names, types and templates."""
 
 from collections.abc import Collection, Iterator
+from typing import Final
 
 from app.errors import Fault, InterfaceError
 from app.interfaces import Interfaces
@@ -26,6 +27,11 @@ from app.panel.model import (
     Published,
 )
 from app.panel.parameter import Parameter
+
+BEST_EFFORT: Final = (
+    "is missing: of a best-effort topic any message may be lost, the one that forbids too; "
+    "give the age in seconds after which it locks"
+)
 
 
 def faults_in(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = ()) -> Iterator[Fault]:
@@ -130,6 +136,8 @@ def _interlock(place: str, interlock: Interlock, interfaces: Interfaces) -> Iter
     yield from fault
     if not fault and (found := interfaces.field_type(interlock.type, interlock.field)) != "bool":
         yield Fault(f"{place}.field", f'"{interlock.field}" is {found}: an interlock needs a bool')
+    if interlock.qos.reliability == "best_effort" and interlock.max_age_s is None:
+        yield Fault(f"{place}.max_age_s", BEST_EFFORT)
 
 
 def _interlocked(place: str, widget: Pressed | Hold, panel: Panel) -> Iterator[Fault]:
