@@ -10,7 +10,7 @@ from typing import Final
 
 from playwright.sync_api import Page, Playwright
 
-from bench.parts import ended, family
+from bench.parts import ENDS_WITHIN_S, ended, family
 from tests.parts import CHROMIUM, CHROMIUM_FLAGS
 
 STARTS_WITHIN_S: Final = 15.0
@@ -60,4 +60,9 @@ class Unattended:
         raise TimeoutError(f"Chromium did not tell its port within {STARTS_WITHIN_S:g} s")
 
     def close(self) -> None:
+        """Returns when none of its processes writes into the profile any more."""
+        pids = self.pids()
         ended(self._process)
+        end = time.monotonic() + ENDS_WITHIN_S
+        while any(Path(f"/proc/{pid}").exists() for pid in pids) and time.monotonic() < end:
+            time.sleep(0.02)
