@@ -2,7 +2,8 @@
 
 import asyncio
 import time
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -314,17 +315,25 @@ def test_what_is_of_another_robot_or_older_than_a_day_is_not_followed(
     run(tmp_path, test, "accepted")
 
 
+@contextmanager
+def unreadable(rig: Rig, monkeypatch: pytest.MonkeyPatch, *, unneeded: bool) -> Iterator[None]:
+    """A log that can't be read; `unneeded`: the panel goes on without it."""
+
+    async def gone(*about: Any) -> list[Unended]:
+        raise LogError(GONE)
+
+    with monkeypatch.context() as broken:
+        broken.setattr(rig.log, "unended", gone)
+        broken.setattr(Logbook, "unneeded", unneeded)
+        yield
+
+
 @pytest.mark.parametrize("needed", [True, False])
 def test_while_the_log_can_not_be_read_it_is_said_that_nothing_is_known(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, needed: bool
 ) -> None:
     async def test(rig: Rig, entry: Entry) -> None:
-        async def gone(*about: Any) -> list[Unended]:
-            raise LogError(GONE)
-
-        with monkeypatch.context() as broken:
-            broken.setattr(rig.log, "unended", gone)
-            broken.setattr(Logbook, "unneeded", not needed)
+        with unreadable(rig, monkeypatch, unneeded=not needed):
             await rig.resuming.start()
             assert rig.bench.shown.text.endswith(f"is not known: {GONE}")
             assert (rig.bench.shown.busy, rig.bench.shown.stoppable) == (needed, False)
@@ -340,12 +349,7 @@ def test_what_was_sent_while_the_log_could_not_be_read_stays_shown(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     async def test(rig: Rig, entry: Entry) -> None:
-        async def gone(*about: Any) -> list[Unended]:
-            raise LogError(GONE)
-
-        with monkeypatch.context() as broken:
-            broken.setattr(rig.log, "unended", gone)
-            broken.setattr(Logbook, "unneeded", True)
+        with unreadable(rig, monkeypatch, unneeded=True):
             await rig.resuming.start()
             assert rig.lock == ""
             start = rig.bench.send_goal("own")
