@@ -37,10 +37,13 @@ class Actions:
         self._services = ActionServices(interfaces, robot, link)
         self._following = Following(self._services, robot, back=self._advanced, tell=self._tell)
         self._latest: dict[str, Goal] = {}  # by widget
+        self._states: dict[str, Sample] = {}  # by action: what its server said last of its goals
 
     def follow(self) -> None:
         """After every change of the graph: of a goal whose server is gone nothing more is heard."""
         bridge = bool(self._robot.graph.bridges)
+        if not bridge:
+            self._states.clear()
         for goal in (*self._latest.values(), *self._following.goals):
             if not goal.cut.done() and not (bridge and self._services.offered(goal.widget)):
                 gone = say("goal_gone", name=goal.widget.action)
@@ -88,6 +91,8 @@ class Actions:
         self._latest.setdefault(goal.widget.id, goal)
         self._following.begin(goal)
         self._show(goal, goal.in_doubt)
+        if (said := self._states.get(goal.widget.action)) is not None:
+            self.hear_status(goal.widget.action, said)
 
     def full(self, action: str) -> str:
         """Why no further goal of an action is sent; "" while one may be."""
@@ -142,7 +147,9 @@ class Actions:
                 self._take_feedback(goal, message.feedback)
 
     def hear_status(self, action: str, sample: Sample) -> None:
-        """The states of an action's goals; those of other programs are passed over."""
+        """The states of an action's goals; those of other programs are passed over, and kept for a goal
+        of before the server's start that is not known yet: the robot says nothing twice."""
+        self._states[action] = sample
         goals = {goal.id.bytes: goal for goal in self._of(action)}
         if not goals:
             return

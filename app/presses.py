@@ -107,6 +107,22 @@ class Presses:
             return await asyncio.shield(known.receipt)
         return known
 
+    async def too_soon(
+        self,
+        widget_id: str,
+        inputs: Mapping[str, Any],
+        press_id: str,
+        before: str,
+        origin: Origin,
+    ) -> Receipt:
+        """Refuses what may be the second tap of another press, of which it says what came too: `before`
+        is its id, "" where there is none."""
+        why = say("press_too_soon")
+        if (last := self.receipt(before)) is not None:
+            said = say("press_before", label=self.widget(last.widget).label, said=last.reason)
+            why = last.reason if last.reason.endswith(why) else f"{said} {why}"
+        return await self._again(self.widget(widget_id), inputs, press_id, why, origin)
+
     async def cancel(self, widget_id: str, origin: Origin, press_id: str = "") -> Receipt:
         """Asks the robot to cancel the goal of one press or, without its id, the one under way: anybody
         may, whoever has control, and however late."""
@@ -211,7 +227,8 @@ class Presses:
     async def _again(
         self, widget: Pressed, inputs: Mapping[str, Any], press_id: str, why: str, origin: Origin
     ) -> Receipt:
-        """A press with an id that was used is not even judged; its receipt has an id of its own."""
+        """A press that is not even judged, for its id was used or it came too soon; its receipt has
+        another id."""
         own_id = f"{press_id:.40}.{secrets.token_hex(4)}"
         if self._logbook.room(origin):
             return await self._once(

@@ -3,7 +3,7 @@
 import shutil
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -19,6 +19,7 @@ from tests.parts import (
     ROOT,
     ROS_PYTHON,
     Bridge,
+    Process,
     RosNode,
     Server,
     free_port,
@@ -32,6 +33,15 @@ def pytest_sessionstart(session: pytest.Session) -> None:
     missing = [str(p) for p in (BRIDGE, ROS_PYTHON, Path(CHROMIUM)) if not Path(p).exists()]
     if missing and not session.config.option.collectonly:
         pytest.exit(f"missing: {', '.join(missing)}; `make test` installs them", returncode=3)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport() -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """A failure shows what the processes of the test said last."""
+    report = yield
+    if report.failed:
+        report.sections += [("a process", process.told()) for process in Process.latest]
+    return report
 
 
 @pytest.fixture(scope="session", autouse=True)

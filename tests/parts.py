@@ -11,18 +11,20 @@ import sys
 import tempfile
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from copy import copy
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import httpx
 from websockets.sync.client import ClientConnection, connect
 
 from tests.commanded import Commanded
 
-TAP_AGAIN_MS = 700  # what a page without scripts sends sooner is a second tap
+# Without scripts, what comes within 700 ms of its page is a second tap; a busy driver waits less.
+TAP_AGAIN_MS = 1000
 ROOT = Path(__file__).resolve().parent.parent
 TESTS = ROOT / "tests"
 BRIDGE = Path(
@@ -68,11 +70,14 @@ def free_port() -> int:
 class Process:
     """A child process whose stderr is kept as lines."""
 
+    latest: ClassVar[deque["Process"]] = deque(maxlen=6)  # what a failed test shows
+
     def __init__(self, command: Sequence[str], env: Mapping[str, str], **options: Any) -> None:
         self._process = subprocess.Popen(
             command, env={**os.environ, **env}, stderr=subprocess.PIPE, text=True, **options
         )
         self.lines: list[str] = []
+        self.latest.append(self)
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
 
@@ -92,6 +97,11 @@ class Process:
     @property
     def running(self) -> bool:
         return self._process.poll() is None
+
+    def told(self, lines: int = 40) -> str:
+        """Which one it is, and the last that it said."""
+        state = "runs" if self.running else f"ended with {self._process.returncode}"
+        return "\n".join([f"{self.pid}, {state}: {self._process.args!r}", *self.lines[-lines:]])
 
     def send(self, number: signal.Signals) -> None:
         self._process.send_signal(number)

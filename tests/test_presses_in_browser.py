@@ -3,6 +3,7 @@
 import csv
 import io
 import re
+import time
 from collections.abc import Callable, Iterator
 from datetime import datetime
 from pathlib import Path
@@ -175,10 +176,14 @@ def many_buttons(folder: Path, asks: bool) -> Server:
     return Server(ROOT, KIOSK_PANEL=str(file))
 
 
+def logged(server: Server) -> list[dict[str, str]]:
+    text = server.http.get("/log.csv?every=true").text.removeprefix("\ufeff")
+    return list(csv.DictReader(io.StringIO(text)))
+
+
 def pressed(server: Server) -> int:
     """How many presses are in the operator's log."""
-    text = server.http.get("/log.csv?every=true").text.removeprefix("\ufeff")
-    return sum(entry["kind"] == "pressed" for entry in csv.DictReader(io.StringIO(text)))
+    return sum(entry["kind"] == "pressed" for entry in logged(server))
 
 
 def start(page: Page, number: int) -> Any:
@@ -307,10 +312,40 @@ def test_without_scripts_a_double_tap_is_one_press_and_its_receipt_stays(
     box = start(page, 1).bounding_box()
     assert box is not None
     double_tap(page, box["x"] + 20, box["y"] + 20)
-    expect(page.locator("#receipt-go1")).to_contain_text("Sent on /operation at")
+    both = re.compile(
+        r"Start 1: Sent on /operation at \S+ Not sent: pressed as soon after the page came"
+    )
+    expect(page.locator("#receipt-go1")).to_have_text(both)
     assert pressed(mine) == 1
     page.mouse.click(box["x"] + 20, box["y"] + 20)
     until(lambda: pressed(mine) == 2, "a later one is another press")
+
+
+def test_a_form_that_comes_as_soon_as_its_page_says_so_and_loses_nothing(demo: Server) -> None:
+    soon = {"_since": str(time.time() + 60), "message": "typed"}
+    page = demo.http.post("/widgets/operation", data=soon, follow_redirects=True)
+    assert "Not sent: pressed as soon after the page came" in page.text
+    assert 'value="typed"' in page.text
+    before = page.url.params["receipt"]
+    again = demo.http.post("/widgets/operation", data={**soon, "_last": before}, follow_redirects=True)
+    assert again.text.count("Not sent: pressed as soon after the page came") == 1
+    told = [entry for entry in logged(demo) if entry["press"] == before]
+    assert [(entry["kind"], entry["outcome"]) for entry in told] == [("refused", "refused")]
+
+
+def test_without_scripts_a_page_that_loaded_itself_takes_a_press_at_once(
+    opens: Opens, without_scripts: Page
+) -> None:
+    page, mine = without_scripts, opens(without_scripts, False)
+    start(page, 1).click()
+    expect(page.locator("#receipt-go1")).to_contain_text("Sent on /operation at")
+    with page.expect_navigation(timeout=15_000):
+        pass
+    expect(page.locator("#receipt-go1")).to_contain_text("Sent on /operation at")
+    assert page.locator("input[name=_since]").count() == 0
+    start(page, 2).click()
+    expect(page.locator("#receipt-go2")).to_contain_text("Sent on /operation1 at")
+    assert pressed(mine) == 2
 
 
 def test_what_a_gateway_says_is_no_refusal(shown: Page) -> None:

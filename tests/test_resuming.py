@@ -345,6 +345,20 @@ def test_while_the_log_can_not_be_read_it_is_said_that_nothing_is_known(
     run(tmp_path, test, "accepted")
 
 
+def test_what_the_robot_said_while_the_log_could_not_be_read_counts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def test(rig: Rig, entry: Entry) -> None:
+        with unreadable(rig, monkeypatch, unneeded=False):
+            await rig.resuming.start()
+            tell_states(rig.bench, (goal_id(entry.hash).bytes, 2))
+        await asked(rig.bench, 1)
+        assert rig.bench.line.timeouts == [RESULT_S]
+        assert (rig.bench.shown.goal, rig.lock) == ("EXECUTING", "busy")
+
+    run(tmp_path, test)
+
+
 def test_what_was_sent_while_the_log_could_not_be_read_stays_shown(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -80,7 +80,7 @@ def test_after_a_restart_a_goal_is_followed_to_its_end(
     shown = again.widget("count")
     assert (shown["busy"], shown["enabled"], shown["press"]) == (True, False, "goal-1")
     found_again(again)
-    assert "waiting for the robot" in again.widget("count")["reason"]
+    until(lambda: "waiting for the robot" in again.widget("count")["reason"], "joined, and locked")
     assert again.widget("count")["stoppable"]
     assert press(again, "count", id="goal-2").status_code == 409
     robot.fibonacci(step_s=0.05)

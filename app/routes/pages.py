@@ -4,6 +4,7 @@ import asyncio
 import secrets
 import time
 from typing import Any, TypedDict, get_args
+from urllib.parse import urlencode
 
 from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse, RedirectResponse, Response
@@ -30,6 +31,7 @@ router = APIRouter(include_in_schema=True)
 # input, rarely enough to type in.
 REFRESH_S = 5
 REFRESH_WITH_INPUTS_S = 30
+RELOADED = "reloaded"  # by itself: nobody tapped for it
 RELOADED_S = 2.0  # a press on a page that should have reloaded before is one on an old page
 # How long after a page without scripts was due it is still thought to be there.
 GRACE_S = 5
@@ -78,7 +80,8 @@ class PageContext(TypedDict):
     unsure: str
     refresh_s: int
     now: int
-    since: float
+    since: float | None
+    again: str
     until: float
     browser: str
     over: bool
@@ -145,6 +148,7 @@ def _context(
     board, rules = kiosk.board, kiosk.control.rules
     refusal = request.query_params.get("control", "")
     receipt = kiosk.presses.receipt(request.query_params.get("receipt", ""))
+    again = {RELOADED: 1} | ({"receipt": receipt.id} if receipt else {})
     now, wall = moments.now(), time.time()
     return PageContext(
         site=site,
@@ -168,7 +172,8 @@ def _context(
         unsure=say("server_unsure"),
         refresh_s=refresh_s,
         now=round(now * 1000),
-        since=round(now, 3),
+        since=None if RELOADED in request.query_params else round(now, 3),
+        again=f"{kiosk.base}/pages/{page.id}?{urlencode(again)}",
         until=round(now + refresh_s + RELOADED_S, 3),
         browser=browser.id,
         over=rules.local and browser.local,

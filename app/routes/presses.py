@@ -96,22 +96,7 @@ async def press(widget: str, request: Request, site: CurrentSite, kiosk: Current
         receipt = await pressed(site, kiosk, browser, widget, as_model(Press, json_of(body)))
         return JSONResponse(receipt.as_json(), status_code=STATUS[receipt.cause])
     if kind == "application/x-www-form-urlencoded":
-        inputs = _form(body)
-        again, last = _is_second_tap(inputs), inputs.pop("_last", "")
-        if kiosk.presses.widget(widget).confirm_press:
-            if inputs.pop(CONFIRMED, "") != "yes" or again:
-                return _ask(site, kiosk, widget, inputs)
-        elif again:
-            return RedirectResponse(_page_after(kiosk, widget, last), status_code=303)
-        # One rendered page has one id for all its buttons, and each button is a press of its own.
-        page_id = inputs.pop("_id", secrets.token_hex(8))
-        if not re.fullmatch(PRESS_ID, page_id):
-            raise InputError(f'_id: "{page_id:.40}" is not the id of a press')
-        press_id = f"{page_id}.{widget}"
-        by = kiosk.doubts.by(widget, browser, inputs.pop("_seen", ""), _until(inputs))
-        receipt = await kiosk.presses.press(widget, kiosk.sending.typed(inputs), press_id, by)
-        _count(site, receipt)
-        return RedirectResponse(_page_after(kiosk, widget, receipt.id), status_code=303)
+        return await _pressed_by_form(site, kiosk, browser, widget, _form(body))
     raise InputError(
         f'a press is "application/json" or "application/x-www-form-urlencoded", not "{kind}"'
     )
@@ -154,6 +139,29 @@ async def pressed(site: Site, kiosk: Kiosk, browser: Browser, widget: str, given
     receipt = await kiosk.presses.press(widget, given.inputs, given.id or secrets.token_hex(8), by)
     _count(site, receipt)
     return receipt
+
+
+async def _pressed_by_form(
+    site: Site, kiosk: Kiosk, browser: Browser, widget: str, inputs: dict[str, str]
+) -> Response:
+    """Back to the page, with the receipt on it; or the question that comes first."""
+    too_soon, before = _is_second_tap(inputs), inputs.pop("_last", "")
+    asks = kiosk.presses.widget(widget).confirm_press
+    if asks and (inputs.pop(CONFIRMED, "") != "yes" or too_soon):
+        return _ask(site, kiosk, widget, inputs)
+    # One rendered page has one id for all its buttons, and each button is a press of its own.
+    page_id = inputs.pop("_id", secrets.token_hex(8))
+    if not re.fullmatch(PRESS_ID, page_id):
+        raise InputError(f'_id: "{page_id:.40}" is not the id of a press')
+    press_id = f"{page_id}.{widget}"
+    by = kiosk.doubts.by(widget, browser, inputs.pop("_seen", ""), _until(inputs))
+    typed = kiosk.sending.typed(inputs)
+    if too_soon:
+        receipt = await kiosk.presses.too_soon(widget, typed, press_id, before, by.origin)
+    else:
+        receipt = await kiosk.presses.press(widget, typed, press_id, by)
+    _count(site, receipt)
+    return RedirectResponse(_page_after(kiosk, widget, receipt.id), status_code=303)
 
 
 def _kind(request: Request) -> str:
@@ -200,7 +208,7 @@ def _until(inputs: dict[str, str]) -> float | None:
 
 def _is_second_tap(inputs: dict[str, str]) -> bool:
     """Whether a page without scripts is pressed sooner than anybody reads it: by the second tap of what
-    brought it. Scripts tell by themselves."""
+    brought it. Scripts tell by themselves; a page that loaded itself was not tapped for."""
     since = _moment(inputs, "_since")
     return since is not None and moments.now() - since < TAP_AGAIN_S
 
