@@ -35,7 +35,9 @@ class Actions:
         self._robot = robot
         self._changed = changed
         self._services = ActionServices(interfaces, robot, link)
-        self._following = Following(self._services, robot, back=self._advanced, tell=self._tell)
+        self._following = Following(
+            self._services, robot, cut=self._doubt, back=self._advanced, tell=self._tell
+        )
         self._latest: dict[str, Goal] = {}  # by widget
         self._states: dict[str, Sample] = {}  # by action: what its server said last of its goals
 
@@ -79,8 +81,11 @@ class Actions:
         if answer.outcome != "rejected":
             goal.advance(ACCEPTED if answer.outcome == "accepted" else UNKNOWN)
             self._following.begin(goal)
-        runs = goal.lives and not cut.done()
-        self._show(goal, goal.under_way if runs else goal.came_to(answer))
+        if cut.done() and answer.outcome == "unknown" and not goal.lives:
+            self._show_doubt(goal, answer.text)
+        else:
+            runs = goal.lives and not cut.done()
+            self._show(goal, goal.under_way if runs else goal.came_to(answer))
         return answer
 
     def resume(self, goal: Goal) -> None:
@@ -193,6 +198,15 @@ class Actions:
         if goal.doubt and goal.advance(EXECUTING):
             self._advanced(goal)
         self._note(goal, goal.under_way)  # shown with the next frame: a goal may say a lot
+
+    def _doubt(self, goal: Goal, why: str) -> None:
+        """It was cut off: the robot may be at it, and until that is known no other is sent."""
+        self._show_doubt(goal, why)
+        goal.corrected(goal.press_id, Answer("unknown", why))
+
+    def _show_doubt(self, goal: Goal, why: str) -> None:
+        goal.doubt = why
+        self._show(goal, goal.in_doubt)
 
     def _tell(self, goal: Goal, answer: Answer) -> None:
         """What came of it, or that it is not known any more: to the widget and the receipt."""

@@ -31,14 +31,16 @@ class Following:
         services: ActionServices,
         robot: Robot,
         *,
+        cut: Callable[[Goal, str], None],
         back: Callable[[Goal], None],
         tell: Callable[[Goal, Answer], None],
     ) -> None:
-        """`tell` gets what came of a goal, or that it is not known any more; `back` is called when the
-        server of a goal that was cut off is offered again."""
+        """`tell` gets what came of a goal, or that it is not known any more; `cut` is called with the
+        sentence when one is cut off, and `back` when its server is offered again."""
         self._services = services
         self._robot = robot
         self._log = RobotLog(log, robot.name)
+        self._cut = cut
         self._back = back
         self._tell = tell
         self._goals: dict[asyncio.Task[None], Goal] = {}
@@ -71,7 +73,7 @@ class Following:
             if goal.cut.done():
                 if goal.lives and not goal.doubt:
                     goal.state = UNKNOWN
-                    self._tell(goal, Answer("unknown", goal.cut.result() or say("goal_cut")))
+                    self._cut(goal, goal.cut.result() or say("goal_cut"))
                 await self._until_offered(goal)
                 goal.cut = asyncio.get_running_loop().create_future()
                 self._back(goal)
@@ -113,12 +115,14 @@ class Following:
     async def _result(self, goal: Goal) -> bytes | None:
         """The reply of `get_result`, which is asked for again where Zenoh refuses.
 
-        One that the robot is not known to have is asked for not much longer than a call.
+        Of one that the robot is not known to have, or to be at, it is awaited not much longer than a
+        call's.
         """
         refused = False
         while not goal.cut.done():
             try:
-                query = self._services.get_result(goal, RESULT_S if goal.known else LATE_S)
+                seconds = RESULT_S if goal.known and not goal.doubt else LATE_S
+                query = self._services.get_result(goal, seconds)
                 return await self._services.reply(goal, query)
             except LinkError as error:
                 if not refused:

@@ -41,7 +41,8 @@ class Goal:
     whether the robot ever had it.
 
     `cut` is done when nothing more is heard of it: with a sentence, or "" for a lost connection.
-    `doubt` is the sentence for a goal of before the server's start, until something is heard of it.
+    `doubt` is the sentence for a goal that may be under way, of before a cut or the server's start,
+    until something is heard of it.
     """
 
     widget: Action
@@ -85,7 +86,7 @@ class Goal:
 
     @property
     def in_doubt(self) -> Progress:
-        """What is shown of a goal of before the server's start: it may be under way."""
+        """What is shown of a goal that may be under way."""
         stoppable, press = not self.cut.done(), self.press_id
         return Progress(True, "unknown", self.doubt, None, stoppable, NAMES[UNKNOWN], press)
 

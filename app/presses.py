@@ -6,7 +6,6 @@ what the browser showed does not count. Between judging and sending nothing wait
 
 import asyncio
 import logging
-import secrets
 import time
 from collections.abc import Callable, Coroutine, Iterator, Mapping
 from contextlib import contextmanager
@@ -40,6 +39,7 @@ from app.receipts import (
 from app.robot import Robot
 from app.sending import Sending
 from app.sentences import clock, say
+from app.unjudged import Unjudged
 
 log = logging.getLogger("kiosk.presses")
 
@@ -80,8 +80,10 @@ class Presses:
         self._under_way: dict[str, _UnderWay] = {}
         self._monotonic = monotonic
         self._receipts = Receipts(witness)
+        self._unjudged = Unjudged(sending, logbook, self._receipts, self._log)
         self.widget = sending.widget
         self.receipt = self._receipts.get
+        self.too_soon = self._unjudged.too_soon
 
     async def press(self, widget_id: str, inputs: Mapping[str, Any], press_id: str, by: By) -> Receipt:
         """Sends what the widget is for, or refuses. The same id again is the same press.
@@ -96,32 +98,14 @@ class Presses:
             work = self._logged(widget, inputs, press_id, by)
             return await self._once(widget, inputs, press_id, work)
         if known is None:
-            return await self._again(
-                widget, inputs, press_id, say("press_past", id=press_id), by.origin
-            )
+            why = say("press_past", id=press_id)
+            return await self._unjudged.refuse(widget, inputs, press_id, why, by.origin)
         if (known.widget, known.fingerprint) != (widget_id, fingerprint(inputs)):
-            return await self._again(
-                widget, inputs, press_id, say("press_reused", id=press_id), by.origin
-            )
+            why = say("press_reused", id=press_id)
+            return await self._unjudged.refuse(widget, inputs, press_id, why, by.origin)
         if isinstance(known, _UnderWay):
             return await asyncio.shield(known.receipt)
         return known
-
-    async def too_soon(
-        self,
-        widget_id: str,
-        inputs: Mapping[str, Any],
-        press_id: str,
-        before: str,
-        origin: Origin,
-    ) -> Receipt:
-        """Refuses what may be the second tap of another press, of which it says what came too: `before`
-        is its id, "" where there is none."""
-        why = say("press_too_soon")
-        if (last := self.receipt(before)) is not None:
-            said = say("press_before", label=self.widget(last.widget).label, said=last.reason)
-            why = last.reason if last.reason.endswith(why) else f"{said} {why}"
-        return await self._again(self.widget(widget_id), inputs, press_id, why, origin)
 
     async def cancel(self, widget_id: str, origin: Origin, press_id: str = "") -> Receipt:
         """Asks the robot to cancel the goal of one press or, without its id, the one under way: anybody
@@ -131,7 +115,7 @@ class Presses:
             raise NotFound(f'"{widget_id}" is not an action: there is nothing to cancel')
         if (why := self._sending.over(widget, press_id)) and not self._logbook.room(origin):
             answer = Answer("refused", why)
-            return self._counted(receipt_of(widget, {}, "", answer, "interlock"), origin)
+            return self._unjudged.counted(receipt_of(widget, {}, "", answer, "interlock"), origin)
         noting = asyncio.ensure_future(self._logbook.canceled(widget_id, origin))
         try:
             # No disk keeps anybody from stopping a robot.
@@ -170,12 +154,7 @@ class Presses:
         if not why:
             return None
         answer = Answer("refused", say(sentence, why=why, time=clock(time.time())))
-        return self._counted(receipt_of(widget, inputs, press_id, answer, cause), by.origin)
-
-    def _counted(self, receipt: Receipt, origin: Origin) -> Receipt:
-        self._logbook.leave_out(origin)
-        self._receipts.keep_left_out(receipt)
-        return receipt
+        return self._unjudged.counted(receipt_of(widget, inputs, press_id, answer, cause), by.origin)
 
     async def _once(
         self,
@@ -223,28 +202,6 @@ class Presses:
                 named(by.origin),
                 LONGEST_LOGGED, own, receipt.outcome, receipt.reason)  # fmt: skip
         return receipt
-
-    async def _again(
-        self, widget: Pressed, inputs: Mapping[str, Any], press_id: str, why: str, origin: Origin
-    ) -> Receipt:
-        """A press that is not even judged, for its id was used or it came too soon; its receipt has
-        another id."""
-        own_id = f"{press_id:.40}.{secrets.token_hex(4)}"
-        if self._logbook.room(origin):
-            return await self._once(
-                widget, inputs, own_id, self._reused(widget, inputs, own_id, why, origin)
-            )
-        refused = receipt_of(widget, inputs, own_id, Answer("refused", why), "input")
-        return self._counted(refused, origin)
-
-    async def _reused(
-        self, widget: Pressed, inputs: Mapping[str, Any], own_id: str, text: str, origin: Origin
-    ) -> Receipt:
-        own = self._sending.needed(widget, inputs)
-        self._receipts.begin(own_id, widget.id, origin, own)
-        self._log.warning("press %s of %s by %s: %s", own_id, widget.id, named(origin), text)
-        why = await self._logbook.refused(widget.id, own, own_id, origin, text)
-        return with_doubt(receipt_of(widget, inputs, own_id, Answer("refused", text), "input"), why)
 
     def _correct(self, noted: Noted, press_id: str, answer: Answer) -> None:
         """What is known of a press now is another thing than its receipt said."""

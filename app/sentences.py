@@ -29,7 +29,7 @@ ENGLISH: Final[Mapping[str, str]] = {
     "no_service": "Locked: the robot does not offer {name} now.",
     "getting_ready": "Locked: the robot has just begun to offer {name}; getting ready.",
     "busy": "Under way: waiting for the robot.",
-    "perhaps_busy": "Locked: a goal of before the server's start may still be under way.",
+    "perhaps_busy": "Locked: a goal that was sent before may still be under way.",
     # QoS that DDS would not match: the robot's and the panel's.
     "publishes_best_effort": "The robot publishes {topic} best effort; this panel asks for reliable.",
     "publishes_volatile": "The robot publishes {topic} volatile; this panel asks for transient local.",

@@ -1,6 +1,7 @@
 """Calls and goals whose robot answers late, wrongly or not at all: without a bridge, at set times."""
 
 import asyncio
+import time
 from collections.abc import Callable, Coroutine
 from typing import Any
 
@@ -10,6 +11,7 @@ from app import keys
 from app.actions import Actions
 from app.calls import LATE_S, LONGEST_SAID, MOST_UNANSWERED, Calls
 from app.errors import LinkError
+from app.interlocks import against_calling
 from app.panel.model import Action, Call, Panel
 from app.progress import Answer, Progress
 from app.robot import Robot, Sample
@@ -207,11 +209,12 @@ def test_a_goal_cut_off_is_unknown_until_the_robot_tells_its_result() -> None:
         assert (await start).outcome == "accepted"
         await asked(bench, 2)
         bench.lose_the_bridge()
-        while bench.robot.progress["count"].busy:
-            await asyncio.sleep(0)
-        outcomes = [bench.robot.progress["count"].outcome]
+        await in_doubt(bench)
+        outcomes = [bench.shown.outcome]
         bench.robot.graph.apply(keys.bridge_token(BRIDGE), True)
+        assert locked_by(bench) == "perhaps_busy"
         await asked(bench, 3)
+        assert (locked_by(bench), bench.shown.stoppable) == ("perhaps_busy", True)
         bench.line.answer(types.get_result_response, status=4, result={"sequence": [0, 1]})
         while not bench.robot.progress["count"].text.startswith("Succeeded"):
             await asyncio.sleep(0)
@@ -374,7 +377,7 @@ def test_a_goal_cut_off_before_its_answer_is_asked_for_when_the_bridge_is_back()
         await asked(bench, 1)
         bench.lose_the_bridge()
         assert (await start).outcome == "unknown"
-        assert (bench.shown.goal, bench.shown.busy) == ("UNKNOWN", False)
+        assert (bench.shown.goal, bench.shown.busy) == ("UNKNOWN", True)
         bench.robot.graph.apply(keys.bridge_token(BRIDGE), True)
         await asked(bench, 2)
         assert bench.line.asked[1][0].endswith("get_result")
@@ -413,8 +416,8 @@ def test_a_goal_that_began_and_is_cut_off_before_its_answer_is_unknown() -> None
         tell_states(bench, (goal_id(bench), 2))
         bench.lose_the_bridge()
         assert (await start).outcome == "unknown"
-        await asyncio.sleep(0)
-        assert (bench.shown.goal, bench.shown.busy) == ("UNKNOWN", False)
+        await in_doubt(bench)
+        assert bench.shown.goal == "UNKNOWN"
         await bench.actions.stop()
 
     run(test)
@@ -506,12 +509,12 @@ def test_a_goal_whose_server_ends_is_unknown_and_asked_for_when_it_is_back() -> 
         token = keys.server_token(BRIDGE, "AS", "count", COUNT)
         bench.robot.graph.apply(token, False)
         bench.actions.follow()
-        while bench.shown.busy:
-            await asyncio.sleep(0)
-        assert (bench.shown.goal, bench.shown.outcome) == ("UNKNOWN", "unknown")
+        await in_doubt(bench)
+        assert (bench.shown.goal, bench.shown.stoppable) == ("UNKNOWN", False)
         assert "no longer offers /count" in bench.shown.text
         bench.robot.graph.apply(token, True)
         await asked(bench, 3)
+        assert locked_by(bench) == "perhaps_busy"
         bench.line.answer(
             INTERFACES.action(COUNT).get_result_response, status=0, result={"sequence": []}
         )
@@ -520,6 +523,19 @@ def test_a_goal_whose_server_ends_is_unknown_and_asked_for_when_it_is_back() -> 
         assert [answer.outcome for _, answer in bench.corrected] == ["unknown", "unknown"]
 
     run(test)
+
+
+async def in_doubt(bench: Bench) -> None:
+    """It may be under way."""
+    while bench.shown.outcome != "unknown":
+        await asyncio.sleep(0)
+    assert bench.shown.busy
+
+
+def locked_by(bench: Bench) -> str:
+    """Why no goal is sent, long after its server was offered."""
+    verdict = against_calling(bench.count, bench.robot, time.monotonic() + 60)
+    return verdict.code if verdict else ""
 
 
 async def settled(bench: Bench) -> None:

@@ -111,6 +111,7 @@ ORDER = (
     "app.receipts",
     "app.doubts",
     "app.sending",
+    "app.unjudged",
     "app.presses",
     "app.leases",
     "app.hold_messages",

@@ -149,7 +149,7 @@ def test_an_accepted_goal_is_in_doubt_and_asked_for_by_its_entry(tmp_path: Path)
         assert (shown.busy, shown.stoppable, shown.goal, shown.press) == (True, True, "UNKNOWN", "g1")
         assert rig.lock == "perhaps_busy"
         assert asked_for(rig) == goal_id(entry.hash).bytes
-        assert rig.bench.line.timeouts == [RESULT_S]
+        assert rig.bench.line.timeouts == [LATE_S]
         tell_states(rig.bench, (bytes(16), 2))
         assert rig.bench.shown == shown
         tell_states(rig.bench, (goal_id(entry.hash).bytes, 2))
@@ -159,6 +159,23 @@ def test_an_accepted_goal_is_in_doubt_and_asked_for_by_its_entry(tmp_path: Path)
         assert len(rig.bench.line.asked) == 1
         await rig.log.stop()
         assert rig.told() == ["", "accepted", "unknown", "accepted", "succeeded"]
+
+    run(tmp_path, test, "accepted")
+
+
+def test_it_is_asked_for_until_it_is_known(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("app.following.ASK_AGAIN_S", 0)
+
+    async def test(rig: Rig, entry: Entry) -> None:
+        await rig.started()
+        rig.bench.line.asked[0][2].set_result(None)
+        await asked(rig.bench, 2)
+        assert rig.lock == "perhaps_busy"
+        tell_states(rig.bench, (goal_id(entry.hash).bytes, 2))
+        rig.bench.line.asked[1][2].set_result(None)
+        await asked(rig.bench, 3)
+        assert rig.bench.line.timeouts == [LATE_S, LATE_S, RESULT_S]
+        assert rig.lock == "busy"
 
     run(tmp_path, test, "accepted")
 

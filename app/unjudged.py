@@ -1,0 +1,57 @@
+"""Presses that are refused and not even judged: their id was used before, or they came too soon."""
+
+import secrets
+from collections.abc import Mapping
+from typing import Any
+
+from app.log import Origin
+from app.logbook import Logbook
+from app.logs import RobotLog
+from app.panel.model import Pressed
+from app.progress import Answer
+from app.receipts import Receipt, Receipts, named, receipt_of, with_doubt
+from app.sending import Sending
+from app.sentences import say
+
+
+class Unjudged:
+    """Of one panel; used on the event loop only."""
+
+    def __init__(self, sending: Sending, logbook: Logbook, receipts: Receipts, log: RobotLog) -> None:
+        self._sending = sending
+        self._logbook = logbook
+        self._receipts = receipts
+        self._log = log
+
+    async def too_soon(
+        self, widget_id: str, inputs: Mapping[str, Any], press_id: str, before: str, origin: Origin
+    ) -> Receipt:
+        """What may be the second tap of another press, of which it says what came too: `before` is its
+        id, "" where there is none."""
+        why = say("press_too_soon")
+        if (last := self._receipts.get(before)) is not None:
+            label = self._sending.widget(last.widget).label
+            said = say("press_before", label=label, said=last.reason)
+            why = last.reason if last.reason.endswith(why) else f"{said} {why}"
+        return await self.refuse(self._sending.widget(widget_id), inputs, press_id, why, origin)
+
+    def counted(self, receipt: Receipt, origin: Origin) -> Receipt:
+        """A refusal that is no entry of the log's."""
+        self._logbook.leave_out(origin)
+        self._receipts.keep_left_out(receipt)
+        return receipt
+
+    async def refuse(
+        self, widget: Pressed, inputs: Mapping[str, Any], press_id: str, why: str, origin: Origin
+    ) -> Receipt:
+        """The receipt has an id of its own: that of the press is another's, or may still be one's."""
+        own_id = f"{press_id:.40}.{secrets.token_hex(4)}"
+        receipt = receipt_of(widget, inputs, own_id, Answer("refused", why), "input")
+        if not self._logbook.room(origin):
+            return self.counted(receipt, origin)
+        own = self._sending.needed(widget, inputs)
+        self._receipts.begin(own_id, widget.id, origin, own)
+        self._log.warning("press %s of %s by %s: %s", own_id, widget.id, named(origin), why)
+        receipt = with_doubt(receipt, await self._logbook.refused(widget.id, own, own_id, origin, why))
+        self._receipts.keep(receipt)
+        return receipt
