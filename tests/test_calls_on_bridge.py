@@ -461,13 +461,43 @@ def test_a_goal_whose_answer_was_cut_off_is_found_again_and_can_be_canceled(
     assert (receipt.status_code, receipt.json()["outcome"]) == (200, "unknown")
     until(lambda: own_kiosk.widget("count")["goal"] == "UNKNOWN", "nothing is heard of it")
     own_cyclone_bridge.start()
-    until(lambda: own_kiosk.widget("count")["stoppable"], "it is found again", within_s=30)
-    assert own_kiosk.widget("count")["goal"] == "EXECUTING"
+    locked_until_found(own_kiosk)
     assert press(own_kiosk, "count", id="goal-1").json()["outcome"] == "accepted"
     until(lambda: robot.requests("/fibonacci/_action/get_result"), "its end is asked for", within_s=30)
     assert cancel(own_kiosk, press="goal-1").status_code == 200
     until(lambda: own_kiosk.widget("count")["outcome"] == "canceled", "canceled")
     assert len(robot.goals()) == 1
+
+
+def locked_until_found(kiosk: Server) -> None:
+    """A goal that was cut off: at no time another can be sent, before the robot tells of it."""
+    reasons = set()
+
+    def found() -> bool:
+        shown = kiosk.widget("count")
+        assert not shown["enabled"], shown
+        reasons.add(shown["reason"])
+        return bool(shown["goal"] == "EXECUTING")
+
+    until(found, "it is found again", within_s=30)
+    assert kiosk.widget("count")["stoppable"]
+    assert "Locked: a goal that was sent before may still be under way." in reasons
+
+
+def test_a_goal_that_was_cut_off_locks_its_button_until_it_is_found(
+    own_kiosk: Server, own_cyclone_bridge: Bridge, robots: Callable[..., CycloneRobot]
+) -> None:
+    robot = robots(own_cyclone_bridge.domain)
+    until(lambda: own_kiosk.widget("count")["enabled"], "offered")
+    robot.fibonacci(step_s=30)
+    assert press(own_kiosk, "count").json()["outcome"] == "accepted"
+    until(lambda: own_kiosk.widget("count")["goal"] == "EXECUTING", "it runs")
+    own_cyclone_bridge.kill()
+    until(lambda: own_kiosk.widget("count")["goal"] == "UNKNOWN", "nothing is heard of it")
+    own_cyclone_bridge.start()
+    locked_until_found(own_kiosk)
+    robot.cancel()
+    until(lambda: own_kiosk.widget("count")["enabled"], "its end is known")
 
 
 def test_a_goal_of_more_than_five_seconds_survives_a_reload(

@@ -53,7 +53,7 @@ def with_a_goal(start: Start, press_id: str = "goal-1") -> Server:
 
 
 def found_again(kiosk: Server) -> Server:
-    """When the robot said its states: Zenoh may wait 10 s for what was said before."""
+    """Waits until the robot has told its states."""
     until(lambda: kiosk.widget("count")["goal"] == "EXECUTING", "it is found", within_s=30)
     return kiosk
 
