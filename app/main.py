@@ -4,6 +4,7 @@ from app.collector import resume
 
 # isort: split
 import asyncio
+import faulthandler
 import logging
 import secrets
 import signal
@@ -46,6 +47,7 @@ if TYPE_CHECKING:
 log = logging.getLogger("kiosk")
 
 READ_WITHIN_S = 1.0  # by a browser, when the server ends
+ENDED_WITHIN_S = 12.0  # else something stands still: where is told, and the process leaves it
 
 
 def create_app(settings: Settings | None = None) -> FastAPI:
@@ -223,7 +225,8 @@ def _on_end(end: Callable[[], object]) -> Iterator[None]:
     """Calls `end` as soon as the process is told to end, before whoever listened for that.
 
     uvicorn waits for open streams before it runs the lifespan's end: they must end first. A terminal
-    that closes ends it in the same order; started by nohup, it goes on.
+    that closes ends it in the same order; started by nohup, it goes on. What then stands still, in a
+    library or on a disk, does not keep the process.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -236,6 +239,7 @@ def _on_end(end: Callable[[], object]) -> Iterator[None]:
         if number == signal.SIGHUP:
             signal.raise_signal(signal.SIGTERM)
             return
+        faulthandler.dump_traceback_later(ENDED_WITHIN_S, exit=True)  # it needs no thread of Python's
         end()
         then = previous[signal.Signals(number)]
         if callable(then):

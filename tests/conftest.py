@@ -36,11 +36,15 @@ def pytest_sessionstart(session: pytest.Session) -> None:
 
 
 @pytest.hookimpl(wrapper=True)
-def pytest_runtest_makereport() -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """A failure shows what the processes of the test said last."""
+def pytest_runtest_makereport(
+    call: pytest.CallInfo[None],
+) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """A failure shows what the processes said last that run, or began about with the test."""
     report = yield
     if report.failed:
-        report.sections += [("a process", process.told()) for process in Process.latest]
+        began = time.monotonic() - call.duration - 10
+        shown = [one for one in Process.latest if one.running or one.began > began]
+        report.sections += [("a process", process.told()) for process in shown]
     return report
 
 

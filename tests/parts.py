@@ -77,6 +77,7 @@ class Process:
             command, env={**os.environ, **env}, stderr=subprocess.PIPE, text=True, **options
         )
         self.lines: list[str] = []
+        self.began = time.monotonic()
         self.latest.append(self)
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()

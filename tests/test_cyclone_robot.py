@@ -171,6 +171,12 @@ def statuses(heard: list[Any], goal: bytes) -> list[int]:
     return seen
 
 
+def went(seen: list[int], *states: int) -> bool:
+    """Whether a goal went through these, to the last one: a topic that keeps one message only may leave
+    out those that did not last."""
+    return seen == [state for state in states if state in seen] and seen[-1] == states[-1]
+
+
 def test_a_goal_from_its_acceptance_to_its_result(robot: CycloneRobot, client: Client) -> None:
     goals = Goals(client)
     with (
@@ -181,7 +187,7 @@ def test_a_goal_from_its_acceptance_to_its_result(robot: CycloneRobot, client: C
         goal = goals.sent(order=5)
         assert goals.result(goal) == (SUCCEEDED, [0, 1, 1, 2, 3, 5])
         until(lambda: statuses(status, goal)[-1:] == [SUCCEEDED], "its end is told")
-    assert statuses(status, goal) == [ACCEPTED, EXECUTING, SUCCEEDED]
+    assert went(statuses(status, goal), ACCEPTED, EXECUTING, SUCCEEDED)
     told = [message.feedback.sequence.tolist() for message in feedback]
     assert told == [[0, 1, 1], [0, 1, 1, 2], [0, 1, 1, 2, 3], [0, 1, 1, 2, 3, 5]]
     assert {message.goal_id.uuid.tobytes() for message in feedback} == {goal}
@@ -220,7 +226,7 @@ def test_the_client_cancels_a_goal(robot: CycloneRobot, client: Client) -> None:
         assert goals.cancel(goal) == (0, [goal])
         assert goals.result(goal) == (CANCELED, [0, 1])
         until(lambda: statuses(status, goal)[-1:] == [CANCELED], "its end is told")
-    assert statuses(status, goal) == [ACCEPTED, EXECUTING, CANCELING, CANCELED]
+    assert went(statuses(status, goal), ACCEPTED, EXECUTING, CANCELING, CANCELED)
     assert {g["id"]: g["status"] for g in robot.goals()} == {
         goal.hex(): CANCELED,
         other.hex(): EXECUTING,
