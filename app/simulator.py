@@ -231,6 +231,7 @@ def _listening(endpoint: str) -> zenoh.Config:
         "scouting/multicast/enabled": "false",
         "scouting/gossip/enabled": "false",
         "timestamping/enabled": "true",
+        "transport/unicast/accept_timeout": "3000",  # who is at it holds up the session's end
         "transport/shared_memory/enabled": "false",  # its file stays when the process is killed
         "adminspace/enabled": "true",  # it tells the port
     }.items():

@@ -299,6 +299,18 @@ def test_it_ends_soon_with_fifty_streams_and_sockets_open(
     assert "Traceback" not in mine.process.text
 
 
+def test_it_ends_while_it_connects_to_what_says_nothing(tmp_path: Path) -> None:
+    with socket.socket() as deaf:
+        deaf.bind(("127.0.0.1", 0))
+        deaf.listen()
+        mine = live(f"tcp/127.0.0.1:{deaf.getsockname()[1]}", tmp_path)
+        taken, _ = deaf.accept()
+        began = time.monotonic()
+        mine.end(signal.SIGTERM)
+        assert time.monotonic() - began < 6  # Zenoh's own time is 10 s
+        taken.close()
+
+
 def test_it_leaves_what_stands_still_at_its_end_and_tells_where() -> None:
     mine = Server(ROOT, app="tests.standing:app")
     assert mine.end(signal.SIGTERM, timeout_s=10) == 1
