@@ -183,8 +183,7 @@ ENGLISH: Final[Mapping[str, str]] = {
     "too_many_presses": "Not sent: {most} presses of this page have had no answer yet.",
     "press_past": "Not sent again: press {id} was made before; the operator's log has what came of it.",
     "press_too_soon": (
-        "Not sent: pressed as soon after the page came as the second tap of a double tap. Press again "
-        "if it was meant."
+        "Not sent: so soon after the page came it may be a second tap. Press again if it was meant."
     ),
     "press_before": "{label}: {said}",
     "press_reused": "Not sent: the press id {id} was already used for another press.",

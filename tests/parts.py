@@ -50,6 +50,9 @@ CYCLONE_ON_LOOPBACK = (
 )
 
 
+STOOD = "Timeout (0:00:12)!"  # a server stood still as it ended, and left
+
+
 def until(what: Callable[[], Any], why: str, within_s: float = 10.0, every_s: float = 0.01) -> Any:
     """Waits for a condition and returns its value; fails with `why` when time is up."""
     end = time.monotonic() + within_s
@@ -127,6 +130,7 @@ class Process:
         for pipe in (self._process.stdin, self._process.stdout, self._process.stderr):
             if pipe is not None:
                 pipe.close()
+        assert STOOD not in self.text, self.text
         return status
 
 
