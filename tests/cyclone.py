@@ -210,9 +210,13 @@ def served(robot: CycloneRobot, client: Client) -> None:
     until(lambda: set(client.tokens()) >= GRAPH, "the robot's services are announced")
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def cyclone_bridge() -> Iterator[Bridge]:
-    """The bridge that these tests share; who ends a bridge takes `own_cyclone_bridge`."""
+    """The bridge that the tests of a file share; who ends a bridge takes `own_cyclone_bridge`.
+
+    It ends with the file, as the next file's is on the same domain: a bridge takes another one's
+    readers and writers for a robot's.
+    """
     shared = Bridge(DOMAINS[0])
     shared.start()
     yield shared
@@ -227,9 +231,9 @@ def own_cyclone_bridge() -> Iterator[Bridge]:
     mine.end()
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def client(cyclone_bridge: Bridge) -> Iterator[Client]:
-    """A session for all tests, that gets each message once whatever the robots do."""
+    """A session for all tests of a file, that gets each message once whatever the robots do."""
     shared = Client(cyclone_bridge.endpoint)
     shared.join("MS", "parameter_events", "rcl_interfaces/msg/ParameterEvent", ":::")
     shared.join("AC", "fibonacci", "example_interfaces/action/Fibonacci")
