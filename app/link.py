@@ -27,7 +27,7 @@ ASK_TIMEOUT_S = 2.0
 MOST_QUEUED = 16  # batches; Zenoh takes no more
 COPIED_MOST = 16_384  # bytes of a sample
 IN_ITS_SOURCE: Final = re.compile(r" at \S+\.rs:\d+\.?")  # where in Zenoh an error was made
-JOINED_WITHIN_MS: Final = 3_000  # by who is connected to: so long a session that ends waits for it
+JOINED_WITHIN_MS: Final = 3_000  # by who took a connection
 BLOCKED_MOST_US = 200_000  # how long a put or a question may wait for room: less than a hold's lease
 
 # Zenoh's own setting of its threads, read when its first session opens. By default the thread that
@@ -76,9 +76,8 @@ def _fit(config: zenoh.Config) -> zenoh.Config:
     No shared memory: Zenoh keeps a segment and its file for each session that was, and a session is
     renewed at every loss of the link. Room for a burst, as Zenoh's own two messages are few. What finds
     no room waits for it, which stops the event loop: where that takes too long (5 s are Zenoh's own)
-    the connection is closed, once, and all is locked. Nothing is dropped in silence. And a session
-    that ends, or is renewed, waits for the one that takes a connection and says nothing, as the port of
-    a frozen bridge does: not for 10 s.
+    the connection is closed, once, and all is locked. Nothing is dropped in silence. And a session's
+    end waits for who takes a connection and says nothing, as a frozen bridge's port does: not for 10 s.
     """
     config.insert_json5("transport/unicast/open_timeout", str(JOINED_WITHIN_MS))
     config.insert_json5("transport/shared_memory/enabled", "false")

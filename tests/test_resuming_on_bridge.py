@@ -53,8 +53,7 @@ def with_a_goal(start: Start, press_id: str = "goal-1") -> Server:
 
 
 def found_again(kiosk: Server) -> Server:
-    """Waits until the robot has told its states."""
-    until(lambda: kiosk.widget("count")["goal"] == "EXECUTING", "it is found", within_s=30)
+    until(lambda: kiosk.widget("count")["goal"] == "EXECUTING", "it is found")
     return kiosk
 
 
