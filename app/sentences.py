@@ -96,7 +96,7 @@ ENGLISH: Final[Mapping[str, str]] = {
     "goals_unread": "Whether a goal of before this server's start is under way is not known: {why}",
     "goal_cut": "The connection was cut: the robot may still be doing it.",
     "goal_fault": "A fault of the panel's server: what came of it is not known.",
-    "goal_gone": "The robot no longer offers {name}: what came of it is not known.",
+    "goal_gone": "The robot stopped offering {name}: what came of it is not known.",
     "cancel": "Cancel",
     "cancel_sent": "The robot was asked to cancel at {time}.",
     "cancel_refused": "The robot did not cancel it at {time}.",

@@ -511,7 +511,7 @@ def test_a_goal_whose_server_ends_is_unknown_and_asked_for_when_it_is_back() -> 
         bench.actions.follow()
         await in_doubt(bench)
         assert (bench.shown.goal, bench.shown.stoppable) == ("UNKNOWN", False)
-        assert "no longer offers /count" in bench.shown.text
+        assert "stopped offering /count" in bench.shown.text
         bench.robot.graph.apply(token, True)
         await asked(bench, 3)
         assert locked_by(bench) == "perhaps_busy"

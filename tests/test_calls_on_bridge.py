@@ -437,7 +437,7 @@ def test_a_node_that_ends_in_the_middle_of_a_goal_leaves_it_unknown_and_the_widg
     assert press(own_kiosk, "count", id="goal-1").json()["outcome"] == "accepted"
     robot.end()
     until(lambda: own_kiosk.widget("count")["goal"] == "UNKNOWN", "it is not known any more")
-    assert "no longer offers /fibonacci" in own_kiosk.widget("count")["result"]
+    assert "stopped offering /fibonacci" in own_kiosk.widget("count")["result"]
     assert press(own_kiosk, "count", id="goal-1").json()["outcome"] == "unknown"
     robot = robots(own_cyclone_bridge.domain)
     until(lambda: "no longer knows this goal" in own_kiosk.widget("count")["result"], "asked for again")
