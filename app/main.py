@@ -10,7 +10,8 @@ import secrets
 import signal
 import sys
 import threading
-from collections.abc import AsyncIterator, Callable, Iterator
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+from concurrent.futures import Future
 from contextlib import AsyncExitStack, ExitStack, asynccontextmanager, contextmanager
 from functools import partial
 from types import FrameType
@@ -47,9 +48,10 @@ if TYPE_CHECKING:
 log = logging.getLogger("kiosk")
 
 READ_WITHIN_S = 1.0  # by a browser, when the server ends
-# Else something stands still: where is told, and the process leaves it. More than an end waits for, a
-# session (3 s) and the operator's log (10 s), and less than the shipped unit's TimeoutStopSec.
-ENDED_WITHIN_S = 14.0
+ANSWERED_WITHIN_S = 2.0  # on its sockets, when the server ends
+# Else something stands still: where is told, and the process leaves it. More than an end waits for
+# (answers, a session for 3 s, the operator's log for 10 s), and less than the unit's TimeoutStopSec.
+ENDED_WITHIN_S = 16.0
 
 
 def create_app(settings: Settings | None = None) -> FastAPI:
@@ -72,14 +74,15 @@ def create_app(settings: Settings | None = None) -> FastAPI:
             app.state.site = site
             loop = asyncio.get_running_loop()
 
-            def ending() -> None:
+            async def ending() -> None:
                 watchdog.end()
                 site.fleet.close()
                 loop.call_later(READ_WITHIN_S, sockets.hang_up, ports)
+                await site.owed.told(ANSWERED_WITHIN_S)
 
             ports: set[int] = set()
             watchdog = _watchdog(site)
-            with _on_end(lambda: loop.call_soon_threadsafe(ending)):
+            with _on_end(loop, ending):
                 if settings.dev:
                     await opened.enter_async_context(
                         development.reloading(site, settings, running, opened.pop_all())
@@ -223,12 +226,13 @@ def _templates(dev: bool) -> Environment:
 
 
 @contextmanager
-def _on_end(end: Callable[[], object]) -> Iterator[None]:
-    """Calls `end` as soon as the process is told to end, before whoever listened for that.
+def _on_end(loop: asyncio.AbstractEventLoop, end: Callable[[], Awaitable[None]]) -> Iterator[None]:
+    """Awaits `end` as soon as the process is told to end, and then tells whoever listened for that; at
+    the second time at once.
 
-    uvicorn waits for open streams before it runs the lifespan's end: they must end first. A terminal
-    that closes ends it in the same order; started by nohup, it goes on. What then stands still, in a
-    library or on a disk, does not keep the process.
+    uvicorn waits for open streams before it runs the lifespan's end: they must end first. WebSockets it
+    closes: they must have their answers first. A terminal that closes ends it in the same order, unless
+    nohup started it. What stands still, in a library or on a disk, does not keep the process.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -236,16 +240,19 @@ def _on_end(end: Callable[[], object]) -> Iterator[None]:
     previous = {n: signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
     if previous[signal.SIGHUP] is not signal.SIG_DFL:
         del previous[signal.SIGHUP]
+    ends: list[Future[None]] = []
 
     def on_signal(number: int, frame: FrameType | None) -> None:
         if number == signal.SIGHUP:
             signal.raise_signal(signal.SIGTERM)
             return
-        faulthandler.dump_traceback_later(ENDED_WITHIN_S, exit=True)  # it needs no thread of Python's
-        end()
         then = previous[signal.Signals(number)]
-        if callable(then):
-            then(number, frame)
+        pass_on = partial(then, number, frame) if callable(then) else lambda: None
+        if ends:
+            pass_on()
+            return
+        faulthandler.dump_traceback_later(ENDED_WITHIN_S, exit=True)  # it needs no thread of Python's
+        ends.append(asyncio.run_coroutine_threadsafe(_first(end, pass_on), loop))
 
     for number in previous:
         signal.signal(number, on_signal)
@@ -254,6 +261,13 @@ def _on_end(end: Callable[[], object]) -> Iterator[None]:
     finally:
         for number, handler in previous.items():
             signal.signal(number, handler)
+
+
+async def _first(does: Callable[[], Awaitable[None]], then: Callable[[], object]) -> None:
+    try:
+        await does()
+    finally:
+        then()
 
 
 def _app_or_exit() -> FastAPI:

@@ -384,6 +384,7 @@ def test_the_servers_end_stops_the_robot_first(touched: Finger, jogger: RosNode)
     time.sleep(QUIET_S)
     soon("server ended", times(jogger, before, began))
     assert [code for code, _ in ended(touched.server)] == ["hold_by_stopping"]
+    expect(touched.page.locator("#receipt-jog")).to_contain_text("the panel's server stops")
     expect(touched.button).to_be_disabled()
     assert touched.state is None
 

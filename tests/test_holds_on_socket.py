@@ -361,6 +361,40 @@ def test_a_terminal_that_closes_ends_it_as_any_end_of_the_server(
     assert "the panel's server stops" in said["reason"]
 
 
+def test_a_server_that_ends_tells_it_though_the_robot_has_to_be_asked_first(
+    own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    panel = tmp_path / "jog.toml"
+    panel.write_text(PANEL)
+    kiosk = servers(live(own_bridge.endpoint, tmp_path, KIOSK_PANEL=str(panel)))
+    own_node.advertise("/operation_enabled", "std_msgs/msg/Bool", durability="transient_local", depth=1)
+    own_node.publish("/operation_enabled", {"data": True})
+    with held(kiosk) as socket:
+        socket.beat()
+        own_bridge.freeze()
+        kiosk.process.send(signal.SIGTERM)
+        said = socket.beat_until_it_ends()
+        own_bridge.thaw()
+    assert said["outcome"] in ("aborted", "unknown")
+    assert "it is not known whether the robot got the message that ends it" in said["reason"]
+    kiosk.process.wait(10)
+
+
+def test_a_server_that_ends_waits_for_no_browser_that_does_not_close(
+    tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    panel = tmp_path / "jog.toml"
+    panel.write_text(PANEL)
+    mine = servers(Server(ROOT, KIOSK_PANEL=str(panel), KIOSK_MODE="demo"))
+    with held(mine) as socket:
+        began = time.monotonic()
+        mine.process.send(signal.SIGTERM)
+        assert socket.beat_until_it_ends()["state"] == "ended"
+        assert socket.closed() in (1000, 1012)
+        mine.process.wait(10)
+        assert time.monotonic() - began < 6
+
+
 def test_a_new_panel_ends_what_is_held_by_the_old_one(tmp_path: Path) -> None:
     panel = tmp_path / "jog.toml"
     panel.write_text(PANEL)

@@ -137,6 +137,7 @@ ORDER = (
     "app.kiosk",
     "app.fleet",
     "app.metrics",
+    "app.owed",
     "app.exposition",
     "app.assets",
     "app.doors",

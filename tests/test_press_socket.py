@@ -1,7 +1,10 @@
 """A socket for presses beside slow robots, impatient clients and other tabs."""
 
 import json
+import signal
 from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Any, Final
 
 import pytest
@@ -25,8 +28,14 @@ FREE: Final = """
 
 @pytest.fixture(scope="module")
 def kiosk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    with slow(tmp_path_factory.mktemp("slow")) as mine:
+        yield mine
+
+
+@contextmanager
+def slow(folder: Path) -> Iterator[Server]:
     """On a robot that answers no call."""
-    folder, robot = tmp_path_factory.mktemp("slow"), Robot()
+    robot = Robot()
     panel = folder / "slow.toml"
     calls = "".join(widget(name, WAITS_S) for name in MUTE)
     panel.write_text(f'title = "Slow"\nmode = "live"\n[[page]]\nid = "p"\ntitle = "P"\n{FREE}{calls}')
@@ -80,6 +89,15 @@ def test_who_leaves_before_the_answer_loses_only_that(kiosk: Server) -> None:
     until(lambda: "timed_out" in logged(kiosk, "left"), "it came to its end")
     again = kiosk.http.post(f"/widgets/{MUTE[1]}", json={"inputs": {}, "id": "left"})
     assert (again.status_code, again.json()["outcome"]) == (504, "timed_out")
+
+
+def test_a_server_that_ends_tells_what_came_of_a_press_that_is_under_way(tmp_path: Path) -> None:
+    with slow(tmp_path) as mine, mine.socket() as socket:
+        socket.say(press(MUTE[0], "late"))
+        until(lambda: mine.widget(MUTE[0])["busy"], "it is under way")
+        mine.process.send(signal.SIGTERM)
+        said = socket.hear()
+        assert (said["press"], said["outcome"], said["status"]) == ("late", "timed_out", 504)
 
 
 def test_what_is_no_press_is_told_so(kiosk: Server) -> None:

@@ -104,7 +104,7 @@ async def hold(socket: WebSocket, widget: str, site: CurrentSite, kiosk: Current
     kiosk.holds.widget(widget)
     await socket.accept()
     session = _Session(socket, kiosk, widget, visitor(socket, site))
-    with suppress(WebSocketDisconnect):
+    with suppress(WebSocketDisconnect), site.owed.one():
         receipt = await session.run(widget)
         site.metrics.pressed(receipt.outcome)
 

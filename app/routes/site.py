@@ -16,6 +16,7 @@ from app.fleet import Fleet
 from app.kiosk import Kiosk
 from app.log import OperatorLog, Unlogged
 from app.metrics import Metrics
+from app.owed import Owed
 
 
 @dataclass(slots=True)
@@ -29,6 +30,7 @@ class Site:
     dev: bool
     log: OperatorLog | Unlogged
     browsers: Browsers = field(default_factory=Browsers)
+    owed: Owed = field(default_factory=Owed)
 
     @property
     def banner(self) -> str:
