@@ -68,6 +68,11 @@ class Fleet:
         for kiosk in self.kiosks:
             kiosk.close()
 
+    def give_up(self) -> None:
+        """Ends the waiting of what was pressed."""
+        for kiosk in self.kiosks:
+            kiosk.presses.give_up()
+
     def show_fault(self, text: str) -> None:
         """A fault of the panel file, shown on every page; "" takes it away."""
         for kiosk in self.kiosks:

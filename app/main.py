@@ -48,10 +48,10 @@ if TYPE_CHECKING:
 log = logging.getLogger("kiosk")
 
 READ_WITHIN_S = 1.0  # by a browser, when the server ends
-ANSWERED_WITHIN_S = 2.0  # on its sockets, when the server ends
-# Else something stands still: where is told, and the process leaves it. More than an end waits for
-# (answers, a session for 3 s, the operator's log for 10 s), and less than the unit's TimeoutStopSec.
-ENDED_WITHIN_S = 16.0
+ANSWERED_WITHIN_S = 2.0  # by the robot, when the server ends; then it is not known what came of a press
+# Else something stands still: where is told, and the process leaves it. More than an end waits for (the
+# two above, a session 3 s, the operator's log 10 s), and less than the unit's TimeoutStopSec.
+ENDED_WITHIN_S = 17.0
 
 
 def create_app(settings: Settings | None = None) -> FastAPI:
@@ -79,6 +79,8 @@ def create_app(settings: Settings | None = None) -> FastAPI:
                 site.fleet.close()
                 loop.call_later(READ_WITHIN_S, sockets.hang_up, ports)
                 await site.owed.told(ANSWERED_WITHIN_S)
+                site.fleet.give_up()
+                await site.owed.told(READ_WITHIN_S)
 
             ports: set[int] = set()
             watchdog = _watchdog(site)

@@ -1,5 +1,5 @@
-"""What is still to be told on WebSockets. At its end uvicorn waits for the answers to posts and closes
-sockets at once: what was pressed or held there would end without a word."""
+"""What is still to be told of presses and holds. At its end uvicorn waits for the answers to posts and
+closes WebSockets at once: what was pressed or held there would end without a word."""
 
 import asyncio
 from collections.abc import Iterator

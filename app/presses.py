@@ -40,6 +40,7 @@ from app.robot import Robot
 from app.sending import Sending
 from app.sentences import clock, say
 from app.unjudged import Unjudged
+from app.waits import Waits
 
 log = logging.getLogger("kiosk.presses")
 
@@ -84,6 +85,8 @@ class Presses:
         self.widget = sending.widget
         self.receipt = self._receipts.get
         self.too_soon = self._unjudged.too_soon
+        self._waits = Waits()
+        self.give_up = self._waits.give_up
 
     async def press(self, widget_id: str, inputs: Mapping[str, Any], press_id: str, by: By) -> Receipt:
         """Sends what the widget is for, or refuses. The same id again is the same press.
@@ -132,7 +135,10 @@ class Presses:
 
     async def _canceled(self, widget: Action, press_id: str) -> tuple[Answer, Cause]:
         try:
-            answer = await self._sending.cancel(widget, press_id)
+            async with self._waits.one():
+                answer = await self._sending.cancel(widget, press_id)
+        except TimeoutError:
+            return Answer("unknown", say("server_ends")), ""
         except LinkError as error:
             text = say("not_encoded", why=str(error), time=clock(time.time()))
             return Answer("refused", text), "link"
@@ -225,7 +231,10 @@ class Presses:
             return refused("refused", why, cause)
         try:
             correct = partial(self._correct, noted)
-            answer = await self._sending.send(widget, inputs, press_id, correct, noted.hash)
+            async with self._waits.one():
+                answer = await self._sending.send(widget, inputs, press_id, correct, noted.hash)
+        except TimeoutError:
+            return receipt(Answer("unknown", say("server_ends")))
         except (FieldError, InputError) as error:
             return refused("not_encoded", str(error), "input")
         except LinkError as error:

@@ -199,6 +199,7 @@ ENGLISH: Final[Mapping[str, str]] = {
     "log_abandoned": "Not sent: the entry was written too late.",
     "log_not_on_disk": "{said} (Not safely in the operator's log: {why}.)",
     "log_ended": "the panel's server ended before it knew",
+    "server_ends": "The panel's server ends: it is not known what came of this.",
     "log_broke_off": "A fault of the panel's server: it is not known whether this was sent.",
     "log_began": "The panel's server started.",
     "log_began_anew": "The log before this one was damaged and is kept as {name}.",

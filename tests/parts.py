@@ -50,7 +50,7 @@ CYCLONE_ON_LOOPBACK = (
 )
 
 
-STOOD = "Timeout (0:00:16)!"  # a server stood still as it ended, and left
+STOOD = "Timeout (0:00:17)!"  # a server stood still as it ended, and left
 
 
 def until(what: Callable[[], Any], why: str, within_s: float = 10.0, every_s: float = 0.01) -> Any:

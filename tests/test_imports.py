@@ -20,6 +20,7 @@ ORDER = (
     "app.browsers",
     "app.logs",
     "app.tasks",
+    "app.waits",
     "app.heap",
     "app.moments",
     "app.systemd",

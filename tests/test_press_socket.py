@@ -2,7 +2,9 @@
 
 import json
 import signal
+import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
@@ -33,11 +35,11 @@ def kiosk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
 
 
 @contextmanager
-def slow(folder: Path) -> Iterator[Server]:
+def slow(folder: Path, waits_s: float = WAITS_S) -> Iterator[Server]:
     """On a robot that answers no call."""
     robot = Robot()
     panel = folder / "slow.toml"
-    calls = "".join(widget(name, WAITS_S) for name in MUTE)
+    calls = "".join(widget(name, waits_s) for name in MUTE)
     panel.write_text(f'title = "Slow"\nmode = "live"\n[[page]]\nid = "p"\ntitle = "P"\n{FREE}{calls}')
     zenoh = str(zenoh_file(folder, robot.endpoint))
     mine = Server(ROOT, KIOSK_PANEL=str(panel), KIOSK_ZENOH=zenoh)
@@ -98,6 +100,26 @@ def test_a_server_that_ends_tells_what_came_of_a_press_that_is_under_way(tmp_pat
         mine.process.send(signal.SIGTERM)
         said = socket.hear()
         assert (said["press"], said["outcome"], said["status"]) == ("late", "timed_out", 504)
+
+
+@pytest.mark.parametrize("way", ["socket", "post"])
+def test_a_server_that_ends_waits_for_no_robot_for_long(tmp_path: Path, way: str) -> None:
+    with slow(tmp_path, waits_s=60) as mine, mine.socket() as socket, ThreadPoolExecutor() as pool:
+        began = time.monotonic()
+        if way == "socket":
+            socket.say(press(MUTE[0], "long"))
+            answered = pool.submit(socket.hear)
+        else:
+            body = {"inputs": {}, "id": "long"}
+            answered = pool.submit(lambda: mine.http.post(f"/widgets/{MUTE[0]}", json=body).json())
+        until(lambda: mine.widget(MUTE[0])["busy"], "it is under way")
+        mine.process.send(signal.SIGTERM)
+        said = answered.result(10)
+        assert (said["id"], said["outcome"]) == ("long", "unknown")
+        assert said["reason"] == "The panel's server ends: it is not known what came of this."
+        assert mine.process.wait(10) == -signal.SIGTERM  # which uvicorn raises again
+        assert time.monotonic() - began < 10
+    assert said["reason"] in logged(mine, "long")
 
 
 def test_what_is_no_press_is_told_so(kiosk: Server) -> None:

@@ -156,8 +156,9 @@ def test_a_goal_that_the_robot_forgot_is_said_to_be_unknown_once(
     assert len(told(tmp_path)) == len(BROKEN_OFF) + 1
 
 
-def test_a_kill_before_the_robots_answer_leaves_a_goal_that_is_found(
-    start: Start, robot: CycloneRobot, tmp_path: Path
+@pytest.mark.parametrize("by", [signal.SIGKILL, signal.SIGTERM])
+def test_an_end_before_the_robots_answer_leaves_a_goal_that_is_found(
+    start: Start, robot: CycloneRobot, tmp_path: Path, by: signal.Signals
 ) -> None:
     robot.fibonacci(step_s=30, answer_goals=False)
     kiosk = start()
@@ -165,7 +166,7 @@ def test_a_kill_before_the_robots_answer_leaves_a_goal_that_is_found(
     with kiosk.socket() as socket:
         socket.say(json.dumps({"widget": "count", "inputs": {}, "id": "goal-1"}))
         until(lambda: robot.goals(), "the robot is at it")
-        kiosk.end(signal.SIGKILL)
+        kiosk.end(by)
     again = start()
     found_again(again)
     assert cancel(again, press="goal-1").status_code == 200

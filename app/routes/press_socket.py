@@ -87,13 +87,9 @@ class _Session:
         if len(self._under_way) >= MOST_AT_ONCE:
             await self._answer(said.id, 429, error=say("too_many_presses", most=MOST_AT_ONCE))
             return
-        task = asyncio.create_task(self._owed(said))
+        task = asyncio.create_task(self._press(said))
         self._under_way.add(task)
         task.add_done_callback(self._under_way.discard)
-
-    async def _owed(self, said: SocketPress) -> None:
-        with self._site.owed.one():
-            await self._press(said)
 
     async def _press(self, said: SocketPress) -> None:
         site, socket = self._site, self._socket

@@ -124,7 +124,8 @@ async def cancel(widget: str, request: Request, site: CurrentSite, kiosk: Curren
         of = _form(body).get("_press", "")
     elif kind == "application/json" and body:
         of = as_model(Cancel, json_of(body)).press
-    receipt = await kiosk.presses.cancel(widget, origin_of(browser), of)
+    with site.owed.one():
+        receipt = await kiosk.presses.cancel(widget, origin_of(browser), of)
     _count(site, receipt)
     if form:
         return RedirectResponse(_page_after(kiosk, widget, receipt.id), status_code=303)
@@ -136,7 +137,8 @@ async def pressed(site: Site, kiosk: Kiosk, browser: Browser, widget: str, given
     at = given.at.timestamp() if given.at else None
     kiosk.presses.widget(widget)
     by = kiosk.doubts.by(widget, browser, given.seen or "", at)
-    receipt = await kiosk.presses.press(widget, given.inputs, given.id or secrets.token_hex(8), by)
+    with site.owed.one():
+        receipt = await kiosk.presses.press(widget, given.inputs, given.id or secrets.token_hex(8), by)
     _count(site, receipt)
     return receipt
 
@@ -159,7 +161,8 @@ async def _pressed_by_form(
     if too_soon:
         receipt = await kiosk.presses.too_soon(widget, typed, press_id, before, by.origin)
     else:
-        receipt = await kiosk.presses.press(widget, typed, press_id, by)
+        with site.owed.one():
+            receipt = await kiosk.presses.press(widget, typed, press_id, by)
     _count(site, receipt)
     return RedirectResponse(_page_after(kiosk, widget, receipt.id), status_code=303)
 
