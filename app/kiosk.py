@@ -194,8 +194,9 @@ class Kiosk:
             self._log.warning("%s", error)
 
     def close(self) -> None:
-        """Ends holds, while there is a way to say so to the robot, and streams."""
+        """Ends holds, while there is a way to say so to the robot, presses and streams."""
         self.holds.close()
+        self.presses.close()
         self.board.close()
 
     def _recording(self, recordings: "Recordings | None") -> "Recorder | None":

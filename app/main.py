@@ -4,17 +4,12 @@ from app.collector import resume
 
 # isort: split
 import asyncio
-import faulthandler
 import logging
 import secrets
-import signal
 import sys
-import threading
-from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
-from concurrent.futures import Future
-from contextlib import AsyncExitStack, ExitStack, asynccontextmanager, contextmanager
+from collections.abc import AsyncIterator
+from contextlib import AsyncExitStack, ExitStack, asynccontextmanager
 from functools import partial
-from types import FrameType
 from typing import TYPE_CHECKING
 
 from fastapi import Depends, FastAPI
@@ -26,6 +21,7 @@ from app import development, heap, logs, simulator, sockets
 from app.assets import Assets, load_assets
 from app.direct import Application
 from app.doors import Doors
+from app.ending import in_order
 from app.errors import KioskError, PanelError
 from app.fleet import Fleet
 from app.link import Config, config_from, config_to
@@ -49,9 +45,6 @@ log = logging.getLogger("kiosk")
 
 READ_WITHIN_S = 1.0  # by a browser, when the server ends
 ANSWERED_WITHIN_S = 2.0  # by the robot, when the server ends; then it is not known what came of a press
-# Else something stands still: where is told, and the process leaves it. More than an end waits for (the
-# two above, a session 3 s, the operator's log 10 s), and less than the unit's TimeoutStopSec.
-ENDED_WITHIN_S = 17.0
 
 
 def create_app(settings: Settings | None = None) -> FastAPI:
@@ -76,15 +69,17 @@ def create_app(settings: Settings | None = None) -> FastAPI:
 
             async def ending() -> None:
                 watchdog.end()
-                site.fleet.close()
-                loop.call_later(READ_WITHIN_S, sockets.hang_up, ports)
-                await site.owed.told(ANSWERED_WITHIN_S)
-                site.fleet.give_up()
-                await site.owed.told(READ_WITHIN_S)
+                try:
+                    site.fleet.close()
+                    await site.owed.told(ANSWERED_WITHIN_S)
+                finally:
+                    site.fleet.give_up()
+                    await site.owed.told(READ_WITHIN_S)
+                    loop.call_later(READ_WITHIN_S, sockets.hang_up, ports)
 
             ports: set[int] = set()
             watchdog = _watchdog(site)
-            with _on_end(loop, ending):
+            with in_order(loop, ending):
                 if settings.dev:
                     await opened.enter_async_context(
                         development.reloading(site, settings, running, opened.pop_all())
@@ -225,51 +220,6 @@ def _templates(dev: bool) -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-
-
-@contextmanager
-def _on_end(loop: asyncio.AbstractEventLoop, end: Callable[[], Awaitable[None]]) -> Iterator[None]:
-    """Awaits `end` as soon as the process is told to end, and then tells whoever listened for that; at
-    the second time at once.
-
-    uvicorn waits for open streams before it runs the lifespan's end: they must end first. WebSockets it
-    closes: they must have their answers first. A terminal that closes ends it in the same order, unless
-    nohup started it. What stands still, in a library or on a disk, does not keep the process.
-    """
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    previous = {n: signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
-    if previous[signal.SIGHUP] is not signal.SIG_DFL:
-        del previous[signal.SIGHUP]
-    ends: list[Future[None]] = []
-
-    def on_signal(number: int, frame: FrameType | None) -> None:
-        if number == signal.SIGHUP:
-            signal.raise_signal(signal.SIGTERM)
-            return
-        then = previous[signal.Signals(number)]
-        pass_on = partial(then, number, frame) if callable(then) else lambda: None
-        if ends:
-            pass_on()
-            return
-        faulthandler.dump_traceback_later(ENDED_WITHIN_S, exit=True)  # it needs no thread of Python's
-        ends.append(asyncio.run_coroutine_threadsafe(_first(end, pass_on), loop))
-
-    for number in previous:
-        signal.signal(number, on_signal)
-    try:
-        yield
-    finally:
-        for number, handler in previous.items():
-            signal.signal(number, handler)
-
-
-async def _first(does: Callable[[], Awaitable[None]], then: Callable[[], object]) -> None:
-    try:
-        await does()
-    finally:
-        then()
 
 
 def _app_or_exit() -> FastAPI:

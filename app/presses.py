@@ -87,6 +87,11 @@ class Presses:
         self.too_soon = self._unjudged.too_soon
         self._waits = Waits()
         self.give_up = self._waits.give_up
+        self._closed = False
+
+    def close(self) -> None:
+        """Nothing more is sent; a goal can be canceled until the end."""
+        self._closed = True
 
     async def press(self, widget_id: str, inputs: Mapping[str, Any], press_id: str, by: By) -> Receipt:
         """Sends what the widget is for, or refuses. The same id again is the same press.
@@ -249,7 +254,7 @@ class Presses:
         verdict = judged(widget, by, self._panel, self._robot, self._monotonic())
         if not verdict.permitted:
             return verdict, verdict.reason or "", cause_of(verdict)
-        return verdict, by.doubt(), "interlock"
+        return verdict, say("press_by_stopping") if self._closed else by.doubt(), "interlock"
 
 
 @contextmanager

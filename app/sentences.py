@@ -199,6 +199,7 @@ ENGLISH: Final[Mapping[str, str]] = {
     "log_abandoned": "Not sent: the entry was written too late.",
     "log_not_on_disk": "{said} (Not safely in the operator's log: {why}.)",
     "log_ended": "the panel's server ended before it knew",
+    "press_by_stopping": "the panel's server stops or takes a new panel. Press again.",
     "server_ends": "The panel's server ends: it is not known what came of this.",
     "log_broke_off": "A fault of the panel's server: it is not known whether this was sent.",
     "log_began": "The panel's server started.",

@@ -18,7 +18,8 @@ class Waits:
         """Ends all of them, and each later one where it first waits."""
         self._given_up = True
         for limit in self._limits:
-            limit.reschedule(asyncio.get_running_loop().time())
+            if not limit.expired():
+                limit.reschedule(asyncio.get_running_loop().time())
 
     @asynccontextmanager
     async def one(self) -> AsyncIterator[None]:

@@ -50,7 +50,7 @@ CYCLONE_ON_LOOPBACK = (
 )
 
 
-STOOD = "Timeout (0:00:17)!"  # a server stood still as it ended, and left
+STOOD = "Timeout (0:00:20)!"  # a server stood still as it ended, and left
 
 
 def until(what: Callable[[], Any], why: str, within_s: float = 10.0, every_s: float = 0.01) -> Any:
@@ -116,7 +116,7 @@ class Process:
     def kill(self) -> None:
         self.end(signal.SIGKILL)
 
-    def end(self, number: signal.Signals = signal.SIGTERM, timeout_s: float = 20) -> int:
+    def end(self, number: signal.Signals = signal.SIGTERM, timeout_s: float = 25) -> int:
         """Ends it and waits; it is killed if it does not end in time."""
         if self.running:
             self.send(number)
@@ -327,7 +327,7 @@ class Server:
         with self.http.stream("GET", f"{self.base}/events", timeout=5) as response:
             yield Stream(response)
 
-    def end(self, number: signal.Signals = signal.SIGTERM, timeout_s: float = 20) -> int:
+    def end(self, number: signal.Signals = signal.SIGTERM, timeout_s: float = 25) -> int:
         self.http.close()
         try:
             return self.process.end(number, timeout_s)

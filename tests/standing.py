@@ -2,7 +2,7 @@
 
 import time
 
-from app import kiosk, main
+from app import ending, kiosk, main
 from app.link import Link
 
 
@@ -12,5 +12,5 @@ class Standing(Link):
 
 
 vars(kiosk)["Link"] = Standing
-vars(main)["ENDED_WITHIN_S"] = 1.0
+vars(ending)["ENDED_WITHIN_S"] = 1.0
 app = main.app

@@ -21,6 +21,7 @@ ORDER = (
     "app.logs",
     "app.tasks",
     "app.waits",
+    "app.ending",
     "app.heap",
     "app.moments",
     "app.systemd",

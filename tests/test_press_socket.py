@@ -13,7 +13,7 @@ import pytest
 from playwright.sync_api import Page, Request, WebSocket, WebSocketRoute, expect
 
 from app.routes.press_socket import MOST_AT_ONCE
-from tests.parts import ROOT, Server, as_response, until, zenoh_file
+from tests.parts import ROOT, PressSocket, Server, as_response, until, zenoh_file
 from tests.test_nothing_grows import MUTE, Robot, widget
 
 WAITS_S: Final = 1.5
@@ -102,9 +102,21 @@ def test_a_server_that_ends_tells_what_came_of_a_press_that_is_under_way(tmp_pat
         assert (said["press"], said["outcome"], said["status"]) == ("late", "timed_out", 504)
 
 
+def stopping(socket: PressSocket) -> bool:
+    """Whether a press is refused because the server stops."""
+    socket.say(press("free", f"free.{time.monotonic_ns()}"))
+    said = socket.hear()
+    return said["status"] == 409 and "the panel's server stops" in said["reason"]
+
+
 @pytest.mark.parametrize("way", ["socket", "post"])
 def test_a_server_that_ends_waits_for_no_robot_for_long(tmp_path: Path, way: str) -> None:
-    with slow(tmp_path, waits_s=60) as mine, mine.socket() as socket, ThreadPoolExecutor() as pool:
+    with (
+        slow(tmp_path, waits_s=60) as mine,
+        mine.socket() as socket,
+        mine.socket() as other,
+        ThreadPoolExecutor() as pool,
+    ):
         began = time.monotonic()
         if way == "socket":
             socket.say(press(MUTE[0], "long"))
@@ -114,6 +126,7 @@ def test_a_server_that_ends_waits_for_no_robot_for_long(tmp_path: Path, way: str
             answered = pool.submit(lambda: mine.http.post(f"/widgets/{MUTE[0]}", json=body).json())
         until(lambda: mine.widget(MUTE[0])["busy"], "it is under way")
         mine.process.send(signal.SIGTERM)
+        until(lambda: stopping(other), "nothing more is sent", every_s=0.05)
         said = answered.result(10)
         assert (said["id"], said["outcome"]) == ("long", "unknown")
         assert said["reason"] == "The panel's server ends: it is not known what came of this."

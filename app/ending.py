@@ -1,0 +1,83 @@
+"""The end of the process, in its order."""
+
+import asyncio
+import faulthandler
+import logging
+import signal
+import threading
+from collections.abc import Awaitable, Callable, Iterator, Mapping
+from contextlib import contextmanager
+from types import FrameType
+from typing import Any, Final
+
+log = logging.getLogger("kiosk")
+
+End = Callable[[], Awaitable[None]]
+
+# Else something stands still: where is told, and the process leaves it. More than an end waits for (the
+# robot 2 s, readers 1 s, a disk 3 s, a session 3 s, the operator's log 10 s), and less than the unit's
+# TimeoutStopSec.
+ENDED_WITHIN_S: Final = 20.0
+
+
+@contextmanager
+def in_order(loop: asyncio.AbstractEventLoop, end: End) -> Iterator[None]:
+    """Awaits `end` as soon as the process is told to end, and then tells whoever listened for that.
+
+    uvicorn waits for open streams before it runs the lifespan's end: they must end first. WebSockets it
+    closes: they must have their answers first. A terminal that closes ends it in the same order, unless
+    nohup started it. What stands still, in a library or on a disk, does not keep the process.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    listened = {n: signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    if listened[signal.SIGHUP] is not signal.SIG_DFL:
+        del listened[signal.SIGHUP]
+    hear = _Ending(loop, end, listened).hear
+    for number in listened:
+        signal.signal(number, hear)
+    try:
+        yield
+    finally:
+        for number, listener in listened.items():
+            signal.signal(number, listener)
+
+
+class _Ending:
+    """From the first signal to those who listened for it."""
+
+    def __init__(
+        self, loop: asyncio.AbstractEventLoop, end: End, listened: Mapping[signal.Signals, Any]
+    ) -> None:
+        self._loop = loop
+        self._end = end
+        self._listened = listened
+        self._begun = self._passed_on = False
+
+    def hear(self, number: int, frame: FrameType | None) -> None:
+        """A second SIGINT waits for nothing more. A SIGTERM after a SIGINT is of uvicorn's reloader: it
+        changes nothing."""
+        if number == signal.SIGHUP:
+            signal.raise_signal(signal.SIGTERM)
+        elif not self._begun:
+            self._begun = True
+            faulthandler.dump_traceback_later(ENDED_WITHIN_S, exit=True)  # no thread of Python's
+            asyncio.run_coroutine_threadsafe(self._first(number, frame), self._loop)
+        elif self._passed_on or number == signal.SIGINT:
+            self._pass_on(number, frame)
+
+    async def _first(self, number: int, frame: FrameType | None) -> None:
+        try:
+            await self._end()
+        except Exception:
+            log.exception("the end is not in order")
+        finally:
+            if not self._passed_on:
+                self._pass_on(number, frame)
+
+    def _pass_on(self, number: int, frame: FrameType | None) -> None:
+        self._passed_on = True
+        listener = self._listened[signal.Signals(number)]
+        if callable(listener):
+            listener(number, frame)
