@@ -264,7 +264,8 @@ def test_what_the_robot_forbids_while_the_server_stands_still_counts_behind_all_
         assert press.result().json()["outcome"] == "refused"
     until(kiosk.ready, "ready again", within_s=15)
     time.sleep(0.5)
-    assert not permitted(kiosk)
+    # What the bridge had no room for, DDS sends again: 1.7 s were seen on a machine that did much else.
+    until(lambda: not permitted(kiosk), "nothing of it is lost")
     assert own_node.heard("/operation1") == []
     until(says_so, "permitted anew", within_s=15, every_s=0.2)
 
