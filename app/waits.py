@@ -15,11 +15,10 @@ class Waits:
         self._given_up = False
 
     def give_up(self) -> None:
-        """Ends all of them, and each later one where it first waits."""
+        """Ends all of them, and each later one where it first waits; once."""
         self._given_up = True
         for limit in self._limits:
-            if not limit.expired():
-                limit.reschedule(asyncio.get_running_loop().time())
+            limit.reschedule(asyncio.get_running_loop().time())
 
     @asynccontextmanager
     async def one(self) -> AsyncIterator[None]:

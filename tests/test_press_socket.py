@@ -15,8 +15,10 @@ from playwright.sync_api import Page, Request, WebSocket, WebSocketRoute, expect
 from app.routes.press_socket import MOST_AT_ONCE
 from tests.parts import ROOT, PressSocket, Server, as_response, until, zenoh_file
 from tests.test_nothing_grows import MUTE, Robot, widget
+from tests.test_server import reads_nothing
 
 WAITS_S: Final = 1.5
+LATER_S: Final = 1.2  # than a server that is told to end gives who reads nothing
 FREE: Final = """
     [[page.widget]]
     id = "free"
@@ -133,6 +135,18 @@ def test_a_server_that_ends_waits_for_no_robot_for_long(tmp_path: Path, way: str
         assert mine.process.wait(10) == -signal.SIGTERM  # which uvicorn raises again
         assert time.monotonic() - began < 10
     assert said["reason"] in logged(mine, "long")
+
+
+def test_who_comes_while_it_ends_and_reads_nothing_holds_it_up_no_longer(tmp_path: Path) -> None:
+    with slow(tmp_path, waits_s=60) as mine, mine.socket() as socket, mine.socket() as other:
+        socket.say(press(MUTE[0], "long"))
+        until(lambda: mine.widget(MUTE[0])["busy"], "it is under way")
+        mine.process.send(signal.SIGTERM)
+        until(lambda: stopping(other), "nothing more is sent", every_s=0.05)
+        time.sleep(LATER_S)
+        with reads_nothing(mine):
+            assert socket.hear()["outcome"] == "unknown"
+            mine.process.wait(10)
 
 
 def test_what_is_no_press_is_told_so(kiosk: Server) -> None:

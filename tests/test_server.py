@@ -10,7 +10,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from urllib.parse import urlencode
 
@@ -318,14 +318,21 @@ def test_it_leaves_what_stands_still_at_its_end_and_tells_where() -> None:
     assert "tests/standing.py" in mine.process.text
 
 
-def test_it_ends_though_somebody_reads_nothing_of_what_they_asked_for() -> None:
-    mine = Server(ROOT)
-    sheet = re.search(r'href="(/static/[^"]+\.css)"', mine.http.get("/").text)
+@contextmanager
+def reads_nothing(server: Server) -> Iterator[None]:
+    """A client that asks for much and takes none of it."""
+    sheet = re.search(r'href="(/static/[^"]+\.css)"', server.http.get("/").text)
     assert sheet
     with socket.socket() as deaf:
         deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-        deaf.connect(("127.0.0.1", mine.port))
+        deaf.connect(("127.0.0.1", server.port))
         deaf.sendall(f"GET {sheet[1]} HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n".encode() * 100)
+        yield
+
+
+def test_it_ends_though_somebody_reads_nothing_of_what_they_asked_for() -> None:
+    mine = Server(ROOT)
+    with reads_nothing(mine):
         until(mine.answers, "it has begun to answer")
         mine.end(signal.SIGTERM)
 

@@ -3,7 +3,7 @@
 import math
 import re
 import secrets
-from collections.abc import Mapping
+from collections.abc import Awaitable, Mapping
 from typing import Annotated, Final
 from urllib.parse import parse_qsl, quote
 
@@ -124,9 +124,7 @@ async def cancel(widget: str, request: Request, site: CurrentSite, kiosk: Curren
         of = _form(body).get("_press", "")
     elif kind == "application/json" and body:
         of = as_model(Cancel, json_of(body)).press
-    with site.owed.one():
-        receipt = await kiosk.presses.cancel(widget, origin_of(browser), of)
-    _count(site, receipt)
+    receipt = await _told(site, kiosk.presses.cancel(widget, origin_of(browser), of))
     if form:
         return RedirectResponse(_page_after(kiosk, widget, receipt.id), status_code=303)
     return JSONResponse(receipt.as_json(), status_code=STATUS[receipt.cause])
@@ -137,10 +135,8 @@ async def pressed(site: Site, kiosk: Kiosk, browser: Browser, widget: str, given
     at = given.at.timestamp() if given.at else None
     kiosk.presses.widget(widget)
     by = kiosk.doubts.by(widget, browser, given.seen or "", at)
-    with site.owed.one():
-        receipt = await kiosk.presses.press(widget, given.inputs, given.id or secrets.token_hex(8), by)
-    _count(site, receipt)
-    return receipt
+    press_id = given.id or secrets.token_hex(8)
+    return await _told(site, kiosk.presses.press(widget, given.inputs, press_id, by))
 
 
 async def _pressed_by_form(
@@ -159,11 +155,10 @@ async def _pressed_by_form(
     by = kiosk.doubts.by(widget, browser, inputs.pop("_seen", ""), _until(inputs))
     typed = kiosk.sending.typed(inputs)
     if too_soon:
-        receipt = await kiosk.presses.too_soon(widget, typed, press_id, before, by.origin)
+        work = kiosk.presses.too_soon(widget, typed, press_id, before, by.origin)
     else:
-        with site.owed.one():
-            receipt = await kiosk.presses.press(widget, typed, press_id, by)
-    _count(site, receipt)
+        work = kiosk.presses.press(widget, typed, press_id, by)
+    receipt = await _told(site, work)
     return RedirectResponse(_page_after(kiosk, widget, receipt.id), status_code=303)
 
 
@@ -229,8 +224,12 @@ def _moment(inputs: dict[str, str], name: str) -> float | None:
     return moment
 
 
-def _count(site: Site, receipt: Receipt) -> None:
+async def _told(site: Site, coming: Awaitable[Receipt]) -> Receipt:
+    """What comes of it, counted; the server's end waits for that."""
+    with site.owed.one():
+        receipt = await coming
     site.metrics.pressed(receipt.outcome)
+    return receipt
 
 
 def _form(body: bytes) -> dict[str, str]:
