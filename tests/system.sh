@@ -12,8 +12,8 @@ need() { # need PACKAGE COMMAND…: the package, unless the command succeeds
     "$@" >/dev/null 2>&1 || missing="$missing $package"
 }
 
-has_libclang() {
-    ls /usr/lib/llvm-*/lib/libclang*.so* /usr/lib/*/libclang*.so* /usr/lib*/libclang*.so* 2>/dev/null | grep -q .
+has_libclang() { # libclang-cpp is another library
+    ls -d /usr/lib/llvm-*/lib/* /usr/lib/*/* /usr/lib*/* 2>/dev/null | grep -Eq '/libclang(-[0-9.]+)?\.so'
 }
 
 has_faketime() {

@@ -2,7 +2,7 @@
 
 import math
 import random
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import pytest
@@ -287,11 +287,72 @@ def test_a_type_like_none_is_refused_without_a_guess() -> None:
         b"\0\3\0\0\1",  # a parameter list
         b"\0\1\0\0\1and more",
         b"\0\1\0\0\6\0\0\0hello\0",
+        b"\0\1\0\0\2",
+        b"\0\1\0\0\x80",
+        b"\0\1\0\0\xff",
+        b"\0\1\0\0\1\0",  # longer than a bool, and not padded to four bytes
+        b"\0\1\0\0\1\0\0",
+        b"\0\1\0\0\1\0\0\0\0",
     ],
 )
 def test_bytes_that_are_not_a_bool_never_permit(data: bytes) -> None:
     with pytest.raises(DecodeError, match=f"{len(data)} bytes are not a std_msgs/msg/Bool"):
         INTERFACES.decode(BOOL, data)
+
+
+def test_a_message_may_be_padded_to_four_bytes_and_no_further() -> None:
+    assert INTERFACES.decode(BOOL, b"\0\1\0\0\1\0\0\0").data is True
+    text = b"\0\1\0\0\2\0\0\0a\0"
+    assert INTERFACES.decode(TEXT, text + b"\0\0").data == "a"
+    for much in (1, 3, 4):
+        with pytest.raises(DecodeError, match="it ends at 10"):
+            INTERFACES.decode(TEXT, text + bytes(much))
+
+
+def test_random_bodies_are_hardly_ever_a_bool() -> None:
+    chance = random.Random(1)
+    bodies = [chance.randbytes(chance.randrange(1, 65)) for _ in range(20_000)]
+    read = [body for body in bodies if readable(BOOL, body)]
+    assert all(len(body) in (1, 4) and body[0] in (0, 1) for body in read)
+    assert len(read) < 20
+
+
+def readable(type_name: str, body: bytes) -> bool:
+    try:
+        INTERFACES.decode(type_name, b"\0\1\0\0" + body)
+    except DecodeError:
+        return False
+    return True
+
+
+@pytest.mark.parametrize("byte", [0, 1, 2, 128, 255])
+def test_a_bool_among_other_bytes_is_0_or_1(byte: int) -> None:
+    type_name = "rcl_interfaces/msg/ParameterValue"
+    fields = {
+        "type": 1,
+        "bool_value": True,
+        "integer_value": 0,
+        "double_value": 0.0,
+        "string_value": "",
+        "byte_array_value": [],
+        "bool_array_value": [True, False],
+        "integer_array_value": [],
+        "double_array_value": [],
+        "string_array_value": [],
+    }
+    whole = INTERFACES.encode(type_name, fields)
+    listed = whole.index(b"\2\0\0\0\1\0") + 4
+    readers: dict[int, Callable[[Any], Any]] = {
+        5: lambda message: message.bool_value,
+        listed: lambda message: message.bool_array_value[0],
+    }
+    for place, read in readers.items():
+        changed = whole[:place] + bytes([byte]) + whole[place + 1 :]
+        if byte > 1:
+            with pytest.raises(DecodeError, match=f"a bool is {byte}, not 0 or 1"):
+                INTERFACES.decode(type_name, changed)
+        else:
+            assert read(INTERFACES.decode(type_name, changed)) is bool(byte)
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from app.interfaces.formats import HEADER
 
 LITTLE_ENDIAN: Final = b"\0\1\0\0"
 ORDERS: Final[Mapping[bytes, Order]] = {b"\0\0": ">", b"\0\1": "<"}  # the last two bytes are options
-MOST_PADDING: Final = 3  # bytes behind a message
+ALIGNMENT: Final = 4  # bytes: a message may be padded to a multiple of it (RTPS 2.5, 9.4.2.12)
 
 
 class Codec:
@@ -35,7 +35,7 @@ class Codec:
             raise ValueError("it does not begin as plain CDR does")
         body = memoryview(data)[HEADER:]
         message, end = self._reader(order, name)(body, 0)
-        if len(body) - end > MOST_PADDING:
+        if len(body) not in (end, end + -end % ALIGNMENT):
             raise ValueError(f"it ends at {HEADER + end}")
         return message
 

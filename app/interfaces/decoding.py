@@ -20,6 +20,9 @@ Step = Callable[["memoryview[int]", int, list[Any]], int]  # the same; the value
 NATIVE: Final[Order] = "<" if sys.byteorder == "little" else ">"
 LAST_UNIT: Final = 0xFFFF  # of UTF-16
 SHORTEST_TEXT: Final = LENGTH + 1
+BOOLS: Final = b"\0\1"
+# `struct` takes any byte for a bool: as a number it can be checked.
+_FORMATS_READ: Final = {**FORMATS, "bool": "B"}
 
 
 def message_reader(
@@ -53,14 +56,29 @@ def _step(run: Sequence[Field], order: Order, nested: Callable[[str], Read]) -> 
 
 def _numbers(kinds: Sequence[Type], order: Order) -> Step:
     size = SIZES[kinds[0].name]
-    form = Struct(order + "".join(FORMATS[kind.name] for kind in kinds))
+    form = Struct(order + "".join(_FORMATS_READ[kind.name] for kind in kinds))
+    bools = [index for index, kind in enumerate(kinds) if kind.name == "bool"]
 
     def numbers(data: "memoryview[int]", at: int, values: list[Any]) -> int:
         at = _aligned(at, size)
         values += form.unpack_from(data, at)
         return at + form.size
 
-    return numbers
+    def numbers_and_bools(data: "memoryview[int]", at: int, values: list[Any]) -> int:
+        first = len(values)
+        end = numbers(data, at, values)
+        for index in bools:
+            values[first + index] = _bool(values[first + index])
+        return end
+
+    return numbers_and_bools if bools else numbers
+
+
+def _bool(byte: int) -> bool:
+    """CDR has 0 and 1 only: whoever sends something else may mean anything."""
+    if byte > 1:
+        raise ValueError(f"a bool is {byte}, not 0 or 1")
+    return byte == 1
 
 
 def _field(kind: Type, order: Order, nested: Callable[[str], Read]) -> Read:
@@ -104,7 +122,9 @@ def _many_numbers(kind: Type, order: Order) -> Read:
 def _viewed(data: "memoryview[int]", form: Any, order: Order) -> Any:
     """A list of numbers as `struct` names their format."""
     if form == "?":
-        return [byte != 0 for byte in data]
+        for byte in bytes(data).translate(None, BOOLS)[:1]:
+            _bool(byte)
+        return data.cast(form)
     if order == NATIVE:
         return data.cast(form)
     turned = array(form, data.tobytes())
