@@ -5,12 +5,24 @@ Kept by topic key, so that asking costs the same however large the robot's graph
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from itertools import chain
 from typing import Any, TypeVar, TypeVarTuple
 
-from app.keys import DEMO_VERSION, Direction, Endpoint, Qos, Role, ServerRole, TopicRole, parsed, within
+from app.keys import (
+    DEMO_VERSION,
+    Direction,
+    Endpoint,
+    Qos,
+    Role,
+    ServerRole,
+    TopicRole,
+    in_token,
+    name_in,
+    parsed,
+    within,
+)
 
 # Whose type must equal the panel's, for what the panel does with a topic. A route of the bridge
 # has one type for all: who created it first has fixed it, be it the robot or another panel.
@@ -55,9 +67,16 @@ class Graph:
     """The ROS graph behind all bridges; changed by `apply`, `learn` and `answered` only, on the
     event loop."""
 
-    def __init__(self, own_zid: str = "", namespace: str | None = None) -> None:
-        """`namespace` tells this robot's bridges from those of others; None: all are its."""
+    def __init__(
+        self,
+        own_zid: str = "",
+        namespace: str | None = None,
+        keys: Collection[str] | None = None,
+    ) -> None:
+        """`namespace` tells this robot's bridges from those of others; None: all are its. Of tokens for
+        other key expressions than `keys` nothing is kept; None: all are."""
         self.own_zid = own_zid  # whose tokens are not the robot's
+        self._names = None if keys is None else frozenset(map(in_token, keys))
         self.known: dict[Any, Any] = {}  # see `remembered`
         self._namespace = namespace
         self._bridges: set[str] = set()
@@ -68,10 +87,23 @@ class Graph:
         self._nodes: defaultdict[str, list[Endpoint]] = defaultdict(list)
         self._answered: Mapping[str, str] | None = None
 
+    def concerns(self, token_key: str) -> bool:
+        """Whether a token is a bridge's own, or about one of the key expressions that count."""
+        if self._names is None:
+            return True
+        name = name_in(token_key)
+        return not name or name in self._names
+
+    def has(self, token_key: str) -> bool:
+        """Whether a token is there by all that was taken."""
+        return (endpoint := parsed(token_key)) is not None and token_key in self._tokens.get(
+            endpoint.key, {}
+        )
+
     def apply(self, token_key: str, alive: bool, now: float = -math.inf) -> str | None:
         """Takes one token's appearance (`now`, monotonic seconds) or end; returns the zid of a
         bridge that came or went."""
-        endpoint = parsed(token_key)
+        endpoint = parsed(token_key) if self.concerns(token_key) else None
         if endpoint is None or endpoint.zid == self.own_zid:
             return None
         self.known.clear()

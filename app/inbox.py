@@ -25,27 +25,35 @@ NO_KEYS: Final[frozenset[str]] = frozenset()
 class Stamp(Protocol):
     """When a sample was sent, by the clock of who sent it."""
 
-    def __ge__(self, other: Any, /) -> bool: ...
     def get_id(self) -> Any: ...
     def get_time(self) -> Any: ...
 
 
 @dataclass(slots=True)
 class Token:
-    """What became of a liveliness token since the last drain; `lost_seq` is 0 if it was never lost."""
+    """What became of a liveliness token since the last drain.
 
-    alive: bool
-    lost_seq: int
+    `lost_seq` and `came_seq` order its last loss and its last appearance among the samples, 0 where
+    there was none; `came_at` (monotonic seconds) is when it appeared, `lost_before` the loss before.
+    """
+
+    alive: bool = False
+    lost_seq: int = 0
+    came_seq: int = 0
+    came_at: float = 0.0
+    lost_before: int = 0
 
 
 @dataclass(slots=True)
 class Changes:
-    """All that came since the last drain; `kept` has each sample of the topics that are kept whole."""
+    """All that came since the last drain; `kept` has each sample of the topics that are kept whole,
+    `caches` the tokens of publishers that keep their last message for late subscribers."""
 
     samples: dict[str, Sample]
     tokens: dict[str, Token]
     link_up: bool
     kept: Collection[tuple[str, Sample]] = ()
+    caches: Collection[str] = ()
 
 
 class _Between:
@@ -105,8 +113,9 @@ class Inbox:
     def _forget(self) -> None:
         self._woken = self._hurried = False
         self._samples: dict[str, _Arrived] = {}
-        self._stamps: dict[str, Stamp] = {}
+        self._live: dict[str, Stamp | None] = {}  # the last stamp of what did not come from a cache
         self._tokens: dict[str, Token] = {}
+        self._caches: list[str] = []
         self._transports: set[str] = set()
         self._kept: deque[tuple[str, _Arrived]] = deque()
         self._kept_bytes = 0
@@ -145,6 +154,7 @@ class Inbox:
             self._woken = self._hurried = False
             samples, self._samples = self._samples, {}
             tokens, self._tokens = self._tokens, {}
+            caches, self._caches = self._caches, []
             kept, self._kept, self._kept_bytes = self._kept, deque(), 0
             link_up = bool(self._transports)
         return Changes(
@@ -152,17 +162,30 @@ class Inbox:
             tokens,
             link_up,
             [(key, arrived.sample(kept=True)) for key, arrived in kept] if kept else (),
+            caches,
         )
+
+    @property
+    def hurried(self) -> bool:
+        """Whether something came since the last drain that is not to wait for the next frame."""
+        return self._hurried
 
     # Below: on the link's threads, under the lock. No work here, and nothing may raise.
 
     def put(self, key: str, payload: Buffer, stamp: Stamp | None) -> None:
-        """A sample of a topic, unless it is history that came after what is newer."""
-        if stamp is not None:
-            last = self._stamps.get(key)
-            if last is not None and not stamp >= last and last.get_id() == stamp.get_id():
+        """A sample of a topic, as it is published. Its stamp does not order it: clocks may be wrong."""
+        self._live[key] = stamp
+        self._add(key, payload, stamp)
+
+    def put_cached(self, key: str, payload: Buffer, stamp: Stamp | None) -> None:
+        """A sample that was published before, unless its source has published since."""
+        if key in self._live:
+            last = self._live[key]
+            if last is None or stamp is None or last.get_id() == stamp.get_id():
                 return
-            self._stamps[key] = stamp
+        self._add(key, payload, stamp)
+
+    def _add(self, key: str, payload: Buffer, stamp: Stamp | None) -> None:
         arrived = _Arrived(payload, stamp, next(self._seq), time.monotonic(), time.time())
         unseen = self._samples.get(key)
         if unseen is not None:
@@ -184,10 +207,17 @@ class Inbox:
     def token(self, key: str, alive: bool) -> None:
         """A liveliness token came or ended."""
         seq = next(self._seq)
-        token = self._tokens.setdefault(key, Token(False, 0))
+        token = self._tokens.setdefault(key, Token())
         token.alive = alive
-        if not alive:
+        if alive:
+            token.came_seq, token.came_at, token.lost_before = seq, time.monotonic(), token.lost_seq
+        else:
             token.lost_seq = seq
+        self._wake(True)
+
+    def cache(self, key: str) -> None:
+        """The token of a publisher's cache came."""
+        self._caches.append(key)
         self._wake(True)
 
     def transport(self, zid: str, up: bool) -> None:

@@ -136,18 +136,33 @@ class Intake:
         """Takes them in; whether there is a bridge where there was none."""
         if not tokens:
             return False
-        came, now, graph = False, time.monotonic(), self._robot.graph
-        had_bridge = bool(graph.bridges)
+        came, now, robot = False, time.monotonic(), self._robot
+        had_bridge = bool(robot.graph.bridges)
         for key, token in tokens.items():
+            if not robot.graph.concerns(key):
+                continue
+            self._publisher(key, token)
             if token.lost_seq:
                 self._parameters.lose(key)
-            if token.lost_seq and (zid := graph.apply(key, False)):
-                self._robot.cut(zid, token.lost_seq)
+            if token.lost_seq and (zid := robot.graph.apply(key, False)):
+                robot.cut(zid, token.lost_seq)
                 self._log.warning("bridge %s lost", zid)
-                had_bridge = had_bridge and bool(graph.bridges)
+                had_bridge = had_bridge and bool(robot.graph.bridges)
             if token.lost_seq and token.alive:
-                self._robot.follow_publishers(token.lost_seq)  # gone, be it for a moment
-            if token.alive and (zid := graph.apply(key, True, now)):
+                robot.follow_publishers(token.lost_seq)  # gone, be it for a moment
+            if token.alive and (zid := robot.graph.apply(key, True, now)):
                 self._log.info("bridge %s found", zid)
                 came = True
         return came and not had_bridge
+
+    def _publisher(self, key: str, token: Token) -> None:
+        """Whether a publisher has appeared, be it for a moment: until it says something, nobody knows
+        what it permits."""
+        graph, silent = self._robot.graph, self._robot.silent
+        endpoint = keys.parsed(key)
+        if endpoint is None or endpoint.zid == graph.own_zid:
+            return
+        if token.came_seq and (token.lost_before or not graph.has(key)):  # else it is told twice
+            silent.appeared(endpoint, token.came_seq, token.came_at, token.lost_before)
+        if token.lost_seq:
+            silent.lost(endpoint, token.lost_seq)

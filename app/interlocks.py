@@ -74,6 +74,8 @@ def interlock_verdict(interlock: Interlock, robot: Robot, now: float) -> Verdict
     reading = robot.reading(topic)
     if reading.status != "message":
         return locked(reading.status, topic=topic, wanted=interlock.type)
+    if robot.silent.any(key, robot.graph.bridges):
+        return locked("new_publisher", topic=topic)
     if value_of(reading.message, interlock.field) is not True:
         return locked("forbidden", name=interlock.name)
     if interlock.max_age_s is None:

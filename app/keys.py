@@ -29,6 +29,7 @@ SERVICE_TYPE: Final = re.compile(r"[a-z][a-z0-9_]*/srv/[A-Z][A-Za-z0-9]*")
 ACTION_TYPE: Final = re.compile(r"[a-z][a-z0-9_]*/action/[A-Z][A-Za-z0-9]*")
 MESSAGE_TYPE: Final = re.compile(r"[a-z][a-z0-9_]*/msg/[A-Z][A-Za-z0-9]*")
 
+_CACHES: Final = "/@adv/pub/"
 _TOKEN = re.compile(
     r"@/(?P<zid>[^/]+)/@ros2_lv"
     r"(?:/(?P<role>MP|MS)/(?P<key>[^/]+)/(?P<type>[^/]+)/"
@@ -47,6 +48,7 @@ class Qos:
     depth: int = 10
 
 
+ROSOUT_TOPIC: Final = "/rosout"
 ROSOUT: Final = Qos(transient_local=True, depth=1000)  # rmw_qos_profile_rosout_default
 
 
@@ -103,9 +105,37 @@ def status(action_key: str) -> str:
     return f"{action_key}/_action/status"
 
 
+def caches(key: str) -> str:
+    """The tokens of the caches that publishers of a topic have for subscribers that come late: of
+    those that are TRANSIENT_LOCAL. Each answers to a query of its own name (source: zenoh-ext 1.10)."""
+    return f"{key}{_CACHES}**"
+
+
+def topic_of_cache(token_key: str) -> str:
+    """The key of the topic that a cache is of."""
+    return token_key.partition(_CACHES)[0]
+
+
+def newest(token_key: str) -> str:
+    """The query for the last message of a cache."""
+    return f"{token_key}?_max=1"
+
+
 def bridge_token(zid: str) -> str:
     """The token by which a bridge says that it is there."""
     return f"@/{zid}/@ros2_lv"
+
+
+def name_in(token_key: str) -> str:
+    """The name that a token is about, as `in_token` writes it; "" for a bridge's own token. There may
+    be ten thousand tokens: this is what it costs to pass one over."""
+    parts = token_key.split("/", 5)
+    return parts[4] if len(parts) > 4 else ""
+
+
+def in_token(key: str) -> str:
+    """How a token writes a key expression."""
+    return _escaped(key)
 
 
 def parsed(token_key: str) -> Endpoint | None:

@@ -21,6 +21,7 @@ from app.intake import Intake
 from app.interfaces import interfaces_of
 from app.interlocks import Verdict, locked, way
 from app.joining import Joining
+from app.keys import ROSOUT_TOPIC
 from app.link import Config, Link
 from app.logbook import Log, Logbook
 from app.logs import RobotLog
@@ -30,7 +31,7 @@ from app.presses import Presses
 from app.pulse import Pulse
 from app.resuming import Resuming
 from app.robot import Robot
-from app.rosout import TOPIC, Rosout
+from app.rosout import Rosout
 from app.sending import Sending
 from app.showing import Alone, Others, Showing
 
@@ -154,7 +155,7 @@ class Kiosk:
         self.interfaces.prepare(
             {*self.panel.subscriptions().values(), *self.panel.publications().values()}
         )
-        publish = [self.robot.key(topic) for topic in (*self.panel.publications(), TOPIC)]
+        publish = [self.robot.key(topic) for topic in (*self.panel.publications(), ROSOUT_TOPIC)]
         listened = self._intake
         self.link.start(
             listened.keys,

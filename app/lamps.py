@@ -23,6 +23,7 @@ NODE: Final = GONE | {
     "cut",
     "stale",
     "unreadable",
+    "new_publisher",
     "wrong_type",
     "publishes_best_effort",
     "publishes_volatile",

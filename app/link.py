@@ -13,17 +13,17 @@ from pathlib import Path
 from typing import Any, Final
 
 import zenoh
-from zenoh.ext import HistoryConfig, declare_advanced_subscriber
 from zenoh.handlers import Callback
 
+from app import keys
 from app.attached import attach
 from app.errors import LinkError, SettingsError
 from app.inbox import NO_KEYS, Changes, Inbox
-from app.keys import TOKENS
 
 Config = zenoh.Config
 
 ASK_TIMEOUT_S = 2.0
+CACHE_TIMEOUT_S = 10.0
 MOST_QUEUED = 16  # batches; Zenoh takes no more
 COPIED_MOST = 16_384  # bytes of a sample
 IN_ITS_SOURCE: Final = re.compile(r" at \S+\.rs:\d+\.?")  # where in Zenoh an error was made
@@ -162,11 +162,13 @@ class Link:
                     self._direct(self._on_transport), history=True
                 ),
                 self._session.liveliness().declare_subscriber(
-                    TOKENS, self._direct(self._on_token), history=True
+                    keys.TOKENS, self._direct(self._on_token), history=True
                 ),
             )
             self._publishers = {key: self._publisher(key) for key in self._publish}
-            self._subscribers = [self._subscriber(key) for key in self._subscribe]
+            self._subscribers = [
+                declared for key in self._subscribe for declared in self._subscriptions(key)
+            ]
 
     def _publisher(self, key: str) -> zenoh.Publisher:
         return self._session.declare_publisher(
@@ -177,14 +179,35 @@ class Link:
             allowed_destination=zenoh.Locality.REMOTE,
         )
 
-    def _subscriber(self, key: str) -> Any:
+    def _subscriptions(self, key: str) -> Iterator[zenoh.Subscriber[None]]:
+        """What is published from now on, and the caches of what was published before. Zenoh's own
+        subscriber with history drops what has an older stamp than what it had last: after a stamp of a
+        clock that is ahead it would be deaf."""
         put = self._inbox.put
-        return declare_advanced_subscriber(
-            self._session,
-            key,
-            self._direct(lambda sample: put(key, _own(sample.payload), sample.timestamp)),
-            history=HistoryConfig(detect_late_publishers=True, max_samples=1),
+        yield self._session.declare_subscriber(
+            key, self._direct(lambda sample: put(key, _own(sample.payload), sample.timestamp))
         )
+        yield self._session.liveliness().declare_subscriber(
+            keys.caches(key), self._direct(self._on_cache), history=True
+        )
+
+    def _ask_cache(self, token_key: str) -> None:
+        """Puts the last message of a cache into the inbox."""
+        key, put = keys.topic_of_cache(token_key), self._inbox.put_cached
+
+        def take(reply: zenoh.Reply) -> None:
+            if reply.ok is not None:
+                put(key, _own(reply.ok.payload), reply.ok.timestamp)
+
+        with suppress(zenoh.ZError):  # a session that is closed: the next one finds the cache again
+            self._session.get(
+                keys.newest(token_key),
+                self._direct(take),
+                target=zenoh.QueryTarget.ALL,
+                consolidation=zenoh.ConsolidationMode.NONE,
+                accept_replies=zenoh.ReplyKeyExpr.ANY,
+                timeout=CACHE_TIMEOUT_S,
+            )
 
     def _direct(self, function: Callable[[Any], None]) -> "Callback[Any]":
         """A handler on the receiving thread, with no thread of its own; deaf once renewed."""
@@ -279,7 +302,15 @@ class Link:
 
     def drain(self) -> Changes:
         """Takes all that came since the last call."""
-        return self._inbox.drain()
+        changes = self._inbox.drain()
+        for cache in changes.caches:  # not where it was heard of: a callback may not ask
+            self._ask_cache(cache)
+        return changes
+
+    @property
+    def hurried(self) -> bool:
+        """Whether something came since the last drain that may change what is permitted."""
+        return self._inbox.hurried
 
     def close(self) -> None:
         """Takes everything down; blocks for up to some tenths of a second."""
@@ -296,6 +327,10 @@ class Link:
 
     def _on_token(self, sample: zenoh.Sample) -> None:
         self._inbox.token(str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT)
+
+    def _on_cache(self, sample: zenoh.Sample) -> None:
+        if sample.kind == zenoh.SampleKind.PUT:
+            self._inbox.cache(str(sample.key_expr))
 
     def _on_transport(self, event: zenoh.TransportEvent) -> None:
         self._inbox.transport(str(event.transport.zid), event.kind == zenoh.SampleKind.PUT)

@@ -13,11 +13,12 @@ from app.declared import Declared
 from app.errors import DecodeError, FieldError
 from app.graph import Graph
 from app.interfaces import Interfaces, value_at
-from app.keys import key_of
+from app.keys import ROSOUT_TOPIC, key_of
 from app.logs import RobotLog
 from app.panel.model import Panel, RobotEntry
 from app.progress import Progress
 from app.seen import Seen, ends
+from app.silent_publishers import SilentPublishers
 
 log = logging.getLogger("kiosk.robot")
 
@@ -90,14 +91,19 @@ class Robot:
         self.settled_at = math.inf  # monotonic: when a bridge that came has set up its routes
         self._keys: dict[str, str] = {}  # of what the panel names
         self._told_apart = entry.namespace if entry else None
-        self.graph = Graph(own_zid, self._told_apart)
+        needed = list(ends(panel))
+        named = (*panel.subscriptions(), *panel.publications(), *(n for _, n in needed), ROSOUT_TOPIC)
+        self._needed = frozenset(map(self.key, named))
+        self.graph = Graph(own_zid, self._told_apart, self._needed)
+        self._judged = frozenset(self.key(interlock.topic) for interlock in panel.interlocks)
+        self.silent = SilentPublishers(self._judged)
         self.progress: dict[str, Progress] = {}  # of what widgets have asked, by their ids
         self.parameters: dict[str, Declared] = {}  # what nodes said of them, by their widgets' ids
         self.held: dict[str, str] = {}  # by the ids of hold widgets: since when, in words
         self._log = RobotLog(log, self.name)
         self.answers = True  # False: its bridges are silent, though nobody knows yet why
         self.caught_up = True  # False: the event loop stood still, and may not know what came meanwhile
-        self.seen = Seen({(role, name): (role, self.key(name)) for role, name in ends(panel)})
+        self.seen = Seen({(role, name): (role, self.key(name)) for role, name in needed})
         self.undecodable: Counter[str] = Counter()
         self._interfaces = interfaces
         self._types = {self.key(topic): name for topic, name in panel.subscriptions().items()}
@@ -117,10 +123,12 @@ class Robot:
     def take(self, key: str, sample: Sample) -> None:
         """A newer sample of a topic."""
         self._samples[key] = sample
+        self.silent.message(key, sample.source, sample.seq, sample.at)
         self._readings.pop(key, None)
 
     def cut(self, bridge: str, seq: int) -> None:
         """A bridge went away at `seq`: what came by it before no longer says what is so."""
+        self.silent.lose_bridge(bridge)
         for key, sample in self._samples.items():
             if sample.seq < seq and sample.source in (bridge, None):
                 self._cut(key, sample)
@@ -147,7 +155,8 @@ class Robot:
         """The link is lost: nobody is known to be there, and nothing that came says what is so."""
         self.link_up = False
         self.settled_at = math.inf
-        self.graph = Graph("", self._told_apart)
+        self.graph = Graph("", self._told_apart, self._needed)
+        self.silent = SilentPublishers(self._judged)
         self.seen.forget()
         for key, sample in self._samples.items():
             self._cut(key, sample)

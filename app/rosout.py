@@ -8,10 +8,10 @@ from typing import Any, Final, Protocol
 
 from app.errors import LinkError
 from app.interfaces import Interfaces
+from app.keys import ROSOUT_TOPIC
 from app.logs import RosoutHandler
 from app.robot import Robot
 
-TOPIC: Final = "/rosout"
 LOG_TYPE: Final = "rcl_interfaces/msg/Log"
 
 
@@ -54,4 +54,4 @@ class Rosout:
     def _put(self, payload: bytes) -> None:
         with suppress(LinkError):  # a log that can't be sent must not become one more log
             if not self._stopped:
-                self._link.put(self._robot.key(TOPIC), payload)
+                self._link.put(self._robot.key(ROSOUT_TOPIC), payload)

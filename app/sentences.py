@@ -23,6 +23,7 @@ ENGLISH: Final[Mapping[str, str]] = {
     "waiting": "Locked: waiting for {topic}.",
     "cut": "Locked: the connection was cut; waiting for a new {topic}.",
     "stale": "Locked: the last {topic} is older than {limit} s.",
+    "new_publisher": "A new publisher of {topic} has not said anything yet.",
     "no_publisher": "Locked: no node of the robot publishes {topic}.",
     "unreadable": "Locked: {topic} can't be read: what arrives is not {wanted}.",
     "forbidden": "The robot does not permit {name}.",

@@ -48,7 +48,7 @@ class Tokens:
                 for topic, name in self._panel.subscriptions().items()
                 if (qos := self._listening(topic)) is not None
             ),
-            ("MP", "/rosout", LOG_TYPE, keys.ROSOUT),
+            ("MP", keys.ROSOUT_TOPIC, LOG_TYPE, keys.ROSOUT),
         ]
         tokens = []
         for role, topic, type_name, qos in wanted:

@@ -143,6 +143,7 @@ def peer() -> Iterator[tuple[str, zenoh.Session]]:
     config = zenoh.Config()
     config.insert_json5("listen/endpoints", f'["{endpoint}"]')
     config.insert_json5("scouting/multicast/enabled", "false")
+    config.insert_json5("timestamping/enabled", "true")  # as a bridge has it
     with zenoh.open(config) as session:
         yield endpoint, session
 

@@ -1,5 +1,6 @@
 """What the tokens say: who is there, whether it answers, and of which type each topic is."""
 
+import time
 from collections.abc import Sized
 
 import pytest
@@ -306,3 +307,17 @@ def test_of_nodes_that_came_and_went_nothing_is_kept(graph: Graph) -> None:
             graph.apply(topic_token(BRIDGE, "MP", f"node{number}/rosout", TEXT), alive)
             graph.apply(server_token(BRIDGE, "SS", f"node{number}/reset", TRIGGER), alive)
     assert sizes() == before
+
+
+def test_ten_thousand_nodes_that_the_panel_does_not_name_cost_next_to_nothing() -> None:
+    """They come at once, when a bridge is joined that has them behind it."""
+    graph = Graph(KIOSK, keys=["a"])
+    others = [topic_token(BRIDGE, "MP", f"some/topic{number}", TEXT) for number in range(10_000)]
+    began = time.thread_time()
+    for one in others:
+        graph.apply(one, True)
+    assert time.thread_time() - began < 0.05
+    graph.apply(bridge_token(BRIDGE), True)
+    graph.apply(topic_token(BRIDGE, "MP", "a", BOOL), True)
+    assert graph.on_robot("MP", "a")
+    assert not graph.on_robot("MP", "some/topic7")

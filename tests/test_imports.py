@@ -89,6 +89,7 @@ ORDER = (
     "app.graph",
     "app.progress",
     "app.seen",
+    "app.silent_publishers",
     "app.robot",
     "app.interlocks",
     "app.lamps",

@@ -1,7 +1,6 @@
 """What a link's threads put in, and what the event loop takes out: no Zenoh, no threads."""
 
 from datetime import UTC, datetime
-from typing import Any
 
 import pytest
 
@@ -14,9 +13,6 @@ class Sent:
     def __init__(self, time: float, source: str = "b1") -> None:
         self.time = time
         self.source = source
-
-    def __ge__(self, other: Any) -> bool:
-        return bool(self.time >= other.time)
 
     def get_id(self) -> str:
         return self.source
@@ -89,15 +85,43 @@ def test_samples_and_losses_are_in_order(inbox: Inbox) -> None:
     changes = inbox.drain()
     token = changes.tokens["t"]
     assert token.alive
-    assert changes.samples["before"].seq < token.lost_seq < changes.samples["after"].seq
+    order = [changes.samples["before"].seq, token.lost_seq, token.came_seq]
+    assert sorted(order) == order
+    assert token.came_seq < changes.samples["after"].seq
+    assert token.lost_before == token.lost_seq
 
 
-def test_history_that_comes_after_what_is_newer_is_passed_over(inbox: Inbox) -> None:
+def test_what_is_published_is_never_dropped_for_its_stamp(inbox: Inbox) -> None:
+    """A clock that was an hour ahead and was set right made all that came later "older"."""
+    inbox.put("permit", b"true", Sent(3600.0))
+    assert inbox.drain().samples["permit"].payload == b"true"
+    for time in (1.0, 2.0, 3601.0, 3.0):
+        inbox.put("permit", b"%d" % time, Sent(time))
+        assert inbox.drain().samples["permit"].payload == b"%d" % time
+
+
+def test_what_a_cache_has_counts_until_its_source_publishes(inbox: Inbox) -> None:
+    inbox.put_cached("heard", b"cached", Sent(9.0))
+    assert inbox.drain().samples["heard"].payload == b"cached"
     inbox.put("heard", b"new", Sent(2.0))
-    inbox.put("heard", b"old", Sent(1.0))
+    inbox.put_cached("heard", b"cached", Sent(9.0))
     assert inbox.drain().samples["heard"].payload == b"new"
-    inbox.put("heard", b"of another clock", Sent(1.0, "b2"))
-    assert inbox.drain().samples["heard"].payload == b"of another clock"
+    inbox.put_cached("heard", b"of another bridge", Sent(1.0, "b2"))
+    assert inbox.drain().samples["heard"].payload == b"of another bridge"
+
+
+def test_what_a_cache_has_without_a_stamp_counts_before_anything_is_published(inbox: Inbox) -> None:
+    inbox.put_cached("heard", b"cached", None)
+    assert inbox.drain().samples["heard"].payload == b"cached"
+    inbox.put("heard", b"new", None)
+    inbox.put_cached("heard", b"cached", None)
+    assert inbox.drain().samples["heard"].payload == b"new"
+
+
+def test_a_cache_is_told_once_and_at_once(inbox: Inbox, woken: list[bool]) -> None:
+    inbox.cache("heard/@adv/pub/b1/uhlc/_")
+    assert (inbox.drain().caches, woken) == (["heard/@adv/pub/b1/uhlc/_"], [True])
+    assert inbox.drain().caches == []
 
 
 def test_of_a_watched_topic_each_change_in_between_is_kept(inbox: Inbox) -> None:

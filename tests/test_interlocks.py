@@ -25,6 +25,7 @@ from tests.builders import (
     TEXT,
     Table,
     endpoint,
+    panel_of,
     permits,
     robot_there,
     small_panel,
@@ -252,8 +253,8 @@ def test_a_subscriber_that_would_not_hear_locks_a_press() -> None:
 
 
 def test_a_service_that_has_just_come_is_not_called_yet() -> None:
-    robot = robot_there(small_panel())
     call = Call(id="reset", kind="call", label="Reset", service="/reset", type="std_srvs/srv/Trigger")
+    robot = robot_there(panel_of(call.model_dump(exclude_none=True)))
     token = server_token(BRIDGE, "SS", "reset", call.type)
     assert press_verdict(call, None, robot, NOW).code == "no_service"
     robot.graph.apply(token, True, NOW)

@@ -7,11 +7,14 @@ import subprocess
 import sys
 import threading
 import time
+from datetime import UTC, datetime, timedelta
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pytest
 import zenoh
+from zenoh.ext import CacheConfig, declare_advanced_publisher
 from zenoh.handlers import Callback
 
 from app import keys
@@ -23,6 +26,12 @@ from tests.parts import free_port, until
 
 RENEWALS = 30
 BURST = 500
+
+
+def matched(publisher: zenoh.Publisher) -> bool:
+    """Whether somebody is known to listen: an object of Zenoh's, whatever its stub says."""
+    status: Any = publisher.matching_status
+    return bool(status.matching)
 
 
 def resident_kb() -> int:
@@ -204,6 +213,61 @@ def test_of_a_watched_topic_what_came_and_went_between_two_drains_is_kept(
     time.sleep(0.5)
     assert [bytes(one.payload) for one in link.drain().samples["a"].between] == [b"yes", b"no"]
     link.close()
+
+
+def test_a_stamp_of_a_clock_that_is_ahead_makes_the_link_deaf_to_nothing(
+    peer: tuple[str, zenoh.Session],
+) -> None:
+    endpoint, session = peer
+    link = Link(config_to(endpoint), lambda _: None)
+    link.start(["a"], [], watched=["a"])
+    until(partial(matched, publisher := session.declare_publisher("a")), "it is subscribed")
+    own = session.new_timestamp().get_id()
+    now = datetime.now(UTC)
+    for payload, ahead_s in ((b"true", 3600), *((b"false%d" % n, n / 100) for n in range(25))):
+        publisher.put(payload, timestamp=zenoh.Timestamp(now + timedelta(seconds=ahead_s), own))
+    heard: list[bytes] = []
+
+    def all_heard() -> bool:
+        if sample := link.drain().samples.get("a"):
+            heard.extend(bytes(one.payload) for one in sample.between)
+            heard.append(bytes(sample.payload))
+        return len(heard) >= 26
+
+    until(all_heard, "each value came")
+    link.close()
+    assert heard == [b"true", *(b"false%d" % n for n in range(25))]
+
+
+def test_a_late_link_gets_the_last_value_of_a_cache_and_nothing_older_than_what_it_heard(
+    peer: tuple[str, zenoh.Session],
+) -> None:
+    endpoint, session = peer
+    latched = declare_advanced_publisher(
+        session, "a", cache=CacheConfig(max_samples=1), publisher_detection=True
+    )
+    latched.put(b"old")
+    latched.put(b"last")
+    link = Link(config_to(endpoint), lambda _: None)
+    link.start(["a"], [])
+    heard: list[bytes] = []
+
+    def came(payload: bytes) -> bool:
+        if sample := link.drain().samples.get("a"):
+            heard.append(bytes(sample.payload))
+        return payload in heard
+
+    until(partial(came, b"last"), "the last value came")
+    latched.put(b"new")
+    until(partial(came, b"new"), "a new value came")
+    latched.undeclare()
+    again = declare_advanced_publisher(
+        session, "a", cache=CacheConfig(max_samples=1), publisher_detection=True
+    )
+    again.put(b"of the next")
+    until(partial(came, b"of the next"), "the next publisher is heard")
+    link.close()
+    assert heard == [b"last", b"new", b"of the next"]
 
 
 def test_a_small_message_does_not_keep_all_that_it_was_read_with(
