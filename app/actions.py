@@ -17,7 +17,7 @@ from app.following import Following
 from app.goals import ACCEPTED, CANCELING, EXECUTING, UNKNOWN, Goal, goal_id
 from app.interfaces import Interfaces
 from app.panel.model import Action
-from app.progress import IDLE, Answer, Corrected, Progress
+from app.progress import IDLE, Answer, Corrected, LastLook, Progress, no_look
 from app.robot import Robot, Sample
 from app.sentences import clock, say
 
@@ -64,6 +64,7 @@ class Actions:
         press_id: str,
         corrected: Corrected,
         entry: str = "",
+        look: LastLook = no_look,
     ) -> Answer:
         """Sends a goal; `corrected` gets what came of it in the end, `entry` is the hash of the press's
         entry in the operator's log. FieldError for bad fields, LinkError where it could not be sent:
@@ -72,6 +73,7 @@ class Actions:
         request = self._services.goal_request(widget, own_id, fields)
         if why := self.full(widget.action):
             return Answer("refused", why)
+        look()
         query = self._services.send_goal(widget, request)
         cut = asyncio.get_running_loop().create_future()
         goal = Goal(widget, press_id, own_id, cut, corrected)

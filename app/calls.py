@@ -17,7 +17,7 @@ from app.interfaces import Interfaces, text_of, value_at
 from app.logs import RobotLog
 from app.panel.model import Call
 from app.panel.template import PLACE
-from app.progress import Answer, Corrected, Progress
+from app.progress import Answer, Corrected, LastLook, Progress, no_look
 from app.robot import Robot, value_of
 from app.sentences import clock, say
 
@@ -94,18 +94,28 @@ class Calls:
         """This service can answer: another one of its node has."""
         self._ever_answered.add(service)
 
-    async def call(self, widget: Call, payload: bytes, press_id: str, corrected: Corrected) -> Answer:
+    async def call(
+        self,
+        widget: Call,
+        payload: bytes,
+        press_id: str,
+        corrected: Corrected,
+        look: LastLook = no_look,
+    ) -> Answer:
         """Calls the service of a widget; see `ask`."""
         read = partial(self._read_call, widget)
         request = Request(widget.id, widget.service, widget.type, payload, widget.timeout_s, read)
-        return await self.ask(request, press_id, corrected)
+        return await self.ask(request, press_id, corrected, look)
 
-    async def ask(self, request: Request, press_id: str, corrected: Corrected) -> Answer:
+    async def ask(
+        self, request: Request, press_id: str, corrected: Corrected, look: LastLook = no_look
+    ) -> Answer:
         """Sends a request and waits; `corrected` gets the answer that comes after the time."""
         key = self._robot.key(request.service)
         if why := self.full(request.service):
             return Answer("refused", why)
         loop = asyncio.get_running_loop()
+        look()
         query = self._link.query(key, request.payload, request.timeout_s + LATE_S)
         waiting = _Waiting(request, press_id, query, loop.create_future())
         number = id(waiting)

@@ -7,6 +7,7 @@
     ├── FieldError             422  a value that its field does not take; `field` names it
     ├── InputError             422  a request that is not what the contract says
     ├── NotFound               404  no such page or widget
+    ├── PressRefused           409  what permitted it is gone, right before it would have been sent
     ├── DecodeError            –    bytes that are not a message of the type
     ├── LinkError              503  Zenoh refused; nothing was sent
     └── LogError               503  the operator's log can't be written or read
@@ -18,6 +19,9 @@ One handler (`routes.on_kiosk_error`) maps them to HTTP; "–" never reaches a c
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
+
+Cause = Literal["", "interlock", "input", "link", "log", "time"]  # why a receipt says it was refused
 
 
 class KioskError(Exception):
@@ -72,6 +76,17 @@ class InputError(KioskError):
 
 class NotFound(KioskError):
     status = 404
+
+
+class PressRefused(KioskError):
+    """`cause` is that of the receipt which tells it."""
+
+    status = 409
+
+    def __init__(self, reason: str, cause: Cause) -> None:
+        super().__init__(reason)
+        self.reason = reason
+        self.cause = cause
 
 
 class DecodeError(KioskError):

@@ -11,6 +11,7 @@ from app.interlocks import way
 from app.panel.check_holds import with_own_fields
 from app.panel.model import Hold
 from app.panel.template import filled, inputs_of
+from app.progress import LastLook, no_look
 from app.robot import Robot
 
 Checked = Callable[[Iterable[str], Mapping[str, Any]], dict[str, Any]]
@@ -49,9 +50,10 @@ class HoldMessages:
             self._interfaces.encode(widget.type, with_own_fields(widget, fields, 0, 0))
         return both
 
-    def put(self, widget: Hold, both: Filled) -> None:
-        """One message more; LinkError where it could not be sent."""
-        self._put(widget, both.message, widget.deadline_ms)
+    def put(self, widget: Hold, both: Filled, look: LastLook) -> None:
+        """One message more; LinkError where it could not be sent, PressRefused where the last look
+        finds that it may not be."""
+        self._put(widget, both.message, widget.deadline_ms, look)
 
     def put_last(self, widget: Hold, both: Filled, now: float) -> str:
         """The message that ends it, if there is any way now, be it in doubt: one stop too many harms
@@ -59,17 +61,18 @@ class HoldMessages:
         if not self._robot.link_up or not self._robot.graph.bridges:
             return way(self._robot, now).reason or ""
         try:
-            self._put(widget, both.release, 0)
+            self._put(widget, both.release, 0, no_look)
         except LinkError as error:
             return f"{error}."
         return ""
 
-    def _put(self, widget: Hold, fields: Mapping[str, Any], deadline_ms: int) -> None:
+    def _put(self, widget: Hold, fields: Mapping[str, Any], deadline_ms: int, look: LastLook) -> None:
         count = self._counts.get(widget.id, 0) + 1
         if widget.counter_field is not None:
             kind = self._interfaces.field_type(widget.type, widget.counter_field)
             count %= INTEGERS[kind][1] + 1
         whole = with_own_fields(widget, fields, deadline_ms, count)
         payload = self._interfaces.encode(widget.type, whole)
+        look()
         self._way.put(self._robot.key(widget.topic), payload)
         self._counts[widget.id] = count

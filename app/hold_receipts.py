@@ -7,13 +7,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Final, NamedTuple
 
+from app.errors import Cause
 from app.hold_messages import Filled
 from app.leases import Lease
 from app.logs import RobotLog
 from app.panel.model import Hold
 from app.panel.template import needed
 from app.progress import Answer, Outcome
-from app.receipts import LONGEST_LOGGED, By, Cause, Receipt, Witness, named, receipt_of
+from app.receipts import LONGEST_LOGGED, By, Receipt, Witness, named, receipt_of
 from app.sentences import clock, say
 
 log = logging.getLogger("kiosk.holds")

@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
-from app.errors import FieldError, InputError, LinkError, NotFound
+from app.errors import Cause, FieldError, InputError, LinkError, NotFound, PressRefused
 from app.hold_messages import Checked, Filled, HoldMessages, Way
 from app.hold_receipts import RELEASED, Holding, HoldReceipts, Refusal, refused
 from app.interfaces import Interfaces
@@ -20,8 +20,8 @@ from app.leases import LEASE_S, Lease
 from app.panel.model import Hold, Panel
 from app.panel.template import needed
 from app.receipts import (
+    MOST_LOOKS,
     By,
-    Cause,
     Receipt,
     Witness,
     cause_of,
@@ -51,11 +51,13 @@ class Holds:
         *,
         checked: Checked,
         take: Callable[[], None],
+        news: Callable[[], bool],
         changed: Callable[[], None],
         witness: Witness | None = None,
     ) -> None:
         """`checked` are the values that a template gets of what was entered; `take` takes in what
-        has come from the robot; `changed` is called when what the widgets show has changed."""
+        has come from the robot, `news` tells whether more has come that may change what is permitted;
+        `changed` is called when what the widgets show has changed."""
         self._panel = panel
         self._robot = robot
         self._loop = loop
@@ -63,6 +65,7 @@ class Holds:
         self._receipts = HoldReceipts(robot.name, witness)
         self.doubted = self._receipts.doubted
         self._take = take
+        self._news = news
         self._changed = changed
         self._widgets = {w.id: w for w in panel.widgets() if isinstance(w, Hold)}
         self._held: dict[str, Holding] = {}
@@ -219,11 +222,25 @@ class Holds:
 
     def _send(self, holding: Holding) -> None:
         try:
-            self._messages.put(holding.widget, holding.filled)
+            self._messages.put(holding.widget, holding.filled, lambda: self._last_look(holding))
         except LinkError as error:
             self._end(holding, "link", f"{error}.")
+        except PressRefused:
+            return  # it has ended
         else:
             holding.sent += 1
+
+    def _last_look(self, holding: Holding) -> None:
+        """Right before a message is sent: what came while it was judged and encoded counts, too."""
+        for _ in range(MOST_LOOKS):
+            if not self._on(holding):
+                raise PressRefused("", "interlock")
+            if not self._news():
+                return
+            self._take()
+            self.judge()
+        self.end(holding, "catching_up")
+        raise PressRefused("", "interlock")
 
     def _end(self, holding: Holding, code: str, why: str) -> None:
         widget, now = holding.widget, self._loop.time()

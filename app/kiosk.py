@@ -119,6 +119,7 @@ class Kiosk:
             self.sending,
             self.logbook,
             catch_up=self._take,
+            news=lambda: self.link.hurried,
             witness=self._recorder,
         )
         self.holds = Holds(
@@ -129,6 +130,7 @@ class Kiosk:
             self._loop,
             checked=self.sending.checked,
             take=self._take,
+            news=lambda: self.link.hurried,
             changed=self.show,
             witness=self._recorder,
         )

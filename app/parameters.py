@@ -23,7 +23,7 @@ from app.logs import RobotLog
 from app.panel.model import Panel
 from app.panel.parameter import DESCRIBE, EVENT_TYPE, GET, SET, Parameter
 from app.parameter_services import NoAnswer, ParameterServices
-from app.progress import Answer, Corrected
+from app.progress import Answer, Corrected, LastLook, no_look
 from app.robot import Robot, Sample
 from app.sentences import clock, say
 from app.tasks import told
@@ -204,7 +204,14 @@ class Parameters:
         """The value to set; InputError with a sentence that names label and limits."""
         return checked(widget, self._known(widget), given)
 
-    async def set(self, widget: Parameter, value: Value, press_id: str, corrected: Corrected) -> Answer:
+    async def set(
+        self,
+        widget: Parameter,
+        value: Value,
+        press_id: str,
+        corrected: Corrected,
+        look: LastLook = no_look,
+    ) -> Answer:
         """Sets a parameter, as a call does; whatever came of it, the node is asked how it is now."""
         service, type_name = SET
         fields = {"parameters": [{"name": widget.parameter, "value": wire(widget, value)}]}
@@ -217,7 +224,7 @@ class Parameters:
             node.ask_now()
             corrected(press_id, answer)
 
-        answer = await self._calls.ask(request, press_id, late)
+        answer = await self._calls.ask(request, press_id, late, look)
         node.ask_now()
         return answer
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from app.errors import FieldError, InputError, LinkError, LogError, NotFound
+from app.errors import Cause, FieldError, InputError, LinkError, LogError, NotFound, PressRefused
 from app.interlocks import Verdict
 from app.log import Origin
 from app.logbook import Logbook, Noted
@@ -23,8 +23,8 @@ from app.progress import Answer
 from app.receipts import (
     FINE,
     LONGEST_LOGGED,
+    MOST_LOOKS,
     By,
-    Cause,
     Receipt,
     Receipts,
     Witness,
@@ -69,15 +69,18 @@ class Presses:
         logbook: Logbook,
         monotonic: Callable[[], float] = time.monotonic,
         catch_up: Callable[[], None] = lambda: None,
+        news: Callable[[], bool] = lambda: False,
         witness: Witness | None = None,
     ) -> None:
-        """`catch_up` takes in all that has come from the robot, right before a press is judged."""
+        """`catch_up` takes in all that has come from the robot, right before a press is judged;
+        `news` tells whether more has come that may change what is permitted."""
         self._panel = panel
         self._robot = robot
         self._log = RobotLog(log, robot.name)
         self._sending = sending
         self._logbook = logbook
         self._catch_up = catch_up
+        self._news = news
         self._under_way: dict[str, _UnderWay] = {}
         self._monotonic = monotonic
         self._receipts = Receipts(witness)
@@ -236,17 +239,31 @@ class Presses:
             return refused("refused", why, cause)
         try:
             correct = partial(self._correct, noted)
+            look = partial(self._last_look, widget, noted, by)
             async with self._waits.one():
-                answer = await self._sending.send(widget, inputs, press_id, correct, noted.hash)
+                answer = await self._sending.send(widget, inputs, press_id, correct, noted.hash, look)
         except TimeoutError:
             return receipt(Answer("unknown", say("server_ends")))
         except (FieldError, InputError) as error:
             return refused("not_encoded", str(error), "input")
         except LinkError as error:
             return refused("not_encoded", str(error), "link")
+        except PressRefused as error:
+            return refused("refused", error.reason, error.cause)
         if answer.outcome == "refused":
             return refused("not_encoded", answer.text, "interlock")
         return receipt(answer, "time" if answer.outcome == "timed_out" else "")
+
+    def _last_look(self, widget: Pressed, noted: Noted, by: By) -> None:
+        """Right before it is sent: what came while it was judged and encoded counts, too."""
+        for _ in range(MOST_LOOKS):
+            if not self._news():
+                return
+            verdict, why, cause = self._ground(widget, by)
+            noted.judged(verdict.code)
+            if why:
+                raise PressRefused(why, cause)
+        raise PressRefused(say("catching_up"), "link")
 
     def _ground(self, widget: Pressed, by: By) -> tuple[Verdict, str, Cause]:
         """The verdict now, and why it may not be sent, "" if it may."""

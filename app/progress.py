@@ -48,3 +48,8 @@ class Answer:
 
 
 Corrected = Callable[[str, Answer], None]  # (press id, what is known of it now)
+LastLook = Callable[[], None]  # right before it is sent; raises PressRefused where it no longer may be
+
+
+def no_look() -> None:
+    """Of what nobody has to permit."""

@@ -6,8 +6,9 @@ from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
-from typing import Any, Final, Literal, Protocol
+from typing import Any, Final, Protocol
 
+from app.errors import Cause
 from app.interlocks import NO_WAY, PERMITTED, Verdict, press_verdict, way
 from app.log import Origin
 from app.panel.model import Hold, Panel, Pressed
@@ -16,9 +17,8 @@ from app.progress import Answer, Outcome
 from app.robot import Robot
 from app.sentences import say
 
-Cause = Literal["", "interlock", "input", "link", "log", "time"]
-
 RECEIPTS_KEPT: Final = 1000
+MOST_LOOKS: Final = 20  # at news that come faster than they are taken in: then nothing is sent
 PAST_KEPT: Final = 20_000  # ids of presses whose receipts are not kept any more
 LONGEST_LOGGED: Final = 300
 LONGEST_KEPT: Final = 4000  # characters of all inputs of a press

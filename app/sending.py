@@ -15,7 +15,7 @@ from app.panel.model import Action, Call, Input, Panel, Pressed, Publish
 from app.panel.parameter import SET, Parameter
 from app.panel.template import filled, inputs_of
 from app.parameters import Parameters
-from app.progress import Answer, Corrected
+from app.progress import Answer, Corrected, LastLook, no_look
 from app.robot import Robot
 from app.sentences import clock, say
 
@@ -89,33 +89,34 @@ class Sending:
         press_id: str,
         correct: Corrected,
         entry: str = "",
+        look: LastLook = no_look,
     ) -> Answer:
         """Sends, and waits for what comes of it; `correct` gets what is known later. `entry` is the
-        hash of the press's entry in the operator's log.
+        hash of the press's entry in the operator's log, `look` the last one at what permits it.
 
         Until it is sent nothing here waits. FieldError or InputError for bad input, LinkError where
-        it could not be sent.
+        it could not be sent, PressRefused where `look` finds that it may not be.
         """
         values = self.checked(self._needs[widget.id], inputs)
         fields = filled(widget.template, values)
         match widget:
             case Publish():
                 if widget.confirm is None:
-                    return await self._arrived(widget, self._published(widget, fields))
+                    return await self._arrived(widget, self._published(widget, fields, look))
                 equals = filled(widget.confirm.equals, values)
                 since = self._monotonic()
-                answer = self._published(widget, fields)
+                answer = self._published(widget, fields, look)
                 return await self._confirmations.awaited(
                     widget, equals, press_id, since, answer.text, correct
                 )
             case Call():
                 request, _ = self._interfaces.service(widget.type)
                 payload = self._interfaces.encode(request, fields)
-                return await self._calls.call(widget, payload, press_id, correct)
+                return await self._calls.call(widget, payload, press_id, correct, look)
             case Action():
-                return await self._actions.start(widget, fields, press_id, correct, entry)
+                return await self._actions.start(widget, fields, press_id, correct, entry, look)
             case Parameter():
-                return await self._parameters.set(widget, fields["value"], press_id, correct)
+                return await self._parameters.set(widget, fields["value"], press_id, correct, look)
 
     def refusal(self, widget: Pressed, inputs: Mapping[str, Any]) -> str:
         """Why `send` would refuse it now, "" if it would not; FieldError or InputError as there."""
@@ -132,10 +133,11 @@ class Sending:
                 return self._calls.full(f"{widget.node}/{SET[0]}")
         return ""
 
-    def _published(self, widget: Publish, fields: dict[str, Any]) -> Answer:
+    def _published(self, widget: Publish, fields: dict[str, Any], look: LastLook) -> Answer:
         payload = self._interfaces.encode(widget.type, fields)
         key = self._robot.key(widget.topic)
         heard = self._way.heard(key)
+        look()
         self._way.put(key, payload)
         sentence = "published" if heard else "sent_to_nobody"
         text = say(sentence, topic=widget.topic, time=clock(time.time()))

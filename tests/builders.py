@@ -165,8 +165,10 @@ def presses_of(
     *,
     logbook: Logbook | None = None,
     monotonic: Callable[[], float] = lambda: NOW,
+    catch_up: Callable[[], None] = lambda: None,
+    news: Callable[[], bool] = lambda: False,
     **more: Any,
 ) -> Presses:
     """The presses of a robot; `more` is for `sending_of`."""
     sending = sending_of(panel, robot, way, monotonic=monotonic, **more)
-    return Presses(panel, robot, sending, logbook or Logbook(Unlogged()), monotonic)
+    return Presses(panel, robot, sending, logbook or Logbook(Unlogged()), monotonic, catch_up, news)

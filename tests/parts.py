@@ -228,6 +228,7 @@ ORDERS: Mapping[str, tuple[str, ...]] = {
     "heard": ("topic",),
     "heard_at": ("topic",),
     "arrivals": ("topic",),
+    "toggle": ("topic", "per_s", "for_s"),
     "flood": ("topic", "fields", "per_s", "for_s"),
     "publish_long": ("topic", "length"),
     "advertise": ("topic", "type"),

@@ -133,9 +133,10 @@ class Bench:
         checked = sending_of(self.panel, self.robot, way).checked
         self.receipts: list[Receipt] = []
         self.pending: list[Callable[[], None]] = []  # what has come from the robot, not taken in yet
+        self.news: Callable[[], bool] = lambda: bool(self.pending)
         self.holds = Holds(
             self.panel, INTERFACES, self.robot, self.way, self.loop,
-            checked=checked, take=self.take, changed=lambda: None,
+            checked=checked, take=self.take, news=lambda: self.news(), changed=lambda: None,
         )  # fmt: skip
 
     def take(self) -> None:
@@ -266,6 +267,31 @@ def test_lost_permission_ends_it_at_once_and_not_at_the_next_message(bench: Benc
 def test_what_has_come_but_is_not_taken_in_yet_counts_before_a_message(bench: Bench) -> None:
     bench.begun()
     bench.pending.append(lambda: permits(bench.robot, False))
+    bench.loop.pass_time(0.05)
+    assert bench.points == [MOVES, STOPS]
+
+
+def test_what_comes_while_a_message_is_encoded_counts_before_it_is_sent(bench: Bench) -> None:
+    bench.begun()
+    looks: list[bool] = []
+
+    def news() -> bool:
+        """It comes between the judging and the last look."""
+        looks.append(True)
+        if len(looks) == 1:
+            bench.pending.append(lambda: permits(bench.robot, False))
+        return bool(bench.pending)
+
+    bench.news = news
+    bench.loop.pass_time(0.05)
+    assert looks
+    assert bench.points == [MOVES, STOPS]
+    assert "The robot does not permit operation." in bench.receipts[0].reason
+
+
+def test_news_without_an_end_end_a_hold(bench: Bench) -> None:
+    bench.begun()
+    bench.news = lambda: True
     bench.loop.pass_time(0.05)
     assert bench.points == [MOVES, STOPS]
 

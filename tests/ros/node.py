@@ -141,6 +141,18 @@ class Commands:
         time.sleep(0.1)
         self.withdraw(topic)
 
+    def toggle(self, topic: str, per_s: float, for_s: float) -> int:
+        """Publishes true and false in turn, so often for so long; returns how many went out."""
+        publisher = self.publishers[topic]
+        began, sent = time.monotonic(), 0
+        while (spent := time.monotonic() - began) < for_s:
+            if sent < spent * per_s:
+                publisher.publish(filled(publisher.msg_type(), {"data": sent % 2 == 0}))
+                sent += 1
+            else:
+                time.sleep(0.0005)
+        return sent
+
     def withdraw(self, topic: str) -> None:
         timer = self.timers.pop(topic, None)
         if timer is not None:
