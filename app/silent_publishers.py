@@ -3,9 +3,11 @@
 What a Fast DDS publisher says right after it appeared may never reach the bridge, which discovers it up
 to seconds later. So a publisher that appears makes the last value a doubt, until a newer one comes.
 
-The bridge tells of a publisher after it has discovered it: a message that got through comes before its
-publisher's token, by 5 to 100 ms where that was measured. So the first message since the publishers
-before were gone counts as said by the one that appears, if it is not older than `BEFORE_S`.
+The bridge tells of a publisher after it has discovered its node: a message that got through comes
+before the token of its publisher, mostly by 5 to 100 ms, now and then by 3 s (measured, see
+docs/permissions.md). So the first message since the publishers before were gone counts as said by the
+one that appears, if it is not older than `BEFORE_S`. A publisher that is TRANSIENT_LOCAL loses nothing
+and says nothing twice: it has `BEFORE_LATCHED_S`.
 """
 
 from collections.abc import Collection
@@ -15,6 +17,7 @@ from typing import Final
 from app.keys import Endpoint
 
 BEFORE_S: Final = 0.5  # from a message to the token of its publisher, at most
+BEFORE_LATCHED_S: Final = 5.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,9 +56,10 @@ class SilentPublishers:
         key, bridge = endpoint.key, endpoint.zid
         since = max(self._changed.get((key, bridge), 0), lost_before)
         self._changed[key, bridge] = max(seq, since)
+        before_s = BEFORE_LATCHED_S if endpoint.transient_local else BEFORE_S
         for source in (bridge, None):
             said = self._said.get((key, source))
-            if said and (said.seq > seq or (said.seq > since and at - said.at <= BEFORE_S)):
+            if said and (said.seq > seq or (said.seq > since and at - said.at <= before_s)):
                 return
         self._silent[key][bridge] = seq
 

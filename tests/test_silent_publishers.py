@@ -3,7 +3,7 @@
 import asyncio
 import logging
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
 import pytest
@@ -18,7 +18,7 @@ from app.keys import Endpoint, Qos, token
 from app.logs import RobotLog
 from app.parameters import Parameters
 from app.robot import Robot
-from app.silent_publishers import BEFORE_S, SilentPublishers
+from app.silent_publishers import BEFORE_LATCHED_S, BEFORE_S, SilentPublishers
 from app.views import Enabled
 from tests.builders import BOOL, BRIDGE, ENABLED, INTERFACES, KIOSK, Nobody, robot_there, small_panel
 
@@ -53,12 +53,21 @@ def test_one_that_came_and_went_silent_leaves_a_doubt(known: SilentPublishers) -
     assert silent(known)
 
 
-@pytest.mark.parametrize(("before_s", "is_silent"), [(0.0, False), (BEFORE_S, False), (0.6, True)])
+@pytest.mark.parametrize(
+    ("latched", "before_s", "is_silent"),
+    [
+        (False, 0.0, False),
+        (False, BEFORE_S, False),
+        (False, BEFORE_S + 0.1, True),
+        (True, BEFORE_S + 0.1, False),  # it loses nothing, and says nothing twice
+        (True, BEFORE_LATCHED_S + 0.1, True),
+    ],
+)
 def test_a_message_just_before_its_publisher_appears_is_its_own(
-    known: SilentPublishers, before_s: float, is_silent: bool
+    known: SilentPublishers, latched: bool, before_s: float, is_silent: bool
 ) -> None:
     known.message(KEY, BRIDGE, 1, 10.0)
-    known.appeared(PUBLISHER, 2, 10.0 + before_s)
+    known.appeared(replace(PUBLISHER, transient_local=latched), 2, 10.0 + before_s)
     assert silent(known) is is_silent
 
 

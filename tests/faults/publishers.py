@@ -1,0 +1,226 @@
+"""Whether a `false` that a new publisher says reaches the panel, by the kind of publisher.
+
+`python -m tests.faults.publishers [TIMES]` measures all kinds and prints a table.
+"""
+
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import closing, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, Literal
+
+import zenoh
+
+from app import keys
+from tests.commanded import Commanded
+from tests.cyclone import CYCLONE
+from tests.domains import FIRST
+from tests.faults.rig import kiosk
+from tests.parts import ROS_PYTHON, TESTS, Bridge, Server, until
+
+Vendor = Literal["fast", "cyclone"]
+Outcome = Literal["heard", "locked", "unnoticed"]
+
+TOPIC: Final = "/kept"
+KEY: Final = TOPIC[1:]
+WIDGET: Final = "guarded"
+NEWS_WITHIN_S: Final = 5.0  # Fast DDS tells of a participant every 3 s; one that is missed, after 4
+GONE_WITHIN_S: Final = 30.0
+OPENED_BY: Final = 5  # publishers, at most
+
+
+@dataclass(frozen=True)
+class Kind:
+    """How a publisher speaks; `stays` is how long it is there after its last message, in seconds."""
+
+    name: str
+    times: int = 1
+    stays: float = 0.1
+    durability: str = "volatile"
+    matched: bool = True
+
+
+KINDS: Final = (
+    Kind("`--once`"),
+    Kind("`--times 3 --rate 10`", times=3),
+    Kind("says it when somebody listens, and stays", stays=NEWS_WITHIN_S),
+    Kind("says it as it is made, and stays", stays=NEWS_WITHIN_S, matched=False),
+    Kind("latched (transient local)", stays=NEWS_WITHIN_S, durability="transient_local", matched=False),
+    Kind("periodic, 10 Hz", times=40),
+)
+
+
+class Publisher(Commanded):
+    """See `tests/ros/publishers.py`."""
+
+    def __init__(self, vendor: Vendor, domain: int) -> None:
+        env = {"ROS_DOMAIN_ID": str(domain), "ROS_LOG_DIR": tempfile.gettempdir()}
+        env |= {"RMW_IMPLEMENTATION": "rmw_fastrtps_cpp", "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+        if vendor == "cyclone":
+            env["CYCLONEDDS_URI"] = CYCLONE.format(lease_s=10)
+        super().__init__([ROS_PYTHON, TESTS / "ros/publishers.py", vendor], env)
+
+    def says(self, value: bool, kind: Kind) -> None:
+        """A new publisher says it, in a process of its own, as the command line's is."""
+        self.end()
+        self.start()
+        how: Mapping[str, Any] = {"times": kind.times, "durability": kind.durability}
+        self("begin", topic=TOPIC, value=value, matched=kind.matched, **how)
+
+    def goes(self, after_s: float) -> None:
+        self("finish", after_s=after_s)
+
+
+class Observer:
+    """What the bridge tells of the topic, seen beside the panel."""
+
+    def __init__(self, endpoint: str) -> None:
+        config = zenoh.Config()
+        config.insert_json5("mode", '"client"')
+        config.insert_json5("connect/endpoints", f'["{endpoint}"]')
+        self._session = zenoh.open(config)
+        self.values: list[bool] = []
+        self.came: list[str] = []
+        self.there: set[str] = set()
+        self._subscribers = (
+            self._session.declare_subscriber(KEY, self._sample),
+            self._session.liveliness().declare_subscriber(keys.TOKENS, self._token, history=True),
+        )
+
+    def _sample(self, sample: zenoh.Sample) -> None:
+        self.values.append(bytes(sample.payload)[4] == 1)
+
+    def _token(self, sample: zenoh.Sample) -> None:
+        token = str(sample.key_expr)
+        endpoint = keys.parsed(token)
+        if endpoint is None or (endpoint.role, endpoint.key) != ("MP", KEY):
+            return
+        if sample.kind == zenoh.SampleKind.PUT:
+            self.came.append(token)
+            self.there.add(token)
+        else:
+            self.there.discard(token)
+
+    def forget(self) -> None:
+        """What was said and who came, until now."""
+        self.values.clear()
+        self.came.clear()
+
+    def close(self) -> None:
+        self._session.close()
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What came of one `false`: whether the bridge brought it, whether it told of the publisher, and
+    whether the panel still permits."""
+
+    heard: bool
+    seen: bool
+    permitted: bool
+
+    @property
+    def outcome(self) -> Outcome:
+        return "heard" if self.heard else "unnoticed" if self.permitted else "locked"
+
+
+class Publishers:
+    """A bridge, a panel on it that nobody permits anything, and publishers that come and go, all with
+    one durability: the panel listens as the first one it saw."""
+
+    def __init__(self, domain: int, folder: Path, durability: str = "volatile") -> None:
+        matched = durability == "volatile"
+        self._opens = Kind("opens", durability=durability, matched=matched, stays=1.0)
+        self._bridge = Bridge(domain)
+        self._bridge.start()
+        self._server: Server = kiosk(self._bridge.endpoint, folder)
+        until(self._server.ready, "ready", within_s=20)
+        self._observer = Observer(self._bridge.endpoint)
+        self._by: dict[Vendor, Publisher] = {
+            "fast": Publisher("fast", domain),
+            "cyclone": Publisher("cyclone", domain),
+        }
+
+    @property
+    def permitted(self) -> bool:
+        return bool(self._server.widget(WIDGET)["enabled"])
+
+    def open(self) -> None:
+        """A publisher on Cyclone DDS, of which next to nothing is lost, permits it and goes."""
+        for _ in range(OPENED_BY):
+            self._by["cyclone"].says(True, self._opens)
+            self._by["cyclone"].goes(self._opens.stays)
+            self._alone()
+            if self.permitted:
+                return
+        raise AssertionError("nobody could permit it")
+
+    @contextmanager
+    def there(self, vendor: Vendor, kind: Kind) -> Iterator[None]:
+        """A new publisher, for as long as it lasts; until it is gone."""
+        self._observer.forget()
+        self._by[vendor].says(True, kind)
+        until(lambda: self._observer.came, "the bridge tells of it", within_s=GONE_WITHIN_S)
+        yield
+        self._by[vendor].goes(0.0)
+        self._alone()
+
+    def until_reason(self, reason: str) -> None:
+        """Until the control is locked for it."""
+        until(lambda: self._server.widget(WIDGET)["reason"] == reason, reason)
+
+    def trial(self, vendor: Vendor, kind: Kind) -> Trial:
+        """A new publisher takes the permission back."""
+        self.open()
+        self._observer.forget()
+        self._by[vendor].says(False, kind)
+        self._by[vendor].goes(kind.stays)
+        self._news()
+        heard, seen = False in self._observer.values, bool(self._observer.came)
+        end = time.monotonic() + 2.0
+        while (permitted := self.permitted) and (heard or seen) and time.monotonic() < end:
+            time.sleep(0.05)
+        self._alone()
+        return Trial(heard, seen, permitted)
+
+    def _news(self) -> None:
+        """Until the message came, or its publisher came and went, or neither will."""
+        end = time.monotonic() + NEWS_WITHIN_S
+        observer = self._observer
+        while (
+            time.monotonic() < end
+            and not observer.values
+            and not (observer.came and not observer.there)
+        ):
+            time.sleep(0.02)
+
+    def _alone(self) -> None:
+        """Until nobody publishes the topic."""
+        until(lambda: not self._observer.there, "its publisher is gone", within_s=GONE_WITHIN_S)
+
+    def close(self) -> None:
+        for publisher in self._by.values():
+            publisher.end()
+        self._observer.close()
+        self._server.end()
+        self._bridge.end()
+
+
+def main(times: int = 20) -> None:
+    print("| publisher | RMW | times | reached the panel | lost, and locked | lost, and not noticed |")
+    print("| --- | --- | --- | --- | --- | --- |")
+    with tempfile.TemporaryDirectory() as folder:
+        rmws: tuple[tuple[Vendor, str], ...] = (("fast", "Fast DDS"), ("cyclone", "Cyclone DDS"))
+        for kind in KINDS:
+            with closing(Publishers(FIRST, Path(folder), kind.durability)) as rig:
+                for vendor, rmw in rmws:
+                    found = [rig.trial(vendor, kind).outcome for _ in range(times)]
+                    counts = [str(found.count(one)) for one in ("heard", "locked", "unnoticed")]
+                    print(f"| {kind.name} | {rmw} | {times} | {' | '.join(counts)} |", flush=True)
+
+
+if __name__ == "__main__":
+    main(*map(int, sys.argv[1:]))
