@@ -1,33 +1,62 @@
-"""`python -m app.check [PANEL]`: every fault of a panel file, with its place.
+"""`python -m app.check [PANEL …]`: every fault of panel files, with its place.
 
-Exit status: 0 the panel is good, 1 it has faults, 2 it can't be read.
+Exit status, of the worst file: 0 good, 1 faults, 2 unreadable.
 """
 
+import argparse
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
-from app.errors import KioskError, PanelError
-from app.panel import load_panel
+from app.errors import KioskError, Note, PanelError
+from app.panel import Panel, check_panel
 from app.settings import Settings
 
+GOOD, FAULTY, UNREADABLE = range(3)
 
-def main(arguments: list[str]) -> int:
-    if len(arguments) > 1:
-        print("usage: python -m app.check [PANEL]", file=sys.stderr)
-        return 2
+
+def main(arguments: Sequence[str]) -> int:
+    given = _parser().parse_args(arguments)
     try:
-        path = Path(arguments[0]) if arguments else Settings.from_environment().panel
-        panel = load_panel(path)
-    except PanelError as error:
-        print(error, file=sys.stderr)
-        return 2 if error.unreadable else 1
+        paths = given.panel or [Settings.from_environment().panel]
     except KioskError as error:
         print(error, file=sys.stderr)
-        return 2
-    count = sum(1 for _ in panel.widgets())
+        return UNREADABLE
+    return max(checked(path) for path in paths)
+
+
+def checked(path: Path) -> int:
+    """Prints what there is to say of one panel file; its exit status."""
+    try:
+        panel, notes = check_panel(path)
+    except PanelError as error:
+        print(error, file=sys.stderr, flush=True)
+        return UNREADABLE if error.unreadable else FAULTY
+    print(_summary(path, panel, notes), flush=True)
+    return GOOD
+
+
+def _summary(path: Path, panel: Panel, notes: Sequence[Note]) -> str:
+    widgets = sum(1 for _ in panel.widgets())
     robots = f"{len(panel.robots)} robot(s), " if panel.robots else ""
-    print(f'{path}: good: "{panel.title}", {robots}{len(panel.pages)} page(s), {count} widget(s)')
-    return 0
+    what = f'"{panel.title}", {robots}{len(panel.pages)} page(s), {widgets} widget(s)'
+    return "\n".join([f"{path}: good: {what}", *(f"  {note}" for note in notes)])
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m app.check",
+        description="Tells every fault of panel files, with its place and what would be right.",
+        epilog="Exit status, of the worst file: 0 good (notes are no faults), 1 faults, 2 unreadable.",
+    )
+    parser.add_argument(
+        "panel",
+        nargs="*",
+        type=Path,
+        metavar="PANEL",
+        help="a panel file; without any, the one of KIOSK_PANEL or else the shipped one",
+    )
+    return parser
 
 
 if __name__ == "__main__":

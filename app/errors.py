@@ -35,14 +35,39 @@ class SettingsError(KioskError):
 
 
 @dataclass(frozen=True, slots=True)
-class Fault:
-    """One fault of a panel file: `place` as in `page[0].widget[2].topic`, "" for the whole file."""
+class Remark:
+    """About one place of a panel file: `place` as in `page[0].widget[2].topic`, "" for the whole file;
+    `id` of the widget, interlock, robot or page that it is in, and `line` from 1, where they are known.
+    """
 
     place: str
     message: str
+    id: str = ""
+    line: int = 0
+
+    @property
+    def where(self) -> str:
+        """`page[0].widget[2].topic "speed", line 41`."""
+        named = f'{self.place} "{self.id}"' if self.id else self.place
+        return ", ".join(filter(None, (named, f"line {self.line}" if self.line else "")))
 
     def __str__(self) -> str:
-        return f"{self.place}: {self.message}" if self.place else self.message
+        return f"{self.where}: {self.message}" if self.where else self.message
+
+
+class Fault(Remark):
+    """What keeps a panel file from being used."""
+
+    __slots__ = ()
+
+
+class Note(Remark):
+    """What is no fault, and still worth a look."""
+
+    __slots__ = ()
+
+    def __str__(self) -> str:
+        return f"note: {super().__str__()}"
 
 
 class PanelError(KioskError):

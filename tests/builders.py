@@ -8,6 +8,7 @@ from app import keys
 from app.actions import Actions
 from app.calls import Asker, Calls
 from app.confirmations import Confirmations
+from app.errors import PanelError
 from app.interfaces import interfaces_of
 from app.keys import Qos, TopicRole
 from app.log import Origin, Unlogged
@@ -57,6 +58,11 @@ COUNT: Final[Table] = {
     "type": "example_interfaces/action/Fibonacci",
     "goal": {"order": 3},
 }
+
+
+def told(error: PanelError) -> str:
+    """The faults of a panel file, a line for each, without what only helps to find them."""
+    return "\n".join(f"{fault.place}: {fault.message}" for fault in error.faults)
 
 
 def panel_of(*widgets: Table, interlock: Table = NOTHING, **more: Any) -> Panel:

@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 
 from app.check import main
+from app.errors import Note
+from app.panel import load_panel
 from app.settings import PACKAGE
 
 SHIPPED = PACKAGE / "panel.toml"
@@ -35,7 +37,10 @@ def test_every_fault_is_printed_with_its_place(
     assert said.out == ""
     first, *lines = said.err.splitlines()
     assert first == f"{faulty} can't be used:"
-    assert [line.split(": ")[0] for line in lines] == ["  title", "  page[0].widget[4].topic"]
+    assert [line.split(": ")[0] for line in lines] == [
+        "  title",
+        '  page[0].widget[4].topic "last_heard", line 55',
+    ]
 
 
 def test_a_file_that_is_not_there_can_not_be_read(
@@ -68,9 +73,46 @@ def test_a_wrong_environment_is_told_without_a_traceback(
     assert capsys.readouterr().err == 'KIOSK_MODE is "maybe": it must be "demo" or "live"\n'
 
 
-def test_more_than_one_panel_is_a_misuse(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["a.toml", "b.toml"]) == 2
-    assert capsys.readouterr().err == "usage: python -m app.check [PANEL]\n"
+def test_several_panels_are_checked_and_the_worst_one_is_the_status(
+    faulty: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    none = tmp_path / "none.toml"
+    assert main([str(faulty), str(SHIPPED)]) == 1
+    said = capsys.readouterr()
+    assert said.err.startswith(f"{faulty} can't be used:")
+    assert said.out.startswith(f"{SHIPPED}: good:")
+    assert main([str(SHIPPED), str(none), str(faulty)]) == 2
+    said = capsys.readouterr()
+    assert [line for line in said.err.splitlines() if line[:1] != " "] == [
+        f"{none} can't be used:",
+        f"{faulty} can't be used:",
+    ]
+    assert main([str(SHIPPED), str(SHIPPED)]) == 0
+
+
+def test_it_tells_how_it_is_used(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["--help"])
+    assert ended.value.code == 0
+    said = capsys.readouterr().out
+    assert said.startswith("usage: python -m app.check [-h] [PANEL ...]")
+    assert "KIOSK_PANEL" in said
+    assert "Exit status" in said
+
+
+def test_a_note_is_no_fault_and_has_its_place(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    noted = [Note("interlock[0]", "is worth a look"), Note("page[0].widget[4].max_age_s", "is missing")]
+    monkeypatch.setattr("app.panel.load.notes_in", lambda panel: noted)
+    assert main([str(SHIPPED)]) == 0
+    said = capsys.readouterr()
+    assert said.err == ""
+    assert said.out.splitlines()[1:] == [
+        '  note: interlock[0] "operation", line 10: is worth a look',
+        '  note: page[0].widget[4].max_age_s "last_heard", line 52: is missing',
+    ]
+    load_panel(SHIPPED)
 
 
 @pytest.mark.parametrize(("text", "status"), [(SHIPPED.read_text(), 0), (NO_TITLE, 1), ("title =", 2)])

@@ -15,6 +15,7 @@ from app.control_view import Role, role
 from app.errors import PanelError
 from app.panel import Panel, load_panel
 from app.panel.control import ControlRules
+from tests.builders import told
 
 RULES = ControlRules(required=True)
 TAKEOVER_S = RULES.takeover_after_s
@@ -451,8 +452,8 @@ def test_what_is_wrong_with_the_table_is_told_with_all_else(
 ) -> None:
     with pytest.raises(PanelError) as caught:
         panel_with(tmp_path, f'{table}\n[[interlock]]\nid = "a"\ntopic = "nowhere"\n')
-    assert fault in str(caught.value)
-    assert "interlock[0].topic" in str(caught.value)
+    assert fault in told(caught.value)
+    assert "interlock[0].topic" in told(caught.value)
 
 
 # Whatever they do, in whatever order.

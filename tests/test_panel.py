@@ -471,11 +471,16 @@ def test_types_are_those_of_the_robots_distribution(load: Load, distro: str) -> 
 @pytest.mark.parametrize(
     ("data", "reason"),
     [
-        (b"title = ", "at end of document"),
-        (b"[[page]\n", "line 1"),
-        (b"title = 'a'\ntitle = 'b'\n", "overwrite"),
-        (b"\xff\xfe", "byte 0xff at line 1 is not UTF-8: save the file as UTF-8"),
-        (b"a = 1\nb = '\xfc'\n", "byte 0xfc at line 2 is not UTF-8"),
+        (b"title = ", "Invalid value, at the end of the file"),
+        (b"[[page]\n", "line 1: Expected ']]'"),
+        (b"title = 'a'\ntitle = 'b'\n", "line 2: this key or table is above already"),
+        (b"[log]\na = 1\n[log]\n", "line 3: Cannot declare log twice"),
+        (
+            b"[[page]]\nwidget = []\n[[page.widget]]\n",
+            "line 3: nothing can be added to .*: page.widget",
+        ),
+        (b"\xff\xfe", "line 1: byte 0xff is not UTF-8: save the file as UTF-8"),
+        (b"a = 1\nb = '\xfc'\n", "line 2: byte 0xfc is not UTF-8"),
     ],
 )
 def test_what_is_no_toml_is_unreadable(tmp_path: Path, data: bytes, reason: str) -> None:
@@ -533,11 +538,14 @@ def test_keys_named_like_something_else_keep_their_place(
     assert list(faults(load, given)) == [place]
 
 
-@pytest.mark.parametrize("content", ["[" * 5000, "9" * 5000])
-def test_what_breaks_the_reader_is_unreadable(tmp_path: Path, content: str) -> None:
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [("[" * 5000, "too many brackets in brackets"), ("9" * 5000, "a number has too many digits")],
+)
+def test_what_breaks_the_reader_is_unreadable(tmp_path: Path, content: str, reason: str) -> None:
     path = tmp_path / "panel.toml"
     path.write_text(f"a = {content}")
-    with pytest.raises(PanelError) as error:
+    with pytest.raises(PanelError, match=reason) as error:
         load_panel(path)
     assert error.value.unreadable
 

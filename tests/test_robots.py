@@ -11,6 +11,7 @@ from websockets.exceptions import InvalidStatus
 
 from app.errors import PanelError
 from app.panel import load_panel
+from tests.builders import told
 from tests.parts import ROOT, Bridge, Process, RosNode, Server, free_port, has_heard, live, until
 
 MANY = 10
@@ -246,7 +247,7 @@ def test_the_panel_file_says_what_is_wrong_with_its_robots(tmp_path: Path) -> No
     path = panel_file(tmp_path, entry(1), entry(1), 'id = "r3"\nname = "R3"\nnamespace = "a b"')
     with pytest.raises(PanelError) as caught:
         load_panel(path)
-    text = str(caught.value)
+    text = told(caught.value)
     assert 'robot[2].namespace: "a b" is not a ROS 2 namespace' in text
     assert 'robot[1].id: "r1" is already the id of robot[0]' in text
     assert 'robot[1].name: "Robot 1" is already the name of robot[0]' in text

@@ -2,7 +2,7 @@
 
 from app.panel.displays import Indicator, LampState, Readout
 from app.panel.inputs import NumberInput, SelectInput, SliderInput, TextInput, ToggleInput
-from app.panel.load import load_panel
+from app.panel.load import check_panel, load_panel
 from app.panel.model import Display, Hold, Input, Interlock, Page, Panel, Publish
 
 __all__ = [
@@ -21,5 +21,6 @@ __all__ = [
     "SliderInput",
     "TextInput",
     "ToggleInput",
+    "check_panel",
     "load_panel",
 ]

@@ -1,9 +1,7 @@
 """Reading a panel file, and every fault in it with its place."""
 
 import copy
-import hashlib
 import re
-import tomllib
 from collections.abc import Callable, Collection, Iterator, Mapping
 from difflib import get_close_matches
 from pathlib import Path
@@ -11,12 +9,15 @@ from typing import Any, Final, get_args
 
 from pydantic import BaseModel, ValidationError
 
-from app.errors import Fault, InterfaceError, PanelError
+from app.errors import Fault, InterfaceError, Note, PanelError
 from app.interfaces import interfaces_of, read_distribution
 from app.panel.check import faults_in
 from app.panel.constants import resolved
 from app.panel.description import ID
 from app.panel.model import KINDS, Hold, Panel
+from app.panel.notes import notes_in
+from app.panel.places import located, place_of
+from app.panel.toml_file import TomlFile, read_toml
 
 INLINE: Final[Mapping[str | int, str]] = {
     "options": '[{ value = 1, label = "One" }]',
@@ -27,40 +28,39 @@ NEEDED: Final[Mapping[str | int, str]] = {
     "release": "a hold needs the message that is published when it ends",
 }
 
+Kept = Callable[[Panel], Path | None]
 
-def load_panel(path: Path, kept: Callable[[Panel], Path | None] = lambda _: None) -> Panel:
+
+def load_panel(path: Path, kept: Kept = lambda _: None) -> Panel:
     """The checked panel; PanelError has every fault, `unreadable` where it is not even TOML.
 
     `kept` says in which folder what is read of the distribution may be kept for the next start.
     """
+    return _panel(read_toml(path), kept)
+
+
+def check_panel(path: Path) -> tuple[Panel, tuple[Note, ...]]:
+    """The checked panel, with what is no fault of it but worth a look; PanelError as `load_panel`."""
+    file = read_toml(path)
+    panel = _panel(file)
+    return panel, tuple(located(notes_in(panel), file.text, file.tables))
+
+
+def _panel(file: TomlFile, kept: Kept = lambda _: None) -> Panel:
+    folder = file.path.parent
+    tables = {key: value for key, value in file.tables.items() if key != "revision"}
+    faults = [] if tables == file.tables else [Fault("revision", "unknown key")]
     try:
-        data = path.read_bytes()
-        tables = tomllib.loads(data.decode("utf-8-sig"))  # some editors begin a file with a mark
-    except (OSError, ValueError, RecursionError) as error:
-        raise PanelError(str(path), (Fault("", _unreadable(error)),), unreadable=True) from error
-    revision = hashlib.sha256(data).hexdigest()[:12]
-    faults = [Fault("revision", "unknown key")] if tables.pop("revision", None) is not None else []
-    try:
-        panel = Panel.model_validate(tables | {"revision": revision}, context=path.parent)
+        panel = Panel.model_validate(tables | {"revision": file.revision}, context=folder)
     except ValidationError as error:
         faults += map(_fault, error.errors())
-        faults += _faults_of_the_rest(tables, error, path.parent)
+        faults += _faults_of_the_rest(tables, error, folder)
     else:
         read_distribution(panel.distro, kept(panel))
         faults += _faults_with_types(panel)
     if faults:
-        raise PanelError(str(path), tuple(faults))
+        raise PanelError(str(file.path), tuple(located(faults, file.text, file.tables)))
     return resolved(panel, interfaces_of(panel.distro, panel.interfaces))
-
-
-def _unreadable(error: Exception) -> str:
-    match error:
-        case OSError(strerror=str(reason)):
-            return reason
-        case UnicodeDecodeError(object=data, start=at):
-            line = data.count(b"\n", 0, at) + 1
-            return f"byte {data[at]:#04x} at line {line} is not UTF-8: save the file as UTF-8"
-    return str(error)
 
 
 def _faults_with_types(panel: Panel, faulty: Collection[str] = ()) -> Iterator[Fault]:
@@ -121,10 +121,7 @@ def _fault(error: Any) -> Fault:
     """One of pydantic's errors in the panel file's own terms."""
     location = error["loc"]
     model, steps = _walk(location)
-    place = ""
-    for step in steps:
-        place += f"[{step}]" if isinstance(step, int) else f".{step}" if place else step
-    return Fault(place, _message(error, model, location))
+    return Fault(place_of(tuple(steps)), _message(error, model, location))
 
 
 def _walk(location: tuple[str | int, ...]) -> tuple[type[BaseModel], list[str | int]]:

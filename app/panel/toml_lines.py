@@ -1,0 +1,139 @@
+"""The line on which each key and table of a TOML text stands: Python's own reader does not tell.
+
+The text must be good TOML (that reader took it): nothing is checked here. Source: TOML 1.0.0 (toml.io).
+"""
+
+import re
+import tomllib
+from bisect import bisect_right
+from collections import Counter
+from typing import Final
+
+Path = tuple[str | int, ...]  # ("page", 0, "widget", 2, "topic")
+
+_SPACE: Final = re.compile(r"(?:[ \t\r\n]|#[^\n]*)*")
+_BARE: Final = re.compile(r"[A-Za-z0-9_-]+")
+_QUOTED: Final = re.compile(r'"(?:\\.|[^"\\])*"|\'[^\']*\'')
+_DOT: Final = re.compile(r"[ \t]*\.[ \t]*")
+# The longest first: three quotes are no empty string and the beginning of another one.
+_VALUE: Final = re.compile(
+    r'"""(?:\\.|[^\\])*?"""{1,3}(?!")'
+    r"|'''.*?'''{1,3}(?!')"
+    r'|"(?:\\.|[^"\\])*"'
+    r"|'[^']*'"
+    r"|[^,\]}#\n]+",
+    re.DOTALL,
+)
+
+
+def lines_of(text: str) -> dict[Path, int]:
+    """Path → line, from 1, of every key, table and list element; a table's is that of its header."""
+    scanner = _Scanner(text)
+    scanner.document()
+    return scanner.lines
+
+
+class _Scanner:
+    def __init__(self, text: str) -> None:
+        self.lines: dict[Path, int] = {}
+        self._text = text
+        self._at = 0
+        self._ends = [match.start() for match in re.finditer("\n", text)]
+        self._tables: Counter[Path] = Counter()  # how many [[headers]] of each there were
+
+    def document(self) -> None:
+        table: Path = ()
+        while self._next():
+            if self._text[self._at] == "[":
+                table = self._header()
+            else:
+                self._pair(table)
+
+    def _next(self) -> str:
+        """The next character that is no space and no comment; "" at the end."""
+        self._take(_SPACE)
+        return self._text[self._at : self._at + 1]
+
+    def _take(self, pattern: re.Pattern[str]) -> str:
+        """What a pattern matches here, which is taken; "" where it does not."""
+        match = pattern.match(self._text, self._at)
+        if match is None:
+            return ""
+        self._at = match.end()
+        return match[0]
+
+    def _line(self) -> int:
+        return bisect_right(self._ends, self._at - 1) + 1
+
+    def _header(self) -> Path:
+        """The table that a header opens: `[a.b]`, or one more of `[[a.b]]`."""
+        line, many = self._line(), self._text.startswith("[[", self._at)
+        self._at += 2 if many else 1
+        *above, last = self._key()
+        self._at += 2 if many else 1
+        path: Path = ()
+        for part in above:
+            path = self._newest((*path, part))
+            self.lines.setdefault(path, line)
+        path = (*path, last)
+        if many:
+            self.lines.setdefault(path, line)
+            self._tables[path] += 1
+            path = self._newest(path)
+        self.lines[path] = line
+        return path
+
+    def _newest(self, path: Path) -> Path:
+        """A table, or the last one of a list of tables."""
+        return (*path, self._tables[path] - 1) if path in self._tables else path
+
+    def _key(self) -> list[str]:
+        """The parts of a key: `a."b.c"` has two. What stands after it, and its spaces, is next."""
+        parts = []
+        while True:
+            self._take(_SPACE)
+            quoted = self._take(_QUOTED)
+            parts.append(tomllib.loads(f"_ = {quoted}")["_"] if quoted else self._take(_BARE))
+            if not self._take(_DOT):
+                self._take(_SPACE)
+                return parts
+
+    def _pair(self, table: Path) -> None:
+        line = self._line()
+        path = table
+        for part in self._key():
+            path = (*path, part)
+            self.lines.setdefault(path, line)
+        self._at += len("=")
+        self._next()
+        self._value(path)
+
+    def _value(self, path: Path) -> None:
+        match self._text[self._at]:
+            case "[":
+                self._list(path)
+            case "{":
+                self._inline_table(path)
+            case _:
+                self._take(_VALUE)
+
+    def _list(self, path: Path) -> None:
+        self._at += 1
+        index = 0
+        while self._next() != "]":
+            self.lines[*path, index] = self._line()
+            self._value((*path, index))
+            index += 1
+            self._comma()
+        self._at += 1
+
+    def _inline_table(self, path: Path) -> None:
+        self._at += 1
+        while self._next() != "}":
+            self._pair(path)
+            self._comma()
+        self._at += 1
+
+    def _comma(self) -> None:
+        if self._next() == ",":
+            self._at += 1
