@@ -11,6 +11,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from app.errors import DecodeError, FieldError, InterfaceError
 from app.interfaces import DISTROS, INTEGERS, PLACEHOLDER, interfaces_of
+from app.interfaces.stock import AS
 from app.keys import MESSAGE_TYPE
 from tests.builders import BOOL, INTERFACES, TEXT
 
@@ -23,7 +24,7 @@ class Sample:
     """Fields for any type, each value unlike the last, at the edges of its range."""
 
     def __init__(self, distro: str) -> None:
-        self._definitions = get_typestore(Stores(f"ros2_{distro}")).fielddefs
+        self._definitions = get_typestore(Stores(f"ros2_{AS.get(distro, distro)}")).fielddefs
         self._turn = 0
         self.types = tuple(self._definitions)
 
@@ -78,6 +79,20 @@ def test_every_type_comes_back_as_it_went(distro: str) -> None:
 @pytest.mark.parametrize("distro", list(DISTROS))
 def test_every_type_can_be_named_by_a_panel(distro: str) -> None:
     assert [name for name in Sample(distro).types if not MESSAGE_TYPE.fullmatch(name)] == []
+
+
+@pytest.mark.parametrize(
+    ("type_name", "field", "distros"),
+    [
+        ("geometry_msgs/msg/Pose2D", "theta", ["humble", "iron", "jazzy", "kilted"]),
+        ("nav_msgs/msg/Goals", "goals", ["kilted", "lyrical", "rolling"]),
+        ("lifecycle_msgs/msg/TransitionEvent", "timestamp", ["humble", "iron", "jazzy", "kilted"]),
+        ("lifecycle_msgs/msg/TransitionEvent", "stamp", ["lyrical", "rolling"]),
+    ],
+)
+def test_each_distribution_has_its_own_messages(type_name: str, field: str, distros: list[str]) -> None:
+    has = {d: interfaces_of(d).structures.get(type_name) for d in DISTROS}
+    assert [d for d, one in has.items() if one and field in [f.name for f in one.fields]] == distros
 
 
 @pytest.mark.parametrize(

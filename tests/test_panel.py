@@ -9,6 +9,7 @@ import pytest
 from pydantic import ValidationError
 
 from app.errors import PanelError
+from app.interfaces import DISTROS
 from app.panel import Panel, Publish, Readout, TextInput, load_panel
 from app.settings import PACKAGE
 from tests.builders import FREE, GUARDED, HEARD, INTERLOCK, MESSAGE, TEXT, Table, small_panel
@@ -163,7 +164,7 @@ def test_an_interlock_and_a_widget_may_have_one_id(load: Load) -> None:
         (tables(revision="x"), "revision", "unknown key"),
         (tables(mode="DEMO"), "mode", "'demo' or 'live', not 'DEMO'"),
         (tables(language="de"), "language", "'en', not 'de'"),
-        (tables(distro="foxy"), "distro", "'humble', 'iron', 'jazzy' or 'kilted', not 'foxy'"),
+        (tables(distro="foxy"), "distro", "'kilted', 'lyrical' or 'rolling', not 'foxy'"),
         (
             tables(namespace="a b"),
             "namespace",
@@ -463,7 +464,7 @@ def test_a_message_without_fields_can_be_sent(load: Load) -> None:
     assert load(with_widget(1, type="std_msgs/msg/Empty", message={}))
 
 
-@pytest.mark.parametrize("distro", ["humble", "iron", "jazzy", "kilted"])
+@pytest.mark.parametrize("distro", DISTROS)
 def test_types_are_those_of_the_robots_distribution(load: Load, distro: str) -> None:
     assert load(tables(distro=distro)).distro == distro
 

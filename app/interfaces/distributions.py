@@ -10,7 +10,7 @@ from app.interfaces import kept
 from app.interfaces.definitions import Definitions, Structure
 from app.interfaces.packages import available, read_folders
 
-DISTROS: Final = ("humble", "iron", "jazzy", "kilted")
+DISTROS: Final = ("humble", "iron", "jazzy", "kilted", "lyrical", "rolling")
 
 # Definitions beside rosbags' messages: services, actions, and packages that it lacks.
 BUILTIN: Final = Path(__file__).parent / "builtin"

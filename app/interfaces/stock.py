@@ -1,18 +1,22 @@
 """The messages of a distribution, as rosbags has them: to import this takes as long as a tenth of the
 server's start, so it is done only where what was read before is not kept (`kept`)."""
 
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_typestore
 
 from app.interfaces.definitions import PLACEHOLDER, Field, Structure, Type
 
+# Rolling is what the next distribution will be: it has the messages of the newest one that rosbags knows.
+AS: Final[Mapping[str, str]] = {"rolling": "lyrical"}
+
 
 def messages_of(distro: str) -> dict[str, Structure]:
     """By name, without defaults: rosbags drops them."""
-    definitions = get_typestore(Stores(f"ros2_{distro}")).fielddefs
+    definitions = get_typestore(Stores(f"ros2_{AS.get(distro, distro)}")).fielddefs
     return {name: _structure(name, definition) for name, definition in definitions.items()}
 
 

@@ -195,7 +195,7 @@ class Panel(Description):
     title: Label
     mode: Literal["demo", "live"] = "live"
     language: Literal["en"] = "en"
-    distro: Literal["humble", "iron", "jazzy", "kilted"] = "jazzy"
+    distro: Literal["humble", "iron", "jazzy", "kilted", "lyrical", "rolling"] = "jazzy"
     interfaces: Annotated[tuple[Folder, ...], Field(strict=False)] = ()
     namespace: Annotated[str, AfterValidator(namespace_of)] = ""
     press_expires_s: Annotated[float, Field(ge=0.5, le=60)] = 2.0
