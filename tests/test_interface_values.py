@@ -138,7 +138,7 @@ def to_plain_fields(value: Any) -> Any:
         ("nothing", {"a": 1}, "nothing.a", "unknown field; std_msgs/msg/Empty has none"),
         ("nothing", None, "nothing", "must be a table"),
         ("nothings", [{}, 1], "nothings[1]", "must be a table"),
-        ("times", [{"sec": 1, "nanosec": 2}, {"sec": 1}], "times[1].nanosec", "is missing"),
+        ("times", [{"sec": 1}, {"nsec": 2}], "times[1].nsec", "unknown field"),
         ("times", [{"sec": 1, "nanosec": 2}, {"sec": 1, "nanosec": 2.5}], "times[1].nanosec", "whole"),
     ],
 )

@@ -185,10 +185,14 @@ def test_a_whole_number_may_stand_for_a_float() -> None:
 @pytest.mark.parametrize(
     ("type_name", "fields", "place", "why"),
     [
-        (TEXT, {}, "data", "is missing"),
         (TEXT, {"data": "x", "dat": "y"}, "dat", "unknown field; std_msgs/msg/String has data"),
         ("std_msgs/msg/Empty", {"data": 1}, "data", "unknown field; std_msgs/msg/Empty has none"),
-        ("std_msgs/msg/Header", {"stamp": {"sec": 1}, "frame_id": ""}, "stamp.nanosec", "is missing"),
+        (
+            "std_msgs/msg/Header",
+            {"stamp": {"secs": 1}},
+            "stamp.secs",
+            "unknown field; .* has sec, nanosec",
+        ),
         ("std_msgs/msg/Header", {"stamp": 1, "frame_id": ""}, "stamp", "must be a table"),
         (
             "std_msgs/msg/Header",
@@ -208,7 +212,7 @@ def test_a_whole_number_may_stand_for_a_float() -> None:
             "name[1]",
             "must be text",
         ),
-        ("geometry_msgs/msg/Polygon", {"points": [{"x": 0, "y": 0}]}, "points[0].z", "is missing"),
+        ("geometry_msgs/msg/Polygon", {"points": [{}, {"w": 0}]}, "points[1].w", "has x, y, z"),
         ("geometry_msgs/msg/Polygon", {"points": "none"}, "points", "must be a list"),
         ("geometry_msgs/msg/Polygon", {"points": {"x": 0}}, "points", "must be a list"),
         (
@@ -226,6 +230,32 @@ def test_a_fault_names_its_place_in_the_message(
     with pytest.raises(FieldError, match=why) as caught:
         INTERFACES.encode(type_name, fields)
     assert caught.value.field == place
+
+
+@pytest.mark.parametrize(
+    ("type_name", "fields", "whole"),
+    [
+        (TEXT, {}, {"data": ""}),
+        ("std_msgs/msg/Header", {"stamp": {"sec": 1}}, {
+            "stamp": {"sec": 1, "nanosec": 0}, "frame_id": ""}),
+        ("geometry_msgs/msg/Polygon", {"points": [{"x": 1}, {}]}, {
+            "points": [{"x": 1.0, "y": 0.0, "z": 0.0}, {"x": 0.0, "y": 0.0, "z": 0.0}]}),
+        (POSE, {"pose": {"position": {"x": 1}}}, {
+            "pose": {
+                "position": {"x": 1.0, "y": 0.0, "z": 0.0},
+                "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0},
+            },
+            "covariance": [0.0] * 36}),
+        ("sensor_msgs/msg/NavSatStatus", {}, {"status": -2, "service": 0}),
+        ("unique_identifier_msgs/msg/UUID", {}, {"uuid": [0] * 16}),
+        (SOLID, {}, {"type": 0, "dimensions": [], "polygon": {"points": []}}),
+    ],
+)  # fmt: skip
+def test_what_a_message_leaves_out_has_its_default_or_is_zero(
+    type_name: str, fields: Mapping[str, Any], whole: Mapping[str, Any]
+) -> None:
+    assert INTERFACES.encode(type_name, fields) == INTERFACES.encode(type_name, whole)
+    assert fields_of(INTERFACES.decode(type_name, INTERFACES.encode(type_name, fields)), whole) == whole
 
 
 def test_a_bounded_list_takes_no_more_than_its_bound() -> None:

@@ -60,6 +60,11 @@ def test_a_hold_has_a_rate_and_its_topic_is_published(tmp_path: Path) -> None:
     assert panel.qos("/cmd_vel") == hold.qos
 
 
+def test_what_is_left_out_of_a_hold_is_zero(tmp_path: Path) -> None:
+    assert loaded(tmp_path, SPEED, {**JOG, "message": {"linear": {"x": "{speed}"}}, "release": {}})
+    assert loaded(tmp_path, {**FLAGS, "message": {"x_offset": 1}, "release": {}})
+
+
 def test_the_kiosk_fills_in_deadline_and_count(tmp_path: Path) -> None:
     assert loaded(tmp_path, SPEED, FLAGS)
 
@@ -76,8 +81,8 @@ def test_the_kiosk_fills_in_deadline_and_count(tmp_path: Path) -> None:
         ({**JOG, "rate": 10}, "rate", 'did you mean "rate_hz"?'),
         ({**JOG, "topic": "/rosout"}, "topic", "/rosout is where the kiosk's own log goes"),
         ({**JOG, "type": "geometry_msgs/msg/Twits"}, "type", "did you mean geometry_msgs/msg/Twist"),
-        ({**JOG, "release": {"linear": ZERO}}, "release.angular", "is missing"),
-        ({**JOG, "message": {"linear": ZERO}}, "message.angular", "is missing"),
+        ({**JOG, "release": {"lineal": ZERO}}, "release.lineal", "unknown field"),
+        ({**JOG, "message": {"linear": {"y": "1"}}}, "message.linear.y", "must be a number (float64)"),
         (
             {**JOG, "release": {"linear": ZERO, "angular": "{spin}"}},
             "release.angular",

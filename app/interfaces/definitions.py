@@ -51,6 +51,27 @@ class Type:
         return f"{one}[<={self.size}]" if self.size else f"{one}[]"
 
 
+def zero(kind: Type) -> Any:
+    """What a field of a type has that nobody gave a value, as ROS makes it: a plain value, of another
+    structure a table without fields."""
+    match kind.many:
+        case "sequence":
+            return []
+        case "array":
+            return [zero(kind.element)] * kind.size
+    if kind.nested:
+        return {}
+    return (
+        False
+        if kind.name == "bool"
+        else ""
+        if kind.name in TEXTS
+        else 0.0
+        if kind.name in FLOATS
+        else 0
+    )
+
+
 def attribute(name: str) -> str:
     """A field's name in a message object: a keyword of Python's gets a "_" after it."""
     return f"{name}_" if keyword.iskeyword(name) else name
@@ -68,6 +89,11 @@ class Field:
     def attribute(self) -> str:
         """The field's name in a message object."""
         return attribute(self.name)
+
+    @property
+    def left_out(self) -> Any:
+        """The plain value of a field that a message leaves out: its default, else zero."""
+        return zero(self.type) if self.default is None else self.default
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from app.interfaces.definitions import PLACEHOLDER, Field, Structure, Type
 
-# Rolling is what the next distribution will be: it has the messages of the newest one that rosbags knows.
+# Rolling is what the next distribution will be: it has the messages of the newest that rosbags knows.
 AS: Final[Mapping[str, str]] = {"rolling": "lyrical"}
 
 

@@ -100,8 +100,9 @@ class Interfaces:
     def encode(self, type_name: str, fields: Mapping[str, Any]) -> bytes:
         """The message as XCDR1 bytes with their encapsulation header (00 01 00 00).
 
-        Every field without a default must be there, and each must fit its definition: else
-        FieldError, which names it. Lists may be NumPy arrays, those of 8-bit unsigned numbers `bytes`.
+        A field that is left out has its default, else zero. Each must be one of the type's and fit its
+        definition: else FieldError, which names it. Lists may be NumPy arrays, those of 8-bit unsigned
+        numbers `bytes`.
         """
         check = self._checks.get(type_name) or self._check(type_name)
         return self._codec.serialize(check(fields), type_name)
