@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Final, NamedTuple
 
 from app.errors import Cause
-from app.hold_messages import Filled
+from app.hold_messages import Values
 from app.leases import Lease
 from app.logs import RobotLog
 from app.panel.model import Hold
@@ -30,7 +30,7 @@ class Holding:
     lease: Lease
     by: By
     inputs: Mapping[str, Any]
-    filled: Filled
+    values: Values
     told: Callable[[Receipt], None]
     since: str
     sent: int = 0

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
 from app.errors import Cause, FieldError, InputError, LinkError, NotFound, PressRefused
-from app.hold_messages import Checked, Filled, HoldMessages, Way
+from app.hold_messages import Checked, HoldMessages, Values, Way
 from app.hold_receipts import RELEASED, Holding, HoldReceipts, Refusal, refused
 from app.interfaces import Interfaces
 from app.interlocks import Verdict
@@ -132,13 +132,13 @@ class Holds:
 
     def _ready(
         self, widget: Hold, inputs: Mapping[str, Any], sent: float, by: By, now: float
-    ) -> Filled | Refusal:
+    ) -> Values | Refusal:
         """What it would publish if it began now, or why it may not."""
         why, cause = self._ground(widget, sent, by, now)
         if why:
             return Refusal(why, cause)
         try:
-            return self._messages.filled(widget, inputs)
+            return self._messages.values(widget, inputs)
         except (FieldError, InputError) as error:
             return Refusal(f"{error}.", "input")
 
@@ -222,7 +222,7 @@ class Holds:
 
     def _send(self, holding: Holding) -> None:
         try:
-            self._messages.put(holding.widget, holding.filled, lambda: self._last_look(holding))
+            self._messages.put(holding.widget, holding.values, lambda: self._last_look(holding))
         except LinkError as error:
             self._end(holding, "link", f"{error}.")
         except PressRefused:
@@ -246,7 +246,7 @@ class Holds:
         widget, now = holding.widget, self._loop.time()
         del self._held[widget.id]
         del self._robot.held[widget.id]
-        unsaid = self._messages.put_last(widget, holding.filled, now)
+        unsaid = self._messages.put_last(widget, holding.values, now)
         receipt = self._receipts.ended(holding, now - holding.lease.begun_at, code, why, unsaid)
         holding.told(receipt)
         self._changed()

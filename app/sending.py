@@ -13,7 +13,7 @@ from app.inputs import checked, typed
 from app.interfaces import Interfaces
 from app.panel.model import Action, Call, Input, Panel, Pressed, Publish
 from app.panel.parameter import SET, Parameter
-from app.panel.template import filled, inputs_of
+from app.panel.template import filled, inputs_of, with_now
 from app.parameters import Parameters
 from app.progress import Answer, Corrected, LastLook, no_look
 from app.robot import Robot
@@ -98,7 +98,7 @@ class Sending:
         it could not be sent, PressRefused where `look` finds that it may not be.
         """
         values = self.checked(self._needs[widget.id], inputs)
-        fields = filled(widget.template, values)
+        fields = filled(widget.template, with_now(values))
         match widget:
             case Publish():
                 if widget.confirm is None:
@@ -120,7 +120,8 @@ class Sending:
 
     def refusal(self, widget: Pressed, inputs: Mapping[str, Any]) -> str:
         """Why `send` would refuse it now, "" if it would not; FieldError or InputError as there."""
-        fields = filled(widget.template, self.checked(self._needs[widget.id], inputs))
+        values = self.checked(self._needs[widget.id], inputs)
+        fields = filled(widget.template, with_now(values))
         match widget:
             case Publish():
                 self._interfaces.encode(widget.type, fields)

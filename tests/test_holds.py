@@ -2,6 +2,7 @@
 
 import logging
 import math
+import time
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
@@ -191,6 +192,24 @@ def test_while_it_is_held_messages_go_out_at_the_rate_and_one_at_the_end(bench: 
     assert (receipt.outcome, receipt.widget, receipt.cause) == ("published", "jog", "")
     assert receipt.reason.startswith("Released at ")
     assert receipt.reason.endswith(", after 1.0 s.")
+
+
+def test_each_message_has_the_time_of_its_own_sending() -> None:
+    stamped = "geometry_msgs/msg/PointStamped"
+    header = {"header": {"stamp": "{now}"}}
+    jog = {**JOG, "type": stamped, "message": {**header, "point": {"x": "{speed}"}}, "release": header}
+    bench = Bench(jog)
+    before = time.time_ns()
+    holding = bench.begun()
+    bench.keep(holding, 0.2)
+    bench.holds.end(holding, RELEASED)
+    after = time.time_ns()
+    sent = [INTERFACES.decode(stamped, payload) for payload in bench.way.payloads]
+    assert [one.point.x for one in sent] == [0.5] * 4 + [0.0]
+    stamps = [one.header.stamp.sec * 10**9 + one.header.stamp.nanosec for one in sent]
+    assert stamps == sorted(set(stamps))
+    assert before <= stamps[0]
+    assert stamps[-1] <= after
 
 
 def test_a_doubt_ends_it_and_the_stop_still_goes_out(bench: Bench) -> None:

@@ -25,6 +25,10 @@ STATES: list[Any] = [{"value": 0, "text": "Idle", "shape": "circle"}]
 LAMP: Mapping[str, Any] = {
     **HEARD, "kind": "indicator", "type": "std_msgs/msg/UInt8", "states": STATES,
 }  # fmt: skip
+PARAMETER: Mapping[str, Any] = {
+    "id": "p", "kind": "parameter", "label": "P", "node": "/arm", "parameter": "speed",
+    "type": "double",
+}  # fmt: skip
 IMAGE_FORMATS = "sensor_msgs/msg/PointField"
 
 
@@ -197,6 +201,74 @@ def test_a_fault_of_an_input_or_a_display_is_told(widget: Mapping[str, Any], fau
     assert found.startswith(f"page[0].widget[0].{fault}")
 
 
+STAMPED = "geometry_msgs/msg/TwistStamped"
+PATH = "nav_msgs/msg/Path"
+NOW_IS = '"{now}", alone, is the time of sending and fills a builtin_interfaces/msg/Time'
+
+
+@pytest.mark.parametrize(
+    "widget",
+    [
+        sent("builtin_interfaces/msg/Time", {}),
+        sent("std_msgs/msg/Header", {"stamp": "{now}"}),
+        sent(STAMPED, {"header": {"stamp": "{now}", "frame_id": "{message}"}}),
+        sent(PATH, {"poses": [{}, {"header": {"stamp": "{now}"}}]}),
+        {**sent(STAMPED, {"header": {"stamp": "{now}"}}), "kind": "hold", "interlock": "operation",
+         "release": {"header": {"stamp": "{now}"}}},
+        {"id": "plan", "kind": "call", "label": "P", "service": "/plan", "type": "nav_msgs/srv/GetPlan",
+         "request": {"start": {"header": {"stamp": "{now}"}}}},
+    ],
+)  # fmt: skip
+def test_now_fills_a_time_anywhere_in_a_message(widget: Mapping[str, Any]) -> None:
+    assert faults(MESSAGE, widget) == []
+
+
+@pytest.mark.parametrize(
+    ("type_name", "message", "place", "fault"),
+    [
+        (TEXT, {"data": "{now}"}, "data", f"{NOW_IS}; the field is string"),
+        (TEXT, {"data": "at {now}"}, "data", f"{NOW_IS}; the field is string"),
+        ("std_msgs/msg/Int32", {"data": "{now}"}, "data", f"{NOW_IS}; the field is int32"),
+        (
+            "builtin_interfaces/msg/Duration",
+            {"sec": "{now}"},
+            "sec",
+            f"{NOW_IS}; the field is int32",
+        ),
+        (STAMPED, {"header": "{now}"}, "header", f"{NOW_IS}; the field is std_msgs/msg/Header"),
+        (STAMPED, {"header": {"stamp": "{now}{now}"}}, "header.stamp", f"{NOW_IS}; the field is built"),
+        (STAMPED, {"header": {"stamps": "{now}"}}, "header.stamps", "unknown field; std_msgs/msg/Head"),
+        (
+            PATH,
+            {"poses": [{}, {"pose": "{now}"}]},
+            "poses[1].pose",
+            f"{NOW_IS}; the field is geometry_msgs/msg/Pose",
+        ),
+        (
+            "trajectory_msgs/msg/JointTrajectory",
+            {"points": [{"time_from_start": "{now}"}]},
+            "points[0].time_from_start",
+            f"{NOW_IS}; the field is builtin_interfaces/msg/Duration",
+        ),
+    ],
+)
+def test_now_fills_nothing_but_a_time(
+    type_name: str, message: dict[str, Any], place: str, fault: str
+) -> None:
+    found = faults(sent(type_name, message))
+    assert {one.split(": ")[0] for one in found} == {f"page[0].widget[0].message.{place}"}
+    assert found[0].startswith(f"page[0].widget[0].message.{place}: {fault}")
+
+
+@pytest.mark.parametrize("kind", ["text", "toggle", "parameter"])
+def test_no_input_is_called_now(kind: str) -> None:
+    one: Mapping[str, Any] = {"text": MESSAGE, "toggle": TOGGLE, "parameter": PARAMETER}[kind]
+    assert faults({**one, "id": "now"}, std("String", "{now}")) == [
+        f'page[0].widget[0].id: "now" is reserved, as {NOW_IS}: choose another id'
+    ]
+    assert faults({**std("String", "x"), "id": "now"}) == []
+
+
 @pytest.mark.parametrize("step", [0.1, 0.7, 1e-7])
 def test_steps_are_counted_as_they_are_written(step: float) -> None:
     assert faults({**NUMBER, "min": -0.7, "max": 0.7, "step": step}) == []
@@ -229,12 +301,6 @@ def test_what_depends_on_a_fault_that_is_told_already_is_not_judged() -> None:
     panel = panel_of(MESSAGE, std("Float64", "{message}"))
     assert list(faults_in(panel, INTERFACES, {"message"})) == []
     assert [type(f) for f in faults_in(panel, INTERFACES, {"other"})] == [Fault]
-
-
-PARAMETER: Mapping[str, Any] = {
-    "id": "p", "kind": "parameter", "label": "P", "node": "/arm", "parameter": "speed",
-    "type": "double",
-}  # fmt: skip
 
 
 @pytest.mark.parametrize(

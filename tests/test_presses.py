@@ -4,6 +4,7 @@ import asyncio
 import logging
 import math
 import re
+import time
 from collections.abc import Callable, Mapping
 from datetime import datetime, timedelta
 from typing import Any
@@ -39,6 +40,8 @@ from tests.builders import (
     sending_of,
     small_panel,
 )
+
+PATH = "nav_msgs/msg/Path"
 
 
 class Way:
@@ -110,6 +113,25 @@ def test_a_press_sends_its_message_once(bench: Bench) -> None:
     receipt = bench.press()
     assert (receipt.outcome, receipt.cause) == ("published", "")
     assert bench.way.sent == [("free", b"\0\1\0\0\6\0\0\0hello\0")]
+
+
+def test_now_is_the_time_of_sending_and_no_input() -> None:
+    message = {"poses": [{}, {"header": {"stamp": "{now}", "frame_id": "{message}"}}]}
+    panel = panel_of(MESSAGE, {**FREE, "type": PATH, "message": message})
+    bench = Bench(panel)
+    before = time.time_ns()
+    receipt = bench.press(inputs={"message": "map"})
+    after = time.time_ns()
+    assert receipt.outcome == "published"
+    assert receipt.inputs == {"message": "map"}
+    ((_, payload),) = bench.way.sent
+    first, second = INTERFACES.decode(PATH, payload).poses
+    assert (first.header.stamp.sec, first.pose.orientation.w) == (0, 1.0)
+    assert second.header.frame_id == "map"
+    assert before <= second.header.stamp.sec * 10**9 + second.header.stamp.nanosec <= after
+    again = bench.press(inputs={"message": "map", "now": "12:00"}, press_id="p2")
+    assert (again.outcome, again.cause) == ("refused", "input")
+    assert 'there is no input "now" on this panel' in again.reason
 
 
 def test_a_receipt_has_what_the_contract_says(bench: Bench) -> None:

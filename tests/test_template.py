@@ -1,11 +1,12 @@
 """Message templates: values of inputs put in once, with their type, and braces checked."""
 
+import time
 from typing import Any
 
 import pytest
 
 from app.errors import FieldError
-from app.panel.template import at, filled, named
+from app.panel.template import at, filled, named, names_in, with_now
 
 
 @pytest.mark.parametrize(
@@ -92,3 +93,17 @@ def test_a_list_can_not_stand_in_a_text() -> None:
 def test_what_stands_at_a_field_is_found(where: str, found: Any) -> None:
     template = {"x": "{a}", "z": [1, {"w": "{b}"}]}
     assert at(template, where) == (template if found is None else found)
+
+
+def test_now_is_the_time_at_which_it_is_asked_for() -> None:
+    before = time.time_ns()
+    values = with_now({"a": 1})
+    stamp = filled([{"stamp": "{now}"}], values)[0]["stamp"]
+    assert set(stamp) == {"sec", "nanosec"}
+    assert before <= stamp["sec"] * 10**9 + stamp["nanosec"] <= time.time_ns()
+    assert stamp["nanosec"] < 10**9
+    assert values["a"] == 1
+
+
+def test_now_is_no_input() -> None:
+    assert names_in([{"x": "{now}"}, "{a}", ["{b} {a}"]]) == ["a", "b"]

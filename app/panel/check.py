@@ -12,7 +12,7 @@ from app.panel.check_holds import hold_faults
 from app.panel.check_inputs import input_faults
 from app.panel.check_parameters import parameter_faults, type_faults
 from app.panel.displays import Indicator, Readout
-from app.panel.examples import template_faults
+from app.panel.examples import NOW_IS, template_faults
 from app.panel.model import (
     Action,
     Call,
@@ -27,6 +27,7 @@ from app.panel.model import (
     Published,
 )
 from app.panel.parameter import Parameter
+from app.panel.template import NOW
 
 BEST_EFFORT: Final = (
     "is missing: of a best-effort topic any message may be lost, the one that forbids too; "
@@ -47,6 +48,9 @@ def faults_in(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = ()
         yield Fault("page", "is missing: a panel has one page at least")
     yield from _repeated("page", [page.id for page in panel.pages])
     yield from _repeated_widgets(panel)
+    reserved = list(_reserved(panel))
+    yield from reserved
+    faulty = {*faulty, NOW} if reserved else faulty
     inputs = {w.id: w for w in panel.widgets() if isinstance(w, Input)}
     for p, page in enumerate(panel.pages):
         on_page = {w.id: w for w in page.widgets if isinstance(w, Input)}
@@ -129,6 +133,15 @@ def _repeated_widgets(panel: Panel) -> Iterator[Fault]:
             if widget.id in seen:
                 yield Fault(f"{place}.id", f'"{widget.id}" is already the id of {seen[widget.id]}')
             seen.setdefault(widget.id, place)
+
+
+def _reserved(panel: Panel) -> Iterator[Fault]:
+    """A widget by whose id a value comes can't be called as what stands for something else."""
+    for p, page in enumerate(panel.pages):
+        for w, widget in enumerate(page.widgets):
+            if isinstance(widget, Input | Parameter) and widget.id == NOW:
+                what = f'"{NOW}" is reserved, as {NOW_IS}: choose another id'
+                yield Fault(f"page[{p}].widget[{w}].id", what)
 
 
 def _interlock(place: str, interlock: Interlock, interfaces: Interfaces) -> Iterator[Fault]:

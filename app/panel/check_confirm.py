@@ -6,9 +6,9 @@ from collections.abc import Collection, Iterator, Mapping
 from app.errors import Fault, FieldError
 from app.interfaces import Interfaces
 from app.panel.check_displays import field_faults, misfit
-from app.panel.examples import examples, unknown
+from app.panel.examples import NOW_IS, examples, unknown
 from app.panel.model import Confirm, Input, Panel, Publish
-from app.panel.template import filled, named
+from app.panel.template import NOW, filled, named
 
 
 def confirm_faults(
@@ -56,6 +56,7 @@ def _equals(
         yield Fault(f"{place}.{error.field}", error.message)
         return
     faults = list(unknown(place, names, inputs, anywhere))
+    faults += [Fault(f"{place}.{where}", NOW_IS) for where, name in names if name == NOW]
     yield from faults
     if faults:
         return

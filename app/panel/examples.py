@@ -1,15 +1,17 @@
 """Templates tried at load, with examples of what their inputs give."""
 
 from collections.abc import Collection, Iterator, Mapping
-from typing import Any
+from contextlib import suppress
+from typing import Any, Final
 
 from app.errors import Fault, FieldError, InterfaceError
 from app.interfaces import Interfaces
 from app.panel.inputs import SelectInput, TextInput, ToggleInput
 from app.panel.model import Input
-from app.panel.template import at, filled, named
+from app.panel.template import NOW, TIME, at, filled, named, with_now
 
-ELSEWHERE = " on this page: an input is read from the page it is on"
+NOW_IS: Final = f'"{{{NOW}}}", alone, is the time of sending and fills a {TIME}'
+ELSEWHERE: Final = " on this page: an input is read from the page it is on"
 
 
 def examples(of: Input) -> list[Any]:
@@ -38,10 +40,12 @@ def template_faults(
     """
     try:
         names = list(named(template))
-        yield from unknown(place, names, inputs, anywhere)
-        known = {name: inputs[name] for _, name in names if name in inputs}
-        if len(known) == len({name for _, name in names}) and not known.keys() & set(faulty):
-            yield from _tried(place, template, type_name, known, interfaces)
+        faults = list(unknown(place, names, inputs, anywhere))
+        if not {name for _, name in names} & set(faulty):
+            faults += _misplaced_now(place, template, type_name, names, interfaces)
+            known = {name: inputs[name] for _, name in names if name in inputs}
+            faults += [] if faults else _tried(place, template, type_name, known, interfaces)
+        yield from faults
     except FieldError as error:
         yield Fault(f"{place}.{error.field}".rstrip("."), error.message)
 
@@ -50,10 +54,25 @@ def unknown(
     place: str, names: list[tuple[str, str]], inputs: Collection[str], anywhere: Collection[str]
 ) -> Iterator[Fault]:
     for where, name in names:
-        if name not in inputs:
+        if name not in inputs and name != NOW:
             there = ", ".join(sorted(inputs)) or "none"
             what = f"; there is {there}" if name not in anywhere else ELSEWHERE
             yield Fault(f"{place}.{where}", f'no input "{name}"{what}')
+
+
+def _misplaced_now(
+    place: str,
+    template: Mapping[str, Any],
+    type_name: str,
+    names: list[tuple[str, str]],
+    interfaces: Interfaces,
+) -> Iterator[Fault]:
+    """`"{now}"` alone, where a time is meant. A field that the type does not have is told elsewhere."""
+    for where in (where for where, name in names if name == NOW):
+        with suppress(InterfaceError):
+            kind = interfaces.field_type(type_name, where)
+            if kind != TIME or at(template, where) != f"{{{NOW}}}":
+                yield Fault(f"{place}.{where}", f"{NOW_IS}; the field is {kind}")
 
 
 def _tried(
@@ -67,7 +86,7 @@ def _tried(
     for turn in range(max(map(len, tried.values()), default=1)):
         values = {name: some[min(turn, len(some) - 1)] for name, some in tried.items()}
         try:
-            interfaces.encode(type_name, filled(template, values))
+            interfaces.encode(type_name, filled(template, with_now(values)))
         except FieldError as error:
             message = _message(error, template, type_name, inputs, values, interfaces)
             yield Fault(f"{place}.{error.field}".rstrip("."), message)

@@ -1,6 +1,7 @@
-"""Message templates: `{ data = "{message}" }` with the values of the inputs it names."""
+"""Message templates: `{ data = "{message}" }` with the values of the inputs it names, and `"{now}"`."""
 
 import re
+import time
 from collections.abc import Iterable, Iterator, Mapping
 from functools import lru_cache
 from string import Formatter
@@ -11,6 +12,16 @@ from app.panel.model import Hold, Pressed, Publish
 
 # In what is shown of an answer: a path in its type. (In what is sent: the id of an input.)
 PLACE: Final = re.compile(r"\{([^{}]*)\}")
+
+NOW: Final = "now"  # no input's id: what it stands for is the time of sending, of the type TIME
+TIME: Final = "builtin_interfaces/msg/Time"
+A_SECOND_NS: Final = 10**9
+
+
+def with_now(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Values of inputs, and what `{now}` stands for at this moment."""
+    seconds, rest = divmod(time.time_ns(), A_SECOND_NS)
+    return {**values, NOW: {"sec": seconds, "nanosec": rest}}
 
 
 def filled(template: Any, inputs: Mapping[str, Any], where: str = "") -> Any:
@@ -102,7 +113,8 @@ def needed(widget: Pressed | Hold, given: Mapping[str, Any]) -> dict[str, Any]:
 
 def names_in(templates: Iterable[Any]) -> list[str]:
     """The ids of the inputs that templates name, each once."""
-    return list(dict.fromkeys(name for template in templates for _, name in named(template)))
+    every = (name for template in templates for _, name in named(template))
+    return [name for name in dict.fromkeys(every) if name != NOW]
 
 
 @lru_cache(1000)
