@@ -16,8 +16,17 @@ SWITCHED: Final = {"true": True, "false": False}
 
 def limits(of: Numeric) -> str:
     """What a number may be, as an operator reads it: "0 to 1.5 m/s, in steps of 0.1"."""
-    unit = f" {of.unit}" if of.unit else ""
-    return say("limits", low=digits(of.min), high=digits(of.max), unit=unit, step=digits(of.step))
+    about = {"low": digits(of.min), "high": digits(of.max), "unit": f" {of.unit}" if of.unit else ""}
+    if of.step is None:
+        return say("limits_both", **about)
+    return say("limits", **about, step=digits(of.step))
+
+
+def default_of(of: Input) -> Any:
+    """The default that the panel file gives an input, as a press gives it; None where it gives none."""
+    if "default" not in of.model_fields_set or of.default is None:
+        return None
+    return of.typed(of.default) if isinstance(of, Numeric) else of.default
 
 
 def typed(of: Input, text: str) -> Any:

@@ -99,9 +99,11 @@ class Presses:
     async def press(self, widget_id: str, inputs: Mapping[str, Any], press_id: str, by: By) -> Receipt:
         """Sends what the widget is for, or refuses. The same id again is the same press.
 
-        What it is judged by, is judged in the moment of sending.
+        What it is judged by, is judged in the moment of sending. An input that has a default in the
+        panel file may be left out.
         """
         widget = self.widget(widget_id)
+        inputs = self._sending.with_defaults(widget, inputs)
         known = self._under_way.get(press_id) or self._receipts.get(press_id)
         if known is None and not self._receipts.is_past(press_id):
             if left_out := self._left_out(widget, inputs, press_id, by):

@@ -9,9 +9,9 @@ from app.actions import Actions
 from app.calls import Calls
 from app.confirmations import Confirmations
 from app.errors import InputError, NotFound
-from app.inputs import checked, typed
+from app.inputs import checked, default_of, typed
 from app.interfaces import Interfaces
-from app.panel.model import Action, Call, Input, Panel, Pressed, Publish
+from app.panel.model import Action, Call, Hold, Input, Panel, Pressed, Publish
 from app.panel.parameter import SET, Parameter
 from app.panel.template import filled, inputs_of, with_now
 from app.parameters import Parameters
@@ -81,6 +81,13 @@ class Sending:
     def needed(self, widget: Pressed, inputs: Mapping[str, Any]) -> dict[str, Any]:
         """Of all that came with a press, the inputs that it needs."""
         return {name: inputs[name] for name in self._needs[widget.id] if name in inputs}
+
+    def with_defaults(self, widget: Pressed | Hold, inputs: Mapping[str, Any]) -> dict[str, Any]:
+        """What came with a press, and the defaults of other inputs that it needs, where the panel file
+        gives one."""
+        fields = ((name, self._widgets[name]) for name in inputs_of(widget) if name not in inputs)
+        missing = {name: default_of(field) for name, field in fields if isinstance(field, Input)}
+        return {name: value for name, value in missing.items() if value is not None} | {**inputs}
 
     async def send(
         self,

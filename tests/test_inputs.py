@@ -15,6 +15,9 @@ SPEED: Mapping[str, Any] = {
     "id": "speed", "kind": "number", "label": "Speed", "min": -0.5, "max": 1.5, "step": 0.1,
     "unit": "m/s",
 }  # fmt: skip
+FREE: Mapping[str, Any] = {
+    "id": "free", "kind": "slider", "label": "Free", "min": -1.0, "max": 1, "unit": "rad",
+}  # fmt: skip
 COUNT: Mapping[str, Any] = {"id": "count", "kind": "slider", "label": "Count", "min": 1, "max": 99}
 MODE: Mapping[str, Any] = {
     "id": "mode", "kind": "select", "label": "Mode", "options": [
@@ -47,6 +50,9 @@ def exactly(value: Any, wanted: Any) -> bool:
         (SPEED, 1.5, 1.5),
         (SPEED, 0.3, 0.3),
         (SPEED, 1.1, 1.1),
+        (FREE, 0.123456789, 0.123456789),
+        (FREE, -1, -1.0),
+        (FREE, 1e-300, 1e-300),
         (COUNT, 1, 1),
         (COUNT, 99.0, 99),
         (MODE, 0, 0),
@@ -89,6 +95,9 @@ SPEED_LIMITS = "-0.5 to 1.5 m/s, in steps of 0.1"
         (SPEED, "1", "Speed must be a number"),
         (SPEED, True, f"Speed must be a number, {SPEED_LIMITS}, not True"),
         (SPEED, [1], "Speed must be a number"),
+        (FREE, 1.0001, "Free is 1.0001: it must be -1 to 1 rad"),
+        (FREE, math.nan, "Free is nan: it must be -1 to 1 rad"),
+        (FREE, "", "Free has no number: it must be -1 to 1 rad"),
         (COUNT, 1.5, "Count is 1.5: it must be 1 to 99, in steps of 1"),
         (COUNT, 100, "Count is 100: it must be 1 to 99, in steps of 1"),
         (MODE, 1, "Mode must be one of Zero, True, Float, Slow, Table, Large, not 1"),
@@ -137,8 +146,29 @@ def test_a_forms_text_becomes_what_its_input_is(
 
 
 def test_limits_read_as_an_operator_says_them() -> None:
-    widget: Any = one(COUNT)
-    assert limits(widget) == "1 to 99, in steps of 1"
+    for table, text in ((COUNT, "1 to 99, in steps of 1"), (FREE, "-1 to 1 rad")):
+        widget: Any = one(table)
+        assert limits(widget) == text
+
+
+@pytest.mark.parametrize(
+    ("more", "step", "whole"),
+    [
+        ({"min": 0, "max": 10}, "1", True),
+        ({"min": 0.0, "max": 10}, "any", False),
+        ({"min": 0, "max": 10.0}, "any", False),
+        ({"min": -1.0, "max": 1.0}, "any", False),
+        ({"min": 0, "max": 1.5}, "any", False),
+        ({"min": 0, "max": 10, "step": 0.5}, "0.5", False),
+        ({"min": 0.0, "max": 10.0, "step": 1}, "1", True),
+        ({"min": 0.5, "max": 10.5, "step": 1}, "1", False),
+    ],
+)
+def test_limits_that_are_written_as_whole_numbers_have_whole_steps(
+    more: Mapping[str, Any], step: str, whole: bool
+) -> None:
+    widget: Any = one({"id": "n", "kind": "number", "label": "N", **more})
+    assert (widget.attributes["step"], widget.whole) == (step, whole)
 
 
 def test_every_value_on_a_step_is_taken() -> None:

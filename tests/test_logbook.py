@@ -342,6 +342,15 @@ def test_an_entry_and_a_receipt_have_the_values_of_their_own_press_only(tmp_path
     assert needed(jog, {"speed": 7, "message": "hi"}) == {"speed": 7}
 
 
+def test_an_entry_has_the_defaults_that_a_press_used(tmp_path: Path) -> None:
+    async def work(bench: Bench) -> None:
+        await bench.press(other="x")
+
+    panel = panel_of({**MESSAGE, "default": "hi"}, {**MESSAGE, "id": "other"}, GUARDED)
+    pressed, *_ = real(tmp_path, work, panel)
+    assert json.loads(pressed.values) == {"message": "hi"}
+
+
 def test_every_refusal_is_in_the_log(tmp_path: Path) -> None:
     async def work(bench: Bench) -> None:
         await bench.press("free", "p1", message="too long for it")

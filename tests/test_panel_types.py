@@ -49,6 +49,7 @@ def std(kind: str, placeholder: str) -> dict[str, Any]:
     [
         (NUMBER, std("Float64", "{n}")),
         ({**NUMBER, "step": 0.5}, std("Float32", "{n}")),
+        ({**NUMBER, "min": -1.0, "max": 1.0, "default": 0.123}, std("Float64", "{n}")),
         (NUMBER, std("UInt8", "{n}")),
         ({**NUMBER, "min": -128, "max": 127}, std("Int8", "{n}")),
         ({**NUMBER, "kind": "slider", "default": 5}, std("Int64", "{n}")),
@@ -80,6 +81,10 @@ def test_an_input_fits_a_field_of_its_type(widgets: tuple[Mapping[str, Any], ...
         ((NUMBER, std("String", "{n}")), 'input "n" gives whole numbers; the field is string'),
         (
             ({**NUMBER, "step": 0.5}, std("Int32", "{n}")),
+            'input "n" gives numbers; the field is int32',
+        ),
+        (
+            ({**NUMBER, "min": 0.0}, std("Int32", "{n}")),
             'input "n" gives numbers; the field is int32',
         ),
         (
@@ -131,7 +136,11 @@ def test_a_fault_deep_in_a_message_has_its_whole_place() -> None:
         ({**NUMBER, "max": 0}, "max: 0 must be more than min (0)"),
         ({**NUMBER, "step": 3}, "step: no whole number of steps of 3 leads from 0 to 10"),
         ({**NUMBER, "default": 11}, "default: 11 is not from 0 to 10"),
-        ({**NUMBER, "default": 0.5}, "default: 0.5 is not on a step of 1 from 0"),
+        (
+            {**NUMBER, "default": 0.5},
+            "default: 0.5 is not on a step of 1 from 0; limits written as 0.0 and 10.0 take any number",
+        ),
+        ({**NUMBER, "min": 0.0, "default": 10.5}, "default: 10.5 is not from 0 to 10"),
         ({**SELECT, "default": 3}, "default: 3 is no option; there is 1, 2"),
         ({**SELECT, "default": True}, "default: True is no option"),
         (

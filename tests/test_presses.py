@@ -295,6 +295,39 @@ def test_an_input_that_the_message_does_not_name_may_come_along() -> None:
     assert bench.way.texts == ["hello"]
 
 
+REACH = {"id": "reach", "kind": "slider", "label": "Reach", "min": -1.0, "max": 1.0, "default": 0.25}
+MODE = {
+    "id": "mode",
+    "kind": "select",
+    "label": "Mode",
+    "options": [{"value": 1, "label": "One"}, {"value": 2, "label": "Two"}],
+    "default": 2,
+}
+ON = {"id": "on", "kind": "toggle", "label": "On", "default": False}
+COUNT = {"id": "count", "kind": "number", "label": "Count", "min": 0, "max": 9, "default": 5}
+ALL = "{message} {reach} {mode} {on} {count}"
+
+
+def test_an_input_with_a_default_may_be_left_out() -> None:
+    inputs = [{**MESSAGE, "default": "hi"}, REACH, MODE, ON, COUNT]
+    bench = Bench(panel_of(*inputs, {**FREE, "message": {"data": ALL}}))
+    receipt = bench.press(inputs={})
+    assert bench.way.texts == ["hi 0.25 2 false 5"]
+    used = {"message": "hi", "reach": 0.25, "mode": 2, "on": False, "count": 5}
+    assert receipt.inputs == used
+    assert bench.press(inputs=used) == receipt  # the same press, said in full
+    bench.press(inputs={"reach": -1, "mode": 1}, press_id="p2")
+    assert bench.way.texts == ["hi 0.25 2 false 5", "hi -1.0 1 false 5"]
+
+
+@pytest.mark.parametrize("one", [MESSAGE, REACH, MODE, ON, COUNT])
+def test_an_input_without_a_default_in_the_file_may_not_be_left_out(one: Table) -> None:
+    plain = {key: value for key, value in one.items() if key != "default"}
+    bench = Bench(panel_of(plain, {**FREE, "message": {"data": f"a {{{one['id']}}}"}}))
+    cause, reason = refused(bench, bench.press(inputs={}))
+    assert (cause, reason) == ("input", f'Not sent: the input "{one["id"]}" is missing.')
+
+
 def test_a_message_may_need_no_input() -> None:
     bench = Bench(panel_of({**FREE, "message": {"data": "start"}}))
     assert bench.press(inputs={}).outcome == "published"

@@ -20,12 +20,15 @@ def input_faults(place: str, of: Input) -> Iterator[Fault]:
 
 def on_step(of: Numeric, value: float) -> bool:
     """Whether a value is whole steps away from the lowest, exactly as both are written."""
+    if of.step is None:
+        return True
     low, step = Fraction(repr(of.min)), Fraction(repr(of.step))
     return (Fraction(repr(value)) - low) % step == 0
 
 
 def _numeric(place: str, of: Numeric) -> Iterator[Fault]:
-    low, high, step = digits(of.min), digits(of.max), digits(of.step)
+    low, high = digits(of.min), digits(of.max)
+    step = "" if of.step is None else digits(of.step)
     if of.max <= of.min:
         yield Fault(f"{place}.max", f"{high} must be more than min ({low})")
     elif not on_step(of, of.max):
@@ -34,7 +37,8 @@ def _numeric(place: str, of: Numeric) -> Iterator[Fault]:
         yield Fault(f"{place}.default", f"{digits(of.default)} is not from {low} to {high}")
     elif of.default is not None and not on_step(of, of.default):
         what = f"is not on a step of {step} from {low}"
-        yield Fault(f"{place}.default", f"{digits(of.default)} {what}")
+        hint = f"; limits written as {of.min} and {of.max} take any number" if of.step == 1 else ""
+        yield Fault(f"{place}.default", f"{digits(of.default)} {what}{hint}")
 
 
 def _select(place: str, of: SelectInput) -> Iterator[Fault]:

@@ -1,9 +1,10 @@
 """Descriptions of inputs: what an operator enters, and what a message takes by an input's id."""
 
 import json
+from collections.abc import Mapping
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, model_validator
 
 from app.panel.description import Description, Label, Placed, Span, some
 from app.sentences import say
@@ -37,18 +38,30 @@ class Stepped(Placed):
 
 
 class Numeric(Stepped):
-    """A number with limits; whole numbers, if its lowest and its step are whole."""
+    """A number with limits; whole numbers, if its lowest and its step are whole.
+
+    Without a `step` any number between the limits is taken; but limits that are written as whole
+    numbers, as 0 and not as 0.0, are those of whole numbers.
+    """
 
     min: Number
     max: Number
-    step: Annotated[Number, Field(gt=0)] = 1.0
+    step: Annotated[Number, Field(gt=0)] | None = None
     unit: Unit = ""
     default: Number | None = None
     span: Span = 6
 
+    @model_validator(mode="before")
+    @classmethod
+    def _stepped(cls, given: Any) -> Any:
+        """Only here it shows how the limits are written."""
+        limits = [given.get(key) for key in ("min", "max")] if isinstance(given, Mapping) else []
+        whole = limits and all(type(limit) is int for limit in limits)
+        return {"step": 1, **given} if whole else given
+
     @property
     def whole(self) -> bool:
-        return self.min.is_integer() and self.step.is_integer()
+        return self.step is not None and self.step.is_integer() and self.min.is_integer()
 
     @property
     def gives(self) -> str:
@@ -57,7 +70,8 @@ class Numeric(Stepped):
     @property
     def attributes(self) -> dict[str, str]:
         """Limits and step as HTML has them."""
-        return {"min": digits(self.min), "max": digits(self.max), "step": digits(self.step)}
+        step = "any" if self.step is None else digits(self.step)
+        return {"min": digits(self.min), "max": digits(self.max), "step": step}
 
     def typed(self, value: float) -> int | float:
         """A value of this input, as a message takes it."""

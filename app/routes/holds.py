@@ -159,22 +159,23 @@ class _Session:
         if not isinstance(said, Begin):
             return refuse(by, say("hold_by_nonsense"))
         sent = self._sent(said)
+        inputs = self._kiosk.sending.with_defaults(holds.widget(widget), said.inputs)
         try:
             by = self._by = self._kiosk.doubts.by(widget, self._browser, said.seen)
-            if not self._room and (left_out := holds.refusal(widget, said.inputs, sent, by)):
+            if not self._room and (left_out := holds.refusal(widget, inputs, sent, by)):
                 return left_out
-            still_held = await self._written(widget, said, by)
+            still_held = await self._written(widget, inputs, by)
         except InputError as error:
             return refuse(by, f"{error}.", "input")
         except LogError as error:
             return refuse(by, str(error), "log")
         if not still_held:
             return refuse(by, say("hold_let_go"))
-        return holds.begin(widget, said.inputs, sent, by, self._ended.set_result, self._id)
+        return holds.begin(widget, inputs, sent, by, self._ended.set_result, self._id)
 
-    async def _written(self, widget: str, said: Begin, by: By) -> bool:
+    async def _written(self, widget: str, inputs: Mapping[str, Any], by: By) -> bool:
         """The entry in the log, while the browser is listened to: whether it holds still."""
-        own = needed(self._kiosk.holds.widget(widget), said.inputs)
+        own = needed(self._kiosk.holds.widget(widget), inputs)
         writing = asyncio.ensure_future(
             self._kiosk.logbook.pressed(widget, own, self._id, by.origin, "hold")
         )
