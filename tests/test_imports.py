@@ -64,6 +64,7 @@ ORDER = (
     "app.panel.check_displays",
     "app.panel.check_confirm",
     "app.panel.check_parameters",
+    "app.panel.check_own_types",
     "app.panel.check_calls",
     "app.panel.check_holds",
     "app.panel.check",

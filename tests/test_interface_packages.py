@@ -186,8 +186,12 @@ def test_a_line_that_is_wrong_is_named(make: Make, line: str, why: str) -> None:
         "cell_msgs/msg/Wear.msg": "int8 a",
         "cell_msgs/msg/Bad.msg": f"# Bad\nuint8 kind\n{line}\n",
     }
+    cell = Interfaces("jazzy", [make(files)])
+    cell.require("cell_msgs/msg/Wear")
+    assert list(cell.left_out) == ["cell_msgs/msg/Bad"]
     with pytest.raises(InterfaceError, match=why) as caught:
-        Interfaces("jazzy", [make(files)])
+        cell.require("cell_msgs/msg/Bad")
+    assert str(caught.value).startswith('"cell_msgs/msg/Bad" can\'t be used: /')
     assert f"{Path('cell_msgs/msg/Bad.msg')}:3: " in str(caught.value)
     assert caught.value.source is not None
     assert caught.value.source.name == "Bad.msg"
@@ -211,9 +215,56 @@ def test_a_line_that_is_wrong_is_named(make: Make, line: str, why: str) -> None:
 def test_files_that_do_not_fit_together_are_named(
     make: Make, files: Mapping[str, str], why: str
 ) -> None:
-    with pytest.raises(InterfaceError) as caught:
-        Interfaces("jazzy", [make(files)])
-    assert why in str(caught.value)
+    every = Interfaces("jazzy", [make(files)])
+    assert why in str(every.left_out[next(iter(every.left_out))])
+    for file in files:
+        name = file.rpartition(".")[0]
+        with pytest.raises(InterfaceError) as caught:
+            every.require(f"{name}_Request" if "/srv/" in name else name)
+        assert why in str(caught.value)
+    assert interfaces_of("jazzy").structures.items() <= every.structures.items()
+
+
+def test_only_what_needs_a_file_with_a_fault_is_left_out_too(make: Make) -> None:
+    files = {
+        **CELL,
+        "cell_msgs/msg/Wear.msg": "int33 since",  # Tool needs it, and whatever needs that
+        "cell_msgs/msg/Lamp.msg": "bool on",
+        "cell_msgs/srv/Light.srv": "Lamp lamp\n---\nbool ok\n",
+    }
+    cell = Interfaces("jazzy", [make(files)])
+    assert set(cell.left_out) == {
+        "cell_msgs/msg/Wear", "cell_msgs/msg/Tool", "cell_msgs/srv/Change", "cell_msgs/action/Weld",
+    }  # fmt: skip
+    cell.require("cell_msgs/msg/Lamp")
+    cell.service("cell_msgs/srv/Light")
+    assert cell.type_hash("cell_msgs/srv/Light").startswith("RIHS01_")
+    for ask, name in (
+        (cell.require, "cell_msgs/msg/Tool"),
+        (cell.service, "cell_msgs/srv/Change"),
+        (cell.action, "cell_msgs/action/Weld"),
+        (cell.require, "cell_msgs/action/Weld_SendGoal_Request"),
+        (cell.type_hash, "cell_msgs/action/Weld"),
+    ):
+        with pytest.raises(InterfaceError) as caught:
+            ask(name)
+        assert str(caught.value).startswith(f'"{name}" can\'t be used: ')
+        assert str(caught.value).endswith(
+            'Wear.msg:1: "int33" is not a type: a base type, Name, or package/Name'
+        )
+        assert caught.value.source is not None
+        assert caught.value.source.name == "Wear.msg"
+    with pytest.raises(InterfaceError, match=r"did you mean cell_msgs/msg/Tool"):
+        cell.require("cell_msgs/msg/Tol")
+
+
+def test_a_file_with_a_fault_hides_the_built_in_type_of_its_name(make: Make) -> None:
+    """The robot has another one than the distribution: nobody knows which."""
+    cell = Interfaces("jazzy", [make({"std_msgs/msg/Header.msg": "int33 x"})])
+    for name in ("std_msgs/msg/Header", "sensor_msgs/msg/Imu", "nav_msgs/srv/GetPlan_Request"):
+        with pytest.raises(InterfaceError, match=r"Header\.msg:1: "):
+            cell.require(name)
+    cell.require("std_msgs/msg/Bool")
 
 
 def test_a_folder_without_interfaces_is_refused(tmp_path: Path) -> None:
@@ -250,7 +301,7 @@ def test_an_interface_that_is_there_as_idl_only_is_named_with_what_would_be_righ
 def test_what_needs_an_interface_that_is_there_as_idl_only_is_named(make: Make) -> None:
     folder = make({"a/msg/A.msg": "b/B b", "b/msg/B.idl": "module b {};"})
     with pytest.raises(InterfaceError) as caught:
-        Interfaces("jazzy", [folder])
+        Interfaces("jazzy", [folder]).require("a/msg/A")
     assert f'{folder / "a/msg/A.msg"}: field "b" is of type b/msg/B, which is not there: ' in str(
         caught.value
     )
@@ -266,8 +317,8 @@ def test_a_folder_with_idl_only_is_refused_with_what_would_be_right(make: Make) 
 def test_a_file_that_is_no_text_is_refused(make: Make) -> None:
     folder = make(CELL)
     (folder / "cell_msgs/msg/Bad.msg").write_bytes(b"int8 \xff")
-    with pytest.raises(InterfaceError, match=r"Bad\.msg can't be read"):
-        Interfaces("jazzy", [folder])
+    with pytest.raises(InterfaceError, match=r"Bad\.msg can't be read: it is not UTF-8"):
+        Interfaces("jazzy", [folder]).require("cell_msgs/msg/Bad")
 
 
 def test_two_folders_must_not_differ_in_a_type(make: Make, tmp_path: Path) -> None:
@@ -277,10 +328,11 @@ def test_two_folders_must_not_differ_in_a_type(make: Make, tmp_path: Path) -> No
     folders = [make(CELL), tmp_path / "other"]
     Interfaces("jazzy", folders)
     (other / "Wear.msg").write_text("int64 count")
+    differ = Interfaces("jazzy", [*folders, folders[0]])
     with pytest.raises(
         InterfaceError, match=r"cell_msgs/msg/Wear is defined here and, differently, in"
     ):
-        Interfaces("jazzy", folders)
+        differ.require("cell_msgs/msg/Wear")
 
 
 def test_a_changed_file_is_read_again(make: Make) -> None:

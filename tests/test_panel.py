@@ -8,9 +8,13 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
+from app.action_services import CANCEL
+from app.actions import STATUS
 from app.errors import PanelError
 from app.interfaces import DISTROS
-from app.panel import Panel, Publish, Readout, TextInput, load_panel
+from app.panel import Panel, Publish, Readout, TextInput, check_panel, load_panel
+from app.panel.check_own_types import OF_ACTIONS, ROSOUT
+from app.rosout import LOG_TYPE
 from app.settings import PACKAGE
 from tests.builders import FREE, GUARDED, HEARD, INTERLOCK, MESSAGE, TEXT, Table, small_panel
 
@@ -339,6 +343,14 @@ def test_a_fault_is_named_with_its_place(
     assert message in found[place]
 
 
+PARAMETER = {
+    "id": "p",
+    "kind": "parameter",
+    "label": "P",
+    "node": "/arm",
+    "parameter": "speed",
+    "type": "double",
+}
 CALL = {
     "id": "call",
     "kind": "call",
@@ -609,8 +621,51 @@ def test_a_panel_may_bring_interfaces_beside_it(load: Load, tmp_path: Path) -> N
 def test_an_interface_file_with_a_fault_is_named(load: Load, tmp_path: Path) -> None:
     interface(tmp_path, "bool closed\nfloat31 kelvin\n")
     found = faults(load, with_doors("closed"))
+    assert list(found) == [f"{READOUT}.type"]
+    assert found[f"{READOUT}.type"].startswith('"cell_msgs/msg/Doors" can\'t be used: ')
+    assert "msgs/cell_msgs/msg/Doors.msg:2: " in found[f"{READOUT}.type"]
+
+
+def test_an_interface_file_that_the_panel_does_not_need_may_have_a_fault(
+    load: Load, tmp_path: Path
+) -> None:
+    interface(tmp_path)
+    for name in ("Wear", "Tool"):
+        (tmp_path / f"msgs/cell_msgs/msg/{name}.msg").write_text("float31 kelvin\n")
+    load(with_doors("closed[0]"))
+    _, notes = check_panel(tmp_path / "cell.toml")
+    (note,) = (str(note) for note in notes)
+    assert note.startswith(
+        "note: interfaces[0], line 1: cell_msgs/msg/Tool can't be used, and this panel "
+    )
+    assert "msgs/cell_msgs/msg/Tool.msg:1: " in note
+    assert note.endswith("; 1 more can't be used either")
+
+
+@pytest.mark.parametrize(
+    ("widgets", "name"),
+    [
+        ([], ROSOUT),
+        ([ACTION], "action_msgs/msg/GoalStatusArray"),
+        ([PARAMETER], "rcl_interfaces/msg/ParameterEvent"),
+    ],
+)
+def test_what_the_kiosk_itself_needs_must_be_usable(
+    load: Load, tmp_path: Path, widgets: list[Table], name: str
+) -> None:
+    interface(tmp_path)
+    path = tmp_path / f"msgs/{name}.msg"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text("float31 kelvin\n")
+    page = {"id": "one", "title": "One", "widget": widgets}
+    found = faults(load, {"interfaces": ["msgs"], **tables(page=[page])})
     assert list(found) == ["interfaces[0]"]
-    assert "msgs/cell_msgs/msg/Doors.msg:2: " in found["interfaces[0]"]
+    assert found["interfaces[0]"].startswith(f'the panel needs this type: "{name}" can\'t')
+
+
+def test_the_types_that_the_kiosk_needs_are_those_that_it_uses() -> None:
+    assert ROSOUT == LOG_TYPE
+    assert (STATUS, f"{CANCEL}_Request") == OF_ACTIONS
 
 
 def test_the_folder_with_the_fault_is_named(load: Load, tmp_path: Path) -> None:

@@ -6,6 +6,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final, Literal
 
+from app.errors import InterfaceError
+
 INTEGERS: Final[Mapping[str, tuple[int, int]]] = {
     **{f"int{bits}": (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) for bits in (8, 16, 32, 64)},
     **{f"uint{bits}": (0, 2**bits - 1) for bits in (8, 16, 32, 64)},
@@ -115,14 +117,35 @@ class Structure:
 @dataclass(frozen=True, slots=True)
 class Definitions:
     """Structures by name. `wholes` are services and actions as REP 2016 describes them: nothing
-    that is ever sent, but what their type hashes are of."""
+    that is ever sent, but what their type hashes are of. `left_out` has why an interface can't be
+    used, by its name: that of a service, and not that of its request."""
 
     structures: dict[str, Structure] = field(default_factory=dict)
     wholes: dict[str, Structure] = field(default_factory=dict)
+    left_out: dict[str, InterfaceError] = field(default_factory=dict)
 
     def __or__(self, over: "Definitions") -> "Definitions":
         """Both; where both have a name, it is as in `over`."""
-        return Definitions(self.structures | over.structures, self.wholes | over.wholes)
+        return Definitions(
+            self.structures | over.structures,
+            self.wholes | over.wholes,
+            self.left_out | over.left_out,
+        )
+
+    def without(self, left_out: Mapping[str, InterfaceError]) -> "Definitions":
+        """What is left where these interfaces can't be used."""
+        return Definitions(
+            {name: one for name, one in self.structures.items() if interface_of(name) not in left_out},
+            {name: one for name, one in self.wholes.items() if interface_of(name) not in left_out},
+            self.left_out | {**left_out},
+        )
 
     def described(self, name: str) -> Structure | None:
         return self.structures.get(name) or self.wholes.get(name)
+
+
+def interface_of(name: str) -> str:
+    """What the file of a structure defines: "cell_msgs/srv/Change", for its "…/Change_Request". No
+    interface has a "_" in its own name."""
+    package, _, rest = name.rpartition("/")
+    return f"{package}/{rest.partition('_')[0]}"

@@ -8,7 +8,7 @@ from typing import Final
 
 from app.errors import InterfaceError
 from app.interfaces.composition import EVENT_INFO
-from app.interfaces.definitions import Definitions, Structure
+from app.interfaces.definitions import Definitions, Structure, interface_of
 from app.interfaces.parsing import KINDS, parsed
 
 _PACKAGE_NAME: Final = re.compile(r"<name>\s*([^<\s]+)\s*</name>")
@@ -20,8 +20,8 @@ _PLACES: Final = (".", "*", "share/*", "*/share/*")
 def read_folders(folders: Sequence[Path]) -> Definitions:
     """All interfaces in folders laid out like ROS packages, workspaces' `share` too.
 
-    InterfaceError where a folder has none, a file can't be read (it names file and line), or two
-    folders differ in a type. Whether all that they need is there, `complete` says.
+    A file that can't be read is left out, and so is a type in which two folders differ; whether all
+    that the others need is there, `complete` says. InterfaceError where a folder has no interfaces.
     """
     found = Definitions()
     for folder in folders:
@@ -33,8 +33,8 @@ def read_folders(folders: Sequence[Path]) -> Definitions:
         for package in packages:
             name = _name(package)
             for file in _files(package):
-                _add(found, _read(file, name))
-    return found
+                _add(found, file, name)
+    return found.without(found.left_out)
 
 
 def stamp(folders: Sequence[Path]) -> tuple[tuple[Path, int, int], ...]:
@@ -96,32 +96,83 @@ def _read(file: Path, package: str) -> Definitions:
     try:
         text = file.read_text("utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        raise InterfaceError(f"{file} can't be read: {error}", file) from error
+        raise InterfaceError(f"{file} can't be read: {_reason(error)}", file) from error
     return parsed(text, package, file.suffix[1:], file.stem, file)
 
 
-def _add(found: Definitions, read: Definitions) -> None:
-    for name, structure in read.structures.items():
-        known = found.structures.setdefault(name, structure)
-        if known != structure:
-            why = f"{name} is defined here and, differently, in {known.source}"
-            raise InterfaceError(f"{structure.source}: {why}", structure.source)
+def _reason(error: OSError | UnicodeDecodeError) -> str:
+    return str(error.strerror) if isinstance(error, OSError) else "it is not UTF-8"
+
+
+def _add(found: Definitions, file: Path, package: str) -> None:
+    """What a file defines, beside what was found already; or why it is left out."""
+    try:
+        read = _read(file, package)
+        for name, structure in read.structures.items():
+            known = found.structures.get(name, structure)
+            if known != structure:
+                why = f"{name} is defined here and, differently, in {known.source}"
+                raise InterfaceError(f"{file}: {why}", file)
+    except InterfaceError as error:
+        found.left_out.setdefault(f"{package}/{file.suffix[1:]}/{file.stem}", error)
+        return
+    found.structures.update(read.structures)
     found.wholes.update(read.wholes)
 
 
 def complete(found: Definitions, known: Definitions, unread: Mapping[str, Path]) -> Definitions:
-    """What can be used of `found`, with `known` beside it; `unread` as `idl_only` tells.
+    """What can be used of `known` and, before it, of `found`; `unread` as `idl_only` tells.
 
+    Left out is what needs something that is not there or left out itself, and what contains itself.
     Events, and so the hashes of services and actions, are left out where the distribution has none
-    (humble). InterfaceError where a structure needs one that is in neither, or needs itself.
+    (humble).
     """
-    found = _with_events_or_none(found, known)
-    every = known.structures | found.structures
-    for structure in found.structures.values():
-        _require_needed(structure, every, unread)
+    every = (known | _with_events_or_none(found, known)).without(found.left_out)
+    while left_out := _lacking_needs(every, unread) or _in_themselves(every.structures):
+        every = every.without(left_out)
+    return every
+
+
+def _lacking_needs(every: Definitions, unread: Mapping[str, Path]) -> dict[str, InterfaceError]:
+    """Why interfaces can't be used that need others which are not there."""
+    return {
+        interface_of(structure.name): _lack(structure, field.name, need, every, unread)
+        for structure in every.structures.values()
+        for field, need in structure.needs()
+        if need not in every.structures
+    }
+
+
+def _lack(
+    structure: Structure, field: str, need: str, every: Definitions, unread: Mapping[str, Path]
+) -> InterfaceError:
+    why = f'{structure.source or structure.name}: field "{field}" is of type {need}, which '
+    if (cause := every.left_out.get(interface_of(need))) is not None:
+        return InterfaceError(f"{why}can't be used: {cause}", cause.source)
+    near = get_close_matches(need, every.structures, n=1)
+    hint = f"; did you mean {near[0]}?" if near else ": its package must be in a folder too"
+    hint = f": {idl_hint(unread[need])}" if need in unread else hint
+    return InterfaceError(f"{why}is not there{hint}", structure.source)
+
+
+def _in_themselves(every: Mapping[str, Structure]) -> dict[str, InterfaceError]:
+    """Why interfaces can't be used that contain themselves, directly or through others."""
     done: set[str] = set()
-    for structure in found.structures.values():
-        _require_end(structure, every, done, ())
+    found: dict[str, InterfaceError] = {}
+
+    def look(structure: Structure, above: tuple[str, ...]) -> None:
+        path = (*above, structure.name)
+        if structure.name in above:
+            why = f"{structure.name} contains itself ({' → '.join(path)})"
+            error = InterfaceError(f"{structure.source}: {why}", structure.source)
+            found[interface_of(structure.name)] = error
+        elif structure.name not in done:
+            for _, need in structure.needs():
+                look(every[need], path)
+            done.add(structure.name)
+
+    for structure in every.values():
+        look(structure, ())
     return found
 
 
@@ -138,7 +189,12 @@ def _with_events_or_none(found: Definitions, known: Definitions) -> Definitions:
     if EVENT_INFO in known.structures or EVENT_INFO in found.structures:
         return found
     return Definitions(
-        {n: s for n, s in found.structures.items() if EVENT_INFO not in {need for _, need in s.needs()}}
+        {
+            n: s
+            for n, s in found.structures.items()
+            if EVENT_INFO not in {need for _, need in s.needs()}
+        },
+        left_out=found.left_out,
     )
 
 
@@ -149,27 +205,3 @@ def _lacking(found: Definitions, known: Definitions) -> set[Path | None]:
 
 def _except(structures: Mapping[str, Structure], files: set[Path | None]) -> dict[str, Structure]:
     return {name: one for name, one in structures.items() if one.source not in files}
-
-
-def _require_needed(
-    structure: Structure, every: Mapping[str, Structure], unread: Mapping[str, Path]
-) -> None:
-    for field, need in structure.needs():
-        if need not in every:
-            near = get_close_matches(need, every, n=1)
-            hint = f"; did you mean {near[0]}?" if near else ": its package must be in a folder too"
-            hint = f": {idl_hint(unread[need])}" if need in unread else hint
-            why = f'field "{field.name}" is of type {need}, which is not there{hint}'
-            raise InterfaceError(f"{structure.source}: {why}", structure.source)
-
-
-def _require_end(
-    structure: Structure, every: Mapping[str, Structure], done: set[str], above: tuple[str, ...]
-) -> None:
-    if structure.name in above:
-        why = f"{structure.name} contains itself ({' → '.join((*above, structure.name))})"
-        raise InterfaceError(f"{structure.source}: {why}", structure.source)
-    if structure.name not in done:
-        for _, need in structure.needs():
-            _require_end(every[need], every, done, (*above, structure.name))
-        done.add(structure.name)

@@ -10,7 +10,7 @@ from typing import Any
 from app.errors import DecodeError, InterfaceError
 from app.interfaces.codec import LITTLE_ENDIAN, Codec
 from app.interfaces.composition import ActionTypes, action_types
-from app.interfaces.definitions import Structure, Type
+from app.interfaces.definitions import Structure, Type, interface_of
 from app.interfaces.distributions import read_distribution
 from app.interfaces.hashes import type_hash
 from app.interfaces.packages import (
@@ -35,11 +35,12 @@ class Interfaces:
 
     def __init__(self, distro: str = "jazzy", folders: Sequence[Path] = ()) -> None:
         """`folders` are packages, or have packages in them (a workspace's `share`); what they
-        define goes before the distribution's. InterfaceError names the file that can't be used."""
+        define goes before the distribution's. A file that can't be used is no fault until its type is
+        asked for: `left_out` says why. InterfaceError names a folder without interfaces."""
         known = read_distribution(distro)
         self._distro = distro
         self._unread = idl_only(folders)
-        self._definitions = known | complete(read_folders(folders), known, self._unread)
+        self._definitions = complete(read_folders(folders), known, self._unread) if folders else known
         self._structures = self._definitions.structures
         self._codec = Codec(self._structures)
         self._checks: dict[str, Check] = {}
@@ -49,6 +50,11 @@ class Interfaces:
     def structures(self) -> Mapping[str, Structure]:
         """The definition of every type that can be encoded, parts of services and actions too."""
         return self._structures
+
+    @property
+    def left_out(self) -> Mapping[str, InterfaceError]:
+        """Why an interface that the folders have can't be used, by its name."""
+        return self._definitions.left_out
 
     def require(self, type_name: str) -> None:
         """Raises InterfaceError, with the nearest known names, if there is no such type."""
@@ -154,9 +160,11 @@ class Interfaces:
         return [n.removesuffix(ending) for n in self._structures if kind in n and n.endswith(ending)]
 
     def _unknown(self, name: str, known: Any, what: str = "an interface") -> InterfaceError:
-        near = get_close_matches(name, known, n=3)
+        if (why := self.left_out.get(interface_of(name))) is not None:
+            return InterfaceError(f'"{name}" can\'t be used: {why}', why.source)
         if name in self._unread:
             return InterfaceError(f'"{name}" is not there: {idl_hint(self._unread[name])}')
+        near = get_close_matches(name, [*known, *self.left_out], n=3)
         hint = f"; did you mean {' or '.join(near)}?" if near else ""
         return InterfaceError(f'"{name}" is not {what} of ROS 2 {self._distro}{hint}')
 

@@ -10,6 +10,7 @@ from app.panel.check_confirm import confirm_faults
 from app.panel.check_displays import display_faults, field_faults
 from app.panel.check_holds import hold_faults
 from app.panel.check_inputs import input_faults
+from app.panel.check_own_types import own_type_faults
 from app.panel.check_parameters import parameter_faults, type_faults
 from app.panel.displays import Indicator, Readout
 from app.panel.examples import NOW_IS, template_faults
@@ -40,6 +41,7 @@ def faults_in(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = ()
 
     `faulty` are ids of widgets whose faults are told already: what depends on them is not judged.
     """
+    yield from own_type_faults(panel, interfaces)
     yield from _robots(panel)
     yield from _repeated("interlock", [i.id for i in panel.interlocks])
     for i, interlock in enumerate(panel.interlocks):

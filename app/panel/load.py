@@ -43,7 +43,8 @@ def check_panel(path: Path) -> tuple[Panel, tuple[Note, ...]]:
     """The checked panel, with what is no fault of it but worth a look; PanelError as `load_panel`."""
     file = read_toml(path)
     panel = _panel(file)
-    return panel, tuple(located(notes_in(panel), file.text, file.tables))
+    notes = notes_in(panel, interfaces_of(panel.distro, panel.interfaces))
+    return panel, tuple(located(notes, file.text, file.tables))
 
 
 def _panel(file: TomlFile, kept: Kept = lambda _: None) -> Panel:
@@ -67,8 +68,7 @@ def _faults_with_types(panel: Panel, faulty: Collection[str] = ()) -> Iterator[F
     try:
         interfaces = interfaces_of(panel.distro, panel.interfaces)
     except InterfaceError as error:
-        source = error.source or Path()
-        at = next((i for i, one in enumerate(panel.interfaces) if source.is_relative_to(one)), 0)
+        at = next((i for i, folder in enumerate(panel.interfaces) if folder == error.source), 0)
         yield Fault(f"interfaces[{at}]", str(error))
         return
     yield from faults_in(panel, interfaces, faulty)
