@@ -1,11 +1,13 @@
 """One kiosk for several robots: each press reaches the one that was on the screen, and no other."""
 
+import json
 import sys
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 
 import pytest
+import zenoh
 from playwright.sync_api import Page, expect
 from websockets.exceptions import InvalidStatus
 
@@ -29,8 +31,8 @@ def panel_file(folder: Path, *robots: str) -> Path:
     return path
 
 
-def entry(number: int, connect: str = "") -> str:
-    where = f'connect = ["{connect}"]\n' if connect else ""
+def entry(number: int, connect: str | None = None) -> str:
+    where = "" if connect is None else f'connect = ["{connect}"]\n'
     return f'id = "r{number}"\nname = "Robot {number}"\nnamespace = "/robot{number}"\n{where}'
 
 
@@ -254,6 +256,37 @@ def test_the_panel_file_says_what_is_wrong_with_its_robots(tmp_path: Path) -> No
     assert "robot[1].namespace: robot[0] has the same namespace and endpoints" in text
 
 
+@pytest.mark.parametrize(
+    "endpoint",
+    [
+        "tcp/robot1:7447", "tcp/192.0.2.7:1", "udp/[::1]:65535", "tls/robot1.local:7447#iface=eth0",
+        "quic/robot1:7447?rel=1", "ws/robot1:80?prio=1-7;rel=0#iface=lo;x=1", "unixsock-stream//tmp/r1",
+    ],
+)  # fmt: skip
+def test_endpoints_that_zenoh_takes_are_taken(tmp_path: Path, endpoint: str) -> None:
+    (robot,) = load_panel(panel_file(tmp_path, entry(1, endpoint))).robots
+    assert robot.connect == (endpoint,)
+    zenoh.Config().insert_json5("connect/endpoints", json.dumps([endpoint]))
+
+
+@pytest.mark.parametrize(
+    "endpoint",
+    [
+        "robot1:7447", "robot1", "", "tcp/", "tcp/robot1", "tcp/robot1:", "tcp/:7447",
+        "tcp//robot1:7447", "tcp/robot1:0", "tcp/robot1:65536", "tcp/robot1:port", "tcp/robot 1:7447",
+        " tcp/robot1:7447", "TCP/robot1:7447", "http://robot1:7447", "serial//dev/ttyS0",
+        "tcp/robot1:7447?", "tcp/robot1:7447#",
+        "unixsock-stream/",
+    ],
+)  # fmt: skip
+def test_an_endpoint_that_is_none_is_a_fault_of_the_panel(tmp_path: Path, endpoint: str) -> None:
+    with pytest.raises(PanelError) as caught:
+        load_panel(panel_file(tmp_path, entry(1, "tcp/robot1:7447"), entry(2, endpoint)))
+    assert told(caught.value) == (
+        f'robot[1].connect[0]: "{endpoint}" is not a Zenoh endpoint: it must be like tcp/robot1:7447'
+    )
+
+
 def test_an_endpoint_that_is_none_ends_the_start_in_words(tmp_path: Path) -> None:
     path = panel_file(tmp_path, entry(1, "robot1:7447"))
     command = [sys.executable, "-m", "uvicorn", "app.main:app", "--port", str(free_port())]
@@ -262,5 +295,5 @@ def test_an_endpoint_that_is_none_ends_the_start_in_words(tmp_path: Path) -> Non
         assert kiosk.wait(15) != 0
     finally:
         kiosk.end()
-    assert "a Zenoh endpoint is like tcp/robot1:7447" in kiosk.text
+    assert '"robot1:7447" is not a Zenoh endpoint: it must be like tcp/robot1:7447' in kiosk.text
     assert "Traceback" not in kiosk.text

@@ -1,5 +1,6 @@
 """What descriptions are made of: checked names, what every widget has, a topic's QoS."""
 
+import re
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
@@ -45,6 +46,14 @@ def namespace_of(given: str) -> str:
     return whole
 
 
+def _endpoint(given: str) -> str:
+    """Where a session connects to, as Zenoh writes it; Zenoh tells of a wrong one only at the start."""
+    found = ENDPOINT.fullmatch(given)
+    if found is None or not 0 < int(found["port"] or 1) <= MOST_PORT:
+        raise ValueError(f'"{given}" is not a Zenoh endpoint: it must be like tcp/robot1:7447')
+    return given
+
+
 def _folder(given: Any, info: ValidationInfo) -> Path:
     """Relative to the panel file's folder, which is the context of the validation."""
     if not isinstance(given, str) or not given:
@@ -62,6 +71,12 @@ def some(given: tuple[Any, ...]) -> tuple[Any, ...]:
     return given
 
 
+# The protocols are those of the Zenoh that a kiosk has; behind the address stand metadata and settings.
+ENDPOINT: Final = re.compile(
+    r"(?:(?:tcp|udp|tls|quic|ws)/[^\s/?#]+:(?P<port>[0-9]{1,5})|unixsock-stream/[^\s?#]+)"
+    r"(?:\?[^\s?#]+)?(?:#[^\s#]+)?"
+)
+MOST_PORT: Final = 65535
 ID: Final = r"^[a-z][a-z0-9_]{0,63}$"
 Id = Annotated[str, Field(pattern=ID)]
 Label = Annotated[str, Field(min_length=1, max_length=120)]
@@ -72,6 +87,7 @@ ServiceType = Annotated[str, AfterValidator(_service)]
 ActionType = Annotated[str, AfterValidator(_action)]
 _STEP: Final = r"[a-z][a-z0-9_]*(\[[0-9]{1,9}\])*"
 FieldPath = Annotated[str, Field(pattern=rf"^{_STEP}(\.{_STEP})*$")]
+Endpoint = Annotated[str, AfterValidator(_endpoint)]
 Folder = Annotated[Path, BeforeValidator(_folder)]
 Seconds = Annotated[float, Field(gt=0, le=86400, allow_inf_nan=False)]
 

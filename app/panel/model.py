@@ -10,6 +10,7 @@ from app.panel.control import ControlRules
 from app.panel.description import (
     ActionType,
     Description,
+    Endpoint,
     FieldPath,
     Folder,
     Id,
@@ -178,7 +179,7 @@ class RobotEntry(Description):
     id: Id
     name: Label
     namespace: Annotated[str, AfterValidator(namespace_of)] = ""
-    connect: Annotated[tuple[Label, ...], Field(strict=False)] = ()
+    connect: Annotated[tuple[Endpoint, ...], Field(strict=False)] = ()
 
 
 # rmw_qos_profile_parameter_events; the durability is given, so that no first event is missed.
