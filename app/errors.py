@@ -17,7 +17,7 @@
 One handler (`routes.on_kiosk_error`) maps them to HTTP; "–" never reaches a client by itself.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
@@ -55,10 +55,13 @@ class Remark:
         return f"{self.where}: {self.message}" if self.where else self.message
 
 
+@dataclass(frozen=True, slots=True)
 class Fault(Remark):
-    """What keeps a panel file from being used."""
+    """What keeps a panel file from being used. Faults of one `cause` that is not "" are one mistake."""
 
-    __slots__ = ()
+    cause: str = field(default="", compare=False)
+
+    __str__ = Remark.__str__
 
 
 class Note(Remark):
@@ -79,11 +82,13 @@ class PanelError(KioskError):
 
 
 class InterfaceError(KioskError):
-    """`source` is the interface file or folder at fault, if it is one of those."""
+    """`source` is the interface file or folder at fault, if it is one of those, `package` the package
+    that is not there at all."""
 
-    def __init__(self, message: str, source: Path | None = None) -> None:
+    def __init__(self, message: str, source: Path | None = None, package: str = "") -> None:
         super().__init__(message)
         self.source = source
+        self.package = package
 
 
 class FieldError(KioskError):

@@ -257,7 +257,7 @@ def panel_file(folder: Path, more: str) -> Path:
         (CONFIRMED % "", "page[0].widget[2].confirm.type: is missing: nothing else in the panel says"),
         (
             'confirm = { topic = "/last_heard", type = "std_msgs/msg/Bool", equals = "x" }',
-            "page[0].widget[2].confirm.equals: must be true or false (bool), not 'x'",
+            'page[0].widget[2].confirm.equals: must be true or false (bool), not "x"',
         ),
         (
             'confirm = { topic = "/s", type = "std_msgs/msg/UInt8", equals = 300 }',

@@ -78,7 +78,9 @@ def test_a_panel_with_a_fault_keeps_the_old_one_and_shows_the_fault(
     fault = page.locator("#fault")
     expect(fault).to_be_hidden()
     checkout.edit("app/panel.toml", 'kind = "readout"', 'kind = "readuot"')
-    expect(fault).to_contain_text('page[0].widget[4] "last_heard", line 52: unknown kind "readuot"')
+    expect(fault).to_contain_text(
+        'page[0].widget[4].kind "last_heard", line 54: unknown kind "readuot"'
+    )
     expect(page.get_by_role("button", name="Publish1")).to_be_visible()
     assert checkout.server.press("operation", "still works").status_code == 200
     checkout.edit("app/panel.toml", 'kind = "readuot"', 'kind = "readout"')

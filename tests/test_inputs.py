@@ -91,9 +91,9 @@ SPEED_LIMITS = "-0.5 to 1.5 m/s, in steps of 0.1"
         (SPEED, 1e308, f"Speed is 1e+308: it must be {SPEED_LIMITS}"),
         (SPEED, "", f"Speed has no number: it must be {SPEED_LIMITS}"),
         (SPEED, None, "Speed has no number"),
-        (SPEED, "fast", f"Speed must be a number, {SPEED_LIMITS}, not 'fast'"),
+        (SPEED, "fast", f'Speed must be a number, {SPEED_LIMITS}, not "fast"'),
         (SPEED, "1", "Speed must be a number"),
-        (SPEED, True, f"Speed must be a number, {SPEED_LIMITS}, not True"),
+        (SPEED, True, f"Speed must be a number, {SPEED_LIMITS}, not true"),
         (SPEED, [1], "Speed must be a number"),
         (FREE, 1.0001, "Free is 1.0001: it must be -1 to 1 rad"),
         (FREE, math.nan, "Free is nan: it must be -1 to 1 rad"),
@@ -105,8 +105,8 @@ SPEED_LIMITS = "-0.5 to 1.5 m/s, in steps of 0.1"
         (MODE, None, "Mode must be one of"),
         (MODE, ["x"], "Mode must be one of"),
         (LIGHT, 1, "Light must be true (Shines) or false (Off), not 1"),
-        (LIGHT, "true", "Light must be true (Shines) or false (Off), not 'true'"),
-        (LIGHT, None, "Light must be true (Shines) or false (Off), not None"),
+        (LIGHT, "true", 'Light must be true (Shines) or false (Off), not "true"'),
+        (LIGHT, None, "Light must be true (Shines) or false (Off), not null"),
     ],
 )
 def test_what_an_input_does_not_take_is_refused_with_label_and_limits(

@@ -4,6 +4,8 @@ import json
 import math
 from array import array
 from collections.abc import Callable, Iterator
+from datetime import date, datetime
+from datetime import time as clock
 from pathlib import Path
 from typing import Any, Final
 
@@ -12,6 +14,7 @@ import pytest
 
 from app.errors import DecodeError, FieldError, InterfaceError
 from app.interfaces import DISTROS, Interfaces, interfaces_of, text_of, to_plain, value_at
+from app.interfaces.scalars import shown
 from tests.samples import Samples
 from tests.test_interfaces import garbage
 
@@ -114,7 +117,7 @@ def to_plain_fields(value: Any) -> Any:
         ("flags", [True, 1], "flags[1]", "true or false"),
         ("pair", [1, 2, 3], "pair", "must have 2 elements, not 3"),
         ("pair", b"abc", "pair", "must have 2 elements, not 3"),
-        ("data", "abc", "data", r"must be a list \(uint8\[\]\), not 'abc'"),
+        ("data", "abc", "data", r'must be a list \(uint8\[\]\), not "abc"'),
         ("data", [0, 256], "data[1]", "out of range"),
         ("data", [0, -1], "data[1]", "out of range"),
         ("data", [0, True], "data[1]", "whole number"),
@@ -369,3 +372,31 @@ def test_all_that_is_built_in_comes_back_as_it_went(distro: str) -> None:
             fields = Samples(interfaces.structures).fields(name, edge)
             plain = to_plain(interfaces.decode(name, interfaces.encode(name, fields)))
             assert plain == to_plain_fields(fields), name
+
+
+@pytest.mark.parametrize(
+    ("given", "text"),
+    [
+        (True, "true"),
+        (None, "null"),
+        (-0.5, "-0.5"),
+        (math.nan, "nan"),
+        (5, "5"),
+        ("fast", '"fast"'),
+        ('a "b" \\', '"a \\"b\\" \\\\"'),
+        ("\U000e0041", '"\\U000e0041"'),
+        ("a\n\0\u202e\ud800é漢", '"a\\u000a\\u0000\\u202e\\ud800é漢"'),
+        ("x" * 100, f'"{"x" * 60}…"'),
+        (date(2026, 1, 2), "2026-01-02"),
+        (datetime(2026, 1, 2, 3, 4, 5), "2026-01-02T03:04:05"),
+        (clock(3, 4), "03:04:00"),
+        ([], "[]"),
+        ([1, "a", True, 4], '[1, "a", true, …]'),
+        ({"x": 0, "y": {"z": "far"}}, '{x = 0, y = {z = "far"}}'),
+        ({"x": [[["deep"]]]}, "{x = [[…]]}"),
+        (["x" * 100] * 2, f'["{"x" * 59}…]'),
+        (10**400, "100000000000000000...0000000000000000000"),
+    ],
+)
+def test_a_value_is_shown_as_files_and_requests_have_it(given: Any, text: str) -> None:
+    assert shown(given) == text

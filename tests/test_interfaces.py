@@ -310,8 +310,21 @@ def test_a_field_that_is_not_there_is_refused_with_those_that_are(
 
 
 def test_an_unknown_type_is_refused_with_the_nearest() -> None:
-    with pytest.raises(InterfaceError, match=r"ROS 2 jazzy; did you mean std_msgs/msg/String or"):
-        INTERFACES.require("std_msgs/msg/Strng")
+    for given, near in (
+        ("std_msgs/msg/Strng", "std_msgs/msg/String?"),
+        ("std_msg/msg/String", "std_msgs/msg/String or "),
+        ("std_msgs/msg/Twist", "geometry_msgs/msg/Twist?"),
+        ("geometry_msgs/msg/PoseStamp", "geometry_msgs/msg/PoseStamped or geometry_msgs/msg/Po"),
+    ):
+        with pytest.raises(InterfaceError) as caught:
+            INTERFACES.require(given)
+        assert f"ROS 2 jazzy; did you mean {near}" in str(caught.value)
+
+
+def test_a_package_that_is_nowhere_is_told() -> None:
+    with pytest.raises(InterfaceError, match=r"there is no package cell_msgs: its folder") as caught:
+        INTERFACES.require("cell_msgs/msg/Jog")
+    assert caught.value.package == "cell_msgs"
 
 
 def test_a_type_like_none_is_refused_without_a_guess() -> None:

@@ -13,7 +13,7 @@ from app.actions import STATUS
 from app.errors import PanelError
 from app.interfaces import DISTROS
 from app.panel import Panel, Publish, Readout, TextInput, check_panel, load_panel
-from app.panel.check_own_types import OF_ACTIONS, ROSOUT
+from app.panel.check_types import OF_ACTIONS, ROSOUT
 from app.rosout import LOG_TYPE
 from app.settings import PACKAGE
 from tests.builders import FREE, GUARDED, HEARD, INTERLOCK, MESSAGE, TEXT, Table, small_panel
@@ -160,30 +160,30 @@ def test_an_interlock_and_a_widget_may_have_one_id(load: Load) -> None:
         (without(tables(), "title"), "title", "is missing"),
         (without(tables(), "page"), "page", "is missing"),
         (tables(page=[]), "page", "is missing: a panel has one page at least"),
-        (tables(title=3), "title", "input should be a valid string, not 3"),
-        (tables(title=""), "title", "at least 1 character"),
+        (tables(title=3), "title", "must be text, not 3"),
+        (tables(title=""), "title", "must not be empty"),
         (tables(titel="x"), "titel", 'unknown key; did you mean "title"?'),
         (tables(interlocks=[]), "interlocks", 'unknown key; did you mean "interlock"?'),
         (tables(zzz=1), "zzz", "unknown key; known here: title, mode, language"),
         (tables(revision="x"), "revision", "unknown key"),
-        (tables(mode="DEMO"), "mode", "'demo' or 'live', not 'DEMO'"),
-        (tables(language="de"), "language", "'en', not 'de'"),
-        (tables(distro="foxy"), "distro", "'kilted', 'lyrical' or 'rolling', not 'foxy'"),
+        (tables(mode="DEMO"), "mode", 'must be "demo" or "live", not "DEMO": did you mean "demo"?'),
+        (tables(language="de"), "language", 'must be "en", not "de"'),
+        (tables(distro="foxy"), "distro", '"kilted", "lyrical" or "rolling", not "foxy"'),
         (
             tables(namespace="a b"),
             "namespace",
             '"a b" is not a ROS 2 namespace: it must be like /robot1',
         ),
         (tables(namespace="/a//b"), "namespace", "is not a ROS 2 namespace"),
-        (tables(log={"days": 0}), "log.days", "greater than 0"),
-        (tables(log={"size_mb": 1}), "log.size_mb", "greater than or equal to 8"),
-        (tables(log={"required": "no"}), "log.required", "valid boolean"),
+        (tables(log={"days": 0}), "log.days", "must be more than 0, not 0"),
+        (tables(log={"size_mb": 1}), "log.size_mb", "must be 8 or more, not 1"),
+        (tables(log={"required": "no"}), "log.required", 'must be true or false, not "no"'),
         (tables(log={"requierd": False}), "log.requierd", 'did you mean "required"?'),
-        (tables(display_hz=0.5), "display_hz", "greater than or equal to 1"),
-        (tables(display_hz=61), "display_hz", "less than or equal to 60"),
-        (tables(display_hz="fast"), "display_hz", "valid number"),
-        (tables(mm_per_px=0), "mm_per_px", "greater than 0.02"),
-        (tables(mm_per_px="0.2"), "mm_per_px", "valid number"),
+        (tables(display_hz=0.5), "display_hz", "must be 1 or more, not 0.5"),
+        (tables(display_hz=61), "display_hz", "must be 60 or less, not 61"),
+        (tables(display_hz="fast"), "display_hz", 'must be a number, not "fast"'),
+        (tables(mm_per_px=0), "mm_per_px", "must be more than 0.02, not 0"),
+        (tables(mm_per_px="0.2"), "mm_per_px", 'must be a number, not "0.2"'),
         (
             tables(interlock=[INTERLOCK, {**INTERLOCK, "id": "Op"}]),
             "interlock[1].id",
@@ -211,7 +211,11 @@ def test_an_interlock_and_a_widget_may_have_one_id(load: Load) -> None:
             "interlock[0].field",
             'there is no "value"',
         ),
-        (tables(interlock=[{**INTERLOCK, "max_age_s": 0}]), "interlock[0].max_age_s", "greater than 0"),
+        (
+            tables(interlock=[{**INTERLOCK, "max_age_s": 0}]),
+            "interlock[0].max_age_s",
+            "must be more than 0, not 0",
+        ),
         (
             tables(interlock=[{**INTERLOCK, "qos": {"reliability": "best_effort"}}]),
             "interlock[0].max_age_s",
@@ -220,7 +224,7 @@ def test_an_interlock_and_a_widget_may_have_one_id(load: Load) -> None:
         (
             tables(interlock=[{**INTERLOCK, "require_publisher": 1}]),
             "interlock[0].require_publisher",
-            "valid boolean, not 1",
+            "must be true or false, not 1",
         ),
         (
             tables(interlock=[{**INTERLOCK, "maxage": 1}]),
@@ -235,7 +239,7 @@ def test_an_interlock_and_a_widget_may_have_one_id(load: Load) -> None:
         ),
         (
             with_widget(1, kind="knob"),
-            BUTTON,
+            f"{BUTTON}.kind",
             'unknown kind "knob"; one of text, number, slider, select, toggle, publish',
         ),
         (
@@ -246,20 +250,24 @@ def test_an_interlock_and_a_widget_may_have_one_id(load: Load) -> None:
         (with_widget(1, colour="red"), f"{BUTTON}.colour", "unknown key; known here: id, label, span"),
         (with_widget(1, lable="x"), f"{BUTTON}.lable", 'did you mean "label"?'),
         (with_widget(1, max_length=3), f"{BUTTON}.max_length", "unknown key"),
-        (with_widget(1, label=""), f"{BUTTON}.label", "at least 1 character"),
+        (with_widget(1, label=""), f"{BUTTON}.label", "must not be empty"),
         (
             with_widget(1, id="1st"),
             f"{BUTTON}.id",
             '"1st" is not an id: a-z, 0-9 and "_", a letter first',
         ),
         (with_widget(1, id="message"), f"{BUTTON}.id", "is already the id of page[0].widget[0]"),
-        (with_widget(1, span=13), f"{BUTTON}.span", "less than or equal to 12, not 13"),
-        (with_widget(1, span=True), f"{BUTTON}.span", "valid integer, not True"),
+        (with_widget(1, span=13), f"{BUTTON}.span", "must be 12 or less, not 13"),
+        (with_widget(1, span=True), f"{BUTTON}.span", "must be a whole number, not true"),
         (with_widget(1, topic="/a b"), f"{BUTTON}.topic", "is not an absolute ROS 2 topic name"),
         (with_widget(1, topic="/a/"), f"{BUTTON}.topic", "is not an absolute ROS 2 topic name"),
         (with_widget(1, topic="/a__b"), f"{BUTTON}.topic", "is not an absolute ROS 2 topic name"),
         (with_widget(1, topic="/**"), f"{BUTTON}.topic", "is not an absolute ROS 2 topic name"),
-        (with_widget(1, topic="/" + "t" * 255), f"{BUTTON}.topic", "at most 255"),
+        (
+            with_widget(1, topic="/" + "t" * 255),
+            f"{BUTTON}.topic",
+            "must be 255 characters at most; it has 256",
+        ),
         (
             with_widget(1, type="std_msgs/String"),
             f"{BUTTON}.type",
@@ -309,7 +317,7 @@ def test_an_interlock_and_a_widget_may_have_one_id(load: Load) -> None:
             f"{BUTTON}.message.points[0].w",
             "unknown field; geometry_msgs/msg/Point32 has x, y, z",
         ),
-        (with_widget(0, max_length=0), "page[0].widget[0].max_length", "greater than or equal to 1"),
+        (with_widget(0, max_length=0), "page[0].widget[0].max_length", "must be 1 or more, not 0"),
         (
             with_widget(0, default="123456789"),
             "page[0].widget[0].default",
@@ -322,7 +330,7 @@ def test_an_interlock_and_a_widget_may_have_one_id(load: Load) -> None:
         ),
         (with_widget(3, field="data.x"), f"{READOUT}.field", "string has no fields of its own"),
         (with_widget(3, type="std_msgs/msg/Strng"), f"{READOUT}.type", "did you mean"),
-        (with_widget(3, max_age_s=-1), f"{READOUT}.max_age_s", "greater than 0, not -1"),
+        (with_widget(3, max_age_s=-1), f"{READOUT}.max_age_s", "must be more than 0, not -1"),
         (
             with_widget(3, topic="/free", type="std_msgs/msg/Bool"),
             f"{READOUT}.type",
@@ -375,9 +383,9 @@ LAMP = {**HEARD, "kind": "indicator", "states": [{"value": "a", "text": "A", "sh
     ("widget", "place", "message"),
     [
         (without(NUMBER, "max"), "max", "is missing"),
-        ({**NUMBER, "min": "0"}, "min", "valid number"),
-        ({**NUMBER, "max": 2**53 + 2}, "max", "less than or equal to"),
-        ({**NUMBER, "step": 0}, "step", "greater than 0"),
+        ({**NUMBER, "min": "0"}, "min", 'must be a number, not "0"'),
+        ({**NUMBER, "max": 2**53 + 2}, "max", "must be 9007199254740992 or less, not 9007199254740994"),
+        ({**NUMBER, "step": 0}, "step", "must be more than 0, not 0"),
         ({**NUMBER, "kind": "slider", "units": "m"}, "units", 'did you mean "unit"?'),
         ({"id": "s", "kind": "select", "label": "S"}, "options", "is missing"),
         (
@@ -390,15 +398,23 @@ LAMP = {**HEARD, "kind": "indicator", "states": [{"value": "a", "text": "A", "sh
             "options[0].label",
             "is missing",
         ),
-        ({"id": "t", "kind": "toggle", "label": "T", "default": 1}, "default", "valid boolean"),
+        (
+            {"id": "t", "kind": "toggle", "label": "T", "default": 1},
+            "default",
+            "must be true or false, not 1",
+        ),
         (
             {**HEARD, "format": "{0.__class__}"},
             "format",
             '"{0.__class__}" is not a format: it must be like ".1f"',
         ),
         ({**HEARD, "constants": "status"}, "constants", "it must be like STATUS_"),
-        ({**HEARD, "qos": {"depth": 0}}, "qos.depth", "greater than or equal to 1"),
-        ({**HEARD, "qos": {"reliability": "best"}}, "qos.reliability", "'reliable' or 'best_effort'"),
+        ({**HEARD, "qos": {"depth": 0}}, "qos.depth", "must be 1 or more, not 0"),
+        (
+            {**HEARD, "qos": {"reliability": "best"}},
+            "qos.reliability",
+            '"reliable" or "best_effort", not',
+        ),
         ({**HEARD, "qos": {"reliable": True}}, "qos.reliable", 'did you mean "reliability"?'),
         ({**LAMP, "states": 5}, "states", "must be a list of tables, like [{ value = 0"),
         (
@@ -409,12 +425,12 @@ LAMP = {**HEARD, "kind": "indicator", "states": [{"value": "a", "text": "A", "sh
         (
             {**LAMP, "states": [{"value": "a", "text": "A", "shape": "star"}]},
             "states[0].shape",
-            "'circle', 'square'",
+            'must be "circle", "square", "triangle", "diamond", "cross" or "bar", not "star"',
         ),
         (
             {**LAMP, "states": [{"value": "a", "text": "A", "shape": "bar", "colour": "green"}]},
             "states[0].colour",
-            "'grey', 'white'",
+            '"blue", "yellow" or "red", not "green"',
         ),
     ],
 )
@@ -425,6 +441,68 @@ def test_a_fault_of_an_input_or_a_display_is_named_with_its_place(
     found = faults(load, tables(page=[page]))
     assert list(found) == [f"page[0].widget[0].{place}"]
     assert message in found[f"page[0].widget[0].{place}"]
+
+
+@pytest.mark.parametrize(
+    ("given", "place", "where"),
+    [
+        (
+            without(tables(interlock=[{**INTERLOCK, "title": "Cell"}]), "title"),
+            "interlock[0].title",
+            "the file itself: write it above the first table",
+        ),
+        (
+            tables(interlock=[{**INTERLOCK, "namespace": "/r1"}]),
+            "interlock[0].namespace",
+            "the file itself: write it above the first table",
+        ),
+        (
+            tables(page=[{"id": "one", "widget": [{**HEARD, "title": "One"}]}]),
+            "page[0].widget[0].title",
+            "page[0]: write it above its [[page.widget]]",
+        ),
+    ],
+)
+def test_a_key_that_stands_too_far_below_is_one_fault(
+    load: Load, given: dict[str, Any], place: str, where: str
+) -> None:
+    assert faults(load, given) == {place: f"unknown key; it belongs to {where}"}
+
+
+def test_faults_of_one_cause_are_one_and_tell_of_the_others(load: Load) -> None:
+    buttons = [{**GUARDED, "id": f"b{n}", "topic": f"/b{n}", "interlock": "x"} for n in range(6)]
+    page = {"id": "one", "title": "One", "widget": [MESSAGE, *buttons]}
+    assert faults(load, tables(page=[page])) == {
+        "page[0].widget[1].interlock": (
+            'no interlock "x"; there is operation (also at page[0].widget[2].interlock, '
+            "page[0].widget[3].interlock, page[0].widget[4].interlock and 2 more)"
+        )
+    }
+
+
+def test_a_package_that_is_nowhere_is_told_once(load: Load) -> None:
+    lamps = [{**LAMP, "id": name.lower(), "type": f"my_robot/msg/{name}"} for name in ("Arm", "Leg")]
+    page = {"id": "one", "title": "One", "widget": lamps}
+    ((place, why),) = faults(load, tables(page=[page])).items()
+    assert place == "page[0].widget[0].type"
+    assert "there is no package my_robot: its folder must be among the panel's `interfaces`" in why
+    assert why.endswith("(also at page[0].widget[1].type)")
+
+
+def test_faults_are_told_in_the_order_of_the_file(load: Load, tmp_path: Path) -> None:
+    path = tmp_path / "cell.toml"
+    path.write_text(
+        '[[page]]\nid = "A"\ntitle = "One"\n[[interlock]]\nid = "a"\n'
+        '[[page.widget]]\nid = "b"\nkind = "text"\nlabel = ""\n'
+    )
+    with pytest.raises(PanelError) as caught:
+        load_panel(path)
+    assert [(fault.place, fault.line) for fault in caught.value.faults] == [
+        ("title", 0),
+        ("page[0].id", 2),
+        ("interlock[0].topic", 4),
+        ("page[0].widget[0].label", 9),
+    ]
 
 
 def test_a_faulty_input_makes_no_fault_where_it_is_used(load: Load) -> None:
@@ -460,10 +538,10 @@ def test_all_faults_of_the_shape_are_told_at_once(load: Load) -> None:
 
 def test_all_faults_of_names_and_messages_are_told_at_once(load: Load) -> None:
     given = with_widget(1, interlock="other", message={"data": 5})
-    given["interlock"] = [{**INTERLOCK, "field": "value"}, {**INTERLOCK, "topic": "/b"}]
+    given["interlock"] = [{**INTERLOCK, "field": "value"}, {**INTERLOCK, "id": "b", "type": TEXT}]
     assert sorted(faults(load, given)) == [
         "interlock[0].field",
-        "interlock[1].id",
+        "interlock[1].field",
         f"{BUTTON}.interlock",
         f"{BUTTON}.message.data",
     ]
@@ -558,7 +636,7 @@ def test_a_fault_of_shape_hides_no_fault_of_meaning(load: Load) -> None:
     assert set(faults(load, given)) == {
         "titel",
         "interlock[0].max_age",
-        "page[0].widget[3]",
+        "page[0].widget[3].kind",
         "page[0].widget[1].message.dat",
     }
 
@@ -684,7 +762,7 @@ def test_the_folder_with_the_fault_is_named(load: Load, tmp_path: Path) -> None:
     [
         (["none"], "interfaces[0]", "is not a folder: it must be a ROS package or have some in it"),
         ([5], "interfaces[0]", "must be the path of a folder, not 5"),
-        ([""], "interfaces[0]", "must be the path of a folder, not ''"),
+        ([""], "interfaces[0]", 'must be the path of a folder, not ""'),
         ("msgs", "interfaces", 'must be a list of folders: write ["folder"]'),
     ],
 )
@@ -704,7 +782,7 @@ def test_interfaces_are_folders(load: Load, given: Any, place: str, why: str) ->
         ({**CALL, "answer": "{total}"}, "answer", 'there is no "total"'),
         ({**CALL, "success": "sum"}, "success", '"sum" is int64: it must be bool'),
         ({**CALL, "interlock": "nothing"}, "interlock", 'no interlock "nothing"'),
-        ({**CALL, "timeout_s": 0}, "timeout_s", "greater than 0"),
+        ({**CALL, "timeout_s": 0}, "timeout_s", "must be more than 0, not 0"),
         ({**ACTION, "type": "example_interfaces/action/Fibo"}, "type", "did you mean"),
         ({**ACTION, "goal": {"order": "{message}"}}, "goal.order", "gives text; the field is int32"),
         ({**ACTION, "progress": "sequence"}, "progress", "is int32[]: it must be a number"),

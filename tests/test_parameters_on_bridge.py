@@ -144,7 +144,7 @@ def test_a_value_is_set_and_shown_as_the_node_has_it(kiosk: Server, robot: Cyclo
     [
         ("speed", 1.6, "Speed is 1.6 m/s: it must be 0 to 1.5 m/s, in steps of 0.1"),
         ("speed", 0.55, "Speed is 0.55 m/s: it must be 0 to 1.5 m/s, in steps of 0.1"),
-        ("speed", "fast", "Speed must be a number, 0 to 1.5 m/s, in steps of 0.1, not 'fast'"),
+        ("speed", "fast", 'Speed must be a number, 0 to 1.5 m/s, in steps of 0.1, not "fast"'),
         ("speed", "", "Speed has no number: it must be 0 to 1.5 m/s, in steps of 0.1"),
         ("limit", 101, "Limit is 101: it must be 0 to 100"),
         ("limit", 1.5, "Limit must be a number, 0 to 100, not 1.5"),

@@ -1,8 +1,10 @@
 """One value of a base type: what fits, and what is wrong with what does not."""
 
+import datetime
 import math
 import reprlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from itertools import islice
 from typing import Any, Final
 
 from app.errors import FieldError
@@ -15,13 +17,52 @@ FLOAT_MAX: Final[Mapping[str, float]] = {
     "float64": math.inf,
 }
 
+LONGEST_SHOWN: Final = 60  # characters
+MOST_SHOWN: Final = 3  # elements of a list or a table
+DEEPEST_SHOWN: Final = 3
+
 _short = reprlib.Repr()
-_short.maxstring = _short.maxother = 60
+_short.maxother = LONGEST_SHOWN
 
 
-def shown(given: Any) -> str:
-    """A value as an error message shows it: never longer than a line."""
+def shown(given: Any, depth: int = DEEPEST_SHOWN) -> str:
+    """A value as TOML and JSON write it, for an error message: never longer than a line."""
+    match given:
+        case None:
+            return "null"
+        case bool():
+            return "true" if given else "false"
+        case str():
+            return _quoted(given)
+        case datetime.date() | datetime.time():
+            return given.isoformat()
+        case Mapping() | list() | tuple() if not depth:
+            return "…"
+        case Mapping():
+            items = (
+                f"{key} = {shown(one, depth - 1)}" for key, one in islice(given.items(), MOST_SHOWN)
+            )
+            return f"{{{_cut(items, len(given))}}}"
+        case list() | tuple():
+            elements = (shown(one, depth - 1) for one in given[:MOST_SHOWN])
+            return f"[{_cut(elements, len(given))}]"
     return _short.repr(given)
+
+
+def _quoted(text: str) -> str:
+    """In double quotes; what would not show, or show as something else, is escaped."""
+    cut = f"{text[:LONGEST_SHOWN]}…" if len(text) > LONGEST_SHOWN else text
+    escaped = cut.replace("\\", "\\\\").replace('"', '\\"')
+    return '"' + "".join(c if c.isprintable() else _escaped(ord(c)) for c in escaped) + '"'
+
+
+def _escaped(code: int) -> str:
+    return f"\\u{code:04x}" if code <= 0xFFFF else f"\\U{code:08x}"
+
+
+def _cut(parts: Iterable[str], count: int) -> str:
+    text = ", ".join(parts) + (", …" if count > MOST_SHOWN else "")
+    return f"{text[:LONGEST_SHOWN]}…" if len(text) > LONGEST_SHOWN else text
 
 
 def scalar_check(kind: Type) -> Check:

@@ -5,7 +5,7 @@ from contextlib import suppress
 from difflib import get_close_matches
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from app.errors import DecodeError, InterfaceError
 from app.interfaces.codec import LITTLE_ENDIAN, Codec
@@ -24,6 +24,9 @@ from app.interfaces.paths import steps
 from app.interfaces.scalars import Check
 from app.interfaces.text import definition_text
 from app.interfaces.values import field_check, message_check
+
+MOST_NEAR: Final = 3  # names that may be meant
+LIKE_A_PACKAGE: Final = 0.8  # all packages of messages end alike
 
 
 class Interfaces:
@@ -160,13 +163,38 @@ class Interfaces:
         return [n.removesuffix(ending) for n in self._structures if kind in n and n.endswith(ending)]
 
     def _unknown(self, name: str, known: Any, what: str = "an interface") -> InterfaceError:
-        if (why := self.left_out.get(interface_of(name))) is not None:
-            return InterfaceError(f'"{name}" can\'t be used: {why}', why.source)
+        if (cause := self.left_out.get(interface_of(name))) is not None:
+            return InterfaceError(f'"{name}" can\'t be used: {cause}', cause.source)
         if name in self._unread:
             return InterfaceError(f'"{name}" is not there: {idl_hint(self._unread[name])}')
-        near = get_close_matches(name, [*known, *self.left_out], n=3)
-        hint = f"; did you mean {' or '.join(near)}?" if near else ""
-        return InterfaceError(f'"{name}" is not {what} of ROS 2 {self._distro}{hint}')
+        why = f'"{name}" is not {what} of ROS 2 {self._distro}'
+        every, package = [*known, *self.left_out], name.partition("/")[0]
+        if near := _near(name, every):
+            return InterfaceError(f"{why}; did you mean {' or '.join(near)}?")
+        if "/" not in name or any(one.startswith(f"{package}/") for one in every):
+            return InterfaceError(why)
+        hint = f"there is no package {package}: its folder must be among the panel's `interfaces`"
+        return InterfaceError(f"{why}; {hint}", package=package)
+
+
+def _near(name: str, known: Sequence[str]) -> list[str]:
+    """Names like one that there is not: of its package, or of one that is called almost so; then the
+    same name of other packages."""
+    package, _, rest = name.partition("/")
+    packages = {one.partition("/")[0] for one in known}
+    near: list[str] = []
+    for each in get_close_matches(package, packages, n=1, cutoff=LIKE_A_PACKAGE):
+        own = [one.partition("/")[2] for one in known if one.startswith(f"{each}/")]
+        near += [f"{each}/{one}" for one in _like(rest, own)]
+    same = [one for one in known if one.endswith(f"/{rest}")]
+    near += get_close_matches(name, same, n=MOST_NEAR, cutoff=0)
+    return list(dict.fromkeys(near))[:MOST_NEAR]
+
+
+def _like(rest: str, known: Sequence[str]) -> list[str]:
+    """Those whose last part is like that of a name."""
+    last = {one.rpartition("/")[2]: one for one in known}
+    return [last[one] for one in get_close_matches(rest.rpartition("/")[2], last, n=MOST_NEAR)]
 
 
 def _indexed(at: Type, index: int, path: str) -> Type:

@@ -1,6 +1,6 @@
 """What can be wrong in a panel file whose shape is right: names, types and templates."""
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import Final
 
 from app.errors import Fault, InterfaceError
@@ -10,8 +10,9 @@ from app.panel.check_confirm import confirm_faults
 from app.panel.check_displays import display_faults, field_faults
 from app.panel.check_holds import hold_faults
 from app.panel.check_inputs import input_faults
-from app.panel.check_own_types import own_type_faults
 from app.panel.check_parameters import parameter_faults, type_faults
+from app.panel.check_types import own_type_faults, type_fault
+from app.panel.description import Placed
 from app.panel.displays import Indicator, Readout
 from app.panel.examples import NOW_IS, template_faults
 from app.panel.model import (
@@ -29,6 +30,7 @@ from app.panel.model import (
 )
 from app.panel.parameter import Parameter
 from app.panel.template import NOW
+from app.panel.wording import listing
 
 BEST_EFFORT: Final = (
     "is missing: of a best-effort topic any message may be lost, the one that forbids too; "
@@ -43,56 +45,92 @@ def faults_in(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = ()
     """
     yield from own_type_faults(panel, interfaces)
     yield from _robots(panel)
-    yield from _repeated("interlock", [i.id for i in panel.interlocks])
-    for i, interlock in enumerate(panel.interlocks):
-        yield from _interlock(f"interlock[{i}]", interlock, interfaces)
     if not panel.pages:
         yield Fault("page", "is missing: a panel has one page at least")
     yield from _repeated("page", [page.id for page in panel.pages])
-    yield from _repeated_widgets(panel)
-    reserved = list(_reserved(panel))
-    yield from reserved
-    faulty = {*faulty, NOW} if reserved else faulty
-    inputs = {w.id: w for w in panel.widgets() if isinstance(w, Input)}
-    for p, page in enumerate(panel.pages):
-        on_page = {w.id: w for w in page.widgets if isinstance(w, Input)}
-        for w, widget in enumerate(page.widgets):
-            place = f"page[{p}].widget[{w}]"
-            match widget:
-                case Publish() | Call() | Action():
-                    yield from _interlocked(place, widget, panel)
-                    try:
-                        part, type_name = sent(widget, interfaces)
-                    except InterfaceError as error:
-                        yield Fault(f"{place}.type", str(error))
-                        continue
-                    yield from template_faults(
-                        f"{place}.{part}",
-                        widget.template,
-                        type_name,
-                        on_page,
-                        inputs.keys(),
-                        interfaces,
-                        faulty,
-                    )
-                    yield from answer_faults(place, widget, interfaces)
-                    if isinstance(widget, Publish):
-                        yield from confirm_faults(
-                            place, widget, panel, on_page, inputs.keys(), interfaces
-                        )
-                case Parameter():
-                    yield from _interlocked(place, widget, panel)
-                    yield from parameter_faults(place, widget)
-                case Hold():
-                    yield from _interlocked(place, widget, panel)
-                    yield from hold_faults(place, widget, on_page, inputs.keys(), interfaces, faulty)
-                case Readout() | Indicator():
-                    yield from display_faults(place, widget, interfaces)
-                case _:
-                    yield from input_faults(place, widget)
-    yield from _topics_of_two_kinds(panel)
+    ids, inputs = list(_of_ids(panel)), list(_of_inputs(panel))
+    yield from (*ids, *inputs)
+    told = [fault.place for fault in (*ids, *inputs)]
+    faulty = {*faulty, *(widget.id for place, widget in _placed(panel) if _within(place, told))}
+    judged = [*_of_interlocks(panel, interfaces), *_of_widgets(panel, interfaces, faulty)]
+    missed = {"interlock" if fault.place.startswith("interlock") else "input" for fault in ids}
+    judged = [fault for fault in judged if fault.cause.partition(" ")[0] not in missed]
+    yield from judged
+    yield from _topics_of_two_kinds(panel, [fault.place for fault in judged])
     yield from type_faults(panel)
     yield from _recorded(panel)
+
+
+def _of_ids(panel: Panel) -> Iterator[Fault]:
+    """Ids that can't be: what is meant by such a one may be missed elsewhere by its right name."""
+    yield from _repeated("interlock", [interlock.id for interlock in panel.interlocks])
+    yield from _repeated_widgets(panel)
+    for place, widget in _placed(panel):
+        if isinstance(widget, Input | Parameter) and widget.id == NOW:
+            yield Fault(f"{place}.id", f'"{NOW}" is reserved, as {NOW_IS}: choose another id')
+
+
+def _within(place: str, told: Iterable[str]) -> bool:
+    """Whether one of the places told is in another one."""
+    return any(each.startswith(f"{place}.") for each in told)
+
+
+def _placed(panel: Panel) -> Iterator[tuple[str, Placed]]:
+    """Every widget, with its place."""
+    for p, page in enumerate(panel.pages):
+        yield from ((f"page[{p}].widget[{w}]", widget) for w, widget in enumerate(page.widgets))
+
+
+def _of_inputs(panel: Panel) -> Iterator[Fault]:
+    for place, widget in _placed(panel):
+        if isinstance(widget, Input):
+            yield from input_faults(place, widget)
+
+
+def _of_interlocks(panel: Panel, interfaces: Interfaces) -> Iterator[Fault]:
+    for i, interlock in enumerate(panel.interlocks):
+        yield from _interlock(f"interlock[{i}]", interlock, interfaces)
+
+
+def _of_widgets(panel: Panel, interfaces: Interfaces, faulty: Collection[str]) -> Iterator[Fault]:
+    anywhere = [widget.id for widget in panel.widgets() if isinstance(widget, Input)]
+    for p, page in enumerate(panel.pages):
+        inputs = {w.id: w for w in page.widgets if isinstance(w, Input)}
+        for w, widget in enumerate(page.widgets):
+            place = f"page[{p}].widget[{w}]"
+            if isinstance(widget, Pressed | Hold):
+                yield from _interlocked(place, widget, panel)
+            match widget:
+                case Publish() | Call() | Action():
+                    yield from _sent(place, widget, panel, inputs, anywhere, interfaces, faulty)
+                case Parameter():
+                    yield from parameter_faults(place, widget)
+                case Hold():
+                    yield from hold_faults(place, widget, inputs, anywhere, interfaces, faulty)
+                case Readout() | Indicator():
+                    yield from display_faults(place, widget, interfaces)
+
+
+def _sent(
+    place: str,
+    widget: Publish | Call | Action,
+    panel: Panel,
+    inputs: Mapping[str, Input],
+    anywhere: Collection[str],
+    interfaces: Interfaces,
+    faulty: Collection[str],
+) -> Iterator[Fault]:
+    try:
+        part, type_name = sent(widget, interfaces)
+    except InterfaceError as error:
+        yield type_fault(f"{place}.type", error)
+        return
+    yield from template_faults(
+        f"{place}.{part}", widget.template, type_name, inputs, anywhere, interfaces, faulty
+    )
+    yield from answer_faults(place, widget, interfaces)
+    if isinstance(widget, Publish):
+        yield from confirm_faults(place, widget, panel, inputs, anywhere, interfaces, faulty)
 
 
 def _recorded(panel: Panel) -> Iterator[Fault]:
@@ -100,11 +138,8 @@ def _recorded(panel: Panel) -> Iterator[Fault]:
     known = panel.subscriptions()
     for t, topic in enumerate((panel.record and panel.record.topics) or ()):
         if topic not in known:
-            listens = ", ".join(known) or "nothing"
-            yield Fault(
-                f"record.topics[{t}]",
-                f"{topic} is no topic that this panel listens to; it listens to {listens}",
-            )
+            what = f"{topic} is no topic that this panel listens to; there is {listing(known)}"
+            yield Fault(f"record.topics[{t}]", what, cause=f"listens {topic}")
 
 
 def _robots(panel: Panel) -> Iterator[Fault]:
@@ -114,9 +149,11 @@ def _robots(panel: Panel) -> Iterator[Fault]:
         yield Fault("namespace", "is of the one robot: with [[robot]] each has its own")
     for r, robot in enumerate(panel.robots):
         for a, above in enumerate(panel.robots[:r]):
+            if robot.id == above.id:
+                break  # that is told, and it may be a copy
             if robot.name == above.name:
                 yield Fault(f"robot[{r}].name", f'"{robot.name}" is already the name of robot[{a}]')
-            if (robot.namespace, robot.connect) == (above.namespace, above.connect):
+            elif (robot.namespace, robot.connect) == (above.namespace, above.connect):
                 same = f"robot[{a}] has the same namespace and endpoints: it would be the same robot"
                 yield Fault(f"robot[{r}].namespace", same)
 
@@ -129,21 +166,13 @@ def _repeated(table: str, ids: list[str]) -> Iterator[Fault]:
 
 def _repeated_widgets(panel: Panel) -> Iterator[Fault]:
     seen: dict[str, str] = {}
+    ids = [page.id for page in panel.pages]
     for p, page in enumerate(panel.pages):
         for w, widget in enumerate(page.widgets):
             place = f"page[{p}].widget[{w}]"
-            if widget.id in seen:
+            if widget.id in seen and page.id not in ids[:p]:  # of a page's copy that is told
                 yield Fault(f"{place}.id", f'"{widget.id}" is already the id of {seen[widget.id]}')
             seen.setdefault(widget.id, place)
-
-
-def _reserved(panel: Panel) -> Iterator[Fault]:
-    """A widget by whose id a value comes can't be called as what stands for something else."""
-    for p, page in enumerate(panel.pages):
-        for w, widget in enumerate(page.widgets):
-            if isinstance(widget, Input | Parameter) and widget.id == NOW:
-                what = f'"{NOW}" is reserved, as {NOW_IS}: choose another id'
-                yield Fault(f"page[{p}].widget[{w}].id", what)
 
 
 def _interlock(place: str, interlock: Interlock, interfaces: Interfaces) -> Iterator[Fault]:
@@ -159,12 +188,14 @@ def _interlocked(place: str, widget: Pressed | Hold, panel: Panel) -> Iterator[F
     if isinstance(widget, Published) and widget.topic == "/rosout":
         yield Fault(f"{place}.topic", "/rosout is where the kiosk's own log goes: choose another")
     if widget.interlock is not None and panel.interlock(widget.interlock) is None:
-        known = ", ".join(i.id for i in panel.interlocks) or "none"
-        yield Fault(f"{place}.interlock", f'no interlock "{widget.interlock}"; there is {known}')
+        known = listing(interlock.id for interlock in panel.interlocks)
+        what = f'no interlock "{widget.interlock}"; there is {known}'
+        yield Fault(f"{place}.interlock", what, cause=f"interlock {widget.interlock}")
 
 
-def _topics_of_two_kinds(panel: Panel) -> Iterator[Fault]:
-    """A topic has one type and one QoS, wherever the panel names it."""
+def _topics_of_two_kinds(panel: Panel, told: Sequence[str]) -> Iterator[Fault]:
+    """A topic has one type and one QoS, wherever the panel names it. Where a fault of either place is
+    `told` already, its type may be the mistake."""
     places: list[tuple[str, Interlock | Published | Display | Confirm]] = []
     confirms: list[tuple[str, Confirm]] = []
     places += [(f"interlock[{i}]", one) for i, one in enumerate(panel.interlocks)]
@@ -178,8 +209,12 @@ def _topics_of_two_kinds(panel: Panel) -> Iterator[Fault]:
     for place, one in (*places, *confirms):
         above, first = firsts.setdefault(one.topic, (place, one))
         if one.type != first.type:
-            yield Fault(f"{place}.type", f"{one.topic} is {one.type} here but {first.type} above")
+            if not _within(place, told) and not _within(above, told):
+                what = f"{one.topic} is {one.type} here but {first.type} above"
+                yield Fault(f"{place}.type", what, cause=f"topic {one.topic}")
+            continue
         if isinstance(one, Confirm) or isinstance(first, Confirm):
             continue  # it takes the topic's, whatever that is
         if one.qos != first.qos:
-            yield Fault(f"{place}.qos", f"{one.topic} has another QoS at {above}: a topic has one")
+            what = f"{one.topic} has another QoS at {above}: a topic has one"
+            yield Fault(f"{place}.qos", what, cause=f"topic {one.topic}")

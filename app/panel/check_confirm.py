@@ -18,8 +18,10 @@ def confirm_faults(
     inputs: Mapping[str, Input],
     anywhere: Collection[str],
     interfaces: Interfaces,
+    faulty: Collection[str] = (),
 ) -> Iterator[Fault]:
-    """Faults of a command's `confirm`; `inputs` are those of its page, `anywhere` all ids."""
+    """Faults of a command's `confirm`; `inputs` are those of its page, `anywhere` all ids. A value that
+    names a `faulty` input is not tried: that is told already."""
     confirm = widget.confirm
     if confirm is None:
         if widget.one_shot:
@@ -29,14 +31,14 @@ def confirm_faults(
     known = confirm.type or panel.subscriptions().get(confirm.topic)
     if known is None:
         what = f"is missing: nothing else in the panel says what {confirm.topic} is"
-        yield Fault(f"{place}.confirm.type", what)
+        yield Fault(f"{place}.confirm.type", what, cause=f"listens {confirm.topic}")
         return
     typed = confirm.model_copy(update={"type": known})
     faults = list(field_faults(f"{place}.confirm", typed, interfaces))
     yield from faults
     if not faults:
         kind = interfaces.field_type(known, confirm.field)
-        yield from _equals(f"{place}.confirm", confirm, kind, inputs, anywhere)
+        yield from _equals(f"{place}.confirm", confirm, kind, inputs, anywhere, faulty)
 
 
 def _equals(
@@ -45,6 +47,7 @@ def _equals(
     kind: str,
     inputs: Mapping[str, Input],
     anywhere: Collection[str],
+    faulty: Collection[str],
 ) -> Iterator[Fault]:
     if re.search(r"[/\]]", kind):
         what = f'"{confirm.field}" is {kind}: one value of it can confirm, not all'
@@ -58,7 +61,7 @@ def _equals(
     faults = list(unknown(place, names, inputs, anywhere))
     faults += [Fault(f"{place}.{where}", NOW_IS) for where, name in names if name == NOW]
     yield from faults
-    if faults:
+    if faults or {name for _, name in names} & set(faulty):
         return
     tried = {name: examples(inputs[name]) for _, name in names}
     for turn in range(max(map(len, tried.values()), default=1)):

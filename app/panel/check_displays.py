@@ -7,9 +7,12 @@ from typing import Any, Final
 
 from app.errors import Fault, InterfaceError
 from app.interfaces import INTEGERS, Interfaces
+from app.interfaces.scalars import shown
+from app.panel.check_types import type_fault
 from app.panel.constants import holder, value_of_state
 from app.panel.displays import Indicator, Readout
 from app.panel.model import Confirm, Display, Interlock
+from app.panel.wording import listing
 
 NUMBERS: Final = frozenset({*INTEGERS, "float32", "float64"})
 SHAPE_AND_TEXT: Final = "only the colour would tell them apart"
@@ -23,7 +26,7 @@ def field_faults(
     try:
         interfaces.require(of.type)
     except InterfaceError as error:
-        yield Fault(f"{place}.type", str(error))
+        yield type_fault(f"{place}.type", error)
         return
     try:
         interfaces.field_type(of.type, of.field)
@@ -51,9 +54,11 @@ def _number(place: str, of: Readout, kind: str) -> Iterator[Fault]:
     scaled = (of.scale, of.offset) != (1.0, 0.0)
     for key, given in (("format", of.format), ("scale", scaled), ("unit", of.unit)):
         if given and kind not in NUMBERS:
-            yield Fault(f"{place}.{key}", f'is for numbers; "{of.field}" is {kind}')
+            what = f'is for numbers; "{of.field}" is {kind}'
+            yield Fault(f"{place}.{key}", what, cause=f"number {place}")
         elif given and of.constants is not None:
-            yield Fault(f"{place}.{key}", "is for numbers; constants are shown by their names")
+            what = "is for numbers; constants are shown by their names"
+            yield Fault(f"{place}.{key}", what, cause=f"number {place}")
     if of.format and of.format.endswith("d") and kind in NUMBERS and (scaled or kind not in INTEGERS):
         what = "a scaled number" if scaled else kind
         yield Fault(f"{place}.format", f'"{of.format}" is for whole numbers; this is {what}')
@@ -66,8 +71,8 @@ def _constants(place: str, of: Readout, interfaces: Interfaces) -> Iterator[Faul
     names = interfaces.constants(type_name)
     found = {name: value for name, value in names.items() if name.startswith(of.constants)}
     if not found:
-        has = ", ".join(names) or "none"
-        yield Fault(f"{place}.constants", f"no constant of {type_name} starts so; it has {has}")
+        what = f"no constant of {type_name} starts so; it has {listing(names)}"
+        yield Fault(f"{place}.constants", what)
     for name, value in found.items():
         first = next(other for other, its in found.items() if its == value)
         if first != name:
@@ -89,14 +94,15 @@ def _states(place: str, of: Indicator, kind: str, interfaces: Interfaces) -> Ite
     for i, state in enumerate(of.states):
         at = f"{place}.states[{i}]"
         if isinstance(given[i], str) and kind in INTEGERS:
-            yield Fault(f"{at}.value", _no_constant(given[i], kind, type_name, constants))
+            what = _no_constant(given[i], kind, type_name, constants)
+            yield Fault(f"{at}.value", what, cause=f"state {place}")
             continue
         if fault := misfit(given[i], kind):
-            yield Fault(f"{at}.value", fault)
+            yield Fault(f"{at}.value", fault, cause=f"state {place}")
             continue
         if values[i] in values[:i]:
             first = values.index(values[i])
-            yield Fault(f"{at}.value", f"{state.value!r} is already the value of states[{first}]")
+            yield Fault(f"{at}.value", f"{shown(state.value)} is already the value of states[{first}]")
         if looks[i] in looks[:i]:
             first = looks.index(looks[i])
             yield Fault(at, f"has the shape and text of states[{first}]: {SHAPE_AND_TEXT}")
@@ -106,22 +112,24 @@ def misfit(value: Any, kind: str) -> str | None:
     """Why a field of this type never has this value."""
     if kind in ("float32", "float64"):
         number = isinstance(value, int | float) and not isinstance(value, bool)
-        return None if number else f"must be a number ({kind}), not {value!r}"
+        return None if number else f"must be a number ({kind}), not {shown(value)}"
     if kind == "bool":
-        return None if isinstance(value, bool) else f"must be true or false (bool), not {value!r}"
+        return None if isinstance(value, bool) else f"must be true or false (bool), not {shown(value)}"
     if kind in INTEGERS:
         low, high = INTEGERS[kind]
         if isinstance(value, bool) or not isinstance(value, int):
-            return f"must be a whole number ({kind}), not {value!r}"
+            return f"must be a whole number ({kind}), not {shown(value)}"
         inside = low <= value <= high
         return None if inside else f"{value} is out of range: {kind} goes from {low} to {high}"
-    return None if isinstance(value, str) else f"must be text ({kind}), not {value!r}"
+    return None if isinstance(value, str) else f"must be text ({kind}), not {shown(value)}"
 
 
 def _no_constant(name: str, kind: str, type_name: str, constants: Mapping[str, Any]) -> str:
     """What would be right where a whole number is meant, and a text is no constant's name."""
-    what = f'must be a whole number ({kind}) or the name of a constant of {type_name}, not "{name}"'
+    what = (
+        f"must be a whole number ({kind}) or the name of a constant of {type_name}, not {shown(name)}"
+    )
     fitting = [one for one, value in constants.items() if misfit(value, kind) is None]
     near = get_close_matches(name, fitting, n=1, cutoff=0.5)
-    has = f"it has {', '.join(fitting)}" if fitting else "it has none"
+    has = f"it has {listing(fitting)}"
     return f"{what}; did you mean {near[0]}? {has}" if near else f"{what}; {has}"

@@ -6,6 +6,7 @@ from typing import Any, Final
 
 from app.errors import Fault, FieldError, InterfaceError
 from app.interfaces import Interfaces
+from app.panel.check_types import type_fault
 from app.panel.examples import template_faults
 from app.panel.model import Hold, Input
 from app.panel.template import placed
@@ -26,7 +27,7 @@ def hold_faults(
     try:
         interfaces.require(hold.type)
     except InterfaceError as error:
-        yield Fault(f"{place}.type", str(error))
+        yield type_fault(f"{place}.type", error)
         return
     fields = list(_own_fields(place, hold, interfaces))
     yield from fields
@@ -71,7 +72,8 @@ def _own_fields(place: str, hold: Hold, interfaces: Interfaces) -> Iterator[Faul
             continue
         for part, template in (("message", hold.message), ("release", hold.release)):
             if _gives(template, path):
-                yield Fault(f"{place}.{part}.{path}", f"is filled in by the kiosk: it is the {key}")
+                what = f"is filled in by the kiosk: it is the {key}"
+                yield Fault(f"{place}.{part}.{path}", what, cause=f"own {place} {key}")
     if hold.counter_field is not None and hold.counter_field == hold.deadline_field:
         yield Fault(f"{place}.counter_field", f'"{hold.counter_field}" is the deadline_field already')
 

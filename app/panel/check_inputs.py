@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from fractions import Fraction
 
 from app.errors import Fault
+from app.interfaces.scalars import shown
 from app.panel.inputs import Numeric, SelectInput, TextInput, digits, same
 from app.panel.model import Input
 
@@ -51,4 +52,5 @@ def _select(place: str, of: SelectInput) -> Iterator[Fault]:
             what = f'"{label}" is already the label of options[{labels.index(label)}]'
             yield Fault(f"{place}.options[{i}].label", what)
     if of.default is not None and not any(same(o.value, of.default) for o in of.options):
-        yield Fault(f"{place}.default", f"{of.default!r} is no option; there is {', '.join(keys)}")
+        there = ", ".join(shown(option.value) for option in of.options)
+        yield Fault(f"{place}.default", f"{shown(of.default)} is no option; there is {there}")

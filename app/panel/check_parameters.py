@@ -13,12 +13,14 @@ def parameter_faults(place: str, of: Parameter) -> Iterator[Fault]:
     given = {key: getattr(of, key) for key in ("min", "max", "step") if getattr(of, key) is not None}
     if not of.numeric:
         for key in (*given, *(["unit"] if of.unit else [])):
-            yield Fault(f"{place}.{key}", f'is for numbers; the type is "{of.type}"')
+            what = f'is for numbers; the type is "{of.type}"'
+            yield Fault(f"{place}.{key}", what, cause=f"number {place}")
         return
     if of.type == "integer":
         broken = {key: one for key, one in given.items() if not one.is_integer()}
         for key, one in broken.items():
-            yield Fault(f"{place}.{key}", f"{digits(one)} must be whole: the type is integer")
+            what = f"{digits(one)} must be whole: the type is integer"
+            yield Fault(f"{place}.{key}", what, cause=f"number {place}")
         if broken:
             return
     if of.min is None or of.max is None:
@@ -42,4 +44,5 @@ def type_faults(panel: Panel) -> Iterator[Fault]:
                     what = (
                         f"{widget.parameter} of {widget.node} is {widget.type} here but {first} above"
                     )
-                    yield Fault(f"page[{p}].widget[{w}].type", what)
+                    cause = f"parameter {widget.node} {widget.parameter}"
+                    yield Fault(f"page[{p}].widget[{w}].type", what, cause=cause)

@@ -7,13 +7,14 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo
 
+from app.interfaces.scalars import shown
 from app.keys import ACTION_TYPE, MESSAGE_TYPE, NAMESPACE, SERVICE_TYPE, TOPIC, Qos
 
 
 def _topic(given: str) -> str:
     if not TOPIC.fullmatch(given) or "__" in given:
         raise ValueError(
-            f'"{given}" is not an absolute ROS 2 topic name: it starts with "/", and each part is '
+            f'{shown(given)} is not an absolute ROS 2 topic name: it starts with "/", and each part is '
             'letters, digits and single "_", and starts with no digit'
         )
     return given
@@ -21,20 +22,24 @@ def _topic(given: str) -> str:
 
 def _type(given: str) -> str:
     if not MESSAGE_TYPE.fullmatch(given):
-        raise ValueError(f'"{given}" is not a ROS 2 message type: it must be like std_msgs/msg/Bool')
+        raise ValueError(
+            f"{shown(given)} is not a ROS 2 message type: it must be like std_msgs/msg/Bool"
+        )
     return given
 
 
 def _service(given: str) -> str:
     if not SERVICE_TYPE.fullmatch(given):
-        raise ValueError(f'"{given}" is not a ROS 2 service type: it must be like std_srvs/srv/SetBool')
+        raise ValueError(
+            f"{shown(given)} is not a ROS 2 service type: it must be like std_srvs/srv/SetBool"
+        )
     return given
 
 
 def _action(given: str) -> str:
     if not ACTION_TYPE.fullmatch(given):
         raise ValueError(
-            f'"{given}" is not a ROS 2 action type: it must be like nav2_msgs/action/NavigateToPose'
+            f"{shown(given)} is no ROS 2 action type: it must be like nav2_msgs/action/NavigateToPose"
         )
     return given
 
@@ -42,7 +47,7 @@ def _action(given: str) -> str:
 def namespace_of(given: str) -> str:
     whole = f"/{given.strip('/')}" if given.strip("/") else ""
     if not NAMESPACE.fullmatch(whole) or "__" in whole:
-        raise ValueError(f'"{given}" is not a ROS 2 namespace: it must be like /robot1')
+        raise ValueError(f"{shown(given)} is not a ROS 2 namespace: it must be like /robot1")
     return whole
 
 
@@ -50,14 +55,14 @@ def _endpoint(given: str) -> str:
     """Where a session connects to, as Zenoh writes it; Zenoh tells of a wrong one only at the start."""
     found = ENDPOINT.fullmatch(given)
     if found is None or not 0 < int(found["port"] or 1) <= MOST_PORT:
-        raise ValueError(f'"{given}" is not a Zenoh endpoint: it must be like tcp/robot1:7447')
+        raise ValueError(f"{shown(given)} is not a Zenoh endpoint: it must be like tcp/robot1:7447")
     return given
 
 
 def _folder(given: Any, info: ValidationInfo) -> Path:
     """Relative to the panel file's folder, which is the context of the validation."""
     if not isinstance(given, str) or not given:
-        raise ValueError(f"must be the path of a folder, not {given!r}")
+        raise ValueError(f"must be the path of a folder, not {shown(given)}")
     folder = Path(info.context or "") / given
     if not folder.is_dir():
         raise ValueError(f"{folder} is not a folder: it must be a ROS package or have some in it")

@@ -4,6 +4,7 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field
 
+from app.interfaces.scalars import shown
 from app.panel.description import (
     Description,
     FieldPath,
@@ -42,7 +43,7 @@ class Readout(Placed):
 
 def _value(given: Any) -> Any:
     if not isinstance(given, bool | int | str):
-        raise ValueError(f"must be a whole number, true or false, or text, not {given!r}")
+        raise ValueError(f"must be a whole number, true or false, or text, not {shown(given)}")
     return given
 
 

@@ -6,9 +6,11 @@ from typing import Any, Final
 
 from app.errors import Fault, FieldError, InterfaceError
 from app.interfaces import Interfaces
+from app.interfaces.scalars import shown
 from app.panel.inputs import SelectInput, TextInput, ToggleInput
 from app.panel.model import Input
 from app.panel.template import NOW, TIME, at, filled, named, with_now
+from app.panel.wording import listing
 
 NOW_IS: Final = f'"{{{NOW}}}", alone, is the time of sending and fills a {TIME}'
 ELSEWHERE: Final = " on this page: an input is read from the page it is on"
@@ -55,9 +57,8 @@ def unknown(
 ) -> Iterator[Fault]:
     for where, name in names:
         if name not in inputs and name != NOW:
-            there = ", ".join(sorted(inputs)) or "none"
-            what = f"; there is {there}" if name not in anywhere else ELSEWHERE
-            yield Fault(f"{place}.{where}", f'no input "{name}"{what}')
+            what = f"; there is {listing(sorted(inputs))}" if name not in anywhere else ELSEWHERE
+            yield Fault(f"{place}.{where}", f'no input "{name}"{what}', cause=f"input {name}")
 
 
 def _misplaced_now(
@@ -89,7 +90,9 @@ def _tried(
             interfaces.encode(type_name, filled(template, with_now(values)))
         except FieldError as error:
             message = _message(error, template, type_name, inputs, values, interfaces)
-            yield Fault(f"{place}.{error.field}".rstrip("."), message)
+            # An input that does not fit may be in several messages.
+            cause = f"value {message}" if message.startswith("input ") else ""
+            yield Fault(f"{place}.{error.field}".rstrip("."), message, cause=cause)
             return
 
 
@@ -113,7 +116,7 @@ def _message(
     if written != f"{{{names[0]}}}":
         return error.message if _why(error) else f'"{written}" makes text; the field is {field}'
     one = inputs[names[0]]
-    gives = repr(values[one.id]) if isinstance(one, SelectInput) or _why(error) else one.gives
+    gives = shown(values[one.id]) if isinstance(one, SelectInput) or _why(error) else one.gives
     if isinstance(one, TextInput):
         gives = "text" if not _why(error) else f"up to {one.max_length} characters"
     return f'input "{one.id}" gives {gives}; the field is {field}{_why(error)}'

@@ -4,6 +4,7 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, Field
 
+from app.interfaces.scalars import shown
 from app.keys import TOPIC
 from app.panel.description import Id, Label, Seconds, Span
 from app.panel.inputs import Number, Stepped, Unit
@@ -22,7 +23,7 @@ SET: Final = ("set_parameters", "rcl_interfaces/srv/SetParameters")
 def _node(given: str) -> str:
     if not TOPIC.fullmatch(given) or "__" in given:
         raise ValueError(
-            f'"{given}" is not the absolute name of a ROS 2 node: it must be like /arm or /cell1/arm'
+            f"{shown(given)} is not the absolute name of a ROS 2 node: it must be like /cell1/arm"
         )
     return given
 

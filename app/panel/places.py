@@ -42,7 +42,8 @@ def id_at(place: str, tables: Any) -> str:
         known = around[owner["key"]][int(owner["index"])]["id"] if owner else ""
     except (LookupError, TypeError):
         return ""
-    return known[:LONGEST_ID] if isinstance(known, str) else ""
+    tells = isinstance(known, str) and known.isprintable() and '"' not in known
+    return known[:LONGEST_ID] if tells else ""
 
 
 def _lines(text: str) -> dict[Path, int]:

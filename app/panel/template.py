@@ -122,8 +122,9 @@ def _parts(text: str, where: str) -> tuple[tuple[str, str | None], ...]:
     """((literal text, input id after it or None), …)"""
     try:
         parsed = list(Formatter().parse(text))
-    except ValueError as error:
-        raise FieldError(where, f'"{text}": {error}; write {{{{ and }}}} for braces') from None
+    except ValueError:
+        why = "a brace has no partner; write {{ and }} for braces"
+        raise FieldError(where, f'"{text}": {why}') from None
     for _, name, format_spec, conversion in parsed:
         if name is not None and (not name.isidentifier() or format_spec or conversion):
             raise FieldError(where, f'"{text}": between braces stands the id of an input, alone')

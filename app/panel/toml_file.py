@@ -5,6 +5,7 @@ import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Final
 
@@ -12,6 +13,13 @@ from app.errors import Fault, PanelError
 
 AT_LINE: Final = re.compile(r"(.*) \(at (?:line ([0-9]+), column [0-9]+|end of document)\)", re.DOTALL)
 NAMES: Final = re.compile(r"\(((?:'[^']*'(?:, |,)?)+)\)")
+HEADER: Final = re.compile(r"\s*\[\[?\s*([a-zA-Z_.]+)\s*\]\]?\s*(?:#.*)?")
+FREE: Final = ("message", "request", "goal", "release")
+TABLES: Final = (
+    "log", "control", "record", "robot", "interlock", "page", "widget", "qos", "confirm", "options",
+    "states", *FREE,
+)  # fmt: skip
+LIKE_A_TABLE: Final = 0.8
 # What Python's reader says of a key or a table that is there twice, in plainer words.
 PLAINER: Final[Mapping[str, str]] = {
     "Cannot overwrite a value": "this key or table is above already, perhaps as another kind of table",
@@ -36,8 +44,26 @@ def read_toml(path: Path) -> TomlFile:
         text = data.decode("utf-8-sig")  # some editors begin a file with a mark
         tables = tomllib.loads(text)
     except (OSError, ValueError, RecursionError) as error:
-        raise PanelError(str(path), (_unreadable(error),), unreadable=True) from error
+        fault = _unreadable(error)
+        if isinstance(error, tomllib.TOMLDecodeError):
+            fault = _misspelt_header(text) or fault
+        raise PanelError(str(path), (fault,), unreadable=True) from error
     return TomlFile(path, text, tables, hashlib.sha256(data).hexdigest()[:12])
+
+
+def _misspelt_header(text: str) -> Fault | None:
+    """The first header that is almost a known one: what stands below it is taken for another table's,
+    and what is wrong shows far from there."""
+    for number, line in enumerate(text.splitlines(), 1):
+        header = HEADER.fullmatch(line)
+        for part in header[1].split(".") if header else ():
+            if part in FREE:
+                break  # what a message has inside, nobody knows here
+            meant = get_close_matches(part, TABLES, n=1, cutoff=LIKE_A_TABLE)
+            if meant and meant[0] != part:
+                what = f'there is no table "{part}"; did you mean "{meant[0]}"?'
+                return Fault("", what, line=number)
+    return None
 
 
 def _unreadable(error: Exception) -> Fault:
