@@ -8,7 +8,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from app.errors import KioskError, Note, PanelError
+from app.errors import KioskError, PanelError
 from app.panel import Panel, check_panel
 from app.settings import Settings
 
@@ -22,25 +22,28 @@ def main(arguments: Sequence[str]) -> int:
     except KioskError as error:
         print(error, file=sys.stderr)
         return UNREADABLE
-    return max(checked(path) for path in paths)
+    return max(checked(path, given.verbose) for path in paths)
 
 
-def checked(path: Path) -> int:
+def checked(path: Path, verbose: bool = False) -> int:
     """Prints what there is to say of one panel file; its exit status."""
     try:
-        panel, notes = check_panel(path)
+        found = check_panel(path)
     except PanelError as error:
         print(error, file=sys.stderr, flush=True)
         return UNREADABLE if error.unreadable else FAULTY
-    print(_summary(path, panel, notes), flush=True)
+    said = [_summary(path, found.panel), *map(str, found.notes)]
+    if verbose:
+        said += [line for remark in found.sent for line in str(remark).splitlines()]
+    print("\n  ".join(said), flush=True)
     return GOOD
 
 
-def _summary(path: Path, panel: Panel, notes: Sequence[Note]) -> str:
+def _summary(path: Path, panel: Panel) -> str:
     widgets = sum(1 for _ in panel.widgets())
     robots = f"{len(panel.robots)} robot(s), " if panel.robots else ""
     what = f'"{panel.title}", {robots}{len(panel.pages)} page(s), {widgets} widget(s)'
-    return "\n".join([f"{path}: good: {what}", *(f"  {note}" for note in notes)])
+    return f"{path}: good: {what}"
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -48,6 +51,9 @@ def _parser() -> argparse.ArgumentParser:
         prog="python -m app.check",
         description="Tells every fault of panel files, with its place and what would be right.",
         epilog="Exit status, of the worst file: 0 good (notes are no faults), 1 faults, 2 unreadable.",
+    )
+    parser.add_argument(
+        "-v", "--verbose", action="store_true", help="print the whole message that each press will send"
     )
     parser.add_argument(
         "panel",

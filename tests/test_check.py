@@ -10,6 +10,7 @@ from app.check import main
 from app.errors import Note
 from app.panel import load_panel
 from app.settings import PACKAGE
+from tests.parts import TESTS
 
 SHIPPED = PACKAGE / "panel.toml"
 NO_TITLE = SHIPPED.read_text().replace('title = "Robot cell 1"\n', "")
@@ -95,7 +96,7 @@ def test_it_tells_how_it_is_used(capsys: pytest.CaptureFixture[str]) -> None:
         main(["--help"])
     assert ended.value.code == 0
     said = capsys.readouterr().out
-    assert said.startswith("usage: python -m app.check [-h] [PANEL ...]")
+    assert said.startswith("usage: python -m app.check [-h] [-v] [PANEL ...]")
     assert "KIOSK_PANEL" in said
     assert "Exit status" in said
 
@@ -104,7 +105,7 @@ def test_a_note_is_no_fault_and_has_its_place(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     noted = [Note("interlock[0]", "is worth a look"), Note("page[0].widget[4].max_age_s", "is missing")]
-    monkeypatch.setattr("app.panel.load.notes_in", lambda *_: noted)
+    monkeypatch.setattr("app.panel.notes.notes_in", lambda *_: noted)
     assert main([str(SHIPPED)]) == 0
     said = capsys.readouterr()
     assert said.err == ""
@@ -113,6 +114,20 @@ def test_a_note_is_no_fault_and_has_its_place(
         '  note: page[0].widget[4].max_age_s "last_heard", line 52: is missing',
     ]
     load_panel(SHIPPED)
+
+
+def test_the_whole_message_of_each_press_is_printed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "cell.toml"
+    path.write_text((TESTS / "everything.toml").read_text())
+    jog = tmp_path / "msgs/cell_msgs/msg/Jog.msg"
+    jog.parent.mkdir(parents=True)
+    jog.write_text("float64 speed\nuint32 valid_ms\nuint16 number\n")
+    assert main(["-v", str(path)]) == 0
+    first, _, said = capsys.readouterr().out.partition("\n")
+    assert "good" in first
+    assert said == (TESTS / "everything.txt").read_text()
 
 
 @pytest.mark.parametrize(("text", "status"), [(SHIPPED.read_text(), 0), (NO_TITLE, 1), ("title =", 2)])

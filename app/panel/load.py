@@ -1,20 +1,16 @@
 """Reading a panel file, and every fault in it with its place."""
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from pathlib import Path
+from typing import Any, NamedTuple
 
 from pydantic import ValidationError
 
-from app.errors import Fault, InterfaceError, Note, PanelError
+from app.errors import Fault, InterfaceError, Note, PanelError, Remark
 from app.interfaces import interfaces_of, read_distribution
-from app.panel.causes import one_for_each
 from app.panel.check import faults_in
 from app.panel.constants import resolved
 from app.panel.model import Panel
-from app.panel.notes import notes_in
-from app.panel.places import located
-from app.panel.shape import shape_of
-from app.panel.stand_ins import Rest, rest_of
 from app.panel.toml_file import TomlFile, read_toml
 
 Kept = Callable[[Panel], Path | None]
@@ -28,12 +24,26 @@ def load_panel(path: Path, kept: Kept = lambda _: None) -> Panel:
     return _panel(read_toml(path), kept)
 
 
-def check_panel(path: Path) -> tuple[Panel, tuple[Note, ...]]:
-    """The checked panel, with what is no fault of it but worth a look; PanelError as `load_panel`."""
+class Checked(NamedTuple):
+    """A good panel; `notes` are worth a look, `sent` is what each press sends."""
+
+    panel: Panel
+    notes: tuple[Note, ...]
+    sent: tuple[Remark, ...]
+
+
+def check_panel(path: Path) -> Checked:
+    """The checked panel, with what there is to say of it; PanelError as `load_panel`."""
+    from app.panel.notes import notes_in
+    from app.panel.places import located
+    from app.panel.preview import previews
+
     file = read_toml(path)
     panel = _panel(file)
-    notes = notes_in(panel, interfaces_of(panel.distro, panel.interfaces))
-    return panel, tuple(located(notes, file.text, file.tables))
+    interfaces = interfaces_of(panel.distro, panel.interfaces)
+    notes = located(notes_in(panel, interfaces), file.text, file.tables)
+    sent = located(previews(panel, interfaces), file.text, file.tables)
+    return Checked(panel, tuple(notes), tuple(sent))
 
 
 def _panel(file: TomlFile, kept: Kept = lambda _: None) -> Panel:
@@ -42,15 +52,12 @@ def _panel(file: TomlFile, kept: Kept = lambda _: None) -> Panel:
     try:
         panel = Panel.model_validate(tables | {"revision": file.revision}, context=file.path.parent)
     except ValidationError as error:
-        shape = shape_of(error, tables)
-        rest = _faults_of_the_rest(rest_of(tables, error), file.path.parent)
-        faults += [*shape.faults, *(fault for fault in rest if not shape.explains(fault))]
+        faults += _faults_of_shape(error, tables, file.path.parent)
     else:
         read_distribution(panel.distro, kept(panel))
         faults += _faults_with_types(panel)
     if faults:
-        told = located(one_for_each(faults), file.text, file.tables)
-        raise PanelError(str(file.path), tuple(sorted(told, key=lambda fault: fault.line)))
+        raise PanelError(str(file.path), _told(faults, file))
     return resolved(panel, interfaces_of(panel.distro, panel.interfaces))
 
 
@@ -64,8 +71,26 @@ def _faults_with_types(panel: Panel, faulty: Collection[str] = ()) -> Iterator[F
     yield from faults_in(panel, interfaces, faulty)
 
 
-def _faults_of_the_rest(rest: Rest | None, folder: Path) -> Iterator[Fault]:
-    """What is wrong beside the shape."""
+# Modules that only a panel with a fault needs are read then: a start is the quicker for it.
+
+
+def _faults_of_shape(error: ValidationError, tables: dict[str, Any], folder: Path) -> list[Fault]:
+    """What is wrong with the shape, and beside that."""
+    from app.panel.shape import shape_of
+    from app.panel.stand_ins import rest_of
+
+    shape, rest = shape_of(error, tables), rest_of(tables, error)
     panel = rest and rest.panel(folder)
-    if rest and panel:
-        yield from filter(rest.judges, _faults_with_types(panel, rest.faulty))
+    if not rest or not panel:
+        return shape.faults
+    others = filter(rest.judges, _faults_with_types(panel, rest.faulty))
+    return shape.faults + [fault for fault in others if not shape.explains(fault)]
+
+
+def _told(faults: Iterable[Fault], file: TomlFile) -> tuple[Fault, ...]:
+    """One for each mistake, with its line, in the order of the file."""
+    from app.panel.causes import one_for_each
+    from app.panel.places import located
+
+    told = located(one_for_each(faults), file.text, file.tables)
+    return tuple(sorted(told, key=lambda fault: fault.line))
