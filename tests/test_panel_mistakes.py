@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Any, Final
 
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from app.errors import Fault, PanelError
 from app.panel import load_panel
@@ -192,3 +194,35 @@ def test_it_is_not_toml(told: Told) -> None:
     ):
         fault = the_one(told, changed(old, new))
         assert (fault.place, fault.line) == ("", line)
+
+
+AT: Final = st.integers(0, len(LINES) - 1)
+VALUES: Final = st.sampled_from((
+    "1979-05-27", "07:32:00", "[]", "[[]]", "{}", "{ a = { b = 1 } }", "''", "-1", "1e400", "nan",
+    "true", "[1, 'a', { b = 2 }]", '"\\u0000"', '"\\u202e"', "'{'", "['{now}']", "1.5", "x",
+))  # fmt: skip
+DAMAGE: Final = st.one_of(
+    st.tuples(st.just("without"), AT),
+    st.tuples(st.just("again"), AT, AT),
+    st.tuples(st.just("value"), AT, VALUES),
+    st.tuples(st.just("mistyped"), AT, st.integers(0, 30), st.sampled_from("aeiou_. ]\"'=#")),
+)
+
+
+@given(st.lists(DAMAGE, min_size=1, max_size=4))
+@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_whatever_is_wrong_is_told_in_words(told: Told, damages: list[tuple[Any, ...]]) -> None:
+    lines = list(LINES)
+    for what, at, *more in damages:
+        match what, *more:
+            case ("without",):
+                lines[at] = ""
+            case "again", other:
+                lines[at] += f"\n{lines[other]}"
+            case "value", value:
+                lines[at] = lines[at].partition("=")[0] + f"= {value}"
+            case "mistyped", column, character:
+                lines[at] = lines[at][:column] + character + lines[at][column + 1 :]
+    for fault in told("\n".join(lines)):
+        assert INTERNAL.search(str(fault)) is None, str(fault)
+        assert fault.line or "." not in fault.place
