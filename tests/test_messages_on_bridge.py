@@ -147,6 +147,7 @@ def test_a_slider_without_a_step_goes_in_fine_ones(cell: Server, robot: RosNode,
     expect(output).to_have_text("0.98")
     speed.press("Home")
     expect(output).to_have_text("-1")
+    assert speed.bounding_box() == box  # its value is wider and narrower, and moves nothing
 
 
 def test_a_number_without_a_step_takes_any(cell: Server, robot: RosNode, page: Page) -> None:

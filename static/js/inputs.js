@@ -16,6 +16,14 @@ function near(input, value) {
   return Math.min(Math.max(rounded, input.min), input.max);
 }
 
+// As wide as its longest value: nothing moves under a finger.
+function widen(output, input) {
+  const grain = input.step === "any" ? fine(input) : Number(input.step);
+  const places = Math.max(0, -Math.floor(Math.log10(grain)));
+  const longest = Math.max(...[input.min, input.max].map((limit) => Number(limit).toFixed(places).length));
+  output.style.minWidth = `max(3.2em, ${Math.max(longest, input.value.length)}ch)`;
+}
+
 function step(input, times) {
   if (input.value === "") input.value = input.min;
   else if (input.step !== "any") input.stepUp(times);
@@ -29,6 +37,7 @@ function equip(input) {
   if (output) {
     input.type = "range";
     output.hidden = false;
+    widen(output, input);
     input.addEventListener("input", () => {
       if (input.step === "any") input.value = near(input, Number(input.value));
       show();
