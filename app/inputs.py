@@ -16,10 +16,11 @@ SWITCHED: Final = {"true": True, "false": False}
 
 def limits(of: Numeric) -> str:
     """What a number may be, as an operator reads it: "0 to 1.5 m/s, in steps of 0.1"."""
-    about = {"low": digits(of.min), "high": digits(of.max), "unit": f" {of.unit}" if of.unit else ""}
+    low, high = digits(of.min), digits(of.max)
+    unit = f" {of.unit}" if of.unit else ""
     if of.step is None:
-        return say("limits_both", **about)
-    return say("limits", **about, step=digits(of.step))
+        return say("limits_both", low=low, high=high, unit=unit)
+    return say("limits", low=low, high=high, unit=unit, step=digits(of.step))
 
 
 def default_of(of: Input) -> Any:

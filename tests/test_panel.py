@@ -469,6 +469,16 @@ def test_a_key_that_stands_too_far_below_is_one_fault(
     assert faults(load, given) == {place: f"unknown key; it belongs to {where}"}
 
 
+def test_keys_that_are_unknown_in_a_widget_are_told_together(load: Load) -> None:
+    text = {**MESSAGE, "scale": 1, "offset": 2}
+    page = {"id": "one", "title": "One", "widget": [text]}
+    assert faults(load, tables(page=[page])) == {
+        "page[0].widget[0].scale": (
+            'unknown key, as "offset"; known here: id, label, span, kind, max_length, default'
+        )
+    }
+
+
 def test_faults_of_one_cause_are_one_and_tell_of_the_others(load: Load) -> None:
     buttons = [{**GUARDED, "id": f"b{n}", "topic": f"/b{n}", "interlock": "x"} for n in range(6)]
     page = {"id": "one", "title": "One", "widget": [MESSAGE, *buttons]}

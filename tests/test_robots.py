@@ -246,14 +246,23 @@ def test_a_bridge_with_another_namespace_is_not_this_robots(
 
 
 def test_the_panel_file_says_what_is_wrong_with_its_robots(tmp_path: Path) -> None:
-    path = panel_file(tmp_path, entry(1), entry(1), 'id = "r3"\nname = "R3"\nnamespace = "a b"')
+    other = 'id = "r{n}"\nname = "{name}"\nnamespace = "{namespace}"'
+    path = panel_file(
+        tmp_path,
+        entry(1),
+        entry(1),  # a copy: that it has the same name and place, too, goes without saying
+        other.format(n=3, name="R3", namespace="a b"),
+        other.format(n=4, name="Robot 1", namespace="/robot4"),
+        other.format(n=5, name="R5", namespace="/robot1"),
+    )
     with pytest.raises(PanelError) as caught:
         load_panel(path)
-    text = told(caught.value)
-    assert 'robot[2].namespace: "a b" is not a ROS 2 namespace' in text
-    assert 'robot[1].id: "r1" is already the id of robot[0]' in text
-    assert 'robot[1].name: "Robot 1" is already the name of robot[0]' in text
-    assert "robot[1].namespace: robot[0] has the same namespace and endpoints" in text
+    assert told(caught.value).splitlines() == [
+        'robot[1].id: "r1" is already the id of robot[0]',
+        'robot[2].namespace: "a b" is not a ROS 2 namespace: it must be like /robot1',
+        'robot[3].name: "Robot 1" is already the name of robot[0]',
+        "robot[4].namespace: robot[0] has the same namespace and endpoints: it would be the same robot",
+    ]
 
 
 @pytest.mark.parametrize(

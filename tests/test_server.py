@@ -364,7 +364,7 @@ def test_a_faulty_panel_stops_the_start_with_its_places(tmp_path: Path) -> None:
         check=False,
     )
     assert done.returncode != 0
-    assert 'page[0].widget[0]: unknown kind "txt"' in done.stderr
+    assert 'page[0].widget[0].kind "message", line 22: unknown kind "txt"' in done.stderr
     assert "Traceback" not in done.stderr
 
 

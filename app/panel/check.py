@@ -1,6 +1,7 @@
 """What can be wrong in a panel file whose shape is right: names, types and templates."""
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from itertools import islice
 from typing import Final
 
 from app.errors import Fault, InterfaceError
@@ -27,6 +28,7 @@ from app.panel.model import (
     Pressed,
     Publish,
     Published,
+    RobotEntry,
 )
 from app.panel.parameter import Parameter
 from app.panel.template import NOW
@@ -148,14 +150,17 @@ def _robots(panel: Panel) -> Iterator[Fault]:
     if panel.robots and panel.namespace:
         yield Fault("namespace", "is of the one robot: with [[robot]] each has its own")
     for r, robot in enumerate(panel.robots):
-        for a, above in enumerate(panel.robots[:r]):
-            if robot.id == above.id:
-                break  # that is told, and it may be a copy
-            if robot.name == above.name:
-                yield Fault(f"robot[{r}].name", f'"{robot.name}" is already the name of robot[{a}]')
-            elif (robot.namespace, robot.connect) == (above.namespace, above.connect):
-                same = f"robot[{a}] has the same namespace and endpoints: it would be the same robot"
-                yield Fault(f"robot[{r}].namespace", same)
+        yield from islice(_like_another(f"robot[{r}]", robot, panel.robots[:r]), 1)
+
+
+def _like_another(place: str, robot: RobotEntry, others: Sequence[RobotEntry]) -> Iterator[Fault]:
+    """What it has as another one. A copy, which has the same id, is told elsewhere."""
+    for a, above in enumerate(others if robot.id not in [one.id for one in others] else ()):
+        if robot.name == above.name:
+            yield Fault(f"{place}.name", f'"{robot.name}" is already the name of robot[{a}]')
+        if (robot.namespace, robot.connect) == (above.namespace, above.connect):
+            same = f"robot[{a}] has the same namespace and endpoints: it would be the same robot"
+            yield Fault(f"{place}.namespace", same)
 
 
 def _repeated(table: str, ids: list[str]) -> Iterator[Fault]:

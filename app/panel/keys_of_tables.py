@@ -129,7 +129,8 @@ def _others(table: Keys) -> Iterator[tuple[str, Model]]:
         if model := inner(table.model, key):
             yield (f"{header}.{key}" if header else key), model
     for kind in KINDS.values():
-        yield "[[page.widget]]", kind
+        if table.path[-2:-1] != ("widget",):
+            yield "[[page.widget]]", kind
         for key in known(kind):
             if model := inner(kind, key):
                 yield f"page.widget.{key}", model
