@@ -26,8 +26,20 @@ def faulty(tmp_path: Path) -> Path:
 def test_a_good_panel_is_summed_up(capsys: pytest.CaptureFixture[str]) -> None:
     assert main([str(SHIPPED)]) == 0
     said = capsys.readouterr()
-    assert said.out == f'{SHIPPED}: good: "Robot cell 1", 1 page(s), 5 widget(s)\n'
+    first, note = said.out.splitlines()
+    assert first == f'{SHIPPED}: good: "Robot cell 1", 1 page(s), 5 widget(s)'
+    assert note.startswith('  note: interlock[0] "operation", line 10: the last value on ')
     assert said.err == ""
+
+
+@pytest.mark.parametrize("rule", ["max_age_s = 2.0", "require_publisher = true"])
+def test_a_permission_that_is_kept_fresh_needs_no_note(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], rule: str
+) -> None:
+    path = tmp_path / "cell.toml"
+    path.write_text(SHIPPED.read_text().replace('field = "data"\n', f'field = "data"\n{rule}\n', 1))
+    assert main([str(path)]) == 0
+    assert "note:" not in capsys.readouterr().out
 
 
 def test_every_fault_is_printed_with_its_place(

@@ -9,7 +9,20 @@ from app.panel.model import Panel
 
 def notes_in(panel: Panel, interfaces: Interfaces) -> Iterator[Note]:
     """Notes by their places in the panel file; ids and lines are added by who prints them."""
+    yield from _trusted(panel)
     yield from _left_out(panel, interfaces)
+
+
+def _trusted(panel: Panel) -> Iterator[Note]:
+    """Interlocks whose last value is trusted for good: see docs/permissions.md."""
+    for i, interlock in enumerate(panel.interlocks):
+        if interlock.max_age_s is None and not interlock.require_publisher:
+            yield Note(
+                f"interlock[{i}]",
+                f"the last value on {interlock.topic} counts for as long as the bridge is connected, "
+                "also when its publisher is gone or one of its messages is lost: give max_age_s where "
+                "it is published regularly, or require_publisher = true where its publisher stays",
+            )
 
 
 def _left_out(panel: Panel, interfaces: Interfaces) -> Iterator[Note]:
