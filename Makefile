@@ -25,7 +25,9 @@ run: .venv/run
 dev: .venv/test
 	KIOSK_DEV=1 KIOSK_LOG_LEVEL=debug .venv/bin/uvicorn app.main:app --reload --reload-dir app
 
-test: test-parts
+# ARGS: of pytest. Tests that need neither bridge nor ROS nor browser are run without them.
+test: $(if $(ARGS),.venv/test,test-parts)
+	$(if $(ARGS),$(MAKE) --no-print-directory .venv/test $$(.venv/bin/python -m tests.needs $(ARGS)))
 	.venv/bin/pytest $(ARGS)
 
 check: .venv/test
@@ -55,10 +57,15 @@ system:
 	sh tests/system.sh
 
 bridge: system
-	cargo build --quiet --release --locked --manifest-path tests/bridge/Cargo.toml --target-dir $(CACHE)/bridge
+	@[ -x $(TEST_BRIDGE) ] || echo "building the bridge of the tests: once, 5 to 10 minutes"
+	cargo build --release --locked --manifest-path tests/bridge/Cargo.toml --target-dir $(CACHE)/bridge
+
+NEW_ENOUGH := $(PYTHON) -c 'import sys; sys.exit(None if sys.version_info >= (3, 11) else "the panel needs Python 3.11 or later, and this is %d.%d: make $(MAKECMDGOALS) PYTHON=python3.11" % sys.version_info[:2])'
 
 .venv/bin/python:
-	$(PYTHON) -m venv .venv || { sh tests/system.sh python3-venv && $(PYTHON) -m venv .venv; }
+	@$(NEW_ENOUGH)
+	@$(PYTHON) -c "import ensurepip" 2>/dev/null || PYTHON=$(PYTHON) sh tests/system.sh python3-venv
+	$(PYTHON) -m venv .venv
 
 .venv/run: deploy/requirements.lock | .venv/bin/python
 	.venv/bin/python $(PIP_INSTALL) $<

@@ -2,6 +2,7 @@
 # What the tests need besides Python, Rust and git: installed on Debian as root, named elsewhere.
 # `system.sh PACKAGE` looks for that one alone.
 set -eu
+RUST=1.89 # of what tests/bridge/Cargo.lock has
 only=${1:-}
 
 missing=""
@@ -29,7 +30,19 @@ need iproute2 ip -V
 need util-linux nsenter --version
 need python3-venv "${PYTHON:-python3}" -c "import ensurepip"
 [ "$only" != npm ] || need npm npm --version # for the benchmark's rivals alone
-[ -n "$only" ] || command -v cargo >/dev/null || { echo "missing: Rust 1.85 or later (cargo)" >&2; exit 1; }
+[ -n "$only" ] || command -v cargo >/dev/null || { echo "missing: Rust $RUST or later (cargo)" >&2; exit 1; }
+if [ -z "$only" ]; then
+    has=$(cargo --version | cut -d" " -f2)
+    [ "$(printf '%s\n' "$RUST" "$has" | sort -V | head -n 1)" = "$RUST" ] || {
+        echo "the bridge of the tests needs Rust $RUST or later; this cargo is $has (rustup installs a newer one)" >&2
+        exit 1
+    }
+    unshare --mount --net true 2>/dev/null || {
+        echo "the tests make mount and network namespaces, which is not allowed here:" \
+            "run them as root (in a container: with CAP_SYS_ADMIN), or by \`unshare -rmn make test\`" >&2
+        exit 1
+    }
+fi
 
 [ -n "$missing" ] || exit 0
 if [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
