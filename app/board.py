@@ -8,7 +8,6 @@ far share the same bytes, the others those of each event that says all of someth
 import asyncio
 import secrets
 from collections.abc import Mapping
-from functools import partial
 from typing import Any, Final
 
 from pydantic_core import to_json
@@ -16,10 +15,18 @@ from pydantic_core import to_json
 from app.heartbeat import Heartbeat
 from app.views import View
 
-# Its text has no line break: it is one line of an event. What is no number is null.
-ENCODE: Final = partial(to_json, inf_nan_mode="null")
+# What some readers take for the end of a line, and JSON leaves as it is.
+SEPARATORS: Final = {c.encode(): b"\\u%04x" % ord(c) for c in "\x85\u2028\u2029"}
 
 Events = dict[str, Mapping[str, Any]]  # the data of each by its name, in their order
+
+
+def encoded(data: Mapping[str, Any]) -> bytes:
+    """JSON in one line, for whoever reads lines; what is no number is null."""
+    text = to_json(data, inf_nan_mode="null")
+    for separator, escaped in SEPARATORS.items():
+        text = text.replace(separator, escaped)
+    return text
 
 
 class Board:
@@ -101,12 +108,12 @@ class Board:
         return whole
 
     def _event(self, name: str, data: Mapping[str, Any]) -> bytes:
-        return b"event: %b\ndata: %b\nid: %b\n\n" % (name.encode(), ENCODE(data), self.id.encode())
+        return b"event: %b\ndata: %b\nid: %b\n\n" % (name.encode(), encoded(data), self.id.encode())
 
 
 def told(browser: str) -> bytes:
     """Tells a page the id of its browser: it knows by it what `control` means for it."""
-    return b"event: browser\ndata: %b\n\n" % ENCODE({"id": browser})
+    return b"event: browser\ndata: %b\n\n" % encoded({"id": browser})
 
 
 def difference(old: View, new: View) -> Events:

@@ -98,7 +98,7 @@ def log_fields(record: logging.LogRecord) -> dict[str, object]:
         "stamp": {"sec": seconds, "nanosec": nanoseconds},
         "level": severity(record)[1],
         "name": NODE_NAME,
-        "msg": text.replace("\0", "\\x00").encode(errors="replace").decode(),
+        "msg": text.translate(_CONTROLS).encode(errors="replace").decode(),
         "file": record.filename,
         "function": record.funcName or "",
         "line": record.lineno,

@@ -140,6 +140,8 @@ def test_no_text_of_the_robots_breaks_the_stream(board: Board, robot: Robot, tex
     board.post(view_of(robot))
     assert list(events(board.since(1, old))) == ["update"]
     assert events(board.since(1, old))["update"]["heard"]["text"] == text
+    for sent in (board.since(1, old), board.snapshot()):
+        assert len(sent.decode().splitlines()) == sent.count(b"\n")
 
 
 def test_what_says_all_of_something_is_encoded_once_for_streams_however_far(
@@ -158,7 +160,7 @@ def test_what_says_all_of_something_is_encoded_once_for_streams_however_far(
         encoded.append(data)
         return json.dumps(data).encode()
 
-    monkeypatch.setattr("app.board.ENCODE", encode)
+    monkeypatch.setattr("app.board.encoded", encode)
     sent = [events(board.since(version, view)) for version, view in enumerate(views, 1)]
     assert all(one["operation-enabled-updated"] == {"enabled": True, "reason": None} for one in sent)
     assert all(one["link"] == board.view["link"] for one in sent)

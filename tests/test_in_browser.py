@@ -70,6 +70,74 @@ def test_the_main_job(server: Server, node: RosNode, page: Page) -> None:
     expect(button(page, "Publish1")).to_be_enabled()
 
 
+# What some readers take for the end of a line; in a text of the robot's it is part of it.
+SEPARATED = "one \x85 two \u2028 three \u2029 four"
+SNAPSHOT = "**/events?once=1"
+NO_STREAM_LEFT = """() => {
+    const forEver = () => new Promise(() => {});
+    for (const place of [0, 1, 2]) navigator.locks.request(`stream-${place}`, forEver);
+}"""
+
+
+@pytest.fixture
+def polling(server: Server, node: RosNode, page: Page) -> Page:
+    """An open page that asks for snapshots: its browser has no event stream to spare."""
+    other = page.context.new_page()
+    other.goto(f"{server.url}/log")
+    other.evaluate(NO_STREAM_LEFT)
+    permit(node, True)
+    until(lambda: server.widget("operation1")["enabled"], "permitted")
+    with page.expect_request(SNAPSHOT):
+        page.goto(server.url)
+    expect(button(page, "Publish1")).to_be_enabled()
+    return page
+
+
+def say(node: RosNode, server: Server, text: str) -> None:
+    node.once("/last_heard", "std_msgs/msg/String", {"data": text})
+    until(lambda: server.widget("last_heard")["text"] == text, "the server has it")
+
+
+def test_a_text_with_line_separators_keeps_no_button_open(
+    polling: Page, server: Server, node: RosNode
+) -> None:
+    say(node, server, SEPARATED)
+    expect(polling.locator('[data-widget="last_heard"] .value')).to_contain_text("four")
+    permit(node, False)
+    expect(button(polling, "Publish1")).to_be_disabled(timeout=4000)
+    expect(why(polling, "operation1")).to_contain_text("The robot does not permit operation")
+
+
+def test_line_separators_that_come_as_they_are_end_no_line_of_a_snapshot(
+    polling: Page, server: Server, node: RosNode
+) -> None:
+    def unescaped(route: Route) -> None:
+        body = route.fetch().text()
+        for separator in "\x85\u2028\u2029":
+            body = body.replace(f"\\u{ord(separator):04x}", separator)
+        route.fulfill(body=body, content_type="text/event-stream")
+
+    polling.route(SNAPSHOT, unescaped)
+    say(node, server, SEPARATED)
+    expect(polling.locator('[data-widget="last_heard"] .value')).to_contain_text("four")
+    permit(node, False)
+    expect(button(polling, "Publish1")).to_be_disabled(timeout=4000)
+    expect(why(polling, "operation1")).to_contain_text("The robot does not permit operation")
+
+
+@pytest.mark.parametrize(
+    "answer",
+    ["", 'event: beat\ndata: {"clock": "10:00:00", "now": 1}\n\n', "event: snapshot\ndata: {\n\n"],
+    ids=["nothing", "no snapshot", "half of one"],
+)
+def test_an_answer_without_its_snapshot_is_a_lost_link(polling: Page, answer: str) -> None:
+    polling.route(SNAPSHOT, lambda route: route.fulfill(body=answer, content_type="text/event-stream"))
+    expect(button(polling, "Publish1")).to_be_disabled()
+    expect(why(polling, "operation1")).to_contain_text(NO_SERVER)
+    polling.unroute(SNAPSHOT)
+    expect(button(polling, "Publish1")).to_be_enabled()
+
+
 def test_every_text_arrives_intact(server: Server, node: RosNode, page: Page) -> None:
     page.goto(server.url)
     expect(button(page, "Publish")).to_be_enabled()

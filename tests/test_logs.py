@@ -93,11 +93,20 @@ def test_a_record_becomes_the_fields_of_the_ros_log_message() -> None:
     }
 
 
-@pytest.mark.parametrize("text", ["plain", "two\nlines", "NUL \0 inside", "漢字"])
-def test_a_record_can_be_sent_on_rosout(text: str) -> None:
+@pytest.mark.parametrize(
+    ("text", "sent"),
+    [
+        ("plain", "plain"),
+        ("two\nlines", "two\nlines"),
+        ("NUL \0 inside", "NUL \\x00 inside"),
+        ("漢字", "漢字"),
+        ("a \x85 b \u2028 c \x1b[2J", "a \\x85 b \\x2028 c \\x1b[2J"),
+    ],
+)
+def test_a_record_can_be_sent_on_rosout(text: str, sent: str) -> None:
     interfaces = interfaces_of("jazzy")
     payload = interfaces.encode("rcl_interfaces/msg/Log", log_fields(record(text)))
-    assert interfaces.decode("rcl_interfaces/msg/Log", payload).msg == text.replace("\0", "\\x00")
+    assert interfaces.decode("rcl_interfaces/msg/Log", payload).msg == sent
 
 
 def test_rosout_gets_each_record() -> None:

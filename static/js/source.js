@@ -11,6 +11,12 @@ const DRIFT_MS = 0.1; // by which two clocks may go apart from one beat to the n
 const EVENTS = ["snapshot", "update", "link", "notice", "robots", "control", "browser", "beat"];
 const BASE = document.body.dataset.base; // of the robot that this page shows
 
+// Those of an answer that came whole. Only "\n" ends a line: a text may have other separators.
+function eventsIn(text) {
+  const fields = (block) => Object.fromEntries(block.split("\n").map((line) => line.split(/: (.*)/s)));
+  return text.split("\n\n").map(fields).filter(({ event }) => event);
+}
+
 export class Source {
   #on;
   #stream = null;
@@ -144,11 +150,10 @@ export class Source {
     const turn = this.#turn;
     try {
       const answer = await fetch(`${BASE}/events?once=1`, { cache: "no-store", signal: AbortSignal.timeout(SILENCE_MS) });
-      const text = await answer.text();
+      const events = eventsIn(await answer.text());
       if (turn !== this.#turn) return;
-      for (const [, name, data, id] of text.matchAll(/^event: (.*)\ndata: (.*)\n(?:id: (.*)\n)?/gm)) {
-        this.#got(name, JSON.parse(data), id, asked);
-      }
+      if (events[0]?.event !== "snapshot") throw new Error("no snapshot");
+      for (const { event, data, id } of events) this.#got(event, JSON.parse(data), id, asked);
     } catch {
       if (turn === this.#turn) this.#lose();
     }
