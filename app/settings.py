@@ -2,8 +2,10 @@
 
 import os
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from difflib import get_close_matches
+from ipaddress import ip_network
 from pathlib import Path
 from typing import Literal, overload
 
@@ -16,6 +18,8 @@ PACKAGE = Path(__file__).resolve().parent
 LOOPBACK_HOSTS = ("127.0.0.1", "localhost", "[::1]")
 HOST_NAME = re.compile(r"\[[0-9a-f:.]+\]|[a-z0-9._-]+")
 LOG_LEVELS = ("debug", "info", "warn", "error", "fatal")
+PREFIX = "KIOSK_"
+NAMES = ("PANEL", "ZENOH", "MODE", "DATA", "HOSTS", "PROXIES", "LOG_LEVEL", "DEV")
 
 
 def shipped(name: str) -> Path:
@@ -32,6 +36,7 @@ class Settings:
     zenoh: Path
     mode: Mode | None = None
     hosts: tuple[str, ...] = LOOPBACK_HOSTS
+    proxies: tuple[str, ...] = ()
     log_level: str = "info"
     dev: bool = False
     data: Path | None = None
@@ -45,6 +50,7 @@ class Settings:
     @classmethod
     def from_environment(cls, env: Mapping[str, str] = os.environ) -> "Settings":
         """Raises SettingsError that names the variable and what would be right."""
+        _known(name for name in env if name.startswith(PREFIX))
         level = (env.get("KIOSK_LOG_LEVEL") or "info").lower()
         if level not in LOG_LEVELS:
             raise SettingsError(f'KIOSK_LOG_LEVEL is "{level}": one of {", ".join(LOG_LEVELS)}')
@@ -53,6 +59,7 @@ class Settings:
             zenoh=_path(env, "KIOSK_ZENOH", shipped("zenoh.json5")),
             mode=_mode(env.get("KIOSK_MODE", "")),
             hosts=(*LOOPBACK_HOSTS, *_hosts(env.get("KIOSK_HOSTS", ""))),
+            proxies=tuple(_proxies(env.get("KIOSK_PROXIES", ""))),
             log_level=level,
             dev=env.get("KIOSK_DEV", "") not in ("", "0"),
             data=_path(env, "KIOSK_DATA", None),
@@ -65,6 +72,17 @@ def state_home() -> Path:
     return given if given.is_absolute() else Path("~/.local/state").expanduser()
 
 
+def _known(variables: Iterable[str]) -> None:
+    """A variable that nobody reads would be a setting that silently does not hold."""
+    for variable in variables:
+        name = variable.removeprefix(PREFIX)
+        if name not in NAMES:
+            close = get_close_matches(name.upper(), NAMES, 1)
+            there = ", ".join(PREFIX + known for known in NAMES)
+            hint = f"did you mean {PREFIX}{close[0]}?" if close else f"there are {there}"
+            raise SettingsError(f"{variable} is not a setting of this server: {hint}")
+
+
 def _mode(given: str) -> Mode | None:
     match given:
         case "":
@@ -74,14 +92,30 @@ def _mode(given: str) -> Mode | None:
     raise SettingsError(f'KIOSK_MODE is "{given}": it must be "demo" or "live"')
 
 
+def _listed(given: str) -> Iterator[str]:
+    return filter(None, (part.strip().lower() for part in given.split(",")))
+
+
 def _hosts(given: str) -> Iterator[str]:
-    for host in filter(None, (part.strip().lower() for part in given.split(","))):
+    for host in _listed(given):
         if not HOST_NAME.fullmatch(host):
             raise SettingsError(
                 f'KIOSK_HOSTS has "{host}": names or addresses with commas between, without port '
                 "and without http://, an IPv6 address in brackets"
             )
         yield host
+
+
+def _proxies(given: str) -> Iterator[str]:
+    for proxy in _listed(given):
+        try:
+            ip_network(proxy)
+        except ValueError:
+            raise SettingsError(
+                f'KIOSK_PROXIES has "{proxy}": addresses or networks with commas between, such as '
+                "127.0.0.1 or 192.0.2.0/24"
+            ) from None
+        yield proxy
 
 
 @overload

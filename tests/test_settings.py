@@ -119,3 +119,29 @@ def test_what_the_project_ships_is_found(name: str) -> None:
 def test_a_host_that_could_never_match_is_refused(hosts: str) -> None:
     with pytest.raises(SettingsError, match="KIOSK_HOSTS"):
         Settings.from_environment({"KIOSK_HOSTS": hosts})
+
+
+@pytest.mark.parametrize(
+    ("name", "meant"),
+    [("KIOSK_PANNEL", "KIOSK_PANEL"), ("KIOSK_HOST", "KIOSK_HOSTS"), ("KIOSK_panel", "KIOSK_PANEL")],
+)
+def test_an_unknown_variable_stops_the_start_and_is_told_what_was_meant(name: str, meant: str) -> None:
+    with pytest.raises(SettingsError, match=f"^{name} is not a setting .* did you mean {meant}\\?$"):
+        Settings.from_environment({name: ""})
+
+
+def test_a_variable_like_none_that_there_is_is_told_all_that_there_are() -> None:
+    with pytest.raises(SettingsError, match=r"KIOSK_XYZZY .* there are KIOSK_PANEL, KIOSK_ZENOH, "):
+        Settings.from_environment({"KIOSK_XYZZY": "1", "PATH": "/bin", "KIOSKS": "2"})
+
+
+def test_proxies_are_addresses_and_networks_and_none_without_a_word() -> None:
+    assert Settings.from_environment({}).proxies == ()
+    settings = Settings.from_environment({"KIOSK_PROXIES": " 127.0.0.1, 192.0.2.0/24,,::1"})
+    assert settings.proxies == ("127.0.0.1", "192.0.2.0/24", "::1")
+
+
+@pytest.mark.parametrize("given", ["*", "proxy.local", "192.0.2.1/24", "127.0.0.1:80", "[::1]"])
+def test_a_proxy_that_could_be_anybody_or_nobody_is_refused(given: str) -> None:
+    with pytest.raises(SettingsError, match="KIOSK_PROXIES has "):
+        Settings.from_environment({"KIOSK_PROXIES": given})
