@@ -16,14 +16,17 @@ export BENCH_CACHE := $(BENCH)
 export TEST_BRIDGE := $(CACHE)/bridge/release/test-bridge
 export TEST_ROS_PYTHON := $(CURDIR)/.venv-ros/bin/python
 
+# The limits of app/serving.py.
+LIMITS := --ws-max-size 65536 --ws-max-queue 2 --ws-per-message-deflate false --no-proxy-headers
+
 .PHONY: run test check dev wheel faults soak bench bench-setup test-parts bridge lock clean
 .DELETE_ON_ERROR:
 
 run: .venv/run
-	.venv/bin/uvicorn app.main:app
+	.venv/bin/uvicorn app.main:app $(LIMITS)
 
 dev: .venv/test
-	KIOSK_DEV=1 KIOSK_LOG_LEVEL=debug .venv/bin/uvicorn app.main:app --reload --reload-dir app
+	KIOSK_DEV=1 KIOSK_LOG_LEVEL=debug .venv/bin/uvicorn app.main:app $(LIMITS) --reload --reload-dir app
 
 # ARGS: of pytest. Tests that need neither bridge nor ROS nor browser are run without them.
 test: $(if $(ARGS),.venv/test,test-parts)

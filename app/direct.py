@@ -9,11 +9,21 @@ from typing import Final
 from fastapi import FastAPI
 from starlette.types import ASGIApp, Receive, Scope, Send
 
+from app.serving import bounded
+
 KEY: Final = "panel.send"
 
 
 class Application(FastAPI):
-    """With that layer around all others: FastAPI has some of its own around those that are added."""
+    """With that layer around all others: FastAPI has some of its own around those that are added.
+
+    `state.server` is the configuration of the server from the start on; None where it is not uvicorn's.
+    """
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] == "lifespan":
+            self.state.server = bounded(receive)  # here: FastAPI wraps it
+        await super().__call__(scope, receive, send)
 
     def build_middleware_stack(self) -> ASGIApp:
         return Direct(super().build_middleware_stack())

@@ -8,6 +8,7 @@
     ├── InputError             422  a request that is not what the contract says
     ├── NotFound               404  no such page or widget
     ├── PressRefused           409  what permitted it is gone, right before it would have been sent
+    ├── TooSlow                408  a body that took too long
     ├── DecodeError            –    bytes that are not a message of the type
     ├── LinkError              503  Zenoh refused; nothing was sent
     └── LogError               503  the operator's log can't be written or read
@@ -21,7 +22,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-Cause = Literal["", "interlock", "input", "link", "log", "time"]  # why a receipt says it was refused
+Cause = Literal["", "interlock", "input", "link", "log", "time", "limit"]  # why a receipt says it was refused
 
 
 class KioskError(Exception):
@@ -117,6 +118,10 @@ class PressRefused(KioskError):
         super().__init__(reason)
         self.reason = reason
         self.cause = cause
+
+
+class TooSlow(KioskError):
+    status = 408
 
 
 class DecodeError(KioskError):

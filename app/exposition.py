@@ -25,6 +25,8 @@ class _Of(Collector):
         metrics = self._metrics
         told = "Refused presses that the operator's log only counts"
         yield CounterMetricFamily("kiosk_refusals_left_out", told, value=metrics.left_out())
+        told = "Presses, holds and cancels over their limit, answered 429"
+        yield CounterMetricFamily("kiosk_presses_limited", told, value=metrics.limited())
         presses = CounterMetricFamily("kiosk_presses", "Presses by outcome", labels=["outcome"])
         for outcome, count in metrics.presses.items():
             presses.add_metric([outcome], count.value, created=count.since)

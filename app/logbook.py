@@ -34,8 +34,8 @@ class Log(Protocol):
     def room(self, origin: Origin) -> bool:
         """Whether a refusal may be an entry; where not, it is left out."""
 
-    def leave_out(self, origin: Origin) -> None:
-        """Counts a refusal that is no entry."""
+    def leave_out(self, origin: Origin, limited: bool = False) -> None:
+        """Counts a refusal that is no entry, `limited` one that was not even judged."""
 
     async def unended(self, robot: str, widgets: Collection[str], since: int) -> list[Unended]:
         """Presses of these widgets, not before `since` (ms), of which the end is not known, the newest

@@ -16,6 +16,7 @@ from fastapi import Depends, FastAPI
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from starlette.exceptions import HTTPException
 from starlette.middleware.gzip import GZipMiddleware
+from starlette.requests import ClientDisconnect
 
 from app import development, heap, logs, simulator, sockets
 from app.assets import Assets, load_assets
@@ -29,10 +30,13 @@ from app.log import Limits, OperatorLog, Unlogged
 from app.metrics import Metrics
 from app.panel import Panel, load_panel
 from app.panel.model import RobotEntry
+from app.press_limits import PressLimits
+from app.proxies import Proxies
 from app.routes import control, events, health, holds, pages, press_socket, presses, static
 from app.routes import log as log_routes
 from app.routes.messages import LONGEST
-from app.routes.site import Site, named_robot, on_http_error, on_kiosk_error
+from app.routes.site import Site, named_robot, on_gone, on_http_error, on_kiosk_error
+from app.serving import check_port
 from app.settings import Settings, shipped
 from app.startup import InWords
 from app.systemd import Manager
@@ -59,10 +63,12 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         async with _logging(settings, panel) as oplog, AsyncExitStack() as opened:
+            check_port(app.state.server)
             running = partial(_running, oplog)
             fleet, assets = await opened.enter_async_context(running(settings, panel, fault))
-            metrics = Metrics(lambda: oplog.left_out)
-            site = Site(fleet, assets, _templates(settings.dev), metrics, settings.dev, oplog)
+            limits = PressLimits(partial(oplog.leave_out, limited=True))
+            metrics = Metrics(lambda: oplog.left_out, lambda: limits.refused)
+            site = Site(fleet, assets, _templates(settings.dev), metrics, settings.dev, oplog, limits)
             site.metrics.follow(fleet)
             app.state.site = site
             loop = asyncio.get_running_loop()
@@ -101,12 +107,18 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         docs_url=None,  # they load scripts from elsewhere
         redoc_url=None,
         max_body_size=LONGEST,
-        exception_handlers={KioskError: on_kiosk_error, HTTPException: on_http_error},
+        exception_handlers={
+            KioskError: on_kiosk_error,
+            HTTPException: on_http_error,
+            ClientDisconnect: on_gone,
+        },
     )
     if settings.dev:
         app.add_exception_handler(Exception, development.on_error)
     app.add_middleware(GZipMiddleware, minimum_size=500)
     app.add_middleware(Doors, hosts=settings.hosts)
+    if settings.proxies:
+        app.add_middleware(Proxies, named=settings.proxies)
     app.add_middleware(InWords)
     for routes in (pages, events, presses, press_socket, control, holds):
         app.include_router(routes.router)

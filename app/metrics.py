@@ -34,9 +34,13 @@ class Open:
 class Metrics:
     """Counts of one application, however often its panel is loaded anew."""
 
-    def __init__(self, left_out: Callable[[], int] = lambda: 0) -> None:
-        """`left_out` is how many refusals the operator's log only counts."""
+    def __init__(
+        self, left_out: Callable[[], int] = lambda: 0, limited: Callable[[], int] = lambda: 0
+    ) -> None:
+        """`left_out` is how many refusals the operator's log only counts, `limited` how many presses,
+        holds and cancels were more than their limit."""
         self.left_out = left_out
+        self.limited = limited
         self.presses: dict[str, Count] = {}  # by outcome
         self.streams = Open()
         self.fleet: Fleet | None = None

@@ -88,6 +88,7 @@ class Presses:
         self.widget = sending.widget
         self.receipt = self._receipts.get
         self.too_soon = self._unjudged.too_soon
+        self.limited = self._unjudged.limited
         self._waits = Waits()
         self.give_up = self._waits.give_up
         self._closed = False

@@ -182,6 +182,8 @@ ENGLISH: Final[Mapping[str, str]] = {
     "refused": "Not sent at {time}: {why}",
     "not_encoded": "Not sent at {time}: {why}.",
     "too_many_presses": "Not sent: {most} presses of this page have had no answer yet.",
+    "too_often": "too many presses in a short time. Wait a second, then press again.",
+    "cancel_too_often": "the robot has been asked to cancel this many times just now. Wait a second.",
     "press_past": "Not sent again: press {id} was made before; the operator's log has what came of it.",
     "press_too_soon": (
         "Not sent: so soon after the page came it may be a second tap. Press again if it was meant."
@@ -196,6 +198,7 @@ ENGLISH: Final[Mapping[str, str]] = {
     "log_slow": "the disk did not take the entry in {seconds} s",
     "log_full_queue": "more is pressed than the disk takes; press again",
     "log_more_refused": "{count} more refusals from {name} since {since}, each answered as ever.",
+    "log_more_limited": "{count} presses from {name} since {since} were over the limit: not sent.",
     "others": "others",
     "log_abandoned": "Not sent: the entry was written too late.",
     "log_not_on_disk": "{said} (Not safely in the operator's log: {why}.)",

@@ -2,6 +2,7 @@
 and tells nobody: they are looked for."""
 
 import asyncio
+import errno
 import fcntl
 import os
 import socket
@@ -12,11 +13,14 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
+from app.errors import SettingsError
+
 LOOK_EVERY_S: Final = 0.02
 LISTENING_WITHIN_S: Final = 5.0  # a socket that the server was given listened before
 INTERNET: Final = frozenset({socket.AF_INET, socket.AF_INET6})
 LISTENS: Final = (socket.SOL_SOCKET, socket.SO_ACCEPTCONN)
 SEND_BUFFER: Final = 8_192  # bytes; Linux takes twice as many
+GONE_AFTER_MS: Final = 120_000  # in which a client confirms nothing of what it was sent
 
 
 def opened() -> Iterator[tuple[str, socket.socket]]:
@@ -49,7 +53,8 @@ def names() -> set[str]:
 
 async def narrow(ports: set[int]) -> None:
     """Narrows what the next sockets to listen accept, and adds their ports: of what a browser does not
-    read little waits in the kernel, where nobody can take it back; the rest is never written."""
+    read little waits in the kernel, where nobody can take it back; the rest is never written. One that
+    is gone without a word, or reads nothing for minutes, does not keep its connection."""
     with suppress(OSError):  # no /proc on this system
         before = names()
         await listening(before)
@@ -57,6 +62,7 @@ async def narrow(ports: set[int]) -> None:
             if name not in before and one.family in INTERNET:
                 ports.add(one.getsockname()[1])
                 one.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER)
+                one.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, GONE_AFTER_MS)
 
 
 def hang_up(ports: Collection[int]) -> None:
@@ -74,3 +80,23 @@ def unsent(one: socket.socket) -> int:
     if one.getsockopt(*LISTENS):
         return 0
     return int.from_bytes(fcntl.ioctl(one, termios.TIOCOUTQ, bytes(4)), sys.byteorder)
+
+
+def check_free(host: str, port: int) -> None:
+    """SettingsError where nobody could listen there now."""
+    where = f"can't listen on {host} port {port}"
+    try:
+        found = socket.getaddrinfo(host or None, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
+        for family, kind, protocol, _, address in found:
+            with socket.socket(family, kind, protocol) as probe:
+                probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+                if family == socket.AF_INET6:  # as asyncio does
+                    probe.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 1)
+                probe.bind(address)
+    except OSError as error:
+        if error.errno != errno.EADDRINUSE:
+            raise SettingsError(f"{where}: {(error.strerror or str(error)).lower()}") from error
+        raise SettingsError(
+            f"{where}: another program does, perhaps another panel; end that one, or start this one "
+            "with --port and another number"
+        ) from error

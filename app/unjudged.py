@@ -1,7 +1,10 @@
-"""Presses that are refused and not even judged: their id was used before, or they came too soon."""
+"""Presses that are refused and not even judged: their id was used before, they came too soon, or they
+are more than their client may."""
 
 import secrets
+import time
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from app.log import Origin
@@ -11,7 +14,7 @@ from app.panel.model import Pressed
 from app.progress import Answer
 from app.receipts import Receipt, Receipts, named, receipt_of, with_doubt
 from app.sending import Sending
-from app.sentences import say
+from app.sentences import clock, say
 
 
 class Unjudged:
@@ -35,6 +38,24 @@ class Unjudged:
             why = last.reason if last.reason.endswith(why) else f"{said} {why}"
         return await self.refuse(self._sending.widget(widget_id), inputs, press_id, why, origin)
 
+    def limited(
+        self,
+        widget_id: str,
+        inputs: Mapping[str, Any],
+        press_id: str,
+        sentence: str = "too_often",
+        *,
+        shown: bool = False,
+    ) -> Receipt:
+        """Of one that its client may make later, by the same id; `shown`: on a page without scripts."""
+        now = clock(time.time())
+        answer = Answer("refused", say("refused", why=say(sentence), time=now))
+        receipt = receipt_of(self._sending.widget(widget_id), inputs, press_id, answer, "limit")
+        if shown:
+            receipt = replace(receipt, id=_own_id(press_id))
+            self._receipts.keep_left_out(receipt)
+        return receipt
+
     def counted(self, receipt: Receipt, origin: Origin) -> Receipt:
         """A refusal that is no entry of the log's."""
         self._logbook.leave_out(origin)
@@ -45,7 +66,7 @@ class Unjudged:
         self, widget: Pressed, inputs: Mapping[str, Any], press_id: str, why: str, origin: Origin
     ) -> Receipt:
         """The receipt has an id of its own: that of the press is another's, or may still be one's."""
-        own_id = f"{press_id:.40}.{secrets.token_hex(4)}"
+        own_id = _own_id(press_id)
         receipt = receipt_of(widget, inputs, own_id, Answer("refused", why), "input")
         if not self._logbook.room(origin):
             return self.counted(receipt, origin)
@@ -55,3 +76,8 @@ class Unjudged:
         receipt = with_doubt(receipt, await self._logbook.refused(widget.id, own, own_id, origin, why))
         self._receipts.keep(receipt)
         return receipt
+
+
+def _own_id(press_id: str) -> str:
+    """That of a refusal, by which its press is known."""
+    return f"{press_id:.40}.{secrets.token_hex(4)}"

@@ -13,12 +13,13 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from copy import copy
 from pathlib import Path
 from typing import Any, ClassVar
 
 import httpx
+from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
 from tests.commanded import Commanded
@@ -342,8 +343,17 @@ class PressSocket:
     def __init__(self, connection: ClientConnection) -> None:
         self._connection = connection
 
-    def say(self, text: str | bytes) -> None:
+    def say(self, text: str | bytes | list[str]) -> None:
+        """A list is one message in pieces."""
         self._connection.send(text)
+
+    def closed(self) -> int:
+        """The code that the server closes with, after whatever it says before."""
+        with suppress(ConnectionClosed):
+            while True:
+                self._connection.recv(10)
+        assert self._connection.close_code is not None
+        return self._connection.close_code
 
     def hear(self, timeout_s: float = 10) -> dict[str, Any]:
         said: dict[str, Any] = json.loads(self._connection.recv(timeout_s))

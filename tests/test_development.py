@@ -48,7 +48,8 @@ def test_make_dev_serves_as_these_tests_do() -> None:
         check=True,
     ).stdout
     assert "KIOSK_DEV=1" in made
-    assert made.rstrip().endswith(f"uvicorn app.main:app {' '.join(RELOAD)}")
+    assert "uvicorn app.main:app --ws-max-size" in made
+    assert made.rstrip().endswith(f" {' '.join(RELOAD)}")
 
 
 @pytest.fixture

@@ -91,7 +91,7 @@ class SlowLog:
     def room(self, origin: Origin) -> bool:
         return True
 
-    def leave_out(self, origin: Origin) -> None:
+    def leave_out(self, origin: Origin, limited: bool = False) -> None:
         raise AssertionError("there is room for all")
 
     async def unended(self, robot: str, widgets: Collection[str], since: int) -> list[Unended]:

@@ -153,14 +153,13 @@ def test_what_is_no_press_is_told_so(kiosk: Server) -> None:
     with kiosk.socket() as socket:
         for text, why in (
             (b"\0", "the message is not text"),
-            ("9" * 70_000, "more than 65536 characters"),
             (json.dumps({"widget": "free", "inputs": {}}), "id: Field required"),
             (json.dumps({"id": "x", "inputs": {}}), "widget: Field required"),
             (press("free", more=1), "more: Extra inputs"),
         ):
             socket.say(text)
             said = socket.hear()
-            assert (said["status"] in (413, 422), why in said["error"]) == (True, True), said
+            assert (said["status"] == 422, why in said["error"]) == (True, True), said
         socket.say(press("nothing", "no-such"))
         assert as_response(socket.hear()).status_code == 404
 

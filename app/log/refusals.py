@@ -60,9 +60,10 @@ class _Left:
 
 @dataclass(slots=True)
 class _More:
-    """Refusals of one browser that are no entries."""
+    """Refusals of one browser that are no entries; `limited`: they were not even judged."""
 
     origin: Origin
+    limited: bool
     since: float  # seconds since the epoch
     count: int = 0
 
@@ -79,7 +80,7 @@ class Refusals:
         self._wall = wall
         self._all = _Left(OF_ALL, monotonic())
         self._left: OrderedDict[tuple[str, ...], _Left] = OrderedDict()
-        self._more: dict[tuple[str, str], _More] = {}
+        self._more: dict[tuple[str, str, bool], _More] = {}
         self.left_out = 0
 
     def room(self, whose: Whose) -> bool:
@@ -98,14 +99,15 @@ class Refusals:
         while len(self._left) > REMEMBERED:
             self._left.popitem(last=False)
 
-    def leave_out(self, origin: Origin) -> bool:
-        """A refusal is only counted; whether it is the first since all were told."""
+    def leave_out(self, origin: Origin, limited: bool = False) -> bool:
+        """A refusal is only counted, `limited` where there were too many presses to judge it; whether
+        it is the first since all were told."""
         first = not self._more
-        key = (origin.address, origin.browser)
+        key = (origin.address, origin.browser, limited)
         if key not in self._more and len(self._more) >= TOLD_APART:
-            key, origin = ("", ""), Origin(address="", who=say("others"))
-        self._more.setdefault(key, _More(origin, self._wall())).count += 1
-        self.left_out += 1
+            key, origin = ("", "", limited), Origin(address="", who=say("others"))
+        self._more.setdefault(key, _More(origin, limited, self._wall())).count += 1
+        self.left_out += not limited
         return first
 
     def told(self) -> list[Entry]:
@@ -121,5 +123,6 @@ def _keys(whose: Whose) -> tuple[tuple[str, ...], tuple[str, ...]]:
 def _entry(more: _More) -> Entry:
     origin = more.origin
     name = " ".join(filter(None, (origin.who, f"({origin.address})" if origin.address else "")))
-    reason = say("log_more_refused", count=more.count, name=name, since=clock(more.since))
+    sentence = "log_more_limited" if more.limited else "log_more_refused"
+    reason = say(sentence, count=more.count, name=name, since=clock(more.since))
     return entered("refused", origin, {"more": more.count}, outcome="refused", reason=reason)

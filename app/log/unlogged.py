@@ -46,7 +46,7 @@ class Unlogged:
     def room(self, origin: Origin) -> bool:
         return True
 
-    def leave_out(self, origin: Origin) -> None:
+    def leave_out(self, origin: Origin, limited: bool = False) -> None:
         """It is not counted."""
 
     async def unended(self, robot: str, widgets: Collection[str], since: int) -> list[Unended]:

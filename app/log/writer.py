@@ -145,9 +145,10 @@ class OperatorLog:
         """Whether a refusal may be an entry; where not, it is left out."""
         return self._refusals.room(origin)
 
-    def leave_out(self, origin: Origin) -> None:
-        """Counts a refusal that is no entry; one entry tells of those of a while."""
-        if self._refusals.leave_out(origin):
+    def leave_out(self, origin: Origin, limited: bool = False) -> None:
+        """Counts a refusal that is no entry, `limited` one that was not even judged; one entry tells of
+        those of a while."""
+        if self._refusals.leave_out(origin, limited):
             self._tell_left_out_later()
 
     @property

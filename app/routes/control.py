@@ -13,6 +13,7 @@ from app.control import LIFE_S, Refusal
 from app.errors import InputError, NotFound
 from app.kiosk import Kiosk
 from app.panel.description import ID
+from app.routes.messages import body_of
 from app.routes.site import CurrentKiosk, CurrentSite
 from app.routes.visitors import keep, visitor, welcomed
 from app.sentences import say
@@ -133,7 +134,7 @@ def _kind(request: Request) -> str:
 
 async def _sent(request: Request) -> dict[str, Any]:
     """The fields of a body: JSON, a form, or nothing at all."""
-    kind, body = _kind(request), await request.body()
+    kind, body = _kind(request), await body_of(request)
     try:
         if kind == FORM:
             text = body.decode("ascii")

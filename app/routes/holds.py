@@ -29,7 +29,6 @@ from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 from pydantic import BaseModel, ConfigDict, Field, JsonValue, TypeAdapter, ValidationError
 from starlette.types import Message
 
-from app.browsers import Browser
 from app.doubts import SEEN
 from app.errors import InputError, LogError
 from app.hold_receipts import RELEASED, Holding
@@ -38,8 +37,8 @@ from app.leases import sent_at
 from app.logbook import Noted
 from app.panel.template import needed
 from app.receipts import By, Receipt, with_doubt
-from app.routes.messages import LONGEST, json_of
-from app.routes.site import CurrentKiosk, CurrentSite
+from app.routes.messages import json_of, received
+from app.routes.site import CurrentKiosk, CurrentSite, Site
 from app.routes.visitors import visitor
 from app.sentences import say
 
@@ -48,7 +47,13 @@ router = APIRouter()
 BEGIN_WITHIN_S: Final = 2.0  # from the opening of the socket
 SILENCE_S: Final = 2.0  # a hold is over long before: nobody is there
 # 4000 + HTTP's
-CLOSE: Final[Mapping[str, int]] = {"interlock": 4409, "input": 4422, "link": 4503, "log": 4503}
+CLOSE: Final[Mapping[str, int]] = {
+    "interlock": 4409,
+    "input": 4422,
+    "limit": 4429,
+    "link": 4503,
+    "log": 4503,
+}
 
 # What a browser may say of why it ends a hold → the code of the sentence.
 WHYS: Final[Mapping[str, str]] = {
@@ -103,23 +108,25 @@ _message: TypeAdapter[Begin | Beat | End] = TypeAdapter(
 async def hold(socket: WebSocket, widget: str, site: CurrentSite, kiosk: CurrentKiosk) -> None:
     kiosk.holds.widget(widget)
     await socket.accept()
-    session = _Session(socket, kiosk, widget, visitor(socket, site))
+    session = _Session(socket, site, kiosk, widget)
     with suppress(WebSocketDisconnect), site.owed.one():
         receipt = await session.run(widget)
-        site.metrics.pressed(receipt.outcome)
+        if receipt.cause != "limit":
+            site.metrics.pressed(receipt.outcome)
 
 
 class _Session:
     """One socket and its one hold."""
 
-    def __init__(self, socket: WebSocket, kiosk: Kiosk, widget: str, browser: Browser) -> None:
+    def __init__(self, socket: WebSocket, site: Site, kiosk: Kiosk, widget: str) -> None:
         self._socket = socket
+        self._limits = site.limits
         self._kiosk = kiosk
         self._opened_at = time.monotonic()
         self._ended: asyncio.Future[Receipt] = asyncio.get_running_loop().create_future()
-        self._browser = browser
+        self._browser = visitor(socket, site)
         self._id = secrets.token_hex(8)  # of the hold: in the log, its receipt and its recording
-        self._by = kiosk.doubts.by(widget, browser)
+        self._by = kiosk.doubts.by(widget, self._browser)
         self._room = kiosk.logbook.room(self._by.origin)
         self._noted: Noted | None = None
         self._receipt: Receipt | None = None  # of its end, when all of it is known
@@ -154,6 +161,8 @@ class _Session:
                 said = await self._read()
         except TimeoutError:
             return refuse(by, say("hold_late"))
+        if not self._limits.admit(self._browser):
+            return refuse(by, say("too_often"), "limit", trace=False)
         if isinstance(said, End):
             return refuse(by, say("hold_let_go"))
         if not isinstance(said, Begin):
@@ -189,6 +198,8 @@ class _Session:
         """A hold that did not begin, in the operator's log."""
         if self._noted is not None:
             return await self._closed(receipt)
+        if receipt.cause == "limit":
+            return receipt
         if not self._room:
             self._kiosk.logbook.leave_out(self._by.origin)
             return receipt
@@ -227,7 +238,7 @@ class _Session:
         return holds.beat(holding, said.number, self._sent(said))
 
     async def _received(self) -> Message:
-        return await self._socket.receive()
+        return await received(self._socket)
 
     async def _read(self) -> Begin | Beat | End | None:
         waiting, self._next = self._next or asyncio.ensure_future(self._received()), None
@@ -262,8 +273,6 @@ class _Session:
 
 def _read(text: str) -> Begin | Beat | End | None:
     """A message of a browser's; None for what is none."""
-    if len(text) > LONGEST:
-        return None
     try:
         return _message.validate_python(json_of(text))
     except (InputError, ValidationError):

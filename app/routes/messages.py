@@ -1,15 +1,40 @@
 """What a client says as JSON, in a body or on a socket: read with the same care everywhere."""
 
+import asyncio
 import json
 from typing import Any, Final, TypeVar
 
+from fastapi import Request, WebSocket
 from pydantic import BaseModel, ValidationError
+from starlette.types import Message
 
-from app.errors import InputError
+from app.errors import InputError, TooSlow
 
-LONGEST: Final = 64 * 1024
+LONGEST: Final = 64 * 1024  # bytes of a body; bytes or characters of a message on a socket
+BODY_WITHIN_S: Final = 10.0
+TOO_BIG: Final = 1009  # RFC 6455
 
 Model = TypeVar("Model", bound=BaseModel)
+
+
+async def body_of(request: Request) -> bytes:
+    """The whole body; TooSlow where it takes longer than any client needs for so little."""
+    try:
+        async with asyncio.timeout(BODY_WITHIN_S):
+            return await request.body()
+    except TimeoutError:
+        raise TooSlow(f"the body took longer than {BODY_WITHIN_S:g} s") from None
+
+
+async def received(socket: WebSocket) -> Message:
+    """The next message; a socket that sends too large a one is closed at once, as its server does
+    where it knows the limit."""
+    message = await socket.receive()
+    said = message.get("text") or message.get("bytes") or ""
+    if len(said) > LONGEST:
+        await socket.close(TOO_BIG)
+        return {"type": "websocket.disconnect", "code": TOO_BIG}
+    return message
 
 
 def json_of(text: str | bytes, place: str = "the body") -> Any:

@@ -22,7 +22,7 @@ from pydantic import Field
 from starlette.types import Message
 
 from app.errors import InputError, KioskError
-from app.routes.messages import LONGEST, as_model, json_of
+from app.routes.messages import as_model, json_of, received
 from app.routes.presses import PRESS_ID, STATUS, Press, pressed
 from app.routes.site import CurrentKiosk, CurrentSite, Site
 from app.routes.visitors import caller
@@ -33,6 +33,10 @@ log = logging.getLogger("kiosk.presses")
 router = APIRouter()
 
 MOST_AT_ONCE: Final = 16  # presses of one socket that have no answer yet
+MOST_REFUSED: Final = (
+    100  # messages of one socket, one after the other, that are no press or one too many
+)
+POLICY_VIOLATION: Final = 1008  # RFC 6455
 PLACE: Final = "the message"
 
 
@@ -53,19 +57,23 @@ async def presses(socket: WebSocket, site: CurrentSite, kiosk: CurrentKiosk) -> 
 class _Session:
     """One socket and what is pressed on it; it knows no more of the page than each press says."""
 
-    __slots__ = ("_caller", "_site", "_socket", "_under_way")
+    __slots__ = ("_caller", "_refused", "_site", "_socket", "_under_way")
 
     def __init__(self, socket: WebSocket, site: Site) -> None:
         self._socket = socket
         self._site = site
         self._caller = caller(socket)
         self._under_way: set[asyncio.Task[None]] = set()
+        self._refused = 0  # one after the other
 
     async def run(self) -> None:
         """Until it is closed, and all that was pressed has come to its end."""
         try:
-            while (message := await self._socket.receive())["type"] == "websocket.receive":
+            while (message := await received(self._socket))["type"] == "websocket.receive":
                 await self._hear(message)
+                if self._refused >= MOST_REFUSED:
+                    await self._socket.close(POLICY_VIOLATION)
+                    break
         finally:
             await asyncio.gather(*self._under_way)
 
@@ -76,16 +84,13 @@ class _Session:
             text = message.get("text")
             if text is None:
                 raise InputError(f"{PLACE} is not text")
-            if len(text) > LONGEST:
-                await self._answer(None, 413, error=f"{PLACE} has more than {LONGEST} characters")
-                return
             given = json_of(text, PLACE)
             said = as_model(SocketPress, given, PLACE)
         except InputError as error:
-            await self._answer(_id_in(given), error.status, error=str(error))
+            await self._refuse(_id_in(given), error.status, str(error))
             return
         if len(self._under_way) >= MOST_AT_ONCE:
-            await self._answer(said.id, 429, error=say("too_many_presses", most=MOST_AT_ONCE))
+            await self._refuse(said.id, 429, say("too_many_presses", most=MOST_AT_ONCE))
             return
         task = asyncio.create_task(self._press(said))
         self._under_way.add(task)
@@ -102,7 +107,13 @@ class _Session:
             log.exception("press %s broke off", said.id)
             await self._answer(said.id, 500, error=say("log_broke_off"))
         else:
+            self._refused = self._refused + 1 if receipt.cause == "limit" else 0
             await self._answer(said.id, STATUS[receipt.cause], **receipt.as_json())
+
+    async def _refuse(self, press_id: str | None, status: int, error: str) -> None:
+        self._refused += 1
+        await self._answer(press_id, status, error=error)
+        await asyncio.sleep(0)  # much may come in one piece: others have their turn
 
     async def _answer(self, press_id: str | None, status: int, **what: str) -> None:
         text = json.dumps({"press": press_id, "status": status, **what}, ensure_ascii=False)

@@ -18,8 +18,9 @@ from app.errors import InputError
 from app.kiosk import Kiosk
 from app.logbook import origin_of
 from app.panel.model import Page
+from app.press_limits import RETRY_AFTER_S
 from app.receipts import Receipt
-from app.routes.messages import as_model, json_of
+from app.routes.messages import as_model, body_of, json_of
 from app.routes.pages import ask_of
 from app.routes.site import CurrentKiosk, CurrentSite, Site
 from app.routes.visitors import visitor
@@ -30,7 +31,8 @@ router = APIRouter()
 CONFIRMED: Final = "_confirmed"  # a form's field: the server has asked, and this is the yes
 TAP_AGAIN_S: Final = 0.7  # as the page's scripts have it
 ASKED_S: Final = 30.0  # the answer is a press, and no later one
-PRESS_ID: Final = r"^[A-Za-z0-9_.:-]{1,64}$"
+LONGEST_ID: Final = 64
+PRESS_ID: Final = rf"^[A-Za-z0-9_.:-]{{1,{LONGEST_ID}}}$"
 STATUS: Final[Mapping[str, int]] = {
     "": 200,
     "interlock": 409,
@@ -38,6 +40,7 @@ STATUS: Final[Mapping[str, int]] = {
     "link": 503,
     "log": 503,
     "time": 504,
+    "limit": 429,
 }
 
 
@@ -90,11 +93,11 @@ class ReceiptAnswer(BaseModel):
 async def press(widget: str, request: Request, site: CurrentSite, kiosk: CurrentKiosk) -> Response:
     kiosk.presses.widget(widget)
     browser = visitor(request, site)
-    body = await request.body()
+    body = await body_of(request)
     kind = _kind(request)
     if kind == "application/json":
         receipt = await pressed(site, kiosk, browser, widget, as_model(Press, json_of(body)))
-        return JSONResponse(receipt.as_json(), status_code=STATUS[receipt.cause])
+        return _answer(receipt)
     if kind == "application/x-www-form-urlencoded":
         return await _pressed_by_form(site, kiosk, browser, widget, _form(body))
     raise InputError(
@@ -116,26 +119,32 @@ async def press(widget: str, request: Request, site: CurrentSite, kiosk: Current
     },
 )
 async def cancel(widget: str, request: Request, site: CurrentSite, kiosk: CurrentKiosk) -> Response:
+    kiosk.presses.widget(widget)
     browser = visitor(request, site)
-    body, kind = await request.body(), _kind(request)
+    body, kind = await body_of(request), _kind(request)
     form = kind == "application/x-www-form-urlencoded"
     of = ""
     if form:
         of = _form(body).get("_press", "")
     elif kind == "application/json" and body:
         of = as_model(Cancel, json_of(body)).press
-    receipt = await _told(site, kiosk.presses.cancel(widget, origin_of(browser), of))
+    if site.limits.admit_cancel(browser, kiosk.base, widget, of[:LONGEST_ID]):
+        receipt = await _told(site, kiosk.presses.cancel(widget, origin_of(browser), of))
+    else:
+        receipt = kiosk.presses.limited(widget, {}, "", "cancel_too_often", shown=form)
     if form:
         return RedirectResponse(_page_after(kiosk, widget, receipt.id), status_code=303)
-    return JSONResponse(receipt.as_json(), status_code=STATUS[receipt.cause])
+    return _answer(receipt)
 
 
 async def pressed(site: Site, kiosk: Kiosk, browser: Browser, widget: str, given: Press) -> Receipt:
     """What comes of a press that was given as JSON, by whatever way."""
-    at = given.at.timestamp() if given.at else None
     kiosk.presses.widget(widget)
-    by = kiosk.doubts.by(widget, browser, given.seen or "", at)
     press_id = given.id or secrets.token_hex(8)
+    if not site.limits.admit(browser):
+        return kiosk.presses.limited(widget, given.inputs, press_id)
+    at = given.at.timestamp() if given.at else None
+    by = kiosk.doubts.by(widget, browser, given.seen or "", at)
     return await _told(site, kiosk.presses.press(widget, given.inputs, press_id, by))
 
 
@@ -152,14 +161,23 @@ async def _pressed_by_form(
     if not re.fullmatch(PRESS_ID, page_id):
         raise InputError(f'_id: "{page_id:.40}" is not the id of a press')
     press_id = f"{page_id}.{widget}"
-    by = kiosk.doubts.by(widget, browser, inputs.pop("_seen", ""), _until(inputs))
+    seen, until = inputs.pop("_seen", ""), _until(inputs)
     typed = kiosk.sending.typed(inputs)
+    if not site.limits.admit(browser):
+        receipt = kiosk.presses.limited(widget, typed, press_id, shown=True)
+        return RedirectResponse(_page_after(kiosk, widget, receipt.id), status_code=303)
+    by = kiosk.doubts.by(widget, browser, seen, until)
     if too_soon:
         work = kiosk.presses.too_soon(widget, typed, press_id, before, by.origin)
     else:
         work = kiosk.presses.press(widget, typed, press_id, by)
     receipt = await _told(site, work)
     return RedirectResponse(_page_after(kiosk, widget, receipt.id), status_code=303)
+
+
+def _answer(receipt: Receipt) -> Response:
+    headers = {"retry-after": str(RETRY_AFTER_S)} if receipt.cause == "limit" else None
+    return JSONResponse(receipt.as_json(), status_code=STATUS[receipt.cause], headers=headers)
 
 
 def _kind(request: Request) -> str:

@@ -11,12 +11,13 @@ from starlette.requests import HTTPConnection
 
 from app.assets import Assets
 from app.browsers import Browsers
-from app.errors import KioskError
+from app.errors import KioskError, TooSlow
 from app.fleet import Fleet
 from app.kiosk import Kiosk
 from app.log import OperatorLog, Unlogged
 from app.metrics import Metrics
 from app.owed import Owed
+from app.press_limits import PressLimits
 
 
 @dataclass(slots=True)
@@ -29,6 +30,7 @@ class Site:
     metrics: Metrics
     dev: bool
     log: OperatorLog | Unlogged
+    limits: PressLimits
     browsers: Browsers = field(default_factory=Browsers)
     owed: Owed = field(default_factory=Owed)
 
@@ -74,7 +76,15 @@ def error_answer(request: Request, status: int, message: str) -> Response:
 
 async def on_kiosk_error(request: Request, error: Exception) -> Response:
     status = error.status if isinstance(error, KioskError) else 500
-    return error_answer(request, status, str(error))
+    answer = error_answer(request, status, str(error))
+    if isinstance(error, TooSlow):
+        answer.headers["connection"] = "close"  # nobody waits for the rest
+    return answer
+
+
+async def on_gone(request: Request, error: Exception) -> Response:
+    """Of who dropped the connection before the request was whole: nobody reads this."""
+    return Response(status_code=400)
 
 
 async def on_http_error(request: Request, error: Exception) -> Response:

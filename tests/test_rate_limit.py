@@ -1,0 +1,112 @@
+"""How often somebody may do something, by a clock that the test sets."""
+
+import pytest
+
+from app.browsers import Browser, stranger
+from app.log import Origin
+from app.press_limits import OF_ADDRESS, OF_ALL, OF_CANCELS, OF_CLIENT, PressLimits
+from app.rate_limit import REMEMBERED, Buckets, Quota
+
+AT_THE_CELL = "127.0.0.1"
+
+
+class Pressing:
+    """Presses of any client, at the time `now`."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+        self.left_out: list[Origin] = []
+        self.limits = PressLimits(self.left_out.append, lambda: self.now)
+
+    def admitted(self, browser: Browser, times: int) -> int:
+        return sum(self.limits.admit(browser) for _ in range(times))
+
+    def canceled(self, browser: Browser, times: int, *goal: str) -> int:
+        return sum(self.limits.admit_cancel(browser, *goal) for _ in range(times))
+
+
+@pytest.fixture
+def pressing() -> Pressing:
+    return Pressing()
+
+
+def browser(number: int, address: str = "10.0.0.7") -> Browser:
+    return Browser(f"b{number}", address, address == AT_THE_CELL, number)
+
+
+def test_so_many_at_once_and_then_so_many_a_second() -> None:
+    now = 0.0
+    buckets = Buckets(Quota(10, 2), lambda: now)
+
+    def taken(key: str) -> int:
+        count = 0
+        while buckets.has(key):
+            buckets.take(key)
+            count += 1
+        return count
+
+    assert (taken("a"), taken("b")) == (10, 10)
+    now = 1.4
+    assert (taken("a"), taken("a")) == (2, 0)
+    now = 1.5
+    assert taken("a") == 1
+    now = 1e6
+    assert taken("a") == 10
+
+
+def test_only_those_are_remembered_that_did_it_last() -> None:
+    buckets = Buckets(Quota(1, 1), lambda: 0.0)
+    for key in range(10 * REMEMBERED):
+        buckets.take(key)
+    assert len(buckets._buckets) == REMEMBERED
+    assert not buckets.has(10 * REMEMBERED - 1)
+    assert buckets.has(0)
+
+
+def test_a_client_has_its_limit_and_takes_nothing_from_another(pressing: Pressing) -> None:
+    assert pressing.admitted(browser(1), 1000) == OF_CLIENT.at_once
+    assert pressing.admitted(browser(2), 10) == 10
+    pressing.now += 10
+    assert pressing.admitted(browser(1), 1000) == OF_CLIENT.at_once
+    pressing.now += 0.5
+    assert pressing.admitted(browser(1), 1000) == OF_CLIENT.per_s / 2
+
+
+def test_in_the_long_run_no_more_than_its_rate_is_admitted(pressing: Pressing) -> None:
+    admitted = 0
+    for _ in range(9240):  # a press each millisecond or so
+        pressing.now += 1 / 924
+        admitted += pressing.limits.admit(browser(1))
+    assert admitted <= OF_CLIENT.at_once + 10 * OF_CLIENT.per_s
+
+
+def test_who_makes_up_cookies_has_the_limit_of_an_address(pressing: Pressing) -> None:
+    assert sum(pressing.admitted(browser(n), 10) for n in range(1000)) == OF_ADDRESS.at_once
+    assert pressing.admitted(browser(1, "10.0.0.8"), 10) == 10
+
+
+def test_programs_without_a_cookie_are_one_client(pressing: Pressing) -> None:
+    assert pressing.admitted(stranger("10.0.0.7"), 1000) == OF_CLIENT.at_once
+    assert pressing.admitted(browser(1), 10) == 10
+
+
+def test_a_whole_network_has_a_limit_and_leaves_the_cell_its_own(pressing: Pressing) -> None:
+    assert sum(pressing.admitted(stranger(f"10.0.1.{n}"), 50) for n in range(250)) == OF_ALL.at_once
+    assert pressing.admitted(browser(1, AT_THE_CELL), 10) == 10
+
+
+def test_each_that_is_too_many_is_counted_and_told_to_the_log(pressing: Pressing) -> None:
+    too_many = 1000 - pressing.admitted(browser(1), 1000)
+    assert pressing.limits.refused == too_many == len(pressing.left_out)
+    assert (pressing.left_out[0].browser, pressing.left_out[0].who) == ("b1", "Panel 1")
+
+
+def test_a_cancel_is_one_too_many_only_if_this_goals_was_asked_for_just_now(pressing: Pressing) -> None:
+    """No press, no other goal and nobody else's cancels keep anybody from stopping a robot."""
+    pressing.admitted(browser(1), 1000)
+    sum(pressing.admitted(stranger(f"10.0.1.{n}"), 50) for n in range(250))
+    assert pressing.canceled(browser(1), 1000, "/robots/r1", "count", "p1") == OF_CANCELS.at_once
+    assert pressing.canceled(browser(1), 3, "/robots/r1", "count", "p2") == 3
+    assert pressing.canceled(browser(1), 3, "/robots/r2", "count", "p1") == 3
+    pressing.now += 1
+    assert pressing.canceled(browser(2), 1000, "/robots/r1", "count", "p1") == OF_CANCELS.per_s
