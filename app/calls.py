@@ -14,7 +14,7 @@ from typing import Any, Final, Protocol
 
 from app.errors import DecodeError, FieldError
 from app.interfaces import Interfaces, text_of, value_at
-from app.logs import RobotLog
+from app.logs import RobotLog, on_rosout
 from app.panel.model import Call
 from app.panel.template import PLACE
 from app.progress import Answer, Corrected, LastLook, Progress, no_look
@@ -151,9 +151,8 @@ class Calls:
             return
         asked = waiting.request
         answer = self._read(asked, reply)
-        self._log.warning(
-            "press %s: a late answer: %s: %s", waiting.press_id, answer.outcome, answer.text
-        )
+        told = f"press {waiting.press_id}: a late answer: {answer.outcome}"
+        self._log.warning("%s: %s", told, answer.text, extra=on_rosout(told))
         corrected(waiting.press_id, answer)
         if self._latest.get(asked.widget) == waiting.press_id:
             self._show(asked, Progress(outcome=answer.outcome, text=answer.text))

@@ -10,11 +10,11 @@ from typing import Any, Final, NamedTuple
 from app.errors import Cause
 from app.hold_messages import Values
 from app.leases import Lease
-from app.logs import RobotLog
+from app.logs import RobotLog, on_rosout
 from app.panel.model import Hold
 from app.panel.template import needed
 from app.progress import Answer, Outcome
-from app.receipts import LONGEST_LOGGED, By, Receipt, Witness, named, receipt_of
+from app.receipts import LONGEST_LOGGED, By, Receipt, Witness, named, receipt_of, untyped
 from app.sentences import clock, say
 
 log = logging.getLogger("kiosk.holds")
@@ -62,8 +62,10 @@ class HoldReceipts:
         widget, lease, by = holding.widget, holding.lease, holding.by
         if self._witness is not None:
             self._witness.pressed(lease.id, widget.id, named(by.origin), holding.inputs)
-        self._log.info("hold %s of %s by %s with %.*s begins", lease.id, widget.id, named(by.origin),
-                LONGEST_LOGGED, holding.inputs)  # fmt: skip
+        who = named(by.origin)
+        told = on_rosout(f"hold {lease.id} of {widget.id} by {who} begins")
+        self._log.info("hold %s of %s by %s with %.*s begins", lease.id, widget.id, who,
+                LONGEST_LOGGED, holding.inputs, extra=told)  # fmt: skip
 
     def ended(self, holding: Holding, seconds: float, code: str, why: str, unsaid: str) -> Receipt:
         """`code` and `why` it ended after so many seconds; `unsaid` is why its last message was not
@@ -84,8 +86,10 @@ class HoldReceipts:
     ) -> Receipt:
         """The same as the function, and told."""
         receipt = refused(widget, inputs, refusal, hold_id)
-        self._log.warning("hold of %s by %s with %.*s: %s", widget.id, named(by.origin),
-                LONGEST_LOGGED, receipt.inputs, receipt.reason)  # fmt: skip
+        who = named(by.origin)
+        told = on_rosout(f"hold of {widget.id} by {who}: {untyped(widget, receipt)}")
+        self._log.warning("hold of %s by %s with %.*s: %s", widget.id, who,
+                LONGEST_LOGGED, receipt.inputs, receipt.reason, extra=told)  # fmt: skip
         if self._witness is not None:
             self._witness.pressed(receipt.id, widget.id, named(by.origin), receipt.inputs)
         return self._answered(receipt)

@@ -46,12 +46,14 @@ class RobotLog(logging.LoggerAdapter[logging.Logger]):
     def __init__(self, logger: logging.Logger, robot: str) -> None:
         """`robot` is "" where there is only one."""
         super().__init__(logger, {"robot": robot})
-        self._prefix = f"{robot}: ".replace("%", "%%") if robot else ""
+        self._prefix = f"{robot}: " if robot else ""
 
     def process(
         self, msg: Any, kwargs: MutableMapping[str, Any]
     ) -> tuple[Any, MutableMapping[str, Any]]:
-        return f"{self._prefix}{msg}", {**kwargs, "extra": self.extra}
+        told = {name: f"{self._prefix}{text}" for name, text in kwargs.get("extra", {}).items()}
+        extra = {**(self.extra or {}), **told}
+        return f"{self._prefix.replace('%', '%%')}{msg}", {**kwargs, "extra": extra}
 
 
 class RosFormatter(logging.Formatter):
@@ -62,6 +64,12 @@ class RosFormatter(logging.Formatter):
         seconds, nanoseconds = stamp(record)
         lines = super().format(record).translate(_CONTROLS).replace("\n", "\n  ")
         return f"[{name}] [{seconds}.{nanoseconds:09}] [{NODE_NAME}]: {lines}"
+
+
+def on_rosout(text: str) -> Mapping[str, str]:
+    """The `extra` of a record that has on /rosout another text, for every node of the robot can read
+    that: not what an operator typed."""
+    return {"rosout": text}
 
 
 class RosoutHandler(logging.Handler):
@@ -91,7 +99,7 @@ class RosoutHandler(logging.Handler):
 def log_fields(record: logging.LogRecord) -> dict[str, object]:
     """A record as the fields of `rcl_interfaces/msg/Log`."""
     seconds, nanoseconds = stamp(record)
-    text = record.getMessage()
+    text = getattr(record, "rosout", None) or record.getMessage()
     if record.exc_info:
         text += "\n" + logging.Formatter().formatException(record.exc_info)
     return {

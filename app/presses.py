@@ -17,7 +17,7 @@ from app.errors import Cause, FieldError, InputError, LinkError, LogError, NotFo
 from app.interlocks import Verdict
 from app.log import Origin
 from app.logbook import Logbook, Noted
-from app.logs import RobotLog
+from app.logs import RobotLog, on_rosout
 from app.panel.model import Action, Panel, Pressed
 from app.progress import Answer
 from app.receipts import (
@@ -34,6 +34,7 @@ from app.receipts import (
     judged,
     named,
     receipt_of,
+    untyped,
     with_doubt,
 )
 from app.robot import Robot
@@ -215,9 +216,10 @@ class Presses:
                 receipt = await self._pressed(widget, inputs, press_id, noted, by)
             receipt = await _closed(noted, receipt)
         level = logging.INFO if receipt.outcome in FINE else logging.WARNING
-        self._log.log(level, "press %s of %s by %s with %.*s: %s: %s", press_id, widget.id,
-                named(by.origin),
-                LONGEST_LOGGED, own, receipt.outcome, receipt.reason)  # fmt: skip
+        who = named(by.origin)
+        told = on_rosout(f"press {press_id} of {widget.id} by {who}: {untyped(widget, receipt)}")
+        self._log.log(level, "press %s of %s by %s with %.*s: %s: %s", press_id, widget.id, who,
+                LONGEST_LOGGED, own, receipt.outcome, receipt.reason, extra=told)  # fmt: skip
         return receipt
 
     def _correct(self, noted: Noted, press_id: str, answer: Answer) -> None:

@@ -12,6 +12,7 @@ from app.errors import Cause
 from app.interlocks import NO_WAY, PERMITTED, Verdict, press_verdict, way
 from app.log import Origin
 from app.panel.model import Hold, Panel, Pressed
+from app.panel.parameter import Parameter
 from app.panel.template import needed
 from app.progress import Answer, Outcome
 from app.robot import Robot
@@ -160,6 +161,13 @@ def _short(inputs: Mapping[str, Any]) -> bool:
 
 def corrected(receipt: Receipt, answer: Answer) -> Receipt:
     return replace(receipt, outcome=answer.outcome, reason=answer.text, cause="")
+
+
+def untyped(widget: Pressed | Hold, receipt: Receipt) -> str:
+    """The outcome, with its reason where that repeats nothing of what was typed in."""
+    if receipt.cause == "input" or isinstance(widget, Parameter):
+        return receipt.outcome
+    return f"{receipt.outcome}: {receipt.reason}"
 
 
 def with_doubt(receipt: Receipt, doubt: str) -> Receipt:

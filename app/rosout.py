@@ -13,6 +13,7 @@ from app.logs import RosoutHandler
 from app.robot import Robot
 
 LOG_TYPE: Final = "rcl_interfaces/msg/Log"
+OWN: Final = logging.getLogger("kiosk")
 
 
 class Putter(Protocol):
@@ -22,7 +23,8 @@ class Putter(Protocol):
 
 
 class Rosout:
-    """Publishes each log record of the process between `start` and `stop`."""
+    """Publishes each log record of the kiosk's between `start` and `stop`: not what its libraries say,
+    such as uvicorn of its connections."""
 
     def __init__(
         self,
@@ -39,11 +41,11 @@ class Rosout:
         self._stopped = False
 
     def start(self) -> None:
-        logging.getLogger().addHandler(self._handler)
+        OWN.addHandler(self._handler)
 
     def stop(self) -> None:
         self._stopped = True
-        logging.getLogger().removeHandler(self._handler)
+        OWN.removeHandler(self._handler)
 
     def _publish(self, fields: Mapping[str, Any]) -> None:
         """On whatever thread the record was written."""

@@ -9,10 +9,10 @@ from typing import Any
 
 from app.log import Origin
 from app.logbook import Logbook
-from app.logs import RobotLog
+from app.logs import RobotLog, on_rosout
 from app.panel.model import Pressed
 from app.progress import Answer
-from app.receipts import Receipt, Receipts, named, receipt_of, with_doubt
+from app.receipts import Receipt, Receipts, named, receipt_of, untyped, with_doubt
 from app.sending import Sending
 from app.sentences import clock, say
 
@@ -72,7 +72,9 @@ class Unjudged:
             return self.counted(receipt, origin)
         own = self._sending.needed(widget, inputs)
         self._receipts.begin(own_id, widget.id, origin, own)
-        self._log.warning("press %s of %s by %s: %s", own_id, widget.id, named(origin), why)
+        who = named(origin)
+        told = on_rosout(f"press {own_id} of {widget.id} by {who}: {untyped(widget, receipt)}")
+        self._log.warning("press %s of %s by %s: %s", own_id, widget.id, who, why, extra=told)
         receipt = with_doubt(receipt, await self._logbook.refused(widget.id, own, own_id, origin, why))
         self._receipts.keep(receipt)
         return receipt

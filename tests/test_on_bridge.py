@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
+from socket import create_connection
 
 import pytest
 import zenoh
@@ -205,15 +206,39 @@ def test_logs_are_in_ros_format_and_on_rosout(server: Server, node: RosNode) -> 
     until(partial(arrives, server, node), "the bridge knows what the node listens to", every_s=0.1)
     line = re.compile(r"\[(INFO|WARN|ERROR|FATAL)\] \[\d{10}\.\d{9}\] \[web_ui\]: .+|  .*")
     assert all(line.fullmatch(text) for text in server.process.lines)
-    server.press("operation", "for the log")
-
-    def on_rosout() -> list[dict[str, object]]:
-        return [m for m in node.heard("/rosout") if "for the log" in str(m["msg"])]
-
-    until(on_rosout, "the press on /rosout")
-    entry = on_rosout()[0]
+    server.press("operation", "typed in", id="for-the-log")
+    entry = on_rosout(node, "press for-the-log of operation by a program (127.0.0.1): published: Sent")
     assert (entry["name"], entry["level"]) == ("web_ui", 20)
-    assert any("for the log" in text for text in server.process.lines)
+    assert any("typed in" in text for text in server.process.lines)
+
+
+def on_rosout(node: RosNode, text: str) -> dict[str, object]:
+    """The message there with this text, when it has come."""
+    found: list[dict[str, object]] = until(
+        lambda: [m for m in node.heard("/rosout") if text in str(m["msg"])], f"{text} on /rosout"
+    )
+    return found[0]
+
+
+def test_what_was_typed_and_what_uvicorn_says_is_not_on_rosout(server: Server, node: RosNode) -> None:
+    until(server.ready, "ready")
+    before = len(node.heard("/rosout"))
+    head = "POST /widgets/operation HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: application/json\r\n"
+    with create_connection(("127.0.0.1", server.port)) as one:
+        one.sendall(f"{head}Content-Length: 100\r\n\r\n{{".encode())  # and drops it
+    with server.socket() as press_socket:
+        press_socket.press(widget="operation", inputs={"message": "typed in" * 20}, id="bad")
+        press_socket.press(widget="operation", inputs={"message": "typed in"}, id="good")
+    server.press("operation", "typed in", id="good")
+    server.press("operation", "typed in otherwise", id="good")
+    server.press("operation", "typed in", id="the-last")
+    on_rosout(node, "press the-last of operation by a program (127.0.0.1): ")
+    said = [str(message["msg"]) for message in node.heard("/rosout")[before:]]
+    assert [text for text in said if text.startswith("press bad of operation by ")] == [
+        "press bad of operation by a program (127.0.0.1): refused"
+    ]
+    never = ("typed in", "Traceback", "ClientDisconnect", "WebSocket", "connection open")
+    assert [text for text in said if any(words in text for words in never)] == []
 
 
 def test_debug_is_hidden_unless_asked_for(
