@@ -36,6 +36,8 @@ NO_WAY: Final = frozenset(
     {"no_link", "no_bridge", "no_bridge_of", "bridge_silent", "joining", "catching_up"}
 )
 
+ENDPOINTS_TOLD: Final = 3
+
 # What comes so soon after joining may be a latched value of any age, sent again.
 HISTORY_S: Final = 1.0
 
@@ -47,7 +49,7 @@ SERVER_SETTLE_S: Final = 0.2
 def way(robot: Robot, now: float) -> Verdict:
     """Whether commands can reach the robot at all."""
     if not robot.link_up:
-        return locked("no_link")
+        return _no_link(robot.endpoints)
     if not robot.graph.bridges:
         return locked("no_bridge_of" if robot.name else "no_bridge", name=robot.name)
     if robot.graph.silent:
@@ -59,6 +61,17 @@ def way(robot: Robot, now: float) -> Verdict:
     if not robot.caught_up:
         return locked("catching_up")
     return PERMITTED
+
+
+@lru_cache(maxsize=64)
+def _no_link(endpoints: tuple[str, ...]) -> Verdict:
+    """With where the bridge was looked for, if that is known."""
+    if not endpoints:
+        return locked("no_link")
+    where, more = ", ".join(endpoints[:ENDPOINTS_TOLD]), len(endpoints) - ENDPOINTS_TOLD
+    if more > 0:
+        where = say("and_more", names=where, number=more)
+    return Verdict(False, "no_link", say("no_link_at", where=where))
 
 
 def interlock_verdict(interlock: Interlock, robot: Robot, now: float) -> Verdict:

@@ -72,6 +72,7 @@ class Kiosk:
         self._loop = asyncio.get_running_loop()
         self.link = Link(config, self._wake)
         self.robot = Robot(panel, self.interfaces, self.link.zid, entry)
+        self.robot.endpoints = self.link.endpoints
         self._log = RobotLog(log, self.robot.name)
         self.control = Control(panel.control, self.robot.name, tell=self._log.info)
         self.showing = Showing(

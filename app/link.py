@@ -117,6 +117,14 @@ class Link:
         self._held: dict[str, zenoh.LivelinessToken] | None = {}  # None: between two sessions
         self._open()
 
+    @property
+    def endpoints(self) -> tuple[str, ...]:
+        """Where it connects, as its configuration says; empty where it only looks around."""
+        found = json.loads(self._config.get_json("connect/endpoints"))
+        if isinstance(found, dict):  # for each mode
+            found = found.get(json.loads(self._config.get_json("mode")) or "peer", [])
+        return tuple(map(str, found))
+
     def _open(self) -> None:
         with _translated("the Zenoh session can't be opened"):
             self._session = zenoh.open(self._config)

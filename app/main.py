@@ -7,7 +7,7 @@ import asyncio
 import logging
 import secrets
 import sys
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Sequence
 from contextlib import AsyncExitStack, ExitStack, asynccontextmanager
 from functools import partial
 from typing import TYPE_CHECKING
@@ -17,6 +17,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from starlette.exceptions import HTTPException
 from starlette.middleware.gzip import GZipMiddleware
 from starlette.requests import ClientDisconnect
+from uvicorn import Config as ServerConfig
 
 from app import development, heap, logs, simulator, sockets
 from app.assets import Assets, load_assets
@@ -36,7 +37,7 @@ from app.routes import control, events, health, holds, pages, press_socket, pres
 from app.routes import log as log_routes
 from app.routes.messages import LONGEST
 from app.routes.site import Site, named_robot, on_gone, on_http_error, on_kiosk_error
-from app.serving import check_port
+from app.serving import check_port, urls
 from app.settings import Settings, shipped
 from app.startup import InWords
 from app.systemd import Manager
@@ -90,7 +91,11 @@ def create_app(settings: Settings | None = None) -> FastAPI:
                     await opened.enter_async_context(
                         development.reloading(site, settings, running, opened.pop_all())
                     )
-                works = (watchdog.run(), sockets.narrow(ports), _made_ready(site.templates))
+                works = (
+                    watchdog.run(),
+                    _listening(app.state.server, ports, settings.hosts),
+                    _made_ready(site.templates),
+                )
                 tasks = [asyncio.create_task(work) for work in works]
                 try:
                     yield
@@ -190,12 +195,21 @@ async def _running(
             if recordings is not None:
                 recordings.start()
             await fleet.start()
-            log.info('panel "%s", %s robot', panel.title, "simulated" if demo else "live")
+            by = "simulated" if demo else f"live by {settings.zenoh}"
+            folder = settings.data_folder("demo" if demo else "live")
+            log.info('panel "%s" (%s), robot %s, data in %s', panel.title, settings.panel, by, folder)
             yield fleet, assets
         finally:
             await fleet.stop()
             if recordings is not None:
                 await asyncio.to_thread(recordings.stop)
+
+
+async def _listening(server: ServerConfig | None, ports: set[int], hosts: Sequence[str]) -> None:
+    """Tells where browsers find the panel, as soon as they do."""
+    listening = await sockets.narrow(ports)
+    if listening:
+        log.info("the panel is at %s", ", ".join(urls(server, listening, hosts)))
 
 
 async def _made_ready(templates: Environment) -> None:

@@ -88,6 +88,7 @@ class Robot:
         self.name = entry.name if entry else ""
         self.namespace = entry.namespace if entry else panel.namespace
         self.link_up = False
+        self.endpoints: tuple[str, ...] = ()  # where its bridge is looked for, as Zenoh names it
         self.settled_at = math.inf  # monotonic: when a bridge that came has set up its routes
         self._keys: dict[str, str] = {}  # of what the panel names
         self._told_apart = entry.namespace if entry else None

@@ -10,6 +10,8 @@ from typing import Final
 ENGLISH: Final[Mapping[str, str]] = {
     # Why a control is locked.
     "no_link": "No connection to the robot: its bridge can't be reached.",
+    "no_link_at": "No connection to the robot: its bridge can't be reached at {where}.",
+    "and_more": "{names} and {number} more",
     "no_bridge": "No connection to the robot: Zenoh answers, but no ROS 2 bridge is there.",
     "no_bridge_of": "No connection to {name}: Zenoh answers, but no ROS 2 bridge of its namespace.",
     "ending": "The panel's server is ending, or takes a new panel.",

@@ -4,6 +4,7 @@
 that was started without them gets them as the application starts, before it listens.
 """
 
+from collections.abc import Sequence
 from typing import Any, Final
 
 from starlette.types import Receive
@@ -45,6 +46,19 @@ def bound(server: Config) -> None:
     if server.http_protocol_class is HttpToolsProtocol:
         server.http_protocol_class = Connection
     want_files()
+
+
+def urls(
+    server: Config | None, listening: Sequence[tuple[str, int]], hosts: Sequence[str]
+) -> list[str]:
+    """Where a browser finds the panel; `hosts` are the names that it answers to, of which any may be
+    meant where the server listens on all addresses."""
+    scheme = "https" if server is not None and server.is_ssl else "http"
+    found = []
+    for host, port in listening:
+        names = hosts if host in ("0.0.0.0", "::") else [f"[{host}]" if ":" in host else host]
+        found += [f"{scheme}://{name}:{port}" for name in names]
+    return found
 
 
 def check_port(server: Config | None) -> None:

@@ -13,7 +13,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import zenoh
 from zenoh.ext import CacheConfig, declare_advanced_publisher
@@ -25,6 +25,9 @@ from app.demo_parameters import EVENT_TYPE, EVENTS, SERVICES
 from app.errors import DecodeError
 from app.interfaces import Interfaces, interfaces_of
 from app.keys import Qos
+
+if TYPE_CHECKING:
+    from argparse import Namespace
 
 ENDPOINT: Final = "tcp/127.0.0.1:7447"
 ANY_PORT: Final = "tcp/127.0.0.1:0"
@@ -253,9 +256,29 @@ def in_process(namespace: str, distro: str) -> Iterator[str]:
         yield robot.endpoint
 
 
+def _given(arguments: list[str]) -> "Namespace":
+    import argparse  # not with the server, which has this robot within
+
+    parser = argparse.ArgumentParser(
+        prog="python -m app.simulator",
+        description="The demo robot as a Zenoh peer of its own, for panels to connect to.",
+    )
+    parser.add_argument(
+        "endpoint",
+        nargs="?",
+        default=ENDPOINT,
+        metavar="ENDPOINT",
+        help="where it listens, as Zenoh names it; default: %(default)s",
+    )
+    parser.add_argument(
+        "namespace", nargs="?", default="", metavar="NAMESPACE", help="of its topics, such as /robot1"
+    )
+    return parser.parse_args(arguments)
+
+
 def main(arguments: list[str]) -> int:
-    endpoint = arguments[0] if arguments else ENDPOINT
-    namespace = arguments[1].rstrip("/") if len(arguments) > 1 else ""
+    given = _given(arguments)
+    endpoint, namespace = given.endpoint, given.namespace.rstrip("/")
     if not keys.NAMESPACE.fullmatch(namespace):
         print(f'demo robot: "{namespace}" is not a ROS 2 namespace, like /robot1', file=sys.stderr)
         return 2

@@ -51,18 +51,23 @@ def names() -> set[str]:
     return {name for name, _ in listeners()}
 
 
-async def narrow(ports: set[int]) -> None:
+async def narrow(ports: set[int]) -> list[tuple[str, int]]:
     """Narrows what the next sockets to listen accept, and adds their ports: of what a browser does not
     read little waits in the kernel, where nobody can take it back; the rest is never written. One that
-    is gone without a word, or reads nothing for minutes, does not keep its connection."""
+    is gone without a word, or reads nothing for minutes, does not keep its connection. Their addresses.
+    """
+    found: list[tuple[str, int]] = []
     with suppress(OSError):  # no /proc on this system
         before = names()
         await listening(before)
         for name, one in listeners():
             if name not in before and one.family in INTERNET:
-                ports.add(one.getsockname()[1])
+                host, port = one.getsockname()[:2]
+                ports.add(port)
+                found.append((host, port))
                 one.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER)
                 one.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, GONE_AFTER_MS)
+    return found
 
 
 def hang_up(ports: Collection[int]) -> None:

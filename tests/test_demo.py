@@ -1,5 +1,7 @@
 """The demo robot, stepped by hand."""
 
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -156,3 +158,18 @@ def test_a_panel_sets_and_follows_its_parameters(
     until(lambda: kiosk.widget("speed")["text"] == "200", "each event of several counts")
     assert kiosk.widget("batch")["outcome"] == "rejected"
     assert kiosk.widget("batch")["result"].endswith(": a batch needs a name")
+
+
+@pytest.mark.parametrize("command", ["app.simulator", "app.log", "app.log verify"])
+def test_a_command_tells_how_it_is_used(command: str) -> None:
+    words = [sys.executable, "-m", *command.split(), "--help"]
+    said = subprocess.run(
+        words, cwd=ROOT, capture_output=True, text=True, check=True, timeout=30
+    ).stdout
+    assert said.startswith(f"usage: python -m {command} [-h] ")
+
+
+def test_a_command_that_is_used_wrongly_says_so() -> None:
+    words = [sys.executable, "-m", "app.simulator", "tcp/127.0.0.1:0", "/r1", "more"]
+    done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False, timeout=30)
+    assert (done.returncode, "unrecognized arguments: more" in done.stderr) == (2, True)

@@ -61,6 +61,16 @@ def bridge_unheard(robot: Robot) -> None:
     robot.answers = False
 
 
+def no_link_at(robot: Robot) -> None:
+    robot.link_up = False
+    robot.endpoints = ("tcp/robot1:7447",)
+
+
+def no_link_at_many(robot: Robot) -> None:
+    robot.link_up = False
+    robot.endpoints = tuple(f"tcp/r{number}:1" for number in range(5))
+
+
 def joining(robot: Robot) -> None:
     robot.settled_at = NOW + 1
 
@@ -68,6 +78,17 @@ def joining(robot: Robot) -> None:
 SILENT = "No connection to the robot: its bridge does not answer. If this stays, restart the bridge."
 WAYS: list[tuple[Callable[[Robot], None], str, str]] = [
     (no_link, "no_link", "No connection to the robot: its bridge can't be reached."),
+    (
+        no_link_at,
+        "no_link",
+        "No connection to the robot: its bridge can't be reached at tcp/robot1:7447.",
+    ),
+    (
+        no_link_at_many,
+        "no_link",
+        "No connection to the robot: its bridge can't be reached at tcp/r0:1, tcp/r1:1, tcp/r2:1 "
+        "and 2 more.",
+    ),
     (
         no_bridge,
         "no_bridge",

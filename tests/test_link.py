@@ -59,6 +59,22 @@ def test_a_configuration_that_can_not_be_used_is_told_in_the_users_terms(
     assert ".rs:" not in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("connect", "endpoints"),
+    [
+        ('["tcp/127.0.0.1:9", "tcp/127.0.0.1:10"]', ("tcp/127.0.0.1:9", "tcp/127.0.0.1:10")),
+        ('{ peer: ["tcp/127.0.0.1:9"], router: ["tcp/127.0.0.1:10"] }', ("tcp/127.0.0.1:9",)),
+        ("[]", ()),
+    ],
+)
+def test_a_link_tells_where_it_connects(connect: str, endpoints: tuple[str, ...]) -> None:
+    config = config_to("tcp/127.0.0.1:9")
+    config.insert_json5("connect/endpoints", connect)
+    link = Link(config, lambda _: None)
+    assert link.endpoints == endpoints
+    link.close()
+
+
 def test_a_session_is_renewed_in_the_middle_of_what_comes_in(
     peer: tuple[str, zenoh.Session],
 ) -> None:

@@ -19,7 +19,7 @@ from uvicorn import Config
 
 from app.connections import FILES_WANTED
 from app.proxies import Proxies
-from app.serving import OPTIONS, bounded
+from app.serving import OPTIONS, bounded, urls
 from tests.hasty import MOST
 from tests.parts import ROOT, Server, free_port, until
 
@@ -160,10 +160,9 @@ def test_a_body_has_its_time(hasty: Server, path: str) -> None:
     head = f"POST {path} HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: application/json\r\n"
     with opened(hasty) as one:
         one.sendall(f"{head}Content-Length: 100\r\n\r\n{{".encode())
-        answer = one.recv(65_536).decode()
+        answer = b"".join(iter(lambda: one.recv(65_536), b"")).decode()  # until it is closed
         assert answer.startswith("HTTP/1.1 408 ")
         assert "the body took longer than 0.5 s" in answer
-        until(lambda: is_closed(one), "nobody waits for the rest")
 
 
 def test_who_drops_a_body_leaves_no_traceback(plain: Server) -> None:
@@ -314,6 +313,28 @@ def test_a_port_in_use_is_one_sentence(plain: Server, tmp_path: Path) -> None:
     said = refused(tmp_path, "--port", str(plain.port))
     assert said.count(str(plain.port)) == 1
     assert f"can't listen on 127.0.0.1 port {plain.port}: another program does, perhaps" in said
+
+
+def test_the_start_tells_what_it_uses_and_where_it_is(servers: Callable[[Server], Server]) -> None:
+    panel = ROOT / "app/panel.toml"
+    mine = servers(Server(ROOT, KIOSK_MODE="live"))
+    until(
+        lambda: f"the panel is at http://127.0.0.1:{mine.port}\n" in mine.process.text + "\n", "where"
+    )
+    said = f'panel "Robot cell 1" ({panel}), robot live by {ROOT / "zenoh.json5"}, data in {mine.data}'
+    assert said in mine.process.text
+
+
+@pytest.mark.parametrize(
+    ("host", "found"),
+    [
+        ("127.0.0.1", ["http://127.0.0.1:80"]),
+        ("::1", ["http://[::1]:80"]),
+        ("0.0.0.0", ["http://localhost:80", "http://cell1.local:80"]),
+    ],
+)
+def test_a_panel_is_found_by_its_names(host: str, found: list[str]) -> None:
+    assert urls(None, [(host, 80)], ["localhost", "cell1.local"]) == found
 
 
 def test_an_address_that_is_not_there_is_one_sentence(tmp_path: Path) -> None:

@@ -44,7 +44,7 @@ def test_what_listens_from_now_on_is_narrowed_and_what_listened_before_is_not() 
             narrowing = asyncio.create_task(sockets.narrow(ports))
             await asyncio.sleep(0)
             with socket.create_server(("127.0.0.1", 0)) as new:
-                await asyncio.wait_for(narrowing, 4)
+                assert await asyncio.wait_for(narrowing, 4) == [new.getsockname()]
                 assert ports == {new.getsockname()[1]}
                 assert accepted(new) == 2 * SEND_BUFFER < wide
                 assert accepted(old) == wide
