@@ -13,6 +13,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from fastapi import Depends, FastAPI
+from fastapi.exceptions import RequestValidationError
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from starlette.exceptions import HTTPException
 from starlette.middleware.gzip import GZipMiddleware
@@ -35,8 +36,9 @@ from app.press_limits import PressLimits
 from app.proxies import Proxies
 from app.routes import control, events, health, holds, pages, press_socket, presses, static
 from app.routes import log as log_routes
+from app.routes.described import errors
 from app.routes.messages import LONGEST
-from app.routes.site import Site, named_robot, on_gone, on_http_error, on_kiosk_error
+from app.routes.site import Site, named_robot, on_gone, on_http_error, on_invalid, on_kiosk_error
 from app.serving import check_port, urls
 from app.settings import Settings, shipped
 from app.startup import InWords
@@ -116,6 +118,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
             KioskError: on_kiosk_error,
             HTTPException: on_http_error,
             ClientDisconnect: on_gone,
+            RequestValidationError: on_invalid,
         },
     )
     if settings.dev:
@@ -128,8 +131,9 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     for routes in (pages, events, presses, press_socket, control, holds):
         app.include_router(routes.router)
         app.include_router(routes.router, prefix="/robots/{robot}", dependencies=[Depends(named_robot)])
-    for common in (static, health, log_routes):
+    for common in (static, health):
         app.include_router(common.router)
+    app.include_router(log_routes.router, responses=errors(403, 404, 422, 503))
     return app
 
 

@@ -164,6 +164,7 @@ ORDER = (
     "app.routes.messages",
     "app.serving",
     "app.direct",
+    "app.routes.described",
     "app.routes.site",
     "app.routes.visitors",
     "app.routes.pages",

@@ -4,15 +4,16 @@ import json
 from typing import Annotated, Any, Final, TypeVar
 from urllib.parse import parse_qsl
 
-from fastapi import APIRouter, Request
+from fastapi import APIRouter, Path, Request
 from fastapi.responses import JSONResponse, RedirectResponse, Response
-from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, JsonValue, ValidationError
 
 from app.browsers import Browser
 from app.control import LIFE_S, Refusal
 from app.errors import InputError, NotFound
 from app.kiosk import Kiosk
 from app.panel.description import ID
+from app.routes.described import FORM, described_body, errors, fields
 from app.routes.messages import body_of
 from app.routes.site import CurrentKiosk, CurrentSite
 from app.routes.visitors import keep, visitor, welcomed
@@ -20,7 +21,9 @@ from app.sentences import say
 
 router = APIRouter()
 
-FORM: Final = "application/x-www-form-urlencoded"
+ACTS: Final[list[JsonValue]] = ["take", "ask", "give", "keep", "release"]
+Act = Annotated[str, Path(json_schema_extra={"enum": ACTS})]
+ASKER: Final = r"^[0-9a-f]{0,12}$"
 
 # A form's browser shows that it is there by loading its page anew, at the latest after this time.
 FORM_LIFE_S: Final = 35.0
@@ -32,7 +35,7 @@ class Acting(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
 
-    to: Annotated[str, Field(pattern=r"^[0-9a-f]{0,12}$")] = ""
+    to: Annotated[str, Field(pattern=ASKER)] = ""
     page: Annotated[str, Field(pattern=ID)] | None = None
     at: AwareDatetime | None = None
 
@@ -57,16 +60,12 @@ class ControlAnswer(BaseModel):
     control: dict[str, bool | str]
 
 
-def _body_of(model: type[BaseModel]) -> dict[str, Any]:
-    """A body that may be left out, for the description of the interface."""
-    return {"requestBody": {"content": {"application/json": {"schema": model.model_json_schema()}}}}
-
-
 @router.post(
     "/control/here",
     status_code=204,
     summary="The holder's or asker's page is still there",
-    openapi_extra=_body_of(Here),
+    responses=errors(403, 404, 408, 413, 422),
+    openapi_extra=described_body(Here, None, required=False),
 )
 async def here(request: Request, site: CurrentSite, kiosk: CurrentKiosk) -> Response:
     _required(kiosk)
@@ -78,10 +77,16 @@ async def here(request: Request, site: CurrentSite, kiosk: CurrentKiosk) -> Resp
     "/control/{act}",
     response_model=ControlAnswer,
     summary="Take, ask for, give, keep or release control of the robot",
-    responses={303: {"description": "a form post"}, 409: {"model": ControlAnswer}},
-    openapi_extra=_body_of(Acting),
+    responses=errors(403, 404, 408, 413, 422)
+    | {
+        303: {"description": "of a form: back to the page"},
+        409: {"model": ControlAnswer, "description": "it was not done"},
+    },
+    openapi_extra=described_body(
+        Acting, fields(to={"pattern": ASKER}, page={"pattern": ID}), required=False
+    ),
 )
-async def act(act: str, request: Request, site: CurrentSite, kiosk: CurrentKiosk) -> Response:
+async def act(act: Act, request: Request, site: CurrentSite, kiosk: CurrentKiosk) -> Response:
     _required(kiosk)
     browser = visitor(request, site)
     _, token = welcomed(request, site)  # without a cookie nothing is done yet, the next time it is

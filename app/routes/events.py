@@ -11,6 +11,7 @@ from app.board import Board, told
 from app.direct import direct
 from app.heartbeat import beat
 from app.metrics import Open
+from app.routes.described import TEXT, errors
 from app.routes.site import CurrentKiosk, CurrentSite
 from app.routes.visitors import keep, welcomed
 
@@ -25,7 +26,7 @@ MEDIA_TYPE: Final = "text/event-stream"
 @router.get(
     "/events",
     response_class=Response,
-    responses={200: {"content": {MEDIA_TYPE: {}}}},
+    responses=errors(403, 404, 422) | {200: {"content": {MEDIA_TYPE: {"schema": TEXT}}}},
     summary="Server-sent events: snapshot, <interlock>-enabled-updated, update, link, control, beat",
 )
 async def events(

@@ -4,20 +4,39 @@ import asyncio
 from collections.abc import Callable
 
 from fastapi import APIRouter
-from fastapi.responses import JSONResponse, Response
+from fastapi.responses import JSONResponse, PlainTextResponse, Response
+from pydantic import BaseModel
 
 from app.metrics import Metrics
+from app.routes.described import errors
 from app.routes.site import CurrentSite
 
 router = APIRouter()
 
 
-@router.get("/healthz", summary="200 while the process serves")
+@router.get("/healthz", summary="200 while the process serves", responses=errors(403))
 async def healthz() -> dict[str, str]:
     return {"status": "ok"}
 
 
-@router.get("/readyz", summary="200 while commands can reach every robot, else 503 with the reason")
+class NotReady(BaseModel):
+    """`code` is the reason's stable name; of several robots each has its own in `robots`."""
+
+    status: str
+    code: str
+    reason: str
+    robots: dict[str, str] = {}
+
+
+@router.get(
+    "/readyz",
+    summary="200 while commands can reach every robot, else 503 with the reason",
+    responses=errors(403)
+    | {
+        200: {"model": dict[str, str], "description": "commands can reach every robot"},
+        503: {"model": NotReady, "description": "they can't"},
+    },
+)
 async def readyz(site: CurrentSite) -> Response:
     kiosks = site.fleet.kiosks
     ways = await asyncio.gather(*(kiosk.way_asked() for kiosk in kiosks))
@@ -29,7 +48,12 @@ async def readyz(site: CurrentSite) -> Response:
     return JSONResponse(body | ({"robots": robots} if robots else {}), status_code=503)
 
 
-@router.get("/metrics", summary="Prometheus text format")
+@router.get(
+    "/metrics",
+    summary="Prometheus text format",
+    response_class=PlainTextResponse,
+    responses=errors(403) | {200: {"description": "the metrics"}},
+)
 async def metrics(site: CurrentSite) -> Response:
     exposition = await asyncio.to_thread(_exposition)
     text, media_type = exposition(site.metrics)

@@ -10,7 +10,7 @@ from urllib.parse import urlencode
 
 from fastapi import APIRouter, Query
 from fastapi.responses import HTMLResponse, Response, StreamingResponse
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, JsonValue
 
 from app.errors import InputError, NotFound
 from app.log import Filter, OperatorLog, Row
@@ -36,14 +36,24 @@ CSV_FIELDS: Final = (
 )  # fmt: skip
 
 
+# For who writes programs; what is no time of the calendar is refused with a sentence.
+A_TIME: Final[dict[str, JsonValue]] = {
+    "pattern": (
+        r"^((19[7-9]\d|20\d\d)-(0[1-9]|1[0-2])-(0[1-9]|1\d|2[0-8])"
+        r"(T([01]\d|2[0-3]):[0-5]\d(:[0-5]\d)?(Z|[+-](0\d|1[0-2]):00)?)?)?$"
+    ),
+    "examples": ["2026-11-21T10:00"],
+}
+
+
 class Wanted(BaseModel):
     """The filter as a form sends it; times are `2026-11-21T10:00`, in the server's zone where they
     have none of their own."""
 
     model_config = ConfigDict(extra="forbid")
 
-    since: Annotated[str, Field(max_length=40)] = ""
-    until: Annotated[str, Field(max_length=40)] = ""
+    since: Annotated[str, Field(max_length=40, json_schema_extra=A_TIME)] = ""
+    until: Annotated[str, Field(max_length=40, json_schema_extra=A_TIME)] = ""
     widget: Annotated[str, Field(max_length=64)] = ""
     outcome: Annotated[str, Field(max_length=20)] = ""
     who: Annotated[str, Field(max_length=64)] = ""

@@ -20,12 +20,18 @@ from app.panel.model import Input, Page, Panel, Pressed
 from app.panel.parameter import Parameter
 from app.panel.template import inputs_of
 from app.receipts import Receipt
+from app.routes.described import PAGE, Described, errors
 from app.routes.site import CurrentSite, Site
 from app.routes.visitors import by_hand, keep, welcomed
 from app.sentences import clock, moment, say
 from app.views import View, as_seen_by
 
 router = APIRouter(include_in_schema=True)
+
+PAGES: Described = errors(403, 404, 422) | {
+    200: {"content": PAGE},
+    303: {"description": "to the same page of the first of several robots"},
+}
 
 # A page without scripts reloads itself, and loses what was typed and not sent: where there is an
 # input, rarely enough to type in.
@@ -89,14 +95,24 @@ class PageContext(TypedDict):
     refused: str
 
 
-@router.get("/", response_class=HTMLResponse, summary="The first page of the panel")
+@router.get(
+    "/",
+    response_class=HTMLResponse,
+    summary="The first page of the panel",
+    responses=PAGES,
+)
 async def first_page(request: Request, site: CurrentSite) -> Response:
     if away := _to_a_robot(request, site, "/"):
         return away
     return _render(request, site, site.fleet.panel.pages[0])
 
 
-@router.get("/pages/{page}", response_class=HTMLResponse, summary="A page of the panel")
+@router.get(
+    "/pages/{page}",
+    response_class=HTMLResponse,
+    summary="A page of the panel",
+    responses=PAGES,
+)
 async def named_page(page: str, request: Request, site: CurrentSite) -> Response:
     if away := _to_a_robot(request, site, f"/pages/{page}"):
         return away

@@ -9,7 +9,7 @@ from urllib.parse import parse_qsl, quote
 
 from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
-from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, JsonValue
+from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, JsonValue, WithJsonSchema
 
 from app import moments
 from app.browsers import Browser
@@ -20,6 +20,17 @@ from app.logbook import origin_of
 from app.panel.model import Page
 from app.press_limits import RETRY_AFTER_S
 from app.receipts import Receipt
+from app.routes.described import (
+    FORM,
+    JSON,
+    PAGE,
+    TEXT,
+    Described,
+    ErrorAnswer,
+    described_body,
+    errors,
+    fields,
+)
 from app.routes.messages import as_model, body_of, json_of
 from app.routes.pages import ask_of
 from app.routes.site import CurrentKiosk, CurrentSite, Site
@@ -44,12 +55,16 @@ STATUS: Final[Mapping[str, int]] = {
 }
 
 
+# Pydantic's own has a reference within the model, which is not the description's.
+INPUTS: Final = {"type": "object", "description": "values by the ids of inputs"}
+
+
 class Press(BaseModel):
     """What a client posts as JSON; only `inputs` is needed."""
 
     model_config = ConfigDict(extra="forbid")
 
-    inputs: dict[str, JsonValue]
+    inputs: Annotated[dict[str, JsonValue], WithJsonSchema(INPUTS)]
     id: Annotated[str, Field(pattern=PRESS_ID)] | None = None
     seen: Annotated[str, Field(pattern=SEEN)] | None = None
     at: AwareDatetime | None = None
@@ -72,61 +87,64 @@ class ReceiptAnswer(BaseModel):
     at: AwareDatetime
 
 
+RECEIPTS: Final[Described] = errors(403, 404, 408, 413) | {
+    303: {"description": "of a form: back to the page, with the receipt on it"},
+    409: {
+        "model": ReceiptAnswer,
+        "description": "refused: an interlock, who has control, no such goal",
+    },
+    429: {
+        "model": ReceiptAnswer,
+        "description": "more than a client may",
+        "headers": {"Retry-After": {"description": "seconds", "schema": {"type": "integer"}}},
+    },
+    503: {"model": ReceiptAnswer | ErrorAnswer, "description": "no way to the robot, or to the log"},
+}
+
+
 @router.post(
     "/widgets/{widget}",
     response_model=ReceiptAnswer,
     summary="Press a widget",
-    responses={
-        303: {"description": "a form post: back to the page, with the receipt on it"},
-        409: {"model": ReceiptAnswer, "description": "refused by an interlock or by who has control"},
-        422: {"model": ReceiptAnswer, "description": "bad input"},
-        503: {"model": ReceiptAnswer, "description": "no way to the robot, or none to the log"},
+    responses=RECEIPTS
+    | {
+        200: {"description": "done or under way; of a form: a page that asks first", "content": PAGE},
+        422: {"model": ReceiptAnswer | ErrorAnswer, "description": "bad input"},
         504: {"model": ReceiptAnswer, "description": "no answer in time"},
     },
-    openapi_extra={
-        "requestBody": {
-            "required": True,
-            "content": {"application/json": {"schema": Press.model_json_schema()}},
-        }
-    },
+    openapi_extra=described_body(
+        Press, {"type": "object", "additionalProperties": TEXT}, required=True
+    ),
 )
 async def press(widget: str, request: Request, site: CurrentSite, kiosk: CurrentKiosk) -> Response:
     kiosk.presses.widget(widget)
     browser = visitor(request, site)
     body = await body_of(request)
     kind = _kind(request)
-    if kind == "application/json":
+    if kind == JSON:
         receipt = await pressed(site, kiosk, browser, widget, as_model(Press, json_of(body)))
         return _answer(receipt)
-    if kind == "application/x-www-form-urlencoded":
+    if kind == FORM:
         return await _pressed_by_form(site, kiosk, browser, widget, _form(body))
-    raise InputError(
-        f'a press is "application/json" or "application/x-www-form-urlencoded", not "{kind}"'
-    )
+    raise InputError(f'a press is "{JSON}" or "{FORM}", not "{kind}"')
 
 
 @router.post(
     "/widgets/{widget}/cancel",
     response_model=ReceiptAnswer,
     summary="Ask the robot to cancel an action's goal",
-    responses={
-        303: {"description": "a form post"},
-        409: {"model": ReceiptAnswer, "description": "that goal is over, or none is under way"},
-        503: {"model": ReceiptAnswer, "description": "no way to the robot"},
-    },
-    openapi_extra={
-        "requestBody": {"content": {"application/json": {"schema": Cancel.model_json_schema()}}}
-    },
+    responses=RECEIPTS | errors(422),
+    openapi_extra=described_body(Cancel, fields(_press={}), required=False),
 )
 async def cancel(widget: str, request: Request, site: CurrentSite, kiosk: CurrentKiosk) -> Response:
     kiosk.presses.widget(widget)
     browser = visitor(request, site)
     body, kind = await body_of(request), _kind(request)
-    form = kind == "application/x-www-form-urlencoded"
+    form = kind == FORM
     of = ""
     if form:
         of = _form(body).get("_press", "")
-    elif kind == "application/json" and body:
+    elif kind == JSON and body:
         of = as_model(Cancel, json_of(body)).press
     if site.limits.admit_cancel(browser, kiosk.base, widget, of[:LONGEST_ID]):
         receipt = await _told(site, kiosk.presses.cancel(widget, origin_of(browser), of))

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from typing import Annotated
 
 from fastapi import Depends, Path, Request
+from fastapi.exceptions import RequestValidationError
 from fastapi.responses import HTMLResponse, JSONResponse, Response
 from jinja2 import Environment
 from starlette.exceptions import HTTPException
@@ -80,6 +81,15 @@ async def on_kiosk_error(request: Request, error: Exception) -> Response:
     if isinstance(error, TooSlow):
         answer.headers["connection"] = "close"  # nobody waits for the rest
     return answer
+
+
+async def on_invalid(request: Request, error: Exception) -> Response:
+    """A path or a query that is not what the description says: the first fault, with its place."""
+    if not isinstance(error, RequestValidationError):
+        raise error
+    first = error.errors()[0]
+    where = ".".join(str(step) for step in first["loc"][1:])
+    return error_answer(request, 422, f"{where}: {first['msg']}")
 
 
 async def on_gone(request: Request, error: Exception) -> Response:

@@ -1,0 +1,50 @@
+"""What openapi.json says of what several routes have in common: errors, and bodies that they read."""
+
+from typing import Any, Final
+
+from pydantic import BaseModel
+
+JSON: Final = "application/json"
+FORM: Final = "application/x-www-form-urlencoded"
+TEXT: Final = {"type": "string"}
+
+Described = dict[int | str, dict[str, Any]]
+
+
+class ErrorAnswer(BaseModel):
+    """What is wrong, in a sentence; who asks for `text/html` gets a page of it."""
+
+    error: str
+
+
+REASONS: Final = {
+    403: "by another site's page, or under a name that the panel does not have",
+    404: "there is no such thing on this panel",
+    408: "the body took too long",
+    413: "the body is too large",
+    422: "it is not what this description says",
+    503: "the operator's log can't be read",
+}
+PAGE: Final = {"text/html": {"schema": TEXT}}
+
+
+def errors(*statuses: int) -> Described:
+    """The answers of a route that are errors."""
+    content = {JSON: {"schema": ErrorAnswer.model_json_schema()}, **PAGE}
+    return {status: {"description": REASONS[status], "content": content} for status in statuses}
+
+
+def described_body(
+    model: type[BaseModel], form: dict[str, Any] | None, *, required: bool
+) -> dict[str, Any]:
+    """JSON or, where there is a schema of one, a form: as a route's `openapi_extra`."""
+    content = {JSON: {"schema": model.model_json_schema()}}
+    if form is not None:
+        content[FORM] = {"schema": form}
+    return {"requestBody": {"required": required, "content": content}}
+
+
+def fields(**texts: dict[str, Any]) -> dict[str, Any]:
+    """The schema of a form with these fields and no others."""
+    properties = {name: {**TEXT, **about} for name, about in texts.items()}
+    return {"type": "object", "properties": properties, "additionalProperties": False}
