@@ -12,7 +12,7 @@ import pytest
 from playwright.sync_api import Browser, Error, Page, expect
 
 from tests.parts import CHROMIUM, CHROMIUM_FLAGS, ROOT, TAP_AGAIN_MS, Server, until
-from tests.test_control_over_http import control_panel
+from tests.test_control_over_http import PROXY, control_panel
 
 IDLE_S = 4.0
 FIRST, SECOND = "192.0.2.1", "192.0.2.2"
@@ -24,7 +24,8 @@ Opens = Callable[..., Page]
 
 @pytest.fixture
 def kiosk(tmp_path: Path) -> Iterator[Server]:
-    mine = Server(ROOT, KIOSK_PANEL=str(control_panel(tmp_path, f"takeover_after_s = {IDLE_S}")))
+    panel = control_panel(tmp_path, f"takeover_after_s = {IDLE_S}")
+    mine = Server(ROOT, KIOSK_PANEL=str(panel), KIOSK_PROXIES=PROXY)
     until(mine.ready, "ready")
     yield mine
     mine.end()
@@ -254,7 +255,7 @@ def test_after_a_restart_of_the_server_nobody_has_it(
     kiosk.process.kill()
     expect(bar(first)).to_have_text("not known")
     expect(button(first, "Give up control")).to_be_disabled()
-    again = Server(ROOT, kiosk.port, KIOSK_PANEL=str(tmp_path / "control.toml"))
+    again = Server(ROOT, kiosk.port, KIOSK_PANEL=str(tmp_path / "control.toml"), KIOSK_PROXIES=PROXY)
     try:
         locked_by(first, "Nobody has control of the robot")
         take(first)

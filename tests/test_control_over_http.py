@@ -15,6 +15,7 @@ from tests.parts import ROOT, Server, until
 from tests.test_robots import entry, panel_file
 
 FAST_S = 2.0
+PROXY = "127.0.0.1"  # through which those who are not at the cell come
 
 
 def control_panel(folder: Path, more: str = "", panel: str | None = None) -> Path:
@@ -54,7 +55,7 @@ class Client:
 @pytest.fixture
 def kiosk(tmp_path: Path) -> Iterator[Server]:
     path = control_panel(tmp_path, f"takeover_after_s = {FAST_S}")
-    mine = Server(ROOT, KIOSK_PANEL=str(path))
+    mine = Server(ROOT, KIOSK_PANEL=str(path), KIOSK_PROXIES=PROXY)
     until(mine.ready, "ready")
     yield mine
     mine.end()
@@ -289,7 +290,7 @@ def test_forms_lead_back_to_their_page_with_what_was_refused(client: Callable[..
 
 def test_each_robot_has_its_own_control(tmp_path: Path) -> None:
     robots = panel_file(tmp_path, entry(1), entry(2)).read_text()
-    kiosk = Server(ROOT, KIOSK_PANEL=str(control_panel(tmp_path, panel=robots)))
+    kiosk = Server(ROOT, KIOSK_PANEL=str(control_panel(tmp_path, panel=robots)), KIOSK_PROXIES=PROXY)
     try:
         until(kiosk.ready, "ready", within_s=20)
         ann = Client(kiosk, "192.0.2.1", "/robots/r1")
@@ -312,7 +313,7 @@ def test_after_a_restart_nobody_has_it(
     ann = client("192.0.2.1")
     ann.take()
     kiosk.process.end()
-    again = Server(ROOT, kiosk.port, KIOSK_PANEL=str(tmp_path / "control.toml"))
+    again = Server(ROOT, kiosk.port, KIOSK_PANEL=str(tmp_path / "control.toml"), KIOSK_PROXIES=PROXY)
     try:
         until(again.ready, "ready")
         ann.control("here", touched=True)
