@@ -307,7 +307,17 @@ class Server:
         return found
 
     def press(self, widget: str, message: str = "", **more: Any) -> httpx.Response:
+        """What comes of it; one that was more than a client may is made again, as programs do."""
         press = {"inputs": {"message": message}, **more}
+
+        def pressed() -> httpx.Response | None:
+            answer = self._press(widget, press)
+            return None if answer.status_code == 429 else answer
+
+        found: httpx.Response = until(pressed, "there is room for a press", every_s=0.05)
+        return found
+
+    def _press(self, widget: str, press: Mapping[str, Any]) -> httpx.Response:
         if self.way == "socket":
             with self.socket() as socket:
                 return socket.press(widget=widget, **press)
