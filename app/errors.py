@@ -22,7 +22,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-Cause = Literal["", "interlock", "input", "link", "log", "time", "limit"]  # why a receipt says it was refused
+# Why a receipt says that a press was refused.
+Cause = Literal["", "interlock", "input", "link", "log", "time", "limit"]
 
 
 class KioskError(Exception):

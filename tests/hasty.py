@@ -2,9 +2,8 @@
 
 from app import connections, main
 from app.routes import messages
+from tests.small import CONNECTIONS
 
-MOST = 20
-
-vars(connections).update(HEAD_WITHIN_S=0.5, CONNECTIONS_MOST=MOST)
+vars(connections).update(HEAD_WITHIN_S=0.5, CONNECTIONS_MOST=CONNECTIONS)
 vars(messages)["BODY_WITHIN_S"] = 0.5
 app = main.app

@@ -2,8 +2,7 @@
 
 from app import main, press_limits
 from app.rate_limit import Quota
+from tests.small import PRESSES
 
-AT_ONCE = 10
-
-vars(press_limits).update(OF_CLIENT=Quota(AT_ONCE, 1), OF_CANCELS=Quota(AT_ONCE, 1))
+vars(press_limits).update(OF_CLIENT=Quota(PRESSES, 1), OF_CANCELS=Quota(PRESSES, 1))
 app = main.app

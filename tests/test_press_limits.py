@@ -18,7 +18,7 @@ from playwright.sync_api import Browser
 from app.press_limits import OF_CLIENT
 from app.routes.press_socket import MOST_REFUSED
 from tests.parts import ROOT, TAP_AGAIN_MS, Server, until
-from tests.strict import AT_ONCE
+from tests.small import PRESSES
 from tests.test_holds_in_browser import PANEL
 from tests.test_holds_on_socket import opened
 
@@ -100,7 +100,7 @@ def test_what_is_too_many_is_told_and_may_come_later_by_the_same_id(strict: Serv
 
 def test_what_is_no_press_is_none_too_many(tmp_path: Path, servers: Callable[[Server], Server]) -> None:
     mine = servers(serving(tmp_path, app="tests.strict:app"))
-    for _ in range(2 * AT_ONCE):
+    for _ in range(2 * PRESSES):
         assert mine.http.post("/widgets/nothing", json={"inputs": {}}).status_code == 404
         assert mine.http.post("/widgets/free", content=b"{").status_code == 422
     assert free(mine).status_code == 200
@@ -125,7 +125,7 @@ def test_a_page_without_scripts_shows_the_reason(strict: Server, chromium: Brows
     def said() -> str:
         page.goto(strict.url)
         page.wait_for_timeout(TAP_AGAIN_MS)
-        for _ in range(2 * AT_ONCE):  # by the same browser
+        for _ in range(2 * PRESSES):  # by the same browser
             page.request.post(f"{strict.url}/widgets/free", data={"inputs": {}})
         page.get_by_role("button", name="Free", exact=True).click()
         return page.locator("#receipt-free").inner_text()

@@ -20,8 +20,8 @@ from uvicorn import Config
 from app.connections import FILES_WANTED
 from app.proxies import Proxies
 from app.serving import OPTIONS, bounded, urls
-from tests.hasty import MOST
 from tests.parts import ROOT, Server, free_port, until
+from tests.small import CONNECTIONS
 
 HEAD = b"GET /healthz HTTP/1.1\r\nHost: 127.0.0.1\r\n"
 ELSEWHERE = "127.0.0.2"  # another address of this machine
@@ -179,12 +179,13 @@ def test_who_drops_a_body_leaves_no_traceback(plain: Server) -> None:
 
 def test_one_address_takes_half_of_the_places_and_no_more(hasty: Server) -> None:
     with ExitStack() as stack:
-        many = [stack.enter_context(opened(hasty, ELSEWHERE)) for _ in range(3 * MOST)]
+        many = [stack.enter_context(opened(hasty, ELSEWHERE)) for _ in range(3 * CONNECTIONS)]
         for one in many:
             with suppress(OSError):
                 one.sendall(HEAD.replace(b"healthz", b"events") + b"\r\n")
         until(
-            lambda: sum(map(is_closed, many)) == len(many) - MOST // 2, "half of the places are taken"
+            lambda: sum(map(is_closed, many)) == len(many) - CONNECTIONS // 2,
+            "half of the places are taken",
         )
         assert httpx.get(f"{hasty.url}/healthz", trust_env=False).status_code == 200
         until(lambda: "too many connections" in hasty.process.text, "it is told")

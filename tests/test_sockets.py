@@ -7,7 +7,7 @@ from contextlib import suppress
 import pytest
 
 from app import sockets
-from app.sockets import SEND_BUFFER
+from app.sockets import GONE_AFTER_MS, SEND_BUFFER
 
 
 def accepted(listening: socket.socket) -> int:
@@ -48,6 +48,8 @@ def test_what_listens_from_now_on_is_narrowed_and_what_listened_before_is_not() 
                 assert ports == {new.getsockname()[1]}
                 assert accepted(new) == 2 * SEND_BUFFER < wide
                 assert accepted(old) == wide
+                gone = (socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT)
+                assert (new.getsockopt(*gone), old.getsockopt(*gone)) == (GONE_AFTER_MS, 0)
 
     asyncio.run(work())
 
