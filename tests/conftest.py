@@ -1,5 +1,6 @@
 """Fixtures: real parts, started once where they can be shared and ended whatever happens."""
 
+import os
 import shutil
 import tempfile
 import time
@@ -12,6 +13,7 @@ import zenoh
 from playwright.sync_api import Browser, Page, sync_playwright
 
 from tests.domains import FIRST
+from tests.fonts import fonts_file
 from tests.needs import needs_parts
 from tests.parts import (
     BRIDGE,
@@ -159,11 +161,21 @@ def utc(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     time.tzset()
 
 
+@pytest.fixture(scope="module")
+def fonts() -> str:
+    """Which fonts the browser has; a module that lays pages out has a fixture of its own."""
+    return "noto"
+
+
 # Of one module: while Playwright runs, so does an event loop of its own in this thread.
 @pytest.fixture(scope="module")
-def chromium() -> Iterator[Browser]:
+def chromium(fonts: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    env: dict[str, str | float | bool] = {
+        **os.environ,
+        "FONTCONFIG_FILE": str(fonts_file(fonts, tmp_path_factory.mktemp("fonts"))),
+    }
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=CHROMIUM_FLAGS)
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=CHROMIUM_FLAGS, env=env)
         yield browser
         browser.close()
 

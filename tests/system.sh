@@ -2,6 +2,7 @@
 # What the tests need besides Python, Rust and git: installed on Debian as root, named elsewhere.
 # `system.sh PACKAGE` looks for that one alone.
 set -eu
+FONTS=/usr/share/fonts/truetype
 RUST=1.89 # of what tests/bridge/Cargo.lock has
 only=${1:-}
 
@@ -27,6 +28,10 @@ need chromium chromium --version
 need libclang-dev has_libclang
 need faketime has_faketime
 need iproute2 ip -V
+# Pages are laid out with each of these alone, see tests/fonts.py.
+need fonts-dejavu-core test -e "$FONTS/dejavu/DejaVuSans.ttf"
+need fonts-noto-core test -e "$FONTS/noto/NotoSans-Regular.ttf"
+need fonts-noto-cjk test -e "${FONTS%/*}/opentype/noto/NotoSansCJK-Regular.ttc"
 need util-linux nsenter --version
 need python3-venv "${PYTHON:-python3}" -c "import ensurepip"
 [ "$only" != npm ] || need npm npm --version # for the benchmark's rivals alone

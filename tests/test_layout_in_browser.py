@@ -7,6 +7,7 @@ from typing import Any, Final
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
+from tests.fonts import SETS
 from tests.parts import ROOT, Server, until
 from tests.test_in_browser import SIZES
 
@@ -91,6 +92,11 @@ node = "/system_controller"
 parameter = "speed"
 type = "double"
 """
+
+
+@pytest.fixture(scope="module", params=SETS)
+def fonts(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
 
 
 @pytest.fixture(scope="module")

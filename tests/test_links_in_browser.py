@@ -164,25 +164,3 @@ def test_the_links_open_under_a_finger_and_move_nothing(
     page.locator(".lamps").click()
     expect(page.locator("#links")).to_be_hidden()
     context.close()
-
-
-# With all lamps at their longest: where they begin and end, and where the header's last link ends.
-LONGEST = """() => {
-  const place = (name) => document.querySelector(name).getBoundingClientRect();
-  const before = place(".lamps");
-  for (const text of document.querySelectorAll(".lamps b")) text.textContent = "no connection";
-  const after = place(".lamps");
-  return [before.left, after.left, before.right, after.right, place("header > a").right];
-}"""
-
-
-@pytest.mark.parametrize(("width", "height"), SIZES)
-def test_beside_the_banner_the_lamps_keep_their_place_whatever_they_say(
-    servers: Keep, page: Page, width: int, height: int
-) -> None:
-    page.set_viewport_size({"width": width, "height": height})
-    page.goto(servers(Server(ROOT)).url)
-    expect(page.locator("#banner")).to_be_visible()
-    left, then_left, right, then_right, end = page.evaluate(LONGEST)
-    assert (left, right) == (then_left, then_right)
-    assert end <= width

@@ -114,29 +114,6 @@ def test_a_form_leads_back_to_its_robot(ten: Server) -> None:
     assert "Sent" in ten.http.get(answer.headers["location"]).text
 
 
-def test_ten_robots_fit_the_screen(ten: Server, page: Page) -> None:
-    page.set_viewport_size({"width": 1024, "height": 600})
-    page.goto(f"{ten.url}/robots/r10/")
-    tabs = page.locator("[data-robot]")
-    expect(tabs).to_have_count(MANY)
-    for tab in tabs.all():
-        box = tab.bounding_box()
-        assert box is not None
-        assert box["width"] >= 20 / 0.22  # millimetres
-        assert box["height"] >= 62  # as a text field has
-        name = tab.locator("span")
-        assert name.evaluate("e => e.scrollWidth <= e.clientWidth"), name.text_content()
-    last = page.get_by_role("button", name="Publish2").bounding_box()
-    assert last is not None
-    assert last["y"] + last["height"] < 500
-    page.get_by_role("link", name="Robot 7").click()
-    expect(page.locator("h1")).to_have_text("Robot 7 Robot cell 1")
-    page.get_by_label("Message").fill("from the screen")
-    page.get_by_role("button", name="Publish", exact=True).click()
-    expect(page.locator('[data-widget="last_heard"]')).to_contain_text("from the screen (/operation)")
-    assert "from the screen" not in heard(ten.robot("r10"))
-
-
 @pytest.fixture
 def two(
     domain: int, tmp_path: Path, servers: Callable[[Server], Server]

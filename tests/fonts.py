@@ -1,0 +1,26 @@
+"""The fonts that a kiosk may have: a browser gets one set of them and no other."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Final
+
+DEJAVU: Final = "/usr/share/fonts/truetype/dejavu"
+NOTO: Final = "/usr/share/fonts/truetype/noto"
+CJK: Final = "/usr/share/fonts/opentype/noto"
+
+SETS: Final[Mapping[str, Sequence[str]]] = {
+    "noto": (NOTO, CJK, DEJAVU),
+    "dejavu": (DEJAVU,),  # a bare Debian
+    "cjk": (CJK, DEJAVU),  # the same, and what Japanese needs
+}
+
+
+def fonts_file(name: str, folder: Path) -> Path:
+    """A configuration of fontconfig that knows one of the sets alone."""
+    folders = "".join(f"<dir>{one}</dir>" for one in SETS[name])
+    path = folder / "fonts.conf"
+    path.write_text(
+        '<?xml version="1.0"?><!DOCTYPE fontconfig SYSTEM "fonts.dtd">'
+        f"<fontconfig>{folders}<cachedir>{folder}</cachedir></fontconfig>"
+    )
+    return path
