@@ -1,10 +1,12 @@
 """Readouts in formats and by constants, lamps with states, and what is not known of them."""
 
 import math
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+from app.panel import load_panel
 from app.robot import Robot, Sample
 from app.sentences import clock
 from app.views import sight
@@ -116,6 +118,51 @@ def test_a_lamp_shows_the_state_of_its_value(value: int, text: str, shape: str, 
         "colour": colour,
         "note": AT,
     }
+
+
+BATTERY = "sensor_msgs/msg/BatteryState"
+BATTERY_FIELDS: dict[str, Any] = {
+    "header": {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""},
+    **dict.fromkeys(("voltage", "temperature", "current", "charge", "capacity"), 0.0),
+    **dict.fromkeys(("design_capacity", "percentage"), 0.0),
+    **dict.fromkeys(("power_supply_status", "power_supply_health", "power_supply_technology"), 0),
+    "present": True,
+    "cell_voltage": [],
+    "cell_temperature": [],
+    "location": "",
+    "serial_number": "",
+}
+LAMP_FILE = """
+title = "Cell"
+
+[[page]]
+id = "one"
+title = "One"
+
+[[page.widget]]
+id = "supply"
+kind = "indicator"
+label = "Supply"
+topic = "/heard"
+type = "sensor_msgs/msg/BatteryState"
+field = "power_supply_status"
+states = [
+  { value = "POWER_SUPPLY_STATUS_DISCHARGING", text = "Discharging", shape = "circle" },
+  { value = 1, text = "Charging", shape = "triangle" },
+]
+"""
+
+
+@pytest.mark.parametrize(("status", "text"), [(2, "Discharging"), (1, "Charging"), (4, "Unknown: 4")])
+def test_a_lamp_of_a_file_shows_the_state_of_a_constant(tmp_path: Path, status: int, text: str) -> None:
+    path = tmp_path / "panel.toml"
+    path.write_text(LAMP_FILE)
+    panel = load_panel(path)
+    assert panel.displays == tuple(panel.widgets())
+    robot = robot_there(panel)
+    battery = INTERFACES.encode(BATTERY, BATTERY_FIELDS | {"power_supply_status": status})
+    robot.take("heard", Sample(battery, 1, NOW, NOW, BRIDGE))
+    assert sight(panel, robot, NOW).view["widgets"]["supply"]["text"] == text
 
 
 def test_a_lamp_of_a_bool_or_a_text() -> None:
