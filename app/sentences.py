@@ -100,7 +100,7 @@ ENGLISH: Final[Mapping[str, str]] = {
     "goal_gone": "The robot stopped offering {name}: what came of it is not known.",
     "cancel": "Cancel",
     "cancel_sent": "The robot was asked to cancel at {time}.",
-    "cancel_refused": "The robot did not cancel it at {time}.",
+    "cancel_refused": "The robot refused to cancel at {time}.",
     "cancel_unheard": (
         "The robot does not offer {name} now: it is not known whether it was asked to cancel."
     ),
