@@ -23,11 +23,17 @@ from typing import Literal
 
 Cause = Literal["", "interlock", "input", "link", "log", "time"]  # why a receipt says it was refused
 
+from app.printable import printable
+
 
 class KioskError(Exception):
-    """The root; `status` is the HTTP status of an answer that carries it."""
+    """The root; `status` is the HTTP status of an answer that carries it. Its message may name what a
+    robot or a browser sent, and goes to pages and terminals."""
 
     status = 500
+
+    def __str__(self) -> str:
+        return printable(super().__str__())
 
 
 class SettingsError(KioskError):

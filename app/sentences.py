@@ -7,6 +7,8 @@ import time
 from collections.abc import Mapping
 from typing import Final
 
+from app.printable import printable
+
 ENGLISH: Final[Mapping[str, str]] = {
     # Why a control is locked.
     "no_link": "No connection to the robot: its bridge can't be reached.",
@@ -314,7 +316,7 @@ ENGLISH: Final[Mapping[str, str]] = {
 
 def say(code: str, **about: object) -> str:
     """The sentence for `code`, filled in; a KeyError is a mistake of the programmer's."""
-    return ENGLISH[code].format(**about)
+    return printable(ENGLISH[code].format(**about))
 
 
 def age(seconds: float) -> str:

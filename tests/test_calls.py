@@ -130,6 +130,16 @@ def test_an_answer_that_can_not_be_read_is_unknown() -> None:
     run(test)
 
 
+def test_what_the_robot_answers_is_shown_by_its_escapes() -> None:
+    async def test(bench: Bench) -> None:
+        call = bench.call()
+        await asked(bench, 1)
+        bench.line.answer(f"{TRIGGER}_Response", success=False, message="no \u202e\x1b[2Jon")
+        assert (await call).text.endswith(": no \\u202e\\u001b[2Jon")
+
+    run(test)
+
+
 def test_a_first_timeout_hints_at_cyclone_and_a_later_one_does_not() -> None:
     async def test(bench: Bench) -> None:
         first = await bench.call()

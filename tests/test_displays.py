@@ -52,6 +52,13 @@ def shown(
         ("Float64", math.inf, {"format": ".1f"}, "Infinity"),
         ("Float32", -math.inf, {"scale": 2}, "-Infinity"),
         ("Bool", True, {}, "true"),
+        ("Float64", 1e308, {"format": ".1f"}, "1e+308"),
+        ("Float64", -1.2345678e300, {"format": "+,.2f", "unit": "m"}, "-1.23457e+300 m"),
+        ("Float64", 1e308, {"format": ".0%"}, "1e+308"),
+        ("Float64", 0.5, {"format": ".99f"}, "0.5"),
+        ("Float64", 1e30, {"format": ".0f"}, "1000000000000000019884624838656"),
+        ("String", "a\u202eb\x1bc", {}, "a\\u202eb\\u001bc"),
+        ("String", "\x1b" * 1000, {}, "\\u001b" * 33 + "\\…"),
     ],
 )
 def test_a_readout_writes_a_number(kind: str, data: Any, more: Any, text: str) -> None:
@@ -59,11 +66,12 @@ def test_a_readout_writes_a_number(kind: str, data: Any, more: Any, text: str) -
     assert (view["text"], view["state"]) == (text, "live")
 
 
-@pytest.mark.parametrize(
-    ("status", "text"), [(0, "STATUS_FIX"), (-1, "STATUS_NO_FIX"), (2, "STATUS_GBAS_FIX"), (77, "77")]
-)
-def test_a_readout_shows_a_constant_by_its_name(status: int, text: str) -> None:
-    more: Any = {"constants": "STATUS_", "field": "status"}
+@pytest.mark.parametrize(("status", "text"), [(0, "FIX"), (-1, "NO_FIX"), (2, "GBAS_FIX"), (77, "77")])
+@pytest.mark.parametrize("prefix", ["STATUS_", "STATUS"])
+def test_a_readout_shows_a_constant_by_its_name_without_the_prefix(
+    status: int, text: str, prefix: str
+) -> None:
+    more: Any = {"constants": prefix, "field": "status"}
     fields = {"status": status, "service": 1}
     assert shown(HEARD, "sensor_msgs/msg/NavSatStatus", fields, **more)["text"] == text
 
@@ -201,6 +209,12 @@ def test_a_lamp_that_is_not_known_now_has_no_colour_and_a_shape_of_its_own(
     view = shown(LAMP, "std_msgs/msg/UInt8", fields, **more)
     look = {"state": state, "text": text, "shape": shape, "colour": "none", "note": note}
     assert view == look
+
+
+def test_a_lamp_shows_an_unknown_text_by_its_escapes() -> None:
+    states = [{"value": "auto", "text": "Automatic", "shape": "bar"}]
+    view = shown({**LAMP, "states": states}, "std_msgs/msg/String", {"data": "m\u202ean"})
+    assert view["text"] == "Unknown: m\\u202ean"
 
 
 def test_a_lamp_that_can_not_be_read_says_so() -> None:

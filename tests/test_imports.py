@@ -14,6 +14,7 @@ from app.settings import PACKAGE
 # A module imports only from those that stand before it.
 ORDER = (
     "app.collector",
+    "app.printable",
     "app.errors",
     "app.settings",
     "app.sentences",

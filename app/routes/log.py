@@ -4,6 +4,7 @@ import csv
 import io
 import json
 from collections.abc import AsyncIterator
+from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Annotated, Final, TypedDict
 from urllib.parse import urlencode
@@ -13,9 +14,10 @@ from fastapi.responses import HTMLResponse, Response, StreamingResponse
 from pydantic import BaseModel, ConfigDict, Field
 
 from app.errors import InputError, NotFound
-from app.log import Filter, OperatorLog, Row
+from app.log import Entry, Filter, OperatorLog, Row
 from app.panel.model import Hold, Input, Panel, Pressed
 from app.panel.parameter import Parameter
+from app.printable import printable, printable_texts
 from app.routes.site import CurrentSite, Site
 from app.sentences import say
 
@@ -73,6 +75,7 @@ class LogContext(TypedDict):
     site: Site
     panel: Panel
     wanted: Wanted
+    typed: dict[str, str]
     rows: list[Row]
     labels: dict[str, str]
     inputs: dict[str, str]
@@ -91,12 +94,13 @@ async def page(site: CurrentSite, wanted: Annotated[Wanted, Query()]) -> Respons
     if isinstance(site.log, OperatorLog):
         rows = await site.log.rows(wanted.filter(), wanted.before, ROWS_ON_PAGE + 1)
     more = len(rows) > ROWS_ON_PAGE
-    rows = rows[:ROWS_ON_PAGE]
+    rows = [_shown(row) for row in rows[:ROWS_ON_PAGE]]
     panel = site.fleet.panel
     context = LogContext(
         site=site,
         panel=panel,
         wanted=wanted,
+        typed=printable_texts(wanted.model_dump()),
         rows=rows,
         labels={w.id: w.label for w in panel.widgets() if isinstance(w, Pressed | Hold)},
         inputs={w.id: w.label for w in panel.widgets() if isinstance(w, Input | Parameter)},
@@ -150,7 +154,8 @@ def _cell(name: str, row: Row) -> str:
         return ""
     if name in ("at", "pressed_at"):
         return _time(value).astimezone(UTC).isoformat(timespec="milliseconds")
-    return f"'{value}" if str(value).startswith(FORMULA) else str(value)
+    text = printable(str(value))
+    return f"'{text}" if text.startswith(FORMULA) else text
 
 
 def _csv(lines: list[tuple[str, ...]]) -> bytes:
@@ -171,10 +176,22 @@ def _word(name: str, **about: object) -> str:
     return say(f"log_page_{name}", **about)
 
 
+def _shown(row: Row) -> Row:
+    """With its texts as a page shows them, but its values: those are JSON still."""
+    cells = (
+        printable(cell) if isinstance(cell, str) and name != "values" else cell
+        for name, cell in row.entry._asdict().items()
+    )
+    return replace(row, entry=Entry._make(cells))
+
+
 def _values_of(text: str) -> list[tuple[str, str]]:
     """The values of an entry as (name, text), but those that are empty."""
     return [
-        (name, value if isinstance(value, str) else json.dumps(value, ensure_ascii=False))
+        (
+            printable(name),
+            printable(value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)),
+        )
         for name, value in json.loads(text).items()
         if value != ""
     ]

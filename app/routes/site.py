@@ -17,6 +17,7 @@ from app.kiosk import Kiosk
 from app.log import OperatorLog, Unlogged
 from app.metrics import Metrics
 from app.owed import Owed
+from app.printable import printable
 
 
 @dataclass(slots=True)
@@ -81,6 +82,7 @@ async def on_http_error(request: Request, error: Exception) -> Response:
     """Starlette's own: no such path, wrong method, body too large."""
     if not isinstance(error, HTTPException):
         raise error
-    answer = error_answer(request, error.status_code, f"{error.detail}: {request.url.path}")
+    message = printable(f"{error.detail}: {request.url.path}")
+    answer = error_answer(request, error.status_code, message)
     answer.headers.update(error.headers or {})
     return answer
