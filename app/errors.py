@@ -12,7 +12,8 @@
     ├── LinkError              503  Zenoh refused; nothing was sent
     └── LogError               503  the operator's log can't be written or read
         ├── LogCorrupt         –    its file is damaged: a new one has to be begun
-        └── FolderInUse        –    another process holds the data folder
+        ├── LogGone            –    its file, or one beside it, was removed or renamed
+        └── FolderInUse        –    another process holds the data folder, or may do so
 
 One handler (`routes.on_kiosk_error`) maps them to HTTP; "–" never reaches a client by itself.
 """
@@ -141,6 +142,14 @@ class LogError(KioskError):
 
 class LogCorrupt(LogError):
     pass
+
+
+class LogGone(LogError):
+    """`itself`: the log's own file is gone, and a new one has to be begun."""
+
+    def __init__(self, message: str, *, itself: bool) -> None:
+        super().__init__(message)
+        self.itself = itself
 
 
 class FolderInUse(LogError):

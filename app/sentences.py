@@ -194,6 +194,9 @@ ENGLISH: Final[Mapping[str, str]] = {
     "log_unwritable": "The operator's log can't be written: {why}.",
     "log_unwritable_free": "The operator's log can't be written, so nothing is logged: {why}.",
     "log_unreadable": "The operator's log can't be read: {why}.",
+    "folder_taken": "Another server has taken this panel's data: {why}.",
+    "log_taken": "{name} was removed or renamed",
+    "log_emptied": "the file was emptied",
     "log_closed": "the file is being opened anew",
     "log_slow": "the disk did not take the entry in {seconds} s",
     "log_full_queue": "more is pressed than the disk takes; press again",
@@ -207,6 +210,11 @@ ENGLISH: Final[Mapping[str, str]] = {
     "log_broke_off": "A fault of the panel's server: it is not known whether this was sent.",
     "log_began": "The panel's server started.",
     "log_began_anew": "The log before this one was damaged and is kept as {name}.",
+    "log_began_for_gone": (
+        "The log before this one, up to entry {last}, was removed or renamed while the server ran."
+    ),
+    "log_began_empty": "The log had no entries when the server opened it; the last was number {last}.",
+    "log_found": "What stood in its place is kept as {name}.",
     "log_resumed": "The log could not be written from {since} to now: {why}.",
     "log_lost": "The disk lost entries {first} to {last}.",
     "log_removed_days": "older than {days} days",

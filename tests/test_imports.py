@@ -92,6 +92,7 @@ ORDER = (
     "app.log.refusals",
     "app.log.ticket",
     "app.log.syncer",
+    "app.log.opening",
     "app.log.keeper",
     "app.log.writer",
     "app.log.unlogged",

@@ -19,11 +19,11 @@ from typing import Final, TypeVar
 
 from app.errors import LogError
 from app.log.entry import Entry, Origin
+from app.log.file import Head
 from app.log.folder import Folder
 from app.log.keeper import Keeper
 from app.log.reading import Filter, Row, Unended, rows, unended
 from app.log.refusals import SUMMED_UP_S, Refusals
-from app.log.store import Head
 from app.log.ticket import Limits, Results, Ticket
 from app.sentences import say
 
@@ -92,7 +92,7 @@ class OperatorLog:
     def fault(self) -> str:
         """The sentence that says that the log can't be written; "" while it can."""
         why = self._why
-        sentence = "log_unwritable" if self._limits.required else "log_unwritable_free"
+        sentence = "log_unwritable" if self._needed else "log_unwritable_free"
         return say(sentence, why=why) if why else ""
 
     @property
@@ -104,7 +104,12 @@ class OperatorLog:
     @property
     def lock(self) -> str:
         """Why nothing may be pressed; "" while it may."""
-        return self.fault if self._limits.required else ""
+        return self.fault if self._needed else ""
+
+    @property
+    def _needed(self) -> bool:
+        """Whether nothing is sent that is not logged."""
+        return self._limits.required or self._keeper.displaced
 
     @contextmanager
     def followed(self, changed: Callable[[], None]) -> Iterator[None]:
@@ -123,7 +128,7 @@ class OperatorLog:
         try:
             return await self._written(entry)
         except LogError as error:
-            if self._limits.required:
+            if self._needed:
                 raise LogError(self.fault or say("log_unwritable", why=error)) from error
             return None
 
