@@ -129,6 +129,7 @@ ORDER = (
     "app.doubts",
     "app.sending",
     "app.unjudged",
+    "app.recall",
     "app.presses",
     "app.leases",
     "app.hold_messages",

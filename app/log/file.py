@@ -31,6 +31,8 @@ CREATE TABLE entry (
 CREATE TABLE undone (seq INTEGER PRIMARY KEY, outcome TEXT NOT NULL) STRICT;
 CREATE TABLE about (key TEXT PRIMARY KEY, value ANY NOT NULL) STRICT, WITHOUT ROWID;
 """
+# By which a press that comes again is found; older files get it when they are opened.
+INDEX: Final = "CREATE INDEX IF NOT EXISTS entry_press ON entry (press) WHERE press <> ''"
 
 WORDS: Final = {
     "SQLITE_FULL": "no space left on device",
@@ -108,6 +110,7 @@ def _prepare(db: sqlite3.Connection, after: Head | None) -> None:
         raise LogCorrupt("the file is not an operator's log")
     elif version != VERSION:
         raise LogError(f"the file is of another version of this program ({version}, not {VERSION})")
+    db.execute(INDEX)
 
 
 def _begin(db: sqlite3.Connection, after: Head | None) -> None:
@@ -142,7 +145,7 @@ class Files:
     """
 
     def __init__(self, folder: Path) -> None:
-        self._known = {path: _inode(path) for path in _paths(folder)}
+        self._known = {str(path): _inode(str(path)) for path in _paths(folder)}
 
     def check(self) -> None:
         """LogGone where one was removed, renamed or replaced; LogCorrupt where the log was emptied."""
@@ -152,8 +155,9 @@ class Files:
             except OSError:
                 found = None
             if found != known:
-                raise LogGone(say("log_taken", name=path.name), itself=path.name == NAME)
-        if not next(iter(self._known)).stat().st_size:
+                name = os.path.basename(path)
+                raise LogGone(say("log_taken", name=name), itself=name == NAME)
+        if not os.stat(next(iter(self._known))).st_size:
             raise LogCorrupt(say("log_emptied"))
 
 
@@ -161,8 +165,8 @@ def _paths(folder: Path) -> list[Path]:
     return [folder / (NAME + suffix) for suffix in SUFFIXES]
 
 
-def _inode(path: Path) -> tuple[int, int]:
-    found = path.stat()
+def _inode(path: str) -> tuple[int, int]:
+    found = os.stat(path)
     return found.st_dev, found.st_ino
 
 

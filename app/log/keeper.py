@@ -17,7 +17,7 @@ from app.log.folder import Folder
 from app.log.opening import Opening, cut_off
 from app.log.store import Store
 from app.log.syncer import Syncer
-from app.log.ticket import Limits, Results, Ticket
+from app.log.ticket import Limits, Repeated, Results, Ticket
 from app.sentences import say
 
 log = logging.getLogger("kiosk.log")
@@ -149,6 +149,7 @@ class Keeper:
             self._fail(wanted, LogError(self.fault))
             return
         try:
+            wanted = self._new(self._store, wanted)
             sealed = self._store.append([ticket.entry for ticket in wanted])
             self._check(self._store)
         except LogError as error:
@@ -162,6 +163,20 @@ class Keeper:
         self._tell([(ticket, entry) for ticket, entry in results if not ticket.durable], False)
         if durable := [(ticket, entry) for ticket, entry in results if ticket.durable]:
             self._syncer.add(durable)
+
+    def _new(self, store: Store, tickets: Sequence[Ticket]) -> list[Ticket]:
+        """Those that are no presses which the log has already: of these it is told what it knows."""
+        new: list[Ticket] = []
+        known: Results = []
+        for ticket in tickets:
+            found = store.told(ticket.entry) if ticket.entry.is_press else []
+            if found and found[0].is_press:
+                told = [one for one in found if one.of == found[0].seq]
+                known.append((ticket, Repeated(found[0], told[-1] if told else None)))
+            else:
+                new.append(ticket)
+        self._tell(known, False)
+        return new
 
     def _fail(self, tickets: Sequence[Ticket], error: LogError) -> None:
         self._owed += [ticket.entry for ticket in tickets if ticket.entry.of is not None]

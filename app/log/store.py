@@ -82,6 +82,16 @@ class Store:
             ).fetchall()
         return [Entry(*row) for row in rows]
 
+    def told(self, press: Entry) -> list[Entry]:
+        """All that the log has of the press with this id on this robot, the oldest first."""
+        with in_words():
+            rows = self._db.execute(
+                f"SELECT {COLUMNS} FROM entry WHERE press = ? AND press <> '' AND robot = ?"
+                " AND action = 'press' ORDER BY seq",
+                (press.press, press.robot),
+            ).fetchall()
+        return [Entry(*row) for row in rows]
+
     def answered(self, seq: int) -> bool:
         """Whether a press that is not done has an outcome already."""
         with in_words():

@@ -123,7 +123,8 @@ class OperatorLog:
     async def pressed(self, entry: Entry) -> Entry | None:
         """Writes the entry of a press that is about to be sent, and returns it as it stands.
 
-        Raises LogError when it can't be written and must be; where it need not be, None.
+        Raises LogError when it can't be written and must be; where it need not be, None. Repeated
+        where the log has a press of this id: nothing is written then.
         """
         try:
             return await self._written(entry)
@@ -211,9 +212,9 @@ class OperatorLog:
             self._stuck.add(ticket)
             self._say_changed()
             raise LogError(say("log_slow", seconds=f"{seconds:g}"))
-        if isinstance(ticket.result, LogError):
-            raise ticket.result
-        return ticket.result
+        if isinstance(ticket.result, Entry):
+            return ticket.result
+        raise ticket.result
 
     def _close_abandoned(self, ticket: Ticket) -> None:
         """A press that nobody waits for any more may have been written all the same."""
