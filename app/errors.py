@@ -8,9 +8,11 @@
     ├── InputError             422  a request that is not what the contract says
     ├── NotFound               404  no such page or widget
     ├── PressRefused           409  what permitted it is gone, right before it would have been sent
+    ├── TooMany                429  more than may be done at a time; `again_s` says when to try again
     ├── DecodeError            –    bytes that are not a message of the type
     ├── LinkError              503  Zenoh refused; nothing was sent
     └── LogError               503  the operator's log can't be written or read
+        ├── SearchTooLong      503  what is searched for takes too long to find
         ├── LogCorrupt         –    its file is damaged: a new one has to be begun
         ├── LogGone            –    its file, or one beside it, was removed or renamed
         └── FolderInUse        –    another process holds the data folder, or may do so
@@ -22,9 +24,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-Cause = Literal["", "interlock", "input", "link", "log", "time"]  # why a receipt says it was refused
-
 from app.printable import printable
+
+Cause = Literal["", "interlock", "input", "link", "log", "time"]  # why a receipt says it was refused
 
 
 class KioskError(Exception):
@@ -126,6 +128,14 @@ class PressRefused(KioskError):
         self.cause = cause
 
 
+class TooMany(KioskError):
+    status = 429
+
+    def __init__(self, message: str, again_s: int) -> None:
+        super().__init__(message)
+        self.again_s = again_s
+
+
 class DecodeError(KioskError):
     pass
 
@@ -138,6 +148,10 @@ class LogError(KioskError):
     """The message is why, to stand in a sentence: "no space left on device"."""
 
     status = 503
+
+
+class SearchTooLong(LogError):
+    pass
 
 
 class LogCorrupt(LogError):

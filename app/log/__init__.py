@@ -1,6 +1,7 @@
 """The operator's log: who pressed what, and what came of it."""
 
 from app.log.entry import Entry, Origin, entered, same_values
+from app.log.process import ReaderProcess
 from app.log.reading import Filter, Row, Unended
 from app.log.ticket import Limits, Repeated
 from app.log.unlogged import Unlogged
@@ -12,6 +13,7 @@ __all__ = [
     "Limits",
     "OperatorLog",
     "Origin",
+    "ReaderProcess",
     "Repeated",
     "Row",
     "Unended",

@@ -11,7 +11,7 @@ from starlette.requests import HTTPConnection
 
 from app.assets import Assets
 from app.browsers import Browsers
-from app.errors import KioskError
+from app.errors import KioskError, TooMany
 from app.fleet import Fleet
 from app.kiosk import Kiosk
 from app.log import OperatorLog, Unlogged
@@ -75,7 +75,10 @@ def error_answer(request: Request, status: int, message: str) -> Response:
 
 async def on_kiosk_error(request: Request, error: Exception) -> Response:
     status = error.status if isinstance(error, KioskError) else 500
-    return error_answer(request, status, str(error))
+    answer = error_answer(request, status, str(error))
+    if isinstance(error, TooMany):
+        answer.headers["retry-after"] = str(error.again_s)
+    return answer
 
 
 async def on_http_error(request: Request, error: Exception) -> Response:
