@@ -90,10 +90,9 @@ class ActionServices:
         seconds = f"{widget.timeout_s:g}"
         return Answer("timed_out", say("timed_out", seconds=seconds) + say("cyclone_hint"))
 
-    def return_code(self, widget: Action, reply: bytes) -> int | None:
-        """What `cancel_goal` answered."""
-        message = self._decoded(widget, self._interfaces.service(CANCEL)[1], reply)
-        return None if message is None else int(message.return_code)
+    def cancel_response(self, widget: Action, reply: bytes) -> Any:
+        """What `cancel_goal` answered: a message with `return_code` and `goals_canceling`."""
+        return self._decoded(widget, self._interfaces.service(CANCEL)[1], reply)
 
     def why_silent(self, widget: Action) -> str:
         """Why `cancel_goal` did not answer."""

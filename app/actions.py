@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from typing import Any, Final
 
 from app import keys
-from app.action_services import NO_SUCH_GOAL, ActionServices
+from app.action_services import CANCEL, NO_SUCH_GOAL, ActionServices
 from app.calls import MOST_UNANSWERED, Asker
 from app.errors import DecodeError
 from app.following import Following
@@ -129,16 +129,24 @@ class Actions:
         reply = await self._services.reply(goal, self._services.cancel_goal(goal))
         if reply is None:
             return Answer("unknown", self._services.why_silent(widget))
+        response = self._services.cancel_response(widget, reply)
+        if response is None:
+            return Answer("unknown", say("answer_unreadable", wanted=CANCEL))
+        return self._cancel_answered(goal, response)
+
+    def _cancel_answered(self, goal: Goal, response: Any) -> Answer:
+        """Only a goal that is listed is being canceled: rclpy refuses with return code 0."""
         now = clock(time.time())
-        code = self._services.return_code(widget, reply)
-        if code in NO_SUCH_GOAL and goal.doubt and not goal.cut.done():
+        if any(bytes(one.goal_id.uuid) == goal.id.bytes for one in response.goals_canceling):
+            if goal.advance(CANCELING) and (goal.doubt or self._robot.progress[goal.widget.id].busy):
+                self._find(goal)
+                self._show(goal, goal.under_way)
+            return Answer("accepted", say("cancel_sent", time=now))
+        if goal.state == CANCELING:  # by an earlier cancel
+            return Answer("accepted", say("goal_canceling"))
+        if response.return_code in NO_SUCH_GOAL and goal.doubt and not goal.cut.done():
             goal.cut.set_result("")  # its end is asked for anew
-        if code != 0:
-            return Answer("rejected", say("cancel_refused", time=now))
-        if goal.advance(CANCELING) and (goal.doubt or self._robot.progress[widget.id].busy):
-            self._find(goal)
-            self._show(goal, goal.under_way)
-        return Answer("accepted", say("cancel_sent", time=now))
+        return Answer("rejected", say("cancel_refused", time=now))
 
     def hear_feedback(self, action: str, sample: Sample) -> None:
         """The latest feedback of an action; of another program's goal it is passed over. Whoever

@@ -76,4 +76,4 @@ def _route(key: str, told: Any) -> Route | None:
         return None
     zid, direction, topic_key = place
     whole = direction == "sub" or told.get("dds_reader") != ""
-    return Route(zid, direction, topic_key, told["ros2_type"], whole)
+    return Route(zid, direction, topic_key, keys.type_in(told["ros2_type"]), whole)

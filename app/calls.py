@@ -17,6 +17,7 @@ from app.interfaces import Interfaces, text_of, value_at
 from app.logs import RobotLog, on_rosout
 from app.panel.model import Call
 from app.panel.template import PLACE
+from app.printable import printable
 from app.progress import Answer, Corrected, LastLook, Progress, no_look
 from app.robot import Robot, value_of
 from app.sentences import clock, say
@@ -201,7 +202,7 @@ def with_fields(template: str, message: Any) -> str:
 
     def shown(path: str) -> str:
         try:
-            return text_of(value_at(message, path), LONGEST_SAID)
+            return printable(text_of(value_at(message, path), LONGEST_SAID))
         except FieldError:
             return NOTHING
 

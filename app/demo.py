@@ -94,15 +94,20 @@ class DemoRobot:
                 del self._goals[old]
         return True
 
-    def cancel(self, goal_id: bytes) -> int:
-        """The return code of `action_msgs/srv/CancelGoal`."""
+    def cancel(self, goal_id: bytes) -> tuple[int, list[bytes]]:
+        """The return code and the goals of `action_msgs/srv/CancelGoal`.
+
+        A count before its last number refuses as a node of rclpy does: with no goal in the list.
+        """
         goal = self._goals.get(goal_id)
         if goal is None:
-            return CANCEL_UNKNOWN
+            return CANCEL_UNKNOWN, []
         if goal.status != EXECUTING:
-            return CANCEL_TOO_LATE
+            return CANCEL_TOO_LATE, []
+        if len(goal.sequence) >= goal.order:
+            return CANCEL_OK, []
         goal.status = CANCELED
-        return CANCEL_OK
+        return CANCEL_OK, [goal_id]
 
     def count(self) -> list[tuple[bytes, list[int]]]:
         """The goals that have a new number since the last call, each with its numbers so far."""

@@ -7,10 +7,12 @@ from typing import Any, Final, Literal
 from app.interlocks import misfit
 from app.panel.displays import Indicator, Readout
 from app.panel.inputs import same
+from app.printable import printable
 from app.robot import Robot, value_of
 from app.sentences import age, clock, say
 
 LONGEST_TEXT: Final = 200  # characters of a value that a readout shows
+LONGEST_NUMBER: Final = 32  # a larger one has an exponent, whatever its format
 NOTHING: Final = "—"
 
 State = Literal["waiting", "live", "old", "unreadable", "missing"]
@@ -96,18 +98,30 @@ def _value(widget: Readout, seen: Look) -> str:
         value = value * widget.scale + widget.offset
     text = written(value)
     if widget.format is not None and math.isfinite(value):
-        text = format(value, widget.format)
+        text = _formatted(value, widget.format)
     return f"{text} {widget.unit}" if widget.unit else text
 
 
+def _formatted(value: float, given: str) -> str:
+    text = format(value, given)  # "inf%" where a percentage is larger than any float
+    return text if len(text) <= LONGEST_NUMBER and "inf" not in text else f"{value:.6g}"
+
+
 def _constant(field: str, prefix: str, seen: Look) -> str:
-    """The name of the constant that a value is; a message's constants are on its class."""
+    """The name of the constant that a value is, without the prefix where that is whole words of it; a
+    message's constants are on its class."""
     around, _, _ = field.rpartition(".")
     holder = type(value_of(seen.message, around) if around else seen.message)
     for name, value in vars(holder).items():
         if name.startswith(prefix) and same(value, seen.value):
-            return str(name)
+            return _without(prefix, name)
     return written(seen.value)
+
+
+def _without(prefix: str, name: str) -> str:
+    rest = name.removeprefix(prefix)
+    whole = prefix.endswith("_") or rest.startswith("_")
+    return rest.lstrip("_") if whole and rest.strip("_") else name
 
 
 def written(value: Any) -> str:
@@ -116,7 +130,7 @@ def written(value: Any) -> str:
         return NOTHING
     if isinstance(value, bool):
         return "true" if value else "false"
-    text = _number(value) if isinstance(value, float) else str(value)
+    text = _number(value) if isinstance(value, float) else printable(str(value)[: LONGEST_TEXT + 1])
     return text if len(text) <= LONGEST_TEXT else text[: LONGEST_TEXT - 1] + "…"
 
 

@@ -14,6 +14,8 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.responses import JSONResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from app.printable import printable
+
 GUARDED: Final = re.compile(r"(/robots/[^/]+)?/events/?")  # read by the panel's own pages only
 STARTS: Final = frozenset({"http.response.start", "websocket.http.response.start"})
 POLICY_VIOLATION: Final = 1008
@@ -59,7 +61,7 @@ class Doors:
             await send(message)
 
         why = self._refusal(scope)
-        answer = self._app if why is None else JSONResponse({"error": why}, status_code=403)
+        answer = self._app if why is None else JSONResponse({"error": printable(why)}, status_code=403)
         if why is not None and scope["type"] == "websocket":
             await receive()  # its wish to connect
             if "websocket.http.response" not in scope.get("extensions", {}):

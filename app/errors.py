@@ -9,11 +9,14 @@
     ├── NotFound               404  no such page or widget
     ├── PressRefused           409  what permitted it is gone, right before it would have been sent
     ├── TooSlow                408  a body that took too long
+    ├── TooMany                429  more than may be done at a time; `again_s` says when to try again
     ├── DecodeError            –    bytes that are not a message of the type
     ├── LinkError              503  Zenoh refused; nothing was sent
     └── LogError               503  the operator's log can't be written or read
+        ├── SearchTooLong      503  what is searched for takes too long to find
         ├── LogCorrupt         –    its file is damaged: a new one has to be begun
-        └── FolderInUse        –    another process holds the data folder
+        ├── LogGone            –    its file, or one beside it, was removed or renamed
+        └── FolderInUse        –    another process holds the data folder, or may do so
 
 One handler (`routes.on_kiosk_error`) maps them to HTTP; "–" never reaches a client by itself.
 """
@@ -22,14 +25,20 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
+from app.printable import printable
+
 # Why a receipt says that a press was refused.
 Cause = Literal["", "interlock", "input", "link", "log", "time", "limit"]
 
 
 class KioskError(Exception):
-    """The root; `status` is the HTTP status of an answer that carries it."""
+    """The root; `status` is the HTTP status of an answer that carries it. Its message may name what a
+    robot or a browser sent, and goes to pages and terminals."""
 
     status = 500
+
+    def __str__(self) -> str:
+        return printable(super().__str__())
 
 
 class SettingsError(KioskError):
@@ -125,6 +134,14 @@ class TooSlow(KioskError):
     status = 408
 
 
+class TooMany(KioskError):
+    status = 429
+
+    def __init__(self, message: str, again_s: int) -> None:
+        super().__init__(message)
+        self.again_s = again_s
+
+
 class DecodeError(KioskError):
     pass
 
@@ -139,8 +156,20 @@ class LogError(KioskError):
     status = 503
 
 
+class SearchTooLong(LogError):
+    pass
+
+
 class LogCorrupt(LogError):
     pass
+
+
+class LogGone(LogError):
+    """`itself`: the log's own file is gone, and a new one has to be begun."""
+
+    def __init__(self, message: str, *, itself: bool) -> None:
+        super().__init__(message)
+        self.itself = itself
 
 
 class FolderInUse(LogError):

@@ -30,8 +30,14 @@ ACTION_TYPE: Final = re.compile(r"[a-z][a-z0-9_]*/action/[A-Z][A-Za-z0-9]*")
 MESSAGE_TYPE: Final = re.compile(r"[a-z][a-z0-9_]*/msg/[A-Z][A-Za-z0-9]*")
 
 _CACHES: Final = "/@adv/pub/"
+
+# What is no name, or longer than any, is not taken over from what others say: it would be shown.
+LONGEST_NAME: Final = 512  # ROS 2 has 255, and the bridge puts its namespace before that
+NO_TYPE: Final = "(not a type)"
+_ANY_TYPE = re.compile(r"[A-Za-z0-9_]+(/[A-Za-z0-9_]+)*")
+
 _TOKEN = re.compile(
-    r"@/(?P<zid>[^/]+)/@ros2_lv"
+    r"@/(?P<zid>[^/]{1,64})/@ros2_lv"
     r"(?:/(?P<role>MP|MS)/(?P<key>[^/]+)/(?P<type>[^/]+)/"
     r"K?:(?P<reliability>[^:/]*):(?P<durability>[^:/]*):.*"
     r"|/(?P<server>SS|AS)/(?P<name>[^/]+)/(?P<server_type>[^/]+))?"
@@ -145,14 +151,25 @@ def parsed(token_key: str) -> Endpoint | None:
         return None
     if found["server"] is not None:
         server: ServerRole = "SS" if found["server"] == "SS" else "AS"
-        key, type_name = _unescaped(found["name"]), _unescaped(found["server_type"])
-        return Endpoint(found["zid"], server, key, type_name)
+        key, type_name = _unescaped(found["name"]), type_in(_unescaped(found["server_type"]))
+        return Endpoint(found["zid"], server, key, type_name) if _is_key(key) else None
     if found["role"] is None:
         return Endpoint(found["zid"])
     role: TopicRole = "MP" if found["role"] == "MP" else "MS"
-    key, type_name = _unescaped(found["key"]), _unescaped(found["type"])
+    key, type_name = _unescaped(found["key"]), type_in(_unescaped(found["type"]))
+    if not _is_key(key):
+        return None
     reliable = {"0": False, "1": True}.get(found["reliability"])
     return Endpoint(found["zid"], role, key, type_name, found["durability"] == "1", reliable)
+
+
+def type_in(told: str) -> str:
+    """The type that somebody names; `NO_TYPE`, which no panel is made for, where that can't be one."""
+    return told if len(told) <= LONGEST_NAME and _ANY_TYPE.fullmatch(told) else NO_TYPE
+
+
+def _is_key(name: str) -> bool:
+    return len(name) <= LONGEST_NAME and TOPIC.fullmatch(f"/{name}") is not None
 
 
 def version(zid: str) -> str:
@@ -175,9 +192,10 @@ def endpoints_of(admin_key: str, node: Mapping[str, Any], namespace: str) -> Ite
     roles: tuple[tuple[TopicRole, str], ...] = (("MP", "publishers"), ("MS", "subscribers"))
     for role, name in roles:
         for topic in node[name]:
-            if TOPIC.fullmatch(namespace + topic["name"]):
+            whole = namespace + topic["name"]
+            if len(whole) <= LONGEST_NAME and TOPIC.fullmatch(whole):
                 key = key_of(topic["name"], namespace)
-                yield Endpoint(zid_of(admin_key), role, key, topic["type"])
+                yield Endpoint(zid_of(admin_key), role, key, type_in(topic["type"]))
 
 
 def zid_of(admin_key: str) -> str:

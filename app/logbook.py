@@ -23,7 +23,8 @@ class Log(Protocol):
     def followed(self, changed: Callable[[], None]) -> AbstractContextManager[None]: ...
 
     async def pressed(self, entry: Entry) -> Entry | None:
-        """Returns when the entry is written; LogError when it can't be and must."""
+        """Returns when the entry is written; LogError when it can't be and must, Repeated where the log
+        has a press of this id."""
 
     async def closed(self, entry: Entry) -> str:
         """Returns when the entry is on the disk, or why it is not."""
@@ -101,7 +102,7 @@ class Logbook:
         origin: Origin,
         action: str = "press",
     ) -> Noted:
-        """Written before anything is sent; LogError when it can't be and must."""
+        """Written before anything is sent; LogError and Repeated as `Log` has them."""
         entry = entered("pressed", origin, inputs, **self._about(widget, press_id, action))
         written = await self._log.pressed(entry)
         return Noted(self._log, written, self._board, self._log.fault)

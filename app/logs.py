@@ -8,6 +8,8 @@ import sys
 from collections.abc import Callable, Mapping, MutableMapping
 from typing import Any
 
+from app.printable import printable
+
 NODE_NAME = "web_ui"
 
 # Python level → (ROS severity name, its number in rcl_interfaces/msg/Log)
@@ -19,13 +21,6 @@ SEVERITIES: Mapping[int, tuple[str, int]] = {
     logging.CRITICAL: ("FATAL", 50),
 }
 LEVELS: Mapping[str, int] = {name.lower(): level for level, (name, _) in SEVERITIES.items()}
-
-# Printable as they are; every other control character is escaped, so that one record is one line.
-_CONTROLS = {
-    code: f"\\x{code:02x}"
-    for code in [*range(32), *range(127, 160), 0x2028, 0x2029]
-    if code not in (9, 10)
-}
 
 log = logging.getLogger("kiosk")
 
@@ -62,7 +57,7 @@ class RosFormatter(logging.Formatter):
     def format(self, record: logging.LogRecord) -> str:
         name, _ = severity(record)
         seconds, nanoseconds = stamp(record)
-        lines = super().format(record).translate(_CONTROLS).replace("\n", "\n  ")
+        lines = printable(super().format(record)).replace("\n", "\n  ")
         return f"[{name}] [{seconds}.{nanoseconds:09}] [{NODE_NAME}]: {lines}"
 
 
@@ -106,7 +101,7 @@ def log_fields(record: logging.LogRecord) -> dict[str, object]:
         "stamp": {"sec": seconds, "nanosec": nanoseconds},
         "level": severity(record)[1],
         "name": NODE_NAME,
-        "msg": text.translate(_CONTROLS).encode(errors="replace").decode(),
+        "msg": printable(text),
         "file": record.filename,
         "function": record.funcName or "",
         "line": record.lineno,

@@ -80,6 +80,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
                 watchdog.end()
                 try:
                     site.fleet.close()
+                    oplog.close()
                     await site.owed.told(ANSWERED_WITHIN_S)
                 finally:
                     site.fleet.give_up()

@@ -7,6 +7,7 @@ from app.declared import LONGEST_TEXT, UNKNOWN, Declared, Value, allowed, limits
 from app.displays import NOTHING, written
 from app.panel.parameter import EVENT_TYPE, EVENTS, Parameter
 from app.panel.ranges import decimal
+from app.printable import printable
 from app.robot import Robot
 from app.sentences import clock, say
 
@@ -34,7 +35,7 @@ def parameter(of: Parameter, robot: Robot) -> dict[str, Any]:
         "state": "waiting" if never_told(known) else LOOKS[known.state],
         "text": NOTHING if known.value is None else written(of.written(known.value)),
         "note": _note(of, known, robot),
-        "hint": known.hint[:LONGEST_HINT],
+        "hint": printable(known.hint[:LONGEST_HINT])[:LONGEST_HINT],
         "limits": limits_text(of, limits),
         "settable": not known.read_only,
         "entry": _entry(known.value),

@@ -23,6 +23,7 @@ from app.logs import RobotLog
 from app.panel.model import Panel
 from app.panel.parameter import DESCRIBE, EVENT_TYPE, GET, SET, Parameter
 from app.parameter_services import NoAnswer, ParameterServices
+from app.printable import printable
 from app.progress import Answer, Corrected, LastLook, no_look
 from app.robot import Robot, Sample
 from app.sentences import clock, say
@@ -257,7 +258,7 @@ def _answer(widget: Parameter, value: Value, response: Any) -> Answer:
     result = response.results[0]
     if result.successful:
         return Answer("succeeded", say("parameter_set", value=widget.written(value), time=now))
-    said = f": {text_of(result.reason, LONGEST_SAID)}" if result.reason else "."
+    said = f": {printable(text_of(result.reason, LONGEST_SAID))}" if result.reason else "."
     return Answer("rejected", say("said_no", time=now) + said)
 
 

@@ -15,11 +15,12 @@ from typing import Any
 
 from app.errors import Cause, FieldError, InputError, LinkError, LogError, NotFound, PressRefused
 from app.interlocks import Verdict
-from app.log import Origin
+from app.log import Origin, Repeated
 from app.logbook import Logbook, Noted
 from app.logs import RobotLog, on_rosout
 from app.panel.model import Action, Panel, Pressed
 from app.progress import Answer
+from app.recall import Recall
 from app.receipts import (
     FINE,
     LONGEST_LOGGED,
@@ -86,6 +87,7 @@ class Presses:
         self._monotonic = monotonic
         self._receipts = Receipts(witness)
         self._unjudged = Unjudged(sending, logbook, self._receipts, self._log)
+        self._recall = Recall(sending, self._unjudged, self._log)
         self.widget = sending.widget
         self.receipt = self._receipts.get
         self.too_soon = self._unjudged.too_soon
@@ -106,7 +108,7 @@ class Presses:
         """
         widget = self.widget(widget_id)
         inputs = self._sending.with_defaults(widget, inputs)
-        known = self._under_way.get(press_id) or self._receipts.get(press_id)
+        known = self._under_way.get(press_id) or self._receipts.made(press_id)
         if known is None and not self._receipts.is_past(press_id):
             if left_out := self._left_out(widget, inputs, press_id, by):
                 return left_out
@@ -194,24 +196,24 @@ class Presses:
         finally:
             del self._under_way[press_id]
         under_way.receipt.set_result(receipt)
-        self._receipts.keep(receipt)
+        if receipt.id == press_id:  # a refusal's own is kept already
+            self._receipts.keep(receipt)
         return receipt
 
     async def _logged(
-        self,
-        widget: Pressed,
-        inputs: Mapping[str, Any],
-        press_id: str,
-        by: By,
+        self, widget: Pressed, inputs: Mapping[str, Any], press_id: str, by: By
     ) -> Receipt:
         own = self._sending.needed(widget, inputs)
-        self._receipts.begin(press_id, widget.id, by.origin, own)
         try:
             noted = await self._logbook.pressed(widget.id, own, press_id, by.origin)
+        except Repeated as known:
+            return await self._recall.receipt(widget, inputs, by.origin, known)
         except LogError as error:
+            self._receipts.begin(press_id, widget.id, by.origin, own)
             text = say("refused", why=str(error), time=clock(time.time()))
             receipt = receipt_of(widget, inputs, press_id, Answer("refused", text), "log")
         else:
+            self._receipts.begin(press_id, widget.id, by.origin, own)
             with _noted_to_the_end(noted):
                 receipt = await self._pressed(widget, inputs, press_id, noted, by)
             receipt = await _closed(noted, receipt)

@@ -6,11 +6,11 @@ from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
-from typing import Any, Final, Protocol
+from typing import Any, Final, Protocol, cast
 
 from app.errors import Cause
 from app.interlocks import NO_WAY, PERMITTED, Verdict, press_verdict, way
-from app.log import Origin
+from app.log import Entry, Origin
 from app.panel.model import Hold, Panel, Pressed
 from app.panel.parameter import Parameter
 from app.panel.template import needed
@@ -34,6 +34,7 @@ class Receipt:
 
     `inputs` are those that the widget needs, `entered` all that the press came with, if they are few
     and short: a page without scripts shows them again. `fingerprint` tells these from any others.
+    `recalled`: it is what the operator's log knew of a press that this server did not make.
     """
 
     id: str
@@ -45,6 +46,7 @@ class Receipt:
     inputs: Mapping[str, Any]
     fingerprint: str
     entered: Mapping[str, Any] = field(default_factory=dict)
+    recalled: bool = False
 
     def as_json(self) -> dict[str, str]:
         return {
@@ -101,10 +103,15 @@ class Receipts:
         self._witness = witness
         self._receipts: OrderedDict[str, Receipt] = OrderedDict()
         self._left_out: OrderedDict[str, Receipt] = OrderedDict()
+        self._recalled: OrderedDict[str, Receipt] = OrderedDict()
         self._past: OrderedDict[str, None] = OrderedDict()
 
     def get(self, press_id: str) -> Receipt | None:
         """The receipt of a press, as it is known now."""
+        return self.made(press_id) or self._recalled.get(press_id)
+
+    def made(self, press_id: str) -> Receipt | None:
+        """The same, of a press of this server's own: what the log knows of others may change."""
         return self._receipts.get(press_id) or self._left_out.get(press_id)
 
     def is_past(self, press_id: str) -> bool:
@@ -117,6 +124,9 @@ class Receipts:
             self._witness.pressed(press_id, widget, named(origin), inputs)
 
     def keep(self, receipt: Receipt) -> None:
+        if receipt.recalled:
+            _keep(self._recalled, receipt)
+            return
         if self._witness is not None:
             self._witness.answered(receipt)
         for press_id in _keep(self._receipts, receipt):
@@ -147,6 +157,19 @@ def receipt_of(
     own, entered = ({**of} if _short(of) else {} for of in (needed(widget, inputs), inputs))
     told = answer.outcome, answer.text, at, cause
     return Receipt(press_id, widget.id, *told, own, fingerprint(inputs), entered)
+
+
+def recalled(
+    widget: Pressed, inputs: Mapping[str, Any], press: Entry, told: Entry | None, cause: Cause
+) -> Receipt:
+    """What the operator's log knows of a press: where it was told nothing, nobody will know."""
+    if told is None:
+        answer, at = Answer("unknown", say("log_ended")), press.at
+    else:
+        answer, at = Answer(cast(Outcome, told.outcome), told.reason), told.at
+    receipt = receipt_of(widget, inputs, press.press, answer, cause)
+    wall = datetime.fromtimestamp(at / 1000, UTC).isoformat(timespec="milliseconds")
+    return replace(receipt, at=wall, recalled=True)
 
 
 def fingerprint(inputs: Mapping[str, Any]) -> str:

@@ -7,6 +7,8 @@ import time
 from collections.abc import Mapping
 from typing import Final
 
+from app.printable import printable
+
 ENGLISH: Final[Mapping[str, str]] = {
     # Why a control is locked.
     "no_link": "No connection to the robot: its bridge can't be reached.",
@@ -102,7 +104,7 @@ ENGLISH: Final[Mapping[str, str]] = {
     "goal_gone": "The robot stopped offering {name}: what came of it is not known.",
     "cancel": "Cancel",
     "cancel_sent": "The robot was asked to cancel at {time}.",
-    "cancel_refused": "The robot did not cancel it at {time}.",
+    "cancel_refused": "The robot refused to cancel at {time}.",
     "cancel_unheard": (
         "The robot does not offer {name} now: it is not known whether it was asked to cancel."
     ),
@@ -196,6 +198,12 @@ ENGLISH: Final[Mapping[str, str]] = {
     "log_unwritable": "The operator's log can't be written: {why}.",
     "log_unwritable_free": "The operator's log can't be written, so nothing is logged: {why}.",
     "log_unreadable": "The operator's log can't be read: {why}.",
+    "log_reader_ended": "what read it was ended",
+    "log_exported": "The operator's log is being exported already. Try again when that is done.",
+    "log_searched": "The operator's log is being searched by others. Try again in a moment.",
+    "folder_taken": "Another server has taken this panel's data: {why}.",
+    "log_taken": "{name} was removed or renamed",
+    "log_emptied": "the file was emptied",
     "log_closed": "the file is being opened anew",
     "log_slow": "the disk did not take the entry in {seconds} s",
     "log_full_queue": "more is pressed than the disk takes; press again",
@@ -210,6 +218,11 @@ ENGLISH: Final[Mapping[str, str]] = {
     "log_broke_off": "A fault of the panel's server: it is not known whether this was sent.",
     "log_began": "The panel's server started.",
     "log_began_anew": "The log before this one was damaged and is kept as {name}.",
+    "log_began_for_gone": (
+        "The log before this one, up to entry {last}, was removed or renamed while the server ran."
+    ),
+    "log_began_empty": "The log had no entries when the server opened it; the last was number {last}.",
+    "log_found": "What stood in its place is kept as {name}.",
     "log_resumed": "The log could not be written from {since} to now: {why}.",
     "log_lost": "The disk lost entries {first} to {last}.",
     "log_removed_days": "older than {days} days",
@@ -319,7 +332,7 @@ ENGLISH: Final[Mapping[str, str]] = {
 
 def say(code: str, **about: object) -> str:
     """The sentence for `code`, filled in; a KeyError is a mistake of the programmer's."""
-    return ENGLISH[code].format(**about)
+    return printable(ENGLISH[code].format(**about))
 
 
 def age(seconds: float) -> str:

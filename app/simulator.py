@@ -134,8 +134,10 @@ class Simulator:
             return {"accepted": accepted, "stamp": {"sec": 0, "nanosec": 0}}
 
         def cancel(request: Any) -> Mapping[str, Any]:
-            code = self._robot.cancel(bytes(request.goal_info.goal_id.uuid))
-            return {"return_code": code, "goals_canceling": []}
+            code, canceled = self._robot.cancel(bytes(request.goal_info.goal_id.uuid))
+            never = {"sec": 0, "nanosec": 0}
+            goals = [{"goal_id": {"uuid": one}, "stamp": never} for one in canceled]
+            return {"return_code": code, "goals_canceling": goals}
 
         def on_result(query: zenoh.Query) -> None:
             try:

@@ -130,6 +130,16 @@ def test_an_answer_that_can_not_be_read_is_unknown() -> None:
     run(test)
 
 
+def test_what_the_robot_answers_is_shown_by_its_escapes() -> None:
+    async def test(bench: Bench) -> None:
+        call = bench.call()
+        await asked(bench, 1)
+        bench.line.answer(f"{TRIGGER}_Response", success=False, message="no \u202e\x1b[2Jon")
+        assert (await call).text.endswith(": no \\u202e\\u001b[2Jon")
+
+    run(test)
+
+
 def test_a_first_timeout_hints_at_cyclone_and_a_later_one_does_not() -> None:
     async def test(bench: Bench) -> None:
         first = await bench.call()
@@ -249,15 +259,60 @@ async def accepted(bench: Bench, press_id: str = "g1") -> None:
     await asked(bench, count + 2)
 
 
-async def canceled(bench: Bench, press_id: str, return_code: int = 0) -> bytes:
-    """Cancels the goal of a press; the id of the goal that the robot was asked to cancel."""
+async def cancel_answered(
+    bench: Bench, press_id: str, *, return_code: int = 0, listed: bool = True
+) -> tuple[Answer, bytes]:
+    """Cancels the goal of a press: what came of that, and the goal that was to be canceled."""
     request, response = INTERFACES.service("action_msgs/srv/CancelGoal")
     count = len(bench.line.asked)
     cancel = asyncio.create_task(bench.actions.cancel(bench.count, press_id))
     await asked(bench, count + 1)
-    bench.line.answer(response, return_code=return_code, goals_canceling=[])
-    assert (await cancel).outcome == ("rejected" if return_code else "accepted")
-    return bytes(INTERFACES.decode(request, bench.line.asked[-1][1]).goal_info.goal_id.uuid)
+    info = INTERFACES.decode(request, bench.line.asked[-1][1]).goal_info
+    goal = {"goal_id": {"uuid": info.goal_id.uuid}, "stamp": {"sec": 0, "nanosec": 0}}
+    bench.line.answer(response, return_code=return_code, goals_canceling=[goal] if listed else [])
+    return await cancel, bytes(info.goal_id.uuid)
+
+
+async def canceled(bench: Bench, press_id: str, return_code: int = 0) -> bytes:
+    """The same, as it has to be; the id."""
+    answer, asked_for = await cancel_answered(
+        bench, press_id, return_code=return_code, listed=not return_code
+    )
+    assert answer.outcome == ("rejected" if return_code else "accepted")
+    return asked_for
+
+
+def test_a_goal_that_the_robot_does_not_list_is_not_being_canceled() -> None:
+    async def test(bench: Bench) -> None:
+        await accepted(bench)
+        tell_states(bench, (goal_id(bench), 2))
+        answer, _ = await cancel_answered(bench, "g1", listed=False)
+        assert answer.outcome == "rejected"
+        assert answer.text.startswith("The robot refused to cancel at ")
+        assert (bench.shown.goal, bench.shown.stoppable) == ("EXECUTING", True)
+        await canceled(bench, "g1")
+        assert bench.shown.goal == "CANCELING"
+        again, _ = await cancel_answered(bench, "g1", return_code=3, listed=False)
+        assert (again.outcome, again.text) == ("accepted", "Being canceled.")
+        await bench.actions.stop()
+
+    run(test)
+
+
+def test_an_answer_to_a_cancel_that_can_not_be_read_is_no_refusal() -> None:
+    async def test(bench: Bench) -> None:
+        await accepted(bench)
+        count = len(bench.line.asked)
+        cancel = asyncio.create_task(bench.actions.cancel(bench.count, "g1"))
+        await asked(bench, count + 1)
+        bench.line.asked[-1][2].set_result(b"broken")
+        answer = await cancel
+        assert answer.outcome == "unknown"
+        assert "not with action_msgs/srv/CancelGoal" in answer.text
+        assert bench.shown.goal == "ACCEPTED"
+        await bench.actions.stop()
+
+    run(test)
 
 
 def test_a_late_cancel_does_not_hit_the_next_goal() -> None:

@@ -555,17 +555,21 @@ def test_a_late_answer_corrects_what_every_browser_shows(
     expect(page.locator('[data-widget="slow"] .receipt')).to_be_empty()
 
 
+@pytest.mark.parametrize("manner", ["rclcpp", "rclpy"])
 def test_a_cancel_that_the_robot_refuses_is_told(
-    kiosk: Server, robot: CycloneRobot, page: Page
+    kiosk: Server, robot: CycloneRobot, page: Page, manner: str
 ) -> None:
-    robot.fibonacci(step_s=30, refuse_cancels=True)
+    robot.fibonacci(step_s=30, refuse_cancels=manner)
     page.goto(kiosk.url)
     count = page.locator('[data-widget="count"]')
     count.get_by_role("button", name="Count", exact=True).click()
     count.get_by_role("button", name="Cancel").click()
-    expect(count.locator(".receipt")).to_contain_text("The robot did not cancel it")
+    expect(count.locator(".receipt")).to_contain_text("The robot refused to cancel")
     expect(count.locator(".goal")).to_have_text("EXECUTING")
-    robot.fibonacci(step_s=0.01, refuse_cancels=False)
+    refused = cancel(kiosk)
+    assert (refused.status_code, refused.json()["outcome"]) == (200, "rejected")
+    assert kiosk.widget("count")["goal"] == "EXECUTING"
+    robot.fibonacci(step_s=0.01, refuse_cancels="")
     expect(count.locator(".goal")).to_have_text("SUCCEEDED")
 
 

@@ -236,11 +236,13 @@ def test_a_cancel_is_refused_unknown_or_too_late_and_one_cancels_all(
     robot: CycloneRobot, client: Client
 ) -> None:
     goals = Goals(client)
-    robot.fibonacci(step_s=60, refuse_cancels=True)
+    robot.fibonacci(step_s=60, refuse_cancels="rclcpp")
     first, second = goals.sent(order=5), goals.sent(order=5)
     assert goals.cancel(first) == (1, [])
+    robot.fibonacci(refuse_cancels="rclpy")
+    assert goals.cancel(first) == (0, [])
     assert goals.cancel(uuid.uuid4().bytes) == (2, [])
-    robot.fibonacci(refuse_cancels=False)
+    robot.fibonacci(refuse_cancels="")
     assert goals.cancel(bytes(16)) == (0, [first, second])
     assert goals.result(first)[0] == goals.result(second)[0] == CANCELED
     assert goals.cancel(first) == (3, [])

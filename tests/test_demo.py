@@ -61,11 +61,21 @@ def test_a_count_is_canceled_rejected_and_unknown() -> None:
     assert not robot.begin(b"x", 0)
     assert not robot.begin(b"x", LONGEST_COUNT + 1)
     assert robot.begin(b"a", 5)
-    assert robot.cancel(b"a") == 0
-    assert robot.cancel(b"a") == 3
-    assert robot.cancel(b"b") == 2
+    assert robot.cancel(b"a") == (0, [b"a"])
+    assert robot.cancel(b"a") == (3, [])
+    assert robot.cancel(b"b") == (2, [])
     assert robot.result(b"a") == (5, [0, 1])
     assert robot.result(b"b") == (0, [])
+
+
+def test_a_count_before_its_last_number_refuses_a_cancel_as_rclpy_does() -> None:
+    robot = DemoRobot()
+    robot.step(0.0)
+    assert robot.begin(b"a", 2)
+    assert robot.cancel(b"a") == (0, [])
+    robot.step(COUNT_STEP_S)
+    assert robot.count() == [(b"a", [0, 1, 1])]
+    assert robot.result(b"a") == (4, [0, 1, 1])
 
 
 def asked(service: str, *names: str) -> Any:
@@ -173,3 +183,50 @@ def test_a_command_that_is_used_wrongly_says_so() -> None:
     words = [sys.executable, "-m", "app.simulator", "tcp/127.0.0.1:0", "/r1", "more"]
     done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False, timeout=30)
     assert (done.returncode, "unrecognized arguments: more" in done.stderr) == (2, True)
+
+
+COUNTS = """
+title = "Cell"
+mode = "demo"
+
+[[page]]
+id = "one"
+title = "One"
+
+[[page.widget]]
+id = "count"
+kind = "action"
+label = "Count"
+action = "/count"
+type = "example_interfaces/action/Fibonacci"
+goal = { order = 40 }
+
+[[page.widget]]
+id = "short"
+kind = "action"
+label = "Short"
+action = "/count"
+type = "example_interfaces/action/Fibonacci"
+goal = { order = 2 }
+"""
+
+
+def test_a_server_cancels_its_counts_and_is_refused_before_the_last_number(
+    tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    panel = tmp_path / "panel.toml"
+    panel.write_text(COUNTS)
+    kiosk = servers(Server(ROOT, KIOSK_PANEL=str(panel)))
+    until(lambda: kiosk.widget("count")["enabled"], "offered")
+    assert kiosk.http.post("/widgets/count", json={"inputs": {}}).json()["outcome"] == "accepted"
+    assert kiosk.http.post("/widgets/count/cancel").json()["outcome"] == "accepted"
+    until(lambda: kiosk.widget("count")["outcome"] == "canceled", "it is canceled")
+
+    def refused() -> bool:
+        """Its last number comes after half a second: a busy machine may be too late for that."""
+        until(lambda: kiosk.widget("short")["enabled"], "the last one is over")
+        assert kiosk.http.post("/widgets/short", json={"inputs": {}}).json()["outcome"] == "accepted"
+        told = kiosk.http.post("/widgets/short/cancel").json()
+        return str(told["reason"]).startswith("The robot refused to cancel at ")
+
+    until(refused, "a cancel is refused")

@@ -1,10 +1,12 @@
 """Readouts in formats and by constants, lamps with states, and what is not known of them."""
 
 import math
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+from app.panel import load_panel
 from app.robot import Robot, Sample
 from app.sentences import clock
 from app.views import sight
@@ -50,6 +52,13 @@ def shown(
         ("Float64", math.inf, {"format": ".1f"}, "Infinity"),
         ("Float32", -math.inf, {"scale": 2}, "-Infinity"),
         ("Bool", True, {}, "true"),
+        ("Float64", 1e308, {"format": ".1f"}, "1e+308"),
+        ("Float64", -1.2345678e300, {"format": "+,.2f", "unit": "m"}, "-1.23457e+300 m"),
+        ("Float64", 1e308, {"format": ".0%"}, "1e+308"),
+        ("Float64", 0.5, {"format": ".99f"}, "0.5"),
+        ("Float64", 1e30, {"format": ".0f"}, "1000000000000000019884624838656"),
+        ("String", "a\u202eb\x1bc", {}, "a\\u202eb\\u001bc"),
+        ("String", "\x1b" * 1000, {}, "\\u001b" * 33 + "\\…"),
     ],
 )
 def test_a_readout_writes_a_number(kind: str, data: Any, more: Any, text: str) -> None:
@@ -57,11 +66,12 @@ def test_a_readout_writes_a_number(kind: str, data: Any, more: Any, text: str) -
     assert (view["text"], view["state"]) == (text, "live")
 
 
-@pytest.mark.parametrize(
-    ("status", "text"), [(0, "STATUS_FIX"), (-1, "STATUS_NO_FIX"), (2, "STATUS_GBAS_FIX"), (77, "77")]
-)
-def test_a_readout_shows_a_constant_by_its_name(status: int, text: str) -> None:
-    more: Any = {"constants": "STATUS_", "field": "status"}
+@pytest.mark.parametrize(("status", "text"), [(0, "FIX"), (-1, "NO_FIX"), (2, "GBAS_FIX"), (77, "77")])
+@pytest.mark.parametrize("prefix", ["STATUS_", "STATUS"])
+def test_a_readout_shows_a_constant_by_its_name_without_the_prefix(
+    status: int, text: str, prefix: str
+) -> None:
+    more: Any = {"constants": prefix, "field": "status"}
     fields = {"status": status, "service": 1}
     assert shown(HEARD, "sensor_msgs/msg/NavSatStatus", fields, **more)["text"] == text
 
@@ -118,6 +128,51 @@ def test_a_lamp_shows_the_state_of_its_value(value: int, text: str, shape: str, 
     }
 
 
+BATTERY = "sensor_msgs/msg/BatteryState"
+BATTERY_FIELDS: dict[str, Any] = {
+    "header": {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""},
+    **dict.fromkeys(("voltage", "temperature", "current", "charge", "capacity"), 0.0),
+    **dict.fromkeys(("design_capacity", "percentage"), 0.0),
+    **dict.fromkeys(("power_supply_status", "power_supply_health", "power_supply_technology"), 0),
+    "present": True,
+    "cell_voltage": [],
+    "cell_temperature": [],
+    "location": "",
+    "serial_number": "",
+}
+LAMP_FILE = """
+title = "Cell"
+
+[[page]]
+id = "one"
+title = "One"
+
+[[page.widget]]
+id = "supply"
+kind = "indicator"
+label = "Supply"
+topic = "/heard"
+type = "sensor_msgs/msg/BatteryState"
+field = "power_supply_status"
+states = [
+  { value = "POWER_SUPPLY_STATUS_DISCHARGING", text = "Discharging", shape = "circle" },
+  { value = 1, text = "Charging", shape = "triangle" },
+]
+"""
+
+
+@pytest.mark.parametrize(("status", "text"), [(2, "Discharging"), (1, "Charging"), (4, "Unknown: 4")])
+def test_a_lamp_of_a_file_shows_the_state_of_a_constant(tmp_path: Path, status: int, text: str) -> None:
+    path = tmp_path / "panel.toml"
+    path.write_text(LAMP_FILE)
+    panel = load_panel(path)
+    assert panel.displays == tuple(panel.widgets())
+    robot = robot_there(panel)
+    battery = INTERFACES.encode(BATTERY, BATTERY_FIELDS | {"power_supply_status": status})
+    robot.take("heard", Sample(battery, 1, NOW, NOW, BRIDGE))
+    assert sight(panel, robot, NOW).view["widgets"]["supply"]["text"] == text
+
+
 def test_a_lamp_of_a_bool_or_a_text() -> None:
     flag = [{"value": True, "text": "Open", "shape": "circle"}]
     assert shown({**LAMP, "states": flag}, "std_msgs/msg/Bool", {"data": True})["text"] == "Open"
@@ -154,6 +209,12 @@ def test_a_lamp_that_is_not_known_now_has_no_colour_and_a_shape_of_its_own(
     view = shown(LAMP, "std_msgs/msg/UInt8", fields, **more)
     look = {"state": state, "text": text, "shape": shape, "colour": "none", "note": note}
     assert view == look
+
+
+def test_a_lamp_shows_an_unknown_text_by_its_escapes() -> None:
+    states = [{"value": "auto", "text": "Automatic", "shape": "bar"}]
+    view = shown({**LAMP, "states": states}, "std_msgs/msg/String", {"data": "m\u202ean"})
+    assert view["text"] == "Unknown: m\\u202ean"
 
 
 def test_a_lamp_that_can_not_be_read_says_so() -> None:

@@ -3,7 +3,18 @@
 import pytest
 
 from app import keys
-from app.keys import MESSAGE_TYPE, NAMESPACE, TOPIC, Endpoint, Qos, TopicRole, key_of, parsed, token
+from app.keys import (
+    MESSAGE_TYPE,
+    NAMESPACE,
+    NO_TYPE,
+    TOPIC,
+    Endpoint,
+    Qos,
+    TopicRole,
+    key_of,
+    parsed,
+    token,
+)
 from tests.builders import BOOL, TEXT
 
 HASH = "RIHS01_0"
@@ -185,6 +196,25 @@ def test_a_server_is_read_from_its_token(role: keys.ServerRole) -> None:
     kind = "srv" if role == "SS" else "action"
     made = keys.server_token("b1", role, "arm/move", f"pkg/{kind}/Move")
     assert parsed(made) == Endpoint("b1", role, "arm/move", f"pkg/{kind}/Move")
+
+
+@pytest.mark.parametrize(
+    "told", ["x" * 50_000, "a\u202eb", "std msgs", "", "a//b", "std_msgs/msg/Bool\n"]
+)
+def test_a_type_that_can_not_be_one_is_no_type(told: str) -> None:
+    assert keys.type_in(told) == NO_TYPE
+    if told:
+        seen = parsed(f"@/b1/@ros2_lv/MP/enabled/{told.replace('/', '§')}/:1:0:0,1:")
+        assert seen is None or seen.type == NO_TYPE
+    node = {"publishers": [{"name": "/enabled", "type": told}], "subscribers": []}
+    assert [one.type for one in keys.endpoints_of("@/b1/ros2/node/g/n", node, "")] == [NO_TYPE]
+
+
+@pytest.mark.parametrize("key", ["a" * 600, "1st", "a\u202eb", "a b"])
+def test_a_name_that_can_not_be_one_shows_nothing(key: str) -> None:
+    assert parsed(f"@/b1/@ros2_lv/MP/{key}/std_msgs§msg§Bool/:1:0:0,1:") is None
+    assert parsed(f"@/b1/@ros2_lv/SS/{key}/std_srvs§srv§Trigger") is None
+    assert parsed(f"@/{'b' * 65}/@ros2_lv") is None
 
 
 def test_a_hostile_action_never_becomes_a_token() -> None:

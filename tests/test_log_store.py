@@ -16,9 +16,10 @@ from app.errors import FolderInUse, LogCorrupt, LogError
 from app.log.__main__ import main
 from app.log.chain import verify
 from app.log.entry import LONGEST_VALUES, Entry, Origin, as_json, entered, plain
-from app.log.file import NAME, set_aside
+from app.log.file import NAME, Head, set_aside
 from app.log.folder import LOCK, Folder
 from app.log.keeper import HOUR_S, Steady
+from app.log.opening import Opening
 from app.log.reading import Filter, rows
 from app.log.store import DAY_MS, REMOVED_AT_ONCE, Store
 
@@ -144,7 +145,7 @@ def swaps(db: sqlite3.Connection) -> None:
 
 def inserts_well_made(db: sqlite3.Connection) -> None:
     (last,) = db.execute("SELECT hash FROM entry WHERE seq = 4").fetchone()
-    for seq in range(20, 4, -1):
+    for seq in range(25, 4, -1):
         db.execute("UPDATE entry SET seq = ? WHERE seq = ?", (seq + 1, seq))
     forged = pressed(99).sealed(5, "boot1", last)
     marks = ", ".join("?" * len(forged))
@@ -154,6 +155,25 @@ def inserts_well_made(db: sqlite3.Connection) -> None:
 
 def changes_the_genesis(db: sqlite3.Connection) -> None:
     db.execute("UPDATE about SET value = 'f' WHERE key = 'genesis'")
+
+
+def takes_the_genesis_of(db: sqlite3.Connection, seq: int) -> None:
+    db.execute("DELETE FROM entry WHERE seq < ?", (seq,))
+    (before,) = db.execute("SELECT prev FROM entry WHERE seq = ?", (seq,)).fetchone()
+    db.execute("UPDATE about SET value = ? WHERE key = 'genesis'", (before,))
+    db.execute("UPDATE about SET value = ? WHERE key = 'first'", (seq,))
+
+
+def removes_the_first_and_begins_anew(db: sqlite3.Connection) -> None:
+    takes_the_genesis_of(db, 5)
+
+
+def begins_anew_with_a_start(db: sqlite3.Connection) -> None:
+    takes_the_genesis_of(db, 21)
+
+
+def empties(db: sqlite3.Connection) -> None:
+    db.execute("DELETE FROM entry")
 
 
 def writes_no_unicode(db: sqlite3.Connection) -> None:
@@ -172,6 +192,9 @@ def writes_no_unicode(db: sqlite3.Connection) -> None:
         (swaps, "entry 5 was changed, or is not in its place"),
         (inserts_well_made, "entry 5 was inserted"),
         (changes_the_genesis, "what stood before entry 1 was removed"),
+        (removes_the_first_and_begins_anew, "what stood before entry 5 was removed"),
+        (begins_anew_with_a_start, "what stood before entry 21 was removed"),
+        (empties, "it has no entries"),
         (writes_no_unicode, "entry 5 was changed"),
     ],
 )
@@ -183,14 +206,54 @@ def test_what_was_done_to_the_file_is_named(
 ) -> None:
     store = Store(tmp_path, "boot1")
     fill(store, 10)
+    store.append([entered("began", values={"mode": "live"}, reason="The panel's server started.")])
+    fill(store, 2)
+    head = store.head.hash
     store.close()
-    assert main(["verify", "--data", str(tmp_path)]) == 0
+    assert main(["verify", "--data", str(tmp_path), "--head", head]) == 0
     with sqlite3.connect(tmp_path / NAME) as db:
         tamper(db)
     db.close()
     capsys.readouterr()
-    assert main(["verify", "--data", str(tmp_path)]) == 1
+    assert main(["verify", "--data", str(tmp_path), "--head", head]) == 1
     assert says in capsys.readouterr().out
+
+
+def began(values: dict[str, Any]) -> Entry:
+    return entered("began", values=values, reason="The log before this one was damaged.")
+
+
+@pytest.mark.parametrize(
+    ("entries", "good"),
+    [
+        ([began({"first": 8})], True),
+        ([began({"first": 8}), pressed()], True),
+        ([began({"first": 7})], False),
+        ([pressed(), began({"first": 9})], False),
+        ([began({"mode": "live"})], False),
+        # As it was written at first.
+        ([began({})], True),
+        ([pressed().followed("closed", "published", "Sent."), began({})], True),
+        ([pressed(), began({})], False),
+    ],
+)
+def test_a_log_begins_later_only_with_an_entry_that_says_so(
+    tmp_path: Path, entries: list[Entry], good: bool
+) -> None:
+    before = Head(7, "ab" * 32, 7)
+    store = Store(tmp_path, "boot1", before)
+    store.append(entries)
+    fill(store, 2)
+    store.close()
+    assert (verify(tmp_path, before.hash).fault == "") is good
+
+
+def test_a_log_that_was_emptied_says_so_when_it_goes_on(tmp_path: Path) -> None:
+    Store(tmp_path, "boot1").close()
+    store = Store(tmp_path, "boot2")
+    (entry,) = Opening(tmp_path, "boot2").first_entries(store, None)
+    assert (entry.kind, "had no entries" in entry.reason) == ("began", True)
+    store.close()
 
 
 def test_a_good_log_is_said_to_be(

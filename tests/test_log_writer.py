@@ -312,10 +312,10 @@ def test_damage_while_it_runs_begins_a_new_log_whose_numbers_go_on(tmp_path: Pat
     assert aside.stat().st_size > 0
     found = [row.entry for row in rows(tmp_path, Filter(every=True), None, 10)]
     assert [(e.seq, e.kind, e.of) for e in reversed(found)][:2] == [
-        (3, "closed", 2),
-        (4, "began", None),
+        (3, "began", None),
+        (4, "closed", 2),
     ]
-    assert aside.name in found[-2].reason
+    assert aside.name in found[-1].reason
     assert verify(tmp_path).fault == ""
 
 

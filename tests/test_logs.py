@@ -68,10 +68,10 @@ def test_a_newline_in_a_message_begins_no_record() -> None:
     assert [bool(LINE.match(line)) for line in lines] == [True, False]
 
 
-@pytest.mark.parametrize("control", ["\r", "\x1b", "\0", "\x07", "\x0b", "\x0c", "\x7f"])
+@pytest.mark.parametrize("control", ["\r", "\x1b", "\0", "\x07", "\x0b", "\x0c", "\x7f", "\u202e"])
 def test_a_control_character_is_escaped(control: str) -> None:
     line = RosFormatter().format(record("a%sb", control))
-    assert line.endswith(f"a\\x{ord(control):02x}b")
+    assert line.endswith(f"a\\u{ord(control):04x}b")
 
 
 def test_a_traceback_follows_indented() -> None:
@@ -98,9 +98,10 @@ def test_a_record_becomes_the_fields_of_the_ros_log_message() -> None:
     [
         ("plain", "plain"),
         ("two\nlines", "two\nlines"),
-        ("NUL \0 inside", "NUL \\x00 inside"),
+        ("NUL \0 inside", "NUL \\u0000 inside"),
         ("漢字", "漢字"),
-        ("a \x85 b \u2028 c \x1b[2J", "a \\x85 b \\x2028 c \\x1b[2J"),
+        ("a\u202eb\ud800", "a\\u202eb\\ud800"),
+        ("a \x85 b \u2028 c \x1b[2J", "a \\u0085 b \\u2028 c \\u001b[2J"),
     ],
 )
 def test_a_record_can_be_sent_on_rosout(text: str, sent: str) -> None:
@@ -160,7 +161,7 @@ def test_a_control_of_the_upper_half_is_escaped_too(control: str) -> None:
         logging.makeLogRecord({"msg": f"a{control}2Jb", "levelno": logging.INFO})
     )
     assert control not in line
-    assert line.endswith(f"a\\x{ord(control):02x}2Jb")
+    assert line.endswith(f"a\\u{ord(control):04x}2Jb")
 
 
 @pytest.mark.usefixtures("logging_as_before")
@@ -181,7 +182,7 @@ def test_rosout_gets_the_exception_and_half_a_surrogate_as_text() -> None:
             {"msg": "it failed \ud800", "levelno": logging.ERROR, "exc_info": sys.exc_info()}
         )
     text = str(log_fields(record)["msg"])
-    assert "it failed ?" in text
+    assert "it failed \\ud800" in text
     assert "ValueError: the cause" in text
 
 

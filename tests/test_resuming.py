@@ -17,6 +17,7 @@ from app.goals import goal_id
 from app.interlocks import against_calling
 from app.log import Entry, Filter, Limits, OperatorLog, Origin, Unended, entered
 from app.log.reading import rows, unended
+from app.log.store import Store
 from app.logbook import Logbook
 from app.progress import IDLE
 from app.resuming import LOOKED_BACK_S, Resuming
@@ -289,14 +290,22 @@ def test_a_cancel_that_the_robot_knows_no_goal_for_asks_for_it_anew(tmp_path: Pa
 
 
 async def canceled(rig: Rig, return_code: int) -> str:
-    _, response = INTERFACES.service("action_msgs/srv/CancelGoal")
+    request, response = INTERFACES.service("action_msgs/srv/CancelGoal")
     cancel = asyncio.create_task(rig.bench.actions.cancel(rig.bench.count, "g1"))
     await asked(rig.bench, 2)
-    rig.bench.line.answer(response, return_code=return_code, goals_canceling=[])
+    info = INTERFACES.decode(request, rig.bench.line.asked[-1][1]).goal_info
+    goal = {"goal_id": {"uuid": info.goal_id.uuid}, "stamp": {"sec": 0, "nanosec": 0}}
+    goals = [] if return_code else [goal]
+    rig.bench.line.answer(response, return_code=return_code, goals_canceling=goals)
     return (await cancel).outcome
 
 
-def test_a_press_id_that_is_used_again_is_another_goal(tmp_path: Path) -> None:
+def test_a_press_id_that_was_used_twice_is_of_two_goals(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As in logs of before an id was looked up."""
+    monkeypatch.setattr(Store, "told", lambda *_: [])
+
     async def test(rig: Rig, entry: Entry) -> None:
         again = await pressed(rig.log, "g1", "accepted")
         await rig.started(questions=2)

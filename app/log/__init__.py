@@ -1,8 +1,9 @@
 """The operator's log: who pressed what, and what came of it."""
 
-from app.log.entry import Entry, Origin, entered
+from app.log.entry import Entry, Origin, entered, same_values
+from app.log.process import ReaderProcess
 from app.log.reading import Filter, Row, Unended
-from app.log.ticket import Limits
+from app.log.ticket import Limits, Repeated
 from app.log.unlogged import Unlogged
 from app.log.writer import OperatorLog
 
@@ -12,8 +13,11 @@ __all__ = [
     "Limits",
     "OperatorLog",
     "Origin",
+    "ReaderProcess",
+    "Repeated",
     "Row",
     "Unended",
     "Unlogged",
     "entered",
+    "same_values",
 ]

@@ -9,6 +9,7 @@ import sqlite3
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from app.errors import LogError
 from app.log.entry import Entry
@@ -53,7 +54,8 @@ class _Chain:
         self._genesis = genesis
         self._noted = noted
         self._first: Entry | None = None
-        self._anchored = False
+        self._begins = False
+        self._kinds: set[str] = set()
         self._last = ("", genesis)  # the hashes of the one before the last, and of the last
         self._seq = 0
         self._count = 0
@@ -65,10 +67,13 @@ class _Chain:
             self._first = self._first or entry
             if self._noted in (entry.hash, entry.prev):
                 self._noted = ""
-            self._anchored = self._anchored or self._is_anchor(entry)
+            self._begins = self._begins or self._tells_the_begin(self._first, entry)
+            self._kinds.add(entry.kind)
             self._last, self._seq = (entry.prev, entry.hash), entry.seq
             self._count += 1
-        if self._first and self._first.prev != self._genesis and not self._anchored:
+        if self._first is None:
+            return self._verified("it has no entries: a log begins with number 1, or says why not")
+        if not self._begins:
             return self._verified(
                 f"what stood before entry {self._first.seq} was removed, by none of the log's own rules"
             )
@@ -97,12 +102,25 @@ class _Chain:
             return f"entry {entry.seq} does not follow the one before it"
         return ""
 
-    def _is_anchor(self, entry: Entry) -> bool:
-        """Whether it says that what stood before the first entry was removed by the log's rules."""
-        if entry.kind != "removed" or self._first is None:
+    def _tells_the_begin(self, first: Entry, entry: Entry) -> bool:
+        """Whether an entry shows that the log may begin with its first one. The genesis, which has no
+        hash of its own, is enough for number 1 only."""
+        if entry.kind == "removed":
+            about = _values(entry)
+            return (about.get("last"), about.get("hash")) == (first.seq - 1, first.prev)
+        if first.prev != self._genesis:
             return False
-        try:
-            about = json.loads(entry.values)
-        except ValueError:
-            return False
-        return (about.get("last"), about.get("hash")) == (self._first.seq - 1, self._first.prev)
+        if first.seq == 1 or entry.kind != "began":
+            return first.seq == 1
+        if entry is first and _values(entry).get("first") == entry.seq:
+            return True
+        # As it was written at first: after what was owed of presses, the only one without a mode.
+        return self._kinds <= {"closed", "corrected"} and not _values(entry)
+
+
+def _values(entry: Entry) -> dict[str, Any]:
+    try:
+        found = json.loads(entry.values)
+    except ValueError:
+        return {}
+    return found if isinstance(found, dict) else {}

@@ -64,6 +64,11 @@ class Entry(NamedTuple):
         row = (seq, self.at, boot, *self[MONOTONIC:PREV], prev)
         return Entry._make((*row, _hash(row)))
 
+    @property
+    def is_press(self) -> bool:
+        """Whether it begins a press that has an id."""
+        return self.kind == "pressed" and self.action == "press" and self.press != ""
+
     def computed_hash(self) -> str:
         """What its hash must be."""
         return _hash(self[:-1])
@@ -88,6 +93,7 @@ MONOTONIC: Final = FIELDS.index("monotonic")
 PREV: Final = FIELDS.index("prev")
 ORIGIN: Final = tuple(field.name for field in fields(Origin))
 _as_text: Final = json.JSONEncoder(ensure_ascii=False, separators=(",", ":")).encode
+_in_order: Final = json.JSONEncoder(sort_keys=True).encode
 _as_json: Final = json.JSONEncoder(ensure_ascii=False, allow_nan=False).encode
 
 
@@ -120,6 +126,11 @@ def as_json(values: Mapping[str, Any]) -> str:
         cut = {"…": text[:LONGEST_VALUES], "… of": len(text)}
         text = json.dumps(cut, ensure_ascii=False)
     return plain(text, len(text))
+
+
+def same_values(text: str, values: Mapping[str, Any]) -> bool:
+    """Whether an entry's values are these, as far as an entry has them."""
+    return _in_order(json.loads(text)) == _in_order(json.loads(as_json(values)))
 
 
 def _hash(row: tuple[Any, ...]) -> str:

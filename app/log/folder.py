@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Final
 
 from app.errors import FolderInUse
+from app.sentences import say
 
 LOCK: Final = "server.lock"
 HELD_BY_OTHER_S: Final = 5.0  # a server that is started anew waits so long for the old one's lock
@@ -26,26 +27,39 @@ class Folder:
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        self._lock = str(path / LOCK)
         self._fd: int | None = None
 
     def hold(self) -> None:
         """Makes and locks the folder; FolderInUse says who has it, OSError that it can't be made."""
-        if self._fd is not None:
+        if self._fd is not None and self._in_place(self._fd):
             return
         self.path.parent.mkdir(parents=True, exist_ok=True)
         self.path.mkdir(mode=0o700, exist_ok=True)
-        fd = os.open(self.path / LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+        fd = os.open(self._lock, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
         try:
             fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             raise FolderInUse(f"{self.path} is in use by {_holder(fd)}: give each server its own "
                               "KIOSK_DATA, and one worker") from None  # fmt: skip
         else:
+            self.release()
             self._fd, fd = fd, -1
         finally:
             if fd >= 0:
                 os.close(fd)
         self._sign(self._fd)
+
+    def check(self) -> None:
+        """FolderInUse where its lock was removed, renamed or replaced: another server may have it."""
+        if self._fd is not None and not self._in_place(self._fd):
+            raise FolderInUse(say("log_taken", name=LOCK))
+
+    def _in_place(self, fd: int) -> bool:
+        try:
+            return os.path.samestat(os.fstat(fd), os.stat(self._lock))
+        except OSError:
+            return False
 
     async def hold_soon(self) -> None:
         """The same, but waits a while for another server to end."""

@@ -7,15 +7,17 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from typing import Final
 
-from app.errors import LogCorrupt, LogError
+from app.errors import FolderInUse, LogError, LogGone
 from app.log.entry import Entry, entered
-from app.log.file import in_words, set_aside
+from app.log.file import Head, in_words
 from app.log.folder import Folder
-from app.log.store import Head, Store
+from app.log.opening import Opening, cut_off
+from app.log.store import Store
 from app.log.syncer import Syncer
-from app.log.ticket import Limits, Results, Ticket
+from app.log.ticket import Limits, Repeated, Results, Ticket
 from app.sentences import say
 
 log = logging.getLogger("kiosk.log")
@@ -24,6 +26,7 @@ TRIED_AGAIN_S: Final = (0.5, 1.0, 2.0, 4.0, 8.0)  # the last one again and again
 HOUR_S: Final = 3600.0
 CLOCK_SET_BY_S: Final = 60.0  # what moves it by more is no drift
 QUIET_S: Final = 1.0  # after so long without a press there is time for the file
+LOOKED_S: Final = 1.0  # between two looks whether the files are still in the folder
 WAL_BYTES: Final = 16_000_000  # then it can wait no longer
 TIDIED_S: Final = 0.1  # between two looks while presses come: each keeps the press from its interpreter
 CHECKPOINT_S: Final = 5.0  # between two that can't wait: a reader may hold them up
@@ -59,17 +62,17 @@ class Keeper:
         """`tell` gets, on a thread of these, what is done; and whether `fault` has changed."""
         self._folder = folder
         self._limits = limits
-        self._boot = boot
         self._mode = mode
         self._tell = tell
         self.fault = ""
+        self.displaced = False  # another server has the folder, or may
         self.head: Head | None = None
         self.tried = threading.Event()
         self._queue: queue.SimpleQueue[Ticket | None] = queue.SimpleQueue()  # None only wakes
         self._owed: deque[Entry] = deque(maxlen=MOST_OWED)
+        self._opening = Opening(folder.path, boot)
         self._store: Store | None = None
         self._began = False
-        self._corrupt = False
         self._lost_sync: LogError | None = None
         self._failures = 0
         self._fault_since = ""
@@ -135,8 +138,7 @@ class Keeper:
     def _idle_s(self) -> float:
         if self._store is None:
             return max(0.0, self._try_at - time.monotonic())
-        until_hour = max(0.0, self._hourly_at - time.monotonic())
-        return until_hour if self._fresh_wal else min(until_hour, QUIET_S)
+        return min(max(0.0, self._hourly_at - time.monotonic()), LOOKED_S, QUIET_S)
 
     def _write(self, batch: list[Ticket]) -> None:
         wanted = [ticket for ticket in batch if not ticket.abandoned]
@@ -147,7 +149,9 @@ class Keeper:
             self._fail(wanted, LogError(self.fault))
             return
         try:
+            wanted = self._new(self._store, wanted)
             sealed = self._store.append([ticket.entry for ticket in wanted])
+            self._check(self._store)
         except LogError as error:
             self._broken(error)
             self._fail(wanted, error)
@@ -160,15 +164,36 @@ class Keeper:
         if durable := [(ticket, entry) for ticket, entry in results if ticket.durable]:
             self._syncer.add(durable)
 
+    def _new(self, store: Store, tickets: Sequence[Ticket]) -> list[Ticket]:
+        """Those that are no presses which the log has already: of these it is told what it knows."""
+        new: list[Ticket] = []
+        known: Results = []
+        for ticket in tickets:
+            found = store.told(ticket.entry) if ticket.entry.is_press else []
+            if found and found[0].is_press:
+                told = [one for one in found if one.of == found[0].seq]
+                known.append((ticket, Repeated(found[0], told[-1] if told else None)))
+            else:
+                new.append(ticket)
+        self._tell(known, False)
+        return new
+
     def _fail(self, tickets: Sequence[Ticket], error: LogError) -> None:
         self._owed += [ticket.entry for ticket in tickets if ticket.entry.of is not None]
         self._tell([(ticket, error) for ticket in tickets], False)
 
+    def _check(self, store: Store) -> None:
+        """LogError unless what was written is in the folder, and the folder is this server's alone."""
+        store.check()
+        with in_words():
+            self._folder.check()
+
     def _broken(self, error: LogError) -> None:
         """From now on nothing is written, until the file could be opened again."""
         self._lost_sync = None
-        self._close()
-        self._corrupt = self._corrupt or isinstance(error, LogCorrupt)
+        self._close(complete=isinstance(error, LogGone))
+        self.displaced = isinstance(error, FolderInUse)
+        self._opening.lost(error)
         wait = TRIED_AGAIN_S[min(self._failures, len(TRIED_AGAIN_S) - 1)]
         self._failures += 1
         self._try_at = time.monotonic() + wait
@@ -182,51 +207,33 @@ class Keeper:
         try:
             with in_words():
                 self._folder.hold()
-            store, aside = self._opened()
-            self._store = store
+            self._store = store = self._opening.store(self.head)
             self._syncer.use(store)
             store.probe()
-            self._catch_up(store, aside)
+            self._catch_up(store)
+            self._check(store)
         except LogError as error:
             self._broken(error)
             return
         self._failures, self._fresh_wal, self._hourly_at = 0, False, 0.0
+        self.displaced = False
         if self.fault:
             log.info("the operator's log can be written again")
             self.fault = self._fault_since = ""
             self._tell([], True)
 
-    def _opened(self) -> tuple[Store, str]:
-        """The file; where it is damaged it is put aside, under the name that is returned."""
-        path, first = self._folder.path, self.head.seq + 1 if self.head else 1
-        try:
-            if self._corrupt:
-                raise LogCorrupt(self.fault)
-            return Store(path, self._boot), ""
-        except LogCorrupt as error:
-            name = set_aside(path)
-            log.error("the operator's log is damaged (%s): it is kept as %s", error, name)
-            self._corrupt = False
-            return Store(path, self._boot, first), name
-
-    def _catch_up(self, store: Store, aside: str) -> None:
+    def _catch_up(self, store: Store) -> None:
         """What the file has to be told before anything new."""
-        lost = self.head.seq - store.head.seq if self.head else 0
-        entries = list(self._owed)
-        if aside:
-            entries.append(entered("began", reason=say("log_began_anew", name=aside)))
-        elif lost > 0 and self.head:
-            gone = say("log_lost", first=store.head.seq + 1, last=self.head.seq)
-            log.error("%s", gone)
-            entries.append(entered("resumed", reason=gone))
+        entries = [*self._opening.first_entries(store, self.head), *self._owed]
         if not self._began:
-            entries += [_ended(entry, store.answered(entry.seq)) for entry in store.undone()]
+            entries += cut_off(store)
             values = {"mode": self._mode}
             entries.append(entered("began", values=values, reason=say("log_began")))
         if self.fault:
             text = say("log_resumed", since=self._fault_since, why=self.fault)
             entries.append(entered("resumed", reason=text))
         store.append(entries)
+        self._opening.written()
         self._owed.clear()
         self._began = True
         self.head = store.head
@@ -235,6 +242,7 @@ class Keeper:
     def _tidy(self, store: Store, quiet: bool) -> None:
         """Keeps the files small, a little at a time; says the head once an hour."""
         try:
+            self._check(store)
             self._remove_old(store)
             self._empty_wal(store, quiet)
         except LogError as error:
@@ -261,11 +269,14 @@ class Keeper:
             store.checkpoint()
             self._fresh_wal, self._checkpoint_at = True, now + CHECKPOINT_S
 
-    def _close(self) -> None:
+    def _close(self, complete: bool = False) -> None:
         self._syncer.use(None)
         if self._store is not None:
             store, self._store = self._store, None
             try:
+                if complete:
+                    with suppress(LogError):  # as far as its disk takes it
+                        store.complete()
                 store.close()
             except LogError as error:
                 log.error("the operator's log could not be closed: %s", error)
@@ -277,8 +288,3 @@ class Keeper:
         self._tell(results, False)
         self._lost_sync = next(error for _, error in results if isinstance(error, LogError))
         self._queue.put(None)
-
-
-def _ended(entry: Entry, answered: bool) -> Entry:
-    """What is to be said of a press of a server that ended before it knew."""
-    return entry.followed("corrected" if answered else "closed", "unknown", say("log_ended"))

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from app.errors import LogError
+from app.errors import LogError, SearchTooLong
 from app.log.entry import FIELDS, Entry
 from app.log.file import in_words, read_only
 
@@ -67,10 +67,17 @@ class Unended:
     accepted: bool
 
 
-def rows(folder: Path, wanted: Filter, before: int | None, count: int) -> list[Row]:
-    """The newest `count` entries before the number `before`, the newest first; LogError."""
+def rows(
+    folder: Path,
+    wanted: Filter,
+    before: int | None,
+    count: int,
+    longest_s: float = LONGEST_SEARCH_S,
+) -> list[Row]:
+    """The newest `count` entries before the number `before`, the newest first; LogError, SearchTooLong
+    where that takes longer than `longest_s`."""
     query, values = _query(wanted, before, count)
-    return [Row(Entry(*row[:-1]), row[-1]) for row in _found(folder, query, values)]
+    return [Row(Entry(*row[:-1]), row[-1]) for row in _found(folder, query, values, longest_s)]
 
 
 def unended(folder: Path, robot: str, widgets: Collection[str], since: int) -> list[Unended]:
@@ -96,16 +103,18 @@ def unended(folder: Path, robot: str, widgets: Collection[str], since: int) -> l
     return [Unended(Entry(*row[:-3]), row[-3], row[-2], bool(row[-1])) for row in found]
 
 
-def _found(folder: Path, query: str, values: Mapping[str, Any]) -> list[Any]:
+def _found(
+    folder: Path, query: str, values: Mapping[str, Any], longest_s: float = LONGEST_SEARCH_S
+) -> list[Any]:
     db = read_only(folder)
-    end = time.monotonic() + LONGEST_SEARCH_S
+    end = time.monotonic() + longest_s
     db.set_progress_handler(lambda: time.monotonic() > end, STEPS_BETWEEN_LOOKS)
     try:
         with in_words():
             return db.execute(query, values).fetchall()
     except LogError as error:
         if time.monotonic() > end:
-            raise LogError("the search took too long: give a shorter time") from error
+            raise SearchTooLong("the search took too long: give a shorter time") from error
         raise
     finally:
         db.close()

@@ -8,13 +8,12 @@ SQLite itself (WAL, synchronous = NORMAL) keeps the file whole through both.
 import os
 import sqlite3
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Literal
 
 from app.errors import LogError
 from app.log.entry import FIELDS, Entry, entered
-from app.log.file import NAME, PATIENCE_S, in_words, opened
+from app.log.file import NAME, PATIENCE_S, Files, Head, in_words, opened
 from app.sentences import say
 
 COLUMNS: Final = ", ".join(f'"{name}"' for name in FIELDS)
@@ -25,21 +24,12 @@ DAY_MS: Final = 86_400_000
 UNSET_BEFORE_MS: Final = 1_704_067_200_000  # 2024: a clock that says less was never set
 
 
-@dataclass(frozen=True, slots=True)
-class Head:
-    """The newest entry, and how many there are; `hash` is the genesis where there are none."""
-
-    seq: int
-    hash: str
-    count: int
-
-
 class Store:
     """The file, open; used by the thread that opened it, but for `sync`."""
 
-    def __init__(self, folder: Path, boot: str, first: int = 1) -> None:
-        """Raises LogError, LogCorrupt; `first` is the first entry's number where the file is new."""
-        self._db = opened(folder, first)
+    def __init__(self, folder: Path, boot: str, after: Head | None = None) -> None:
+        """Raises LogError, LogCorrupt; a new file goes on `after` an entry of another one."""
+        self._db = opened(folder, after)
         self._wal = -1
         self._boot = boot
         try:
@@ -48,6 +38,7 @@ class Store:
                 self._db.execute("INSERT OR REPLACE INTO about VALUES ('opened', ?)", (boot,))
                 self._wal = os.open(folder / f"{NAME}-wal", os.O_RDONLY | os.O_CLOEXEC)
                 _sync_folder(folder)
+                self._files = Files(folder)
         except BaseException:
             self.close()
             raise
@@ -57,6 +48,7 @@ class Store:
         newest = self._db.execute("SELECT seq, hash FROM entry ORDER BY seq DESC LIMIT 1").fetchone()
         oldest = self._db.execute("SELECT seq FROM entry ORDER BY seq LIMIT 1").fetchone()
         before = (int(about["first"]) - 1, str(about["genesis"]))
+        self.was_there = about.get("opened", self._boot) != self._boot  # before this server
         self._seq: int
         self._hash: str
         self._seq, self._hash = newest or before
@@ -65,6 +57,11 @@ class Store:
     @property
     def head(self) -> Head:
         return Head(self._seq, self._hash, self._seq - self._oldest + 1)
+
+    def check(self) -> None:
+        """LogError unless what is written goes to the files that are in the folder."""
+        with in_words():
+            self._files.check()
 
     def append(self, entries: Sequence[Entry]) -> list[Entry]:
         """Writes them in one commit, and returns them as they stand in the file."""
@@ -82,6 +79,16 @@ class Store:
                 f"SELECT {COLUMNS} FROM entry WHERE boot <> ? AND seq IN (SELECT seq FROM undone)"
                 " ORDER BY seq",
                 (self._boot,),
+            ).fetchall()
+        return [Entry(*row) for row in rows]
+
+    def told(self, press: Entry) -> list[Entry]:
+        """All that the log has of the press with this id on this robot, the oldest first."""
+        with in_words():
+            rows = self._db.execute(
+                f"SELECT {COLUMNS} FROM entry WHERE press = ? AND press <> '' AND robot = ?"
+                " AND action = 'press' ORDER BY seq",
+                (press.press, press.robot),
             ).fetchall()
         return [Entry(*row) for row in rows]
 
@@ -203,6 +210,11 @@ class Store:
             finally:
                 self._db.execute(f"PRAGMA busy_timeout = {int(PATIENCE_S * 1000)}")
             self._db.execute("UPDATE about SET value = ? WHERE key = 'opened'", (self._boot,))
+
+    def complete(self) -> None:
+        """Takes all that is beside the file into it, also where it is in the folder no more."""
+        with in_words():
+            self._db.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchall()
 
     def close(self) -> None:
         """Closes the file, whatever state it is in."""

@@ -16,6 +16,16 @@ class Limits:
     required: bool = True
 
 
+class Repeated(Exception):
+    """A press whose id the log has already: its entry `press`, and `told`, what was said of it last;
+    None where nothing was."""
+
+    def __init__(self, press: Entry, told: Entry | None) -> None:
+        super().__init__(f"press {press.press} is entry {press.seq}")
+        self.press = press
+        self.told = told
+
+
 @dataclass(slots=True, eq=False)
 class Ticket:
     """An entry to be written; `result` is the one that stands in the file, or why there is none.
@@ -26,7 +36,7 @@ class Ticket:
 
     entry: Entry
     waiter: "asyncio.Future[None]"
-    result: Entry | LogError | None = None
+    result: Entry | LogError | Repeated | None = None
     abandoned: bool = False
 
     def wake(self) -> None:
@@ -39,4 +49,4 @@ class Ticket:
         return self.entry.kind != "pressed"
 
 
-Results = list[tuple[Ticket, Entry | LogError]]
+Results = list[tuple[Ticket, Entry | LogError | Repeated]]

@@ -5,10 +5,12 @@ from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from app.errors import FolderInUse, LogError
 from app.log.entry import Entry, Origin
+from app.log.file import Head
 from app.log.folder import Folder
 from app.log.reading import Unended
-from app.log.store import Head
+from app.sentences import say
 
 log = logging.getLogger("kiosk.log")
 
@@ -53,10 +55,21 @@ class Unlogged:
         return []
 
     async def pressed(self, entry: Entry) -> Entry | None:
+        """LogError where another server took the folder meanwhile."""
+        if self._folder is not None:
+            try:
+                self._folder.hold()
+            except FolderInUse as error:
+                raise LogError(say("folder_taken", why=error)) from error
+            except OSError as error:
+                log.warning("a second server would not be noticed: %s", error)
         return None
 
     async def closed(self, entry: Entry) -> str:
         return ""
+
+    def close(self) -> None:
+        """Nobody reads it."""
 
     def add(self, entry: Entry) -> None:
         """It is not kept."""

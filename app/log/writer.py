@@ -12,30 +12,28 @@ import logging
 import secrets
 from collections.abc import Callable, Collection, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager, suppress
-from functools import partial
+from contextlib import AbstractAsyncContextManager, contextmanager, suppress
 from pathlib import Path
-from typing import Final, TypeVar
+from typing import Final
 
 from app.errors import LogError
 from app.log.entry import Entry, Origin
+from app.log.file import Head
 from app.log.folder import Folder
 from app.log.keeper import Keeper
-from app.log.reading import Filter, Row, Unended, rows, unended
+from app.log.process import ReaderProcess
+from app.log.readers import Readers
+from app.log.reading import Filter, Row, Unended
 from app.log.refusals import SUMMED_UP_S, Refusals
-from app.log.store import Head
 from app.log.ticket import Limits, Results, Ticket
 from app.sentences import say
 
 log = logging.getLogger("kiosk.log")
 
-READERS: Final = 2
 MOST_WAITING: Final = 1000
 PRESSED_WITHIN_S: Final = 2.0  # an entry that takes longer is a press that is not sent
 CLOSED_WITHIN_S: Final = 3.0  # a receipt does not wait longer: it says that it is not on the disk
 ENDED_WITHIN_S: Final = 10.0
-
-Read = TypeVar("Read")
 
 
 class OperatorLog:
@@ -46,7 +44,7 @@ class OperatorLog:
         self._limits = limits
         self._folder = Folder(folder)
         self._changed: set[Callable[[], None]] = set()
-        self._readers = ThreadPoolExecutor(READERS, "operators-log-reader")
+        self._readers = Readers(folder)
         self._stuck: set[Ticket] = set()
         self._loop = asyncio.get_running_loop()
         self._refusals = Refusals()
@@ -67,7 +65,7 @@ class OperatorLog:
             self._telling.cancel()
             self._add_left_out()
         await self._own(self._keeper.stop)
-        self._readers.shutdown(wait=False, cancel_futures=True)
+        self._readers.stop()
         self._folder.release()
 
     async def _own(self, wait: Callable[[float], object]) -> None:
@@ -92,7 +90,7 @@ class OperatorLog:
     def fault(self) -> str:
         """The sentence that says that the log can't be written; "" while it can."""
         why = self._why
-        sentence = "log_unwritable" if self._limits.required else "log_unwritable_free"
+        sentence = "log_unwritable" if self._needed else "log_unwritable_free"
         return say(sentence, why=why) if why else ""
 
     @property
@@ -104,7 +102,12 @@ class OperatorLog:
     @property
     def lock(self) -> str:
         """Why nothing may be pressed; "" while it may."""
-        return self.fault if self._limits.required else ""
+        return self.fault if self._needed else ""
+
+    @property
+    def _needed(self) -> bool:
+        """Whether nothing is sent that is not logged."""
+        return self._limits.required or self._keeper.displaced
 
     @contextmanager
     def followed(self, changed: Callable[[], None]) -> Iterator[None]:
@@ -118,12 +121,13 @@ class OperatorLog:
     async def pressed(self, entry: Entry) -> Entry | None:
         """Writes the entry of a press that is about to be sent, and returns it as it stands.
 
-        Raises LogError when it can't be written and must be; where it need not be, None.
+        Raises LogError when it can't be written and must be; where it need not be, None. Repeated
+        where the log has a press of this id: nothing is written then.
         """
         try:
             return await self._written(entry)
         except LogError as error:
-            if self._limits.required:
+            if self._needed:
                 raise LogError(self.fault or say("log_unwritable", why=error)) from error
             return None
 
@@ -170,21 +174,25 @@ class OperatorLog:
             self._keeper.add(Ticket(entry, self._loop.create_future()), None)
 
     async def rows(self, wanted: Filter, before: int | None, count: int) -> list[Row]:
-        """The newest entries that are wanted before a number; LogError when they can't be read."""
-        return await self._read(partial(rows, self.folder, wanted, before, count))
+        """The newest entries that are wanted before a number; LogError, TooMany."""
+        return await self._readers.rows(wanted, before, count)
+
+    def export(
+        self, wanted: Filter, before: int | None, gzip: bool
+    ) -> AbstractAsyncContextManager[ReaderProcess]:
+        """All that is wanted before a number, as CSV, while this lasts; LogError, TooMany."""
+        return self._readers.export(wanted, before, gzip)
+
+    def close(self) -> None:
+        """The server is about to end: it waits for nobody who reads."""
+        self._readers.close()
 
     async def unended(self, robot: str, widgets: Collection[str], since: int) -> list[Unended]:
         """Presses of these widgets, not before `since` (ms), of which the end is not known, the newest
         first; LogError when that can't be read, or what was cut off is not closed yet."""
         if self.head is None:
             raise LogError(say("log_unreadable", why=self._why or say("log_closed")))
-        return await self._read(partial(unended, self.folder, robot, widgets, since))
-
-    async def _read(self, read: Callable[[], Read]) -> Read:
-        try:
-            return await self._loop.run_in_executor(self._readers, read)
-        except LogError as error:
-            raise LogError(say("log_unreadable", why=error)) from error
+        return await self._readers.unended(robot, widgets, since)
 
     async def _written(self, entry: Entry) -> Entry:
         if why := self._why:
@@ -207,9 +215,9 @@ class OperatorLog:
             self._stuck.add(ticket)
             self._say_changed()
             raise LogError(say("log_slow", seconds=f"{seconds:g}"))
-        if isinstance(ticket.result, LogError):
-            raise ticket.result
-        return ticket.result
+        if isinstance(ticket.result, Entry):
+            return ticket.result
+        raise ticket.result
 
     def _close_abandoned(self, ticket: Ticket) -> None:
         """A press that nobody waits for any more may have been written all the same."""

@@ -23,6 +23,7 @@ REASONS: Final = {
     408: "the body took too long",
     413: "the body is too large",
     422: "it is not what this description says",
+    429: "others do that already; `Retry-After` says when to try again",
     503: "the operator's log can't be read",
 }
 PAGE: Final = {"text/html": {"schema": TEXT}}

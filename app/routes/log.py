@@ -1,39 +1,40 @@
 """The operator's log, to read, to filter and to take away as CSV."""
 
-import csv
-import io
+import asyncio
 import json
-from collections.abc import AsyncIterator
-from datetime import UTC, datetime
+import logging
+from contextlib import AsyncExitStack
+from dataclasses import replace
+from datetime import datetime
 from typing import Annotated, Final, TypedDict
 from urllib.parse import urlencode
 
-from fastapi import APIRouter, Query
-from fastapi.responses import HTMLResponse, Response, StreamingResponse
+from fastapi import APIRouter, Query, Request
+from fastapi.responses import HTMLResponse, Response
 from pydantic import BaseModel, ConfigDict, Field, JsonValue
+from starlette.types import Message, Receive, Scope, Send
 
-from app.errors import InputError, NotFound
-from app.log import Filter, OperatorLog, Row
+from app.errors import InputError, LogError, NotFound
+from app.log import Entry, Filter, OperatorLog, ReaderProcess, Row
 from app.panel.model import Hold, Input, Panel, Pressed
 from app.panel.parameter import Parameter
+from app.printable import printable, printable_texts
+from app.routes.described import TEXT, errors
 from app.routes.site import CurrentSite, Site
 from app.sentences import say
+
+log = logging.getLogger("kiosk.log")
 
 router = APIRouter()
 
 ROWS_ON_PAGE: Final = 50
-ROWS_AT_ONCE: Final = 500
 OUTCOMES: Final = (
     "published", "confirmed", "accepted", "succeeded", "rejected", "canceled", "aborted", "timed_out",
     "refused", "unknown", "pressed", "began", "resumed", "removed",
 )  # fmt: skip
-# What a spreadsheet would take as a formula.
-FORMULA: Final = ("=", "+", "-", "@", "\t", "\r")
-CSV_FIELDS: Final = (
-    "seq", "at", "boot", "monotonic", "kind", "of", "pressed_at", "address", "browser", "who", "robot",
-    "press", "widget", "action", "values", "seen", "verdict", "board", "outcome", "reason", "prev",
-    "hash",
-)  # fmt: skip
+TAKEN_WITHIN_S: Final = 20.0  # a piece of an export: another one may be waited for
+START: Final = "http.response.start"
+BODY: Final = "http.response.body"
 
 
 # For who writes programs; what is no time of the calendar is refused with a sentence.
@@ -83,6 +84,7 @@ class LogContext(TypedDict):
     site: Site
     panel: Panel
     wanted: Wanted
+    typed: dict[str, str]
     rows: list[Row]
     labels: dict[str, str]
     inputs: dict[str, str]
@@ -95,18 +97,24 @@ class LogContext(TypedDict):
     csv: str
 
 
-@router.get("/log", response_class=HTMLResponse, summary="The operator's log, the newest first")
+@router.get(
+    "/log",
+    response_class=HTMLResponse,
+    summary="The operator's log, the newest first",
+    responses=errors(403, 422, 429, 503),
+)
 async def page(site: CurrentSite, wanted: Annotated[Wanted, Query()]) -> Response:
     rows: list[Row] = []
     if isinstance(site.log, OperatorLog):
         rows = await site.log.rows(wanted.filter(), wanted.before, ROWS_ON_PAGE + 1)
     more = len(rows) > ROWS_ON_PAGE
-    rows = rows[:ROWS_ON_PAGE]
+    rows = [_shown(row) for row in rows[:ROWS_ON_PAGE]]
     panel = site.fleet.panel
     context = LogContext(
         site=site,
         panel=panel,
         wanted=wanted,
+        typed=printable_texts(wanted.model_dump()),
         rows=rows,
         labels={w.id: w.label for w in panel.widgets() if isinstance(w, Pressed | Hold)},
         inputs={w.id: w.label for w in panel.widgets() if isinstance(w, Input | Parameter)},
@@ -128,45 +136,69 @@ async def page(site: CurrentSite, wanted: Annotated[Wanted, Query()]) -> Respons
     "/log.csv",
     response_class=Response,
     summary="What the filter shows, as CSV",
-    responses={200: {"content": {"text/csv": {}}}},
+    responses=errors(403, 404, 422, 429, 503) | {200: {"content": {"text/csv": {"schema": TEXT}}}},
 )
-async def as_csv(site: CurrentSite, wanted: Annotated[Wanted, Query()]) -> Response:
+async def as_csv(request: Request, site: CurrentSite, wanted: Annotated[Wanted, Query()]) -> Response:
     if not isinstance(site.log, OperatorLog):
         raise NotFound(say("log_off"))
-    first = await site.log.rows(wanted.filter(), wanted.before, ROWS_AT_ONCE)
-    name = f"operators-log-{datetime.now().strftime('%Y%m%d-%H%M%S')}.csv"
-    headers = {"content-disposition": f'attachment; filename="{name}"', "cache-control": "no-store"}
-    lines = _lines(site.log, wanted.filter(), first)
-    return StreamingResponse(lines, media_type="text/csv; charset=utf-8", headers=headers)
+    gzip = "gzip" in request.headers.get("accept-encoding", "")
+    async with AsyncExitStack() as opened:
+        export = await opened.enter_async_context(site.log.export(wanted.filter(), wanted.before, gzip))
+        first = await export.start()
+        return Exported(export, first, gzip, opened.pop_all())
 
 
-async def _lines(log: OperatorLog, wanted: Filter, rows: list[Row]) -> AsyncIterator[bytes]:
-    """RFC 4180 with a byte order mark, some rows at a time; nothing is open in between."""
-    yield "\ufeff".encode() + _csv([CSV_FIELDS])
-    while rows:
-        yield _csv([_cells(row) for row in rows])
-        if len(rows) < ROWS_AT_ONCE:
-            break
-        rows = await log.rows(wanted, rows[-1].entry.seq, ROWS_AT_ONCE)
+class Exported(Response):
+    """An export, handed on piece by piece. One that breaks off, or that nobody takes, is not brought to
+    its end, so that no client takes it for whole."""
+
+    media_type = "text/csv"
+
+    def __init__(self, export: ReaderProcess, first: bytes, gzip: bool, opened: AsyncExitStack) -> None:
+        """`opened` is closed when it is over."""
+        name = f"operators-log-{datetime.now().strftime('%Y%m%d-%H%M%S')}.csv"
+        headers = {"content-disposition": f'attachment; filename="{name}"', "cache-control": "no-store"}
+        if gzip:
+            headers |= {"content-encoding": "gzip", "vary": "accept-encoding"}
+        self._export = export
+        self._first = first
+        self._opened = opened
+        self.status_code = 200
+        self.background = None
+        self.init_headers(headers)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        async with self._opened, asyncio.TaskGroup() as group:
+            going = group.create_task(self._gone(receive))
+            try:
+                await self._send(send, going)
+            except TimeoutError:
+                log.warning("an export of the operator's log was not taken for %g s", TAKEN_WITHIN_S)
+            except LogError as error:
+                if not going.done():
+                    log.warning("an export of the operator's log broke off: %s", error)
+            going.cancel()
+
+    async def _send(self, send: Send, going: "asyncio.Task[None]") -> None:
+        await _taken(send, {"type": START, "status": 200, "headers": self.raw_headers})
+        piece = self._first
+        while piece and not going.done():
+            await _taken(send, {"type": BODY, "body": piece, "more_body": True})
+            piece = await self._export.more()
+        await self._opened.aclose()  # who has it whole may ask for the next
+        await _taken(send, {"type": BODY, "body": b"", "more_body": False})
+
+    async def _gone(self, receive: Receive) -> None:
+        """Until who asked is gone."""
+        while (await receive())["type"] != "http.disconnect":
+            pass
+        self._export.cut()
 
 
-def _cells(row: Row) -> tuple[str, ...]:
-    return tuple(_cell(name, row) for name in CSV_FIELDS)
-
-
-def _cell(name: str, row: Row) -> str:
-    value = row.pressed_at if name == "pressed_at" else getattr(row.entry, name)
-    if value is None:
-        return ""
-    if name in ("at", "pressed_at"):
-        return _time(value).astimezone(UTC).isoformat(timespec="milliseconds")
-    return f"'{value}" if str(value).startswith(FORMULA) else str(value)
-
-
-def _csv(lines: list[tuple[str, ...]]) -> bytes:
-    text = io.StringIO()
-    csv.writer(text).writerows(lines)
-    return text.getvalue().encode()
+async def _taken(send: Send, message: Message) -> None:
+    """TimeoutError where nobody takes it."""
+    async with asyncio.timeout(TAKEN_WITHIN_S):
+        await send(message)
 
 
 def _time(ms: int) -> datetime:
@@ -181,10 +213,22 @@ def _word(name: str, **about: object) -> str:
     return say(f"log_page_{name}", **about)
 
 
+def _shown(row: Row) -> Row:
+    """With its texts as a page shows them, but its values: those are JSON still."""
+    cells = (
+        printable(cell) if isinstance(cell, str) and name != "values" else cell
+        for name, cell in row.entry._asdict().items()
+    )
+    return replace(row, entry=Entry._make(cells))
+
+
 def _values_of(text: str) -> list[tuple[str, str]]:
     """The values of an entry as (name, text), but those that are empty."""
     return [
-        (name, value if isinstance(value, str) else json.dumps(value, ensure_ascii=False))
+        (
+            printable(name),
+            printable(value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)),
+        )
         for name, value in json.loads(text).items()
         if value != ""
     ]

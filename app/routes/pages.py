@@ -19,6 +19,7 @@ from app.kiosk import Kiosk
 from app.panel.model import Input, Page, Panel, Pressed
 from app.panel.parameter import Parameter
 from app.panel.template import inputs_of
+from app.printable import printable_texts
 from app.receipts import Receipt
 from app.routes.described import PAGE, Described, errors
 from app.routes.site import CurrentSite, Site
@@ -179,7 +180,7 @@ def _context(
         loaded=moment(wall),
         press_id=secrets.token_hex(8),
         receipt=receipt,
-        inputs=dict(receipt.entered) if receipt else {},
+        inputs=dict(receipt.entered) | printable_texts(receipt.entered) if receipt else {},
         words=_words(kiosk, page),
         lost=say("server_lost"),
         lost_short=say("lost"),

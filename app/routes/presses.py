@@ -19,6 +19,7 @@ from app.kiosk import Kiosk
 from app.logbook import origin_of
 from app.panel.model import Page
 from app.press_limits import RETRY_AFTER_S
+from app.printable import printable_texts
 from app.receipts import Receipt
 from app.routes.described import (
     FORM,
@@ -220,6 +221,7 @@ def _ask(site: Site, kiosk: Kiosk, widget: str, inputs: dict[str, str]) -> Respo
             "_until": str(round(moments.now() + ASKED_S, 3)),
             "_since": str(round(moments.now(), 3)),
         },
+        typed=printable_texts(inputs),
         no=say("back"),
         empty=say("empty"),
         label=pressed.label,

@@ -12,13 +12,14 @@ from starlette.requests import HTTPConnection
 
 from app.assets import Assets
 from app.browsers import Browsers
-from app.errors import KioskError, TooSlow
+from app.errors import KioskError, TooMany, TooSlow
 from app.fleet import Fleet
 from app.kiosk import Kiosk
 from app.log import OperatorLog, Unlogged
 from app.metrics import Metrics
 from app.owed import Owed
 from app.press_limits import PressLimits
+from app.printable import printable
 
 
 @dataclass(slots=True)
@@ -80,6 +81,8 @@ async def on_kiosk_error(request: Request, error: Exception) -> Response:
     answer = error_answer(request, status, str(error))
     if isinstance(error, TooSlow):
         answer.headers["connection"] = "close"  # nobody waits for the rest
+    if isinstance(error, TooMany):
+        answer.headers["retry-after"] = str(error.again_s)
     return answer
 
 
@@ -101,6 +104,7 @@ async def on_http_error(request: Request, error: Exception) -> Response:
     """Starlette's own: no such path, wrong method, body too large."""
     if not isinstance(error, HTTPException):
         raise error
-    answer = error_answer(request, error.status_code, f"{error.detail}: {request.url.path}")
+    message = printable(f"{error.detail}: {request.url.path}")
+    answer = error_answer(request, error.status_code, message)
     answer.headers.update(error.headers or {})
     return answer

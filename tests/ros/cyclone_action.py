@@ -55,7 +55,7 @@ class Fibonacci:
 
     def __init__(self, node: Node, name: str = "/fibonacci") -> None:
         self.step_s = 0.05
-        self.refuse_cancels = False
+        self.refuse_cancels = ""  # as "rclcpp" does, with its return code, or as "rclpy", with 0
         self.answer_goals = True
         self.keep_s = 10.0
         self._goals: dict[bytes, Goal] = {}
@@ -142,7 +142,8 @@ class Fibonacci:
             if wanted != EVERY_GOAL and not chosen:
                 code = CANCEL_ENDED if known else CANCEL_UNKNOWN_ID
             elif self.refuse_cancels:
-                code, chosen = CANCEL_REFUSED, []
+                code = CANCEL_REFUSED if self.refuse_cancels == "rclcpp" else CANCEL_OK
+                chosen = []
             for goal in chosen:
                 self._move(goal, CANCELING)
                 goal.ending = CANCELED
