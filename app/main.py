@@ -172,7 +172,9 @@ async def _running(
 ) -> AsyncIterator[tuple[Fleet, Assets]]:
     """The robots that the panel is for: the real ones, or demo robots of its own."""
     demo = (settings.mode or panel.mode) == "demo"
-    kinds = {widget.kind for widget in panel.widgets()}
+    kinds: set[str] = {widget.kind for widget in panel.widgets()}
+    if any(len(widget.interlocks) > 1 for widget in panel.commands):
+        kinds.add("interlocks")
     assets = load_assets(shipped("static"), shipped("templates"), panel.mm_per_px, kinds)
     revision = f"{panel.revision}-{assets.revision}"
     if settings.dev:

@@ -85,7 +85,7 @@ def test_a_file_becomes_descriptions(load: Load) -> None:
     assert kinds == [TextInput, Publish, Publish, Readout]
     guarded = list(panel.widgets())[2]
     assert isinstance(guarded, Publish)
-    assert (guarded.topic, guarded.type, guarded.interlock) == ("/guarded", TEXT, "operation")
+    assert (guarded.topic, guarded.type, guarded.interlocks) == ("/guarded", TEXT, ("operation",))
     assert guarded.message == {"data": "{message}"}
 
 
@@ -135,7 +135,7 @@ def test_pages_and_interlocks_are_found_by_id(load: Load) -> None:
     assert panel.page("one") is panel.pages[0]
     assert panel.page("two") is None
     assert panel.interlock("operation") is panel.interlocks[0]
-    assert panel.interlock(None) is None
+    assert panel.interlock("other") is None
 
 
 def test_the_revision_changes_with_the_file(load: Load) -> None:

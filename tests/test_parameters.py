@@ -110,7 +110,7 @@ class Bench:
 
     def reason(self, name: str = "speed") -> str:
         one = next(w for w in self.panel.parameters() if w.id == name)
-        return press_verdict(one, None, self.robot, NOW).reason or ""
+        return press_verdict(one, (), self.robot, NOW).reason or ""
 
 
 def run(test: Callable[[Bench], Coroutine[Any, Any, None]], *widgets: Table) -> None:

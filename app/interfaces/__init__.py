@@ -5,7 +5,7 @@ actions, packages from files, defaults, and the codec with checks that name the 
 """
 
 from app.interfaces.composition import ActionTypes
-from app.interfaces.definitions import INTEGERS, PLACEHOLDER, Field, Structure, Type
+from app.interfaces.definitions import INTEGERS, PLACEHOLDER, TEXTS, Field, Structure, Type
 from app.interfaces.distributions import DISTROS, read_distribution
 from app.interfaces.paths import value_at
 from app.interfaces.plain import text_of, to_plain
@@ -15,6 +15,7 @@ __all__ = [
     "DISTROS",
     "INTEGERS",
     "PLACEHOLDER",
+    "TEXTS",
     "ActionTypes",
     "Field",
     "Interfaces",

@@ -85,11 +85,15 @@ class Interfaces:
 
     def field_type(self, type_name: str, path: str) -> str:
         """The type at a path ("pose.position.x", "poses[0]"), as in a .msg file ("float64[36]")."""
+        return str(self.type_at(type_name, path))
+
+    def type_at(self, type_name: str, path: str) -> Type:
+        """The same; InterfaceError where the type has no such field."""
         self.require(type_name)
         at = Type(type_name)
         for step in steps(path):
             at = self._named(at, step, path) if isinstance(step, str) else _indexed(at, step, path)
-        return str(at)
+        return at
 
     def type_hash(self, type_name: str) -> str:
         """The REP 2016 type hash, `RIHS01_…`, as the robot's own nodes compute it.

@@ -69,6 +69,21 @@ def _folder(given: Any, info: ValidationInfo) -> Path:
     return folder
 
 
+def _interlocks(given: Any) -> tuple[str, ...]:
+    """One id, or a list of them."""
+    named = [given] if isinstance(given, str) else given
+    if not isinstance(named, list | tuple):
+        raise ValueError(f"must be the id of an interlock, or a list of ids, not {given!r}")
+    if not named:
+        raise ValueError("is an empty list: name an interlock, or leave the key out")
+    for i, one in enumerate(named):
+        if not isinstance(one, str) or not re.fullmatch(ID, one):
+            raise ValueError(f'"{one}" is not an id: a-z, 0-9 and "_", a letter first')
+        if one in named[:i]:
+            raise ValueError(f'names "{one}" twice')
+    return tuple(named)
+
+
 def some(given: tuple[Any, ...]) -> tuple[Any, ...]:
     """A list of tables that can't be empty."""
     if not given:
@@ -84,6 +99,7 @@ ENDPOINT: Final = re.compile(
 MOST_PORT: Final = 65535
 ID: Final = r"^[a-z][a-z0-9_]{0,63}$"
 Id = Annotated[str, Field(pattern=ID)]
+Interlocks = Annotated[tuple[str, ...], BeforeValidator(_interlocks)]
 Label = Annotated[str, Field(min_length=1, max_length=120)]
 Span = Annotated[int, Field(ge=1, le=12)]
 Topic = Annotated[str, AfterValidator(_topic), Field(max_length=255)]

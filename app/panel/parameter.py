@@ -6,7 +6,7 @@ from pydantic import AfterValidator, Field
 
 from app.interfaces.scalars import shown
 from app.keys import TOPIC
-from app.panel.description import Id, Label, Seconds, Span
+from app.panel.description import Interlocks, Label, Seconds, Span
 from app.panel.inputs import Number, Stepped, Unit
 from app.panel.ranges import decimal
 from app.sentences import say
@@ -44,7 +44,7 @@ class Parameter(Stepped):
     step: Annotated[Number, Field(gt=0)] | None = None
     on: Label = say("on")
     off: Label = say("off")
-    interlock: Id | None = None
+    interlocks: Interlocks = Field(default=(), alias="interlock")
     timeout_s: Seconds = 5.0
     confirm_press: bool = False
     span: Span = 6
