@@ -16,7 +16,7 @@ from app.panel.interlock import Interlock
 from app.panel.model import Panel
 from app.panel.parameter import EVENTS
 from app.parameters import Parameters
-from app.robot import Robot, Sample, value_of
+from app.robot import Reading, Robot, Sample
 from app.views import Enabled, enabled
 
 if TYPE_CHECKING:
@@ -107,9 +107,13 @@ class Intake:
         self._guarded(key, sample, self._sample)
         if before != [self._said(one) for one in interlocks]:
             return "now"
+        return self._change(key, shown)
+
+    def _change(self, key: str, shown: Mapping[str, Enabled]) -> Change:
         now = time.monotonic()
         changes = [
-            _change(interlock_verdict(one, self._robot, now), shown[one.id]) for one in interlocks
+            _change(interlock_verdict(one, self._robot, now), shown[one.id])
+            for one in self._interlocks.get(key, ())
         ]
         return "now" if "now" in changes else "soon" if "soon" in changes else ""
 
@@ -118,7 +122,7 @@ class Intake:
         reading = self._robot.reading(interlock.topic)
         if reading.status != "message":
             return False
-        return permits(interlock, value_of(reading.message, interlock.field))
+        return permits(interlock, reading.value(interlock.field))
 
     def _record(self, changes: Changes) -> None:
         if self._recorder is not None:
@@ -140,7 +144,14 @@ class Intake:
             if key == self._events:
                 self._parameters.hear(sample)
             self._robot.take(key, sample)
-            self._confirmations.hear(key)
+            if self._confirmations.awaits(key):
+                self._confirmations.hear(key, self._robot.reading_of(key))
+
+    def read(self, key: str, reading: Reading, shown: Mapping[str, Enabled]) -> Change:
+        """A message that took more than one turn is read: whether a permission may be another one by it
+        than is shown."""
+        self._confirmations.hear(key, reading)
+        return self._change(key, shown)
 
     def _tokens(self, tokens: Mapping[str, Token]) -> bool:
         """Takes them in; whether there is a bridge where there was none."""
@@ -176,6 +187,7 @@ class Intake:
             silent.appeared(endpoint, token.came_seq, token.came_at, token.lost_before)
         if token.lost_seq:
             silent.lost(endpoint, token.lost_seq)
+
 
 def _change(verdict: Verdict, shown: Enabled) -> Change:
     """A reason with the robot's value in it may change as often as a readout, and waits as one."""

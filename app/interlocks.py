@@ -8,7 +8,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any, Final
+from typing import Final
 
 from app.conditions import permits, unmet
 from app.declared import UNKNOWN, Declared, allowed, limits_text, own_range
@@ -18,7 +18,7 @@ from app.panel.interlock import Interlock
 from app.panel.model import Action, Call, Display, Hold, Pressed, Publish, Published
 from app.panel.parameter import DESCRIBE, GET, SET, Parameter
 from app.progress import IDLE
-from app.robot import Robot, value_of
+from app.robot import Reading, Robot
 from app.sentences import say
 
 
@@ -99,9 +99,8 @@ def interlock_verdict(interlock: Interlock, robot: Robot, now: float) -> Verdict
         return locked(reading.status, topic=topic, wanted=interlock.type)
     if robot.silent.any(key, robot.graph.bridges):
         return locked("new_publisher", topic=topic)
-    value = value_of(reading.message, interlock.field)
-    if not permits(interlock, value):
-        return _forbidden(interlock, value)
+    if not permits(interlock, reading.value(interlock.field)):
+        return _forbidden(interlock, reading)
     if interlock.max_age_s is None:
         return PERMITTED
     if reading.at < robot.settled_at + HISTORY_S:
@@ -112,7 +111,10 @@ def interlock_verdict(interlock: Interlock, robot: Robot, now: float) -> Verdict
     return Verdict(True, until=stale_at)
 
 
-def _forbidden(interlock: Interlock, value: Any) -> Verdict:
+def _forbidden(interlock: Interlock, reading: Reading) -> Verdict:
+    value = reading.value(interlock.field)
+    if reading.several(interlock.field):
+        return locked("several", field=interlock.field, topic=interlock.topic)
     if value is None:
         return locked("missing", field=interlock.field, topic=interlock.topic)
     if not interlock.conditions:

@@ -30,10 +30,11 @@ from app.parameters import Parameters
 from app.presses import Presses
 from app.pulse import Pulse
 from app.resuming import Resuming
-from app.robot import Robot
+from app.robot import Reading, Robot
 from app.rosout import Rosout
 from app.sending import Sending
 from app.showing import Alone, Others, Showing
+from app.slices import Slices
 
 if TYPE_CHECKING:
     from app.recording import Recorder, Recordings
@@ -57,6 +58,7 @@ class Kiosk:
         entry: RobotEntry | None = None,
         others: Others = ALONE,
         recordings: "Recordings | None" = None,
+        slices: Slices | None = None,
         simulated: bool = False,
         fault: str = "",
     ) -> None:
@@ -71,8 +73,9 @@ class Kiosk:
         self.interfaces = interfaces_of(panel.distro, panel.interfaces)
         self._loop = asyncio.get_running_loop()
         self.link = Link(config, self._wake)
-        self.robot = Robot(panel, self.interfaces, self.link.zid, entry)
+        self.robot = Robot(panel, self.interfaces, self.link.zid, entry, slices)
         self.robot.endpoints = self.link.endpoints
+        self.robot.read_later = self._read_later
         self._log = RobotLog(log, self.robot.name)
         self.control = Control(panel.control, self.robot.name, tell=self._log.info)
         self.showing = Showing(
@@ -297,6 +300,18 @@ class Kiosk:
             self.showing.soon()
         elif news.values:
             self.showing.values(news.values)
+
+    def _read_later(self, key: str, reading: Reading) -> None:
+        """What was too large for one turn is read."""
+        if self._stopped:
+            return
+        match self._intake.read(key, reading, self.board.view["interlocks"]):
+            case "now":
+                self.show()
+            case "soon":
+                self.showing.soon()
+            case _:
+                self.showing.values({key})
 
     def _follow(self, came: bool) -> None:
         """After every change of the graph; `came`: there is a bridge where there was none."""

@@ -17,7 +17,7 @@ from app import keys
 from app.calls import LONGEST_SAID, Asker, Calls, Request
 from app.declared import UNKNOWN, Declared, Value, checked, declared, name_of, value_in, wire
 from app.errors import DecodeError
-from app.interfaces import Interfaces, text_of
+from app.interfaces import Fields, Interfaces, text_of
 from app.interlocks import parameters_offered
 from app.logs import RobotLog
 from app.panel.model import Panel
@@ -33,6 +33,7 @@ log = logging.getLogger("kiosk.parameters")
 FAILED: Final = "following a node's parameters failed"
 CONFIRM_S: Final = 3.0  # after which the bridge surely brings the events of a node that appeared
 AGAIN_S: Final = 1.0  # between two readings at least, and before the first try again
+SET_PATHS: Final = ("results[0].successful", "results[0].reason", "results[1].successful")
 AGAIN_MOST_S: Final = 600.0  # the pause between tries doubles up to this
 
 
@@ -217,7 +218,7 @@ class Parameters:
         fields = {"parameters": [{"name": widget.parameter, "value": wire(widget, value)}]}
         payload = self._interfaces.encode(self._interfaces.service(type_name)[0], fields)
         name, read = f"{widget.node}/{service}", partial(_answer, widget, value)
-        request = Request(widget.id, name, type_name, payload, widget.timeout_s, read)
+        request = Request(widget.id, name, type_name, payload, widget.timeout_s, SET_PATHS, read)
         node = self._nodes[widget.node]
 
         def late(press_id: str, answer: Answer) -> None:
@@ -249,15 +250,15 @@ class Parameters:
         self._learn_all(node, lambda known: replace(known, state="silent"))
 
 
-def _answer(widget: Parameter, value: Value, response: Any) -> Answer:
+def _answer(widget: Parameter, value: Value, response: Fields) -> Answer:
     """What a response of SetParameters says of the one parameter that was to be set."""
     now = clock(time.time())
-    if len(response.results) != 1:
+    successful, reason, second = (response.get(path) for path in SET_PATHS)
+    if successful is None or second is not None:
         return Answer("unknown", say("answer_unreadable", wanted=SET[1]))
-    result = response.results[0]
-    if result.successful:
+    if successful:
         return Answer("succeeded", say("parameter_set", value=widget.written(value), time=now))
-    said = f": {text_of(result.reason, LONGEST_SAID)}" if result.reason else "."
+    said = f": {text_of(reason, LONGEST_SAID)}" if reason else "."
     return Answer("rejected", say("said_no", time=now) + said)
 
 

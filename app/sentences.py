@@ -29,6 +29,8 @@ ENGLISH: Final[Mapping[str, str]] = {
     "no_publisher": "Locked: no node of the robot publishes {topic}.",
     "unreadable": "Locked: {topic} can't be read: what arrives is not {wanted}.",
     "missing": "Locked: there is no {field} in the last {topic}.",
+    "several": "Locked: {field} is in the last {topic} more than once.",
+    "reading": "Locked: {topic} is large; it is being read.",
     "forbidden": "The robot does not permit {name}.",
     "unmet": "{name} is {value}: it must be {wanted}.",
     "either": "{first} or {last}",
@@ -162,6 +164,7 @@ ENGLISH: Final[Mapping[str, str]] = {
     "readout_unreadable": "{topic} can't be read: what arrives is not {wanted}",
     "readout_time": "received {time}",
     "readout_missing": "there is no {field} in what was received {time}",
+    "readout_several": "{field} is more than once in what was received {time}",
     # What a lamp shows when no state of its own does.
     "lamp_waiting": "No value yet",
     "lamp_unknown": "Unknown: {value}",

@@ -276,7 +276,7 @@ def test_a_subscriber_that_would_not_hear_locks_a_press() -> None:
 
 def test_a_service_that_has_just_come_is_not_called_yet() -> None:
     call = Call(id="reset", kind="call", label="Reset", service="/reset", type="std_srvs/srv/Trigger")
-    robot = robot_there(panel_of(call.model_dump(exclude_none=True)))
+    robot = robot_there(panel_of(call.model_dump(exclude_none=True, exclude_defaults=True)))
     token = server_token(BRIDGE, "SS", "reset", call.type)
     assert press_verdict(call, (), robot, NOW).code == "no_service"
     robot.graph.apply(token, True, NOW)

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from itertools import takewhile
 from typing import Any
 
-from app.interfaces import INTEGERS, TEXTS, Interfaces, Type
+from app.interfaces import INTEGERS, TEXTS, Interfaces, Type, around, name_of
 from app.panel.displays import Indicator, Readout
 from app.panel.interlock import Interlock
 from app.panel.model import Panel
@@ -13,8 +13,8 @@ from app.panel.ranges import single
 
 def holder(of: Readout | Indicator | Interlock, interfaces: Interfaces) -> str:
     """The type whose constants a field's values have: that of the message around it."""
-    around, _, _ = of.field.rpartition(".")
-    return interfaces.field_type(of.type, around) if around else of.type
+    where = around(of.field)
+    return interfaces.field_type(of.type, where) if where else of.type
 
 
 def value_of_state(given: bool | int | str, kind: str, constants: Mapping[str, Any]) -> Any:
@@ -70,7 +70,7 @@ def _names(of: Interlock, kind: Type, constants: Mapping[str, Any]) -> dict[Any,
     named = [one for one in given if isinstance(one, str) and kind.name not in TEXTS]
     if not named:
         return {}
-    own = f"{of.field.rpartition('.')[2]}_".upper()
+    own = f"{name_of(of.field)}_".upper()
     alike = own if all(name.startswith(own) for name in named) else _alike(named)
     found: dict[Any, list[str]] = {}
     for name, value in constants.items():

@@ -7,6 +7,8 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo
 
+from app.errors import InterfaceError
+from app.interfaces.paths import Key, steps
 from app.interfaces.scalars import shown
 from app.keys import ACTION_TYPE, MESSAGE_TYPE, NAMESPACE, SERVICE_TYPE, TOPIC, Qos
 
@@ -69,6 +71,20 @@ def _folder(given: Any, info: ValidationInfo) -> Path:
     return folder
 
 
+def _field(given: str) -> str:
+    try:
+        steps(given)
+    except InterfaceError as error:
+        raise ValueError(str(error)) from None
+    return given
+
+
+def _written_field(given: str) -> str:
+    if any(isinstance(step, Key) for step in steps(_field(given))):
+        raise ValueError(f'"{given}" is filled in: an element is given by its number, as in data[2]')
+    return given
+
+
 def _interlocks(given: Any) -> tuple[str, ...]:
     """One id, or a list of them."""
     named = [given] if isinstance(given, str) else given
@@ -106,8 +122,8 @@ Topic = Annotated[str, AfterValidator(_topic), Field(max_length=255)]
 Type = Annotated[str, AfterValidator(_type)]
 ServiceType = Annotated[str, AfterValidator(_service)]
 ActionType = Annotated[str, AfterValidator(_action)]
-_STEP: Final = r"[a-z][a-z0-9_]*(\[[0-9]{1,9}\])*"
-FieldPath = Annotated[str, Field(pattern=rf"^{_STEP}(\.{_STEP})*$")]
+FieldPath = Annotated[str, AfterValidator(_field)]
+WrittenField = Annotated[str, AfterValidator(_written_field)]  # without keys
 Endpoint = Annotated[str, AfterValidator(_endpoint)]
 Folder = Annotated[Path, BeforeValidator(_folder)]
 Seconds = Annotated[float, Field(gt=0, le=86400, allow_inf_nan=False)]

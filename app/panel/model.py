@@ -23,6 +23,7 @@ from app.panel.description import (
     Topic,
     TopicQos,
     Type,
+    WrittenField,
     namespace_of,
 )
 from app.panel.displays import Indicator, Readout
@@ -78,8 +79,8 @@ class Hold(Placed):
     release: dict[str, Any]
     interlocks: Interlocks = Field(alias="interlock")
     rate_hz: Annotated[float, Field(ge=1, le=100)] = 20.0
-    deadline_field: FieldPath | None = None
-    counter_field: FieldPath | None = None
+    deadline_field: WrittenField | None = None
+    counter_field: WrittenField | None = None
     qos: TopicQos = TopicQos()
     span: Span = 4
 
@@ -225,6 +226,15 @@ class Panel(Description):
         own = {one.topic: one.type for one in self.confirms() if one.type is not None}
         events = {EVENTS: EVENT_TYPE} if any(self.parameters()) else {}
         return own | {of.topic: of.type for of in self.listening()} | events
+
+    def fields(self) -> dict[str, list[str]]:
+        """Topic → the paths of all that the panel reads of it."""
+        found: dict[str, list[str]] = {}
+        for of in self.listening():
+            found.setdefault(of.topic, []).append(of.field)
+        for confirm in self.confirms():
+            found.setdefault(confirm.topic, []).append(confirm.field)
+        return found
 
     def confirms(self) -> Iterator[Confirm]:
         """All that shows that a command took effect."""
