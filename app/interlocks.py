@@ -11,7 +11,7 @@ from functools import lru_cache
 from typing import Final
 
 from app.conditions import permits, unmet
-from app.declared import UNKNOWN, Declared, allowed, limits_text, own_range
+from app.declared import UNKNOWN, Declared, each_text, ours_text, suits
 from app.graph import Graph, remembered
 from app.keys import Qos, ServerRole, TopicRole
 from app.panel.interlock import Interlock
@@ -230,9 +230,9 @@ def unsettable(of: Parameter, known: Declared) -> Verdict | None:
         return locked(code, node=node, name=name, found=known.found, wanted=of.type)
     if known.read_only:
         return locked("parameter_read_only", node=node, name=name)
-    if allowed(of, known).empty:
-        theirs, ours = limits_text(of, known.range), limits_text(of, own_range(of))
-        return locked("parameter_apart", node=node, name=name, theirs=theirs, ours=ours)
+    if not suits(of, known):
+        theirs = each_text(of, known.range)
+        return locked("parameter_apart", node=node, name=name, theirs=theirs, ours=ours_text(of))
     return None
 
 

@@ -15,7 +15,7 @@ from app.calls import Calls
 from app.confirmations import Confirmations
 from app.control import Control
 from app.doubts import Doubts
-from app.errors import LinkError
+from app.errors import LinkError, NotFound
 from app.holds import Holds
 from app.intake import Intake
 from app.interfaces import interfaces_of
@@ -26,6 +26,7 @@ from app.link import Config, Link
 from app.logbook import Log, Logbook
 from app.logs import RobotLog
 from app.panel.model import Panel, RobotEntry
+from app.panel.parameter import Parameter
 from app.parameters import Parameters
 from app.presses import Presses
 from app.pulse import Pulse
@@ -229,6 +230,13 @@ class Kiosk:
         if not self.way.permitted or await self._asked.answers():
             return self.way
         return locked("bridge_silent") if self.way.permitted else self.way
+
+    def read_again(self, widget_id: str) -> str:
+        """Asks the node of a parameter for it; why it can't be asked, or "". NotFound for other ids."""
+        widget = self.sending.widget(widget_id)
+        if not isinstance(widget, Parameter):
+            raise NotFound(f'"{widget_id}" is not a parameter: there is nothing to read')
+        return self._parameters.read_again(widget)
 
     def _heal(self) -> None:
         """A new session though there is a way: what is held gets its last message by the old one."""

@@ -1,8 +1,9 @@
 """The parameters of a robot's nodes: read when a node is there, followed by its events, and set.
 
 A node is asked when its services appear in the graph, once more when events must have been flowing
-for a while, after a set, and where an event may have been missed; never twice at a time. What was
-asked of a bridge or a node that went away meanwhile no longer counts.
+for a while, after a set, and where an event may have been missed; never twice at a time. One that did
+not answer is asked again only when somebody wants it: each question makes a node on Fast DDS print an
+error. What was asked of a bridge or a node that went away meanwhile no longer counts.
 """
 
 import asyncio
@@ -11,24 +12,27 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 from app import keys
 from app.calls import LONGEST_SAID, Asker, Calls, Request
-from app.declared import UNKNOWN, Declared, Value, checked, declared, name_of, value_in, wire
+from app.declared import UNKNOWN, Declared, declared, name_of, value_in, wire
 from app.errors import DecodeError
 from app.interfaces import Fields, Interfaces, text_of
 from app.interlocks import parameters_offered
 from app.logs import RobotLog
 from app.panel.model import Panel
-from app.panel.parameter import DESCRIBE, EVENT_TYPE, GET, SET, Parameter
+from app.panel.parameter import DESCRIBE, EVENT_TYPE, GET, SET, Parameter, Value
 from app.parameter_services import NoAnswer, ParameterServices
+from app.parameter_values import checked
 from app.progress import Answer, Corrected, LastLook, no_look
 from app.robot import Robot, Sample
 from app.sentences import clock, say
 from app.tasks import told
 
 log = logging.getLogger("kiosk.parameters")
+
+Read = Literal["whole", "partly", "silent"]
 
 FAILED: Final = "following a node's parameters failed"
 CONFIRM_S: Final = 3.0  # after which the bridge surely brings the events of a node that appeared
@@ -118,6 +122,7 @@ class Parameters:
             return
         node.task.cancel()
         node.task = None
+        self._end_asking(node)
         for widget in node.widgets:
             known = self._known(widget)
             cut = replace(known, state="cut") if known.value is not None else UNKNOWN
@@ -169,27 +174,40 @@ class Parameters:
             node.wanted.clear()
             node.urgent.clear()
             node.heard.clear()
-            whole = await self._read(node)
+            read = await self._read(node)
             await _within(node.urgent, AGAIN_S)
-            if whole:
-                await _within(node.wanted, None if confirmed else CONFIRM_S)
-                confirmed, pause = True, AGAIN_S
-            else:
-                await _within(node.wanted, pause)
-                pause = min(2 * pause, AGAIN_MOST_S)
+            match read:
+                case "silent":
+                    await node.urgent.wait()
+                case "partly":
+                    await _within(node.wanted, pause)
+                    pause = min(2 * pause, AGAIN_MOST_S)
+                case "whole":
+                    await _within(node.wanted, None if confirmed else CONFIRM_S)
+                    confirmed, pause = True, AGAIN_S
 
-    async def _read(self, node: _Node) -> bool:
-        """Asks for all of a node's parameters; False where one of them has no value to show."""
+    async def _read(self, node: _Node) -> Read:
+        """Asks for all of a node's parameters: whether it told all, not all, or nothing."""
+        self._robot.asking |= {widget.id for widget in node.widgets}
+        self._changed()
+        try:
+            return await self._answered(node)
+        finally:
+            if node.task is asyncio.current_task():  # else it was cut off, and may be asked anew
+                self._end_asking(node)
+                self._changed()
+
+    async def _answered(self, node: _Node) -> Read:
         names = list(dict.fromkeys(widget.parameter for widget in node.widgets))
         try:
             asked = self._services.read(node.name, names, partial(self._silent, node))
             descriptors, values = await asked
         except NoAnswer:
-            return False
+            return "silent"
         except DecodeError as error:
             self._log.error("%s: %s", node.name, error)
             self._learn_all(node, lambda known: Declared("unreadable", wall=time.time()))
-            return False
+            return "partly"
         self._calls.mark_answered(f"{node.name}/{SET[0]}")
         values |= node.heard  # told after it was asked
         for widget in node.widgets:
@@ -197,7 +215,20 @@ class Parameters:
             found = declared(widget, descriptors.get(name), values.get(name), time.time())
             self._learn(widget, found)
         self._changed()
-        return all(self._known(widget).state == "live" for widget in node.widgets)
+        live = all(self._known(widget).state == "live" for widget in node.widgets)
+        return "whole" if live else "partly"
+
+    def _end_asking(self, node: _Node) -> None:
+        self._robot.asking -= {widget.id for widget in node.widgets}
+
+    def read_again(self, widget: Parameter) -> str:
+        """Asks the node of a parameter once more, unless it is being asked; why it can't be, or ""."""
+        node = self._nodes[widget.node]
+        if node.task is None:
+            return say("no_parameters", node=widget.node)
+        if widget.id not in self._robot.asking:
+            node.ask_now()
+        return ""
 
     # Setting.
 

@@ -62,6 +62,7 @@ class Robot:
         self.silent = SilentPublishers(self._judged)
         self.progress: dict[str, Progress] = {}  # of what widgets have asked, by their ids
         self.parameters: dict[str, Declared] = {}  # what nodes said of them, by their widgets' ids
+        self.asking: set[str] = set()  # ids of parameter widgets whose nodes are being asked
         self.held: dict[str, str] = {}  # by the ids of hold widgets: since when, in words
         self._log = RobotLog(log, self.name)
         self.answers = True  # False: its bridges are silent, though nobody knows yet why

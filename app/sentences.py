@@ -54,7 +54,9 @@ ENGLISH: Final[Mapping[str, str]] = {
     # Parameters: why one is locked, what is shown of it, what came of setting it.
     "no_parameters": "Locked: the robot does not offer the parameters of {node} now.",
     "parameter_waiting": "Locked: waiting for {node} to tell its {name}.",
-    "parameter_silent": "Locked: {node} does not answer when it is asked for its {name}.",
+    "parameter_silent": (
+        "Locked: {node} does not answer when it is asked for its {name}. “Read again” asks once more."
+    ),
     "parameter_undeclared": "Locked: {node} has no parameter {name}.",
     "parameter_mistyped": "{name} of {node} is {found}, but this panel is made for {wanted}.",
     "parameter_unreadable": "Locked: what {node} tells of its {name} can't be read.",
@@ -67,6 +69,9 @@ ENGLISH: Final[Mapping[str, str]] = {
     "parameter_cut": "from before the connection was cut, read {time}",
     "parameter_no_answer": "no answer since; read {time}",
     "parameter_asking": "waiting for {node}",
+    "parameter_unanswered": "no answer from {node}",
+    "read_again": "Read again",
+    "read_named": "Read {label} again",
     "parameter_no_value": "declared, but it has no value yet",
     "parameter_not_there": "not declared by {node}",
     "parameter_set": "Set to {value} at {time}.",
@@ -78,6 +83,11 @@ ENGLISH: Final[Mapping[str, str]] = {
     "limits_step": "in steps of {step}",
     "any_number": "a number",
     "any_whole": "a whole number",
+    "any_text": "a text",
+    "limits_list": "{each}; several with commas between them",
+    "list_value": "{label}, value {number}",
+    "list_long": "{label} has {count} values; {most} are allowed",
+    "no_list": "{label} must be {limits}, not {given}",
     "no_text": "{label} must be text of {most} characters at most, not {given}",
     # What came of a call or a goal.
     "waiting_for_answer": "Sent; waiting for the robot's answer.",

@@ -41,6 +41,7 @@ const SHOW = {
     const bar = root.querySelector("progress");
     if (bar) bar.hidden = !value;
   },
+  askable: (root, value) => (root.querySelector(".read").disabled = !value),
   entry: showEntry,
   bounds: showBounds,
   settable: (root, value) => (root.querySelector(".setting").inert = !value),
