@@ -19,7 +19,7 @@ from app.calls import LONGEST_SAID, Asker, Calls, Request
 from app.declared import UNKNOWN, Declared, declared, name_of, value_in, wire
 from app.errors import DecodeError
 from app.interfaces import Fields, Interfaces, text_of
-from app.interlocks import parameters_offered
+from app.interlocks import SERVER_SETTLE_S, parameters_offered
 from app.logs import RobotLog
 from app.panel.model import Panel
 from app.panel.parameter import DESCRIBE, EVENT_TYPE, GET, SET, Parameter, Value
@@ -35,6 +35,7 @@ log = logging.getLogger("kiosk.parameters")
 Read = Literal["whole", "partly", "silent"]
 
 FAILED: Final = "following a node's parameters failed"
+SETTLE_S: Final = SERVER_SETTLE_S  # before which a question to a node that appeared may be lost
 CONFIRM_S: Final = 3.0  # after which the bridge surely brings the events of a node that appeared
 AGAIN_S: Final = 1.0  # between two readings at least, and before the first try again
 SET_PATHS: Final = ("results[0].successful", "results[0].reason", "results[1].successful")
@@ -170,6 +171,7 @@ class Parameters:
     async def _follow_node(self, node: _Node) -> None:
         """Asks a node, as often as there is need, until it is cut off."""
         confirmed, pause = False, AGAIN_S
+        await asyncio.sleep(SETTLE_S)
         while True:
             node.wanted.clear()
             node.urgent.clear()
@@ -202,8 +204,8 @@ class Parameters:
         try:
             asked = self._services.read(node.name, names, partial(self._silent, node))
             descriptors, values = await asked
-        except NoAnswer:
-            return "silent"
+        except NoAnswer as error:
+            return "partly" if error.dropped else "silent"
         except DecodeError as error:
             self._log.error("%s: %s", node.name, error)
             self._learn_all(node, lambda known: Declared("unreadable", wall=time.time()))

@@ -92,7 +92,7 @@ def test_a_list_is_typed_value_by_value(kind: str, given: Any, value: tuple[Any,
 @pytest.mark.parametrize(
     ("more", "given", "why"),
     [
-        ({}, "1, x", "Gains, value 2 must be a number, 0 to 5, not 'x'"),
+        ({}, "1, x", 'Gains, value 2 must be a number, 0 to 5, not "x"'),
         ({}, "1, 7", "Gains, value 2 is 7: it must be 0 to 5"),
         ({"min": 1, "unit": "N"}, [0.5], "Gains, value 1 is 0.5 N: it must be 1 to 5 N"),
         ({}, [1, None], "Gains, value 2 has no number"),
@@ -101,7 +101,7 @@ def test_a_list_is_typed_value_by_value(kind: str, given: Any, value: tuple[Any,
         (
             {"type": "bool[]"},
             "On, maybe",
-            "Gains, value 2 must be true .On. or false .Off., not 'maybe'",
+            'Gains, value 2 must be true .On. or false .Off., not "maybe"',
         ),
         ({"type": "integer[]"}, "1, 1.5", "Gains, value 2 must be a number, a whole number, not"),
         ({"type": "string[]"}, [5], "Gains, value 1 must be text of 1000 characters at most, not 5"),

@@ -144,6 +144,7 @@ def soon(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pauses of a test's length; the confirming reading far away."""
     monkeypatch.setattr(parameters, "AGAIN_S", 0.01)
     monkeypatch.setattr(parameters, "CONFIRM_S", 60.0)
+    monkeypatch.setattr(parameters, "SETTLE_S", 0.0)
 
 
 def test_a_node_is_asked_when_it_is_seen_and_no_more() -> None:
@@ -295,7 +296,8 @@ def test_a_node_that_does_not_answer_is_asked_again_when_it_is_touched_or_new(
         assert bench.parameters.read_again(one) == ""
         assert bench.parameters.read_again(one) == ""
         await bench.asked(2)
-        bench.line.asked[1][2].set_result(None)
+        await asyncio.sleep(0.03)
+        bench.line.asked[1][2].set_result(None)  # after its time
         await bench.until(lambda: bench.shown["askable"])
         await asyncio.sleep(0.03)
         assert len(bench.line.asked) == 2
@@ -304,6 +306,17 @@ def test_a_node_that_does_not_answer_is_asked_again_when_it_is_touched_or_new(
         assert bench.shown["askable"] is False
         bench.offer()
         await bench.tell(3, 0.5)
+        assert bench.known().value == 0.5
+
+    run(test)
+
+
+def test_a_question_that_the_bridge_dropped_is_asked_again() -> None:
+    async def test(bench: Bench) -> None:
+        bench.offer()
+        await bench.asked(1)
+        bench.line.asked[0][2].set_result(None)  # at once: it never got to the node
+        await bench.tell(2, 0.5)
         assert bench.known().value == 0.5
 
     run(test)

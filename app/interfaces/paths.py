@@ -18,7 +18,7 @@ from typing import Final, NamedTuple
 from app.errors import InterfaceError
 
 _STEP: Final = re.compile(
-    r"""(?P<dot>\.?)(?P<name>[^\[\].]+)
+    r"""(?P<dot>\.?)(?P<name>[A-Za-z][A-Za-z0-9_]*)
     |\[(?P<index>[0-9]{1,9})\]
     |\[(?P<key>[a-z][a-z0-9_.]*)=(?P<value>[^\[\]'"=\s]+|'(?:[^']|'')*'|"(?:[^"]|"")*")\]""",
     re.VERBOSE,

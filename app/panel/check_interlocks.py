@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from app.errors import Fault, FieldError
 from app.interfaces import INTEGERS, Interfaces, Type
-from app.interfaces.scalars import scalar_check
+from app.interfaces.scalars import scalar_check, shown
 from app.panel.check_displays import NUMBERS, field_faults, no_constant
 from app.panel.constants import compared, holder, meant
 from app.panel.inputs import same
@@ -42,11 +42,11 @@ def interlock_faults(place: str, of: Interlock, interfaces: Interfaces) -> Itera
 def _conditions(place: str, of: Interlock, kind: Type, interfaces: Interfaces) -> Iterator[Fault]:
     numeric = kind.name in NUMBERS
     if of.unit and not numeric:
-        yield Fault(f"{place}.unit", f'is for numbers; "{of.field}" is {kind}')
+        yield _for_numbers(place, "unit", of, kind)
     alone = next((key for key in ALONE if key in of.conditions), None)
     if alone and (others := [key for key in of.conditions if key != alone]):
         what = f"has no meaning beside {alone}, which says all: leave it out"
-        yield from (Fault(f"{place}.{key}", what) for key in others)
+        yield from (Fault(f"{place}.{key}", what, cause=f"alone {place}") for key in others)
         return
     faults = list(_values(place, of, kind, interfaces))
     yield from faults
@@ -60,20 +60,25 @@ def _values(place: str, of: Interlock, kind: Type, interfaces: Interfaces) -> It
     constants = interfaces.constants(type_name)
     for key, given in of.conditions.items():
         if key in ("min", "max") and kind.name not in NUMBERS:
-            yield Fault(f"{place}.{key}", f'is for numbers; "{of.field}" is {kind}')
+            yield _for_numbers(place, key, of, kind)
             continue
         several = given if key == "one_of" else (given,)
         found: list[Any] = []
         for i, one in enumerate(several):
             at = f"{place}.{key}[{i}]" if key == "one_of" else f"{place}.{key}"
             value = meant(one, kind, constants)
+            cause = f"condition {place}"
             if isinstance(value, str) and kind.name in NUMBERS:
-                yield Fault(at, no_constant(value, str(kind), type_name, constants))
+                yield Fault(at, no_constant(value, str(kind), type_name, constants), cause=cause)
             elif fault := _misfit(value, kind):
-                yield Fault(at, fault)
+                yield Fault(at, fault, cause=cause)
             elif any(same(value, other) for other in found):
-                yield Fault(at, f"{one!r} is there already")
+                yield Fault(at, f"{shown(one)} is there already")
             found.append(value)
+
+
+def _for_numbers(place: str, key: str, of: Interlock, kind: Type) -> Fault:
+    return Fault(f"{place}.{key}", f'is for numbers; "{of.field}" is {kind}', cause=f"number {place}")
 
 
 def _misfit(value: Any, kind: Type) -> str | None:
@@ -93,7 +98,9 @@ def _never(place: str, of: Interlock, kind: Type, interfaces: Interfaces) -> Ite
         for one, none in ((of.min, lowest), (of.max, highest), (of.not_equals, math.nan))
     )
     if low > high:
-        yield Fault(f"{place}.max", f"{of.max!r} is less than min ({of.min!r}): no value permits")
+        yield Fault(
+            f"{place}.max", f"{shown(of.max)} is less than min ({shown(of.min)}): no value permits"
+        )
     elif low == high == excluded:
-        what = f"{of.not_equals!r} is all that the limits leave: no value permits"
+        what = f"{shown(of.not_equals)} is all that the limits leave: no value permits"
         yield Fault(f"{place}.not_equals", what)

@@ -6,6 +6,7 @@ from typing import Any, Final
 
 from app.errors import Fault
 from app.interfaces import INTEGERS
+from app.interfaces.scalars import shown
 from app.panel.check_inputs import option_faults
 from app.panel.inputs import digits
 from app.panel.model import Panel
@@ -46,7 +47,7 @@ def _options(place: str, of: Parameter) -> Iterator[Fault]:
         several = value if of.many and isinstance(value, list) else [value]
         right = of.many == isinstance(value, list) and all(fits(of.element, one) for one in several)
         if not right:
-            what = f"must be {KINDS[of.element]}, not {value!r}"
+            what = f"must be {KINDS[of.element]}, not {shown(value)}"
             yield Fault(f"{place}.options[{i}].value", f"a list: each {what}" if of.many else what)
 
 

@@ -89,14 +89,14 @@ def _interlocks(given: Any) -> tuple[str, ...]:
     """One id, or a list of them."""
     named = [given] if isinstance(given, str) else given
     if not isinstance(named, list | tuple):
-        raise ValueError(f"must be the id of an interlock, or a list of ids, not {given!r}")
+        raise ValueError(f"must be the id of an interlock, or a list of ids, not {shown(given)}")
     if not named:
         raise ValueError("is an empty list: name an interlock, or leave the key out")
     for i, one in enumerate(named):
         if not isinstance(one, str) or not re.fullmatch(ID, one):
-            raise ValueError(f'"{one}" is not an id: a-z, 0-9 and "_", a letter first')
+            raise ValueError(f'{shown(one)} is not an id: a-z, 0-9 and "_", a letter first')
         if one in named[:i]:
-            raise ValueError(f'names "{one}" twice')
+            raise ValueError(f"names {shown(one)} twice")
     return tuple(named)
 
 

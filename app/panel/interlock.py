@@ -5,6 +5,7 @@ from typing import Annotated, Any, Final
 
 from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr
 
+from app.interfaces.scalars import shown
 from app.panel.description import Description, FieldPath, Id, Label, Seconds, Topic, TopicQos, Type
 from app.panel.inputs import Unit
 
@@ -13,7 +14,7 @@ CONDITIONS: Final = ("equals", "not_equals", "min", "max", "one_of")
 
 def _condition(given: Any) -> Any:
     if not isinstance(given, bool | int | float | str):
-        raise ValueError(f"must be a number, true or false, or text, not {given!r}")
+        raise ValueError(f"must be a number, true or false, or text, not {shown(given)}")
     if given != given:
         raise ValueError("NaN is no value that could permit")
     return given
