@@ -12,8 +12,8 @@ from typing import Final
 
 from app.interfaces import FieldReader, Fields, Walk
 
-AT_ONCE_S: Final = 0.015  # of one turn in which something came, for all that is read in it
-LATER_S: Final = 0.005  # of each turn after that
+AT_ONCE_S: Final = 0.01  # of one turn in which something came, for all that is read in it
+LATER_S: Final = 0.003  # of each turn after that
 SMALL: Final = 2_000  # bytes: read at once, however much came in this turn
 
 GoOn = Callable[[float], bool]  # reads on until then (monotonic seconds); whether it is through

@@ -20,13 +20,14 @@ Reader = Callable[[Type], Read]  # what reads a value of a type
 Hits = dict[Any, list[tuple[int, int]]]  # a key's value → (number, place) of the elements that have it
 Next = tuple[int, int]  # the place that is gone to, and the step
 
-SLICE: Final = 500  # elements
+SLICE: Final = 100  # elements
 ENOUGH: Final = 2  # elements of one key: several
 
 # The steps that most elements have.
 TEXT: Final = Do.TEXT
 PASS: Final = Do.PASS
 NEXT: Final = Do.NEXT
+NUMBERS: Final = Do.NUMBERS
 EACH: Final = Do.EACH
 CHOSEN: Final = Do.CHOSEN
 END: Final = Do.END
@@ -91,6 +92,13 @@ class Going:
                     raise ValueError(f"a text that ends at {at} is cut off or has no end")
             elif do is PASS:
                 at += one[at % PHASES]
+            elif do is NUMBERS:
+                at = (at + 3) & -LENGTH
+                if count := words[at >> 2]:
+                    at = (at + LENGTH + one - 1) & -one
+                    at += count * one
+                else:
+                    at += LENGTH
             elif do is EACH:
                 count, at = self._count(at, other)
                 if count:
@@ -132,10 +140,6 @@ class Going:
         if self._body[at] > 1:
             raise ValueError(f"a bool is {self._body[at]}, not 0 or 1")
         return at + 1, step
-
-    def _numbers(self, at: int, step: int, size: int) -> Next:
-        count, at = self._count(at, size)
-        return (at if not count else ((at + size - 1) & -size) + count * size), step
 
     def _alike(self, at: int, step: int, room: Any) -> Next:
         count, at = self._count(at, 1)
@@ -246,7 +250,6 @@ class Going:
 STEPS: Final[Mapping[Do, Callable[[Going, int, int, Any], Next]]] = {
     Do.WIDE_TEXT: Going._wide_text,
     Do.BOOL: Going._bool,
-    Do.NUMBERS: Going._numbers,
     Do.ALIKE: Going._alike,
     Do.TIMES: Going._times,
     Do.NOTE: Going._note,
