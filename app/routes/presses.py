@@ -183,7 +183,7 @@ async def _pressed_by_form(
     typed = kiosk.sending.typed(inputs)
     if not site.limits.admit(browser):
         receipt = kiosk.presses.limited(widget, typed, press_id, shown=True)
-        return RedirectResponse(_page_after(kiosk, widget, receipt.id), status_code=303)
+        return RedirectResponse(page_after(kiosk, widget, receipt.id), status_code=303)
     by = kiosk.doubts.by(widget, browser, seen, until)
     if too_soon:
         work = kiosk.presses.too_soon(widget, typed, press_id, before, by.origin)
