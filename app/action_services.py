@@ -12,9 +12,10 @@ from typing import Any, Final
 from app.calls import CUT_NEWS_S, Asker
 from app.errors import DecodeError
 from app.goals import Goal
-from app.interfaces import Interfaces
+from app.interfaces import Fields, Interfaces
 from app.logs import RobotLog
 from app.panel.model import Action
+from app.panel.template import PLACE
 from app.progress import Answer
 from app.robot import Robot
 from app.sentences import clock, say
@@ -22,6 +23,8 @@ from app.sentences import clock, say
 log = logging.getLogger("kiosk.actions")
 
 CANCEL: Final = "action_msgs/srv/CancelGoal"
+STATUS: Final = "status"
+RESULT: Final = "result."  # where it is in the response of `get_result`
 NO_SUCH_GOAL: Final = frozenset({2, 3})  # its ERROR_UNKNOWN_GOAL_ID, ERROR_GOAL_TERMINATED
 
 Query = asyncio.Future[bytes | None]
@@ -100,9 +103,15 @@ class ActionServices:
             return say("timed_out", seconds=f"{widget.timeout_s:g}")
         return say("cancel_unheard", name=widget.action)
 
-    def result(self, widget: Action, reply: bytes) -> Any:
-        """What `get_result` answered: a message with `status` and `result`."""
-        return self._decoded(widget, self._interfaces.action(widget.type).get_result_response, reply)
+    async def result(self, widget: Action, reply: bytes) -> Fields | None:
+        """What `get_result` answered: its status, and what the widget shows of the result."""
+        paths = (STATUS, *(RESULT + path for path in PLACE.findall(widget.result)))
+        response = self._interfaces.action(widget.type).get_result_response
+        try:
+            return await self._robot.slices.whole(self._interfaces.fields(response, paths), reply)
+        except DecodeError as error:
+            self._log.error("%s: %s", widget.action, error)
+            return None
 
     def _decoded(self, widget: Action, type_name: str, reply: bytes) -> Any:
         try:

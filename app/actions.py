@@ -7,6 +7,7 @@ one. Wire format: ROS 2's `<action>/_action/…` topics (design.ros2.org, "Actio
 import asyncio
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any, Final
 
 from app import keys
@@ -14,14 +15,17 @@ from app.action_services import CANCEL, NO_SUCH_GOAL, ActionServices
 from app.calls import MOST_UNANSWERED, Asker
 from app.errors import DecodeError
 from app.following import Following
-from app.goals import ACCEPTED, CANCELING, EXECUTING, UNKNOWN, Goal, goal_id
-from app.interfaces import Interfaces
+from app.goals import ACCEPTED, CANCELING, EXECUTING, FEEDBACK, UNKNOWN, Goal, goal_id
+from app.interfaces import Fields, Interfaces
 from app.panel.model import Action
+from app.panel.template import PLACE
 from app.progress import IDLE, Answer, Corrected, LastLook, Progress, no_look
-from app.robot import Robot, Sample
+from app.robot import Reading, Robot, Sample
 from app.sentences import clock, say
+from app.topics import Topic
 
 STATUS: Final = "action_msgs/msg/GoalStatusArray"
+GOAL_ID: Final = "goal_id.uuid"
 
 
 class Actions:
@@ -39,6 +43,7 @@ class Actions:
             self._services, robot, cut=self._doubt, back=self._advanced, tell=self._tell
         )
         self._latest: dict[str, Goal] = {}  # by widget
+        self._feedback: dict[str, Topic] = {}  # by widget
         self._states: dict[str, Sample] = {}  # by action: what its server said last of its goals
 
     def follow(self) -> None:
@@ -151,15 +156,37 @@ class Actions:
     def hear_feedback(self, action: str, sample: Sample) -> None:
         """The latest feedback of an action; of another program's goal it is passed over. Whoever
         calls this shows it when a frame is due."""
-        goals = [g for g in self._of(action) if self._robot.progress[g.widget.id].stoppable]
-        if not goals:
-            return
-        types = self._interfaces.action(goals[0].widget.type)  # the server's, which has but one
-        key = keys.feedback(self._robot.key(action))
-        message = self._heard(key, types.feedback_message, sample)
-        for goal in goals:
-            if message is not None and bytes(message.goal_id.uuid) == goal.id.bytes:
-                self._take_feedback(goal, message.feedback)
+        for goal in self._of(action):
+            if self._robot.progress[goal.widget.id].stoppable:
+                topic = self._feedback_of(goal.widget)
+                topic.take(sample)
+                self._hear(goal, topic.reading())
+
+    def _hear(self, goal: Goal, reading: Reading) -> None:
+        fields = reading.fields
+        if reading.status == "message" and fields and bytes(fields.get(GOAL_ID)) == goal.id.bytes:
+            self._take_feedback(goal, fields)
+
+    def _hear_later(self, widget: str, reading: Reading) -> None:
+        if (goal := self._latest.get(widget)) and self._robot.progress[widget].stoppable:
+            self._hear(goal, reading)
+            self._changed()
+
+    def _feedback_of(self, widget: Action) -> Topic:
+        """The feedback of an action, with what its widget shows of it."""
+        if widget.id not in self._feedback:
+            message = self._interfaces.action(widget.type).feedback_message
+            shown = [*PLACE.findall(widget.feedback), *filter(None, [widget.progress])]
+            self._feedback[widget.id] = Topic(
+                self._interfaces.fields(message, [GOAL_ID, *(FEEDBACK + path for path in shown)]),
+                self._robot.slices,
+                watched=False,
+                unreadable=partial(
+                    self._robot.count_unreadable, keys.feedback(self._robot.key(widget.action))
+                ),
+                read_later=partial(self._hear_later, widget.id),
+            )
+        return self._feedback[widget.id]
 
     def hear_status(self, action: str, sample: Sample) -> None:
         """The states of an action's goals; those of other programs are passed over, and kept for a goal
@@ -203,8 +230,8 @@ class Actions:
             answer = Answer("accepted", say("goal_found", time=clock(time.time())))
             goal.corrected(goal.press_id, answer)
 
-    def _take_feedback(self, goal: Goal, feedback: Any) -> None:
-        goal.hear(feedback)
+    def _take_feedback(self, goal: Goal, message: Fields) -> None:
+        goal.hear(message)
         if goal.doubt and goal.advance(EXECUTING):
             self._advanced(goal)
         self._note(goal, goal.under_way)  # shown with the next frame: a goal may say a lot

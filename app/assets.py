@@ -15,7 +15,11 @@ from pathlib import Path
 from typing import Final
 
 LAYERS: Final = ("tokens", "base", "layout", "widgets")
-OF_KINDS: Final = {"entries": frozenset({"number", "slider", "toggle", "parameter"})}
+OF_KINDS: Final = {
+    "entries": frozenset({"number", "slider", "toggle", "parameter"}),
+    "parameters": frozenset({"parameter"}),
+    "reasons": frozenset({"interlocks"}),
+}
 OWN_PAGE: Final = "log"
 LEFT_OUT: Final = {
     ".css": re.compile(rb"/\*.*?\*/|^\s+|(?<=[:;,{}])\s+|\s+(?=[{}])", re.DOTALL | re.MULTILINE),
@@ -51,7 +55,7 @@ def load_assets(static: Path, templates: Path, mm_per_px: float, kinds: Collecti
     """Reads `static`, and `templates` for the revision only.
 
     `mm_per_px` (millimetres per CSS pixel) gives the sizes of buttons; `kinds` are those of the panel's
-    widgets.
+    widgets, and "interlocks" where one has several.
     """
     needed = [name for name, of in OF_KINDS.items() if not of.isdisjoint(kinds)]
     layers = [(static / "css" / f"{name}.css").read_bytes() for name in (*LAYERS, *needed)]

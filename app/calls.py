@@ -12,18 +12,20 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, Final, Protocol
 
-from app.errors import DecodeError, FieldError
-from app.interfaces import Interfaces, text_of, value_at
+from app.errors import DecodeError
+from app.interfaces import Fields, Interfaces, text_of
 from app.logs import RobotLog, on_rosout
 from app.panel.model import Call
 from app.panel.template import PLACE
 from app.printable import printable
 from app.progress import Answer, Corrected, LastLook, Progress, no_look
-from app.robot import Robot, value_of
+from app.robot import Robot
 from app.sentences import clock, say
+from app.tasks import told
 
 log = logging.getLogger("kiosk.calls")
 
+LATE_FAILED: Final = "taking in a late answer failed"
 CUT_NEWS_S: Final = 0.3
 NOTHING: Final = "—"
 LONGEST_SAID: Final = 500  # characters of one value: every browser gets it, and logs keep it
@@ -39,14 +41,16 @@ class Asker(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """What a widget asks of a service; `read` makes an answer of the decoded response."""
+    """What a widget asks of a service; `read` makes an answer of the fields at these `paths` of the
+    response."""
 
     widget: str
     service: str
     type: str
     payload: bytes
     timeout_s: float
-    read: Callable[[Any], Answer]
+    paths: tuple[str, ...]
+    read: Callable[[Fields], Answer]
 
 
 @dataclass(slots=True)
@@ -74,6 +78,7 @@ class Calls:
         self._open: dict[int, _Waiting] = {}
         self._ever_answered: set[str] = set()
         self._latest: dict[str, str] = {}
+        self._correcting: set[asyncio.Task[None]] = set()
 
     def unanswered(self, key: str) -> int:
         """How many requests of a service the bridge may still hold."""
@@ -104,8 +109,13 @@ class Calls:
         look: LastLook = no_look,
     ) -> Answer:
         """Calls the service of a widget; see `ask`."""
-        read = partial(self._read_call, widget)
-        request = Request(widget.id, widget.service, widget.type, payload, widget.timeout_s, read)
+        _, response_type = self._interfaces.service(widget.type)
+        success = field_of(self._interfaces, response_type, widget.success, "success", "bool")
+        message = field_of(self._interfaces, response_type, widget.message, "message", "string")
+        paths = (*filter(None, (success, message)), *PLACE.findall(widget.answer))
+        read = partial(_read_call, widget, success, message)
+        to = (widget.id, widget.service, widget.type)
+        request = Request(*to, payload, widget.timeout_s, paths, read)
         return await self.ask(request, press_id, corrected, look)
 
     async def ask(
@@ -133,7 +143,7 @@ class Calls:
         ends: set[asyncio.Future[Any]] = {waiting.answered, waiting.cut}
         await asyncio.wait(ends, timeout=asked.timeout_s, return_when=asyncio.FIRST_COMPLETED)
         if waiting.answered.done() and (reply := waiting.answered.result()) is not None:
-            return self._read(asked, reply)
+            return await self._read(asked, reply)
         if waiting.answered.done():  # without an answer: the news that the bridge is gone may follow
             await asyncio.wait({waiting.cut}, timeout=CUT_NEWS_S)
         else:
@@ -150,36 +160,29 @@ class Calls:
     ) -> None:
         if done.cancelled() or (reply := done.result()) is None:
             return
+        task = told(self._correct(waiting, reply, corrected), self._log, LATE_FAILED)
+        self._correcting.add(task)
+        task.add_done_callback(self._correcting.discard)
+
+    async def _correct(self, waiting: _Waiting, reply: bytes, corrected: Corrected) -> None:
         asked = waiting.request
-        answer = self._read(asked, reply)
-        told = f"press {waiting.press_id}: a late answer: {answer.outcome}"
-        self._log.warning("%s: %s", told, answer.text, extra=on_rosout(told))
+        answer = await self._read(asked, reply)
+        said = f"press {waiting.press_id}: a late answer: {answer.outcome}"
+        self._log.warning("%s: %s", said, answer.text, extra=on_rosout(said))
         corrected(waiting.press_id, answer)
         if self._latest.get(asked.widget) == waiting.press_id:
             self._show(asked, Progress(outcome=answer.outcome, text=answer.text))
 
-    def _read(self, asked: Request, reply: bytes) -> Answer:
+    async def _read(self, asked: Request, reply: bytes) -> Answer:
         self._ever_answered.add(asked.service)
         _, response_type = self._interfaces.service(asked.type)
+        reader = self._interfaces.fields(response_type, asked.paths)
         try:
-            response = self._interfaces.decode(response_type, reply)
+            fields = await self._robot.slices.whole(reader, reply)
         except DecodeError as error:
             self._log.error("%s: %s", asked.service, error)
             return Answer("unknown", say("answer_unreadable", wanted=asked.type))
-        return asked.read(response)
-
-    def _read_call(self, widget: Call, response: Any) -> Answer:
-        _, response_type = self._interfaces.service(widget.type)
-        success = field_of(self._interfaces, response_type, widget.success, "success", "bool")
-        message = field_of(self._interfaces, response_type, widget.message, "message", "string")
-        words = [with_fields(f"{{{message}}}", response)] if message else []
-        words += [with_fields(widget.answer, response)] if widget.answer else []
-        said = " – ".join(word for word in words if word)
-        said = f": {said}" if said else "."
-        now = clock(time.time())
-        if success is None or value_of(response, success):
-            return Answer("succeeded", say("answered", time=now) + said)
-        return Answer("rejected", say("said_no", time=now) + said)
+        return asked.read(fields)
 
     def _show(self, asked: Request, progress: Progress) -> None:
         self._robot.progress[asked.widget] = progress
@@ -196,14 +199,24 @@ def field_of(
     return usual if own.get(usual) == kind else None
 
 
-def with_fields(template: str, message: Any) -> str:
-    """The template with each `{path}` replaced by that field's value, which is cut where it is long, or
-    by "—" where a list in the path is too short."""
+def _read_call(widget: Call, success: str | None, message: str | None, fields: Fields) -> Answer:
+    """What a response says; `success` and `message` are its fields that mean this, if there are any."""
+    words = [with_fields(f"{{{message}}}", fields)] if message else []
+    words += [with_fields(widget.answer, fields)] if widget.answer else []
+    said = " – ".join(word for word in words if word)
+    said = f": {said}" if said else "."
+    now = clock(time.time())
+    if success is None or fields.get(success):
+        return Answer("succeeded", say("answered", time=now) + said)
+    return Answer("rejected", say("said_no", time=now) + said)
+
+
+def with_fields(template: str, fields: Fields, within: str = "") -> str:
+    """The template with each `{path}` (behind `within`) replaced by that field's value: cut where it is
+    long, "—" where it is not there."""
 
     def shown(path: str) -> str:
-        try:
-            return printable(text_of(value_at(message, path), LONGEST_SAID))
-        except FieldError:
-            return NOTHING
+        value = fields.get(within + path)
+        return NOTHING if value is None else printable(text_of(value, LONGEST_SAID))
 
     return PLACE.sub(lambda found: shown(found[1]), template)

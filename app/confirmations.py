@@ -15,7 +15,7 @@ from app.logs import RobotLog
 from app.panel.inputs import same
 from app.panel.model import Confirm, Publish
 from app.progress import Answer, Corrected, Progress
-from app.robot import Robot, value_of
+from app.robot import Reading, Robot
 from app.sentences import clock, say
 
 log = logging.getLogger("kiosk.confirmations")
@@ -84,15 +84,18 @@ class Confirmations:
         limit = f"{confirm.within_s:g}"
         return Answer("unknown", f"{sent} {say('no_effect', topic=confirm.topic, seconds=limit)}")
 
-    def hear(self, key: str) -> None:
-        """After a new sample of a topic: of several presses of a widget it confirms the oldest, for
+    def awaits(self, key: str) -> bool:
+        """Whether what this topic says next may confirm something."""
+        return any(not waiting.confirmed.done() for waiting in self._waiting.get(key, ()))
+
+    def hear(self, key: str, reading: Reading) -> None:
+        """After each message of a topic: of several presses of a widget it confirms the oldest, for
         one effect is no proof of two commands."""
         done: set[str] = set()
         for waiting in [w for w in self._waiting.get(key, []) if not w.confirmed.done()]:
-            reading = self._robot.reading(waiting.confirm.topic)
             if waiting.widget.id in done or reading.status != "message" or reading.at < waiting.since:
                 continue
-            if equal(value_of(reading.message, waiting.confirm.field), waiting.equals):
+            if equal(reading.value(waiting.confirm.field), waiting.equals):
                 waiting.confirmed.set_result(reading.wall)
                 done.add(waiting.widget.id)
 

@@ -4,23 +4,18 @@ Shapes: rcl_interfaces/msg/ParameterValue and ParameterDescriptor, of ROS 2's pa
 """
 
 import math
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
-from app.errors import InputError
-from app.inputs import DECIMAL
-from app.interfaces import INTEGERS
-from app.interfaces.scalars import shown
-from app.panel.parameter import Parameter
+from app.panel.parameter import Parameter, Value
 from app.panel.ranges import Range, described
 from app.sentences import say
 
 # rcl_interfaces/msg/ParameterType: a type is its place here.
 NAMES: Final = (
-    "not set", "bool", "integer", "double", "string", "byte array", "bool array", "integer array",
-    "double array", "string array",
+    "not set", "bool", "integer", "double", "string", "byte[]", "bool[]", "integer[]", "double[]",
+    "string[]",
 )  # fmt: skip
 NOT_SET: Final = 0
 EMPTY: Final[Mapping[str, Any]] = {
@@ -35,12 +30,9 @@ EMPTY: Final[Mapping[str, Any]] = {
     "double_array_value": (),
     "string_array_value": (),
 }
-LONGEST_TEXT: Final = 1000  # characters that can be set
-WHOLE: Final = re.compile(r"\s*[+-]?[0-9]{1,19}\s*", re.ASCII)
+LONGEST_LIST: Final = 1000  # values that can be set; of longer lists so many and one more are known
 
 State = Literal["waiting", "live", "cut", "silent", "missing", "undeclared", "mistyped", "unreadable"]
-Value = bool | int | float | str
-
 OPEN: Final = Range()
 
 
@@ -93,19 +85,23 @@ def name_of(kind: int) -> str:
 
 def value_in(of: Parameter, value: Any) -> Value:
     """The value of a ParameterValue whose type is the parameter's."""
-    found: Value = getattr(value, f"{of.type}_value")
-    return found
+    found: Any = getattr(value, _field(of))
+    return tuple(found[: LONGEST_LIST + 1]) if of.many else found
 
 
 def wire(of: Parameter, value: Value) -> dict[str, Any]:
     """The fields of a ParameterValue."""
-    return {**EMPTY, "type": NAMES.index(of.type), f"{of.type}_value": value}
+    return {**EMPTY, "type": NAMES.index(of.type), _field(of): value}
+
+
+def _field(of: Parameter) -> str:
+    return f"{of.element}_array_value" if of.many else f"{of.element}_value"
 
 
 def range_of(of: Parameter, descriptor: Any) -> Range:
     """The range that a node describes; without a limit where it gives none that is a number."""
-    ranges = descriptor.integer_range if of.type == "integer" else descriptor.floating_point_range
-    if not of.numeric or not ranges:
+    ranges = descriptor.integer_range if of.element == "integer" else descriptor.floating_point_range
+    if not of.counts or not ranges:
         return OPEN
     one = ranges[0]
     return Range(_limit(one.from_value), _limit(one.to_value), _limit(one.step) or None)
@@ -118,7 +114,7 @@ def _limit(number: float) -> float | None:
 def own_range(of: Parameter) -> Range:
     """What the panel itself allows."""
     limits = (of.min, of.max, of.step)
-    if of.type == "integer":
+    if of.element == "integer":
         return Range(*(None if one is None else int(one) for one in limits))
     return Range(*limits)
 
@@ -128,70 +124,35 @@ def allowed(of: Parameter, known: Declared) -> Range:
     return known.range.within(own_range(of))
 
 
+def suits(of: Parameter, known: Declared) -> bool:
+    """Whether there is a value that both the node and the panel allow."""
+    if not (of.options and of.counts):
+        return not allowed(of, known).empty
+    values = (one.value if of.many else [one.value] for one in of.options)
+    return any(all(known.range.holds(one) for one in several) for several in values)
+
+
+def ours_text(of: Parameter) -> str:
+    """What the panel lets be set, as an operator reads it."""
+    labels = ", ".join(option.label for option in of.options)
+    return labels or limits_text(of, own_range(of))
+
+
 def limits_text(of: Parameter, limits: Range) -> str:
-    """What may be set, as an operator reads it; "" for what is no number."""
-    if not of.numeric:
+    """What may be set, as an operator reads it; "" where nothing has to be said."""
+    if of.options:
         return ""
-    return described(limits, of.unit) or say("any_whole" if of.type == "integer" else "any_number")
+    if of.many:
+        return say("limits_list", each=each_text(of, limits))
+    return each_text(of, limits) if of.counts else ""
 
 
-def typed(of: Parameter, text: str) -> Any:
-    """A form's text as a value of this parameter's type; as it is where it is none."""
-    match of.type:
+def each_text(of: Parameter, limits: Range) -> str:
+    """What one value may be."""
+    match of.element:
         case "bool":
-            return {"true": True, "false": False}.get(text, text)
-        case "double":
-            return float(text) if DECIMAL.fullmatch(text) else text
-    return text
-
-
-def checked(of: Parameter, known: Declared, given: Any) -> Value:
-    """The value to set; InputError names the label and what it may be."""
-    match of.type:
-        case "bool":
-            if isinstance(given, bool):
-                return given
-            raise InputError(say("no_toggle", label=of.label, on=of.on, off=of.off, given=shown(given)))
+            return say("either", first=of.on, last=of.off)
         case "string":
-            if isinstance(given, str) and len(given) <= LONGEST_TEXT:
-                return given
-            text = shown(given)
-            raise InputError(say("no_text", label=of.label, most=LONGEST_TEXT, given=text))
-    return _number(of, known, given)
-
-
-def _number(of: Parameter, known: Declared, given: Any) -> int | float:
-    limits = allowed(of, known)
-    text = limits_text(of, limits)
-    if given == "" or given is None:
-        raise InputError(say("number_empty", label=of.label, limits=text))
-    value = _whole(given) if of.type == "integer" else _double(given)
-    if value is None:
-        raise InputError(say("no_number", label=of.label, limits=text, given=shown(given)))
-    for one in (limits, known.range):
-        if not one.holds(value):
-            text = limits_text(of, one)
-            raise InputError(say("off_limits", label=of.label, limits=text, given=of.written(value)))
-    return value
-
-
-def _whole(given: Any) -> int | None:
-    """An int64: as a number, or as text where a browser's numbers are not exact."""
-    if isinstance(given, str) and WHOLE.fullmatch(given):
-        given = int(given)
-    if isinstance(given, float) and given.is_integer():
-        given = int(given)
-    if isinstance(given, bool) or not isinstance(given, int):
-        return None
-    low, high = INTEGERS["int64"]
-    return given if low <= given <= high else None
-
-
-def _double(given: Any) -> float | None:
-    if isinstance(given, bool) or not isinstance(given, int | float):
-        return None
-    try:
-        value = float(given)
-    except OverflowError:
-        return None
-    return value if math.isfinite(value) else None
+            return say("any_text")
+    whole = of.element == "integer"
+    return described(limits, of.unit) or say("any_whole" if whole else "any_number")

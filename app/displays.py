@@ -1,6 +1,7 @@
 """What readouts and lamps show: pure, from (widget, robot, time)."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Final, Literal
 
@@ -8,7 +9,7 @@ from app.interlocks import misfit
 from app.panel.displays import Indicator, Readout
 from app.panel.inputs import same
 from app.printable import printable
-from app.robot import Robot, value_of
+from app.robot import Robot
 from app.sentences import age, clock, say
 
 LONGEST_TEXT: Final = 200  # characters of a value that a readout shows
@@ -21,12 +22,11 @@ SHAPES: Final = {"waiting": "waiting", "old": "old", "unreadable": "unreadable",
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """What is known of a field: `value` and the `message` it is in, if there is one; `until`
-    (monotonic seconds) is when time alone changes it."""
+    """What is known of a field: its `value`, if there is one; `until` (monotonic seconds) is when time
+    alone changes it."""
 
     state: State
     note: str
-    message: Any = None
     value: Any = None
     until: float = math.inf
 
@@ -39,13 +39,14 @@ def look(widget: Readout | Indicator, robot: Robot, now: float) -> Look:
     reading = robot.reading(topic)
     if reading.status == "unreadable":
         return Look("unreadable", say("readout_unreadable", topic=topic, wanted=widget.type))
-    if reading.message is None:
+    if reading.fields is None:
         return Look("waiting", say("readout_waiting", topic=topic))
     time = clock(reading.wall)
-    value = value_of(reading.message, widget.field)
+    value = reading.value(widget.field)
     if value is None:
-        return Look("missing", say("readout_missing", field=widget.field, time=time))
-    seen = Look("live", say("readout_time", time=time), reading.message, value)
+        code = "readout_several" if reading.several(widget.field) else "readout_missing"
+        return Look("missing", say(code, field=widget.field, time=time))
+    seen = Look("live", say("readout_time", time=time), value)
     if reading.status == "cut":
         return replace(seen, state="old", note=say("readout_cut", time=time))
     if widget.max_age_s is None:
@@ -61,7 +62,7 @@ def look(widget: Readout | Indicator, robot: Robot, now: float) -> Look:
 def readout(widget: Readout, robot: Robot, now: float) -> tuple[dict[str, Any], float]:
     """Attributes of a readout: `state`, `text` and `note`; and when they change."""
     seen = look(widget, robot, now)
-    text = NOTHING if seen.value is None else _value(widget, seen)
+    text = NOTHING if seen.value is None else _value(widget, seen.value, robot)
     return {"state": seen.state, "text": text, "note": seen.note}, seen.until
 
 
@@ -88,10 +89,9 @@ def _lamp(widget: Indicator, value: Any) -> tuple[str, str, str]:
     return say("lamp_unknown", value=written(value)), "unknown", "none"
 
 
-def _value(widget: Readout, seen: Look) -> str:
+def _value(widget: Readout, value: Any, robot: Robot) -> str:
     if widget.constants is not None:
-        return _constant(widget.field, widget.constants, seen)
-    value = seen.value
+        return _constant(widget.constants, robot.constants(widget), value)
     if isinstance(value, bool) or not isinstance(value, int | float):
         return written(value)
     if (widget.scale, widget.offset) != (1.0, 0.0):
@@ -107,15 +107,13 @@ def _formatted(value: float, given: str) -> str:
     return text if len(text) <= LONGEST_NUMBER and "inf" not in text else f"{value:.6g}"
 
 
-def _constant(field: str, prefix: str, seen: Look) -> str:
-    """The name of the constant that a value is, without the prefix where that is whole words of it; a
-    message's constants are on its class."""
-    around, _, _ = field.rpartition(".")
-    holder = type(value_of(seen.message, around) if around else seen.message)
-    for name, value in vars(holder).items():
-        if name.startswith(prefix) and same(value, seen.value):
+def _constant(prefix: str, constants: Mapping[str, Any], value: Any) -> str:
+    """The name of the constant that a value is, without the prefix where that is whole words
+    of it."""
+    for name, its in constants.items():
+        if name.startswith(prefix) and same(its, value):
             return _without(prefix, name)
-    return written(seen.value)
+    return written(value)
 
 
 def _without(prefix: str, name: str) -> str:

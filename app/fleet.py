@@ -16,6 +16,7 @@ from app.logbook import Log
 from app.panel.model import Panel, RobotEntry
 from app.robot import Robot
 from app.sentences import say
+from app.slices import Slices
 
 if TYPE_CHECKING:
     from app.recording import Recordings
@@ -40,6 +41,7 @@ class Fleet:
         """One robot without a name, or the panel's `[[robot]]` entries."""
         self.panel = panel
         self._kiosks: dict[str | None, Kiosk] = {}
+        slices = Slices()
         for entry in panel.robots or (None,):
             self._kiosks[entry.id if entry else None] = Kiosk(
                 panel,
@@ -49,6 +51,7 @@ class Fleet:
                 entry=entry,
                 others=self,
                 recordings=recordings,
+                slices=slices,
                 simulated=simulated,
                 fault=fault,
             )

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Collection
 from typing import Final
 
-from app.action_services import ActionServices
+from app.action_services import RESULT, STATUS, ActionServices
 from app.calls import LATE_S, with_fields
 from app.errors import LinkError
 from app.goals import ENDS, UNKNOWN, Goal
@@ -101,15 +101,16 @@ class Following:
         reply = await self._result(goal)
         if reply is None:
             return None
-        message = self._services.result(goal.widget, reply)
-        if message is None:
+        fields = await self._services.result(goal.widget, reply)
+        if fields is None:
             return Answer("unknown", say("answer_unreadable", wanted=goal.widget.type))
-        goal.state = message.status if message.status in ENDS else UNKNOWN
-        if message.status not in ENDS:
+        status = fields.get(STATUS)
+        goal.state = status if status in ENDS else UNKNOWN
+        if status not in ENDS:
             return Answer("unknown", say("goal_lost") if goal.known else say("goal_not_there"))
-        outcome, seen, asked = ENDS[message.status]
+        outcome, seen, asked = ENDS[status]
         sentence = asked if goal.doubt else seen
-        said = with_fields(goal.widget.result, message.result)
+        said = with_fields(goal.widget.result, fields, RESULT)
         return Answer(outcome, say(sentence, time=clock(time.time())) + (f": {said}" if said else "."))
 
     async def _result(self, goal: Goal) -> bytes | None:

@@ -8,14 +8,15 @@ import math
 import uuid
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 from app.calls import with_fields
+from app.interfaces import Fields
 from app.panel.model import Action
 from app.progress import Answer, Outcome, Progress
-from app.robot import value_of
 from app.sentences import say
 
+FEEDBACK: Final = "feedback."  # where it is in the message that has it
 UNKNOWN: Final = 0
 ACCEPTED: Final = 1
 EXECUTING: Final = 2
@@ -64,14 +65,14 @@ class Goal:
         self.known = self.known or state != UNKNOWN
         return True
 
-    def hear(self, feedback: Any) -> None:
-        """Takes a feedback: what it says, and how far the goal is."""
+    def hear(self, message: Fields) -> None:
+        """Takes a feedback message: what it says, and how far the goal is."""
         widget = self.widget
         if widget.progress is not None:
-            found = value_of(feedback, widget.progress)
+            found = message.get(FEEDBACK + widget.progress)
             done = math.nan if found is None else float(found) / widget.progress_max
             self.fraction = min(1.0, max(0.0, done)) if done == done else None  # NaN is no progress
-        self.said = with_fields(widget.feedback, feedback)
+        self.said = with_fields(widget.feedback, message, FEEDBACK)
 
     @property
     def lives(self) -> bool:

@@ -3,22 +3,27 @@
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from app import keys
 from app.actions import Actions
+from app.conditions import permits
 from app.confirmations import Confirmations
 from app.inbox import Changes, Token
-from app.interlocks import interlock_verdict
+from app.interlocks import Verdict, interlock_verdict
 from app.logs import RobotLog
-from app.panel.model import Interlock, Panel
+from app.panel.interlock import Interlock
+from app.panel.model import Panel
 from app.panel.parameter import EVENTS
 from app.parameters import Parameters
-from app.robot import Robot, Sample, value_of
+from app.robot import Reading, Robot, Sample
 from app.views import Enabled, enabled
 
 if TYPE_CHECKING:
     from app.recording import Recorder
+
+
+Change = Literal["", "soon", "now"]
 
 
 @dataclass(slots=True)
@@ -81,9 +86,11 @@ class Intake:
                 show()
             for payload, at, wall in sample.between:
                 passed = sample._replace(payload=payload, at=at, wall=wall, between=())
-                if self._changes(key, passed, shown()):
+                if self._changes(key, passed, shown()) == "now":
                     show()
-            news.urgent |= self._changes(key, sample, shown())
+            change = self._changes(key, sample, shown())
+            news.urgent |= change == "now"
+            news.more |= change == "soon"
             if key in self._feedback or key in self._status or key == self._events:
                 news.more = True
             else:
@@ -92,23 +99,30 @@ class Intake:
         news.came = self._tokens(changes.tokens)
         return news
 
-    def _changes(self, key: str, sample: Sample, shown: Mapping[str, Enabled]) -> bool:
+    def _changes(self, key: str, sample: Sample, shown: Mapping[str, Enabled]) -> Change:
         """Takes a sample in; whether a permission may be another one by it than is shown. What says
         something else is not judged here: it will be, when all is looked at."""
         interlocks = self._interlocks.get(key, ())
         before = [self._said(one) for one in interlocks]
         self._guarded(key, sample, self._sample)
         if before != [self._said(one) for one in interlocks]:
-            return True
+            return "now"
+        return self._change(key, shown)
+
+    def _change(self, key: str, shown: Mapping[str, Enabled]) -> Change:
         now = time.monotonic()
-        return any(
-            enabled(interlock_verdict(one, self._robot, now)) != shown[one.id] for one in interlocks
-        )
+        changes = [
+            _change(interlock_verdict(one, self._robot, now), shown[one.id])
+            for one in self._interlocks.get(key, ())
+        ]
+        return "now" if "now" in changes else "soon" if "soon" in changes else ""
 
     def _said(self, interlock: Interlock) -> bool:
         """Whether the last of a topic can be read, and permits."""
         reading = self._robot.reading(interlock.topic)
-        return reading.status == "message" and value_of(reading.message, interlock.field) is True
+        if reading.status != "message":
+            return False
+        return permits(interlock, reading.value(interlock.field))
 
     def _record(self, changes: Changes) -> None:
         if self._recorder is not None:
@@ -130,7 +144,14 @@ class Intake:
             if key == self._events:
                 self._parameters.hear(sample)
             self._robot.take(key, sample)
-            self._confirmations.hear(key)
+            if self._confirmations.awaits(key):
+                self._confirmations.hear(key, self._robot.reading_of(key))
+
+    def read(self, key: str, reading: Reading, shown: Mapping[str, Enabled]) -> Change:
+        """A message that took more than one turn is read: whether a permission may be another one by it
+        than is shown."""
+        self._confirmations.hear(key, reading)
+        return self._change(key, shown)
 
     def _tokens(self, tokens: Mapping[str, Token]) -> bool:
         """Takes them in; whether there is a bridge where there was none."""
@@ -166,3 +187,10 @@ class Intake:
             silent.appeared(endpoint, token.came_seq, token.came_at, token.lost_before)
         if token.lost_seq:
             silent.lost(endpoint, token.lost_seq)
+
+
+def _change(verdict: Verdict, shown: Enabled) -> Change:
+    """A reason with the robot's value in it may change as often as a readout, and waits as one."""
+    if enabled(verdict) == shown:
+        return ""
+    return "soon" if verdict.code == "unmet" and not shown["enabled"] else "now"

@@ -5,29 +5,39 @@ reason an operator reads.
 """
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Final
 
-from app.declared import UNKNOWN, Declared, allowed, limits_text, own_range
+from app.conditions import permits, unmet
+from app.declared import UNKNOWN, Declared, each_text, ours_text, suits
 from app.graph import Graph, remembered
 from app.keys import Qos, ServerRole, TopicRole
-from app.panel.model import Action, Call, Display, Hold, Interlock, Pressed, Publish, Published
+from app.panel.interlock import Interlock
+from app.panel.model import Action, Call, Display, Hold, Pressed, Publish, Published
 from app.panel.parameter import DESCRIBE, GET, SET, Parameter
 from app.progress import IDLE
-from app.robot import Robot, value_of
+from app.robot import Reading, Robot
 from app.sentences import say
 
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
     """`reason` is None when permitted; `code` is its stable name; `until` (monotonic seconds) is
-    when time alone would change the verdict."""
+    when time alone would change the verdict. `others` are further verdicts that lock the same."""
 
     permitted: bool
     code: str = "permitted"
     reason: str | None = None
     until: float = math.inf
+    others: tuple["Verdict", ...] = ()
+
+    @property
+    def reasons(self) -> list[str]:
+        """All that is told of a lock, each sentence once."""
+        told = (one.reason for one in (self, *self.others))
+        return list(dict.fromkeys(reason for reason in told if reason))
 
 
 PERMITTED: Final = Verdict(True)
@@ -89,8 +99,8 @@ def interlock_verdict(interlock: Interlock, robot: Robot, now: float) -> Verdict
         return locked(reading.status, topic=topic, wanted=interlock.type)
     if robot.silent.any(key, robot.graph.bridges):
         return locked("new_publisher", topic=topic)
-    if value_of(reading.message, interlock.field) is not True:
-        return locked("forbidden", name=interlock.name)
+    if not permits(interlock, reading.value(interlock.field)):
+        return _forbidden(interlock, reading)
     if interlock.max_age_s is None:
         return PERMITTED
     if reading.at < robot.settled_at + HISTORY_S:
@@ -101,21 +111,48 @@ def interlock_verdict(interlock: Interlock, robot: Robot, now: float) -> Verdict
     return Verdict(True, until=stale_at)
 
 
+def _forbidden(interlock: Interlock, reading: Reading) -> Verdict:
+    value = reading.value(interlock.field)
+    if reading.several(interlock.field):
+        return locked("several", field=interlock.field, topic=interlock.topic)
+    if value is None:
+        return locked("missing", field=interlock.field, topic=interlock.topic)
+    if not interlock.conditions:
+        return locked("forbidden", name=interlock.name)
+    return Verdict(False, "unmet", unmet(interlock, value))
+
+
 def press_verdict(
-    widget: Pressed | Hold, interlock: Interlock | None, robot: Robot, now: float
+    widget: Pressed | Hold, interlocks: Iterable[Interlock], robot: Robot, now: float
 ) -> Verdict:
-    """Whether a widget may be pressed: a way, nothing of its own against it, and the interlock."""
-    permission = PERMITTED if interlock is None else interlock_verdict(interlock, robot, now)
-    return command_verdict(widget, way(robot, now), permission, robot, now)
+    """Whether a widget may be pressed: a way, nothing of its own against it, and its interlocks."""
+    permissions = [interlock_verdict(one, robot, now) for one in interlocks]
+    return command_verdict(widget, way(robot, now), permissions, robot, now)
 
 
 def command_verdict(
-    widget: Pressed | Hold, passable: Verdict, permission: Verdict, robot: Robot, now: float
+    widget: Pressed | Hold,
+    passable: Verdict,
+    permissions: Sequence[Verdict],
+    robot: Robot,
+    now: float,
 ) -> Verdict:
-    """The same by verdicts that are known: of the way, and of the widget's interlock."""
+    """The same by verdicts that are known: of the way, and of the widget's interlocks."""
     if not passable.permitted:
         return passable
-    return _against(widget, robot, now) or permission
+    own = _against(widget, robot, now)
+    return combined(permissions if own is None else (own, *permissions))
+
+
+def combined(verdicts: Sequence[Verdict]) -> Verdict:
+    """The verdict of what all have to permit: the first that does not is told first."""
+    if len(verdicts) == 1:
+        return verdicts[0]
+    locking = [one for one in verdicts if not one.permitted]
+    until = min((one.until for one in verdicts), default=math.inf)
+    if not locking:
+        return PERMITTED if until == math.inf else Verdict(True, until=until)
+    return replace(locking[0], until=until, others=tuple(locking[1:]))
 
 
 def _against(widget: Pressed | Hold, robot: Robot, now: float) -> Verdict | None:
@@ -193,9 +230,9 @@ def unsettable(of: Parameter, known: Declared) -> Verdict | None:
         return locked(code, node=node, name=name, found=known.found, wanted=of.type)
     if known.read_only:
         return locked("parameter_read_only", node=node, name=name)
-    if allowed(of, known).empty:
-        theirs, ours = limits_text(of, known.range), limits_text(of, own_range(of))
-        return locked("parameter_apart", node=node, name=name, theirs=theirs, ours=ours)
+    if not suits(of, known):
+        theirs = each_text(of, known.range)
+        return locked("parameter_apart", node=node, name=name, theirs=theirs, ours=ours_text(of))
     return None
 
 

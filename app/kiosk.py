@@ -15,7 +15,7 @@ from app.calls import Calls
 from app.confirmations import Confirmations
 from app.control import Control
 from app.doubts import Doubts
-from app.errors import LinkError
+from app.errors import LinkError, NotFound
 from app.holds import Holds
 from app.intake import Intake
 from app.interfaces import interfaces_of
@@ -26,14 +26,16 @@ from app.link import Config, Link
 from app.logbook import Log, Logbook
 from app.logs import RobotLog
 from app.panel.model import Panel, RobotEntry
+from app.panel.parameter import Parameter
 from app.parameters import Parameters
 from app.presses import Presses
 from app.pulse import Pulse
 from app.resuming import Resuming
-from app.robot import Robot
+from app.robot import Reading, Robot
 from app.rosout import Rosout
 from app.sending import Sending
 from app.showing import Alone, Others, Showing
+from app.slices import Slices
 
 if TYPE_CHECKING:
     from app.recording import Recorder, Recordings
@@ -57,6 +59,7 @@ class Kiosk:
         entry: RobotEntry | None = None,
         others: Others = ALONE,
         recordings: "Recordings | None" = None,
+        slices: Slices | None = None,
         simulated: bool = False,
         fault: str = "",
     ) -> None:
@@ -71,8 +74,9 @@ class Kiosk:
         self.interfaces = interfaces_of(panel.distro, panel.interfaces)
         self._loop = asyncio.get_running_loop()
         self.link = Link(config, self._wake)
-        self.robot = Robot(panel, self.interfaces, self.link.zid, entry)
+        self.robot = Robot(panel, self.interfaces, self.link.zid, entry, slices)
         self.robot.endpoints = self.link.endpoints
+        self.robot.read_later = self._read_later
         self._log = RobotLog(log, self.robot.name)
         self.control = Control(panel.control, self.robot.name, tell=self._log.info)
         self.showing = Showing(
@@ -227,6 +231,13 @@ class Kiosk:
             return self.way
         return locked("bridge_silent") if self.way.permitted else self.way
 
+    def read_again(self, widget_id: str) -> str:
+        """Asks the node of a parameter for it; why it can't be asked, or "". NotFound for other ids."""
+        widget = self.sending.widget(widget_id)
+        if not isinstance(widget, Parameter):
+            raise NotFound(f'"{widget_id}" is not a parameter: there is nothing to read')
+        return self._parameters.read_again(widget)
+
     def _heal(self) -> None:
         """A new session though there is a way: what is held gets its last message by the old one."""
         self.holds.end_all("hold_by_renewal")
@@ -297,6 +308,18 @@ class Kiosk:
             self.showing.soon()
         elif news.values:
             self.showing.values(news.values)
+
+    def _read_later(self, key: str, reading: Reading) -> None:
+        """What was too large for one turn is read."""
+        if self._stopped:
+            return
+        match self._intake.read(key, reading, self.board.view["interlocks"]):
+            case "now":
+                self.show()
+            case "soon":
+                self.showing.soon()
+            case _:
+                self.showing.values({key})
 
     def _follow(self, came: bool) -> None:
         """After every change of the graph; `came`: there is a bridge where there was none."""

@@ -24,6 +24,9 @@ NODE: Final = GONE | {
     "stale",
     "unreadable",
     "new_publisher",
+    "reading",
+    "missing",
+    "several",
     "wrong_type",
     "publishes_best_effort",
     "publishes_volatile",
@@ -134,7 +137,9 @@ def silent(panel: Panel, robot: Robot, now: float) -> tuple[str, float]:
 
 def labels(panel: Panel, verdicts: Mapping[str, Verdict], codes: frozenset[str]) -> list[str]:
     """The labels of the controls that are locked for one of these codes."""
-    locked = {widget for widget, verdict in verdicts.items() if verdict.code in codes}
+    locked = {
+        name for name, verdict in verdicts.items() if any(one.code in codes for one in _all(verdict))
+    }
     return [w.label for w in panel.commands if w.id in locked]
 
 
@@ -152,7 +157,12 @@ def locks(names: Sequence[str]) -> str:
 
 
 def _first(verdicts: Mapping[str, Verdict], codes: frozenset[str]) -> Verdict:
-    return next((v for v in verdicts.values() if v.code in codes), PERMITTED)
+    every = (one for verdict in verdicts.values() for one in _all(verdict))
+    return next((one for one in every if one.code in codes), PERMITTED)
+
+
+def _all(verdict: Verdict) -> tuple[Verdict, ...]:
+    return (verdict, *verdict.others)
 
 
 def _gone(names: Sequence[str]) -> str:

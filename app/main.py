@@ -34,7 +34,7 @@ from app.panel import Panel, load_panel
 from app.panel.model import RobotEntry
 from app.press_limits import PressLimits
 from app.proxies import Proxies
-from app.routes import control, events, health, holds, pages, press_socket, presses, static
+from app.routes import control, events, health, holds, pages, parameters, press_socket, presses, static
 from app.routes import log as log_routes
 from app.routes.described import errors
 from app.routes.messages import LONGEST
@@ -129,7 +129,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     if settings.proxies:
         app.add_middleware(Proxies, named=settings.proxies)
     app.add_middleware(InWords)
-    for routes in (pages, events, presses, press_socket, control, holds):
+    for routes in (pages, events, presses, press_socket, control, holds, parameters):
         app.include_router(routes.router)
         app.include_router(routes.router, prefix="/robots/{robot}", dependencies=[Depends(named_robot)])
     for common in (static, health):
@@ -173,7 +173,9 @@ async def _running(
 ) -> AsyncIterator[tuple[Fleet, Assets]]:
     """The robots that the panel is for: the real ones, or demo robots of its own."""
     demo = (settings.mode or panel.mode) == "demo"
-    kinds = {widget.kind for widget in panel.widgets()}
+    kinds: set[str] = {widget.kind for widget in panel.widgets()}
+    if any(len(widget.interlocks) > 1 for widget in panel.commands):
+        kinds.add("interlocks")
     assets = load_assets(shipped("static"), shipped("templates"), panel.mm_per_px, kinds)
     revision = f"{panel.revision}-{assets.revision}"
     if settings.dev:

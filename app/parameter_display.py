@@ -3,9 +3,11 @@
 import math
 from typing import Any, Final
 
-from app.declared import LONGEST_TEXT, UNKNOWN, Declared, Value, allowed, limits_text
+from app.declared import LONGEST_LIST, UNKNOWN, Declared, allowed, limits_text
 from app.displays import NOTHING, written
-from app.panel.parameter import EVENT_TYPE, EVENTS, Parameter
+from app.interlocks import parameters_offered
+from app.panel.check_parameters import LONGEST_TEXT
+from app.panel.parameter import EVENT_TYPE, EVENTS, Parameter, Value
 from app.panel.ranges import decimal
 from app.printable import printable
 from app.robot import Robot
@@ -27,8 +29,9 @@ ANY_STEP: Final = {False: "any", True: "1"}
 
 
 def parameter(of: Parameter, robot: Robot) -> dict[str, Any]:
-    """Attributes: `state`, `text`, `note`, `hint`, `limits`, `settable`, and of the input `entry`
-    (the value to start from) and `bounds` (`min`, `max` and `step` as HTML has them)."""
+    """Attributes: `state`, `text`, `note`, `hint`, `limits`, `settable`, `askable` (whether its node
+    can be asked now), and of the input `entry` (the value to start from) and `bounds` (`min`, `max` and
+    `step` as HTML has them)."""
     known = robot.parameters.get(of.id, UNKNOWN)
     limits = allowed(of, known)
     return {
@@ -38,11 +41,12 @@ def parameter(of: Parameter, robot: Robot) -> dict[str, Any]:
         "hint": printable(known.hint[:LONGEST_HINT])[:LONGEST_HINT],
         "limits": limits_text(of, limits),
         "settable": not known.read_only,
-        "entry": _entry(known.value),
+        "askable": of.id not in robot.asking and parameters_offered(of.node, robot) is None,
+        "entry": _entry(of, known.value),
         "bounds": {
             "min": "" if limits.low is None else decimal(limits.low),
             "max": "" if limits.high is None else decimal(limits.high),
-            "step": ANY_STEP[of.type == "integer"] if limits.step is None else decimal(limits.step),
+            "step": ANY_STEP[of.element == "integer"] if limits.step is None else decimal(limits.step),
         },
     }
 
@@ -54,7 +58,8 @@ def never_told(known: Declared) -> bool:
 def _note(of: Parameter, known: Declared, robot: Robot) -> str:
     time = clock(known.wall)
     if never_told(known):
-        return say("parameter_asking", node=of.node)
+        silent = known.state == "silent" and of.id not in robot.asking
+        return say("parameter_unanswered" if silent else "parameter_asking", node=of.node)
     match known.state:
         case "cut":
             return say("parameter_cut", time=time)
@@ -80,10 +85,15 @@ def tells(robot: Robot) -> bool:
     return heard and graph.wrong_type("MS", key, EVENT_TYPE) is None
 
 
-def _entry(value: Value | None) -> bool | str:
+def _entry(of: Parameter, value: Value | None) -> bool | str:
     """What the input starts from, exactly; "" where it can't hold the value as it is."""
-    if value is None or (isinstance(value, float) and not math.isfinite(value)):
+    if of.options and value is not None:
+        return "" if (option := of.option(value)) is None else option.key
+    several = value if isinstance(value, tuple) else (value,)
+    unusual = any(isinstance(one, float) and not math.isfinite(one) for one in several)
+    if value is None or unusual or len(several) > LONGEST_LIST:
         return ""
-    if isinstance(value, str):
-        return value if len(value) <= LONGEST_TEXT and value.isprintable() else ""
+    if isinstance(value, str | tuple):
+        text = of.entered(value)
+        return text if len(text) <= LONGEST_TEXT and text.isprintable() else ""
     return value if isinstance(value, bool) else decimal(value)

@@ -16,7 +16,11 @@ LATE_S: Final = 5.0  # how long after that nothing more is asked: it may only be
 
 
 class NoAnswer(Exception):
-    """Nothing came in time; what comes late does not count."""
+    """Nothing came in time; what comes late does not count. `dropped`: the question never got there."""
+
+    def __init__(self, why: str, *, dropped: bool) -> None:
+        super().__init__(why)
+        self.dropped = dropped
 
 
 class ParameterServices:
@@ -54,7 +58,7 @@ class ParameterServices:
             query = self._link.query(key, payload, ANSWER_S + LATE_S)
         except LinkError as error:
             silent()
-            raise NoAnswer(str(error)) from error
+            raise NoAnswer(str(error), dropped=True) from error
         await asyncio.wait({query}, timeout=ANSWER_S)
         in_time = query.done()
         if not in_time:
@@ -62,7 +66,7 @@ class ParameterServices:
         reply = await query
         if reply is None or not in_time:
             silent()
-            raise NoAnswer(f"{key} did not answer")
+            raise NoAnswer(f"{key} did not answer", dropped=in_time)
         answer: list[Any] = getattr(self._interfaces.decode(response, reply), part)
         return answer
 

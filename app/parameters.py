@@ -1,8 +1,9 @@
 """The parameters of a robot's nodes: read when a node is there, followed by its events, and set.
 
 A node is asked when its services appear in the graph, once more when events must have been flowing
-for a while, after a set, and where an event may have been missed; never twice at a time. What was
-asked of a bridge or a node that went away meanwhile no longer counts.
+for a while, after a set, and where an event may have been missed; never twice at a time. One that did
+not answer is asked again only when somebody wants it: each question makes a node on Fast DDS print an
+error. What was asked of a bridge or a node that went away meanwhile no longer counts.
 """
 
 import asyncio
@@ -11,18 +12,19 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 from app import keys
 from app.calls import LONGEST_SAID, Asker, Calls, Request
-from app.declared import UNKNOWN, Declared, Value, checked, declared, name_of, value_in, wire
+from app.declared import UNKNOWN, Declared, declared, name_of, value_in, wire
 from app.errors import DecodeError
-from app.interfaces import Interfaces, text_of
-from app.interlocks import parameters_offered
+from app.interfaces import Fields, Interfaces, text_of
+from app.interlocks import SERVER_SETTLE_S, parameters_offered
 from app.logs import RobotLog
 from app.panel.model import Panel
-from app.panel.parameter import DESCRIBE, EVENT_TYPE, GET, SET, Parameter
+from app.panel.parameter import DESCRIBE, EVENT_TYPE, GET, SET, Parameter, Value
 from app.parameter_services import NoAnswer, ParameterServices
+from app.parameter_values import checked
 from app.printable import printable
 from app.progress import Answer, Corrected, LastLook, no_look
 from app.robot import Robot, Sample
@@ -31,9 +33,13 @@ from app.tasks import told
 
 log = logging.getLogger("kiosk.parameters")
 
+Read = Literal["whole", "partly", "silent"]
+
 FAILED: Final = "following a node's parameters failed"
+SETTLE_S: Final = SERVER_SETTLE_S  # before which a question to a node that appeared may be lost
 CONFIRM_S: Final = 3.0  # after which the bridge surely brings the events of a node that appeared
 AGAIN_S: Final = 1.0  # between two readings at least, and before the first try again
+SET_PATHS: Final = ("results[0].successful", "results[0].reason", "results[1].successful")
 AGAIN_MOST_S: Final = 600.0  # the pause between tries doubles up to this
 
 
@@ -118,6 +124,7 @@ class Parameters:
             return
         node.task.cancel()
         node.task = None
+        self._end_asking(node)
         for widget in node.widgets:
             known = self._known(widget)
             cut = replace(known, state="cut") if known.value is not None else UNKNOWN
@@ -165,31 +172,45 @@ class Parameters:
     async def _follow_node(self, node: _Node) -> None:
         """Asks a node, as often as there is need, until it is cut off."""
         confirmed, pause = False, AGAIN_S
+        await asyncio.sleep(SETTLE_S)
         while True:
             node.wanted.clear()
             node.urgent.clear()
             node.heard.clear()
-            whole = await self._read(node)
+            read = await self._read(node)
             await _within(node.urgent, AGAIN_S)
-            if whole:
-                await _within(node.wanted, None if confirmed else CONFIRM_S)
-                confirmed, pause = True, AGAIN_S
-            else:
-                await _within(node.wanted, pause)
-                pause = min(2 * pause, AGAIN_MOST_S)
+            match read:
+                case "silent":
+                    await node.urgent.wait()
+                case "partly":
+                    await _within(node.wanted, pause)
+                    pause = min(2 * pause, AGAIN_MOST_S)
+                case "whole":
+                    await _within(node.wanted, None if confirmed else CONFIRM_S)
+                    confirmed, pause = True, AGAIN_S
 
-    async def _read(self, node: _Node) -> bool:
-        """Asks for all of a node's parameters; False where one of them has no value to show."""
+    async def _read(self, node: _Node) -> Read:
+        """Asks for all of a node's parameters: whether it told all, not all, or nothing."""
+        self._robot.asking |= {widget.id for widget in node.widgets}
+        self._changed()
+        try:
+            return await self._answered(node)
+        finally:
+            if node.task is asyncio.current_task():  # else it was cut off, and may be asked anew
+                self._end_asking(node)
+                self._changed()
+
+    async def _answered(self, node: _Node) -> Read:
         names = list(dict.fromkeys(widget.parameter for widget in node.widgets))
         try:
             asked = self._services.read(node.name, names, partial(self._silent, node))
             descriptors, values = await asked
-        except NoAnswer:
-            return False
+        except NoAnswer as error:
+            return "partly" if error.dropped else "silent"
         except DecodeError as error:
             self._log.error("%s: %s", node.name, error)
             self._learn_all(node, lambda known: Declared("unreadable", wall=time.time()))
-            return False
+            return "partly"
         self._calls.mark_answered(f"{node.name}/{SET[0]}")
         values |= node.heard  # told after it was asked
         for widget in node.widgets:
@@ -197,7 +218,20 @@ class Parameters:
             found = declared(widget, descriptors.get(name), values.get(name), time.time())
             self._learn(widget, found)
         self._changed()
-        return all(self._known(widget).state == "live" for widget in node.widgets)
+        live = all(self._known(widget).state == "live" for widget in node.widgets)
+        return "whole" if live else "partly"
+
+    def _end_asking(self, node: _Node) -> None:
+        self._robot.asking -= {widget.id for widget in node.widgets}
+
+    def read_again(self, widget: Parameter) -> str:
+        """Asks the node of a parameter once more, unless it is being asked; why it can't be, or ""."""
+        node = self._nodes[widget.node]
+        if node.task is None:
+            return say("no_parameters", node=widget.node)
+        if widget.id not in self._robot.asking:
+            node.ask_now()
+        return ""
 
     # Setting.
 
@@ -218,7 +252,7 @@ class Parameters:
         fields = {"parameters": [{"name": widget.parameter, "value": wire(widget, value)}]}
         payload = self._interfaces.encode(self._interfaces.service(type_name)[0], fields)
         name, read = f"{widget.node}/{service}", partial(_answer, widget, value)
-        request = Request(widget.id, name, type_name, payload, widget.timeout_s, read)
+        request = Request(widget.id, name, type_name, payload, widget.timeout_s, SET_PATHS, read)
         node = self._nodes[widget.node]
 
         def late(press_id: str, answer: Answer) -> None:
@@ -250,15 +284,15 @@ class Parameters:
         self._learn_all(node, lambda known: replace(known, state="silent"))
 
 
-def _answer(widget: Parameter, value: Value, response: Any) -> Answer:
+def _answer(widget: Parameter, value: Value, response: Fields) -> Answer:
     """What a response of SetParameters says of the one parameter that was to be set."""
     now = clock(time.time())
-    if len(response.results) != 1:
+    successful, reason, second = (response.get(path) for path in SET_PATHS)
+    if successful is None or second is not None:
         return Answer("unknown", say("answer_unreadable", wanted=SET[1]))
-    result = response.results[0]
-    if result.successful:
+    if successful:
         return Answer("succeeded", say("parameter_set", value=widget.written(value), time=now))
-    said = f": {printable(text_of(result.reason, LONGEST_SAID))}" if result.reason else "."
+    said = f": {printable(text_of(reason, LONGEST_SAID))}" if reason else "."
     return Answer("rejected", say("said_no", time=now) + said)
 
 

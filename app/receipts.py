@@ -75,11 +75,11 @@ class By:
 
 def judged(widget: Pressed | Hold, by: By, panel: Panel, robot: Robot, now: float) -> Verdict:
     """Whether a widget may be pressed or held by somebody now. The first that locks is told: the way to
-    the robot, who has control, the widget's interlock."""
+    the robot, who has control, the widget's interlocks."""
     for verdict in (way(robot, now), by.controls()):
         if not verdict.permitted:
             return verdict
-    return press_verdict(widget, panel.interlock(widget.interlock), robot, now)
+    return press_verdict(widget, panel.interlocks_of(widget), robot, now)
 
 
 def cause_of(verdict: Verdict) -> Cause:

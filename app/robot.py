@@ -1,77 +1,37 @@
 """What the kiosk knows of the robot at this moment; changed on the event loop only.
 
-One latest sample per topic, as raw bytes, decoded when it is first asked for.
+One latest sample per topic, as raw bytes, read when it is first asked for.
 """
 
 import logging
 import math
 from collections import Counter
-from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple, Protocol
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from functools import partial
+from typing import Any
 
 from app.declared import Declared
-from app.errors import DecodeError, FieldError
+from app.errors import DecodeError
 from app.graph import Graph
-from app.interfaces import Interfaces, value_at
+from app.interfaces import Interfaces
 from app.keys import ROSOUT_TOPIC, key_of
 from app.logs import RobotLog
-from app.panel.model import Panel, RobotEntry
+from app.panel.constants import holder
+from app.panel.model import Display, Panel, RobotEntry
 from app.progress import Progress
+from app.samples import Buffer as Buffer
+from app.samples import Passed as Passed
+from app.samples import Sample as Sample
 from app.seen import Seen, ends
 from app.silent_publishers import SilentPublishers
+from app.slices import Slices
+from app.topics import Reading as Reading
+from app.topics import Topic
 
 log = logging.getLogger("kiosk.robot")
 
 UNREADABLE_LOG_S = 60.0  # one line per topic in this time, at most
-
-
-class Buffer(Protocol):
-    """Bytes, or what becomes bytes when asked (Zenoh's buffers: no copy until then)."""
-
-    def __bytes__(self) -> bytes: ...
-    def __len__(self) -> int: ...
-
-
-class Passed(NamedTuple):
-    """A payload that came and went before anybody looked, and when: see `Sample`."""
-
-    payload: Buffer
-    at: float
-    wall: float
-
-
-class Sample(NamedTuple):
-    """One message as it came: `at` monotonic seconds, `wall` seconds since the epoch.
-
-    `source` is the zid of the bridge that sent it (from its timestamp), None if it did not say;
-    `seq` orders samples and losses of bridges as this session saw them; `skipped` is how many came
-    just before it that nobody looked at; `sent` is the timestamp of its sender's clock, in seconds
-    since the epoch; `between` are other payloads that came and went unseen, for watched topics, and
-    `overrun` says that there were more before these, of which nobody knows what they said.
-    """
-
-    payload: Buffer
-    seq: int
-    at: float
-    wall: float
-    source: str | None
-    skipped: int = 0
-    sent: float | None = None
-    between: tuple[Passed, ...] = ()
-    overrun: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class Reading:
-    """The latest of a topic: not seen yet, seen before a cut, not readable, or a message."""
-
-    status: Literal["waiting", "cut", "unreadable", "message"]
-    message: Any = None
-    at: float = -math.inf
-    wall: float = 0.0
-
-
-WAITING = Reading("waiting")
 
 
 class Robot:
@@ -83,8 +43,10 @@ class Robot:
         interfaces: Interfaces,
         own_zid: str = "",
         entry: RobotEntry | None = None,
+        slices: Slices | None = None,
     ) -> None:
-        """`entry` is which of the panel's robots this is, where it has several."""
+        """`entry` is which of the panel's robots this is, where it has several; `slices` is of all that
+        is read on one event loop."""
         self.name = entry.name if entry else ""
         self.namespace = entry.namespace if entry else panel.namespace
         self.link_up = False
@@ -100,19 +62,39 @@ class Robot:
         self.silent = SilentPublishers(self._judged)
         self.progress: dict[str, Progress] = {}  # of what widgets have asked, by their ids
         self.parameters: dict[str, Declared] = {}  # what nodes said of them, by their widgets' ids
+        self.asking: set[str] = set()  # ids of parameter widgets whose nodes are being asked
         self.held: dict[str, str] = {}  # by the ids of hold widgets: since when, in words
         self._log = RobotLog(log, self.name)
         self.answers = True  # False: its bridges are silent, though nobody knows yet why
         self.caught_up = True  # False: the event loop stood still, and may not know what came meanwhile
         self.seen = Seen({(role, name): (role, self.key(name)) for role, name in needed})
         self.undecodable: Counter[str] = Counter()
+        self.slices = slices or Slices()
+        # Gets what took more than one turn to read: the topic's key, and what it said.
+        self.read_later: Callable[[str, Reading], None] = lambda _key, _reading: None
         self._interfaces = interfaces
-        self._types = {self.key(topic): name for topic, name in panel.subscriptions().items()}
         self._required = [self.key(i.topic) for i in panel.interlocks if i.require_publisher]
         self._published: set[str] = set()
-        self._samples: dict[str, Sample] = {}
-        self._readings: dict[str, Reading] = {}
+        self._topics = dict(self._made(panel))
         self._logged_at: dict[str, float] = {}
+
+    def _made(self, panel: Panel) -> Iterator[tuple[str, Topic]]:
+        """A topic for each that the panel listens to, by its key."""
+        fields = panel.fields()
+        watched = {one.topic for one in panel.interlocks} | {one.topic for one in panel.confirms()}
+        for topic, type_name in panel.subscriptions().items():
+            key = self.key(topic)
+            made = Topic(
+                self._interfaces.fields(type_name, fields.get(topic, ())),
+                self.slices,
+                watched=topic in watched,
+                unreadable=partial(self.count_unreadable, key),
+                read_later=partial(self._read_later, key),
+            )
+            yield key, made
+
+    def _read_later(self, key: str, reading: Reading) -> None:
+        self.read_later(key, reading)
 
     def key(self, topic: str) -> str:
         """The key expression of a topic of this robot."""
@@ -123,16 +105,17 @@ class Robot:
 
     def take(self, key: str, sample: Sample) -> None:
         """A newer sample of a topic."""
-        self._samples[key] = sample
         self.silent.message(key, sample.source, sample.seq, sample.at)
-        self._readings.pop(key, None)
+        if (topic := self._topics.get(key)) is not None:
+            topic.take(sample)
 
     def cut(self, bridge: str, seq: int) -> None:
         """A bridge went away at `seq`: what came by it before no longer says what is so."""
         self.silent.lose_bridge(bridge)
-        for key, sample in self._samples.items():
-            if sample.seq < seq and sample.source in (bridge, None):
-                self._cut(key, sample)
+        for topic in self._topics.values():
+            sample = topic.sample
+            if sample is not None and sample.seq < seq and sample.source in (bridge, None):
+                topic.cut()
 
     def follow_publishers(self, before: float = math.inf) -> None:
         """After every change of the graph: where a publisher is required, what it said (`before` this
@@ -143,14 +126,13 @@ class Robot:
                 self._published.add(key)
             elif key in self._published:
                 self._published.discard(key)
-                sample = self._samples.get(key)
-                if sample is not None and sample.seq < before:
-                    self._cut(key, sample)
+                topic = self._topics[key]
+                if topic.sample is not None and topic.sample.seq < before:
+                    topic.cut()
 
     def doubt(self, key: str) -> None:
         """It is not known what a topic said last."""
-        if sample := self._samples.get(key):
-            self._cut(key, sample)
+        self._topics[key].cut()
 
     def lose(self) -> None:
         """The link is lost: nobody is known to be there, and nothing that came says what is so."""
@@ -159,38 +141,24 @@ class Robot:
         self.graph = Graph("", self._told_apart, self._needed)
         self.silent = SilentPublishers(self._judged)
         self.seen.forget()
-        for key, sample in self._samples.items():
-            self._cut(key, sample)
-
-    def _cut(self, key: str, sample: Sample) -> None:
-        old = self._reading(key, sample)
-        if old.status != "waiting":
-            self._readings[key] = Reading("cut", old.message, old.at, old.wall)
+        for topic in self._topics.values():
+            topic.cut()
 
     def reading(self, topic: str) -> Reading:
         """The latest of a topic that the panel listens to."""
-        key = self.key(topic)
-        sample = self._samples.get(key)
-        if sample is None:
-            return WAITING
-        found = self._reading(key, sample)
-        if sample.source is not None and sample.source not in self.graph.bridges:
-            return Reading("cut", found.message, found.at, found.wall)
-        return found
+        return self.reading_of(self.key(topic))
 
-    def _reading(self, key: str, sample: Sample) -> Reading:
-        known = self._readings.get(key)
-        if known is None:
-            known = self._readings[key] = self._decoded(key, sample)
-        return known
+    def reading_of(self, key: str) -> Reading:
+        """The same by the topic's key."""
+        known = self._topics[key]
+        found, sample = known.reading(), known.sample
+        if sample is None or sample.source is None or sample.source in self.graph.bridges:
+            return found
+        return replace(found, status="cut")
 
-    def _decoded(self, key: str, sample: Sample) -> Reading:
-        try:
-            message = self._interfaces.decode(self._types[key], bytes(sample.payload))
-        except DecodeError as error:
-            self.count_unreadable(key, sample, error)
-            return Reading("unreadable", None, sample.at, sample.wall)
-        return Reading("message", message, sample.at, sample.wall)
+    def constants(self, of: Display) -> Mapping[str, Any]:
+        """Name → value of the constants of the message that a display's field is in."""
+        return self._interfaces.constants(holder(of, self._interfaces))
 
     def count_unreadable(self, key: str, sample: Sample, error: DecodeError) -> None:
         """Counts a sample that can't be read; logs one of a topic in `UNREADABLE_LOG_S`."""
@@ -198,11 +166,3 @@ class Robot:
         if sample.at - self._logged_at.get(key, -math.inf) >= UNREADABLE_LOG_S:
             self._logged_at[key] = sample.at
             self._log.error("/%s: %s (%d so far)", key, error, self.undecodable[key])
-
-
-def value_of(message: Any, path: str) -> Any:
-    """The field at a path of a decoded message; None where a list in it is too short."""
-    try:
-        return value_at(message, path)
-    except FieldError:
-        return None

@@ -4,7 +4,7 @@ import time
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 from typing import Any, Protocol
 
-from app import declared
+from app import parameter_values
 from app.actions import Actions
 from app.calls import Calls
 from app.confirmations import Confirmations
@@ -75,7 +75,7 @@ class Sending:
     def _typed(self, name: str, text: str) -> Any:
         field = self._widgets.get(name)
         if isinstance(field, Parameter):
-            return declared.typed(field, text)
+            return parameter_values.typed(field, text)
         return typed(field, text) if isinstance(field, Input) else text
 
     def needed(self, widget: Pressed, inputs: Mapping[str, Any]) -> dict[str, Any]:

@@ -5,14 +5,14 @@ nothing.
 """
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final, NamedTuple, TypedDict
 
 from app.browsers import Browser
 from app.control_view import NO_CONTROL, ControlView
 from app.displays import indicator, readout
 from app.inputs import limits
-from app.interlocks import PERMITTED, Verdict, command_verdict, interlock_verdict, way
+from app.interlocks import Verdict, command_verdict, interlock_verdict, way
 from app.lamps import Lamp, LinkLamp, lamps, summary
 from app.panel.displays import Readout
 from app.panel.inputs import Numeric
@@ -85,9 +85,7 @@ def sight(
     passable = way(robot, now)
     interlocks = {i.id: interlock_verdict(i, robot, now) for i in panel.interlocks}
     verdicts = {
-        w.id: command_verdict(
-            w, passable, interlocks[w.interlock] if w.interlock else PERMITTED, robot, now
-        )
+        w.id: command_verdict(w, passable, [interlocks[i] for i in w.interlocks], robot, now)
         for w in panel.commands
     }
     told = {w: Verdict(False, "log", lock) for w in verdicts} if lock else verdicts
@@ -131,10 +129,10 @@ def _shown(widget: Shown, robot: Robot, verdicts: Mapping[str, Verdict]) -> dict
         case Numeric():
             return {"limits": limits(widget)}
         case Publish() | Call() | Action() | Parameter():
-            return {**enabled(verdicts[widget.id]), **_came(widget, robot)}
+            return {**_lock(widget, verdicts[widget.id]), **_came(widget, robot)}
         case Hold():
             holding = robot.held.get(widget.id, "")
-            return {**enabled(verdicts[widget.id]), "held": bool(holding), "holding": holding}
+            return {**_lock(widget, verdicts[widget.id]), "held": bool(holding), "holding": holding}
     return {}
 
 
@@ -153,13 +151,25 @@ def as_seen_by(view: View, browser: Browser) -> View:
     mine = browser.id and browser.id == control["holder"]
     if not control["required"] or mine or view["link"]["bridge"]["state"] != "ok":
         return view
-    lock = {"enabled": False, "reason": control["text"]}
-    widgets = {w: {**a, **lock} if "enabled" in a else a for w, a in view["widgets"].items()}
+    lock = {"enabled": False, "reason": control["text"], **_told([control["text"]])}
+    widgets = {w: {**a, **{k: lock[k] for k in a.keys() & lock}} for w, a in view["widgets"].items()}
     return {**view, "widgets": widgets}
 
 
 def enabled(verdict: Verdict) -> Enabled:
     return {"enabled": verdict.permitted, "reason": verdict.reason}
+
+
+def _lock(widget: Pressed | Hold, verdict: Verdict) -> dict[str, Any]:
+    """Attributes of a control; one with several interlocks tells all reasons."""
+    several = _told(verdict.reasons) if len(widget.interlocks) > 1 else {}
+    return {**enabled(verdict), **several}
+
+
+def _told(reasons: Sequence[str]) -> dict[str, str]:
+    """`reasons` are all, a line each, and `more` says how many there are beside the first."""
+    more = say("more_reasons", number=len(reasons) - 1) if len(reasons) > 1 else ""
+    return {"reasons": "\n".join(reasons), "more": more}
 
 
 def progress(of: Progress) -> dict[str, Any]:

@@ -1,7 +1,7 @@
 """Small real things that unit tests are made of: a panel, a robot that is there, what it says."""
 
 import asyncio
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Final, Protocol
 
 from app import keys
@@ -65,10 +65,12 @@ def told(error: PanelError) -> str:
     return "\n".join(f"{fault.place}: {fault.message}" for fault in error.faults)
 
 
-def panel_of(*widgets: Table, interlock: Table = NOTHING, **more: Any) -> Panel:
-    """A panel of one page; `interlock` changes the one that it has."""
+def panel_of(
+    *widgets: Table, interlock: Table = NOTHING, further: Iterable[Table] = (), **more: Any
+) -> Panel:
+    """A panel of one page; `interlock` changes the one that it has, `further` are others."""
     page = {"id": "one", "title": "One", "widget": list(widgets)}
-    tables = {"title": "Cell", "interlock": [{**INTERLOCK, **interlock}], "page": [page]}
+    tables = {"title": "Cell", "interlock": [{**INTERLOCK, **interlock}, *further], "page": [page]}
     return Panel.model_validate({**tables, **more})
 
 

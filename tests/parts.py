@@ -184,7 +184,7 @@ class Bridge:
 class RosNode(Commanded):
     """A real rclpy node in its own environment; see `tests/ros/node.py` for what it can do."""
 
-    def __init__(self, domain: int, name: str = "system_controller") -> None:
+    def __init__(self, domain: int, name: str = "system_controller", **options: Any) -> None:
         super().__init__(
             [ROS_PYTHON, TESTS / "ros/node.py", name],
             {
@@ -194,6 +194,7 @@ class RosNode(Commanded):
                 "RCUTILS_LOGGING_USE_STDOUT": "0",
                 "ROS_LOG_DIR": tempfile.gettempdir(),
             },
+            **options,
         )
 
     def __getattr__(self, name: str) -> Callable[..., Any]:

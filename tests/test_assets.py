@@ -129,3 +129,12 @@ def test_no_shipped_file_loads_anything_from_elsewhere() -> None:
         assert b"http:" not in asset.content, name
         assert b"https:" not in asset.content, name
         assert b"@import" not in asset.content, name
+
+
+def test_only_a_panel_that_needs_it_gets_the_look_of_several_reasons() -> None:
+    several, single = (
+        load_assets(shipped("static"), shipped("templates"), 0.22, kinds).files["kiosk.css"].content
+        for kinds in (("publish", "interlocks"), tuple(KINDS))
+    )
+    assert b"button.why" in several
+    assert b"button.why" not in single

@@ -150,3 +150,17 @@ def test_the_exit_status_says_good_faulty_or_unreadable(tmp_path: Path, text: st
     ended = subprocess.run(command, cwd=PACKAGE.parent, capture_output=True, text=True, check=False)
     assert ended.returncode == status
     assert "Traceback" not in ended.stderr
+
+
+def test_an_interlock_that_locks_nothing_is_noted(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "cell.toml"
+    spare = '\n[[interlock]]\nid = "spare"\ntopic = "/spare"\nmax_age_s = 1.0\n'
+    path.write_text(SHIPPED.read_text() + spare)
+    assert main([str(path)]) == 0
+    line = len(path.read_text().splitlines()) - 3
+    told = [one for one in capsys.readouterr().out.splitlines() if "locks nothing" in one]
+    assert told == [
+        f'  note: interlock[1] "spare", line {line}: locks nothing: no control has interlock = "spare"'
+    ]

@@ -67,7 +67,7 @@ class Desk:
 
     def says(self, text: str, at: float) -> None:
         says(self.robot, "/heard", text, at=at, seq=next(self._seq))
-        self.confirmations.hear(self.robot.key("/heard"))
+        self.confirmations.hear(self.robot.key("/heard"), self.robot.reading("/heard"))
 
 
 def test_a_command_is_confirmed_by_what_comes_after_it() -> None:

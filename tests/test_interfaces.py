@@ -299,7 +299,7 @@ def test_a_field_has_the_type_of_its_definition(type_name: str, path: str, writt
         (POSE, "covariance.x", 'no "x" .*has no fields'),
         ("std_msgs/msg/Header", "stamp.secs", 'no "secs" .*Time has sec, nanosec'),
         ("std_msgs/msg/Empty", PLACEHOLDER, "has no fields"),
-        (BOOL, "", 'no ""'),
+        (BOOL, "", '"" is not a field: it must be like pose.x'),
     ],
 )
 def test_a_field_that_is_not_there_is_refused_with_those_that_are(

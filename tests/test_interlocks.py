@@ -13,7 +13,8 @@ from app.interlocks import (
     way,
 )
 from app.keys import Qos, bridge_token, server_token
-from app.panel.model import Call, Interlock, Publish
+from app.panel.interlock import Interlock
+from app.panel.model import Call, Publish
 from app.robot import Robot, Sample
 from tests.builders import (
     BOOL,
@@ -111,7 +112,7 @@ def test_without_a_way_to_the_robot_everything_is_locked(
     robot: Robot, broken: Callable[[Robot], None], code: str, reason: str
 ) -> None:
     broken(robot)
-    for verdict in (way(robot, NOW), verdict_of(robot), press_verdict(free(), None, robot, NOW)):
+    for verdict in (way(robot, NOW), verdict_of(robot), press_verdict(free(), (), robot, NOW)):
         assert (verdict.permitted, verdict.code, verdict.reason) == (False, code, reason)
 
 
@@ -220,12 +221,12 @@ def test_a_publisher_that_ended_locks_where_one_is_asked_for(robot: Robot) -> No
 
 
 def test_a_publish_without_an_interlock_needs_a_way_only() -> None:
-    assert press_verdict(free(), None, robot_there(small_panel()), NOW).permitted
+    assert press_verdict(free(), (), robot_there(small_panel()), NOW).permitted
 
 
 def test_a_publish_to_a_topic_of_another_type_is_locked(robot: Robot) -> None:
     endpoint(robot, "MS", "/free", BOOL)
-    verdict = press_verdict(free(), None, robot, NOW)
+    verdict = press_verdict(free(), (), robot, NOW)
     assert (verdict.code, verdict.reason) == (
         "wrong_type",
         "/free is std_msgs/msg/Bool on the robot, but this panel is made for std_msgs/msg/String.",
@@ -234,9 +235,9 @@ def test_a_publish_to_a_topic_of_another_type_is_locked(robot: Robot) -> None:
 
 def test_a_publish_has_the_verdict_of_its_interlock(robot: Robot) -> None:
     interlock = Interlock(id="operation", topic=ENABLED)
-    assert press_verdict(free(), interlock, robot, NOW).permitted
+    assert press_verdict(free(), [interlock], robot, NOW).permitted
     permits(robot, False)
-    assert press_verdict(free(), interlock, robot, NOW).code == "forbidden"
+    assert press_verdict(free(), [interlock], robot, NOW).code == "forbidden"
 
 
 @pytest.mark.parametrize("permitted", [True, False])
@@ -266,7 +267,7 @@ def test_a_permission_that_is_published_best_effort_locks_a_panel_that_asks_for_
 def test_a_subscriber_that_would_not_hear_locks_a_press() -> None:
     robot = robot_there(small_panel())
     endpoint(robot, "MS", "/free", TEXT, qos=Qos(transient_local=True))
-    verdict = press_verdict(free(), None, robot, NOW)
+    verdict = press_verdict(free(), (), robot, NOW)
     assert (
         verdict.reason == "The robot asks for /free transient local; this panel publishes it volatile."
     )
@@ -275,18 +276,18 @@ def test_a_subscriber_that_would_not_hear_locks_a_press() -> None:
 
 def test_a_service_that_has_just_come_is_not_called_yet() -> None:
     call = Call(id="reset", kind="call", label="Reset", service="/reset", type="std_srvs/srv/Trigger")
-    robot = robot_there(panel_of(call.model_dump(exclude_none=True)))
+    robot = robot_there(panel_of(call.model_dump(exclude_none=True, exclude_defaults=True)))
     token = server_token(BRIDGE, "SS", "reset", call.type)
-    assert press_verdict(call, None, robot, NOW).code == "no_service"
+    assert press_verdict(call, (), robot, NOW).code == "no_service"
     robot.graph.apply(token, True, NOW)
-    verdict = press_verdict(call, None, robot, NOW)
+    verdict = press_verdict(call, (), robot, NOW)
     assert (verdict.permitted, verdict.code, verdict.reason, verdict.until) == (
         False,
         "getting_ready",
         "Locked: the robot has just begun to offer /reset; getting ready.",
         NOW + SERVER_SETTLE_S,
     )
-    assert press_verdict(call, None, robot, NOW + SERVER_SETTLE_S).permitted
+    assert press_verdict(call, (), robot, NOW + SERVER_SETTLE_S).permitted
     robot.graph.apply(token, False)
     robot.graph.apply(token, True, NOW + 9)  # another node of this name
-    assert press_verdict(call, None, robot, NOW + 9).code == "getting_ready"
+    assert press_verdict(call, (), robot, NOW + 9).code == "getting_ready"

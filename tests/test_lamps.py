@@ -74,6 +74,7 @@ NO_LINK = frozenset(
     {
         "permitted",
         "forbidden",
+        "unmet",
         "busy",
         "perhaps_busy",
         "log",

@@ -362,7 +362,7 @@ def test_a_parameter_has_one_type_in_a_panel() -> None:
     ("more", "fault"),
     [
         ({"node": "arm"}, "is not the absolute name of a ROS 2 node: it must be like /cell1"),
-        ({"type": "float"}, "'bool', 'integer', 'double' or 'string'"),
+        ({"type": "float"}, "'bool', 'integer', 'double', 'string', 'bool.*'"),
         ({"parameter": "a b"}, "should match pattern"),
         ({"parameter": "a" * 256}, "at most 255 characters"),
         ({"step": 0}, "greater than 0"),

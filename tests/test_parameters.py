@@ -9,13 +9,14 @@ import pytest
 
 from app import keys, parameter_services, parameters
 from app.calls import Calls
-from app.declared import UNKNOWN, Declared, allowed, checked, limits_text, typed, wire
+from app.declared import UNKNOWN, Declared, allowed, limits_text, wire
 from app.errors import InputError
 from app.interlocks import press_verdict
 from app.panel.model import Panel
 from app.panel.parameter import DESCRIBE, EVENT_TYPE, GET, SET, Parameter
 from app.panel.ranges import Range, described
 from app.parameter_display import parameter
+from app.parameter_values import checked, typed
 from app.parameters import Parameters
 from app.progress import Answer
 from app.robot import Sample
@@ -105,12 +106,22 @@ class Bench:
         payload = INTERFACES.encode(EVENT_TYPE, fields)
         self.parameters.hear(Sample(payload, 1, NOW, NOW, BRIDGE, skipped))
 
+    async def until(self, what: Callable[[], bool]) -> None:
+        async with asyncio.timeout(5):
+            while not what():
+                await asyncio.sleep(0.001)
+
+    @property
+    def shown(self) -> dict[str, Any]:
+        (one,) = self.panel.parameters()
+        return parameter(one, self.robot)
+
     def known(self, name: str = "speed") -> Declared:
         return self.robot.parameters.get(name, UNKNOWN)
 
     def reason(self, name: str = "speed") -> str:
         one = next(w for w in self.panel.parameters() if w.id == name)
-        return press_verdict(one, None, self.robot, NOW).reason or ""
+        return press_verdict(one, (), self.robot, NOW).reason or ""
 
 
 def run(test: Callable[[Bench], Coroutine[Any, Any, None]], *widgets: Table) -> None:
@@ -133,6 +144,7 @@ def soon(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pauses of a test's length; the confirming reading far away."""
     monkeypatch.setattr(parameters, "AGAIN_S", 0.01)
     monkeypatch.setattr(parameters, "CONFIRM_S", 60.0)
+    monkeypatch.setattr(parameters, "SETTLE_S", 0.0)
 
 
 def test_a_node_is_asked_when_it_is_seen_and_no_more() -> None:
@@ -256,31 +268,77 @@ def test_a_node_that_was_another_one_for_a_moment_is_asked_anew() -> None:
     run(test)
 
 
-def test_a_silent_node_locks_and_is_asked_one_question_at_a_time(
+def test_a_node_that_does_not_answer_is_asked_again_when_it_is_touched_or_new(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    """Each question makes a node on Fast DDS print an error."""
     monkeypatch.setattr(parameter_services, "ANSWER_S", 0.01)
 
     async def test(bench: Bench) -> None:
+        (one,) = bench.panel.parameters()
+        assert "does not offer" in bench.parameters.read_again(one)
         bench.offer()
         await bench.asked(1)
-        async with asyncio.timeout(5):
-            while bench.known().state != "silent":
-                await asyncio.sleep(0.001)
-        assert "Cyclone DDS" in bench.reason()
-        bench.event(changed_parameters=change(0.7))
-        await asyncio.sleep(0.05)
-        assert len(bench.line.asked) == 1
+        assert bench.parameters.read_again(one) == ""  # it is being asked
+        await bench.until(lambda: bench.known().state == "silent")
+        assert (bench.shown["askable"], bench.shown["note"]) == (False, "waiting for /arm")
         await bench.answer(1, DESCRIBE, descriptors=[descriptor("speed", DOUBLE)])  # late
+        await bench.until(lambda: bench.shown["askable"])
         assert bench.known().state == "silent"
+        assert bench.shown["note"] == "no answer from /arm"
+        assert "Cyclone DDS" in bench.reason()
+        assert "“Read again” asks once more" in bench.reason()
+        for _ in range(3):  # whatever it says by itself
+            bench.event(skipped=1, changed_parameters=change(0.7), new_parameters=change(0.7))
+            bench.parameters.follow()
+            await asyncio.sleep(0.03)
+        assert len(bench.line.asked) == 1
+        assert bench.parameters.read_again(one) == ""
+        assert bench.parameters.read_again(one) == ""
+        await bench.asked(2)
+        await asyncio.sleep(0.03)
+        bench.line.asked[1][2].set_result(None)  # after its time
+        await bench.until(lambda: bench.shown["askable"])
+        await asyncio.sleep(0.03)
+        assert len(bench.line.asked) == 2
         monkeypatch.setattr(parameter_services, "ANSWER_S", 5.0)
+        bench.offer(alive=False)
+        assert bench.shown["askable"] is False
+        bench.offer()
+        await bench.tell(3, 0.5)
+        assert bench.known().value == 0.5
+
+    run(test)
+
+
+def test_a_question_that_the_bridge_dropped_is_asked_again() -> None:
+    async def test(bench: Bench) -> None:
+        bench.offer()
+        await bench.asked(1)
+        bench.line.asked[0][2].set_result(None)  # at once: it never got to the node
         await bench.tell(2, 0.5)
         assert bench.known().value == 0.5
 
     run(test)
 
 
-def test_a_node_that_never_answers_is_asked_ever_more_rarely(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_node_that_was_cut_off_while_it_was_asked_can_be_asked_when_it_is_back() -> None:
+    async def test(bench: Bench) -> None:
+        bench.offer()
+        await bench.asked(1)
+        bench.offer(alive=False)
+        bench.offer()
+        await bench.asked(2)
+        assert bench.robot.asking == {"speed"}
+        await bench.tell(2, 0.5)
+        await bench.until(lambda: bench.shown["askable"])
+
+    run(test)
+
+
+def test_a_node_that_answers_without_it_is_asked_ever_more_rarely(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr(parameters, "AGAIN_MOST_S", 0.04)
     paused: list[float | None] = []
 
@@ -292,10 +350,10 @@ def test_a_node_that_never_answers_is_asked_ever_more_rarely(monkeypatch: pytest
 
     async def test(bench: Bench) -> None:
         bench.offer()
-        for number in range(1, 5):
-            await bench.asked(number)
-            bench.line.asked[number - 1][2].set_result(None)
-        await bench.asked(5)
+        for number in range(1, 9, 2):
+            await bench.answer(number, DESCRIBE, descriptors=[])
+            await bench.answer(number + 1, GET, values=[])
+        await bench.asked(9)
         assert paused[1:8:2] == [0.01, 0.02, 0.04, 0.04]  # the others are between any two readings
 
     run(test)
@@ -321,7 +379,7 @@ def test_of_several_parameters_one_that_is_not_declared_spoils_no_other() -> Non
     [
         (descriptor("", 0), value(DOUBLE, 0) | {"type": 0}, "undeclared", "has no parameter speed"),
         (descriptor("speed", INTEGER), value(INTEGER, 1), "mistyped", "speed of /arm is integer"),
-        (descriptor("speed", 8), value(DOUBLE, 0) | {"type": 8}, "mistyped", "is double array"),
+        (descriptor("speed", 8), value(DOUBLE, 0) | {"type": 8}, "mistyped", "is double[]"),
         (descriptor("speed", DOUBLE), value(DOUBLE, 0) | {"type": 0}, "missing", ""),
         (descriptor("speed", 0, dynamic_typing=True), value(DOUBLE, 1), "live", ""),
         (descriptor("speed", INTEGER, dynamic_typing=True), value(DOUBLE, 1), "live", ""),

@@ -80,8 +80,8 @@ class Page:
 
     def show(self) -> None:
         self._view = sight(self._panel, self._robot, time.monotonic()).view["interlocks"]
-        if message := self._robot.reading(ENABLED).message:
-            self.said.append(message.data)
+        if (said := self._robot.reading(ENABLED).value("data")) is not None:
+            self.said.append(said)
 
     def shown(self) -> Mapping[str, Enabled]:
         return self._view
@@ -98,7 +98,7 @@ def test_what_fails_at_a_sample_keeps_no_lock_from_closing(caplog: pytest.LogCap
     page = Page(panel, robot)
     news = intake.take(changes, page.shown, page.show)
     assert (news.urgent, news.came) == (True, False)
-    assert robot.reading(ENABLED).message.data is False
+    assert robot.reading(ENABLED).value("data") is False
     assert "was not taken in whole" in caplog.text
 
 
@@ -110,7 +110,7 @@ def test_a_permission_that_blinked_is_shown_in_between() -> None:
     blink = Changes({robot.key(ENABLED): sample(flag(True), flag(True), flag(False))}, {}, True)
     intake.take(blink, page.shown, page.show)
     assert page.said == [True, False]
-    assert robot.reading(ENABLED).message.data is True
+    assert robot.reading(ENABLED).value("data") is True
 
 
 def test_of_what_a_permission_said_too_fast_to_be_kept_nothing_is_taken_for_true() -> None:
@@ -148,7 +148,7 @@ def test_a_permission_that_is_said_again_is_not_urgent() -> None:
     assert said(False) == (False, {key})
     assert said(True) == (True, {key})
     assert said(True) == (False, {key})
-    assert robot.reading(ENABLED).message.data is True
+    assert robot.reading(ENABLED).value("data") is True
 
 
 def test_what_cannot_be_read_as_a_permission_is_urgent() -> None:
@@ -183,11 +183,10 @@ def test_each_sample_that_is_kept_whole_is_recorded_and_no_other() -> None:
 
 
 def test_a_list_that_is_too_short_is_shown_as_nothing() -> None:
-    names = INTERFACES.decode(
-        "sensor_msgs/msg/JointState",
-        INTERFACES.encode("sensor_msgs/msg/JointState", JOINTS),
-    )
-    assert with_fields("{name[0]}, {name[1]}", names) == "a, —"
+    type_name = "sensor_msgs/msg/JointState"
+    names = INTERFACES.fields(type_name, ["name[0]", "name[1]"])
+    payload = INTERFACES.encode(type_name, JOINTS)
+    assert with_fields("{name[0]}, {name[1]}", names.read(payload)) == "a, —"
 
 
 JOINTS = {

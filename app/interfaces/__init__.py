@@ -5,9 +5,10 @@ actions, packages from files, defaults, and the codec with checks that name the 
 """
 
 from app.interfaces.composition import ActionTypes
-from app.interfaces.definitions import INTEGERS, PLACEHOLDER, Field, Structure, Type
+from app.interfaces.definitions import INTEGERS, PLACEHOLDER, TEXTS, Field, Structure, Type
 from app.interfaces.distributions import DISTROS, read_distribution
-from app.interfaces.paths import value_at
+from app.interfaces.fields import FieldReader, Fields, Walk
+from app.interfaces.paths import around, name_of
 from app.interfaces.plain import text_of, to_plain
 from app.interfaces.store import Interfaces, interfaces_of
 
@@ -15,14 +16,19 @@ __all__ = [
     "DISTROS",
     "INTEGERS",
     "PLACEHOLDER",
+    "TEXTS",
     "ActionTypes",
     "Field",
+    "FieldReader",
+    "Fields",
     "Interfaces",
     "Structure",
     "Type",
+    "Walk",
+    "around",
     "interfaces_of",
+    "name_of",
     "read_distribution",
     "text_of",
     "to_plain",
-    "value_at",
 ]

@@ -7,11 +7,14 @@ from typing import Any, Final
 from app.interfaces.decoding import Order, Read, message_reader
 from app.interfaces.definitions import PLACEHOLDER, Field, Structure, Type
 from app.interfaces.encoding import Write, message_writer
-from app.interfaces.formats import HEADER
+from app.interfaces.envelope import LITTLE_ENDIAN, judge_end, opened
+from app.interfaces.fields import FieldReader
+from app.interfaces.programs import Programs
+from app.interfaces.reading import SLICE
+from app.interfaces.wanted import Wanted
 
-LITTLE_ENDIAN: Final = b"\0\1\0\0"
-ORDERS: Final[Mapping[bytes, Order]] = {b"\0\0": ">", b"\0\1": "<"}  # the last two bytes are options
-ALIGNMENT: Final = 4  # bytes: a message may be padded to a multiple of it (RTPS 2.5, 9.4.2.12)
+FEW_BYTES: Final = 20_000  # have few elements
+MOST_ELEMENTS: Final = 4_000  # of a message that is read whole
 
 
 class Codec:
@@ -22,6 +25,8 @@ class Codec:
         self._classes: dict[str, type[Any]] = {}
         self._writers: dict[str, Write] = {}
         self._readers: dict[tuple[Order, str], Read] = {}
+        self._programs = Programs(self._fields)
+        self._counters: dict[str, FieldReader] = {}
 
     def serialize(self, message: Any, name: str) -> bytes:
         out = bytearray(LITTLE_ENDIAN)
@@ -30,14 +35,28 @@ class Codec:
 
     def deserialize(self, data: bytes, name: str) -> Any:
         """The message object; ValueError, `struct.error` or UnicodeError where it is none."""
-        order = ORDERS.get(bytes(data[:2])) if len(data) >= HEADER else None
-        if order is None:
-            raise ValueError("it does not begin as plain CDR does")
-        body = memoryview(data)[HEADER:]
+        if len(data) > FEW_BYTES:
+            self._count(data, name)
+        body, order = opened(data)
         message, end = self._reader(order, name)(body, 0)
-        if len(body) not in (end, end + -end % ALIGNMENT):
-            raise ValueError(f"it ends at {HEADER + end}")
+        judge_end(body, end)
         return message
+
+    def _count(self, data: bytes, name: str) -> None:
+        """ValueError for a message of so many elements that building them would take its time."""
+        if name not in self._counters:
+            ops = self._programs.program(name, Wanted(), each=True)
+            self._counters[name] = FieldReader(name, ops, self._made_of)
+        walk = self._counters[name].walk(data)
+        for _ in range(MOST_ELEMENTS // SLICE):
+            if walk.go_on() is not None:
+                return
+        raise ValueError(f"it has more than {MOST_ELEMENTS} elements, which are not read at once")
+
+    def fields(self, name: str, wanted: Wanted) -> FieldReader:
+        """What reads some fields of each message of a type."""
+        ops = self._programs.program(name, wanted)
+        return FieldReader(name, ops, self._made_of)
 
     def message_class(self, name: str) -> type[Any]:
         """The class of a structure's message objects: fields as attributes, constants on the class."""
@@ -57,6 +76,9 @@ class Codec:
             known = message_reader(fields, made, order, lambda inner: self._reader(order, inner))
             self._readers[order, name] = known
         return known
+
+    def _made_of(self, name: str) -> tuple[tuple[Field, ...], type[Any]]:
+        return self._fields(name), self.message_class(name)
 
     def _fields(self, name: str) -> tuple[Field, ...]:
         return self._structures[name].fields or (Field(PLACEHOLDER, Type("uint8")),)

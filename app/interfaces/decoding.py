@@ -6,6 +6,7 @@ what came, not copies: an image costs no more than its header.
 
 import sys
 from array import array
+from codecs import utf_8_decode, utf_16_be_decode, utf_16_le_decode
 from collections.abc import Callable, Sequence
 from struct import Struct, unpack_from
 from typing import Any, Final, Literal
@@ -18,8 +19,10 @@ Read = Callable[["memoryview[int]", int], tuple[Any, int]]  # bytes, where → v
 Step = Callable[["memoryview[int]", int, list[Any]], int]  # the same; the values are added to a list
 
 NATIVE: Final[Order] = "<" if sys.byteorder == "little" else ">"
-LAST_UNIT: Final = 0xFFFF  # of UTF-16
 SHORTEST_TEXT: Final = LENGTH + 1
+LAST_UNIT: Final = 0xFFFF  # of UTF-16
+LONGEST_TEXT: Final = 50_000  # bytes or units that are read of one value
+CUT: Final = "…"
 BOOLS: Final = b"\0\1"
 # `struct` takes any byte for a bool: as a number it can be checked.
 _FORMATS_READ: Final = {**FORMATS, "bool": "B"}
@@ -38,6 +41,22 @@ def message_reader(
         return make(*values), at
 
     return read
+
+
+def value_reader(kind: Type, order: Order) -> Read:
+    """Reads a value that is no structure: a number, a bool, a list of them, the beginning of a text."""
+    if not is_number(kind):
+        return (_text if kind.name == "string" else _wide_text)(order, LONGEST_TEXT)
+    if kind.many != "one":
+        return _many_numbers(kind, order)
+    step = _numbers([kind], order)
+
+    def one(data: "memoryview[int]", at: int) -> tuple[Any, int]:
+        values: list[Any] = []
+        end = step(data, at, values)
+        return values[0], end
+
+    return one
 
 
 def _step(run: Sequence[Field], order: Order, nested: Callable[[str], Read]) -> Step:
@@ -149,8 +168,9 @@ def _length(order: Order) -> Read:
     return length
 
 
-def _text(order: Order) -> Read:
-    """Of a "string": UTF-8 with a NUL at its end, which counts."""
+def _text(order: Order, most: int | None = None) -> Read:
+    """Of a "string": UTF-8 with a NUL at its end, which counts. Of more than `most` bytes these, with a
+    mark that something is missing."""
     length = _length(order)
 
     def text(data: "memoryview[int]", at: int) -> tuple[str, int]:
@@ -158,12 +178,14 @@ def _text(order: Order) -> Read:
         end = at + size
         if not size or end > len(data) or data[end - 1]:
             raise ValueError(f"a text of {size} bytes at {at} is cut off or has no end")
+        if most is not None and size > most:
+            return utf_8_decode(data[at : at + most])[0] + CUT, end
         return str(data[at : end - 1], "utf-8"), end
 
     return text
 
 
-def _wide_text(order: Order) -> Read:
+def _wide_text(order: Order, most: int | None = None) -> Read:
     """Of a "wstring": a count of UTF-16 units, each in four bytes, no terminator and no byte order
     mark (so do rmw_fastrtps and rmw_cyclonedds; source: rosidl_typesupport_fastrtps, and tried)."""
     length = _length(order)
@@ -171,10 +193,14 @@ def _wide_text(order: Order) -> Read:
     def text(data: "memoryview[int]", at: int) -> tuple[str, int]:
         count, at = length(data, at)
         _require(data, at, count * LENGTH)
-        units = unpack_from(f"{order}{count}I", data, at)
+        read = count if most is None else min(count, most)
+        units = unpack_from(f"{order}{read}I", data, at)
         if any(unit > LAST_UNIT for unit in units):
             raise ValueError("a wstring has a unit beyond UTF-16's")
-        return array("H", units).tobytes().decode(f"utf-16-{sys.byteorder[0]}e"), at + count * LENGTH
+        found = array("H", units).tobytes()
+        cut = read < count
+        decode = utf_16_le_decode if NATIVE == "<" else utf_16_be_decode
+        return decode(found, "strict", not cut)[0] + CUT * cut, at + count * LENGTH
 
     return text
 

@@ -1,40 +1,82 @@
-"""Paths to a field: "pose.position.x", "position[2]", "poses[0].position"."""
+"""Paths to a field: "pose.position.x", "position[2]", "position[name=joint_2]",
+"status[name='drive: motor'].level".
+
+    path    = field *("." field)
+    field   = name *("[" (number / key "=" value) "]")
+    key     = name *("." name)
+    value   = text without spaces, quotes, "=" and brackets
+            / "'" text "'" / '"' text '"'      (a quote inside is written twice)
+
+In "list[key=value]" the key is a field of the list's elements or, where they have none of this name, a
+list beside it whose element at the same place has the value.
+"""
 
 import re
 from functools import lru_cache
-from typing import Any, Final
+from typing import Final, NamedTuple
 
-from app.errors import FieldError, InterfaceError
-from app.interfaces.definitions import attribute
+from app.errors import InterfaceError
 
-_PART: Final = re.compile(r"([^\[\]]*)((?:\[[0-9]+\])*)")
+_STEP: Final = re.compile(
+    r"""(?P<dot>\.?)(?P<name>[A-Za-z][A-Za-z0-9_]*)
+    |\[(?P<index>[0-9]{1,9})\]
+    |\[(?P<key>[a-z][a-z0-9_.]*)=(?P<value>[^\[\]'"=\s]+|'(?:[^']|'')*'|"(?:[^"]|"")*")\]""",
+    re.VERBOSE,
+)
+LIKE: Final = "it must be like pose.x, position[2], position[name=joint_2] or status[name='a b'].level"
+
+
+class Key(NamedTuple):
+    """Chooses the element of a list by what one of its fields says, or a list beside it."""
+
+    path: str
+    value: str
+
+
+Step = str | int | Key
+
+
+class _Parsed(NamedTuple):
+    steps: tuple[Step, ...]
+    around: str  # the path of the message that the last name is in, "" for the whole
 
 
 @lru_cache(4096)
-def steps(path: str) -> tuple[str | int, ...]:
-    """The names and indexes that a path goes through; InterfaceError where it is not written so."""
-    found: list[str | int] = []
-    for part in path.split("."):
-        match = _PART.fullmatch(part)
-        if match is None:
-            raise InterfaceError(f'"{path}" is not a field: it must be like pose.x or position[2]')
-        found.append(match[1])
-        found.extend(int(index) for index in re.findall("[0-9]+", match[2]))
-    return tuple(found)
-
-
-def value_at(message: Any, path: str) -> Any:
-    """The value at a path of a decoded message: a number, a text, a message or a list.
-
-    FieldError where a list is shorter than the path's index; the path must be one of the type's
-    (`Interfaces.field_type` says).
-    """
-    at = message
-    for step in steps(path):
-        if isinstance(step, str):
-            at = getattr(at, attribute(step))
-        elif step < len(at):
-            at = at[step]
+def _parsed(path: str) -> _Parsed:
+    steps: list[Step] = []
+    at = last = 0
+    while at < len(path) or not steps:
+        match = _STEP.match(path, at)
+        named = match is not None and match["name"] is not None
+        # It begins with a name, and each further one has a dot before it.
+        if match is None or (not named and not at) or (named and bool(match["dot"]) != (at > 0)):
+            raise InterfaceError(f'"{path}" is not a field: {LIKE}')
+        if named:
+            steps.append(match["name"])
+            last = at
+        elif match["index"] is not None:
+            steps.append(int(match["index"]))
         else:
-            raise FieldError(path, f"there is no [{step}]: the list has {len(at)} elements now")
-    return at
+            steps.append(Key(match["key"], _unquoted(match["value"])))
+        at = match.end()
+    return _Parsed(tuple(steps), path[:last])
+
+
+def _unquoted(text: str) -> str:
+    quote = text[0]
+    return text[1:-1].replace(quote * 2, quote) if quote in "'\"" else text
+
+
+def steps(path: str) -> tuple[Step, ...]:
+    """What a path goes through: names, indexes and keys; InterfaceError where it is not written so."""
+    return _parsed(path).steps
+
+
+def around(path: str) -> str:
+    """The path of the message that has the field, or the list with the element; "" for the whole."""
+    return _parsed(path).around
+
+
+def name_of(path: str) -> str:
+    """The last name in a path: that of the field, or of the list with the element."""
+    return next(step for step in reversed(steps(path)) if isinstance(step, str))

@@ -8,10 +8,12 @@ from pathlib import Path
 from typing import Any, Final
 
 from app.errors import DecodeError, InterfaceError
-from app.interfaces.codec import LITTLE_ENDIAN, Codec
+from app.interfaces.codec import Codec
 from app.interfaces.composition import ActionTypes, action_types
 from app.interfaces.definitions import Structure, Type, interface_of
 from app.interfaces.distributions import read_distribution
+from app.interfaces.envelope import LITTLE_ENDIAN
+from app.interfaces.fields import FieldReader
 from app.interfaces.hashes import type_hash
 from app.interfaces.packages import (
     complete,
@@ -20,10 +22,10 @@ from app.interfaces.packages import (
     read_folders,
     stamp,
 )
-from app.interfaces.paths import steps
 from app.interfaces.scalars import Check
 from app.interfaces.text import definition_text
 from app.interfaces.values import field_check, message_check
+from app.interfaces.wanted import Resolver
 
 MOST_NEAR: Final = 3  # names that may be meant
 LIKE_A_PACKAGE: Final = 0.8  # all packages of messages end alike
@@ -48,6 +50,8 @@ class Interfaces:
         self._codec = Codec(self._structures)
         self._checks: dict[str, Check] = {}
         self._hashes: dict[str, str] = {}
+        self._resolver = Resolver(self._structures)
+        self._field_readers: dict[tuple[str, tuple[str, ...]], FieldReader] = {}
 
     @property
     def structures(self) -> Mapping[str, Structure]:
@@ -85,11 +89,24 @@ class Interfaces:
 
     def field_type(self, type_name: str, path: str) -> str:
         """The type at a path ("pose.position.x", "poses[0]"), as in a .msg file ("float64[36]")."""
+        return str(self.type_at(type_name, path))
+
+    def type_at(self, type_name: str, path: str) -> Type:
+        """The same; InterfaceError where the type has no such field."""
         self.require(type_name)
-        at = Type(type_name)
-        for step in steps(path):
-            at = self._named(at, step, path) if isinstance(step, str) else _indexed(at, step, path)
-        return str(at)
+        return self._resolver.type_at(type_name, path)
+
+    def fields(self, type_name: str, paths: Iterable[str]) -> FieldReader:
+        """What reads the fields at these paths of each message, and passes over the rest.
+
+        InterfaceError where the type has no such field.
+        """
+        self.require(type_name)
+        key = type_name, tuple(dict.fromkeys(paths))
+        if key not in self._field_readers:
+            wanted = self._resolver.wanted(*key)
+            self._field_readers[key] = self._codec.fields(type_name, wanted)
+        return self._field_readers[key]
 
     def type_hash(self, type_name: str) -> str:
         """The REP 2016 type hash, `RIHS01_…`, as the robot's own nodes compute it.
@@ -117,7 +134,8 @@ class Interfaces:
         return self._codec.serialize(check(fields), type_name)
 
     def decode(self, type_name: str, data: bytes) -> Any:
-        """The message object (fields as attributes); DecodeError if these bytes are not one."""
+        """The message object (fields as attributes); DecodeError if these bytes are not one, or have
+        more elements than are read at once: see `fields`."""
         try:
             return self._codec.deserialize(data, type_name)
         except Exception as error:  # whatever arrived, it must not stop the panel
@@ -141,14 +159,6 @@ class Interfaces:
 
     def _field_check(self, kind: Type) -> Check:
         return field_check(kind, self._check)
-
-    def _named(self, at: Type, name: str, path: str) -> Type:
-        inner = self._structures[at.name].fields if at.nested and at.many == "one" else ()
-        for one in inner:
-            if one.name == name:
-                return one.type
-        has = f"has {', '.join(one.name for one in inner)}" if inner else "has no fields of its own"
-        raise InterfaceError(f'there is no "{name}" (in "{path}"): {at} {has}')
 
     def _described(self, type_name: str) -> Structure:
         found = self._definitions.described(type_name)
@@ -195,14 +205,6 @@ def _like(rest: str, known: Sequence[str]) -> list[str]:
     """Those whose last part is like that of a name."""
     last = {one.rpartition("/")[2]: one for one in known}
     return [last[one] for one in get_close_matches(rest.rpartition("/")[2], last, n=MOST_NEAR)]
-
-
-def _indexed(at: Type, index: int, path: str) -> Type:
-    if at.many == "one":
-        raise InterfaceError(f'there is no [{index}] (in "{path}"): {at} is not a list')
-    if at.size and index >= at.size:
-        raise InterfaceError(f'there is no [{index}] (in "{path}"): {at} ends with [{at.size - 1}]')
-    return at.element
 
 
 def interfaces_of(distro: str, folders: Sequence[Path] = ()) -> Interfaces:

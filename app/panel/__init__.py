@@ -2,8 +2,9 @@
 
 from app.panel.displays import Indicator, LampState, Readout
 from app.panel.inputs import NumberInput, SelectInput, SliderInput, TextInput, ToggleInput
+from app.panel.interlock import Interlock
 from app.panel.load import Checked, check_panel, load_panel
-from app.panel.model import Display, Hold, Input, Interlock, Page, Panel, Publish
+from app.panel.model import Display, Hold, Input, Page, Panel, Publish
 
 __all__ = [
     "Checked",

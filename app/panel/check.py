@@ -2,20 +2,21 @@
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from itertools import islice
-from typing import Final
 
 from app.errors import Fault, InterfaceError
 from app.interfaces import Interfaces
 from app.panel.check_calls import answer_faults, sent
 from app.panel.check_confirm import confirm_faults
-from app.panel.check_displays import display_faults, field_faults
+from app.panel.check_displays import display_faults
 from app.panel.check_holds import hold_faults
 from app.panel.check_inputs import input_faults
+from app.panel.check_interlocks import interlock_faults
 from app.panel.check_parameters import parameter_faults, type_faults
 from app.panel.check_types import own_type_faults, type_fault
 from app.panel.description import Placed
 from app.panel.displays import Indicator, Readout
 from app.panel.examples import NOW_IS, template_faults
+from app.panel.interlock import Interlock
 from app.panel.model import (
     Action,
     Call,
@@ -23,7 +24,6 @@ from app.panel.model import (
     Display,
     Hold,
     Input,
-    Interlock,
     Panel,
     Pressed,
     Publish,
@@ -33,11 +33,6 @@ from app.panel.model import (
 from app.panel.parameter import Parameter
 from app.panel.template import NOW
 from app.panel.wording import listing
-
-BEST_EFFORT: Final = (
-    "is missing: of a best-effort topic any message may be lost, the one that forbids too; "
-    "give the age in seconds after which it locks"
-)
 
 
 def faults_in(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = ()) -> Iterator[Fault]:
@@ -91,7 +86,7 @@ def _of_inputs(panel: Panel) -> Iterator[Fault]:
 
 def _of_interlocks(panel: Panel, interfaces: Interfaces) -> Iterator[Fault]:
     for i, interlock in enumerate(panel.interlocks):
-        yield from _interlock(f"interlock[{i}]", interlock, interfaces)
+        yield from interlock_faults(f"interlock[{i}]", interlock, interfaces)
 
 
 def _of_widgets(panel: Panel, interfaces: Interfaces, faulty: Collection[str]) -> Iterator[Fault]:
@@ -180,22 +175,15 @@ def _repeated_widgets(panel: Panel) -> Iterator[Fault]:
             seen.setdefault(widget.id, place)
 
 
-def _interlock(place: str, interlock: Interlock, interfaces: Interfaces) -> Iterator[Fault]:
-    fault = list(field_faults(place, interlock, interfaces))
-    yield from fault
-    if not fault and (found := interfaces.field_type(interlock.type, interlock.field)) != "bool":
-        yield Fault(f"{place}.field", f'"{interlock.field}" is {found}: an interlock needs a bool')
-    if interlock.qos.reliability == "best_effort" and interlock.max_age_s is None:
-        yield Fault(f"{place}.max_age_s", BEST_EFFORT)
-
-
 def _interlocked(place: str, widget: Pressed | Hold, panel: Panel) -> Iterator[Fault]:
     if isinstance(widget, Published) and widget.topic == "/rosout":
         yield Fault(f"{place}.topic", "/rosout is where the kiosk's own log goes: choose another")
-    if widget.interlock is not None and panel.interlock(widget.interlock) is None:
-        known = listing(interlock.id for interlock in panel.interlocks)
-        what = f'no interlock "{widget.interlock}"; there is {known}'
-        yield Fault(f"{place}.interlock", what, cause=f"interlock {widget.interlock}")
+    known = [one.id for one in panel.interlocks]
+    for i, name in enumerate(widget.interlocks):
+        if name not in known:
+            at = f"[{i}]" if len(widget.interlocks) > 1 else ""
+            what = f'no interlock "{name}"; there is {listing(known)}'
+            yield Fault(f"{place}.interlock{at}", what, cause=f"interlock {name}")
 
 
 def _topics_of_two_kinds(panel: Panel, told: Sequence[str]) -> Iterator[Fault]:

@@ -11,7 +11,8 @@ from app.interfaces.scalars import shown
 from app.panel.check_types import type_fault
 from app.panel.constants import holder, value_of_state
 from app.panel.displays import Indicator, Readout
-from app.panel.model import Confirm, Display, Interlock
+from app.panel.interlock import Interlock
+from app.panel.model import Confirm, Display
 from app.panel.wording import listing
 
 NUMBERS: Final = frozenset({*INTEGERS, "float32", "float64"})
@@ -94,7 +95,7 @@ def _states(place: str, of: Indicator, kind: str, interfaces: Interfaces) -> Ite
     for i, state in enumerate(of.states):
         at = f"{place}.states[{i}]"
         if isinstance(given[i], str) and kind in INTEGERS:
-            what = _no_constant(given[i], kind, type_name, constants)
+            what = no_constant(given[i], kind, type_name, constants)
             yield Fault(f"{at}.value", what, cause=f"state {place}")
             continue
         if fault := misfit(given[i], kind):
@@ -124,7 +125,7 @@ def misfit(value: Any, kind: str) -> str | None:
     return None if isinstance(value, str) else f"must be text ({kind}), not {shown(value)}"
 
 
-def _no_constant(name: str, kind: str, type_name: str, constants: Mapping[str, Any]) -> str:
+def no_constant(name: str, kind: str, type_name: str, constants: Mapping[str, Any]) -> str:
     """What would be right where a whole number is meant, and a text is no constant's name."""
     what = (
         f"must be a whole number ({kind}) or the name of a constant of {type_name}, not {shown(name)}"

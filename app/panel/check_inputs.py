@@ -1,11 +1,11 @@
 """What can be wrong in an input whose shape is right: limits, steps, defaults, options."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
 
 from app.errors import Fault
 from app.interfaces.scalars import shown
-from app.panel.inputs import Numeric, SelectInput, TextInput, digits, same
+from app.panel.inputs import Numeric, Option, SelectInput, TextInput, digits, same
 from app.panel.model import Input
 
 
@@ -43,14 +43,19 @@ def _numeric(place: str, of: Numeric) -> Iterator[Fault]:
 
 
 def _select(place: str, of: SelectInput) -> Iterator[Fault]:
-    keys = [option.key for option in of.options]
-    labels = [option.label for option in of.options]
+    yield from option_faults(place, of.options)
+    if of.default is not None and not any(same(o.value, of.default) for o in of.options):
+        there = ", ".join(shown(option.value) for option in of.options)
+        yield Fault(f"{place}.default", f"{shown(of.default)} is no option; there is {there}")
+
+
+def option_faults(place: str, options: Sequence[Option]) -> Iterator[Fault]:
+    """Options that can't be told apart."""
+    keys = [option.key for option in options]
+    labels = [option.label for option in options]
     for i, (key, label) in enumerate(zip(keys, labels, strict=True)):
         if key in keys[:i]:
             yield Fault(f"{place}.options[{i}].value", f"{key} is already options[{keys.index(key)}]")
         if label in labels[:i]:
             what = f'"{label}" is already the label of options[{labels.index(label)}]'
             yield Fault(f"{place}.options[{i}].label", what)
-    if of.default is not None and not any(same(o.value, of.default) for o in of.options):
-        there = ", ".join(shown(option.value) for option in of.options)
-        yield Fault(f"{place}.default", f"{shown(of.default)} is no option; there is {there}")

@@ -8,6 +8,8 @@ from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo
 
+from app.errors import InterfaceError
+from app.interfaces.paths import Key, steps
 from app.interfaces.scalars import shown
 from app.keys import ACTION_TYPE, MESSAGE_TYPE, NAMESPACE, SERVICE_TYPE, TOPIC, Qos
 
@@ -70,6 +72,35 @@ def _folder(given: Any, info: ValidationInfo) -> Path:
     return folder
 
 
+def _field(given: str) -> str:
+    try:
+        steps(given)
+    except InterfaceError as error:
+        raise ValueError(str(error)) from None
+    return given
+
+
+def _written_field(given: str) -> str:
+    if any(isinstance(step, Key) for step in steps(_field(given))):
+        raise ValueError(f'"{given}" is filled in: an element is given by its number, as in data[2]')
+    return given
+
+
+def _interlocks(given: Any) -> tuple[str, ...]:
+    """One id, or a list of them."""
+    named = [given] if isinstance(given, str) else given
+    if not isinstance(named, list | tuple):
+        raise ValueError(f"must be the id of an interlock, or a list of ids, not {shown(given)}")
+    if not named:
+        raise ValueError("is an empty list: name an interlock, or leave the key out")
+    for i, one in enumerate(named):
+        if not isinstance(one, str) or not re.fullmatch(ID, one):
+            raise ValueError(f'{shown(one)} is not an id: a-z, 0-9 and "_", a letter first')
+        if one in named[:i]:
+            raise ValueError(f"names {shown(one)} twice")
+    return tuple(named)
+
+
 def some(given: tuple[Any, ...]) -> tuple[Any, ...]:
     """A list of tables that can't be empty."""
     if not given:
@@ -85,14 +116,15 @@ ENDPOINT: Final = re.compile(
 MOST_PORT: Final = 65535
 ID: Final = r"^[a-z][a-z0-9_]{0,63}$"
 Id = Annotated[str, Field(pattern=ID)]
+Interlocks = Annotated[tuple[str, ...], BeforeValidator(_interlocks)]
 Label = Annotated[str, Field(min_length=1, max_length=120)]
 Span = Annotated[int, Field(ge=1, le=12)]
 Topic = Annotated[str, AfterValidator(_topic), Field(max_length=255)]
 Type = Annotated[str, AfterValidator(_type)]
 ServiceType = Annotated[str, AfterValidator(_service)]
 ActionType = Annotated[str, AfterValidator(_action)]
-_STEP: Final = r"[a-z][a-z0-9_]*(\[[0-9]{1,9}\])*"
-FieldPath = Annotated[str, Field(pattern=rf"^{_STEP}(\.{_STEP})*$")]
+FieldPath = Annotated[str, AfterValidator(_field)]
+WrittenField = Annotated[str, AfterValidator(_written_field)]  # without keys
 Endpoint = Annotated[str, AfterValidator(_endpoint)]
 Folder = Annotated[Path, BeforeValidator(_folder)]
 Seconds = Annotated[float, Field(gt=0, le=86400, allow_inf_nan=False)]

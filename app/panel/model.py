@@ -14,6 +14,7 @@ from app.panel.description import (
     FieldPath,
     Folder,
     Id,
+    Interlocks,
     Label,
     Placed,
     Seconds,
@@ -22,30 +23,15 @@ from app.panel.description import (
     Topic,
     TopicQos,
     Type,
+    WrittenField,
     namespace_of,
 )
 from app.panel.displays import Indicator, Readout
 from app.panel.inputs import NumberInput, SelectInput, SliderInput, TextInput, ToggleInput
+from app.panel.interlock import Interlock
 from app.panel.log import LogRules
 from app.panel.parameter import EVENT_TYPE, EVENTS, Parameter
 from app.panel.record import RecordRules
-
-
-class Interlock(Description):
-    """A Bool field of the robot's that permits; never seen, stale or cut off locks."""
-
-    id: Id
-    label: Label | None = None
-    topic: Topic
-    type: Type = "std_msgs/msg/Bool"
-    field: FieldPath = "data"
-    max_age_s: Seconds | None = None
-    require_publisher: bool = False
-    qos: TopicQos = TopicQos()
-
-    @property
-    def name(self) -> str:
-        return self.label or self.id
 
 
 class Confirm(Description):
@@ -67,7 +53,7 @@ class Publish(Placed):
     topic: Topic
     type: Type
     message: dict[str, Any]
-    interlock: Id | None = None
+    interlocks: Interlocks = Field(default=(), alias="interlock")
     qos: TopicQos = TopicQos()
     confirm: Confirm | None = None
     one_shot: bool = False
@@ -91,10 +77,10 @@ class Hold(Placed):
     type: Type
     message: dict[str, Any]
     release: dict[str, Any]
-    interlock: Id
+    interlocks: Interlocks = Field(alias="interlock")
     rate_hz: Annotated[float, Field(ge=1, le=100)] = 20.0
-    deadline_field: FieldPath | None = None
-    counter_field: FieldPath | None = None
+    deadline_field: WrittenField | None = None
+    counter_field: WrittenField | None = None
     qos: TopicQos = TopicQos()
     span: Span = 4
 
@@ -116,7 +102,7 @@ class Call(Placed):
     service: Topic
     type: ServiceType
     request: dict[str, Any] = Field(default_factory=dict)
-    interlock: Id | None = None
+    interlocks: Interlocks = Field(default=(), alias="interlock")
     timeout_s: Seconds = 5.0
     success: FieldPath | None = None
     message: FieldPath | None = None
@@ -137,7 +123,7 @@ class Action(Placed):
     action: Topic
     type: ActionType
     goal: dict[str, Any] = Field(default_factory=dict)
-    interlock: Id | None = None
+    interlocks: Interlocks = Field(default=(), alias="interlock")
     timeout_s: Seconds = 5.0
     progress: FieldPath | None = None
     progress_max: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 100.0
@@ -227,14 +213,28 @@ class Panel(Description):
     def page(self, page_id: str) -> Page | None:
         return next((page for page in self.pages if page.id == page_id), None)
 
-    def interlock(self, interlock_id: str | None) -> Interlock | None:
+    def interlock(self, interlock_id: str) -> Interlock | None:
         return next((i for i in self.interlocks if i.id == interlock_id), None)
+
+    def interlocks_of(self, widget: "Pressed | Hold") -> tuple[Interlock, ...]:
+        """Those that all have to permit a press, in the order of the file."""
+        known = {one.id: one for one in self.interlocks}
+        return tuple(known[name] for name in widget.interlocks)
 
     def subscriptions(self) -> dict[str, str]:
         """Topic → type of all that the panel listens to."""
         own = {one.topic: one.type for one in self.confirms() if one.type is not None}
         events = {EVENTS: EVENT_TYPE} if any(self.parameters()) else {}
         return own | {of.topic: of.type for of in self.listening()} | events
+
+    def fields(self) -> dict[str, list[str]]:
+        """Topic → the paths of all that the panel reads of it."""
+        found: dict[str, list[str]] = {}
+        for of in self.listening():
+            found.setdefault(of.topic, []).append(of.field)
+        for confirm in self.confirms():
+            found.setdefault(confirm.topic, []).append(confirm.field)
+        return found
 
     def confirms(self) -> Iterator[Confirm]:
         """All that shows that a command took effect."""

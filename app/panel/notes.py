@@ -10,6 +10,7 @@ from app.panel.model import Panel
 def notes_in(panel: Panel, interfaces: Interfaces) -> Iterator[Note]:
     """Notes by their places in the panel file; ids and lines are added by who prints them."""
     yield from _trusted(panel)
+    yield from _unused(panel)
     yield from _left_out(panel, interfaces)
 
 
@@ -23,6 +24,15 @@ def _trusted(panel: Panel) -> Iterator[Note]:
                 "also when its publisher is gone or one of its messages is lost: give max_age_s where "
                 "it is published regularly, or require_publisher = true where its publisher stays",
             )
+
+
+def _unused(panel: Panel) -> Iterator[Note]:
+    """Interlocks that lock nothing."""
+    used = {name for widget in panel.commands for name in widget.interlocks}
+    for i, interlock in enumerate(panel.interlocks):
+        if interlock.id not in used:
+            what = f'locks nothing: no control has interlock = "{interlock.id}"'
+            yield Note(f"interlock[{i}]", what)
 
 
 def _left_out(panel: Panel, interfaces: Interfaces) -> Iterator[Note]:

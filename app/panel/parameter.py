@@ -6,10 +6,14 @@ from pydantic import AfterValidator, Field
 
 from app.interfaces.scalars import shown
 from app.keys import TOPIC
-from app.panel.description import Id, Label, Seconds, Span
-from app.panel.inputs import Number, Stepped, Unit
+from app.panel.description import Interlocks, Label, Seconds, Span
+from app.panel.inputs import Number, Option, Stepped, Unit, same
+from app.panel.listed import listed, quoted
 from app.panel.ranges import decimal
 from app.sentences import say
+
+One = bool | int | float | str
+Value = One | tuple[One, ...]
 
 EVENTS: Final = "/parameter_events"
 EVENT_TYPE: Final = "rcl_interfaces/msg/ParameterEvent"
@@ -37,21 +41,38 @@ class Parameter(Stepped):
     kind: Literal["parameter"]
     node: Annotated[str, AfterValidator(_node), Field(max_length=200)]
     parameter: Annotated[str, Field(pattern=r"^[^\s\x00-\x1f]+$", max_length=255)]
-    type: Literal["bool", "integer", "double", "string"]
+    type: Literal["bool", "integer", "double", "string", "bool[]", "integer[]", "double[]", "string[]"]
     unit: Unit = ""
+    options: Annotated[tuple[Option, ...], Field(strict=False)] = ()
     min: Number | None = None
     max: Number | None = None
     step: Annotated[Number, Field(gt=0)] | None = None
     on: Label = say("on")
     off: Label = say("off")
-    interlock: Id | None = None
+    interlocks: Interlocks = Field(default=(), alias="interlock")
     timeout_s: Seconds = 5.0
     confirm_press: bool = False
     span: Span = 6
 
     @property
+    def many(self) -> bool:
+        """Whether it is a list."""
+        return self.type.endswith("[]")
+
+    @property
+    def element(self) -> str:
+        """The type of one value."""
+        return self.type.removesuffix("[]")
+
+    @property
+    def counts(self) -> bool:
+        """Whether it is a number, or a list of them."""
+        return self.element in ("integer", "double")
+
+    @property
     def numeric(self) -> bool:
-        return self.type in ("integer", "double")
+        """Whether it is entered as a number."""
+        return self.counts and not self.many and not self.options
 
     @property
     def template(self) -> dict[str, Any]:
@@ -62,10 +83,32 @@ class Parameter(Stepped):
         """What the button is called where its place does not tell what it sets."""
         return say("set_named", label=self.label)
 
-    def written(self, value: bool | float | str) -> str:
+    @property
+    def again(self) -> str:
+        """What the button is called that asks its node once more."""
+        return say("read_named", label=self.label)
+
+    def option(self, value: Any) -> Option | None:
+        """The option that has this value."""
+        value = list(value) if isinstance(value, tuple) else value
+        return next((one for one in self.options if same(one.value, value)), None)
+
+    def written(self, value: Value) -> str:
         """A value as an operator reads it, exactly."""
+        if (option := self.option(value)) is not None:
+            return option.label
+        text = self.entered(value)
+        if value == ():
+            return say("empty")
+        return f"{text} {self.unit}" if self.unit else text
+
+    def entered(self, value: Value) -> str:
+        """A value as it is entered where no option is chosen."""
+        if isinstance(value, tuple):
+            return listed(quoted(one) if isinstance(one, str) else self._one(one) for one in value)
+        return self._one(value)
+
+    def _one(self, value: bool | float | str) -> str:
         if isinstance(value, bool):
             return self.on if value else self.off
-        if isinstance(value, float):
-            value = decimal(value)
-        return f"{value} {self.unit}" if self.unit else f"{value}"
+        return decimal(value) if isinstance(value, float) else f"{value}"

@@ -9,6 +9,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
+from struct import pack, unpack
 from typing import Final
 
 from app.interfaces import to_plain
@@ -94,6 +95,23 @@ def decimal(number: float) -> str:
     if isinstance(number, int) or not math.isfinite(number):
         return str(to_plain(number))
     return digits(number) if abs(number) < WRITTEN_OUT else repr(number)
+
+
+def single(number: float) -> float:
+    """The nearest float32."""
+    try:
+        found: float = unpack("f", pack("f", number))[0]
+    except OverflowError:
+        return math.copysign(math.inf, number)
+    return found
+
+
+def shortest(number: float) -> float:
+    """A float32 as it is written: 0.1 for 0.10000000149011612; any other number as it is."""
+    if not math.isfinite(number) or single(number) != number:
+        return number
+    written = (float(f"{number:.{digits}g}") for digits in range(6, 10))
+    return next(one for one in written if single(one) == number)
 
 
 def _written(number: float | None) -> str:

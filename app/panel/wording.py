@@ -10,18 +10,13 @@ from app.panel.inputs import digits
 
 LIKE_A_NAME: Final = 0.7
 MOST_LISTED: Final = 12
-FIELD: Final = "is not a field: it must be like pose.x or position[2]"
 # What a text must be like, by its key.
 PATTERNS: Final[Mapping[str, str]] = {
     "id": 'is not an id: a-z, 0-9 and "_", a letter first, 64 at most',
-    "interlock": 'is not an id: a-z, 0-9 and "_", a letter first',
     "format": 'is not a format: it must be like ".1f", "+.2e" or ",d"',
     "constants": "is not how names of constants start: it must be like STATUS_",
     "parameter": "is not the name of a parameter: it has no spaces",
     "default": "has a NUL character, at which a ROS string ends",
-    **dict.fromkeys(
-        ("field", "success", "message", "progress", "deadline_field", "counter_field"), FIELD
-    ),
 }
 # What a list must be like, by its key.
 LISTS: Final[Mapping[str, str]] = {

@@ -43,7 +43,17 @@ RELOADED_S = 2.0  # a press on a page that should have reloaded before is one on
 # How long after a page without scripts was due it is still thought to be there.
 GRACE_S = 5
 REFUSALS = get_args(Refusal)
-WORDS = ("cancel", "robots", "control", "set", "back", "empty", "hold_cut", "hold_scripts")
+WORDS = (
+    "cancel",
+    "robots",
+    "control",
+    "set",
+    "read_again",
+    "back",
+    "empty",
+    "hold_cut",
+    "hold_scripts",
+)
 LINK_WORDS = ("links", "link_state", "link_since", "link_locks")
 CONTROL_ACTS = ("take", "ask", "give", "keep", "release", "withdraw")
 

@@ -152,7 +152,7 @@ async def cancel(widget: str, request: Request, site: CurrentSite, kiosk: Curren
     else:
         receipt = kiosk.presses.limited(widget, {}, "", "cancel_too_often", shown=form)
     if form:
-        return RedirectResponse(_page_after(kiosk, widget, receipt.id), status_code=303)
+        return RedirectResponse(page_after(kiosk, widget, receipt.id), status_code=303)
     return _answer(receipt)
 
 
@@ -184,14 +184,14 @@ async def _pressed_by_form(
     typed = kiosk.sending.typed(inputs)
     if not site.limits.admit(browser):
         receipt = kiosk.presses.limited(widget, typed, press_id, shown=True)
-        return RedirectResponse(_page_after(kiosk, widget, receipt.id), status_code=303)
+        return RedirectResponse(page_after(kiosk, widget, receipt.id), status_code=303)
     by = kiosk.doubts.by(widget, browser, seen, until)
     if too_soon:
         work = kiosk.presses.too_soon(widget, typed, press_id, before, by.origin)
     else:
         work = kiosk.presses.press(widget, typed, press_id, by)
     receipt = await _told(site, work)
-    return RedirectResponse(_page_after(kiosk, widget, receipt.id), status_code=303)
+    return RedirectResponse(page_after(kiosk, widget, receipt.id), status_code=303)
 
 
 def _answer(receipt: Receipt) -> Response:
@@ -286,7 +286,7 @@ def _form(body: bytes) -> dict[str, str]:
     return inputs
 
 
-def _page_after(kiosk: Kiosk, widget: str, receipt_id: str) -> str:
+def page_after(kiosk: Kiosk, widget: str, receipt_id: str) -> str:
     """The page of a widget, with a receipt if there is one."""
     page = f"{kiosk.base}/pages/{_page_of(kiosk, widget).id}"
     return f"{page}?receipt={quote(receipt_id)}" if receipt_id else page

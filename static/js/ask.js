@@ -36,5 +36,6 @@ function shown(input) {
   if (entry.type === "checkbox") {
     return entry.parentElement.querySelector(entry.checked ? ".on" : ".off").textContent;
   }
+  if (entry.value === "") return "";
   return entry.selectedOptions ? entry.selectedOptions[0].textContent : entry.value;
 }

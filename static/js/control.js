@@ -4,6 +4,7 @@ const TAP_AGAIN_MS = 700;
 const ANSWER_WITHIN_MS = 5000;
 const BEATS_PER_SIGN = 3; // the server beats twice a second, and gives up who is silent for 5 s
 const TOUCH_AGAIN_MS = 1000;
+const LOCK = { enabled: false, more: "" }; // and its reasons
 const TEXT = { asking: "asker_text", holding: "holder_text", asked: "holder_text" };
 
 export class Control {
@@ -72,8 +73,9 @@ export class Control {
   // The attributes as this page shows them. A lost link is told before who has control.
   over(id, attributes) {
     if (!("enabled" in attributes || this.#said.has(id))) return attributes;
-    const { enabled, reason } = { ...this.#said.get(id), ...attributes };
-    this.#said.set(id, { enabled, reason });
+    const all = { ...this.#said.get(id), ...attributes };
+    const said = Object.entries(all).filter(([name]) => name in LOCK || name.startsWith("reason"));
+    this.#said.set(id, Object.fromEntries(said));
     return { ...attributes, ...this.#locked(this.#said.get(id)) };
   }
 
@@ -85,7 +87,8 @@ export class Control {
 
   #locked(said) {
     if (this.#mine || !this.#state || !this.#passable) return said;
-    return { enabled: false, reason: this.#state.text };
+    const told = Object.keys(said).map((name) => [name, LOCK[name] ?? this.#state.text]);
+    return Object.fromEntries(told);
   }
 
   #lockAgain() {

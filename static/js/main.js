@@ -28,6 +28,11 @@ const SHOW = {
     if (cancel) cancel.value = value;
   },
   held: (root, value) => root.toggleAttribute("data-held", value),
+  reasons: (root, value) => {
+    const list = root.querySelector(".reasons");
+    setText(list?.querySelector("p"), value);
+    if (!value) list?.hidePopover();
+  },
   state: (root, value) => (root.dataset.state = value),
   shape: (root, value) => (root.dataset.shape = value),
   colour: (root, value) => (root.dataset.colour = value),
@@ -36,6 +41,7 @@ const SHOW = {
     const bar = root.querySelector("progress");
     if (bar) bar.hidden = !value;
   },
+  askable: (root, value) => (root.querySelector(".read").disabled = !value),
   entry: showEntry,
   bounds: showBounds,
   settable: (root, value) => (root.querySelector(".setting").inert = !value),
@@ -119,7 +125,7 @@ function lockAll() {
     const buttons = root.querySelectorAll("button[type=submit], .hold");
     for (const button of buttons) button.disabled = true;
     root.querySelector("dialog.ask")?.close();
-    if (buttons.length) setText(root.querySelector('[data-text="reason"]'), body.dataset.lost);
+    if (buttons.length) showWidget(root.dataset.widget, { reason: body.dataset.lost, reasons: body.dataset.lost, more: "" });
     if (root.dataset.state) {
       root.dataset.state = "old"; // its note still says from when it is
       if (root.dataset.shape) {

@@ -121,6 +121,8 @@ export class Presser {
     event.preventDefault();
     const root = this.#buttons.get(button);
     if (!root || button.disabled) return;
+    // What the robot answers comes with the events.
+    if (button.matches(".read")) return void fetch(button.getAttribute("formaction"), { method: "POST" }).catch(() => {});
     const touched = event.detail > 0;
     const click = this.#moment(event, touched ? this.#seen : this.#source.seen);
     const cancel = button.matches(".cancel");

@@ -29,10 +29,19 @@ from cyclone_types import (
     Time,
 )
 
-NAMES = ("not set", "bool", "integer", "double", "string")
-FIELDS = ("", "bool_value", "integer_value", "double_value", "string_value")
+NAMES = ("not set", "bool", "integer", "double", "string", "bytes", "bools", "integers", "doubles",
+         "strings")  # fmt: skip
+FIELDS = ("", "bool_value", "integer_value", "double_value", "string_value", "byte_array_value",
+          "bool_array_value", "integer_array_value", "double_array_value",
+          "string_array_value")  # fmt: skip
 _, BOOL, INTEGER, DOUBLE, STRING = range(5)
 KINDS = {bool: BOOL, int: INTEGER, float: DOUBLE, str: STRING}
+LISTS = 5  # a list's type is so many after that of its elements
+
+
+def kind_of(value: Any) -> int:
+    return KINDS[type(value[0])] + LISTS if isinstance(value, list) else KINDS[type(value)]
+
 
 EVENT_HASH = "RIHS01_043e627780fcad87a22d225bc2a037361dba713fca6a6b9f4b869a5aa0393204"
 
@@ -58,6 +67,11 @@ class Declared:
         if type_ != d.type:
             given = NAMES[type_] if type_ < len(NAMES) else "array"
             return f"parameter '{d.name}' is of type {NAMES[d.type]}, not {given}"
+        each = value if isinstance(value, list) else [value]
+        return next(filter(None, map(self._off_limits, each)), "")
+
+    def _off_limits(self, value: Any) -> str:
+        d = self.descriptor
         for limits in (*d.floating_point_range, *d.integer_range):
             if not limits.from_value <= value <= limits.to_value:
                 return f"parameter '{d.name}' is out of range {limits.from_value} to {limits.to_value}"
@@ -70,6 +84,7 @@ class Declared:
 def robot_parameters() -> list[Declared]:
     describe = ParameterDescriptor
     speed = describe("speed", DOUBLE, "m/s", floating_point_range=[FloatingPointRange(0.0, 2.0, 0.1)])
+    gain = FloatingPointRange(0.0, 5.0, 0.0)
     limit = describe("limit", INTEGER, "kg", integer_range=[IntegerRange(0, 100, 0)])
     return [
         Declared(speed, 0.5),
@@ -77,6 +92,11 @@ def robot_parameters() -> list[Declared]:
         Declared(describe("enabled", BOOL), True),
         Declared(limit, 10),
         Declared(describe("serial", STRING, "from the factory", read_only=True), "CR-0001"),
+        Declared(describe("gains", DOUBLE + LISTS, floating_point_range=[gain]), [1.0, 2.5]),
+        Declared(describe("axes", BOOL + LISTS), [True, False]),
+        Declared(describe("frames", STRING + LISTS), ["base", "tool, left"]),
+        Declared(describe("slots", INTEGER + LISTS), [1, 2**53 + 1]),
+        Declared(describe("mode", INTEGER), 1),
     ]
 
 
@@ -129,7 +149,7 @@ class Parameters:
 
     def declare(self, name: str, value: Any, **more: Any) -> None:
         """Declares a parameter, or declares it anew, and tells of it."""
-        type_ = KINDS[type(value)]
+        type_ = kind_of(value)
         self._declared[name] = Declared(ParameterDescriptor(name, type_, **more), value)
         self._tell([], new=[self._declared[name]])
 

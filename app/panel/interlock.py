@@ -1,0 +1,72 @@
+"""The description of an interlock: a value of the robot's that permits."""
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Final
+
+from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr
+
+from app.interfaces.scalars import shown
+from app.panel.description import Description, FieldPath, Id, Label, Seconds, Topic, TopicQos, Type
+from app.panel.inputs import Unit
+
+CONDITIONS: Final = ("equals", "not_equals", "min", "max", "one_of")
+
+
+def _condition(given: Any) -> Any:
+    if not isinstance(given, bool | int | float | str):
+        raise ValueError(f"must be a number, true or false, or text, not {shown(given)}")
+    if given != given:
+        raise ValueError("NaN is no value that could permit")
+    return given
+
+
+def _some(given: tuple[Any, ...]) -> tuple[Any, ...]:
+    if not given:
+        raise ValueError("is empty: it must have one value at least")
+    return given
+
+
+# A value of the field's type, or the name of a constant of the message around it.
+Condition = Annotated[bool | int | float | str, BeforeValidator(_condition)]
+
+
+class Interlock(Description):
+    """A field of the robot's that permits: a bool that is true or, with conditions, a value that meets
+    all of them. Never seen, stale or cut off locks."""
+
+    id: Id
+    label: Label | None = None
+    topic: Topic
+    type: Type = "std_msgs/msg/Bool"
+    field: FieldPath = "data"
+    equals: Condition | None = None
+    not_equals: Condition | None = None
+    min: Condition | None = None
+    max: Condition | None = None
+    one_of: Annotated[tuple[Condition, ...], Field(strict=False), AfterValidator(_some)] | None = None
+    unit: Unit = ""
+    max_age_s: Seconds | None = None
+    require_publisher: bool = False
+    qos: TopicQos = TopicQos()
+    _constants: Mapping[Any, str] = PrivateAttr(default_factory=dict)
+
+    @property
+    def name(self) -> str:
+        return self.label or self.id
+
+    @property
+    def conditions(self) -> dict[str, Any]:
+        """Those that are given, by their keys."""
+        given = {key: getattr(self, key) for key in CONDITIONS}
+        return {key: value for key, value in given.items() if value is not None}
+
+    @property
+    def constants(self) -> Mapping[Any, str]:
+        """Value → name, of the constants by which the field's values are told; of the checked panel."""
+        return self._constants
+
+    def resolved(self, conditions: Mapping[str, Any], constants: Mapping[Any, str]) -> "Interlock":
+        """The same with values for the names of constants in its conditions."""
+        made = self.model_copy(update=dict(conditions))
+        made._constants = constants
+        return made

@@ -1,0 +1,36 @@
+"""Lists as an operator reads and enters them: values with commas between them.
+
+A text with a comma, a quote or spaces around it stands in quotes, in which a quote is written twice.
+"""
+
+import re
+from collections.abc import Iterable
+from typing import Final
+
+_ELEMENT: Final = re.compile(r'\s*(?:"(?P<quoted>(?:[^"]|"")*)"|(?P<plain>[^",]*?))\s*(?P<end>,|$)')
+_PLAIN: Final = re.compile(r'[^\s",](?:[^",]*[^\s",])?')
+
+
+def listed(texts: Iterable[str]) -> str:
+    """The elements as one text."""
+    return ", ".join(texts)
+
+
+def quoted(text: str) -> str:
+    """A text as an element."""
+    return text if _PLAIN.fullmatch(text) else '"' + text.replace('"', '""') + '"'
+
+
+def elements(text: str) -> list[str]:
+    """The elements of a text; ValueError where one is empty without quotes, or quotes don't match."""
+    found: list[str] = []
+    at = 0
+    more = bool(text.strip())
+    while more:
+        match = _ELEMENT.match(text, at)
+        if match is None or match["plain"] == "":
+            raise ValueError(f"the {len(found) + 1}. of them is none")
+        given = match["quoted"]
+        found.append(match["plain"] if given is None else given.replace('""', '"'))
+        at, more = match.end(), match["end"] == ","
+    return found
