@@ -16,7 +16,7 @@ export BENCH_CACHE := $(BENCH)
 export TEST_BRIDGE := $(CACHE)/bridge/release/test-bridge
 export TEST_ROS_PYTHON := $(CURDIR)/.venv-ros/bin/python
 
-# The limits of app/serving.py.
+# The limits of app/web/serving.py.
 LIMITS := --ws-max-size 65536 --ws-max-queue 2 --ws-per-message-deflate false --no-proxy-headers
 
 .PHONY: run test check dev wheel faults soak bench bench-setup test-parts bridge lock clean
@@ -44,7 +44,7 @@ FAULTS_RESULTS := $(CACHE)/faults.jsonl
 faults: test-parts
 	mkdir -p $(CACHE)
 	rm -f $(FAULTS_RESULTS)
-	FAULTS=$(FORM) FAULTS_RESULTS=$(FAULTS_RESULTS) .venv/bin/pytest tests/test_faults_of_*.py tests/test_at_random.py $(ARGS)
+	FAULTS=$(FORM) FAULTS_RESULTS=$(FAULTS_RESULTS) .venv/bin/pytest tests/test_faults_of_*.py tests/permission/test_at_random.py $(ARGS)
 	FAULTS=$(FORM) .venv/bin/python -m tests.faults.results $(FAULTS_RESULTS) README.md
 
 soak: test-parts
@@ -61,7 +61,7 @@ system:
 
 bridge: system
 	@[ -x $(TEST_BRIDGE) ] || echo "building the bridge of the tests: once, 5 to 10 minutes"
-	cargo build --release --locked --manifest-path tests/bridge/Cargo.toml --target-dir $(CACHE)/bridge
+	cargo build --release --locked --manifest-path tests/bridge_crate/Cargo.toml --target-dir $(CACHE)/bridge
 
 NEW_ENOUGH := $(PYTHON) -c 'import sys; sys.exit(None if sys.version_info >= (3, 11) else "the panel needs Python 3.11 or later, and this is %d.%d: make $(MAKECMDGOALS) PYTHON=python3.11" % sys.version_info[:2])'
 

@@ -1,6 +1,6 @@
 """`uvicorn app.main:app`: the only wiring."""
 
-from app.collector import resume
+from app.process.collector import resume
 
 # isort: split
 import asyncio
@@ -20,30 +20,41 @@ from starlette.middleware.gzip import GZipMiddleware
 from starlette.requests import ClientDisconnect
 from uvicorn import Config as ServerConfig
 
-from app import development, heap, logs, simulator, sockets
-from app.assets import Assets, load_assets
-from app.direct import Application
-from app.doors import Doors
-from app.ending import in_order
+from app import hot_reload, ros_logging
+from app.audit import Limits, OperatorLog, Unlogged
+from app.commands.press_limits import PressLimits
 from app.errors import KioskError, PanelError
-from app.fleet import Fleet
-from app.link import Config, config_from, config_to
-from app.log import Limits, OperatorLog, Unlogged
-from app.metrics import Metrics
 from app.panel import Panel, load_panel
 from app.panel.model import RobotEntry
-from app.press_limits import PressLimits
-from app.proxies import Proxies
-from app.routes import control, events, health, holds, pages, parameters, press_socket, presses, static
-from app.routes import log as log_routes
-from app.routes.described import errors
-from app.routes.messages import LONGEST
-from app.routes.site import Site, named_robot, on_gone, on_http_error, on_invalid, on_kiosk_error
-from app.serving import check_port, urls
+from app.process import heap, listen_sockets
+from app.process.sd_notify import Manager
+from app.process.shutdown import in_order
+from app.process.watchdog import Watchdog
+from app.runtime.fleet import Fleet
 from app.settings import Settings, shipped
-from app.startup import InWords
-from app.systemd import Manager
-from app.watchdog import Watchdog
+from app.simulator import zenoh_peer
+from app.transport.zenoh_session import Config, config_from, config_to
+from app.web.app_state import Site, named_robot, on_gone, on_http_error, on_invalid, on_kiosk_error
+from app.web.asgi import Application, InWords
+from app.web.assets import Assets, load_assets
+from app.web.described import errors
+from app.web.metrics import Metrics
+from app.web.proxies import Proxies
+from app.web.request_body import LONGEST
+from app.web.routes import audit_log as log_routes
+from app.web.routes import (
+    control,
+    events,
+    health,
+    hold_socket,
+    pages,
+    parameters,
+    press_socket,
+    presses,
+    static,
+)
+from app.web.security import Doors
+from app.web.serving import check_port, urls
 
 if TYPE_CHECKING:
     from app.recording import Recordings
@@ -57,7 +68,7 @@ ANSWERED_WITHIN_S = 2.0  # by the robot, when the server ends; then it is not kn
 def create_app(settings: Settings | None = None) -> FastAPI:
     """The application; raises KioskError where its settings or its panel are unusable."""
     settings = settings or Settings.from_environment()
-    logs.configure(settings.log_level)
+    ros_logging.configure(settings.log_level)
     panel, fault = _first_panel(settings)
     if (settings.mode or panel.mode) == "live":
         for entry in panel.robots or (None,):  # what can't be used is told before anything starts
@@ -85,14 +96,14 @@ def create_app(settings: Settings | None = None) -> FastAPI:
                 finally:
                     site.fleet.give_up()
                     await site.owed.told(READ_WITHIN_S)
-                    loop.call_later(READ_WITHIN_S, sockets.hang_up, ports)
+                    loop.call_later(READ_WITHIN_S, listen_sockets.hang_up, ports)
 
             ports: set[int] = set()
             watchdog = _watchdog(site)
             with in_order(loop, ending):
                 if settings.dev:
                     await opened.enter_async_context(
-                        development.reloading(site, settings, running, opened.pop_all())
+                        hot_reload.reloading(site, settings, running, opened.pop_all())
                     )
                 works = (
                     watchdog.run(),
@@ -123,13 +134,13 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         },
     )
     if settings.dev:
-        app.add_exception_handler(Exception, development.on_error)
+        app.add_exception_handler(Exception, hot_reload.on_error)
     app.add_middleware(GZipMiddleware, minimum_size=500)
     app.add_middleware(Doors, hosts=settings.hosts)
     if settings.proxies:
         app.add_middleware(Proxies, named=settings.proxies)
     app.add_middleware(InWords)
-    for routes in (pages, events, presses, press_socket, control, holds, parameters):
+    for routes in (pages, events, presses, press_socket, control, hold_socket, parameters):
         app.include_router(routes.router)
         app.include_router(routes.router, prefix="/robots/{robot}", dependencies=[Depends(named_robot)])
     for common in (static, health):
@@ -145,7 +156,7 @@ def _first_panel(settings: Settings) -> tuple[Panel, str]:
     except PanelError as error:
         if not settings.dev:
             raise
-        return development.EMPTY_PANEL, str(error)
+        return hot_reload.EMPTY_PANEL, str(error)
 
 
 @asynccontextmanager
@@ -186,7 +197,7 @@ async def _running(
             if not demo:
                 return config_from(settings.zenoh, entry.connect if entry else ())
             namespace = entry.namespace if entry else panel.namespace
-            return config_to(stack.enter_context(simulator.in_process(namespace, panel.distro)))
+            return config_to(stack.enter_context(zenoh_peer.in_process(namespace, panel.distro)))
 
         recordings = _recordings(settings, panel, demo)
         fleet = Fleet(
@@ -214,7 +225,7 @@ async def _running(
 
 async def _listening(server: ServerConfig | None, ports: set[int], hosts: Sequence[str]) -> None:
     """Tells where browsers find the panel, as soon as they do."""
-    listening = await sockets.narrow(ports)
+    listening = await listen_sockets.narrow(ports)
     if listening:
         log.info("the panel is at %s", ", ".join(urls(server, listening, hosts)))
 

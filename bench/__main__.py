@@ -30,7 +30,7 @@ from bench.rig import QUICK, Rig, Sizes
 from bench.stalled import stalled
 from bench.start import start
 from bench.store import Store
-from tests.parts import ROOT
+from tests.support.parts import ROOT
 
 KIOSK: Final = Kiosk()
 SAME_STREAM: Final = ("plain-ws",)  # as another peer's: it differs in how it presses only

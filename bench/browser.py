@@ -11,7 +11,7 @@ from playwright.sync_api import Browser, CDPSession, Page, Playwright, ViewportS
 from playwright.sync_api import Error as PlaywrightError
 
 from bench.parts import family
-from tests.parts import CHROMIUM, CHROMIUM_FLAGS
+from tests.support.parts import CHROMIUM, CHROMIUM_FLAGS
 
 VIEWPORT: Final[ViewportSize] = {"width": 1280, "height": 800}
 WITHIN_MS: Final = 15_000

@@ -9,7 +9,7 @@ from typing import Final
 
 from bench.parts import COMMAND, ENABLED, KIOSK_PYTHON, ended
 from bench.peer import Bare, Peer, Place, Running, until_answers
-from tests.parts import free_port, zenoh_file
+from tests.support.parts import free_port, zenoh_file
 
 HEAD: Final = f"""
 title = "Benchmark"

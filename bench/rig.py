@@ -15,7 +15,7 @@ from bench.browser import Chromium, Watched
 from bench.parts import robot
 from bench.peer import Peer, Place, Running
 from bench.unattended import Unattended
-from tests.parts import Bridge
+from tests.support.parts import Bridge
 
 DOMAIN: Final = 97
 SAID_EVERY_S: Final = 0.05

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from bench.figures import median
-from tests.parts import ROOT
+from tests.support.parts import ROOT
 
 Results = dict[str, Any]
 

@@ -11,7 +11,7 @@ from typing import Final
 from playwright.sync_api import Page, Playwright
 
 from bench.parts import ENDS_WITHIN_S, ended, family
-from tests.parts import CHROMIUM, CHROMIUM_FLAGS
+from tests.support.parts import CHROMIUM, CHROMIUM_FLAGS
 
 STARTS_WITHIN_S: Final = 15.0
 

@@ -12,10 +12,10 @@ import pytest
 import zenoh
 from playwright.sync_api import Browser, Page, sync_playwright
 
-from tests.domains import FIRST
-from tests.fonts import fonts_file
 from tests.needs import needs_parts
-from tests.parts import (
+from tests.support.domains import FIRST
+from tests.support.fonts import fonts_file
+from tests.support.parts import (
     BRIDGE,
     CHROMIUM,
     CHROMIUM_FLAGS,

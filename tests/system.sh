@@ -3,7 +3,7 @@
 # `system.sh PACKAGE` looks for that one alone.
 set -eu
 FONTS=/usr/share/fonts/truetype
-RUST=1.89 # of what tests/bridge/Cargo.lock has
+RUST=1.89 # of what tests/bridge_crate/Cargo.lock has
 only=${1:-}
 
 missing=""
@@ -28,7 +28,7 @@ need chromium chromium --version
 need libclang-dev has_libclang
 need faketime has_faketime
 need iproute2 ip -V
-# Pages are laid out with each of these alone, see tests/fonts.py.
+# Pages are laid out with each of these alone, see tests/support/fonts.py.
 need fonts-dejavu-core test -e "$FONTS/dejavu/DejaVuSans.ttf"
 need fonts-noto-core test -e "$FONTS/noto/NotoSans-Regular.ttf"
 need fonts-noto-cjk test -e "${FONTS%/*}/opentype/noto/NotoSansCJK-Regular.ttc"

@@ -4,7 +4,7 @@ import asyncio
 import time
 from typing import Final
 
-from app.owed import Owed
+from app.concurrency import Owed
 
 SOON_S: Final = 0.05
 

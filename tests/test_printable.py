@@ -12,9 +12,9 @@ from urllib.parse import quote
 import pytest
 
 from app.errors import InputError
+from app.i18n import say
 from app.printable import printable
-from app.sentences import say
-from tests.parts import ROOT, Server, until
+from tests.support.parts import ROOT, Server, until
 
 HIDDEN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]")
 BAD = "in \u202everted\u202c \x1b[31mred\u2028\u2066line\x85"

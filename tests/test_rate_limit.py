@@ -2,9 +2,9 @@
 
 import pytest
 
-from app.browsers import Browser, stranger
-from app.log import Origin
-from app.press_limits import OF_ADDRESS, OF_ALL, OF_CANCELS, OF_CLIENT, PressLimits
+from app.audit import Origin
+from app.commands.press_limits import OF_ADDRESS, OF_ALL, OF_CANCELS, OF_CLIENT, PressLimits
+from app.permission.clients import Browser, stranger
 from app.rate_limit import REMEMBERED, Buckets, Quota
 
 AT_THE_CELL = "127.0.0.1"

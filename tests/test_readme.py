@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 from app.panel import load_panel
-from tests.parts import ROOT
+from tests.support.parts import ROOT
 
 EXAMPLES = re.findall(
     r"^```toml\n(.*?)^```", (ROOT / "README.md").read_text(), re.DOTALL | re.MULTILINE

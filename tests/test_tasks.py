@@ -5,8 +5,8 @@ import logging
 
 import pytest
 
-from app.logs import RobotLog
-from app.tasks import told
+from app.concurrency import told
+from app.ros_logging import RobotLog
 
 LOG = RobotLog(logging.getLogger("kiosk.tasks"), "Robot 1")
 

@@ -4,7 +4,7 @@ import asyncio
 
 import pytest
 
-from app.waits import Waits
+from app.concurrency import Waits
 
 
 async def waits(on: Waits, event: asyncio.Event) -> str:

@@ -4,7 +4,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from tests.parts import ROOT, Server, until
+from tests.support.parts import ROOT, Server, until
 
 
 def test_an_installed_wheel_serves_from_any_folder(tmp_path: Path) -> None:

@@ -4,13 +4,13 @@ The definitions of messages are rosbags' (`rosbags.typesys`); what it has not is
 actions, packages from files, defaults, and the codec with checks that name the field.
 """
 
-from app.interfaces.composition import ActionTypes
+from app.interfaces.cdr.fields import FieldReader, Fields, Walk
 from app.interfaces.definitions import INTEGERS, PLACEHOLDER, TEXTS, Field, Structure, Type
+from app.interfaces.derived_types import ActionTypes
 from app.interfaces.distributions import DISTROS, read_distribution
-from app.interfaces.fields import FieldReader, Fields, Walk
-from app.interfaces.paths import around, name_of
-from app.interfaces.plain import text_of, to_plain
-from app.interfaces.store import Interfaces, interfaces_of
+from app.interfaces.field_path import around, name_of
+from app.interfaces.json_values import text_of, to_plain
+from app.interfaces.registry import Interfaces, interfaces_of
 
 __all__ = [
     "DISTROS",

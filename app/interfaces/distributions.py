@@ -6,7 +6,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
-from app.interfaces import kept
+from app.interfaces import distribution_cache
 from app.interfaces.definitions import Definitions, Structure
 from app.interfaces.packages import available, read_folders
 
@@ -42,13 +42,13 @@ def read_distribution(distro: str, folder: Path | None = None) -> Definitions:
 
 
 def _messages(distro: str, folder: Path | None) -> dict[str, Structure]:
-    messages = kept.read(folder, distro) if folder else None
+    messages = distribution_cache.read(folder, distro) if folder else None
     if messages is None:
-        from app.interfaces.stock import messages_of  # see there
+        from app.interfaces.bundled_messages import messages_of
 
         messages = messages_of(distro)
         if folder:
-            kept.write(folder, distro, messages)
+            distribution_cache.write(folder, distro, messages)
     return messages
 
 

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Final
 
 from app.errors import InterfaceError
-from app.interfaces.composition import EVENT_INFO
 from app.interfaces.definitions import Definitions, Structure, interface_of
+from app.interfaces.derived_types import EVENT_INFO
 from app.interfaces.parsing import KINDS, parsed
 
 _PACKAGE_NAME: Final = re.compile(r"<name>\s*([^<\s]+)\s*</name>")

@@ -1,10 +1,10 @@
 """The panel file: TOML in, frozen and checked descriptions out."""
 
-from app.panel.displays import Indicator, LampState, Readout
-from app.panel.inputs import NumberInput, SelectInput, SliderInput, TextInput, ToggleInput
 from app.panel.interlock import Interlock
 from app.panel.load import Checked, check_panel, load_panel
 from app.panel.model import Display, Hold, Input, Page, Panel, Publish
+from app.panel.widgets.displays import Indicator, LampState, Readout
+from app.panel.widgets.inputs import NumberInput, SelectInput, SliderInput, TextInput, ToggleInput
 
 __all__ = [
     "Checked",

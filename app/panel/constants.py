@@ -5,10 +5,10 @@ from itertools import takewhile
 from typing import Any
 
 from app.interfaces import INTEGERS, TEXTS, Interfaces, Type, around, name_of
-from app.panel.displays import Indicator, Readout
 from app.panel.interlock import Interlock
 from app.panel.model import Panel
-from app.panel.ranges import single
+from app.panel.number_range import single
+from app.panel.widgets.displays import Indicator, Readout
 
 
 def holder(of: Readout | Indicator | Interlock, interfaces: Interfaces) -> str:

@@ -5,9 +5,9 @@ from typing import Annotated, Any, Final
 
 from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr
 
-from app.interfaces.scalars import shown
-from app.panel.description import Description, FieldPath, Id, Label, Seconds, Topic, TopicQos, Type
-from app.panel.inputs import Unit
+from app.interfaces.validation import shown
+from app.panel.base import Description, FieldPath, Id, Label, Seconds, Topic, TopicQos, Type
+from app.panel.widgets.inputs import Unit
 
 CONDITIONS: Final = ("equals", "not_equals", "min", "max", "one_of")
 

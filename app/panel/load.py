@@ -8,10 +8,10 @@ from pydantic import ValidationError
 
 from app.errors import Fault, InterfaceError, Note, PanelError, Remark
 from app.interfaces import interfaces_of, read_distribution
-from app.panel.check import faults_in
+from app.panel.checks import faults_in
 from app.panel.constants import resolved
+from app.panel.faults.toml_file import TomlFile, read_toml
 from app.panel.model import Panel
-from app.panel.toml_file import TomlFile, read_toml
 
 Kept = Callable[[Panel], Path | None]
 
@@ -34,8 +34,8 @@ class Checked(NamedTuple):
 
 def check_panel(path: Path) -> Checked:
     """The checked panel, with what there is to say of it; PanelError as `load_panel`."""
-    from app.panel.notes import notes_in
-    from app.panel.places import located
+    from app.panel.checks.notes import notes_in
+    from app.panel.faults.places import located
     from app.panel.preview import previews
 
     file = read_toml(path)
@@ -76,8 +76,8 @@ def _faults_with_types(panel: Panel, faulty: Collection[str] = ()) -> Iterator[F
 
 def _faults_of_shape(error: ValidationError, tables: dict[str, Any], folder: Path) -> list[Fault]:
     """What is wrong with the shape, and beside that."""
-    from app.panel.shape import shape_of
-    from app.panel.stand_ins import rest_of
+    from app.panel.faults.shape import shape_of
+    from app.panel.faults.stand_ins import rest_of
 
     shape, rest = shape_of(error, tables), rest_of(tables, error)
     panel = rest and rest.panel(folder)
@@ -89,8 +89,8 @@ def _faults_of_shape(error: ValidationError, tables: dict[str, Any], folder: Pat
 
 def _told(faults: Iterable[Fault], file: TomlFile) -> tuple[Fault, ...]:
     """One for each mistake, with its line, in the order of the file."""
-    from app.panel.causes import one_for_each
-    from app.panel.places import located
+    from app.panel.faults.duplicates import one_for_each
+    from app.panel.faults.places import located
 
     told = located(one_for_each(faults), file.text, file.tables)
     return tuple(sorted(told, key=lambda fault: fault.line))

@@ -6,8 +6,7 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, Field
 
-from app.panel.control import ControlRules
-from app.panel.description import (
+from app.panel.base import (
     ActionType,
     Description,
     Endpoint,
@@ -26,12 +25,11 @@ from app.panel.description import (
     WrittenField,
     namespace_of,
 )
-from app.panel.displays import Indicator, Readout
-from app.panel.inputs import NumberInput, SelectInput, SliderInput, TextInput, ToggleInput
 from app.panel.interlock import Interlock
-from app.panel.log import LogRules
-from app.panel.parameter import EVENT_TYPE, EVENTS, Parameter
-from app.panel.record import RecordRules
+from app.panel.rules import ControlRules, LogRules, RecordRules
+from app.panel.widgets.displays import Indicator, Readout
+from app.panel.widgets.inputs import NumberInput, SelectInput, SliderInput, TextInput, ToggleInput
+from app.panel.widgets.parameter import EVENT_TYPE, EVENTS, Parameter
 
 
 class Confirm(Description):

@@ -6,14 +6,14 @@ from typing import Any
 
 from app.errors import Remark
 from app.interfaces import Interfaces, Type
-from app.interfaces.scalars import shown
-from app.panel.check_calls import sent
-from app.panel.check_holds import with_own_fields
-from app.panel.inputs import SelectInput, TextInput, ToggleInput, digits
+from app.interfaces.validation import shown
+from app.panel.checks.calls import sent
+from app.panel.checks.holds import with_own_fields
 from app.panel.message_text import Comments, message_lines
 from app.panel.model import Action, Call, Hold, Input, Panel, Publish
-from app.panel.parameter import Parameter
 from app.panel.template import NOW
+from app.panel.widgets.inputs import SelectInput, TextInput, ToggleInput, digits
+from app.panel.widgets.parameter import Parameter
 
 
 def previews(panel: Panel, interfaces: Interfaces) -> Iterator[Remark]:

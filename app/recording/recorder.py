@@ -6,15 +6,15 @@ from collections.abc import Mapping
 from datetime import UTC, datetime
 from typing import Any, Final
 
+from app.commands.receipts import Receipt
 from app.interfaces import Interfaces
 from app.panel.model import Panel
-from app.panel.record import RecordRules
-from app.receipts import Receipt
-from app.recording.file import Channel
-from app.recording.folder import name_of
-from app.recording.ring import Ring, taken
+from app.panel.rules import RecordRules
+from app.recording.directory import name_of
+from app.recording.mcap_file import Channel
+from app.recording.ring_buffer import Ring, taken
 from app.recording.writer import Recording, Recordings
-from app.robot import Robot, Sample
+from app.robot.state import Robot, Sample
 
 AGAIN_S: Final = 1.0
 LONGEST_S: Final = 600.0  # after a press, a recording waits for its receipt no longer

@@ -9,10 +9,10 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final
 
-from app.recording.file import Channel, File
-from app.recording.folder import Folder
-from app.recording.ring import OVERHEAD, Taken
-from app.sentences import say
+from app.i18n import say
+from app.recording.directory import Folder
+from app.recording.mcap_file import Channel, File
+from app.recording.ring_buffer import OVERHEAD, Taken
 
 log = logging.getLogger("kiosk.recording")
 

@@ -8,7 +8,7 @@ from typing import Any, Final
 from playwright.sync_api import Page
 
 from bench.peer import Peer, Running
-from tests.parts import until
+from tests.support.parts import until
 
 FOUND_WITHIN_S: Final = 20.0  # nodes find each other, scripts load
 THEN_WITHIN_S: Final = 3.0

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Final
 
 from bench.peer import Bare, Place, Running, until_answers
-from tests.parts import Process, until
+from tests.support.parts import Process, until
 
 PEERS: Final = Path(__file__).resolve().parent
 # As bench/parts.py has it, and the Makefile.

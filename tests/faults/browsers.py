@@ -4,7 +4,7 @@ import selectors
 import socket
 import time
 
-from tests.parts import Server
+from tests.support.parts import Server
 
 REQUEST = b"GET /events HTTP/1.1\r\nHost: 127.0.0.1\r\nAccept-Encoding: identity\r\n\r\n"
 

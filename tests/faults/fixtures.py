@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.faults.rig import Rig
-from tests.parts import Server
+from tests.support.parts import Server
 
 _domains = itertools.cycle((2, 5, 6, 7, 8))
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from tests.faults.presser import Press, Presser
 from tests.faults.rig import permitted
-from tests.parts import Server
+from tests.support.parts import Server
 
 LIVES_AT_MOST_S = 0.8
 PRESSED_EVERY_S = 0.01

@@ -12,7 +12,7 @@ from typing import Final
 
 import httpx
 
-from tests.parts import Server, until
+from tests.support.parts import Server, until
 
 PERIOD_S: Final = 0.03
 TWICE_EACH: Final = 5  # each fifth press is posted a second time, with the same id

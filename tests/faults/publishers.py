@@ -14,12 +14,12 @@ from typing import Any, Final, Literal
 
 import zenoh
 
-from app import keys
-from tests.commanded import Commanded
-from tests.cyclone import CYCLONE
-from tests.domains import FIRST
+from app.dialect import bridge_dialect
 from tests.faults.rig import kiosk
-from tests.parts import ROS_PYTHON, TESTS, Bridge, Server, until
+from tests.support.commanded import Commanded
+from tests.support.cyclone import CYCLONE
+from tests.support.domains import FIRST
+from tests.support.parts import ROS_PYTHON, TESTS, Bridge, Server, until
 
 Vendor = Literal["fast", "cyclone"]
 Outcome = Literal["heard", "locked", "unnoticed"]
@@ -87,7 +87,9 @@ class Observer:
         self.there: set[str] = set()
         self._subscribers = (
             self._session.declare_subscriber(KEY, self._sample),
-            self._session.liveliness().declare_subscriber(keys.TOKENS, self._token, history=True),
+            self._session.liveliness().declare_subscriber(
+                bridge_dialect.TOKENS, self._token, history=True
+            ),
         )
 
     def _sample(self, sample: zenoh.Sample) -> None:
@@ -95,7 +97,7 @@ class Observer:
 
     def _token(self, sample: zenoh.Sample) -> None:
         token = str(sample.key_expr)
-        endpoint = keys.parsed(token)
+        endpoint = bridge_dialect.parsed(token)
         if endpoint is None or (endpoint.role, endpoint.key) != ("MP", KEY):
             return
         if sample.kind == zenoh.SampleKind.PUT:

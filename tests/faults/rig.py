@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
 
-from tests.parts import ROOT, Bridge, RosNode, Server, until, zenoh_file
+from tests.support.parts import ROOT, Bridge, RosNode, Server, until, zenoh_file
 
 LONG: Final = os.environ.get("FAULTS") == "long"
 BOOL: Final = "std_msgs/msg/Bool"

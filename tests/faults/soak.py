@@ -15,7 +15,7 @@ from typing import Final
 from tests.faults.presser import Account, Presser, accounted
 from tests.faults.rig import TEXT, Rig
 from tests.faults.watch import Resources, Watch, answering, resources
-from tests.parts import Server
+from tests.support.parts import Server
 
 DOMAIN: Final = 99
 LOST_S: Final = 10.0  # what is not shown after so long is lost

@@ -9,7 +9,7 @@ from tests.faults.presser import Account, Press, Presser, accounted
 from tests.faults.results import ms, record
 from tests.faults.rig import Rig
 from tests.faults.watch import Watch, answering
-from tests.parts import Server, until
+from tests.support.parts import Server, until
 
 # What is answered `published` so shortly before a fault may be on its way when it breaks.
 UNDER_WAY_S: Final = 0.2

@@ -12,7 +12,7 @@ from typing import Any, Final
 
 import httpx
 
-from tests.parts import Server, events_in, until
+from tests.support.parts import Server, events_in, until
 
 DEAD_AFTER_S: Final = 10.0
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from bench.peer import Peer, Place, Running
 from bench.peers.parts import serving, uvicorn
-from tests.parts import free_port
+from tests.support.parts import free_port
 
 
 class Floor(Peer):

@@ -5,7 +5,7 @@ from typing import Final
 
 from bench.peer import Bare, Peer, Place, Running
 from bench.peers.parts import CACHE, serving
-from tests.parts import free_port
+from tests.support.parts import free_port
 
 VENV: Final = CACHE / "nicegui"
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from bench.peer import Bare, Peer, Place, Running
 from bench.peers.parts import serving, uvicorn, with_topics
-from tests.parts import free_port
+from tests.support.parts import free_port
 
 HERE = Path(__file__).parent
 

@@ -8,7 +8,7 @@ from typing import Final
 
 from bench.peer import Bare, Peer, Place, Running
 from bench.peers.parts import CACHE, started, with_page
-from tests.parts import Process, free_port
+from tests.support.parts import Process, free_port
 
 HERE: Final = Path(__file__).parent
 VENV: Final = CACHE / "rosbridge"

@@ -7,7 +7,7 @@ from typing import Final
 
 from bench.peer import Bare, Peer, Place, Running
 from bench.peers.parts import CACHE, ending, started, with_page
-from tests.parts import free_port
+from tests.support.parts import free_port
 
 HERE: Final = Path(__file__).parent
 ROUTER: Final = CACHE / "router/release/bench-router"

@@ -1,0 +1,23 @@
+"""The operator's log: who pressed what, and what came of it."""
+
+from app.audit.audit_log import OperatorLog
+from app.audit.entry import Entry, Origin, entered, same_values
+from app.audit.null_log import Unlogged
+from app.audit.queries import Filter, Row, Unended
+from app.audit.reader_process import ReaderProcess
+from app.audit.ticket import Limits, Repeated
+
+__all__ = [
+    "Entry",
+    "Filter",
+    "Limits",
+    "OperatorLog",
+    "Origin",
+    "ReaderProcess",
+    "Repeated",
+    "Row",
+    "Unended",
+    "Unlogged",
+    "entered",
+    "same_values",
+]

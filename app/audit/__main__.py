@@ -1,0 +1,48 @@
+"""`python -m app.log verify [--data FOLDER] [--head HASH]`: is the operator's log as it was written?
+
+Exit status: 0 it is, 1 an entry was changed, removed, reordered or inserted, 2 it can't be read.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+from app.audit.verify import verify
+from app.errors import KioskError
+from app.panel import load_panel
+from app.settings import Settings
+
+
+def main(arguments: list[str]) -> int:
+    parser = argparse.ArgumentParser(prog="python -m app.log", description="The operator's log.")
+    commands = parser.add_subparsers(dest="command", required=True)
+    check = commands.add_parser("verify", help="check that no entry was changed")
+    check.add_argument(
+        "--data", type=Path, metavar="FOLDER", help="where the log is; default: KIOSK_DATA's folder"
+    )
+    check.add_argument(
+        "--head", default="", metavar="HASH", help="a head that was noted once, and must be in it"
+    )
+    given = parser.parse_args(arguments)
+    try:
+        found = verify(given.data or _usual_folder(), given.head)
+    except KioskError as error:
+        print(f"the operator's log can't be read: {error}", file=sys.stderr)
+        return 2
+    if found.fault:
+        print(f"not as it was written: {found.fault} ({found.count} entries are)")
+        return 1
+    print(f"ok, {found.count} entries, head {found.head}")
+    return 0
+
+
+def _usual_folder() -> Path:
+    """That of a server that was started with these settings."""
+    settings = Settings.from_environment()
+    if settings.data is not None:  # a panel file with a fault is no reason not to look
+        return settings.data
+    return settings.data_folder(settings.mode or load_panel(settings.panel).mode)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

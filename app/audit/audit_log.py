@@ -1,0 +1,258 @@
+"""The face of the operator's log to the event loop, and the thread that owns its file.
+
+`pressed` returns when the entry is committed to the operating system: a process that is killed
+after that has it. `closed` returns when the outcome, and every entry before it, is on the disk
+(fdatasync): so is all that has a receipt, after a power cut too. What comes together is committed
+together, and shares a sync; syncs have a thread of their own, so that no press waits for one of
+another. Neither ever blocks the event loop.
+"""
+
+import asyncio
+import logging
+import secrets
+from collections.abc import Callable, Collection, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import AbstractAsyncContextManager, contextmanager, suppress
+from pathlib import Path
+from typing import Final
+
+from app.audit.data_dir import Folder
+from app.audit.database import Head
+from app.audit.entry import Entry, Origin
+from app.audit.queries import Filter, Row, Unended
+from app.audit.reader_process import ReaderProcess
+from app.audit.readers import Readers
+from app.audit.refusal_quota import SUMMED_UP_S, Refusals
+from app.audit.ticket import Limits, Results, Ticket
+from app.audit.writer_thread import Keeper
+from app.errors import LogError
+from app.i18n import say
+
+log = logging.getLogger("kiosk.log")
+
+MOST_WAITING: Final = 1000
+PRESSED_WITHIN_S: Final = 2.0  # an entry that takes longer is a press that is not sent
+CLOSED_WITHIN_S: Final = 3.0  # a receipt does not wait longer: it says that it is not on the disk
+ENDED_WITHIN_S: Final = 10.0
+
+
+class OperatorLog:
+    """One log for a whole server, in a folder that is its own; used on the event loop only."""
+
+    def __init__(self, folder: Path, limits: Limits, mode: str = "live") -> None:
+        self.folder = folder
+        self._limits = limits
+        self._folder = Folder(folder)
+        self._changed: set[Callable[[], None]] = set()
+        self._readers = Readers(folder)
+        self._stuck: set[Ticket] = set()
+        self._loop = asyncio.get_running_loop()
+        self._refusals = Refusals()
+        self._telling: asyncio.TimerHandle | None = None
+        self._keeper = Keeper(self._folder, limits, secrets.token_hex(4), mode, self._tell)
+
+    async def start(self) -> None:
+        """Opens the log; FolderInUse when another server has the folder. What else may be wrong is
+        its `fault`, and tried again."""
+        with suppress(OSError):  # the keeper meets it again, and says it
+            await self._folder.hold_soon()
+        self._keeper.start()
+        await self._own(self._keeper.tried.wait)
+
+    async def stop(self) -> None:
+        """Writes what is waiting, and lets go of the folder."""
+        if self._telling is not None:
+            self._telling.cancel()
+            self._add_left_out()
+        await self._own(self._keeper.stop)
+        self._readers.stop()
+        self._folder.release()
+
+    async def _own(self, wait: Callable[[float], object]) -> None:
+        """Waits on a thread of its own, whatever else the process's threads are busy with."""
+        thread = ThreadPoolExecutor(1, "operators-log-wait")
+        waited = self._loop.run_in_executor(thread, wait, ENDED_WITHIN_S)
+        try:
+            await waited
+        finally:
+            thread.shutdown(wait=waited.done() and not waited.cancelled())
+
+    @property
+    def enabled(self) -> bool:
+        return True
+
+    @property
+    def head(self) -> Head | None:
+        """None until it could be opened."""
+        return self._keeper.head
+
+    @property
+    def fault(self) -> str:
+        """The sentence that says that the log can't be written; "" while it can."""
+        why = self._why
+        sentence = "log_unwritable" if self._needed else "log_unwritable_free"
+        return say(sentence, why=why) if why else ""
+
+    @property
+    def _why(self) -> str:
+        if self._stuck and not self._keeper.fault:
+            return say("log_slow", seconds=f"{PRESSED_WITHIN_S:g}")
+        return self._keeper.fault
+
+    @property
+    def lock(self) -> str:
+        """Why nothing may be pressed; "" while it may."""
+        return self.fault if self._needed else ""
+
+    @property
+    def _needed(self) -> bool:
+        """Whether nothing is sent that is not logged."""
+        return self._limits.required or self._keeper.displaced
+
+    @contextmanager
+    def followed(self, changed: Callable[[], None]) -> Iterator[None]:
+        """`changed` is called, on the loop, whenever `fault` has changed."""
+        self._changed.add(changed)
+        try:
+            yield
+        finally:
+            self._changed.discard(changed)
+
+    async def pressed(self, entry: Entry) -> Entry | None:
+        """Writes the entry of a press that is about to be sent, and returns it as it stands.
+
+        Raises LogError when it can't be written and must be; where it need not be, None. Repeated
+        where the log has a press of this id: nothing is written then.
+        """
+        try:
+            return await self._written(entry)
+        except LogError as error:
+            if self._needed:
+                raise LogError(self.fault or say("log_unwritable", why=error)) from error
+            return None
+
+    async def closed(self, entry: Entry) -> str:
+        """Writes what came of a press; returns when that is on the disk, or why it is not."""
+        if entry.outcome == "refused":
+            self._refusals.take(entry)
+        try:
+            await self._within(self._add(entry), CLOSED_WITHIN_S)
+        except LogError as error:
+            return str(error)
+        return ""
+
+    def add(self, entry: Entry) -> None:
+        """Writes what came of a press, when nobody waits for it."""
+        self._add(entry)
+
+    def room(self, origin: Origin) -> bool:
+        """Whether a refusal may be an entry; where not, it is left out."""
+        return self._refusals.room(origin)
+
+    def leave_out(self, origin: Origin, limited: bool = False) -> None:
+        """Counts a refusal that is no entry, `limited` one that was not even judged; one entry tells of
+        those of a while."""
+        if self._refusals.leave_out(origin, limited):
+            self._tell_left_out_later()
+
+    @property
+    def left_out(self) -> int:
+        """How many refusals are no entries, since the start."""
+        return self._refusals.left_out
+
+    def _tell_left_out_later(self) -> None:
+        self._telling = self._loop.call_later(SUMMED_UP_S, self._tell_left_out)
+
+    def _tell_left_out(self) -> None:
+        if self._why:
+            self._tell_left_out_later()
+        else:
+            self._add_left_out()
+
+    def _add_left_out(self) -> None:
+        for entry in self._refusals.told():
+            self._keeper.add(Ticket(entry, self._loop.create_future()), None)
+
+    async def rows(self, wanted: Filter, before: int | None, count: int) -> list[Row]:
+        """The newest entries that are wanted before a number; LogError, TooMany."""
+        return await self._readers.rows(wanted, before, count)
+
+    def export(
+        self, wanted: Filter, before: int | None, gzip: bool
+    ) -> AbstractAsyncContextManager[ReaderProcess]:
+        """All that is wanted before a number, as CSV, while this lasts; LogError, TooMany."""
+        return self._readers.export(wanted, before, gzip)
+
+    def close(self) -> None:
+        """The server is about to end: it waits for nobody who reads."""
+        self._readers.close()
+
+    async def unended(self, robot: str, widgets: Collection[str], since: int) -> list[Unended]:
+        """Presses of these widgets, not before `since` (ms), of which the end is not known, the newest
+        first; LogError when that can't be read, or what was cut off is not closed yet."""
+        if self.head is None:
+            raise LogError(say("log_unreadable", why=self._why or say("log_closed")))
+        return await self._readers.unended(robot, widgets, since)
+
+    async def _written(self, entry: Entry) -> Entry:
+        if why := self._why:
+            raise LogError(why)
+        ticket = self._add(entry)
+        try:
+            return await self._within(ticket, PRESSED_WITHIN_S)
+        except BaseException:
+            ticket.abandoned = True
+            self._close_abandoned(ticket)
+            raise
+
+    async def _within(self, ticket: Ticket, seconds: float) -> Entry:
+        timer = self._loop.call_later(seconds, ticket.wake)
+        try:
+            await ticket.waiter
+        finally:
+            timer.cancel()
+        if ticket.result is None:
+            self._stuck.add(ticket)
+            self._say_changed()
+            raise LogError(say("log_slow", seconds=f"{seconds:g}"))
+        if isinstance(ticket.result, Entry):
+            return ticket.result
+        raise ticket.result
+
+    def _close_abandoned(self, ticket: Ticket) -> None:
+        """A press that nobody waits for any more may have been written all the same."""
+        if isinstance(ticket.result, Entry):
+            self._add(ticket.result.followed("closed", "refused", say("log_abandoned")))
+
+    def _add(self, entry: Entry) -> Ticket:
+        """Hands it to the keeper. Only what starts a press is turned away when too much waits: what
+        came of it is bounded by the presses that there are."""
+        ticket = Ticket(entry, self._loop.create_future())
+        if not self._keeper.add(ticket, MOST_WAITING if entry.of is None else None):
+            raise LogError(say("log_full_queue"))
+        return ticket
+
+    def _tell(self, results: Results, changed: bool) -> None:
+        """On the keeper's threads; wakes the loop only where there is something to tell."""
+        if not (results or changed):
+            return
+        try:
+            self._loop.call_soon_threadsafe(self._told, results, changed)
+        except RuntimeError:  # the loop is closed: the process ends
+            log.debug("nobody is told of %d entries", len(results))
+
+    def _told(self, results: Results, changed: bool) -> None:
+        for ticket, result in results:
+            ticket.result = result
+            ticket.wake()
+            if ticket.abandoned:
+                self._close_abandoned(ticket)
+            if ticket in self._stuck:
+                self._stuck.discard(ticket)
+                changed = True
+        if changed:
+            self._say_changed()
+
+    def _say_changed(self) -> None:
+        for listener in tuple(self._changed):
+            listener()

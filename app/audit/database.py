@@ -1,0 +1,197 @@
+"""The SQLite file of the operator's log: its shape, how it is opened, what its errors mean."""
+
+import os
+import secrets
+import sqlite3
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, Literal
+
+from app.errors import LogCorrupt, LogError, LogGone
+from app.i18n import say
+
+NAME: Final = "operators-log.sqlite3"
+SUFFIXES: Final = ("", "-wal", "-shm")
+APPLICATION: Final = 0x4F504C47  # "OPLG"
+VERSION: Final = 1
+PATIENCE_S: Final = 1.0  # with a program of somebody's that has the file locked
+
+# `undone` has the presses of which the end is not known; it can be made from `entry` anew.
+SCHEMA: Final = """
+CREATE TABLE entry (
+  seq INTEGER PRIMARY KEY, at INTEGER NOT NULL, boot TEXT NOT NULL, monotonic INTEGER NOT NULL,
+  kind TEXT NOT NULL, of INTEGER, address TEXT NOT NULL, browser TEXT NOT NULL, who TEXT NOT NULL,
+  robot TEXT NOT NULL, press TEXT NOT NULL, widget TEXT NOT NULL, action TEXT NOT NULL,
+  "values" TEXT NOT NULL, seen TEXT NOT NULL, verdict TEXT NOT NULL, board TEXT NOT NULL,
+  outcome TEXT NOT NULL, reason TEXT NOT NULL, prev TEXT NOT NULL, hash TEXT NOT NULL
+) STRICT;
+CREATE TABLE undone (seq INTEGER PRIMARY KEY, outcome TEXT NOT NULL) STRICT;
+CREATE TABLE about (key TEXT PRIMARY KEY, value ANY NOT NULL) STRICT, WITHOUT ROWID;
+"""
+# By which a press that comes again is found; older files get it when they are opened.
+INDEX: Final = "CREATE INDEX IF NOT EXISTS entry_press ON entry (press) WHERE press <> ''"
+
+WORDS: Final = {
+    "SQLITE_FULL": "no space left on device",
+    "SQLITE_READONLY": "the file is read-only",
+    "SQLITE_CANTOPEN": "the file can't be opened",
+    "SQLITE_BUSY": "another program has the file locked",
+    "SQLITE_PERM": "permission denied",
+    "SQLITE_IOERR": "the disk does not take it (input/output error)",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Head:
+    """The newest entry, and how many there are; `hash` is the genesis where there are none."""
+
+    seq: int
+    hash: str
+    count: int
+
+
+DAMAGED: Final = frozenset({"SQLITE_CORRUPT", "SQLITE_NOTADB"})
+
+
+@contextmanager
+def in_words() -> Iterator[None]:
+    """What SQLite and the system raise, as LogError; LogCorrupt where the file is damaged."""
+    try:
+        yield
+    except sqlite3.Error as error:
+        name = getattr(error, "sqlite_errorname", "")
+        short = "_".join(name.split("_")[:2])
+        if short in DAMAGED:
+            raise LogCorrupt(f"the file is damaged: {error}") from error
+        raise LogError(WORDS.get(short, str(error))) from error
+    except OSError as error:
+        words = "not a folder" if isinstance(error, FileExistsError) else error.strerror or str(error)
+        where = f" ({error.filename})" if error.filename else ""
+        raise LogError(words[:1].lower() + words[1:] + where) from error
+
+
+def opened(folder: Path, after: Head | None = None) -> sqlite3.Connection:
+    """The file open for writing, made if it was not there: its first entry then follows the entry
+    `after`, which another file has, or none.
+
+    Raises LogCorrupt where it is no such file, LogError where it can't be opened.
+    """
+    path = folder / NAME
+    with in_words():
+        os.close(os.open(path, os.O_RDWR | os.O_CREAT, 0o600))
+        db = sqlite3.connect(path, timeout=PATIENCE_S, isolation_level=None)
+        try:
+            _prepare(db, after)
+        except BaseException:
+            db.close()
+            raise
+    return db
+
+
+def _prepare(db: sqlite3.Connection, after: Head | None) -> None:
+    db.execute("PRAGMA auto_vacuum = INCREMENTAL")  # counts for a new file only
+    db.execute("PRAGMA journal_mode = WAL")
+    db.execute("PRAGMA synchronous = NORMAL")
+    db.execute("PRAGMA wal_autocheckpoint = 0")
+    application, version, tables = (
+        db.execute(question).fetchone()[0]
+        for question in (
+            "PRAGMA application_id",
+            "PRAGMA user_version",
+            "SELECT count(*) FROM sqlite_schema WHERE name IN ('entry', 'undone', 'about')",
+        )
+    )
+    if not application and not version and not tables:
+        _begin(db, after)
+    elif application != APPLICATION or tables != 3:
+        raise LogCorrupt("the file is not an operator's log")
+    elif version != VERSION:
+        raise LogError(f"the file is of another version of this program ({version}, not {VERSION})")
+    db.execute(INDEX)
+
+
+def _begin(db: sqlite3.Connection, after: Head | None) -> None:
+    genesis, first = (after.hash, after.seq + 1) if after else (secrets.token_hex(32), 1)
+    db.executescript(
+        f"BEGIN; {SCHEMA} PRAGMA application_id = {APPLICATION}; PRAGMA user_version = {VERSION};"
+    )
+    db.executemany("INSERT INTO about VALUES (?, ?)", [("genesis", genesis), ("first", first)])
+    db.execute("COMMIT")
+
+
+def read_only(folder: Path) -> sqlite3.Connection:
+    """A connection of a reader's, which holds up no writer."""
+    with in_words():
+        path = folder / NAME
+        path.stat()
+        db = sqlite3.connect(
+            f"{path.absolute().as_uri()}?mode=ro",
+            uri=True,
+            timeout=PATIENCE_S,
+            isolation_level=None,
+        )
+    db.text_factory = lambda data: data.decode("utf-8", "replace")
+    return db
+
+
+class Files:
+    """The log's files as they are in the folder when it was opened.
+
+    They are known by their inodes, and not by descriptors: the first one of a file that a process
+    closes takes all SQLite's locks with it.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._known = {str(path): _inode(str(path)) for path in _paths(folder)}
+
+    def check(self) -> None:
+        """LogGone where one was removed, renamed or replaced; LogCorrupt where the log was emptied."""
+        for path, known in self._known.items():
+            try:
+                found = _inode(path)
+            except OSError:
+                found = None
+            if found != known:
+                name = os.path.basename(path)
+                raise LogGone(say("log_taken", name=name), itself=name == NAME)
+        if not os.stat(next(iter(self._known))).st_size:
+            raise LogCorrupt(say("log_emptied"))
+
+
+def _paths(folder: Path) -> list[Path]:
+    return [folder / (NAME + suffix) for suffix in SUFFIXES]
+
+
+def _inode(path: str) -> tuple[int, int]:
+    found = os.stat(path)
+    return found.st_dev, found.st_ino
+
+
+def clear(folder: Path) -> str:
+    """Makes room for a new log where one was taken away: what another program put there is put aside
+    under the name that is returned, "" where nothing was."""
+    main, wal, shm = _paths(folder)
+    if main.exists() or (wal.exists() and wal.stat().st_size):
+        return set_aside(folder, "found")
+    wal.unlink(missing_ok=True)
+    shm.unlink(missing_ok=True)  # an index of the other two
+    return ""
+
+
+def set_aside(folder: Path, word: Literal["damaged", "found"] = "damaged") -> str:
+    """Renames what can't be used; returns its new name, with the time. Nothing is deleted."""
+    stamp = time.strftime("%Y%m%dT%H%M%SZ", time.gmtime())
+    stem = NAME.removesuffix(".sqlite3")
+    number, name = 0, f"{stem}.{word}-{stamp}.sqlite3"
+    while any((folder / (name + suffix)).exists() for suffix in SUFFIXES):
+        number += 1
+        name = f"{stem}.{word}-{stamp}.{number}.sqlite3"
+    with in_words():
+        for suffix in reversed(SUFFIXES):
+            old = folder / (NAME + suffix)
+            if old.exists():
+                old.rename(folder / (name + suffix))
+    return name

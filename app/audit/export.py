@@ -1,0 +1,62 @@
+"""The operator's log as CSV: RFC 4180 with a byte order mark, the newest entry first.
+
+Some rows at a time, with nothing open in between: a slow reader keeps nothing from being written.
+"""
+
+import csv
+import io
+import zlib
+from collections.abc import Iterable, Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Final
+
+from app.audit import entry
+from app.audit.queries import Filter, Row, rows
+from app.printable import printable
+
+ROWS_AT_ONCE: Final = 500
+GZIP: Final = zlib.MAX_WBITS | 16  # the format, as zlib has it
+TEXTS: Final = entry.FIELDS.index("address")  # an entry's fields from here on
+FIELDS: Final = (*entry.FIELDS[:TEXTS], "pressed_at", *entry.FIELDS[TEXTS:])
+# What a spreadsheet would take as a formula.
+FORMULA: Final = ("=", "+", "-", "@", "\t", "\r")
+
+
+def lines(folder: Path, wanted: Filter, before: int | None) -> Iterator[bytes]:
+    """All that is wanted before a number; LogError."""
+    found = rows(folder, wanted, before, ROWS_AT_ONCE)
+    yield "\ufeff".encode() + _csv([FIELDS, *map(_cells, found)])
+    while len(found) == ROWS_AT_ONCE:
+        found = rows(folder, wanted, found[-1].entry.seq, ROWS_AT_ONCE)
+        yield _csv(map(_cells, found))
+
+
+def packed(pieces: Iterable[bytes]) -> Iterator[bytes]:
+    """The same by gzip."""
+    packer = zlib.compressobj(wbits=GZIP)
+    for piece in pieces:
+        yield packer.compress(piece)
+    yield packer.flush()
+
+
+def _cells(row: Row) -> tuple[str | int | None, ...]:
+    seq, at, boot, monotonic, kind, of, *texts = row.entry
+    return (seq, _time(at), boot, monotonic, kind, of, _time(row.pressed_at), *map(_text, texts))
+
+
+def _time(ms: int | None) -> str | None:
+    if ms is None:
+        return None
+    return datetime.fromtimestamp(ms / 1000, UTC).isoformat(timespec="milliseconds")
+
+
+def _text(text: str) -> str:
+    shown = text if text.isprintable() else printable(text)
+    return f"'{shown}" if shown.startswith(FORMULA) else shown
+
+
+def _csv(found: Iterable[tuple[str | int | None, ...]]) -> bytes:
+    text = io.StringIO()
+    csv.writer(text).writerows(found)
+    return text.getvalue().encode()

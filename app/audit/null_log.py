@@ -1,0 +1,75 @@
+"""What stands in the log's place where the panel file switches it off: it keeps nothing."""
+
+import logging
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from app.audit.data_dir import Folder
+from app.audit.database import Head
+from app.audit.entry import Entry, Origin
+from app.audit.queries import Unended
+from app.errors import FolderInUse, LogError
+from app.i18n import say
+
+log = logging.getLogger("kiosk.log")
+
+
+class Unlogged:
+    """Takes every entry and writes none; keeps a second server from the folder all the same."""
+
+    folder = None
+    enabled = False
+    fault = ""
+    lock = ""
+    head: Head | None = None
+    left_out = 0
+
+    def __init__(self, folder: Path | None = None) -> None:
+        self._folder = Folder(folder) if folder else None
+
+    async def start(self) -> None:
+        """FolderInUse when another server has the folder: each would send what comes twice."""
+        try:
+            if self._folder is not None:
+                await self._folder.hold_soon()
+        except OSError as error:
+            log.warning("a second server would not be noticed: %s", error)
+
+    async def stop(self) -> None:
+        if self._folder is not None:
+            self._folder.release()
+
+    @contextmanager
+    def followed(self, changed: Callable[[], None]) -> Iterator[None]:
+        """There is never anything to be told."""
+        yield
+
+    def room(self, origin: Origin) -> bool:
+        return True
+
+    def leave_out(self, origin: Origin, limited: bool = False) -> None:
+        """It is not counted."""
+
+    async def unended(self, robot: str, widgets: Collection[str], since: int) -> list[Unended]:
+        return []
+
+    async def pressed(self, entry: Entry) -> Entry | None:
+        """LogError where another server took the folder meanwhile."""
+        if self._folder is not None:
+            try:
+                self._folder.hold()
+            except FolderInUse as error:
+                raise LogError(say("folder_taken", why=error)) from error
+            except OSError as error:
+                log.warning("a second server would not be noticed: %s", error)
+        return None
+
+    async def closed(self, entry: Entry) -> str:
+        return ""
+
+    def close(self) -> None:
+        """Nobody reads it."""
+
+    def add(self, entry: Entry) -> None:
+        """It is not kept."""

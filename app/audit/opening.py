@@ -1,0 +1,87 @@
+"""Opening the operator's log, and what it is told before anything new."""
+
+import logging
+from collections.abc import Sequence
+from pathlib import Path
+
+from app.audit.database import NAME, Head, clear, in_words, set_aside
+from app.audit.entry import Entry, entered
+from app.audit.store import Store
+from app.errors import LogCorrupt, LogError, LogGone
+from app.i18n import say
+
+log = logging.getLogger("kiosk.log")
+
+
+class Opening:
+    """Opens the file, as often as it takes; keeps why a new one was begun until that stands in it."""
+
+    def __init__(self, folder: Path, boot: str) -> None:
+        self._folder = folder
+        self._boot = boot
+        self._lost: LogError | None = None
+        self._begun = ""
+
+    def lost(self, error: LogError) -> None:
+        """The file was closed for this; what needs a new one stays known until there is one."""
+        if not isinstance(self._lost, LogCorrupt | LogGone):
+            self._lost = error
+
+    def store(self, head: Head | None) -> Store:
+        """The file, open: a new one where the old one is damaged or gone. `head` is the newest entry
+        that this server has written. LogError where it can't be opened."""
+        try:
+            return self._store(head)
+        except LogCorrupt as error:
+            name = set_aside(self._folder)
+            log.error("the operator's log is damaged (%s): it is kept as %s", error, name)
+            self._lost, self._begun = None, say("log_began_anew", name=name)
+            return Store(self._folder, self._boot, head)
+
+    def _store(self, head: Head | None) -> Store:
+        lost = self._lost
+        if isinstance(lost, LogCorrupt):
+            raise lost
+        taken = isinstance(lost, LogGone) and lost.itself
+        if not self._begun and (taken or (head and not (self._folder / NAME).exists())):
+            self._begun = self._why_gone(head)
+        store = Store(self._folder, self._boot, head)
+        self._lost = None
+        return store
+
+    def _why_gone(self, head: Head | None) -> str:
+        with in_words():
+            found = clear(self._folder)
+        why = say("log_began_for_gone", last=head.seq if head else 0)
+        why += " " + say("log_found", name=found) if found else ""
+        log.error("%s", why)
+        return why
+
+    def first_entries(self, store: Store, head: Head | None) -> Sequence[Entry]:
+        """What the file has to be told first: that it is a new one, or lacks what was written.
+
+        `first` in the first entry of a file is that entry's own number: its chain may begin there.
+        """
+        found = store.head
+        if not found.count and (self._begun or found.seq or store.was_there):
+            why = self._begun or say("log_began_empty", last=found.seq)
+            return [entered("began", values={"first": found.seq + 1}, reason=why)]
+        if head is None or head.seq <= found.seq:
+            return []
+        gone = say("log_lost", first=found.seq + 1, last=head.seq)
+        log.error("%s", gone)
+        return [entered("resumed", reason=gone)]
+
+    def written(self) -> None:
+        """What was to be told first stands in the file."""
+        self._begun = ""
+
+
+def cut_off(store: Store) -> Sequence[Entry]:
+    """What is to be said of presses of servers that ended before they knew what came of them."""
+    return [
+        entry.followed(
+            "corrected" if store.answered(entry.seq) else "closed", "unknown", say("log_ended")
+        )
+        for entry in store.undone()
+    ]

@@ -1,0 +1,142 @@
+"""Reading the operator's log, page by page, beside the writer and never holding it up.
+
+Each call is one short read on a connection of its own: a slow reader keeps nothing open.
+"""
+
+import time
+from collections.abc import Collection, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from app.audit.database import in_words, read_only
+from app.audit.entry import FIELDS, Entry
+from app.errors import LogError, SearchTooLong
+
+LONGEST_SEARCH_S: Final = 5.0
+STEPS_BETWEEN_LOOKS: Final = 10_000
+MOST_LOOKED_AT: Final = 20_000  # entries, from the newest back
+
+# What has become more by now is told by a later entry.
+DONE: Final = "(e.kind <> 'pressed' OR e.seq IN (SELECT seq FROM undone))"
+CONDITIONS: Final = {
+    "since": "e.at >= :since",
+    "until": "e.at < :until",
+    "widget": "e.widget = :widget",
+    "outcome": "(CASE WHEN e.outcome = '' THEN e.kind ELSE e.outcome END) = :outcome",
+    "who": "(e.who = :who OR e.address = :who)",
+    "text": (
+        "(e.reason || ' ' || e.\"values\" || ' ' || e.widget || ' ' || e.press || ' ' || e.robot"
+        " || ' ' || e.who || ' ' || e.address || ' ' || e.outcome) LIKE :pattern ESCAPE '\\'"
+    ),
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Filter:
+    """Which entries; times in ms since 1970 (UTC), `since` included and `until` not.
+
+    `every`: presses too of which a later entry tells what came of them.
+    """
+
+    since: int | None = None
+    until: int | None = None
+    widget: str = ""
+    outcome: str = ""
+    who: str = ""
+    text: str = ""
+    every: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """An entry, and when what it tells of was pressed (ms; None where that is no longer there)."""
+
+    entry: Entry
+    pressed_at: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class Unended:
+    """A press of which the log has no end: its entry, what was told of it last ("" where nothing was),
+    and whether what it was for was `accepted` once."""
+
+    press: Entry
+    outcome: str
+    reason: str
+    accepted: bool
+
+
+def rows(
+    folder: Path,
+    wanted: Filter,
+    before: int | None,
+    count: int,
+    longest_s: float = LONGEST_SEARCH_S,
+) -> list[Row]:
+    """The newest `count` entries before the number `before`, the newest first; LogError, SearchTooLong
+    where that takes longer than `longest_s`."""
+    query, values = _query(wanted, before, count)
+    return [Row(Entry(*row[:-1]), row[-1]) for row in _found(folder, query, values, longest_s)]
+
+
+def unended(folder: Path, robot: str, widgets: Collection[str], since: int) -> list[Unended]:
+    """Presses of these widgets of a robot, not before `since` (ms), of which the end is not known; the
+    newest first. LogError."""
+    names = {f"widget{number}": widget for number, widget in enumerate(widgets)}
+    columns = ", ".join(f'p."{name}"' for name in FIELDS)
+    query = f"""
+        WITH recent AS (
+          SELECT * FROM entry
+          WHERE seq > (SELECT max(seq) FROM entry) - {MOST_LOOKED_AT} AND action = 'press'
+            AND robot = :robot AND widget IN ({", ".join(f":{name}" for name in names)})
+        ), told AS (
+          SELECT of, max(seq) AS last, max(outcome = 'accepted') AS accepted FROM recent GROUP BY of
+        )
+        SELECT {columns}, ifnull(l.outcome, '') AS said, ifnull(l.reason, ''), ifnull(t.accepted, 0)
+        FROM recent p LEFT JOIN told t ON t.of = p.seq LEFT JOIN entry l ON l.seq = t.last
+        WHERE p.kind = 'pressed' AND p.at >= :since
+          AND said IN ('', 'accepted', 'unknown', 'timed_out')
+        ORDER BY p.seq DESC
+    """
+    found = _found(folder, query, {"robot": robot, "since": since, **names})
+    return [Unended(Entry(*row[:-3]), row[-3], row[-2], bool(row[-1])) for row in found]
+
+
+def _found(
+    folder: Path, query: str, values: Mapping[str, Any], longest_s: float = LONGEST_SEARCH_S
+) -> list[Any]:
+    db = read_only(folder)
+    end = time.monotonic() + longest_s
+    db.set_progress_handler(lambda: time.monotonic() > end, STEPS_BETWEEN_LOOKS)
+    try:
+        with in_words():
+            return db.execute(query, values).fetchall()
+    except LogError as error:
+        if time.monotonic() > end:
+            raise SearchTooLong("the search took too long: give a shorter time") from error
+        raise
+    finally:
+        db.close()
+
+
+def _query(wanted: Filter, before: int | None, count: int) -> tuple[str, dict[str, Any]]:
+    given = {name: value for name, value in asdict(wanted).items() if value not in (None, "")}
+    conditions = [CONDITIONS[name] for name in given if name in CONDITIONS]
+    if not wanted.every:
+        conditions.append(DONE)
+    if before is not None:
+        conditions.append("e.seq < :before")
+    where = f"WHERE {' AND '.join(conditions)}" if conditions else ""
+    columns = ", ".join(f'e."{name}"' for name in FIELDS)
+    query = (
+        f"SELECT {columns}, p.at FROM entry e LEFT JOIN entry p ON p.seq = e.of {where}"
+        " ORDER BY e.seq DESC LIMIT :count"
+    )
+    return query, given | {"pattern": _pattern(wanted.text), "before": before, "count": count}
+
+
+def _pattern(text: str) -> str:
+    for special in "\\%_":
+        text = text.replace(special, f"\\{special}")
+    return f"%{text}%"

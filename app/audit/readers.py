@@ -1,0 +1,91 @@
+"""Who reads the operator's log beside the event loop: few at a time, and where it takes long by another
+process, so that presses and holds keep this one's time."""
+
+import asyncio
+from collections.abc import AsyncIterator, Callable, Collection
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import asynccontextmanager
+from functools import partial
+from pathlib import Path
+from typing import Final, TypeVar
+
+from app.audit.queries import Filter, Row, Unended, rows, unended
+from app.audit.reader_main import Wish, rows_in
+from app.audit.reader_process import ReaderProcess
+from app.audit.reader_slots import Places
+from app.errors import LogError, SearchTooLong
+from app.i18n import say
+
+SEARCHES_MOST: Final = 2  # at a time
+THREADS: Final = SEARCHES_MOST + 1  # one for what the server itself has to know
+QUICK_S: Final = 0.03  # a search that takes longer is done by another process
+SEARCH_AGAIN_S: Final = 2
+EXPORT_AGAIN_S: Final = 10
+
+Read = TypeVar("Read")
+
+
+class Readers:
+    """Of one log; used on the event loop only."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._threads = ThreadPoolExecutor(THREADS, "operators-log-reader")
+        self._searching = Places(SEARCHES_MOST, SEARCH_AGAIN_S, say("log_searched"))
+        self._exporting = Places(1, EXPORT_AGAIN_S, say("log_exported"))
+        self._processes: set[ReaderProcess] = set()
+        self._closed = False
+
+    async def rows(self, wanted: Filter, before: int | None, count: int) -> list[Row]:
+        """The newest entries that are wanted before a number; LogError when they can't be read, TooMany
+        when others search."""
+        with self._searching.one():
+            try:
+                return await self._read(partial(rows, self._folder, wanted, before, count, QUICK_S))
+            except SearchTooLong:
+                async with self._apart(Wish(self._folder, wanted, before, count)) as process:
+                    return rows_in(await process.whole())
+
+    async def unended(self, robot: str, widgets: Collection[str], since: int) -> list[Unended]:
+        """See `unended` of app/audit/queries.py."""
+        return await self._read(partial(unended, self._folder, robot, widgets, since))
+
+    @asynccontextmanager
+    async def export(
+        self, wanted: Filter, before: int | None, gzip: bool
+    ) -> AsyncIterator[ReaderProcess]:
+        """All that is wanted before a number, as CSV, while this lasts; TooMany beside another one,
+        LogError when the server ends."""
+        with self._exporting.one():
+            async with self._apart(Wish(self._folder, wanted, before, gzip=gzip)) as process:
+                yield process
+
+    def close(self) -> None:
+        """The server is about to end: it waits for nobody who reads."""
+        self._closed = True
+        for process in self._processes:
+            process.cut()
+
+    def stop(self) -> None:
+        """Leaves no thread behind."""
+        self._threads.shutdown(wait=False, cancel_futures=True)
+
+    async def _read(self, read: Callable[[], Read]) -> Read:
+        try:
+            return await asyncio.get_running_loop().run_in_executor(self._threads, read)
+        except SearchTooLong:
+            raise
+        except LogError as error:
+            raise LogError(say("log_unreadable", why=error)) from error
+
+    @asynccontextmanager
+    async def _apart(self, wish: Wish) -> AsyncIterator[ReaderProcess]:
+        if self._closed:
+            raise LogError(say("ending"))
+        process = ReaderProcess(wish)
+        self._processes.add(process)
+        try:
+            yield process
+        finally:
+            self._processes.discard(process)
+            await process.end()

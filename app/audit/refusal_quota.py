@@ -1,0 +1,129 @@
+"""How many refusals are entries of the operator's log, and what is told of those that are not.
+
+Who presses what is refused, as fast as a network takes it, would push older entries out of a log that
+keeps so much. So there is an allowance for each browser, for each address (a browser may throw its
+cookie away) and for all together. What is sent is not counted here.
+"""
+
+import time
+from collections import OrderedDict
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+from app.audit.entry import Entry, Origin, entered
+from app.clock import format_time
+from app.i18n import say
+
+SUMMED_UP_S: Final = 60.0  # from the first that is left out to the entry that tells of it
+TOLD_APART: Final = 5  # browsers in that time; the rest is told together
+REMEMBERED: Final = 500  # browsers and addresses
+
+
+@dataclass(frozen=True, slots=True)
+class Allowance:
+    """So many at once, and one more each `every_s` seconds."""
+
+    at_once: float
+    every_s: float
+
+
+OF_BROWSER: Final = Allowance(60, 30.0)
+OF_ADDRESS: Final = Allowance(200, 15.0)
+OF_ALL: Final = Allowance(600, 10.0)
+
+
+class Whose(Protocol):
+    """An origin, or an entry of it."""
+
+    @property
+    def address(self) -> str: ...
+    @property
+    def browser(self) -> str: ...
+
+
+class _Left:
+    """What is left of an allowance, at a time in monotonic seconds; less than nothing is a debt."""
+
+    def __init__(self, of: Allowance, now: float) -> None:
+        self._of = of
+        self._left = of.at_once
+        self._at = now
+
+    def now(self, now: float) -> float:
+        self._left = min(self._of.at_once, self._left + (now - self._at) / self._of.every_s)
+        self._at = now
+        return self._left
+
+    def take(self, now: float) -> None:
+        self._left = self.now(now) - 1
+
+
+@dataclass(slots=True)
+class _More:
+    """Refusals of one browser that are no entries; `limited`: they were not even judged."""
+
+    origin: Origin
+    limited: bool
+    since: float  # seconds since the epoch
+    count: int = 0
+
+
+class Refusals:
+    """Used on the event loop only."""
+
+    def __init__(
+        self,
+        monotonic: Callable[[], float] = time.monotonic,
+        wall: Callable[[], float] = time.time,
+    ) -> None:
+        self._monotonic = monotonic
+        self._wall = wall
+        self._all = _Left(OF_ALL, monotonic())
+        self._left: OrderedDict[tuple[str, ...], _Left] = OrderedDict()
+        self._more: dict[tuple[str, str, bool], _More] = {}
+        self.left_out = 0
+
+    def room(self, whose: Whose) -> bool:
+        """Whether a refusal may be an entry."""
+        now = self._monotonic()
+        known = (self._left.get(key) for key in _keys(whose))
+        return all(left is None or left.now(now) >= 1 for left in (self._all, *known))
+
+    def take(self, whose: Whose) -> None:
+        """A refusal became an entry."""
+        now = self._monotonic()
+        self._all.take(now)
+        for key, of in zip(_keys(whose), (OF_BROWSER, OF_ADDRESS), strict=True):
+            self._left.setdefault(key, _Left(of, now)).take(now)
+            self._left.move_to_end(key)
+        while len(self._left) > REMEMBERED:
+            self._left.popitem(last=False)
+
+    def leave_out(self, origin: Origin, limited: bool = False) -> bool:
+        """A refusal is only counted, `limited` where there were too many presses to judge it; whether
+        it is the first since all were told."""
+        first = not self._more
+        key = (origin.address, origin.browser, limited)
+        if key not in self._more and len(self._more) >= TOLD_APART:
+            key, origin = ("", "", limited), Origin(address="", who=say("others"))
+        self._more.setdefault(key, _More(origin, limited, self._wall())).count += 1
+        self.left_out += not limited
+        return first
+
+    def told(self) -> list[Entry]:
+        """An entry for each browser of which some were left out, and none of these any more."""
+        more, self._more = self._more, {}
+        return [_entry(one) for one in more.values()]
+
+
+def _keys(whose: Whose) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    return (whose.address, whose.browser), (whose.address,)
+
+
+def _entry(more: _More) -> Entry:
+    origin = more.origin
+    name = " ".join(filter(None, (origin.who, f"({origin.address})" if origin.address else "")))
+    sentence = "log_more_limited" if more.limited else "log_more_refused"
+    reason = say(sentence, count=more.count, name=name, since=format_time(more.since))
+    return entered("refused", origin, {"more": more.count}, outcome="refused", reason=reason)

@@ -1,0 +1,235 @@
+"""The operator's log as a file that is written: append, sync, retention. Blocks; used by one thread.
+
+`append` returns when its entries are committed to the operating system: they outlive the process,
+not a power cut. They, and all before them, outlive that too once a `sync` that began later returned.
+SQLite itself (WAL, synchronous = NORMAL) keeps the file whole through both.
+"""
+
+import os
+import sqlite3
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final, Literal
+
+from app.audit.database import NAME, PATIENCE_S, Files, Head, in_words, opened
+from app.audit.entry import FIELDS, Entry, entered
+from app.errors import LogError
+from app.i18n import say
+
+COLUMNS: Final = ", ".join(f'"{name}"' for name in FIELDS)
+INSERT: Final = f"INSERT INTO entry ({COLUMNS}) VALUES ({', '.join('?' * len(FIELDS))})"
+REMOVED_AT_ONCE: Final = 1000
+PROBE_BYTES: Final = 256 * 1024
+DAY_MS: Final = 86_400_000
+UNSET_BEFORE_MS: Final = 1_704_067_200_000  # 2024: a clock that says less was never set
+
+
+class Store:
+    """The file, open; used by the thread that opened it, but for `sync`."""
+
+    def __init__(self, folder: Path, boot: str, after: Head | None = None) -> None:
+        """Raises LogError, LogCorrupt; a new file goes on `after` an entry of another one."""
+        self._db = opened(folder, after)
+        self._wal = -1
+        self._boot = boot
+        try:
+            with in_words():
+                self._read_head()
+                self._db.execute("INSERT OR REPLACE INTO about VALUES ('opened', ?)", (boot,))
+                self._wal = os.open(folder / f"{NAME}-wal", os.O_RDONLY | os.O_CLOEXEC)
+                _sync_folder(folder)
+                self._files = Files(folder)
+        except BaseException:
+            self.close()
+            raise
+
+    def _read_head(self) -> None:
+        about = dict(self._db.execute("SELECT key, value FROM about"))
+        newest = self._db.execute("SELECT seq, hash FROM entry ORDER BY seq DESC LIMIT 1").fetchone()
+        oldest = self._db.execute("SELECT seq FROM entry ORDER BY seq LIMIT 1").fetchone()
+        before = (int(about["first"]) - 1, str(about["genesis"]))
+        self.was_there = about.get("opened", self._boot) != self._boot  # before this server
+        self._seq: int
+        self._hash: str
+        self._seq, self._hash = newest or before
+        self._oldest: int = oldest[0] if oldest else self._seq + 1
+
+    @property
+    def head(self) -> Head:
+        return Head(self._seq, self._hash, self._seq - self._oldest + 1)
+
+    def check(self) -> None:
+        """LogError unless what is written goes to the files that are in the folder."""
+        with in_words():
+            self._files.check()
+
+    def append(self, entries: Sequence[Entry]) -> list[Entry]:
+        """Writes them in one commit, and returns them as they stand in the file."""
+        return self._commit(entries)
+
+    def sync(self) -> None:
+        """On the disk is, after this, all that was committed before. May be called by any thread."""
+        with in_words():
+            os.fdatasync(self._wal)
+
+    def undone(self) -> list[Entry]:
+        """Presses of servers before this one of which the end is not known."""
+        with in_words():
+            rows = self._db.execute(
+                f"SELECT {COLUMNS} FROM entry WHERE boot <> ? AND seq IN (SELECT seq FROM undone)"
+                " ORDER BY seq",
+                (self._boot,),
+            ).fetchall()
+        return [Entry(*row) for row in rows]
+
+    def told(self, press: Entry) -> list[Entry]:
+        """All that the log has of the press with this id on this robot, the oldest first."""
+        with in_words():
+            rows = self._db.execute(
+                f"SELECT {COLUMNS} FROM entry WHERE press = ? AND press <> '' AND robot = ?"
+                " AND action = 'press' ORDER BY seq",
+                (press.press, press.robot),
+            ).fetchall()
+        return [Entry(*row) for row in rows]
+
+    def answered(self, seq: int) -> bool:
+        """Whether a press that is not done has an outcome already."""
+        with in_words():
+            found = self._db.execute("SELECT outcome FROM undone WHERE seq = ?", (seq,)).fetchone()
+        return bool(found and found[0])
+
+    def remove_old(self, days: float, size_mb: float, now_ms: int) -> bool:
+        """Removes some of the oldest entries, if there are any to remove; whether it did.
+
+        What was removed, and why, is an entry of its own; it has the hash of the last of them, by
+        which what is left can be verified.
+        """
+        with in_words():
+            if last := self._last_older(now_ms - days * DAY_MS):
+                return self._remove(last, "days", say("log_removed_days", days=f"{days:g}"))
+            if last := self._last_beyond(size_mb * 1_000_000):
+                return self._remove(last, "size", say("log_removed_size", size=f"{size_mb:g}"))
+        return False
+
+    def _last_older(self, limit_ms: float) -> int:
+        """The last one before the first that is young enough, of those looked at; 0 for none.
+
+        One that was written before its machine had the time goes with the next that has it.
+        """
+        last = 0
+        for seq, at in self._db.execute(
+            "SELECT seq, at FROM entry ORDER BY seq LIMIT ?", (REMOVED_AT_ONCE,)
+        ):
+            if at >= limit_ms:
+                break
+            if at >= UNSET_BEFORE_MS:
+                last = seq
+        return last
+
+    def _last_beyond(self, allowed: float) -> int:
+        if self.used_bytes() <= allowed:
+            return 0
+        return self._oldest - 1 + min(REMOVED_AT_ONCE, self.head.count)
+
+    def used_bytes(self) -> int:
+        """The size of the file without its free pages."""
+        pages, free, size = (
+            self._db.execute(f"PRAGMA {name}").fetchone()[0]
+            for name in ("page_count", "freelist_count", "page_size")
+        )
+        return int(pages - free) * int(size)
+
+    def _remove(self, last: int, why: Literal["days", "size"], reason: str) -> bool:
+        first, (anchor,) = (
+            self._oldest,
+            self._db.execute("SELECT hash FROM entry WHERE seq = ?", (last,)).fetchone(),
+        )
+        values = {"first": first, "last": last, "hash": anchor, "why": why}
+        entry = entered("removed", values=values, reason=reason)
+        self._commit([entry], removed=last)
+        self._db.execute("PRAGMA incremental_vacuum(200)").fetchall()
+        return True
+
+    def _commit(self, entries: Sequence[Entry], removed: int = 0) -> list[Entry]:
+        seq, last, sealed = self._seq, self._hash, []
+        for entry in entries:
+            seq += 1
+            sealed.append(entry.sealed(seq, self._boot, last))
+            last = sealed[-1].hash
+        with in_words():
+            self._db.execute("BEGIN IMMEDIATE")
+            try:
+                self._db.executemany(INSERT, sealed)
+                self._note_undone(sealed)
+                if removed:
+                    self._db.execute("DELETE FROM entry WHERE seq <= ?", (removed,))
+                    self._db.execute("DELETE FROM undone WHERE seq <= ?", (removed,))
+                self._db.execute("COMMIT")
+            except BaseException:
+                if self._db.in_transaction:
+                    self._db.execute("ROLLBACK")
+                raise
+        self._seq, self._hash = seq, last
+        self._oldest = max(self._oldest, removed + 1)
+        return sealed
+
+    def _note_undone(self, sealed: Sequence[Entry]) -> None:
+        for entry in sealed:
+            if entry.kind == "pressed":
+                self._db.execute("INSERT INTO undone VALUES (?, '')", (entry.seq,))
+            elif entry.of and entry.outcome == "accepted" and entry.action == "press":
+                self._db.execute(
+                    "INSERT OR REPLACE INTO undone VALUES (?, ?)", (entry.of, entry.outcome)
+                )
+            elif entry.of:
+                self._db.execute("DELETE FROM undone WHERE seq = ?", (entry.of,))
+
+    def probe(self) -> None:
+        """Whether there is room, and the disk takes it: written, synced, and taken out again."""
+        with in_words():
+            self._db.execute(
+                "INSERT OR REPLACE INTO about VALUES ('probe', zeroblob(?))", (PROBE_BYTES,)
+            )
+            self.sync()
+            self._db.execute("DELETE FROM about WHERE key = 'probe'")
+
+    def wal_bytes(self) -> int:
+        with in_words():
+            return os.fstat(self._wal).st_size
+
+    def checkpoint(self) -> None:
+        """Takes the log that is beside the file into it, and begins that one anew; synced.
+
+        What a reader still needs stays for the next time. The first commit after it waits for the
+        disk, so that is done here.
+        """
+        with in_words():
+            self._db.execute("PRAGMA busy_timeout = 0")
+            try:
+                self._db.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchall()
+            finally:
+                self._db.execute(f"PRAGMA busy_timeout = {int(PATIENCE_S * 1000)}")
+            self._db.execute("UPDATE about SET value = ? WHERE key = 'opened'", (self._boot,))
+
+    def complete(self) -> None:
+        """Takes all that is beside the file into it, also where it is in the folder no more."""
+        with in_words():
+            self._db.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchall()
+
+    def close(self) -> None:
+        """Closes the file, whatever state it is in."""
+        if self._wal >= 0:
+            os.close(self._wal)
+            self._wal = -1
+        try:
+            self._db.close()
+        except sqlite3.Error as error:
+            raise LogError(str(error)) from error
+
+
+def _sync_folder(folder: Path) -> None:
+    fd = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(fd)
+    finally:
+        os.close(fd)

@@ -1,0 +1,60 @@
+"""The thread that takes the operator's log to the disk."""
+
+import threading
+from collections.abc import Callable
+
+from app.audit.store import Store
+from app.audit.ticket import Results
+from app.errors import LogError
+from app.i18n import say
+
+
+class Syncer:
+    """Takes what was committed to the disk, all that came together at once."""
+
+    def __init__(self, done: Callable[[Results], None], failed: Callable[[Results], None]) -> None:
+        self._done = done
+        self._failed = failed
+        self._waiting: Results = []
+        self._store: Store | None = None
+        self._ended = False
+        self._wake = threading.Condition()
+        self._syncing = threading.Lock()
+        self._thread = threading.Thread(target=self._run, name="operators-log-sync", daemon=True)
+
+    def start(self) -> None:
+        self._thread.start()
+
+    def use(self, store: Store | None) -> None:
+        """Waits for a sync that is under way: a file must stay open while it is synced."""
+        with self._syncing:
+            self._store = store
+
+    def add(self, written: Results) -> None:
+        with self._wake:
+            self._waiting += written
+            self._wake.notify()
+
+    def end(self, timeout_s: float) -> None:
+        """Does what is waiting, and ends."""
+        with self._wake:
+            self._ended = True
+            self._wake.notify()
+        self._thread.join(timeout_s)
+
+    def _run(self) -> None:
+        while True:
+            with self._wake:
+                self._wake.wait_for(lambda: self._waiting or self._ended)
+                batch, self._waiting = self._waiting, []
+            if not batch:
+                return
+            try:
+                with self._syncing:
+                    if self._store is None:
+                        raise LogError(say("log_closed"))
+                    self._store.sync()
+            except LogError as error:
+                self._failed([(ticket, error) for ticket, _ in batch])
+            else:
+                self._done(batch)

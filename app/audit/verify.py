@@ -1,0 +1,126 @@
+"""Whether the operator's log is as it was written: each entry's hash, and how they follow.
+
+What this can't see is the removal of the newest entries, and a log that somebody wrote anew as a
+whole: for that the head is compared with one that was noted elsewhere.
+"""
+
+import json
+import sqlite3
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from app.audit.database import in_words, read_only
+from app.audit.entry import Entry
+from app.audit.store import COLUMNS
+from app.errors import LogError
+
+
+@dataclass(frozen=True, slots=True)
+class Verified:
+    """`fault` says which entry is the first that is not as it was written; "" when all are."""
+
+    count: int
+    head: str
+    fault: str = ""
+
+
+def verify(folder: Path, noted: str = "") -> Verified:
+    """Checks the whole log, as it is at this moment, and that a head which was noted once is in it,
+    unless that is ""; LogError where it can't be read."""
+    db = read_only(folder)
+    try:
+        with in_words():
+            db.execute("BEGIN")
+            (genesis,) = db.execute("SELECT value FROM about WHERE key = 'genesis'").fetchone() or ("",)
+            return _Chain(genesis, noted).follow(_entries(db))
+    finally:
+        db.close()
+
+
+def _entries(db: sqlite3.Connection) -> Iterator[Entry]:
+    for row in db.execute(f"SELECT {COLUMNS} FROM entry ORDER BY seq"):
+        try:
+            yield Entry(*row)
+        except (TypeError, ValueError) as error:
+            raise LogError(f"the file has what is no entry: {error}") from error
+
+
+class _Chain:
+    """Follows the entries from the oldest; keeps no more of them than the last two hashes."""
+
+    def __init__(self, genesis: str, noted: str) -> None:
+        self._genesis = genesis
+        self._noted = noted
+        self._first: Entry | None = None
+        self._begins = False
+        self._kinds: set[str] = set()
+        self._last = ("", genesis)  # the hashes of the one before the last, and of the last
+        self._seq = 0
+        self._count = 0
+
+    def follow(self, entries: Iterator[Entry]) -> Verified:
+        for entry in entries:
+            if fault := self._fault(entry):
+                return self._verified(fault)
+            self._first = self._first or entry
+            if self._noted in (entry.hash, entry.prev):
+                self._noted = ""
+            self._begins = self._begins or self._tells_the_begin(self._first, entry)
+            self._kinds.add(entry.kind)
+            self._last, self._seq = (entry.prev, entry.hash), entry.seq
+            self._count += 1
+        if self._first is None:
+            return self._verified("it has no entries: a log begins with number 1, or says why not")
+        if not self._begins:
+            return self._verified(
+                f"what stood before entry {self._first.seq} was removed, by none of the log's own rules"
+            )
+        if self._noted:
+            return self._verified(f"no entry has the head {self._noted}: the newest were removed")
+        return self._verified("")
+
+    def _verified(self, fault: str) -> Verified:
+        return Verified(self._count, self._last[1], fault)
+
+    def _fault(self, entry: Entry) -> str:
+        before, last = self._last
+        if self._first is None:
+            before, last = "", entry.prev
+        elif entry.prev == before:
+            return f"entry {self._seq} was inserted"
+        elif entry.seq != self._seq + 1:
+            gone = (self._seq + 1, entry.seq - 1)
+            names = (
+                f"entry {gone[0]} is" if gone[0] == gone[1] else f"entries {gone[0]} to {gone[1]} are"
+            )
+            return f"{names} missing"
+        if entry.hash != entry.computed_hash():
+            return f"entry {entry.seq} was changed, or is not in its place"
+        if entry.prev != last:
+            return f"entry {entry.seq} does not follow the one before it"
+        return ""
+
+    def _tells_the_begin(self, first: Entry, entry: Entry) -> bool:
+        """Whether an entry shows that the log may begin with its first one. The genesis, which has no
+        hash of its own, is enough for number 1 only."""
+        if entry.kind == "removed":
+            about = _values(entry)
+            return (about.get("last"), about.get("hash")) == (first.seq - 1, first.prev)
+        if first.prev != self._genesis:
+            return False
+        if first.seq == 1 or entry.kind != "began":
+            return first.seq == 1
+        if entry is first and _values(entry).get("first") == entry.seq:
+            return True
+        # As it was written at first: after what was owed of presses, the only one without a mode.
+        return self._kinds <= {"closed", "corrected"} and not _values(entry)
+
+
+def _values(entry: Entry) -> dict[str, Any]:
+    try:
+        found = json.loads(entry.values)
+    except ValueError:
+        return {}
+    return found if isinstance(found, dict) else {}

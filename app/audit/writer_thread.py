@@ -1,0 +1,290 @@
+"""The thread that owns the file of the operator's log: it writes, keeps it small, opens it again."""
+
+import logging
+import math
+import queue
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from typing import Final
+
+from app.audit.data_dir import Folder
+from app.audit.database import Head, in_words
+from app.audit.entry import Entry, entered
+from app.audit.opening import Opening, cut_off
+from app.audit.store import Store
+from app.audit.syncer import Syncer
+from app.audit.ticket import Limits, Repeated, Results, Ticket
+from app.errors import FolderInUse, LogError, LogGone
+from app.i18n import say
+
+log = logging.getLogger("kiosk.log")
+
+TRIED_AGAIN_S: Final = (0.5, 1.0, 2.0, 4.0, 8.0)  # the last one again and again
+HOUR_S: Final = 3600.0
+CLOCK_SET_BY_S: Final = 60.0  # what moves it by more is no drift
+QUIET_S: Final = 1.0  # after so long without a press there is time for the file
+LOOKED_S: Final = 1.0  # between two looks whether the files are still in the folder
+WAL_BYTES: Final = 16_000_000  # then it can wait no longer
+TIDIED_S: Final = 0.1  # between two looks while presses come: each keeps the press from its interpreter
+CHECKPOINT_S: Final = 5.0  # between two that can't wait: a reader may hold them up
+TIDY_AFTER: Final = 1000  # entries
+MOST_OWED: Final = 1000
+
+
+class Steady:
+    """Whether the wall's clock can be trusted to tell what is old: nobody set it for an hour."""
+
+    def __init__(self) -> None:
+        self._ahead: float | None = None  # of the clock that nobody sets
+        self._since = 0.0
+
+    def steady(self, wall: float, now: float) -> bool:
+        if self._ahead is None or abs(wall - now - self._ahead) > CLOCK_SET_BY_S:
+            self._since = now
+        self._ahead = wall - now
+        return now - self._since >= HOUR_S
+
+
+class Keeper:
+    """Owns the file: writes what is handed to it, keeps the file small, and opens it again."""
+
+    def __init__(
+        self,
+        folder: Folder,
+        limits: Limits,
+        boot: str,
+        mode: str,
+        tell: Callable[[Results, bool], None],
+    ) -> None:
+        """`tell` gets, on a thread of these, what is done; and whether `fault` has changed."""
+        self._folder = folder
+        self._limits = limits
+        self._mode = mode
+        self._tell = tell
+        self.fault = ""
+        self.displaced = False  # another server has the folder, or may
+        self.head: Head | None = None
+        self.tried = threading.Event()
+        self._queue: queue.SimpleQueue[Ticket | None] = queue.SimpleQueue()  # None only wakes
+        self._owed: deque[Entry] = deque(maxlen=MOST_OWED)
+        self._opening = Opening(folder.path, boot)
+        self._store: Store | None = None
+        self._began = False
+        self._lost_sync: LogError | None = None
+        self._failures = 0
+        self._fault_since = ""
+        self._try_at = 0.0
+        self._hourly_at = 0.0
+        self._checkpoint_at = 0.0
+        self._tidy_at = 0.0
+        self._since_tidy = 0
+        self._fresh_wal = True
+        self._steady = Steady()
+        self._ended = False
+        self._syncer = Syncer(lambda results: self._tell(results, False), self._sync_failed)
+        self._thread = threading.Thread(target=self._run, name="operators-log", daemon=True)
+
+    # On the event loop.
+
+    def start(self) -> None:
+        self._syncer.start()
+        self._thread.start()
+
+    def stop(self, timeout_s: float) -> None:
+        """Writes what is waiting, and closes the file; gives up after the time."""
+        self._ended = True
+        self._queue.put(None)
+        self._thread.join(timeout_s)
+
+    def add(self, ticket: Ticket, most: int | None) -> bool:
+        """Takes it, unless as many as `most` are waiting already."""
+        if most is not None and self._queue.qsize() >= most:
+            return False
+        self._queue.put(ticket)
+        return True
+
+    # On the keeper's thread.
+
+    def _run(self) -> None:
+        ended = False
+        while not ended:
+            if self._store is None and time.monotonic() >= self._try_at:
+                self._open()
+                self.tried.set()
+            batch = self._next()
+            ended = self._ended and not self._queue.qsize()
+            if self._lost_sync is not None:
+                self._broken(self._lost_sync)
+            if batch:
+                self._write(batch)
+            if self._store is not None and (not batch or time.monotonic() >= self._tidy_at):
+                self._tidy(self._store, quiet=not batch)
+                self._tidy_at = time.monotonic() + TIDIED_S
+        self._syncer.end(QUIET_S * 5)
+        self._close()
+
+    def _next(self) -> list[Ticket]:
+        """All that waits, as soon as there is something to do; none where that is no writing."""
+        try:
+            waiting = [self._queue.get(timeout=self._idle_s())]
+        except queue.Empty:
+            return []
+        waiting += [self._queue.get() for _ in range(self._queue.qsize())]
+        return [ticket for ticket in waiting if ticket is not None]
+
+    def _idle_s(self) -> float:
+        if self._store is None:
+            return max(0.0, self._try_at - time.monotonic())
+        return min(max(0.0, self._hourly_at - time.monotonic()), LOOKED_S, QUIET_S)
+
+    def _write(self, batch: list[Ticket]) -> None:
+        wanted = [ticket for ticket in batch if not ticket.abandoned]
+        if len(wanted) < len(batch):
+            given_up = LogError(say("log_abandoned"))
+            self._tell([(ticket, given_up) for ticket in batch if ticket.abandoned], False)
+        if self._store is None:
+            self._fail(wanted, LogError(self.fault))
+            return
+        try:
+            wanted = self._new(self._store, wanted)
+            sealed = self._store.append([ticket.entry for ticket in wanted])
+            self._check(self._store)
+        except LogError as error:
+            self._broken(error)
+            self._fail(wanted, error)
+            return
+        self.head = self._store.head
+        self._fresh_wal = False
+        self._since_tidy += len(sealed)
+        results: Results = list(zip(wanted, sealed, strict=True))
+        self._tell([(ticket, entry) for ticket, entry in results if not ticket.durable], False)
+        if durable := [(ticket, entry) for ticket, entry in results if ticket.durable]:
+            self._syncer.add(durable)
+
+    def _new(self, store: Store, tickets: Sequence[Ticket]) -> list[Ticket]:
+        """Those that are no presses which the log has already: of these it is told what it knows."""
+        new: list[Ticket] = []
+        known: Results = []
+        for ticket in tickets:
+            found = store.told(ticket.entry) if ticket.entry.is_press else []
+            if found and found[0].is_press:
+                told = [one for one in found if one.of == found[0].seq]
+                known.append((ticket, Repeated(found[0], told[-1] if told else None)))
+            else:
+                new.append(ticket)
+        self._tell(known, False)
+        return new
+
+    def _fail(self, tickets: Sequence[Ticket], error: LogError) -> None:
+        self._owed += [ticket.entry for ticket in tickets if ticket.entry.of is not None]
+        self._tell([(ticket, error) for ticket in tickets], False)
+
+    def _check(self, store: Store) -> None:
+        """LogError unless what was written is in the folder, and the folder is this server's alone."""
+        store.check()
+        with in_words():
+            self._folder.check()
+
+    def _broken(self, error: LogError) -> None:
+        """From now on nothing is written, until the file could be opened again."""
+        self._lost_sync = None
+        self._close(complete=isinstance(error, LogGone))
+        self.displaced = isinstance(error, FolderInUse)
+        self._opening.lost(error)
+        wait = TRIED_AGAIN_S[min(self._failures, len(TRIED_AGAIN_S) - 1)]
+        self._failures += 1
+        self._try_at = time.monotonic() + wait
+        if self.fault != str(error):
+            log.error("the operator's log can't be written: %s", error)
+            self._fault_since = self._fault_since or time.strftime("%H:%M:%S")
+            self.fault = str(error)
+            self._tell([], True)
+
+    def _open(self) -> None:
+        try:
+            with in_words():
+                self._folder.hold()
+            self._store = store = self._opening.store(self.head)
+            self._syncer.use(store)
+            store.probe()
+            self._catch_up(store)
+            self._check(store)
+        except LogError as error:
+            self._broken(error)
+            return
+        self._failures, self._fresh_wal, self._hourly_at = 0, False, 0.0
+        self.displaced = False
+        if self.fault:
+            log.info("the operator's log can be written again")
+            self.fault = self._fault_since = ""
+            self._tell([], True)
+
+    def _catch_up(self, store: Store) -> None:
+        """What the file has to be told before anything new."""
+        entries = [*self._opening.first_entries(store, self.head), *self._owed]
+        if not self._began:
+            entries += cut_off(store)
+            values = {"mode": self._mode}
+            entries.append(entered("began", values=values, reason=say("log_began")))
+        if self.fault:
+            text = say("log_resumed", since=self._fault_since, why=self.fault)
+            entries.append(entered("resumed", reason=text))
+        store.append(entries)
+        self._opening.written()
+        self._owed.clear()
+        self._began = True
+        self.head = store.head
+        store.sync()
+
+    def _tidy(self, store: Store, quiet: bool) -> None:
+        """Keeps the files small, a little at a time; says the head once an hour."""
+        try:
+            self._check(store)
+            self._remove_old(store)
+            self._empty_wal(store, quiet)
+        except LogError as error:
+            self._broken(error)
+
+    def _remove_old(self, store: Store) -> None:
+        now = time.monotonic()
+        if now < self._hourly_at and self._since_tidy < TIDY_AFTER:
+            return
+        limits = self._limits
+        days = limits.days if self._steady.steady(time.time(), now) else math.inf
+        more = store.remove_old(days, limits.size_mb, time.time_ns() // 1_000_000)
+        self._since_tidy = TIDY_AFTER if more else 0
+        self._fresh_wal = self._fresh_wal and not more
+        self.head = store.head
+        if now >= self._hourly_at and not more:
+            self._hourly_at = now + HOUR_S
+            log.info("operator's log: %d entries, head %s", self.head.count, self.head.hash)
+
+    def _empty_wal(self, store: Store, quiet: bool) -> None:
+        now = time.monotonic()
+        must = now >= self._checkpoint_at and store.wal_bytes() > WAL_BYTES
+        if must or (quiet and not self._fresh_wal):
+            store.checkpoint()
+            self._fresh_wal, self._checkpoint_at = True, now + CHECKPOINT_S
+
+    def _close(self, complete: bool = False) -> None:
+        self._syncer.use(None)
+        if self._store is not None:
+            store, self._store = self._store, None
+            try:
+                if complete:
+                    with suppress(LogError):  # as far as its disk takes it
+                        store.complete()
+                store.close()
+            except LogError as error:
+                log.error("the operator's log could not be closed: %s", error)
+
+    # On the syncer's thread.
+
+    def _sync_failed(self, results: Results) -> None:
+        """What is not known to be on the disk is not known to be in the log."""
+        self._tell(results, False)
+        self._lost_sync = next(error for _, error in results if isinstance(error, LogError))
+        self._queue.put(None)

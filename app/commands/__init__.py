@@ -1,0 +1,1 @@
+"""From a press to its receipt: topics, services, actions, parameters, holds. No HTTP, no Zenoh."""

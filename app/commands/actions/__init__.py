@@ -1,0 +1,1 @@
+"""Action goals: sent, tracked to their end, canceled, recovered after a restart."""

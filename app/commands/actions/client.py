@@ -1,0 +1,122 @@
+"""The services of an action server, by which a goal is sent, canceled and asked for its result.
+
+Wire format: ROS 2's `<action>/_action/…` services (design.ros2.org, "Actions").
+"""
+
+import asyncio
+import logging
+import time
+import uuid
+from typing import Any, Final
+
+from app.clock import format_time
+from app.commands.actions.goal import Goal
+from app.commands.service_calls import CUT_NEWS_S, Asker
+from app.errors import DecodeError
+from app.i18n import say
+from app.interfaces import Fields, Interfaces
+from app.panel.model import Action
+from app.panel.template import PLACE
+from app.robot.command_status import Answer
+from app.robot.state import Robot
+from app.ros_logging import RobotLog
+
+log = logging.getLogger("kiosk.actions")
+
+CANCEL: Final = "action_msgs/srv/CancelGoal"
+STATUS: Final = "status"
+RESULT: Final = "result."  # where it is in the response of `get_result`
+NO_SUCH_GOAL: Final = frozenset({2, 3})  # its ERROR_UNKNOWN_GOAL_ID, ERROR_GOAL_TERMINATED
+
+Query = asyncio.Future[bytes | None]
+
+
+class ActionServices:
+    """Those of one robot. What asks gives LinkError where that could not be sent; what reads a reply
+    gives None for one that can't be read."""
+
+    def __init__(self, interfaces: Interfaces, robot: Robot, link: Asker) -> None:
+        self._interfaces = interfaces
+        self._robot = robot
+        self._log = RobotLog(log, robot.name)
+        self._link = link
+
+    def offered(self, widget: Action) -> bool:
+        """Whether the robot offers a widget's action, with just its type."""
+        return self._robot.graph.server_type("AS", self._robot.key(widget.action)) == widget.type
+
+    def goal_request(self, widget: Action, goal_id: uuid.UUID, fields: dict[str, Any]) -> bytes:
+        """What `send_goal` sends; FieldError for bad fields."""
+        wrapped = {"goal_id": {"uuid": list(goal_id.bytes)}, "goal": fields}
+        return self._interfaces.encode(self._interfaces.action(widget.type).send_goal_request, wrapped)
+
+    def send_goal(self, widget: Action, request: bytes) -> Query:
+        return self._ask(widget, "send_goal", request, widget.timeout_s)
+
+    def cancel_goal(self, goal: Goal) -> Query:
+        request, _ = self._interfaces.service(CANCEL)
+        stamp = {"sec": 0, "nanosec": 0}
+        info = {"goal_id": {"uuid": list(goal.id.bytes)}, "stamp": stamp}
+        payload = self._interfaces.encode(request, {"goal_info": info})
+        return self._ask(goal.widget, "cancel_goal", payload, goal.widget.timeout_s)
+
+    def get_result(self, goal: Goal, timeout_s: float) -> Query:
+        request = self._interfaces.action(goal.widget.type).get_result_request
+        payload = self._interfaces.encode(request, {"goal_id": {"uuid": list(goal.id.bytes)}})
+        return self._ask(goal.widget, "get_result", payload, timeout_s)
+
+    def _ask(self, widget: Action, service: str, payload: bytes, timeout_s: float) -> Query:
+        key = f"{self._robot.key(widget.action)}/_action/{service}"
+        return self._link.query(key, payload, timeout_s)
+
+    async def reply(self, goal: Goal, query: Query) -> bytes | None:
+        """The reply; None when there is none in time, or the bridge went away meanwhile."""
+        ends: set[asyncio.Future[Any]] = {query} if goal.cut.done() else {query, goal.cut}
+        await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
+        reply = query.result() if query.done() else None
+        if reply is None:
+            await asyncio.wait({goal.cut}, timeout=CUT_NEWS_S)  # the news of a cut may follow
+        return reply
+
+    def first_answer(self, goal: Goal, reply: bytes | None) -> Answer:
+        """What `send_goal` answered, or why it did not."""
+        widget, now = goal.widget, format_time(time.time())
+        if reply is not None:
+            response = self._interfaces.action(widget.type).send_goal_response
+            message = self._decoded(widget, response, reply)
+            if message is None:
+                return Answer("unknown", say("answer_unreadable", wanted=widget.type))
+            if message.accepted:
+                return Answer("accepted", say("goal_accepted", time=now))
+            return Answer("rejected", say("goal_rejected", time=now))
+        if goal.cut.done():
+            return Answer("unknown", goal.cut.result() or say("call_cut"))
+        seconds = f"{widget.timeout_s:g}"
+        return Answer("timed_out", say("timed_out", seconds=seconds) + say("cyclone_hint"))
+
+    def cancel_response(self, widget: Action, reply: bytes) -> Any:
+        """What `cancel_goal` answered: a message with `return_code` and `goals_canceling`."""
+        return self._decoded(widget, self._interfaces.service(CANCEL)[1], reply)
+
+    def why_silent(self, widget: Action) -> str:
+        """Why `cancel_goal` did not answer."""
+        if self.offered(widget):
+            return say("timed_out", seconds=f"{widget.timeout_s:g}")
+        return say("cancel_unheard", name=widget.action)
+
+    async def result(self, widget: Action, reply: bytes) -> Fields | None:
+        """What `get_result` answered: its status, and what the widget shows of the result."""
+        paths = (STATUS, *(RESULT + path for path in PLACE.findall(widget.result)))
+        response = self._interfaces.action(widget.type).get_result_response
+        try:
+            return await self._robot.slices.whole(self._interfaces.fields(response, paths), reply)
+        except DecodeError as error:
+            self._log.error("%s: %s", widget.action, error)
+            return None
+
+    def _decoded(self, widget: Action, type_name: str, reply: bytes) -> Any:
+        try:
+            return self._interfaces.decode(type_name, reply)
+        except DecodeError as error:
+            self._log.error("%s: %s", widget.action, error)
+            return None

@@ -1,0 +1,100 @@
+"""One goal of an action: its state by its ROS name, and what is shown of it. Pure.
+
+States and their order: action_msgs/msg/GoalStatus.
+"""
+
+import asyncio
+import math
+import uuid
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from app.commands.service_calls import with_fields
+from app.i18n import say
+from app.interfaces import Fields
+from app.panel.model import Action
+from app.robot.command_status import Answer, Outcome, Progress
+
+FEEDBACK: Final = "feedback."  # where it is in the message that has it
+UNKNOWN: Final = 0
+ACCEPTED: Final = 1
+EXECUTING: Final = 2
+CANCELING: Final = 3
+NAMES: Final = ("UNKNOWN", "ACCEPTED", "EXECUTING", "CANCELING", "SUCCEEDED", "CANCELED", "ABORTED")
+# The outcome, and the sentences for an end that was seen and for one that was asked for later.
+ENDS: Final[Mapping[int, tuple[Outcome, str, str]]] = {
+    4: ("succeeded", "goal_succeeded", "goal_had_succeeded"),
+    5: ("canceled", "goal_canceled", "goal_had_been_canceled"),
+    6: ("aborted", "goal_aborted", "goal_had_been_aborted"),
+}
+
+
+def goal_id(entry: str) -> uuid.UUID:
+    """That of the goal of the press whose entry in the operator's log has this hash, so that the log is
+    enough to ask for it; a random one where there is no entry."""
+    return uuid.UUID(entry[:32]) if entry else uuid.uuid4()
+
+
+@dataclass(slots=True)
+class Goal:
+    """A goal that was sent; `state` is None until something is known of it, and `known` says
+    whether the robot ever had it.
+
+    `cut` is done when nothing more is heard of it: with a sentence, or "" for a lost connection.
+    `doubt` is the sentence for a goal that may be under way, of before a cut or the server's start,
+    until something is heard of it.
+    """
+
+    widget: Action
+    press_id: str
+    id: uuid.UUID
+    cut: "asyncio.Future[str]"
+    corrected: Callable[[str, Answer], None]
+    state: int | None = None
+    known: bool = False
+    doubt: str = ""
+    said: str = ""
+    fraction: float | None = None
+
+    def advance(self, state: int) -> bool:
+        """Takes a state; False for one that it had already: states only go on."""
+        if state not in range(len(NAMES)) or (self.state is not None and state <= self.state):
+            return False
+        self.state = state
+        self.known = self.known or state != UNKNOWN
+        return True
+
+    def hear(self, message: Fields) -> None:
+        """Takes a feedback message: what it says, and how far the goal is."""
+        widget = self.widget
+        if widget.progress is not None:
+            found = message.get(FEEDBACK + widget.progress)
+            done = math.nan if found is None else float(found) / widget.progress_max
+            self.fraction = min(1.0, max(0.0, done)) if done == done else None  # NaN is no progress
+        self.said = with_fields(widget.feedback, message, FEEDBACK)
+
+    @property
+    def lives(self) -> bool:
+        """Whether the robot is known to be at it."""
+        return self.state is not None and self.state != UNKNOWN and self.state not in ENDS
+
+    @property
+    def under_way(self) -> Progress:
+        sentence = say("goal_canceling" if self.state == CANCELING else "goal_executing")
+        text = f"{sentence} {self.said}".strip()
+        return Progress(True, "accepted", text, self.fraction, True, self._name, self.press_id)
+
+    @property
+    def in_doubt(self) -> Progress:
+        """What is shown of a goal that may be under way."""
+        stoppable, press = not self.cut.done(), self.press_id
+        return Progress(True, "unknown", self.doubt, None, stoppable, NAMES[UNKNOWN], press)
+
+    def came_to(self, answer: Answer) -> Progress:
+        """What is shown when nothing is awaited any more."""
+        return Progress(outcome=answer.outcome, text=answer.text, goal=self._name)
+
+    @property
+    def _name(self) -> str:
+        return "" if self.state is None else NAMES[self.state]

@@ -1,0 +1,122 @@
+"""Goals of before this server's start: those whose end the operator's log does not know are followed
+anew.
+
+A goal's id is made of the hash of its press's entry (`goals.goal_id`), so the log is enough to ask the
+robot for it. Nothing is sent by itself but that question.
+"""
+
+import asyncio
+import logging
+import time
+from collections.abc import Callable
+from typing import Final
+
+from app.audit import Unended
+from app.audit.press_record import Logbook, Noted
+from app.clock import format_datetime, format_time
+from app.commands.actions.goal import UNKNOWN, Goal, goal_id
+from app.commands.actions.goals import Actions
+from app.concurrency import told
+from app.errors import LogError
+from app.i18n import say
+from app.panel.model import Action, Panel
+from app.robot.command_status import IDLE, Answer, Progress
+from app.robot.state import Robot
+from app.ros_logging import RobotLog
+
+log = logging.getLogger("kiosk.actions")
+
+LOOKED_BACK_S: Final = 86_400.0
+TODAY_S: Final = 43_200.0  # an older time has its date
+READ_AGAIN_S: Final = 1.0
+
+
+class Resuming:
+    """Of one robot; on the event loop only."""
+
+    def __init__(
+        self,
+        panel: Panel,
+        robot: Robot,
+        logbook: Logbook,
+        actions: Actions,
+        changed: Callable[[], None],
+        read_again_s: float = READ_AGAIN_S,
+    ) -> None:
+        """`changed` is called when what the widgets show has changed."""
+        self._widgets = {w.id: w for w in panel.widgets() if isinstance(w, Action)}
+        self._robot = robot
+        self._log = RobotLog(log, robot.name)
+        self._logbook = logbook
+        self._actions = actions
+        self._changed = changed
+        self._read_again_s = read_again_s
+        self._unread = IDLE  # what is shown while the log can't be read
+        self._reading: asyncio.Task[None] | None = None
+
+    async def start(self) -> None:
+        """Returns when the goals are known; where the log can't be read, that is tried again and again,
+        and meanwhile no goal is sent, unless the panel goes on without its log."""
+        if self._widgets and not await self._read():
+            self._reading = told(self._read_later(), self._log, "goals were not followed anew")
+
+    async def stop(self) -> None:
+        if self._reading is not None:
+            self._reading.cancel()
+            await asyncio.gather(self._reading, return_exceptions=True)
+
+    async def _read_later(self) -> None:
+        read = False
+        while not read:
+            await asyncio.sleep(self._read_again_s)
+            read = await self._read()
+
+    async def _read(self) -> bool:
+        since = round((time.time() - LOOKED_BACK_S) * 1000)
+        try:
+            found = await self._logbook.unended(self._widgets, since)
+        except LogError as error:
+            self._say_unread(str(error))
+            return False
+        self._show(IDLE)
+        final = {say("goal_lost"), say("goal_not_there")}
+        for unended, noted in found:
+            if unended.reason not in final:
+                self._resume(unended, noted)
+        return True
+
+    def _say_unread(self, why: str) -> None:
+        text = say("goals_unread", why=why)
+        if text != self._unread.text:
+            self._log.warning("%s", text)
+        self._show(Progress(busy=not self._logbook.unneeded, outcome="unknown", text=text))
+
+    def _show(self, progress: Progress) -> None:
+        """Where nothing else is shown."""
+        before, self._unread = self._unread, progress
+        if before == progress:
+            return
+        for widget in self._widgets:
+            if self._robot.progress.get(widget, IDLE) in (IDLE, before):
+                self._robot.progress[widget] = progress
+        self._changed()
+
+    def _resume(self, unended: Unended, noted: Noted) -> None:
+        press, widget = unended.press, self._widgets[unended.press.widget]
+        if why := self._actions.full(widget.action):
+            self._log.warning("press %s is not followed anew: %s", press.press, why)
+            return
+
+        def corrected(press_id: str, answer: Answer) -> None:
+            noted.corrected(answer)
+
+        cut = asyncio.get_running_loop().create_future()
+        cut.set_result("")  # until its server is offered
+        at = press.at / 1000
+        pressed = format_time(at) if abs(time.time() - at) < TODAY_S else format_datetime(at)
+        doubt = say("goal_in_doubt", time=pressed)
+        own = goal_id(press.hash)
+        self._log.info("press %s: goal %s is followed anew: %s", press.press, own, doubt)
+        self._actions.resume(
+            Goal(widget, press.press, own, cut, corrected, UNKNOWN, unended.accepted, doubt)
+        )

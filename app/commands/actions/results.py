@@ -1,0 +1,136 @@
+"""Goals are followed to their ends, over cuts of the connection too: the robot goes on meanwhile."""
+
+import asyncio
+import logging
+import time
+from collections.abc import Callable, Collection
+from typing import Final
+
+from app.clock import format_time
+from app.commands.actions.client import RESULT, STATUS, ActionServices
+from app.commands.actions.goal import ENDS, UNKNOWN, Goal
+from app.commands.service_calls import LATE_S, with_fields
+from app.concurrency import told
+from app.errors import LinkError
+from app.i18n import say
+from app.permission.interlocks import SERVER_SETTLE_S
+from app.robot.command_status import Answer
+from app.robot.state import Robot
+from app.ros_logging import RobotLog
+
+log = logging.getLogger("kiosk.actions")
+
+RESULT_S: Final = 86_400.0  # a result is waited for as long as the goal takes
+ASK_AGAIN_S: Final = 1.0
+
+
+class Following:
+    """The goals of one robot whose ends are not known yet, each with a task of its own."""
+
+    def __init__(
+        self,
+        services: ActionServices,
+        robot: Robot,
+        *,
+        cut: Callable[[Goal, str], None],
+        back: Callable[[Goal], None],
+        tell: Callable[[Goal, Answer], None],
+    ) -> None:
+        """`tell` gets what came of a goal, or that it is not known any more; `cut` is called with the
+        sentence when one is cut off, and `back` when its server is offered again."""
+        self._services = services
+        self._robot = robot
+        self._log = RobotLog(log, robot.name)
+        self._cut = cut
+        self._back = back
+        self._tell = tell
+        self._goals: dict[asyncio.Task[None], Goal] = {}
+
+    @property
+    def goals(self) -> Collection[Goal]:
+        return self._goals.values()
+
+    def begin(self, goal: Goal) -> None:
+        """Follows a goal from now on."""
+        task = told(self._follow(goal), self._log, "following a goal failed")
+        self._goals[task] = goal
+        task.add_done_callback(self._ended)
+
+    async def stop(self) -> None:
+        """Ends the tasks; goals go on in the robot."""
+        tasks = list(self._goals)
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+    def _ended(self, task: "asyncio.Task[None]") -> None:
+        goal = self._goals.pop(task)
+        if not task.cancelled() and task.exception():
+            goal.state = UNKNOWN
+            self._tell(goal, Answer("unknown", say("goal_fault")))
+
+    async def _follow(self, goal: Goal) -> None:
+        while True:
+            if goal.cut.done():
+                if goal.lives and not goal.doubt:
+                    goal.state = UNKNOWN
+                    self._cut(goal, goal.cut.result() or say("goal_cut"))
+                await self._until_offered(goal)
+                goal.cut = asyncio.get_running_loop().create_future()
+                self._back(goal)
+            if answer := await self._end(goal):
+                break
+            if not (goal.known or goal.cut.done()):
+                if not goal.doubt:
+                    return  # it was never heard of: what was said of it stands
+                answer = Answer("unknown", say("goal_silent", seconds=f"{LATE_S:g}"))
+                break
+            await asyncio.wait({goal.cut}, timeout=ASK_AGAIN_S)
+        self._log.info("press %s: goal %s: %s: %s", goal.press_id, goal.id, answer.outcome, answer.text)
+        self._tell(goal, answer)
+
+    async def _until_offered(self, goal: Goal) -> None:
+        key = self._robot.key(goal.widget.action)
+        while not (
+            self._services.offered(goal.widget)
+            and time.monotonic() >= self._robot.graph.served_since("AS", key) + SERVER_SETTLE_S
+        ):
+            await asyncio.sleep(ASK_AGAIN_S)
+
+    async def _end(self, goal: Goal) -> Answer | None:
+        """What came of it; None where nothing more is heard, or nobody answered."""
+        reply = await self._result(goal)
+        if reply is None:
+            return None
+        fields = await self._services.result(goal.widget, reply)
+        if fields is None:
+            return Answer("unknown", say("answer_unreadable", wanted=goal.widget.type))
+        status = fields.get(STATUS)
+        goal.state = status if status in ENDS else UNKNOWN
+        if status not in ENDS:
+            return Answer("unknown", say("goal_lost") if goal.known else say("goal_not_there"))
+        outcome, seen, asked = ENDS[status]
+        sentence = asked if goal.doubt else seen
+        said = with_fields(goal.widget.result, fields, RESULT)
+        return Answer(
+            outcome, say(sentence, time=format_time(time.time())) + (f": {said}" if said else ".")
+        )
+
+    async def _result(self, goal: Goal) -> bytes | None:
+        """The reply of `get_result`, which is asked for again where Zenoh refuses.
+
+        Of one that the robot is not known to have, or to be at, it is awaited not much longer than a
+        call's.
+        """
+        refused = False
+        while not goal.cut.done():
+            try:
+                seconds = RESULT_S if goal.known and not goal.doubt else LATE_S
+                query = self._services.get_result(goal, seconds)
+                return await self._services.reply(goal, query)
+            except LinkError as error:
+                if not refused:
+                    self._log.warning("press %s: %s", goal.press_id, error)
+                refused = True
+                await asyncio.wait({goal.cut}, timeout=ASK_AGAIN_S)
+        return None

@@ -1,0 +1,246 @@
+"""Hold-to-run: a message at a rate while one browser holds a button, and one more when it ends.
+
+Each message is judged as a press is. Whatever ends a hold ends it for good: to go on, the operator
+has to let go and press again. Nothing is sent late: where there is no way for the last message when
+a hold ends, it is not sent at all.
+"""
+
+import asyncio
+import secrets
+import time
+from collections.abc import Callable, Mapping
+from typing import Any, Protocol
+
+from app.clock import format_time
+from app.commands.holds.lease import LEASE_S, Lease
+from app.commands.holds.messages import Checked, HoldMessages, Values, Way
+from app.commands.holds.receipts import RELEASED, Holding, HoldReceipts, Refusal, refused
+from app.commands.receipts import MOST_LOOKS, By, Receipt, Witness, cause_of, judged
+from app.errors import Cause, FieldError, InputError, LinkError, NotFound, PressRefused
+from app.i18n import say
+from app.interfaces import Interfaces
+from app.panel.model import Hold, Panel
+from app.panel.template import needed
+from app.permission.interlocks import Verdict
+from app.robot.state import Robot
+
+
+class Clock(Protocol):
+    """What a hold needs of the event loop; `time` is in monotonic seconds."""
+
+    def time(self) -> float: ...
+    def call_at(self, when: float, callback: Callable[[], object]) -> asyncio.TimerHandle: ...
+
+
+class Holds:
+    """The holds of one robot, one for each widget at most; used on the event loop only."""
+
+    def __init__(
+        self,
+        panel: Panel,
+        interfaces: Interfaces,
+        robot: Robot,
+        way: Way,
+        loop: Clock,
+        *,
+        checked: Checked,
+        take: Callable[[], None],
+        news: Callable[[], bool],
+        changed: Callable[[], None],
+        witness: Witness | None = None,
+    ) -> None:
+        """`checked` are the values that a template gets of what was entered; `take` takes in what
+        has come from the robot, `news` tells whether more has come that may change what is permitted;
+        `changed` is called when what the widgets show has changed."""
+        self._panel = panel
+        self._robot = robot
+        self._loop = loop
+        self._messages = HoldMessages(interfaces, robot, way, checked)
+        self._receipts = HoldReceipts(robot.name, witness)
+        self.doubted = self._receipts.doubted
+        self._take = take
+        self._news = news
+        self._changed = changed
+        self._widgets = {w.id: w for w in panel.widgets() if isinstance(w, Hold)}
+        self._held: dict[str, Holding] = {}
+        self._timer: asyncio.TimerHandle | None = None
+        self._closed = False
+
+    def widget(self, widget_id: str) -> Hold:
+        """What can be held; NotFound for everything else."""
+        if widget_id not in self._widgets:
+            raise NotFound(f'there is no widget "{widget_id}" that can be held')
+        return self._widgets[widget_id]
+
+    def begin(
+        self,
+        widget_id: str,
+        inputs: Mapping[str, Any],
+        sent: float,
+        by: By,
+        told: Callable[[Receipt], None],
+        hold_id: str = "",
+    ) -> Receipt | Holding:
+        """Begins to publish, or says why not. `sent` is when the browser asked, at the latest; a hold
+        without an id gets one."""
+        self._take()
+        self.judge()
+        widget, now = self.widget(widget_id), self._loop.time()
+        ready = self._ready(widget, inputs, sent, by, now)
+        if isinstance(ready, Refusal):
+            return self._receipts.refused(widget, inputs, by, ready, hold_id)
+        lease = Lease.begun(hold_id or secrets.token_hex(8), widget.period_s, sent, now)
+        since = say("hold_since", time=format_time(time.time()))
+        holding = Holding(widget, lease, by, needed(widget, inputs), ready, told, since)
+        self._held[widget_id] = holding
+        self._robot.held[widget_id] = since
+        self._receipts.began(holding)
+        self._changed()
+        self.step()
+        return holding
+
+    def refuse(
+        self,
+        widget_id: str,
+        by: By,
+        why: str,
+        cause: Cause = "interlock",
+        *,
+        hold_id: str = "",
+        trace: bool = True,
+    ) -> Receipt:
+        """A hold that is not even judged; it may leave a trace or none."""
+        widget = self.widget(widget_id)
+        refusal = Refusal(why, cause)
+        if trace:
+            return self._receipts.refused(widget, {}, by, refusal, hold_id)
+        return refused(widget, {}, refusal, hold_id)
+
+    def refusal(self, widget_id: str, inputs: Mapping[str, Any], sent: float, by: By) -> Receipt | None:
+        """The receipt of a hold that `begin` would refuse now, without a trace; None for others."""
+        self._take()
+        self.judge()
+        widget = self.widget(widget_id)
+        ready = self._ready(widget, inputs, sent, by, self._loop.time())
+        return refused(widget, inputs, ready) if isinstance(ready, Refusal) else None
+
+    def _ready(
+        self, widget: Hold, inputs: Mapping[str, Any], sent: float, by: By, now: float
+    ) -> Values | Refusal:
+        """What it would publish if it began now, or why it may not."""
+        why, cause = self._ground(widget, sent, by, now)
+        if why:
+            return Refusal(why, cause)
+        try:
+            return self._messages.values(widget, inputs)
+        except (FieldError, InputError) as error:
+            return Refusal(f"{error}.", "input")
+
+    def _ground(self, widget: Hold, sent: float, by: By, now: float) -> tuple[str, Cause]:
+        """Why it may not begin now, "" if it may."""
+        if self._closed:
+            return say("hold_by_stopping"), "interlock"
+        if other := next(
+            (one for one in self._held.values() if one.widget.topic == widget.topic), None
+        ):
+            code = "hold_elsewhere" if other.widget is widget else "hold_same_topic"
+            return say(code, label=other.widget.label, topic=widget.topic), "interlock"
+        if now >= sent + LEASE_S:
+            return say("hold_late"), "interlock"
+        if not (verdict := self._verdict(widget, by, now)).permitted:
+            return verdict.reason or "", cause_of(verdict)
+        return by.doubt(), "interlock"
+
+    def beat(self, holding: Holding, number: int, sent: float) -> bool:
+        """A heartbeat; whether the hold goes on."""
+        self.judge()
+        if not self._on(holding) or not holding.lease.beat(number, sent, self._loop.time()):
+            return False
+        self._plan()
+        return True
+
+    def end(self, holding: Holding, code: str) -> None:
+        """Ends a hold, if it is going on; `code` is of the sentence that says why."""
+        self.judge()
+        if self._on(holding):
+            self._end(holding, code, say(code) if code != RELEASED else "")
+
+    def end_all(self, code: str) -> None:
+        """Ends all that is going on."""
+        for holding in list(self._held.values()):
+            self.end(holding, code)
+        self._plan()
+
+    def close(self) -> None:
+        """Ends all for good."""
+        self._closed = True
+        self.end_all("hold_by_stopping")
+
+    def judge(self) -> None:
+        """Ends what has lost its ground: after every change, and before anything goes on."""
+        for holding in list(self._held.values()):
+            now = self._loop.time()
+            if not self._on(holding):
+                continue  # ended meanwhile, by what the end of another one showed
+            if code := holding.lease.over(now):
+                self._end(holding, code, say(code))
+            elif not (verdict := self._verdict(holding.widget, holding.by, now)).permitted:
+                self._end(holding, verdict.code, verdict.reason or "")
+
+    def step(self) -> None:
+        """Sends what is due, by all that has come until now, and plans the next step."""
+        self._take()
+        self.judge()
+        for holding in list(self._held.values()):
+            if self._on(holding) and holding.lease.due(self._loop.time()):
+                self._send(holding)
+        self._plan()
+
+    def _on(self, holding: Holding) -> bool:
+        return self._held.get(holding.widget.id) is holding
+
+    def _verdict(self, widget: Hold, by: By, now: float) -> Verdict:
+        return judged(widget, by, self._panel, self._robot, now)
+
+    def _plan(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        now = self._loop.time()
+        whens = [
+            min(one.lease.next_at, one.lease.until, self._verdict(one.widget, one.by, now).until)
+            for one in self._held.values()
+        ]
+        if whens:
+            self._timer = self._loop.call_at(min(whens), self.step)
+
+    def _send(self, holding: Holding) -> None:
+        try:
+            self._messages.put(holding.widget, holding.values, lambda: self._last_look(holding))
+        except LinkError as error:
+            self._end(holding, "link", f"{error}.")
+        except PressRefused:
+            return  # it has ended
+        else:
+            holding.sent += 1
+
+    def _last_look(self, holding: Holding) -> None:
+        """Right before a message is sent: what came while it was judged and encoded counts, too."""
+        for _ in range(MOST_LOOKS):
+            if not self._on(holding):
+                raise PressRefused("", "interlock")
+            if not self._news():
+                return
+            self._take()
+            self.judge()
+        self.end(holding, "catching_up")
+        raise PressRefused("", "interlock")
+
+    def _end(self, holding: Holding, code: str, why: str) -> None:
+        widget, now = holding.widget, self._loop.time()
+        del self._held[widget.id]
+        del self._robot.held[widget.id]
+        unsaid = self._messages.put_last(widget, holding.values, now)
+        receipt = self._receipts.ended(holding, now - holding.lease.begun_at, code, why, unsaid)
+        holding.told(receipt)
+        self._changed()

@@ -1,0 +1,78 @@
+"""What a hold publishes: a message while it is held and one that ends it, each with the fields that the
+panel lets the server fill in (a deadline, a counter)."""
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, Protocol
+
+from app.errors import LinkError
+from app.interfaces import INTEGERS, Interfaces
+from app.panel.checks.holds import with_own_fields
+from app.panel.model import Hold
+from app.panel.template import filled, inputs_of, with_now
+from app.permission.interlocks import way
+from app.robot.command_status import LastLook, no_look
+from app.robot.state import Robot
+
+Values = Mapping[str, Any]  # of inputs by their ids, as they were when the hold began
+Checked = Callable[[Iterable[str], Values], dict[str, Any]]
+
+
+class Way(Protocol):
+    """What a hold needs of the link."""
+
+    def put(self, key: str, payload: bytes) -> None: ...
+
+
+class HoldMessages:
+    """Those of one robot; the counter of a widget goes on from hold to hold."""
+
+    def __init__(self, interfaces: Interfaces, robot: Robot, way: Way, checked: Checked) -> None:
+        """`checked` are the values that a template gets of what was entered."""
+        self._interfaces = interfaces
+        self._robot = robot
+        self._way = way
+        self._checked = checked
+        self._counts: dict[str, int] = {}
+
+    def values(self, widget: Hold, inputs: Mapping[str, Any]) -> Values:
+        """Those that both messages get; FieldError or InputError for bad input."""
+        values = self._checked(inputs_of(widget), inputs)
+        for template in (widget.message, widget.release):
+            fields = filled(template, with_now(values))
+            self._interfaces.encode(widget.type, with_own_fields(widget, fields, 0, 0))
+        return values
+
+    def put(self, widget: Hold, values: Values, look: LastLook) -> None:
+        """One message more; LinkError where it could not be sent, PressRefused where the last look
+        finds that it may not be."""
+        self._put(widget, widget.message, values, widget.deadline_ms, look)
+
+    def put_last(self, widget: Hold, values: Values, now: float) -> str:
+        """The message that ends it, if there is any way now, be it in doubt: one stop too many harms
+        nobody. Why it was not sent, or ""."""
+        if not self._robot.link_up or not self._robot.graph.bridges:
+            return way(self._robot, now).reason or ""
+        try:
+            self._put(widget, widget.release, values, 0, no_look)
+        except LinkError as error:
+            return f"{error}."
+        return ""
+
+    def _put(
+        self,
+        widget: Hold,
+        template: Mapping[str, Any],
+        values: Values,
+        deadline_ms: int,
+        look: LastLook,
+    ) -> None:
+        count = self._counts.get(widget.id, 0) + 1
+        if widget.counter_field is not None:
+            kind = self._interfaces.field_type(widget.type, widget.counter_field)
+            count %= INTEGERS[kind][1] + 1
+        fields = filled(template, with_now(values))
+        whole = with_own_fields(widget, fields, deadline_ms, count)
+        payload = self._interfaces.encode(widget.type, whole)
+        look()
+        self._way.put(self._robot.key(widget.topic), payload)
+        self._counts[widget.id] = count

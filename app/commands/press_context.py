@@ -1,0 +1,92 @@
+"""Who presses, and why what he saw may no longer be what he means: judged in the moment of sending.
+
+The one place for this, whether a press comes as JSON, as a form or as a hold.
+"""
+
+import re
+from collections.abc import Callable, Collection
+from typing import Final
+
+from app import clock
+from app.audit.press_record import Log, origin_of
+from app.commands.receipts import By
+from app.errors import InputError
+from app.i18n import say
+from app.permission.clients import Browser
+from app.permission.control_authority import Control
+from app.permission.interlocks import Verdict, locked
+from app.view.publisher import Board
+
+AHEAD_S: Final = 1.0  # a press can't be from later than now, but for rounding and drift
+SEEN: Final = r"^[0-9a-f]{1,32}-[0-9]{1,18}$"  # <boot>-<version>, an event's id
+_is_seen: Final = re.compile(SEEN).fullmatch
+
+
+class Doubts:
+    """Of one robot's controls."""
+
+    def __init__(
+        self,
+        board: Board,
+        control: Control,
+        operators_log: Log,
+        expires_s: float,
+        boots: Callable[[], Collection[str]],
+    ) -> None:
+        """`boots` are those of all robots' boards, by which a page of another one is told."""
+        self._board = board
+        self._control = control
+        self._log = operators_log
+        self._expires_s = expires_s
+        self._boots = boots
+        self._ended = False
+
+    def end(self) -> None:
+        """From now on nothing is sent any more."""
+        self._ended = True
+
+    def by(self, widget: str, browser: Browser, seen: str = "", at: float | None = None) -> By:
+        """Who presses or holds a widget, and what has to hold for that at every moment.
+
+        `seen` is the id of the last event that the operator saw, "" where that is not known; `at`
+        is when it was pressed, in the server's own time. InputError for what can't have been seen.
+        """
+        if seen:
+            self._check(seen)
+        self._control.touch(browser)
+        return By(
+            origin_of(browser, seen),
+            lambda: self._controls(browser),
+            lambda: self._doubt(widget, seen, at),
+        )
+
+    def late(self, at: float) -> str:
+        """Why what was touched at this moment (the server's own time) is not done now; "" if it is."""
+        age = clock.server_now() - at
+        if age > self._expires_s:
+            return say("expired", seconds=f"{age:.1f}")
+        return say("ahead") if age < -AHEAD_S else ""
+
+    def _check(self, seen: str) -> None:
+        boot, _, version = seen.partition("-")
+        if not _is_seen(seen):
+            raise InputError(f'seen: "{seen:.60}" is not the id of an event')
+        if boot == self._board.boot and int(version) > self._board.version:
+            newest = self._board.id
+            raise InputError(f"seen: version {version} is not there yet, the newest is {newest}")
+
+    def _controls(self, browser: Browser) -> Verdict:
+        if self._ended:
+            return locked("ending")
+        if self._log.lock:
+            return Verdict(False, "log", self._log.lock)
+        return self._control.verdict(browser)
+
+    def _doubt(self, widget: str, seen: str, at: float | None) -> str:
+        """Why a press is no longer what was meant; "" if it is."""
+        boot, _, version = seen.partition("-")
+        if boot and boot != self._board.boot:
+            return say("seen_on_another" if boot in self._boots() else "seen_before_restart")
+        if boot and int(version) < self._board.turned(widget):
+            return say("changed_meanwhile")
+        return "" if at is None else self.late(at)

@@ -1,0 +1,64 @@
+"""How often a client may press, on all robots together: what is more is not judged, sent or recorded.
+
+A client is a browser by its cookie; programs without one are one client for each address. An address
+has a limit of its own, for a cookie is made up easily, and all addresses together have one. The kiosk's
+own machine does not count among these: nobody in the network keeps the panel at the cell from pressing.
+"""
+
+import time
+from collections.abc import Callable, Hashable
+from typing import Final
+
+from app.audit import Origin
+from app.audit.press_record import origin_of
+from app.permission.clients import Browser
+from app.rate_limit import Buckets, Quota
+
+# A finger taps ten times a second at most; a program that follows a control loop presses 50 times.
+OF_CLIENT: Final = Quota(100, 50)
+OF_ADDRESS: Final = Quota(200, 100)
+OF_ALL: Final = Quota(400, 200)
+OF_CANCELS: Final = Quota(20, 5)  # of one goal, by whomever: each of them has asked the robot
+RETRY_AFTER_S: Final = 1  # each has room again much sooner; HTTP knows whole seconds
+
+
+class PressLimits:
+    """Used on the event loop only."""
+
+    def __init__(
+        self, leave_out: Callable[[Origin], None], monotonic: Callable[[], float] = time.monotonic
+    ) -> None:
+        """`leave_out` tells the operator's log of a press that is not one of its entries."""
+        self._leave_out = leave_out
+        self._clients = Buckets(OF_CLIENT, monotonic)
+        self._addresses = Buckets(OF_ADDRESS, monotonic)
+        self._all = Buckets(OF_ALL, monotonic)
+        self._cancels = Buckets(OF_CANCELS, monotonic)
+        self.refused = 0
+
+    def admit(self, browser: Browser) -> bool:
+        """Whether it may press once more now; what may not is counted, here and for the log."""
+        asked: list[tuple[Buckets, Hashable]] = [
+            (self._clients, (browser.address, browser.id)),
+            (self._addresses, browser.address),
+        ]
+        if not browser.local:
+            asked.append((self._all, ""))
+        if not all(buckets.has(key) for buckets, key in asked):
+            return self._refuse(browser)
+        for buckets, key in asked:
+            buckets.take(key)
+        return True
+
+    def admit_cancel(self, browser: Browser, *goal: str) -> bool:
+        """The same for a cancel: it is one too many only if this very goal's was asked for that often
+        just now, so that nobody is kept from stopping a robot."""
+        if not self._cancels.has(goal):
+            return self._refuse(browser)
+        self._cancels.take(goal)
+        return True
+
+    def _refuse(self, browser: Browser) -> bool:
+        self.refused += 1
+        self._leave_out(origin_of(browser))
+        return False

@@ -1,0 +1,303 @@
+"""One press: log, permission, encoding, put, log, receipt. Knows no HTTP.
+
+The permission is judged here, by what the server knows when the press stands in the operator's log;
+what the browser showed does not count. Between judging and sending nothing waits.
+"""
+
+import asyncio
+import logging
+import time
+from collections.abc import Callable, Coroutine, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+from app.audit import Origin, Repeated
+from app.audit.press_record import Logbook, Noted
+from app.clock import format_time
+from app.commands.dispatch import Sending
+from app.commands.receipts import (
+    FINE,
+    LONGEST_LOGGED,
+    MOST_LOOKS,
+    By,
+    Receipt,
+    Receipts,
+    Witness,
+    cause_of,
+    corrected,
+    fingerprint,
+    judged,
+    named,
+    receipt_of,
+    untyped,
+    with_doubt,
+)
+from app.commands.refusals import Unjudged
+from app.commands.repeated import Recall
+from app.concurrency import Waits
+from app.errors import Cause, FieldError, InputError, LinkError, LogError, NotFound, PressRefused
+from app.i18n import say
+from app.panel.model import Action, Panel, Pressed
+from app.permission.interlocks import Verdict
+from app.robot.command_status import Answer
+from app.robot.state import Robot
+from app.ros_logging import RobotLog, on_rosout
+
+log = logging.getLogger("kiosk.presses")
+
+
+@dataclass(frozen=True, slots=True)
+class _UnderWay:
+    """A press whose receipt is not there yet."""
+
+    widget: str
+    inputs: Mapping[str, Any]
+    receipt: "asyncio.Future[Receipt]"
+
+    @property
+    def fingerprint(self) -> str:
+        return fingerprint(self.inputs)
+
+
+class Presses:
+    """Presses of one panel, with their receipts by press id."""
+
+    def __init__(
+        self,
+        panel: Panel,
+        robot: Robot,
+        sending: Sending,
+        logbook: Logbook,
+        monotonic: Callable[[], float] = time.monotonic,
+        catch_up: Callable[[], None] = lambda: None,
+        news: Callable[[], bool] = lambda: False,
+        witness: Witness | None = None,
+    ) -> None:
+        """`catch_up` takes in all that has come from the robot, right before a press is judged;
+        `news` tells whether more has come that may change what is permitted."""
+        self._panel = panel
+        self._robot = robot
+        self._log = RobotLog(log, robot.name)
+        self._sending = sending
+        self._logbook = logbook
+        self._catch_up = catch_up
+        self._news = news
+        self._under_way: dict[str, _UnderWay] = {}
+        self._monotonic = monotonic
+        self._receipts = Receipts(witness)
+        self._unjudged = Unjudged(sending, logbook, self._receipts, self._log)
+        self._recall = Recall(sending, self._unjudged, self._log)
+        self.widget = sending.widget
+        self.receipt = self._receipts.get
+        self.too_soon = self._unjudged.too_soon
+        self.limited = self._unjudged.limited
+        self._waits = Waits()
+        self.give_up = self._waits.give_up
+        self._closed = False
+
+    def close(self) -> None:
+        """Nothing more is sent; a goal can be canceled until the end."""
+        self._closed = True
+
+    async def press(self, widget_id: str, inputs: Mapping[str, Any], press_id: str, by: By) -> Receipt:
+        """Sends what the widget is for, or refuses. The same id again is the same press.
+
+        What it is judged by, is judged in the moment of sending. An input that has a default in the
+        panel file may be left out.
+        """
+        widget = self.widget(widget_id)
+        inputs = self._sending.with_defaults(widget, inputs)
+        known = self._under_way.get(press_id) or self._receipts.made(press_id)
+        if known is None and not self._receipts.is_past(press_id):
+            if left_out := self._left_out(widget, inputs, press_id, by):
+                return left_out
+            work = self._logged(widget, inputs, press_id, by)
+            return await self._once(widget, inputs, press_id, work)
+        if known is None:
+            why = say("press_past", id=press_id)
+            return await self._unjudged.refuse(widget, inputs, press_id, why, by.origin)
+        if (known.widget, known.fingerprint) != (widget_id, fingerprint(inputs)):
+            why = say("press_reused", id=press_id)
+            return await self._unjudged.refuse(widget, inputs, press_id, why, by.origin)
+        if isinstance(known, _UnderWay):
+            return await asyncio.shield(known.receipt)
+        return known
+
+    async def cancel(self, widget_id: str, origin: Origin, press_id: str = "") -> Receipt:
+        """Asks the robot to cancel the goal of one press or, without its id, the one under way: anybody
+        may, whoever has control, and however late."""
+        widget = self.widget(widget_id)
+        if not isinstance(widget, Action):
+            raise NotFound(f'"{widget_id}" is not an action: there is nothing to cancel')
+        if (why := self._sending.over(widget, press_id)) and not self._logbook.room(origin):
+            answer = Answer("refused", why)
+            return self._unjudged.counted(receipt_of(widget, {}, "", answer, "interlock"), origin)
+        noting = asyncio.ensure_future(self._logbook.canceled(widget_id, origin))
+        try:
+            # No disk keeps anybody from stopping a robot.
+            answer, cause = await self._canceled(widget, press_id)
+        except BaseException:
+            (await noting).broke_off("log_broke_off")
+            raise
+        noted = await noting
+        self._log.info(
+            "cancel of %s by %s: %s: %s", widget_id, named(origin), answer.outcome, answer.text
+        )
+        receipt = receipt_of(widget, {}, "", answer, cause)
+        return await _closed(noted, receipt)
+
+    async def _canceled(self, widget: Action, press_id: str) -> tuple[Answer, Cause]:
+        try:
+            async with self._waits.one():
+                answer = await self._sending.cancel(widget, press_id)
+        except TimeoutError:
+            return Answer("unknown", say("server_ends")), ""
+        except LinkError as error:
+            text = say("not_encoded", why=str(error), time=format_time(time.time()))
+            return Answer("refused", text), "link"
+        return answer, "interlock" if answer.outcome == "refused" else ""
+
+    def _left_out(
+        self, widget: Pressed, inputs: Mapping[str, Any], press_id: str, by: By
+    ) -> Receipt | None:
+        """The receipt of a refusal that the log only counts; None for every other press."""
+        if self._logbook.room(by.origin):
+            return None
+        _, why, cause = self._ground(widget, by)
+        sentence = "refused" if why else "not_encoded"
+        if not why:
+            try:
+                why, cause = self._sending.refusal(widget, inputs), "interlock"
+            except (FieldError, InputError) as error:
+                why, cause = str(error), "input"
+        if not why:
+            return None
+        answer = Answer("refused", say(sentence, why=why, time=format_time(time.time())))
+        return self._unjudged.counted(receipt_of(widget, inputs, press_id, answer, cause), by.origin)
+
+    async def _once(
+        self,
+        widget: Pressed,
+        inputs: Mapping[str, Any],
+        press_id: str,
+        work: Coroutine[Any, Any, Receipt],
+    ) -> Receipt:
+        """Does the work of a press, while others of the same id wait for its receipt."""
+        loop = asyncio.get_running_loop()
+        under_way = _UnderWay(widget.id, inputs, loop.create_future())
+        self._under_way[press_id] = under_way
+        try:
+            receipt = await work
+        except BaseException as error:
+            under_way.receipt.set_exception(error)
+            under_way.receipt.exception()  # who else waited is told; nobody needs to have
+            raise
+        finally:
+            del self._under_way[press_id]
+        under_way.receipt.set_result(receipt)
+        if receipt.id == press_id:  # a refusal's own is kept already
+            self._receipts.keep(receipt)
+        return receipt
+
+    async def _logged(
+        self, widget: Pressed, inputs: Mapping[str, Any], press_id: str, by: By
+    ) -> Receipt:
+        own = self._sending.needed(widget, inputs)
+        try:
+            noted = await self._logbook.pressed(widget.id, own, press_id, by.origin)
+        except Repeated as known:
+            return await self._recall.receipt(widget, inputs, by.origin, known)
+        except LogError as error:
+            self._receipts.begin(press_id, widget.id, by.origin, own)
+            text = say("refused", why=str(error), time=format_time(time.time()))
+            receipt = receipt_of(widget, inputs, press_id, Answer("refused", text), "log")
+        else:
+            self._receipts.begin(press_id, widget.id, by.origin, own)
+            with _noted_to_the_end(noted):
+                receipt = await self._pressed(widget, inputs, press_id, noted, by)
+            receipt = await _closed(noted, receipt)
+        level = logging.INFO if receipt.outcome in FINE else logging.WARNING
+        who = named(by.origin)
+        told = on_rosout(f"press {press_id} of {widget.id} by {who}: {untyped(widget, receipt)}")
+        self._log.log(level, "press %s of %s by %s with %.*s: %s: %s", press_id, widget.id, who,
+                LONGEST_LOGGED, own, receipt.outcome, receipt.reason, extra=told)  # fmt: skip
+        return receipt
+
+    def _correct(self, noted: Noted, press_id: str, answer: Answer) -> None:
+        """What is known of a press now is another thing than its receipt said."""
+        noted.corrected(answer)
+        if old := self._receipts.get(press_id):
+            self._receipts.keep(corrected(old, answer))
+
+    async def _pressed(
+        self, widget: Pressed, inputs: Mapping[str, Any], press_id: str, noted: Noted, by: By
+    ) -> Receipt:
+        def receipt(answer: Answer, cause: Cause = "") -> Receipt:
+            return receipt_of(widget, inputs, press_id, answer, cause)
+
+        def refused(sentence: str, why: str, cause: Cause) -> Receipt:
+            now = format_time(time.time())
+            return receipt(Answer("refused", say(sentence, why=why, time=now)), cause)
+
+        verdict, why, cause = self._ground(widget, by)
+        noted.judged(verdict.code)
+        if why:
+            return refused("refused", why, cause)
+        try:
+            correct = partial(self._correct, noted)
+            look = partial(self._last_look, widget, noted, by)
+            async with self._waits.one():
+                answer = await self._sending.send(widget, inputs, press_id, correct, noted.hash, look)
+        except TimeoutError:
+            return receipt(Answer("unknown", say("server_ends")))
+        except (FieldError, InputError) as error:
+            return refused("not_encoded", str(error), "input")
+        except LinkError as error:
+            return refused("not_encoded", str(error), "link")
+        except PressRefused as error:
+            return refused("refused", error.reason, error.cause)
+        if answer.outcome == "refused":
+            return refused("not_encoded", answer.text, "interlock")
+        return receipt(answer, "time" if answer.outcome == "timed_out" else "")
+
+    def _last_look(self, widget: Pressed, noted: Noted, by: By) -> None:
+        """Right before it is sent: what came while it was judged and encoded counts, too."""
+        for _ in range(MOST_LOOKS):
+            if not self._news():
+                return
+            verdict, why, cause = self._ground(widget, by)
+            noted.judged(verdict.code)
+            if why:
+                raise PressRefused(why, cause)
+        raise PressRefused(say("catching_up"), "link")
+
+    def _ground(self, widget: Pressed, by: By) -> tuple[Verdict, str, Cause]:
+        """The verdict now, and why it may not be sent, "" if it may."""
+        self._catch_up()
+        verdict = judged(widget, by, self._panel, self._robot, self._monotonic())
+        if not verdict.permitted:
+            return verdict, verdict.reason or "", cause_of(verdict)
+        return verdict, say("press_by_stopping") if self._closed else by.doubt(), "interlock"
+
+
+@contextmanager
+def _noted_to_the_end(noted: Noted) -> Iterator[None]:
+    """What breaks off in here is said to have, in the log."""
+    try:
+        yield
+    except asyncio.CancelledError:
+        noted.broke_off("log_ended")
+        raise
+    except BaseException:
+        noted.broke_off("log_broke_off")
+        raise
+
+
+async def _closed(noted: Noted, receipt: Receipt) -> Receipt:
+    """The receipt, when what it says is on the disk; where it is not, it says so."""
+    doubt = await noted.closed(receipt.outcome, receipt.reason)
+    if noted.corrected_to is not None:  # meanwhile
+        receipt = corrected(receipt, noted.corrected_to)
+    return with_doubt(receipt, doubt)

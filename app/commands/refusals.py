@@ -1,0 +1,86 @@
+"""Presses that are refused and not even judged: their id was used before, they came too soon, or they
+are more than their client may."""
+
+import secrets
+import time
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from app.audit import Origin
+from app.audit.press_record import Logbook
+from app.clock import format_time
+from app.commands.dispatch import Sending
+from app.commands.receipts import Receipt, Receipts, named, receipt_of, untyped, with_doubt
+from app.i18n import say
+from app.panel.model import Pressed
+from app.robot.command_status import Answer
+from app.ros_logging import RobotLog, on_rosout
+
+
+class Unjudged:
+    """Of one panel; used on the event loop only."""
+
+    def __init__(self, sending: Sending, logbook: Logbook, receipts: Receipts, log: RobotLog) -> None:
+        self._sending = sending
+        self._logbook = logbook
+        self._receipts = receipts
+        self._log = log
+
+    async def too_soon(
+        self, widget_id: str, inputs: Mapping[str, Any], press_id: str, before: str, origin: Origin
+    ) -> Receipt:
+        """What may be the second tap of another press, of which it says what came too: `before` is its
+        id, "" where there is none."""
+        why = say("press_too_soon")
+        if (last := self._receipts.get(before)) is not None:
+            label = self._sending.widget(last.widget).label
+            said = say("press_before", label=label, said=last.reason)
+            why = last.reason if last.reason.endswith(why) else f"{said} {why}"
+        return await self.refuse(self._sending.widget(widget_id), inputs, press_id, why, origin)
+
+    def limited(
+        self,
+        widget_id: str,
+        inputs: Mapping[str, Any],
+        press_id: str,
+        sentence: str = "too_often",
+        *,
+        shown: bool = False,
+    ) -> Receipt:
+        """Of one that its client may make later, by the same id; `shown`: on a page without scripts."""
+        now = format_time(time.time())
+        answer = Answer("refused", say("refused", why=say(sentence), time=now))
+        receipt = receipt_of(self._sending.widget(widget_id), inputs, press_id, answer, "limit")
+        if shown:
+            receipt = replace(receipt, id=_own_id(press_id))
+            self._receipts.keep_left_out(receipt)
+        return receipt
+
+    def counted(self, receipt: Receipt, origin: Origin) -> Receipt:
+        """A refusal that is no entry of the log's."""
+        self._logbook.leave_out(origin)
+        self._receipts.keep_left_out(receipt)
+        return receipt
+
+    async def refuse(
+        self, widget: Pressed, inputs: Mapping[str, Any], press_id: str, why: str, origin: Origin
+    ) -> Receipt:
+        """The receipt has an id of its own: that of the press is another's, or may still be one's."""
+        own_id = _own_id(press_id)
+        receipt = receipt_of(widget, inputs, own_id, Answer("refused", why), "input")
+        if not self._logbook.room(origin):
+            return self.counted(receipt, origin)
+        own = self._sending.needed(widget, inputs)
+        self._receipts.begin(own_id, widget.id, origin, own)
+        who = named(origin)
+        told = on_rosout(f"press {own_id} of {widget.id} by {who}: {untyped(widget, receipt)}")
+        self._log.warning("press %s of %s by %s: %s", own_id, widget.id, who, why, extra=told)
+        receipt = with_doubt(receipt, await self._logbook.refused(widget.id, own, own_id, origin, why))
+        self._receipts.keep(receipt)
+        return receipt
+
+
+def _own_id(press_id: str) -> str:
+    """That of a refusal, by which its press is known."""
+    return f"{press_id:.40}.{secrets.token_hex(4)}"

@@ -1,0 +1,51 @@
+"""Presses that are sent again after a restart of the server: the operator's log knows them."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from app.audit import Entry, Origin, Repeated, same_values
+from app.commands.dispatch import Sending
+from app.commands.receipts import Receipt, cause_of, named, recalled
+from app.commands.refusals import Unjudged
+from app.errors import Cause, FieldError, InputError
+from app.i18n import say
+from app.panel.model import Pressed
+from app.permission.interlocks import PERMITTED, Verdict
+from app.ros_logging import RobotLog
+
+
+class Recall:
+    """Of one panel; used on the event loop only."""
+
+    def __init__(self, sending: Sending, unjudged: Unjudged, log: RobotLog) -> None:
+        self._sending = sending
+        self._unjudged = unjudged
+        self._log = log
+
+    async def receipt(
+        self, widget: Pressed, inputs: Mapping[str, Any], origin: Origin, known: Repeated
+    ) -> Receipt:
+        """What the log knows of the press; a refusal where its id is that of another press."""
+        press, told = known.press, known.told
+        own = self._sending.needed(widget, inputs)
+        if press.widget != widget.id or not same_values(press.values, own):
+            why = say("press_reused", id=press.press)
+            return await self._unjudged.refuse(widget, inputs, press.press, why, origin)
+        receipt = recalled(widget, inputs, press, told, self._cause(widget, inputs, told))
+        self._log.info("press %s of %s by %s is that of entry %d: %s: %s", press.press, widget.id,
+                named(origin), press.seq, receipt.outcome, receipt.reason)  # fmt: skip
+        return receipt
+
+    def _cause(self, widget: Pressed, inputs: Mapping[str, Any], told: Entry | None) -> Cause:
+        """Why it was refused, as far as an entry tells: inputs that never fit were refused for that."""
+        if told is None or told.outcome not in ("refused", "timed_out"):
+            return ""
+        if told.outcome == "timed_out":
+            return "time"
+        if told.verdict != PERMITTED.code:
+            return cause_of(Verdict(False, told.verdict or "log"))
+        try:
+            self._sending.refusal(widget, inputs)
+        except (FieldError, InputError):
+            return "input"
+        return "interlock"

@@ -1,0 +1,78 @@
+"""Tasks that no one awaits, waits that shutdown cancels, and commands that shutdown waits for."""
+
+import asyncio
+import logging
+from collections.abc import AsyncIterator, Coroutine, Iterator
+from contextlib import asynccontextmanager, contextmanager, suppress
+from typing import Any
+
+from app.ros_logging import RobotLog
+
+
+def told(
+    work: Coroutine[Any, Any, None], log: logging.Logger | RobotLog, failure: str
+) -> "asyncio.Task[None]":
+    """A task whose failure is logged, not lost."""
+
+    def done(task: "asyncio.Task[None]") -> None:
+        if not task.cancelled() and (error := task.exception()):
+            log.error(failure, exc_info=error)
+
+    task = asyncio.get_running_loop().create_task(work)
+    task.add_done_callback(done)
+    return task
+
+
+class Waits:
+    """On the event loop."""
+
+    __slots__ = ("_given_up", "_limits")
+
+    def __init__(self) -> None:
+        self._limits: set[asyncio.Timeout] = set()
+        self._given_up = False
+
+    def give_up(self) -> None:
+        """Ends all of them, and each later one where it first waits; once."""
+        self._given_up = True
+        for limit in self._limits:
+            limit.reschedule(asyncio.get_running_loop().time())
+
+    @asynccontextmanager
+    async def one(self) -> AsyncIterator[None]:
+        """TimeoutError where it was given up; what never waits is done in any case."""
+        limit = asyncio.timeout(0 if self._given_up else None)
+        self._limits.add(limit)
+        try:
+            async with limit:
+                yield
+        finally:
+            self._limits.discard(limit)
+
+
+class Owed:
+    """On the event loop."""
+
+    __slots__ = ("_many", "_none")
+
+    def __init__(self) -> None:
+        self._many = 0
+        self._none = asyncio.Event()
+        self._none.set()
+
+    @contextmanager
+    def one(self) -> Iterator[None]:
+        """While it lasts, somebody waits for an answer."""
+        self._many += 1
+        self._none.clear()
+        try:
+            yield
+        finally:
+            self._many -= 1
+            if not self._many:
+                self._none.set()
+
+    async def told(self, within_s: float) -> None:
+        """Until nobody waits for one; `within_s` at most."""
+        with suppress(TimeoutError):
+            await asyncio.wait_for(self._none.wait(), within_s)

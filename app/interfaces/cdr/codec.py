@@ -1,0 +1,93 @@
+"""Message objects to and from CDR."""
+
+from collections.abc import Mapping
+from dataclasses import field, make_dataclass
+from typing import Any, Final
+
+from app.interfaces.cdr.encapsulation import LITTLE_ENDIAN, judge_end, opened
+from app.interfaces.cdr.fields import FieldReader
+from app.interfaces.cdr.reader import Order, Read, message_reader
+from app.interfaces.cdr.scanner import SLICE
+from app.interfaces.cdr.selection import Wanted
+from app.interfaces.cdr.steps import Programs
+from app.interfaces.cdr.writer import Write, message_writer
+from app.interfaces.definitions import PLACEHOLDER, Field, Structure, Type
+
+FEW_BYTES: Final = 20_000  # have few elements
+MOST_ELEMENTS: Final = 4_000  # of a message that is read whole
+
+
+class Codec:
+    """Serializes the structures of one set of definitions; each is prepared at its first use."""
+
+    def __init__(self, structures: Mapping[str, Structure]) -> None:
+        self._structures = structures
+        self._classes: dict[str, type[Any]] = {}
+        self._writers: dict[str, Write] = {}
+        self._readers: dict[tuple[Order, str], Read] = {}
+        self._programs = Programs(self._fields)
+        self._counters: dict[str, FieldReader] = {}
+
+    def serialize(self, message: Any, name: str) -> bytes:
+        out = bytearray(LITTLE_ENDIAN)
+        self._writer(name)(out, message)
+        return bytes(out)
+
+    def deserialize(self, data: bytes, name: str) -> Any:
+        """The message object; ValueError, `struct.error` or UnicodeError where it is none."""
+        if len(data) > FEW_BYTES:
+            self._count(data, name)
+        body, order = opened(data)
+        message, end = self._reader(order, name)(body, 0)
+        judge_end(body, end)
+        return message
+
+    def _count(self, data: bytes, name: str) -> None:
+        """ValueError for a message of so many elements that building them would take its time."""
+        if name not in self._counters:
+            ops = self._programs.program(name, Wanted(), each=True)
+            self._counters[name] = FieldReader(name, ops, self._made_of)
+        walk = self._counters[name].walk(data)
+        for _ in range(MOST_ELEMENTS // SLICE):
+            if walk.go_on() is not None:
+                return
+        raise ValueError(f"it has more than {MOST_ELEMENTS} elements, which are not read at once")
+
+    def fields(self, name: str, wanted: Wanted) -> FieldReader:
+        """What reads some fields of each message of a type."""
+        ops = self._programs.program(name, wanted)
+        return FieldReader(name, ops, self._made_of)
+
+    def message_class(self, name: str) -> type[Any]:
+        """The class of a structure's message objects: fields as attributes, constants on the class."""
+        if name not in self._classes:
+            self._classes[name] = _message_class(self._structures[name])
+        return self._classes[name]
+
+    def _writer(self, name: str) -> Write:
+        if name not in self._writers:
+            self._writers[name] = message_writer(self._fields(name), self._writer)
+        return self._writers[name]
+
+    def _reader(self, order: Order, name: str) -> Read:
+        known = self._readers.get((order, name))
+        if known is None:
+            fields, made = self._fields(name), self.message_class(name)
+            known = message_reader(fields, made, order, lambda inner: self._reader(order, inner))
+            self._readers[order, name] = known
+        return known
+
+    def _made_of(self, name: str) -> tuple[tuple[Field, ...], type[Any]]:
+        return self._fields(name), self.message_class(name)
+
+    def _fields(self, name: str) -> tuple[Field, ...]:
+        return self._structures[name].fields or (Field(PLACEHOLDER, Type("uint8")),)
+
+
+def _message_class(structure: Structure) -> type[Any]:
+    fields: list[Any] = [(one.attribute, Any) for one in structure.fields]
+    return make_dataclass(
+        structure.name.rpartition("/")[2],
+        fields or [(PLACEHOLDER, int, field(default=0, repr=False))],
+        namespace={"__msgtype__": structure.name, **structure.constants},
+    )

@@ -1,0 +1,214 @@
+"""From CDR bytes to values. What is no such message raises ValueError or `struct.error`.
+
+A reader is made once per structure and byte order, as nested closures. Lists of numbers are views of
+what came, not copies: an image costs no more than its header.
+"""
+
+import sys
+from array import array
+from codecs import utf_8_decode, utf_16_be_decode, utf_16_le_decode
+from collections.abc import Callable, Sequence
+from struct import Struct, unpack_from
+from typing import Any, Final, Literal
+
+from app.interfaces.cdr.formats import FORMATS, LENGTH, SIZES, is_number, runs
+from app.interfaces.definitions import Field, Type
+
+Order = Literal["<", ">"]  # little-endian, big-endian; as `struct` names them
+Read = Callable[["memoryview[int]", int], tuple[Any, int]]  # bytes, where → value, where it ends
+Step = Callable[["memoryview[int]", int, list[Any]], int]  # the same; the values are added to a list
+
+NATIVE: Final[Order] = "<" if sys.byteorder == "little" else ">"
+SHORTEST_TEXT: Final = LENGTH + 1
+LAST_UNIT: Final = 0xFFFF  # of UTF-16
+LONGEST_TEXT: Final = 50_000  # bytes or units that are read of one value
+CUT: Final = "…"
+BOOLS: Final = b"\0\1"
+# `struct` takes any byte for a bool: as a number it can be checked.
+_FORMATS_READ: Final = {**FORMATS, "bool": "B"}
+
+
+def message_reader(
+    fields: Sequence[Field], make: Callable[..., Any], order: Order, nested: Callable[[str], Read]
+) -> Read:
+    """Reads a whole structure; `nested` finds the reader of another one."""
+    steps = [_step(run, order, nested) for run in runs(fields)]
+
+    def read(data: "memoryview[int]", at: int) -> tuple[Any, int]:
+        values: list[Any] = []
+        for step in steps:
+            at = step(data, at, values)
+        return make(*values), at
+
+    return read
+
+
+def value_reader(kind: Type, order: Order) -> Read:
+    """Reads a value that is no structure: a number, a bool, a list of them, the beginning of a text."""
+    if not is_number(kind):
+        return (_text if kind.name == "string" else _wide_text)(order, LONGEST_TEXT)
+    if kind.many != "one":
+        return _many_numbers(kind, order)
+    step = _numbers([kind], order)
+
+    def one(data: "memoryview[int]", at: int) -> tuple[Any, int]:
+        values: list[Any] = []
+        end = step(data, at, values)
+        return values[0], end
+
+    return one
+
+
+def _step(run: Sequence[Field], order: Order, nested: Callable[[str], Read]) -> Step:
+    kind = run[0].type
+    if is_number(kind) and kind.many == "one":
+        return _numbers([one.type for one in run], order)
+    read = _field(kind, order, nested)
+
+    def one(data: "memoryview[int]", at: int, values: list[Any]) -> int:
+        value, at = read(data, at)
+        values.append(value)
+        return at
+
+    return one
+
+
+def _numbers(kinds: Sequence[Type], order: Order) -> Step:
+    size = SIZES[kinds[0].name]
+    form = Struct(order + "".join(_FORMATS_READ[kind.name] for kind in kinds))
+    bools = [index for index, kind in enumerate(kinds) if kind.name == "bool"]
+
+    def numbers(data: "memoryview[int]", at: int, values: list[Any]) -> int:
+        at = _aligned(at, size)
+        values += form.unpack_from(data, at)
+        return at + form.size
+
+    def numbers_and_bools(data: "memoryview[int]", at: int, values: list[Any]) -> int:
+        first = len(values)
+        end = numbers(data, at, values)
+        for index in bools:
+            values[first + index] = _bool(values[first + index])
+        return end
+
+    return numbers_and_bools if bools else numbers
+
+
+def _bool(byte: int) -> bool:
+    """CDR has 0 and 1 only: whoever sends something else may mean anything."""
+    if byte > 1:
+        raise ValueError(f"a bool is {byte}, not 0 or 1")
+    return byte == 1
+
+
+def _field(kind: Type, order: Order, nested: Callable[[str], Read]) -> Read:
+    if is_number(kind):
+        return _many_numbers(kind, order)
+    text = _text if kind.name == "string" else _wide_text
+    one = nested(kind.name) if kind.nested else text(order)
+    return one if kind.many == "one" else _many(kind, one, order)
+
+
+def _many(kind: Type, read: Read, order: Order) -> Read:
+    count = _count(kind, order)
+    least = SHORTEST_TEXT if kind.name == "string" else 1
+
+    def many(data: "memoryview[int]", at: int) -> tuple[Any, int]:
+        length, at = count(data, at)
+        _require(data, at, length * least)
+        values = []
+        for _ in range(length):
+            value, at = read(data, at)
+            values.append(value)
+        return values, at
+
+    return many
+
+
+def _many_numbers(kind: Type, order: Order) -> Read:
+    count = _count(kind, order)
+    form, size = FORMATS[kind.name], SIZES[kind.name]
+
+    def many(data: "memoryview[int]", at: int) -> tuple[Any, int]:
+        length, at = count(data, at)
+        at = _aligned(at, size) if length else at
+        end = at + length * size
+        _require(data, at, length * size)
+        return _viewed(data[at:end], form, order), end
+
+    return many
+
+
+def _viewed(data: "memoryview[int]", form: Any, order: Order) -> Any:
+    """A list of numbers as `struct` names their format."""
+    if form == "?":
+        for byte in bytes(data).translate(None, BOOLS)[:1]:
+            _bool(byte)
+        return data.cast(form)
+    if order == NATIVE:
+        return data.cast(form)
+    turned = array(form, data.tobytes())
+    turned.byteswap()
+    return memoryview(turned)
+
+
+def _count(kind: Type, order: Order) -> Read:
+    """How many elements come: as many as an array has, or as it says before a sequence."""
+    if kind.many == "array":
+        return lambda _, at: (kind.size, at)
+    return _length(order)
+
+
+def _length(order: Order) -> Read:
+    form = Struct(f"{order}I")
+
+    def length(data: "memoryview[int]", at: int) -> tuple[int, int]:
+        at = _aligned(at, LENGTH)
+        return form.unpack_from(data, at)[0], at + LENGTH
+
+    return length
+
+
+def _text(order: Order, most: int | None = None) -> Read:
+    """Of a "string": UTF-8 with a NUL at its end, which counts. Of more than `most` bytes these, with a
+    mark that something is missing."""
+    length = _length(order)
+
+    def text(data: "memoryview[int]", at: int) -> tuple[str, int]:
+        size, at = length(data, at)
+        end = at + size
+        if not size or end > len(data) or data[end - 1]:
+            raise ValueError(f"a text of {size} bytes at {at} is cut off or has no end")
+        if most is not None and size > most:
+            return utf_8_decode(data[at : at + most])[0] + CUT, end
+        return str(data[at : end - 1], "utf-8"), end
+
+    return text
+
+
+def _wide_text(order: Order, most: int | None = None) -> Read:
+    """Of a "wstring": a count of UTF-16 units, each in four bytes, no terminator and no byte order
+    mark (so do rmw_fastrtps and rmw_cyclonedds; source: rosidl_typesupport_fastrtps, and tried)."""
+    length = _length(order)
+
+    def text(data: "memoryview[int]", at: int) -> tuple[str, int]:
+        count, at = length(data, at)
+        _require(data, at, count * LENGTH)
+        read = count if most is None else min(count, most)
+        units = unpack_from(f"{order}{read}I", data, at)
+        if any(unit > LAST_UNIT for unit in units):
+            raise ValueError("a wstring has a unit beyond UTF-16's")
+        found = array("H", units).tobytes()
+        cut = read < count
+        decode = utf_16_le_decode if NATIVE == "<" else utf_16_be_decode
+        return decode(found, "strict", not cut)[0] + CUT * cut, at + count * LENGTH
+
+    return text
+
+
+def _aligned(at: int, size: int) -> int:
+    return (at + size - 1) & -size
+
+
+def _require(data: "memoryview[int]", at: int, size: int) -> None:
+    if size > len(data) - at:
+        raise ValueError(f"{size} bytes at {at} are more than there are")

@@ -1,0 +1,270 @@
+"""Going through a message for what is wanted of it, without building the rest.
+
+However long a message is, some hundred elements at a time: between them something else may be done.
+All of the message is passed over, so that what is too short or too long is never taken for one.
+"""
+
+from array import array
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+from app.interfaces.cdr.formats import LENGTH
+from app.interfaces.cdr.layout import PHASES, passed
+from app.interfaces.cdr.reader import NATIVE, Order, Read
+from app.interfaces.cdr.selection import Lookup
+from app.interfaces.cdr.steps import Choice, Do, Mark, Op
+from app.interfaces.definitions import Type
+
+Reader = Callable[[Type], Read]  # what reads a value of a type
+Hits = dict[Any, list[tuple[int, int]]]  # a key's value → (number, place) of the elements that have it
+Next = tuple[int, int]  # the place that is gone to, and the step
+
+SLICE: Final = 100  # elements
+ENOUGH: Final = 2  # elements of one key: several
+
+# The steps that most elements have.
+TEXT: Final = Do.TEXT
+PASS: Final = Do.PASS
+NEXT: Final = Do.NEXT
+NUMBERS: Final = Do.NUMBERS
+EACH: Final = Do.EACH
+CHOSEN: Final = Do.CHOSEN
+END: Final = Do.END
+
+
+@dataclass(slots=True)
+class _Looking:
+    """A list whose elements are looked at, `start` is where the one of this index begins. Then those
+    `chosen` are read (places and steps), and it goes on at `resume`."""
+
+    choice: Choice
+    indexes: Mapping[int, int]
+    count: int
+    start: int
+    resume: int | None
+    index: int = 0
+    chosen: list[Next] = field(default_factory=list)
+
+    def note(self) -> None:
+        if (step := self.indexes.get(self.index)) is not None:
+            self.chosen.append((self.start, step))
+
+
+class Going:
+    """One time through one message: by `at` it is now, in the end where the message ends. `marks` are
+    the places where what is wanted begins, `several` the paths whose key more than one element has."""
+
+    __slots__ = (
+        "_body", "_counts", "_hits", "_loops", "_ops", "_reader", "_step", "_words", "at", "marks",
+        "several",
+    )  # fmt: skip
+
+    def __init__(
+        self, ops: Sequence[Op], body: "memoryview[int]", order: Order, reader: Reader
+    ) -> None:
+        self._ops = ops
+        self._body = body
+        self._words = _words(body, order)
+        self._reader = reader
+        self._loops: list[Any] = []  # elements to come, or `_Looking`
+        self._hits: dict[Lookup, Hits] = {}
+        self._counts: dict[Lookup, int] = {}
+        self._step = 0
+        self.at = 0
+        self.marks: dict[Mark, int] = {}
+        self.several: set[str] = set()
+
+    def go_on(self) -> bool:
+        """Goes over a slice; whether that was the last. ValueError or IndexError where the bytes are no
+        such message."""
+        ops, body, words, loops = self._ops, self._body, self._words, self._loops
+        at, step = self.at, self._step
+        left = SLICE
+        while left:
+            do, one, other = ops[step]
+            step += 1
+            if do is TEXT:
+                at = (at + 3) & -LENGTH
+                size = words[at >> 2]
+                at += LENGTH + size
+                if not size or body[at - 1]:
+                    raise ValueError(f"a text that ends at {at} is cut off or has no end")
+            elif do is PASS:
+                at += one[at % PHASES]
+            elif do is NUMBERS:
+                at = (at + 3) & -LENGTH
+                if count := words[at >> 2]:
+                    at = (at + LENGTH + one - 1) & -one
+                    at += count * one
+                else:
+                    at += LENGTH
+            elif do is EACH:
+                count, at = self._count(at, other)
+                if count:
+                    loops.append(count)
+                else:
+                    step = one
+            elif do is NEXT:
+                if loops[-1] > 1:
+                    loops[-1] -= 1
+                    step = one
+                else:
+                    loops.pop()
+                left -= 1
+            elif do is CHOSEN:
+                at, step = self._next_element(at)
+                left -= 1
+            elif do is END:
+                self.at = at
+                return True
+            else:
+                at, step = STEPS[do](self, at, step, one)
+        self.at, self._step = at, step
+        return False
+
+    def _count(self, at: int, least: int) -> tuple[int, int]:
+        """How many elements come, which must have their bytes, and where the first begins."""
+        at = (at + 3) & -LENGTH
+        count = self._words[at >> 2]
+        at += LENGTH
+        if count * least > len(self._body) - at:
+            raise ValueError(f"{count} elements at {at} are more than there are")
+        return count, at
+
+    def _wide_text(self, at: int, step: int, _: None) -> Next:
+        count, at = self._count(at, LENGTH)
+        return at + count * LENGTH, step
+
+    def _bool(self, at: int, step: int, _: None) -> Next:
+        if self._body[at] > 1:
+            raise ValueError(f"a bool is {self._body[at]}, not 0 or 1")
+        return at + 1, step
+
+    def _alike(self, at: int, step: int, room: Any) -> Next:
+        count, at = self._count(at, 1)
+        return passed(room, at, count), step
+
+    def _times(self, at: int, step: int, count: int) -> Next:
+        self._loops.append(count)
+        return at, step
+
+    def _note(self, at: int, step: int, mark: Mark) -> Next:
+        self.marks[mark] = at
+        return at, step
+
+    # Elements of lists.
+
+    def _compare(self, at: int, step: int, key: Lookup) -> Next:
+        value = self._value(at, key)
+        if value in key.values:
+            looking = self._loops[-1]
+            hits = self._hits.setdefault(key, {}).setdefault(value, [])
+            if len(hits) < ENOUGH:
+                hits.append((looking.index, looking.start))
+        return at, step
+
+    def _value(self, at: int, key: Lookup) -> Any:
+        if key.type.name != "string":
+            return self._reader(key.type)(self._body, at)[0]
+        at = (at + 3) & -LENGTH
+        end = at + LENGTH + self._words[at >> 2]
+        if end - at not in key.sizes:
+            return None
+        return key.texts.get(bytes(self._body[at + LENGTH : end]))
+
+    def _choose(self, at: int, _: int, choice: Choice) -> Next:
+        return self._look(at, choice, choice.indexes)
+
+    def _look(
+        self, at: int, choice: Choice, indexes: Mapping[int, int], resume: int | None = None
+    ) -> Next:
+        count = choice.count
+        if count is None:
+            count, at = self._count(at, choice.least)
+        if choice.looks_up is not None:
+            self._counts[choice.looks_up] = count
+        looking = _Looking(choice, indexes, count, at, resume)
+        self._loops.append(looking)
+        if (room := choice.room) is not None:
+            looking.chosen = [(passed(room, at, i), s) for i, s in indexes.items() if i < count]
+            return self._looked(passed(room, at, count))
+        if not count:
+            return self._looked(at)
+        looking.note()
+        return at, choice.body
+
+    def _next_element(self, at: int) -> Next:
+        looking: _Looking = self._loops[-1]
+        looking.index += 1
+        if looking.index == looking.count:
+            return self._looked(at)
+        looking.start = at
+        looking.note()
+        return at, looking.choice.body
+
+    def _looked(self, at: int) -> Next:
+        """Each element was looked at: those with the keys are chosen too."""
+        looking: _Looking = self._loops[-1]
+        if looking.resume is None:
+            looking.resume = at
+        if looking.choice.place is None:
+            for key in looking.choice.found:
+                chosen = self._chosen_by(key, looking.choice)
+                looking.chosen += [(place, step) for _, place, step in chosen]
+        return self._done(at, 0, None)
+
+    def _done(self, _at: int, _step: int, _: None) -> Next:
+        """On to the next one that was chosen, or behind the list."""
+        looking: _Looking = self._loops[-1]
+        if looking.chosen:
+            return looking.chosen.pop()
+        self._loops.pop()
+        assert looking.resume is not None
+        return looking.resume, looking.choice.after
+
+    def _beside(self, at: int, _: int, choice: Choice) -> Next:
+        """Elements of a list by what the one beside it says; both must be equally long."""
+        assert choice.key is not None
+        assert choice.place is not None
+        indexes = {index: step for index, _, step in self._chosen_by(choice.key, choice)}
+        place = self.marks[choice.place]
+        count = self._count(place, choice.least)[0] if choice.count is None else choice.count
+        if not indexes or count != self._counts[choice.key]:
+            return at, choice.after
+        return self._look(place, choice, indexes, at)
+
+    def _chosen_by(self, key: Lookup, choice: Choice) -> list[tuple[int, int, int]]:
+        """(index, place, step) of each element that alone has what it is chosen by."""
+        chosen = []
+        hits = self._hits.get(key, {})
+        for value, step in choice.found[key].items():
+            having = hits.get(value, [])
+            if len(having) == 1:
+                chosen.append((*having[0], step))
+            elif having:
+                self.several.update(choice.several[key, value])
+        return chosen
+
+
+STEPS: Final[Mapping[Do, Callable[[Going, int, int, Any], Next]]] = {
+    Do.WIDE_TEXT: Going._wide_text,
+    Do.BOOL: Going._bool,
+    Do.ALIKE: Going._alike,
+    Do.TIMES: Going._times,
+    Do.NOTE: Going._note,
+    Do.COMPARE: Going._compare,
+    Do.CHOOSE: Going._choose,
+    Do.BESIDE: Going._beside,
+    Do.DONE: Going._done,
+}
+
+
+def _words(body: "memoryview[int]", order: Order) -> Sequence[int]:
+    """All that may be the length of something."""
+    whole = body[: len(body) & -LENGTH]
+    if order == NATIVE:
+        return whole.cast("I")
+    turned = array("I", whole.tobytes())
+    turned.byteswap()
+    return turned

@@ -1,0 +1,160 @@
+"""Which fields of a message are wanted: their paths resolved against a type, as a tree."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from itertools import chain
+from typing import Any
+
+from app.errors import FieldError, InterfaceError
+from app.interfaces.cdr.formats import LENGTH
+from app.interfaces.definitions import FLOATS, TEXTS, Structure, Type
+from app.interfaces.field_path import Key, steps
+from app.interfaces.parsing import BOOLS
+from app.interfaces.validation import scalar_check
+
+Structures = Mapping[str, Structure]
+
+
+@dataclass(eq=False, slots=True)
+class Lookup:
+    """What is compared with a key: the field of that type of each element of a list."""
+
+    type: Type
+    values: set[Any] = field(default_factory=set)
+    texts: dict[bytes, str] = field(default_factory=dict)  # as they lie in a message
+    sizes: set[int] = field(default_factory=set)  # with their lengths before them
+
+    def prepare(self) -> None:
+        """Texts are compared without being decoded."""
+        if self.type.name == "string":
+            self.texts = {f"{value}\0".encode(): value for value in self.values}
+            self.sizes = {LENGTH + len(text) for text in self.texts}
+
+
+@dataclass(eq=False, slots=True)
+class Wanted:
+    """A field on the way to what is wanted, or wanted itself: `paths` then says for which.
+
+    Of a list, elements are chosen by their index, by a field of theirs (`keys`: path of that field →
+    value → element) or by the list of this name beside it (`beside`).
+    """
+
+    paths: list[str] = field(default_factory=list)
+    fields: "dict[str, Wanted]" = field(default_factory=dict)
+    indexes: "dict[int, Wanted]" = field(default_factory=dict)
+    keys: "dict[str, dict[Any, Wanted]]" = field(default_factory=dict)
+    beside: "dict[str, dict[Any, Wanted]]" = field(default_factory=dict)
+    lookup: Lookup | None = None  # it is a key itself
+
+    @property
+    def chooses(self) -> bool:
+        """Whether elements of it are looked at, one by one."""
+        return bool(self.indexes or self.keys or self.lookup)
+
+    def all_paths(self) -> Iterable[str]:
+        """The paths of all that is wanted in it."""
+        yield from self.paths
+        chosen = (*self.keys.values(), *self.beside.values())
+        inner = chain(self.fields.values(), self.indexes.values(), *(one.values() for one in chosen))
+        for one in inner:
+            yield from one.all_paths()
+
+
+class Resolver:
+    """Resolves paths of one set of definitions."""
+
+    def __init__(self, structures: Structures) -> None:
+        self._structures = structures
+
+    def wanted(self, type_name: str, paths: Iterable[str]) -> Wanted:
+        """The tree of these paths; InterfaceError where the type has no such field."""
+        root = Wanted()
+        for path in paths:
+            self._add(root, Type(type_name), path)
+        return root
+
+    def type_at(self, type_name: str, path: str) -> Type:
+        """The type of the field at a path."""
+        return self._add(Wanted(), Type(type_name), path)
+
+    def _add(self, root: Wanted, whole: Type, path: str) -> Type:
+        node, at, around = root, whole, whole
+        for step in steps(path):
+            match step:
+                case Key():
+                    node = self._keyed(node, at, around, step, path)
+                    at = at.element
+                case str():
+                    around, at = at, self._named(at, step, path)
+                    node = node.fields.setdefault(step, Wanted())
+                case _:
+                    at = _indexed(at, step, path)
+                    node = node.indexes.setdefault(step, Wanted())
+        node.paths.append(path)
+        return at
+
+    def _keyed(self, node: Wanted, at: Type, around: Type, key: Key, path: str) -> Wanted:
+        if at.many == "one":
+            raise InterfaceError(f'there is no [{key.path}=…] (in "{path}"): {at} is not a list')
+        kind = self._own_key(at.element, key.path)
+        if kind is not None:
+            value = self._value(key, kind, at.name, path)
+            return node.keys.setdefault(key.path, {}).setdefault(value, Wanted())
+        kind = next((o.type for o in self._fields(around) if o.name == key.path), None)
+        if kind is None or kind.many == "one":
+            raise InterfaceError(f'there is no "{key.path}" (in "{path}"): {self._has(at, around)}')
+        value = self._value(key, kind.element, around.name, path)
+        return node.beside.setdefault(key.path, {}).setdefault(value, Wanted())
+
+    def _own_key(self, element: Type, path: str) -> Type | None:
+        """The type of a single field in an element; None where there is none of this name."""
+        at = element
+        for name in path.split("."):
+            found = next((one.type for one in self._fields(at) if one.name == name), None)
+            if found is None:
+                return None
+            at = found
+        return at
+
+    def _value(self, key: Key, kind: Type, holder: str, path: str) -> Any:
+        """The key's value as the field has it; of whole numbers a constant's name too."""
+        what = f'"{key.path}" (in "{path}") is {kind}'
+        if kind.nested or kind.many != "one" or kind.name in FLOATS:
+            raise InterfaceError(f"{what}: a key is a text, a whole number or a bool")
+        if kind.name in TEXTS:
+            return key.value
+        constants = self._structures[holder].constants
+        found = BOOLS.get(key.value) if kind.name == "bool" else constants.get(key.value)
+        if found is None and kind.name != "bool":
+            found = int(key.value) if key.value.lstrip("-").isdecimal() else key.value
+        try:
+            return scalar_check(kind)(found)
+        except FieldError as error:
+            has = f"; constants of {holder}: {', '.join(constants)}" if constants else ""
+            raise InterfaceError(f'{what}, and "{key.value}" is none: {error.message}{has}') from None
+
+    def _fields(self, kind: Type) -> Iterable[Any]:
+        return self._structures[kind.name].fields if kind.nested and kind.many == "one" else ()
+
+    def _has(self, at: Type, around: Type) -> str:
+        own = [one.name for one in self._fields(at.element)]
+        lists = [one.name for one in self._fields(around) if one.type.many != "one"]
+        elements = f"its elements have {', '.join(own)}; " if own else ""
+        return f"{elements}the lists beside it are {', '.join(lists)}"
+
+    def _named(self, at: Type, name: str, path: str) -> Type:
+        inner = list(self._fields(at))
+        for one in inner:
+            if one.name == name:
+                found: Type = one.type
+                return found
+        has = f"has {', '.join(one.name for one in inner)}" if inner else "has no fields of its own"
+        raise InterfaceError(f'there is no "{name}" (in "{path}"): {at} {has}')
+
+
+def _indexed(at: Type, index: int, path: str) -> Type:
+    if at.many == "one":
+        raise InterfaceError(f'there is no [{index}] (in "{path}"): {at} is not a list')
+    if at.size and index >= at.size:
+        raise InterfaceError(f'there is no [{index}] (in "{path}"): {at} ends with [{at.size - 1}]')
+    return at.element

@@ -1,0 +1,97 @@
+"""From checked values to CDR bytes, little-endian. A writer is made once per structure."""
+
+from collections.abc import Callable, Sequence
+from struct import Struct, pack, unpack
+from typing import Any, Final
+
+from app.interfaces.cdr.formats import FORMATS, HEADER, LENGTH, SIZES, is_number, runs
+from app.interfaces.definitions import Field, Type
+
+Write = Callable[[bytearray, Any], None]  # what is written so far, and a value that is added to it
+
+_COUNT: Final = Struct("<I")
+
+
+def message_writer(fields: Sequence[Field], nested: Callable[[str], Write]) -> Write:
+    """Writes a message object; `nested` finds the writer of another structure."""
+    steps = [_step(run, nested) for run in runs(fields)]
+
+    def write(out: bytearray, message: Any) -> None:
+        for step in steps:
+            step(out, message)
+
+    return write
+
+
+def _step(run: Sequence[Field], nested: Callable[[str], Write]) -> Write:
+    kind, names = run[0].type, [one.attribute for one in run]
+    if is_number(kind) and kind.many == "one":
+        return _numbers([one.type for one in run], names)
+    write, name = _field(kind, nested), names[0]
+    return lambda out, message: write(out, getattr(message, name))
+
+
+def _numbers(kinds: Sequence[Type], names: Sequence[str]) -> Write:
+    size = SIZES[kinds[0].name]
+    form = Struct("<" + "".join(FORMATS[kind.name] for kind in kinds))
+
+    def numbers(out: bytearray, message: Any) -> None:
+        _align(out, size)
+        out += form.pack(*[getattr(message, name) for name in names])
+
+    return numbers
+
+
+def _field(kind: Type, nested: Callable[[str], Write]) -> Write:
+    if is_number(kind):
+        return _many_numbers(kind)
+    one = nested(kind.name) if kind.nested else _text if kind.name == "string" else _wide_text
+    return one if kind.many == "one" else _many(kind, one)
+
+
+def _many(kind: Type, write: Write) -> Write:
+    def many(out: bytearray, values: Sequence[Any]) -> None:
+        if kind.many == "sequence":
+            _count(out, len(values))
+        for value in values:
+            write(out, value)
+
+    return many
+
+
+def _many_numbers(kind: Type) -> Write:
+    form, size = FORMATS[kind.name], SIZES[kind.name]
+
+    def many(out: bytearray, values: Sequence[Any]) -> None:
+        if kind.many == "sequence":
+            _count(out, len(values))
+        if values:
+            _align(out, size)
+            out += values if isinstance(values, bytes) else pack(f"<{len(values)}{form}", *values)
+
+    return many
+
+
+def _text(out: bytearray, text: str) -> None:
+    content = text.encode()
+    _count(out, len(content) + 1)
+    out += content
+    out.append(0)
+
+
+def _wide_text(out: bytearray, text: str) -> None:
+    """As `decoding` reads it: four bytes for each UTF-16 unit."""
+    content = text.encode("utf-16-le")
+    count = len(content) // 2
+    _count(out, count)
+    out += pack(f"<{count}I", *unpack(f"<{count}H", content))
+
+
+def _count(out: bytearray, count: int) -> None:
+    _align(out, LENGTH)
+    out += _COUNT.pack(count)
+
+
+def _align(out: bytearray, size: int) -> None:
+    """Up to the next multiple of `size` behind the header, with zeros."""
+    out.extend(bytes((HEADER - len(out)) % size))

@@ -1,0 +1,161 @@
+"""What descriptions are made of: checked names, what every widget has, a topic's QoS."""
+
+import re
+from collections.abc import Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated, Any, Final, Literal, Self
+
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo
+
+from app.errors import InterfaceError
+from app.interfaces.field_path import Key, steps
+from app.interfaces.names import ACTION_TYPE, MESSAGE_TYPE, NAMESPACE, SERVICE_TYPE, TOPIC, Qos
+from app.interfaces.validation import shown
+
+
+def _topic(given: str) -> str:
+    if not TOPIC.fullmatch(given) or "__" in given:
+        raise ValueError(
+            f'{shown(given)} is not an absolute ROS 2 topic name: it starts with "/", and each part is '
+            'letters, digits and single "_", and starts with no digit'
+        )
+    return given
+
+
+def _type(given: str) -> str:
+    if not MESSAGE_TYPE.fullmatch(given):
+        raise ValueError(
+            f"{shown(given)} is not a ROS 2 message type: it must be like std_msgs/msg/Bool"
+        )
+    return given
+
+
+def _service(given: str) -> str:
+    if not SERVICE_TYPE.fullmatch(given):
+        raise ValueError(
+            f"{shown(given)} is not a ROS 2 service type: it must be like std_srvs/srv/SetBool"
+        )
+    return given
+
+
+def _action(given: str) -> str:
+    if not ACTION_TYPE.fullmatch(given):
+        raise ValueError(
+            f"{shown(given)} is no ROS 2 action type: it must be like nav2_msgs/action/NavigateToPose"
+        )
+    return given
+
+
+def namespace_of(given: str) -> str:
+    whole = f"/{given.strip('/')}" if given.strip("/") else ""
+    if not NAMESPACE.fullmatch(whole) or "__" in whole:
+        raise ValueError(f"{shown(given)} is not a ROS 2 namespace: it must be like /robot1")
+    return whole
+
+
+def _endpoint(given: str) -> str:
+    """Where a session connects to, as Zenoh writes it; Zenoh tells of a wrong one only at the start."""
+    found = ENDPOINT.fullmatch(given)
+    if found is None or not 0 < int(found["port"] or 1) <= MOST_PORT:
+        raise ValueError(f"{shown(given)} is not a Zenoh endpoint: it must be like tcp/robot1:7447")
+    return given
+
+
+def _folder(given: Any, info: ValidationInfo) -> Path:
+    """Relative to the panel file's folder, which is the context of the validation."""
+    if not isinstance(given, str) or not given:
+        raise ValueError(f"must be the path of a folder, not {shown(given)}")
+    folder = Path(info.context or "") / given
+    if not folder.is_dir():
+        raise ValueError(f"{folder} is not a folder: it must be a ROS package or have some in it")
+    return folder
+
+
+def _field(given: str) -> str:
+    try:
+        steps(given)
+    except InterfaceError as error:
+        raise ValueError(str(error)) from None
+    return given
+
+
+def _written_field(given: str) -> str:
+    if any(isinstance(step, Key) for step in steps(_field(given))):
+        raise ValueError(f'"{given}" is filled in: an element is given by its number, as in data[2]')
+    return given
+
+
+def _interlocks(given: Any) -> tuple[str, ...]:
+    """One id, or a list of them."""
+    named = [given] if isinstance(given, str) else given
+    if not isinstance(named, list | tuple):
+        raise ValueError(f"must be the id of an interlock, or a list of ids, not {shown(given)}")
+    if not named:
+        raise ValueError("is an empty list: name an interlock, or leave the key out")
+    for i, one in enumerate(named):
+        if not isinstance(one, str) or not re.fullmatch(ID, one):
+            raise ValueError(f'{shown(one)} is not an id: a-z, 0-9 and "_", a letter first')
+        if one in named[:i]:
+            raise ValueError(f"names {shown(one)} twice")
+    return tuple(named)
+
+
+def some(given: tuple[Any, ...]) -> tuple[Any, ...]:
+    """A list of tables that can't be empty."""
+    if not given:
+        raise ValueError("is empty: it must have one table at least")
+    return given
+
+
+# The protocols are those of the Zenoh that a kiosk has; behind the address stand metadata and settings.
+ENDPOINT: Final = re.compile(
+    r"(?:(?:tcp|udp|tls|quic|ws)/[^\s/?#]+:(?P<port>[0-9]{1,5})|unixsock-stream/[^\s?#]+)"
+    r"(?:\?[^\s?#]+)?(?:#[^\s#]+)?"
+)
+MOST_PORT: Final = 65535
+ID: Final = r"^[a-z][a-z0-9_]{0,63}$"
+Id = Annotated[str, Field(pattern=ID)]
+Interlocks = Annotated[tuple[str, ...], BeforeValidator(_interlocks)]
+Label = Annotated[str, Field(min_length=1, max_length=120)]
+Span = Annotated[int, Field(ge=1, le=12)]
+Topic = Annotated[str, AfterValidator(_topic), Field(max_length=255)]
+Type = Annotated[str, AfterValidator(_type)]
+ServiceType = Annotated[str, AfterValidator(_service)]
+ActionType = Annotated[str, AfterValidator(_action)]
+FieldPath = Annotated[str, AfterValidator(_field)]
+WrittenField = Annotated[str, AfterValidator(_written_field)]  # without keys
+Endpoint = Annotated[str, AfterValidator(_endpoint)]
+Folder = Annotated[Path, BeforeValidator(_folder)]
+Seconds = Annotated[float, Field(gt=0, le=86400, allow_inf_nan=False)]
+
+
+class Description(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, defer_build=True)
+
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """Without the cached properties of the original: they were computed from its fields."""
+        copied = super().model_copy(update=update, deep=deep)
+        for name in copied.__dict__.keys() - type(copied).model_fields:
+            del copied.__dict__[name]
+        return copied
+
+
+class Placed(Description):
+    """What every widget has; `span` is its width in twelfths of the page."""
+
+    id: Id
+    label: Label
+    span: Span = 12
+
+
+class TopicQos(Description):
+    """A topic's QoS; no durability means volatile to publish, and the publisher's to listen."""
+
+    reliability: Literal["reliable", "best_effort"] = "reliable"
+    durability: Literal["volatile", "transient_local"] | None = None
+    depth: Annotated[int, Field(ge=1, le=10_000)] = 10
+
+    @cached_property
+    def on_wire(self) -> Qos:
+        return Qos(self.reliability == "reliable", self.durability == "transient_local", self.depth)

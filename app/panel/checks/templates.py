@@ -1,0 +1,127 @@
+"""Templates tried at load, with examples of what their inputs give."""
+
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import suppress
+from typing import Any, Final
+
+from app.errors import Fault, FieldError, InterfaceError
+from app.interfaces import Interfaces
+from app.interfaces.validation import shown
+from app.panel.faults.wording import listing
+from app.panel.model import Input
+from app.panel.template import NOW, TIME, at, filled, named, with_now
+from app.panel.widgets.inputs import SelectInput, TextInput, ToggleInput
+
+NOW_IS: Final = f'"{{{NOW}}}", alone, is the time of sending and fills a {TIME}'
+ELSEWHERE: Final = " on this page: an input is read from the page it is on"
+
+
+def examples(of: Input) -> list[Any]:
+    """The values at which a template would fail first: limits, every option, true and false."""
+    match of:
+        case TextInput():
+            return ["x" * of.max_length]
+        case SelectInput():
+            return [option.value for option in of.options]
+        case ToggleInput():
+            return [False, True]
+    return [of.typed(of.min), of.typed(of.max)]
+
+
+def template_faults(
+    place: str,
+    template: Mapping[str, Any],
+    type_name: str,
+    inputs: Mapping[str, Input],
+    anywhere: Collection[str],
+    interfaces: Interfaces,
+    faulty: Collection[str] = (),
+) -> Iterator[Fault]:
+    """The first fault of a template for a type, at `place`; `inputs` are those of its page,
+    `anywhere` all ids of inputs. One that names a `faulty` input is not tried: that is told already.
+    """
+    try:
+        names = list(named(template))
+        faults = list(unknown(place, names, inputs, anywhere))
+        if not {name for _, name in names} & set(faulty):
+            faults += _misplaced_now(place, template, type_name, names, interfaces)
+            known = {name: inputs[name] for _, name in names if name in inputs}
+            faults += [] if faults else _tried(place, template, type_name, known, interfaces)
+        yield from faults
+    except FieldError as error:
+        yield Fault(f"{place}.{error.field}".rstrip("."), error.message)
+
+
+def unknown(
+    place: str, names: list[tuple[str, str]], inputs: Collection[str], anywhere: Collection[str]
+) -> Iterator[Fault]:
+    for where, name in names:
+        if name not in inputs and name != NOW:
+            what = f"; there is {listing(sorted(inputs))}" if name not in anywhere else ELSEWHERE
+            yield Fault(f"{place}.{where}", f'no input "{name}"{what}', cause=f"input {name}")
+
+
+def _misplaced_now(
+    place: str,
+    template: Mapping[str, Any],
+    type_name: str,
+    names: list[tuple[str, str]],
+    interfaces: Interfaces,
+) -> Iterator[Fault]:
+    """`"{now}"` alone, where a time is meant. A field that the type does not have is told elsewhere."""
+    for where in (where for where, name in names if name == NOW):
+        with suppress(InterfaceError):
+            kind = interfaces.field_type(type_name, where)
+            if kind != TIME or at(template, where) != f"{{{NOW}}}":
+                yield Fault(f"{place}.{where}", f"{NOW_IS}; the field is {kind}")
+
+
+def _tried(
+    place: str,
+    template: Mapping[str, Any],
+    type_name: str,
+    inputs: Mapping[str, Input],
+    interfaces: Interfaces,
+) -> Iterator[Fault]:
+    tried = {name: examples(one) for name, one in inputs.items()}
+    for turn in range(max(map(len, tried.values()), default=1)):
+        values = {name: some[min(turn, len(some) - 1)] for name, some in tried.items()}
+        try:
+            interfaces.encode(type_name, filled(template, with_now(values)))
+        except FieldError as error:
+            message = _message(error, template, type_name, inputs, values, interfaces)
+            # An input that does not fit may be in several messages.
+            cause = f"value {message}" if message.startswith("input ") else ""
+            yield Fault(f"{place}.{error.field}".rstrip("."), message, cause=cause)
+            return
+
+
+def _message(
+    error: FieldError,
+    template: Mapping[str, Any],
+    type_name: str,
+    inputs: Mapping[str, Input],
+    values: Mapping[str, Any],
+    interfaces: Interfaces,
+) -> str:
+    """What is wrong, by the input that gave it and the type that the field has."""
+    written = at(template, error.field)
+    names = [name for _, name in named(written)] if isinstance(written, str) else []
+    if not names:
+        return error.message
+    try:
+        field = interfaces.field_type(type_name, error.field)
+    except InterfaceError:  # what is written there is no field
+        return error.message
+    if written != f"{{{names[0]}}}":
+        return error.message if _why(error) else f'"{written}" makes text; the field is {field}'
+    one = inputs[names[0]]
+    gives = shown(values[one.id]) if isinstance(one, SelectInput) or _why(error) else one.gives
+    if isinstance(one, TextInput):
+        gives = "text" if not _why(error) else f"up to {one.max_length} characters"
+    return f'input "{one.id}" gives {gives}; the field is {field}{_why(error)}'
+
+
+def _why(error: FieldError) -> str:
+    """What the types alone do not say: a range, a length."""
+    return "" if error.message.startswith("must be") else f": {error.message}"

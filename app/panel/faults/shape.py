@@ -1,0 +1,91 @@
+"""Faults of a panel file's shape: keys and values that are not as the descriptions have them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from pydantic import ValidationError
+
+from app.errors import Fault
+from app.interfaces.validation import shown
+from app.panel.faults.places import place_of
+from app.panel.faults.table_keys import Keys, Model, inner, key_faults
+from app.panel.faults.toml_lines import Path
+from app.panel.faults.wording import near, worded
+from app.panel.model import KINDS, Panel
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """Faults; what is in one of the places of `follow` follows from one of them."""
+
+    faults: list[Fault]
+    follow: tuple[str, ...]
+
+    def explains(self, fault: Fault) -> bool:
+        """Whether a fault that was found later is told already."""
+        return any(_is_in(fault.place, place) for place in self.follow)
+
+
+def shape_of(error: ValidationError, tables: Mapping[str, Any]) -> Shape:
+    """One fault for each mistake that pydantic found in the tables of a panel file."""
+    faults: list[Fault] = []
+    keys: dict[Path, Keys] = {}
+    for one in error.errors():
+        _, path = _walked(one["loc"])
+        match one["type"]:
+            case "missing" | "extra_forbidden" as kind:
+                model, above = _walked(one["loc"][:-1])
+                table = keys.setdefault(above, Keys(above, model, _at(tables, above)))
+                (table.missing if kind == "missing" else table.unknown).append(str(path[-1]))
+            case "union_tag_not_found" | "union_tag_invalid":
+                faults.append(_no_kind(path, one["input"]))
+            case _:
+                key = next(step for step in reversed(path) if isinstance(step, str))
+                faults.append(Fault(place_of(path), worded(one, key)))
+    of_keys, follow = key_faults(keys)
+    faults += of_keys
+
+    def follows(fault: Fault) -> bool:
+        return any(source is not fault and _is_in(fault.place, place) for place, source in follow)
+
+    own = [fault for fault in faults if not follows(fault)]
+    return Shape(own, tuple(place for place, _ in follow))
+
+
+def _is_in(place: str, around: str) -> bool:
+    return place == around or place.startswith((f"{around}.", f"{around}["))
+
+
+def _walked(location: tuple[str | int, ...]) -> tuple[Model, Path]:
+    """The description that a location is in, and the location without pydantic's kind tags."""
+    model: Model = Panel
+    path: Path = ()
+    before: str | int = ""
+    for step in location:
+        if path[-2:-1] == ("widget",) and isinstance(before, int) and step in KINDS:
+            model = KINDS[str(step)]
+        else:
+            path = (*path, step)
+            model = inner(model, step) or model
+        before = step
+    return model, path
+
+
+def _at(tables: Any, path: Path) -> Any:
+    for step in path:
+        tables = tables[step]
+    return tables
+
+
+def _no_kind(path: Path, table: Any) -> Fault:
+    if not isinstance(table, Mapping):
+        return Fault(place_of(path), f"must be a table, not {shown(table)}")
+    kinds = ", ".join(KINDS)
+    if "kind" not in table:
+        if meant := near("kind", table):
+            return Fault(place_of((*path, meant)), 'unknown key; did you mean "kind"?')
+        return Fault(place_of(path), f'"kind" is missing; one of {kinds}')
+    meant = near(str(table["kind"]).lower(), KINDS)
+    hint = f'did you mean "{meant}"?' if meant else f"one of {kinds}"
+    return Fault(place_of((*path, "kind")), f"unknown kind {shown(table['kind'])}; {hint}")

@@ -1,0 +1,98 @@
+"""What is wrong with one value of a panel file, in the file's own terms, and what would be right."""
+
+import re
+from collections.abc import Iterable, Mapping
+from difflib import get_close_matches
+from typing import Any, Final
+
+from app.interfaces.validation import shown
+from app.panel.widgets.inputs import digits
+
+LIKE_A_NAME: Final = 0.7
+MOST_LISTED: Final = 12
+# What a text must be like, by its key.
+PATTERNS: Final[Mapping[str, str]] = {
+    "id": 'is not an id: a-z, 0-9 and "_", a letter first, 64 at most',
+    "format": 'is not a format: it must be like ".1f", "+.2e" or ",d"',
+    "constants": "is not how names of constants start: it must be like STATUS_",
+    "parameter": "is not the name of a parameter: it has no spaces",
+    "default": "has a NUL character, at which a ROS string ends",
+}
+# What a list must be like, by its key.
+LISTS: Final[Mapping[str, str]] = {
+    "interfaces": 'folders: write ["folder"]',
+    "connect": 'Zenoh endpoints: write ["tcp/robot1:7447"]',
+    "topics": 'topics: write ["/battery"]',
+    "options": 'tables, like [{ value = 1, label = "One" }]',
+    "states": 'tables, like [{ value = 0, text = "Idle", shape = "circle" }]',
+    "page": "tables: write [[page]]",
+    "widget": "tables: write [[page.widget]]",
+    "robot": "tables: write [[robot]]",
+    "interlock": "tables: write [[interlock]]",
+}
+# Of a number, by the name of its limit.
+LIMITS: Final[Mapping[str, str]] = {
+    "ge": "{} or more",
+    "gt": "more than {}",
+    "le": "{} or less",
+    "lt": "less than {}",
+}
+
+
+def worded(error: Mapping[str, Any], key: str) -> str:
+    """One of the errors that pydantic has of a value under a key; never in its own words."""
+    kind, given, about = error["type"], shown(error["input"]), error.get("ctx", {})
+    match kind:
+        case "value_error":
+            return str(about["error"])
+        case "string_pattern_mismatch":
+            return f"{given} {PATTERNS.get(key, 'is not written as it must be')}"
+        case "literal_error":
+            return _one_of(re.findall("'([^']*)'", about["expected"]), error["input"])
+        case "tuple_type":
+            return f"must be a list of {LISTS.get(key, 'values')}, not {given}"
+        case "dict_type":
+            return f'must be a table, like {{ field = "value" }}, not {given}'
+        case "string_too_short" | "too_short":
+            return "must not be empty"
+        case "string_too_long" | "too_long":
+            length = len(error["input"])
+            return f"must be {about['max_length']} characters at most; it has {length}"
+    for name, words in LIMITS.items():
+        if name in about:
+            return f"must be {words.format(digits(float(about[name])))}, not {given}"
+    return f"{_must_be(kind)}, not {given}"
+
+
+def near(name: str, known: Iterable[str]) -> str:
+    """The name that is meant, most likely; "" where none is like it: many keys are short and alike."""
+    return next(iter(get_close_matches(name, list(known), n=1, cutoff=LIKE_A_NAME)), "")
+
+
+def listing(names: Iterable[str]) -> str:
+    """What there is, for a fault: the first names and how many more, "none" where there is none."""
+    every = list(names)
+    more = f" and {len(every) - MOST_LISTED} more" if len(every) > MOST_LISTED else ""
+    return ", ".join(every[:MOST_LISTED]) + more or "none"
+
+
+def _one_of(known: list[str], given: Any) -> str:
+    *others, last = (f'"{one}"' for one in known)
+    listed = f"{', '.join(others)} or {last}" if others else last
+    meant = near(str(given).lower(), known)
+    hint = f': did you mean "{meant}"?' if meant else ""
+    return f"must be {listed}, not {shown(given)}{hint}"
+
+
+def _must_be(kind: str) -> str:
+    for part, what in (
+        ("string", "text"),
+        ("bool", "true or false"),
+        ("int", "a whole number"),
+        ("finite", "a finite number"),
+        ("float", "a number"),
+        ("model", "a table"),
+    ):
+        if kind.startswith(part):
+            return f"must be {what}"
+    return "can't be used here"

@@ -1,0 +1,122 @@
+"""Ranges of numbers as panels and ROS 2's parameter descriptors give them, open where they say so.
+
+A value of a descriptor's range is whole steps from its lowest, or its highest
+(rcl_interfaces/msg/FloatingPointRange, IntegerRange).
+"""
+
+import math
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from fractions import Fraction
+from struct import pack, unpack
+from typing import Final
+
+from app.i18n import say
+from app.interfaces import to_plain
+from app.panel.widgets.inputs import digits
+
+# rclcpp takes a double for on a step when it is this near, in units of the last place.
+NEAR_ULP: Final = 100
+WRITTEN_OUT: Final = 1e16  # whole doubles from here on have an exponent
+
+
+@dataclass(frozen=True, slots=True)
+class Range:
+    """From `low` to `high` in steps of `step`; each is None where there is no such limit."""
+
+    low: float | None = None
+    high: float | None = None
+    step: float | None = None
+
+    def holds(self, value: float) -> bool:
+        """Whether a value is inside and on a step."""
+        if self.low is not None and value < self.low:
+            return False
+        if self.high is not None and value > self.high:
+            return False
+        return value == self.high or self.on_step(value)
+
+    def on_step(self, value: float) -> bool:
+        """Exactly as numbers are written, or as near as doubles come to it."""
+        if self.step is None:
+            return True
+        low, step = _exact(self.low or 0), _exact(self.step)
+        steps = round((_exact(value) - low) / step)
+        nearest = low + steps * step
+        if isinstance(value, int) and isinstance(self.step, int):
+            return nearest == value
+        return abs(nearest - _exact(value)) <= abs(_exact(value)) * NEAR_ULP * Fraction(
+            sys.float_info.epsilon
+        )
+
+    def within(self, other: "Range") -> "Range":
+        """This range, narrowed by another; on this one's steps, where the other has none."""
+        low, high = self.low, self.high
+        if other.low is not None and (low is None or other.low > low):
+            low = other.low if other.step is not None else self._step_at(other.low, math.ceil)
+        if other.high is not None and (high is None or other.high < high):
+            high = other.high if other.step is not None else self._step_at(other.high, math.floor)
+        return Range(low, high, self.step if other.step is None else other.step)
+
+    @property
+    def empty(self) -> bool:
+        return self.low is not None and self.high is not None and self.low > self.high
+
+    def _step_at(self, value: float, rounded: Callable[[Fraction], int]) -> float:
+        """The step of this range at or beside a value."""
+        if self.step is None or self.low is None:
+            return value
+        low, step = _exact(self.low), _exact(self.step)
+        found = low + rounded((_exact(value) - low) / step) * step
+        return int(found) if isinstance(self.low, int) else float(found)
+
+
+def described(of: Range, unit: str) -> str:
+    """A range as an operator reads it: "0 to 1.5 m/s, in steps of 0.1"; "" where all is open."""
+    unit = f" {unit}" if unit else ""
+    low, high = _written(of.low), _written(of.high)
+    if of.low is not None and of.high is not None:
+        text = say("limits_both", low=low, high=high, unit=unit)
+    elif of.low is not None:
+        text = say("limits_low", low=low, unit=unit)
+    elif of.high is not None:
+        text = say("limits_high", high=high, unit=unit)
+    else:
+        text = ""
+    if of.step is None or (of.step == 1 and isinstance(of.step, int)):
+        return text
+    steps = say("limits_step", step=_written(of.step))
+    return f"{text}, {steps}" if text else steps
+
+
+def decimal(number: float) -> str:
+    """A number exactly, as HTML has it; what is none as "NaN", "Infinity" or "-Infinity"."""
+    if isinstance(number, int) or not math.isfinite(number):
+        return str(to_plain(number))
+    return digits(number) if abs(number) < WRITTEN_OUT else repr(number)
+
+
+def single(number: float) -> float:
+    """The nearest float32."""
+    try:
+        found: float = unpack("f", pack("f", number))[0]
+    except OverflowError:
+        return math.copysign(math.inf, number)
+    return found
+
+
+def shortest(number: float) -> float:
+    """A float32 as it is written: 0.1 for 0.10000000149011612; any other number as it is."""
+    if not math.isfinite(number) or single(number) != number:
+        return number
+    written = (float(f"{number:.{digits}g}") for digits in range(6, 10))
+    return next(one for one in written if single(one) == number)
+
+
+def _written(number: float | None) -> str:
+    return "" if number is None else decimal(number)
+
+
+def _exact(number: float) -> Fraction:
+    return Fraction(repr(number))

@@ -1,0 +1,37 @@
+"""The tables `[control]`, `[log]` and `[record]` of a panel file."""
+
+from typing import Annotated
+
+from pydantic import Field
+
+from app.panel.base import Description, Seconds, Topic
+
+
+class ControlRules(Description):
+    """`takeover_after_s` without a touch by the holder lets a request through; `local`: browsers on
+    the kiosk's own machine may always take over."""
+
+    required: bool
+    takeover_after_s: Seconds = 30.0
+    local: bool = True
+
+
+class LogRules(Description):
+    """`required`: while the log can't be written, nothing can be pressed. The oldest entries go
+    after `days`, or when the file is larger than `size_mb` megabytes."""
+
+    enabled: bool = True
+    required: bool = True
+    days: Annotated[float, Field(gt=0, le=36_500, allow_inf_nan=False)] = 365.0
+    size_mb: Annotated[float, Field(ge=8, le=100_000, allow_inf_nan=False)] = 512.0
+
+
+class RecordRules(Description):
+    """Around each press what was received is recorded, from `before_s` before it to `after_s` after
+    it. `topics` are some of those that the panel listens to, None for all. The oldest files go when
+    the folder is larger than `max_mb` megabytes."""
+
+    before_s: Annotated[float, Field(ge=0, le=600, allow_inf_nan=False)] = 10.0
+    after_s: Annotated[float, Field(ge=0, le=600, allow_inf_nan=False)] = 10.0
+    max_mb: Annotated[float, Field(ge=16, le=1_000_000, allow_inf_nan=False)] = 512.0
+    topics: Annotated[tuple[Topic, ...] | None, Field(strict=False)] = None

@@ -1,0 +1,1 @@
+"""The widgets of a panel file, a module per family."""

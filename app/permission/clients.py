@@ -1,0 +1,104 @@
+"""Who presses: one identity per browser, by a random token that it keeps, with a short name.
+
+It tells browsers apart, it does not say who the operator is: there are no users here.
+"""
+
+import hashlib
+import re
+import secrets
+from collections import OrderedDict
+from dataclasses import dataclass
+from functools import lru_cache
+from ipaddress import IPv6Address, ip_address
+from typing import Final
+
+from app.i18n import say
+
+TOKEN: Final = re.compile(r"[0-9a-f]{32}")
+BROWSERS_KEPT: Final = 500
+
+
+@dataclass(frozen=True, slots=True)
+class Browser:
+    """`id` may be shown to all, the token that it comes from is the browser's own; "" is one that
+    keeps no token. `local`: it runs on the kiosk's own machine. `number` tells it from others."""
+
+    id: str
+    address: str
+    local: bool
+    number: int
+
+    @property
+    def name(self) -> str:
+        """ "Panel 2"; "the panel at the cell"."""
+        if not self.id:
+            return say("browser_unknown")
+        if self.local:
+            return say("browser_local" if self.number == 1 else "browser_more", number=self.number)
+        return say("browser", number=self.number)
+
+    @property
+    def title(self) -> str:
+        """The name at the begin of a sentence, with the address where it is of use."""
+        name = self.name if self.local else str(self)
+        return name[:1].upper() + name[1:]
+
+    def __str__(self) -> str:
+        return f"{self.name} ({self.address})"
+
+
+class Browsers:
+    """The browsers that came lately, by their tokens; forgets those not seen for the longest time."""
+
+    def __init__(self) -> None:
+        self._known: OrderedDict[str, Browser] = OrderedDict()
+
+    def seen(self, token: str, address: str) -> Browser:
+        """The browser with this token, now at this address."""
+        address, local = where(address)
+        browser = self._known.get(token)
+        if browser is None or (browser.address, browser.local) != (address, local):
+            kept = browser is not None and browser.local == local
+            number = browser.number if browser is not None and kept else self._free_number(local)
+            browser = self._known[token] = Browser(public_id(token), address, local, number)
+        self._known.move_to_end(token)
+        while len(self._known) > BROWSERS_KEPT:
+            self._known.popitem(last=False)
+        return browser
+
+    def _free_number(self, local: bool) -> int:
+        taken = {one.number for one in self._known.values() if one.local == local}
+        return next(n for n in range(1, len(taken) + 2) if n not in taken)
+
+
+def stranger(address: str) -> Browser:
+    """Who came without a token and gets none: a program, mostly."""
+    address, local = where(address)
+    return Browser("", address, local, 0)
+
+
+def newcomer(token: str, address: str) -> Browser:
+    """Who is given this token just now: it is counted when it comes back with it."""
+    address, local = where(address)
+    return Browser(public_id(token), address, local, 0)
+
+
+def new_token() -> str:
+    return secrets.token_hex(16)
+
+
+def public_id(token: str) -> str:
+    """What others may know of a token: the same after a restart, and no way back."""
+    return hashlib.sha256(token.encode()).hexdigest()[:12]
+
+
+@lru_cache(BROWSERS_KEPT)
+def where(address: str) -> tuple[str, bool]:
+    """The address as it is shown, and whether it is of this machine."""
+    try:
+        found = ip_address(address.partition("%")[0])
+    except ValueError:
+        return say("unknown"), False
+    if isinstance(found, IPv6Address) and found.ipv4_mapped:
+        found = found.ipv4_mapped
+    return str(found), found.is_loopback

@@ -1,0 +1,237 @@
+"""The single point of control (ISO 10218): one browser at a time may press for a robot.
+
+Pure, but for its clocks: acts and signs of life come in, a verdict for each press comes out. A
+browser that is not heard of loses what it held or asked for; that is checked before everything else.
+"""
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Final, Literal
+
+from app.i18n import say
+from app.panel.rules import ControlRules
+from app.permission.clients import Browser
+from app.permission.control_authority_view import NO_CONTROL, ControlView, control_view
+from app.permission.interlocks import PERMITTED, Verdict, locked
+
+LIFE_S: Final = 5.0  # without a sign of life; a page with scripts gives one every 1.5 s
+ASK_AGAIN_S: Final = 10.0  # after a request was denied
+
+Refusal = Literal[
+    "",
+    "control_taken",
+    "control_asked_by",
+    "control_denied",
+    "control_not_yours",
+    "control_stranger",
+]
+
+
+@dataclass(slots=True)
+class _Party:
+    """Who holds or asks; `since` counts the time to a takeover, `scripted` once its page answered."""
+
+    browser: Browser
+    since: float
+    alive_until: float
+    scripted: bool
+
+
+class Control:
+    """Who has control of one robot; times are monotonic seconds."""
+
+    def __init__(
+        self,
+        rules: ControlRules,
+        robot: str,
+        *,
+        monotonic: Callable[[], float] = time.monotonic,
+        wall: Callable[[], float] = time.time,
+        tell: Callable[[str], None] = lambda _: None,
+    ) -> None:
+        """`robot` is its name, "" where there is only one; `tell` gets a line for each change."""
+        self.rules = rules
+        self._robot = robot or say("the_robot")
+        self._now = monotonic
+        self._wall = wall
+        self._tell = tell
+        self._holder: _Party | None = None
+        self._asker: _Party | None = None
+        self._since = ""
+        self._given_up = False
+        self._denied: dict[str, float] = {}
+
+    @property
+    def holder(self) -> Browser | None:
+        self.advance()
+        return self._holder.browser if self._holder else None
+
+    @property
+    def asker(self) -> Browser | None:
+        self.advance()
+        return self._asker.browser if self._asker else None
+
+    @property
+    def until(self) -> float:
+        """When time alone would change who has control, where a panel asks for it."""
+        if not self.rules.required:
+            return float("inf")
+        times = [party.alive_until for party in (self._holder, self._asker) if party]
+        return min([*times, self._due()])
+
+    def verdict(self, browser: Browser) -> Verdict:
+        """Whether this browser may press."""
+        if not self.rules.required or _is(browser, self.holder):
+            return PERMITTED
+        if holder := self.holder:
+            return locked("control_held", name=holder.title, robot=self._robot)
+        return locked("control_free", robot=self._robot)
+
+    # Acts: each answers why it was refused, "" where it was done. Done twice is done once.
+
+    def take(self, browser: Browser, life_s: float = LIFE_S) -> Refusal:
+        """Takes what is free; the panel at the cell takes over."""
+        if not browser.id:
+            return "control_stranger"
+        if (holder := self.holder) and not self._over(browser) and not _is(browser, holder):
+            return "control_taken"
+        if not _is(browser, holder):
+            self._hold(browser, life_s, "taken over" if holder else "taken")
+        return ""
+
+    def ask(self, browser: Browser, life_s: float = LIFE_S) -> Refusal:
+        """Asks the holder; what is free or may be taken over is taken."""
+        if not browser.id:
+            return "control_stranger"
+        if not self.holder or self._over(browser) or _is(browser, self.holder):
+            return self.take(browser, life_s)
+        if self._asker:
+            return "" if _is(browser, self._asker.browser) else "control_asked_by"
+        self._denied = {who: until for who, until in self._denied.items() if until > self._now()}
+        if browser.id in self._denied:
+            return "control_denied"
+        self._asker = self._party(browser, life_s)
+        self._tell(f"{browser} asks for control")
+        return ""
+
+    def give(self, browser: Browser, to: str) -> Refusal:
+        """The holder grants the request of the browser with the id `to`."""
+        asker = self.asker
+        if asker is None or asker.id != to or not _is(browser, self.holder):
+            return "control_not_yours"
+        self._pass_on(f"given by {browser}")
+        return ""
+
+    def keep(self, browser: Browser, to: str) -> Refusal:
+        """The holder denies the request of the browser with the id `to`."""
+        asker = self.asker
+        if asker is None or asker.id != to or not _is(browser, self.holder):
+            return "control_not_yours"
+        self._denied[to] = self._now() + ASK_AGAIN_S
+        self._asker = None
+        self.touch(browser)
+        self._tell(f"{browser} keeps control: {asker} was denied")
+        return ""
+
+    def release(self, browser: Browser) -> Refusal:
+        """The holder gives it up: to who asks, else to nobody; who asks, asks no more."""
+        if _is(browser, self.holder):
+            self._given_up = True
+            self._pass_on(f"given up by {browser}")
+        elif _is(browser, self.asker):
+            self._end_request()
+        else:
+            return "control_not_yours"
+        return ""
+
+    # Signs of life.
+
+    def here(self, browser: Browser, touched: bool) -> None:
+        """A page with scripts is there; `touched` by its operator since it said so last."""
+        for party in self._parties(browser):
+            party.scripted = True
+            party.alive_until = self._now() + LIFE_S
+        if touched:
+            self.touch(browser)
+
+    def touch(self, browser: Browser) -> None:
+        """The operator touched or pressed something: a request waits longer."""
+        self.advance()
+        if self._holder and _is(browser, self.holder):
+            self._holder.since = self._now()
+            self._holder.alive_until = max(self._holder.alive_until, self._now() + LIFE_S)
+
+    def loaded(self, browser: Browser, life_s: float, by_hand: bool) -> None:
+        """A page was loaded; without scripts it comes again within `life_s`. With `by_hand` False
+        (a program, a browser that fetches ahead) nothing is taken."""
+        for party in self._parties(browser):
+            party.alive_until = self._now() + (LIFE_S if party.scripted else life_s)
+        if by_hand and not self.holder and not self._given_up and self._over(browser):
+            self._hold(browser, life_s, "taken at its first page")
+
+    def advance(self) -> None:
+        """What time alone has changed."""
+        now = self._now()
+        if self._asker and now >= self._asker.alive_until:
+            self._end_request()
+        if self._holder and now >= self._holder.alive_until:
+            self._pass_on(f"lost by {self._holder.browser}")
+        elif now >= self._due():
+            self._pass_on("taken over for want of a touch")
+
+    def view(self) -> ControlView:
+        """What the pages show."""
+        if not self.rules.required:
+            return NO_CONTROL
+        return control_view(self.rules, self._robot, self.holder, self.asker, self._since)
+
+    def _over(self, browser: Browser) -> bool:
+        return browser.local and self.rules.local and bool(browser.id)
+
+    def _due(self) -> float:
+        """When the request goes through by itself: the holder has the whole time from its begin."""
+        if not self._holder or not self._asker:
+            return math.inf
+        return max(self._holder.since, self._asker.since) + self.rules.takeover_after_s
+
+    def _parties(self, browser: Browser) -> list[_Party]:
+        self.advance()
+        both = (party for party in (self._holder, self._asker) if party)
+        return [party for party in both if _is(browser, party.browser)]
+
+    def _party(self, browser: Browser, life_s: float) -> _Party:
+        return _Party(browser, self._now(), self._now() + life_s, life_s == LIFE_S)
+
+    def _hold(self, browser: Browser, life_s: float, how: str) -> None:
+        self._install(self._party(browser, life_s))
+        self._tell(f"control {how} by {browser}")
+
+    def _install(self, party: _Party | None) -> None:
+        self._holder = party
+        self._since = ""
+        if party:
+            self._given_up = False
+            now = datetime.fromtimestamp(self._wall(), UTC)
+            self._since = now.isoformat(timespec="milliseconds")
+            if self._asker and _is(party.browser, self._asker.browser):
+                self._asker = None
+
+    def _pass_on(self, how: str) -> None:
+        """To who asks, else to nobody."""
+        heir, self._asker = self._asker, None
+        if heir:
+            heir.since = self._now()
+        self._install(heir)
+        self._tell(f"control {how}, now of {heir.browser if heir else 'nobody'}")
+
+    def _end_request(self) -> None:
+        if self._asker:
+            self._tell(f"{self._asker.browser} asks for control no more")
+        self._asker = None
+
+
+def _is(browser: Browser, other: Browser | None) -> bool:
+    return other is not None and bool(browser.id) and browser.id == other.id

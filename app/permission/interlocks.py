@@ -1,0 +1,266 @@
+"""May this be pressed now? Pure: (panel, robot, time) → a verdict with its reason.
+
+Nothing is permitted on a doubt: each ground must be there, and the first that is missing is the
+reason an operator reads.
+"""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Final
+
+from app.dialect.endpoint import ServerRole, TopicRole
+from app.i18n import say
+from app.interfaces.names import Qos
+from app.panel.interlock import Interlock
+from app.panel.model import Action, Call, Display, Hold, Pressed, Publish, Published
+from app.panel.widgets.parameter import DESCRIBE, GET, SET, Parameter
+from app.permission.conditions import permits, unmet
+from app.robot.command_status import IDLE
+from app.robot.graph import Graph, remembered
+from app.robot.parameter_state import UNKNOWN, Declared, each_text, ours_text, suits
+from app.robot.state import Reading, Robot
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """`reason` is None when permitted; `code` is its stable name; `until` (monotonic seconds) is
+    when time alone would change the verdict. `others` are further verdicts that lock the same."""
+
+    permitted: bool
+    code: str = "permitted"
+    reason: str | None = None
+    until: float = math.inf
+    others: tuple["Verdict", ...] = ()
+
+    @property
+    def reasons(self) -> list[str]:
+        """All that is told of a lock, each sentence once."""
+        told = (one.reason for one in (self, *self.others))
+        return list(dict.fromkeys(reason for reason in told if reason))
+
+
+PERMITTED: Final = Verdict(True)
+# The codes of `way`.
+NO_WAY: Final = frozenset(
+    {"no_link", "no_bridge", "no_bridge_of", "bridge_silent", "joining", "catching_up"}
+)
+
+ENDPOINTS_TOLD: Final = 3
+
+# What comes so soon after joining may be a latched value of any age, sent again.
+HISTORY_S: Final = 1.0
+
+# From a server's token to routes that carry the first call: a call sent in the same millisecond was
+# lost 2 times in 30, none after 5 ms, with all on one machine.
+SERVER_SETTLE_S: Final = 0.2
+
+
+def way(robot: Robot, now: float) -> Verdict:
+    """Whether commands can reach the robot at all."""
+    if not robot.link_up:
+        return _no_link(robot.endpoints)
+    if not robot.graph.bridges:
+        return locked("no_bridge_of" if robot.name else "no_bridge", name=robot.name)
+    if robot.graph.silent:
+        return locked("bridge_silent")
+    if now < robot.settled_at:
+        return Verdict(False, "joining", say("joining"), robot.settled_at)
+    if not robot.answers:
+        return locked("bridge_silent")
+    if not robot.caught_up:
+        return locked("catching_up")
+    return PERMITTED
+
+
+@lru_cache(maxsize=64)
+def _no_link(endpoints: tuple[str, ...]) -> Verdict:
+    """With where the bridge was looked for, if that is known."""
+    if not endpoints:
+        return locked("no_link")
+    where, more = ", ".join(endpoints[:ENDPOINTS_TOLD]), len(endpoints) - ENDPOINTS_TOLD
+    if more > 0:
+        where = say("and_more", names=where, number=more)
+    return Verdict(False, "no_link", say("no_link_at", where=where))
+
+
+def interlock_verdict(interlock: Interlock, robot: Robot, now: float) -> Verdict:
+    """Whether an interlock permits."""
+    passable = way(robot, now)
+    if not passable.permitted:
+        return passable
+    topic, key = interlock.topic, robot.key(interlock.topic)
+    if doubt := misfit("MS", interlock, robot):
+        return doubt
+    if interlock.require_publisher and not robot.graph.on_robot("MP", key):
+        return locked("no_publisher", topic=topic)
+    reading = robot.reading(topic)
+    if reading.status != "message":
+        return locked(reading.status, topic=topic, wanted=interlock.type)
+    if robot.silent.any(key, robot.graph.bridges):
+        return locked("new_publisher", topic=topic)
+    if not permits(interlock, reading.value(interlock.field)):
+        return _forbidden(interlock, reading)
+    if interlock.max_age_s is None:
+        return PERMITTED
+    if reading.at < robot.settled_at + HISTORY_S:
+        return locked("waiting", topic=topic)
+    stale_at = reading.at + interlock.max_age_s
+    if now >= stale_at:
+        return locked("stale", topic=topic, limit=f"{interlock.max_age_s:g}")
+    return Verdict(True, until=stale_at)
+
+
+def _forbidden(interlock: Interlock, reading: Reading) -> Verdict:
+    value = reading.value(interlock.field)
+    if reading.several(interlock.field):
+        return locked("several", field=interlock.field, topic=interlock.topic)
+    if value is None:
+        return locked("missing", field=interlock.field, topic=interlock.topic)
+    if not interlock.conditions:
+        return locked("forbidden", name=interlock.name)
+    return Verdict(False, "unmet", unmet(interlock, value))
+
+
+def press_verdict(
+    widget: Pressed | Hold, interlocks: Iterable[Interlock], robot: Robot, now: float
+) -> Verdict:
+    """Whether a widget may be pressed: a way, nothing of its own against it, and its interlocks."""
+    permissions = [interlock_verdict(one, robot, now) for one in interlocks]
+    return command_verdict(widget, way(robot, now), permissions, robot, now)
+
+
+def command_verdict(
+    widget: Pressed | Hold,
+    passable: Verdict,
+    permissions: Sequence[Verdict],
+    robot: Robot,
+    now: float,
+) -> Verdict:
+    """The same by verdicts that are known: of the way, and of the widget's interlocks."""
+    if not passable.permitted:
+        return passable
+    own = _against(widget, robot, now)
+    return combined(permissions if own is None else (own, *permissions))
+
+
+def combined(verdicts: Sequence[Verdict]) -> Verdict:
+    """The verdict of what all have to permit: the first that does not is told first."""
+    if len(verdicts) == 1:
+        return verdicts[0]
+    locking = [one for one in verdicts if not one.permitted]
+    until = min((one.until for one in verdicts), default=math.inf)
+    if not locking:
+        return PERMITTED if until == math.inf else Verdict(True, until=until)
+    return replace(locking[0], until=until, others=tuple(locking[1:]))
+
+
+def _against(widget: Pressed | Hold, robot: Robot, now: float) -> Verdict | None:
+    match widget:
+        case Publish() | Hold():
+            return against_publishing(widget, robot)
+        case Parameter():
+            return against_setting(widget, robot)
+    return against_calling(widget, robot, now)
+
+
+def against_publishing(publish: Published, robot: Robot) -> Verdict | None:
+    """Why a message may not be published: another type, or the last one's effect is awaited."""
+    if doubt := misfit("MP", publish, robot):
+        return doubt
+    if isinstance(publish, Publish) and publish.one_shot and robot.progress.get(publish.id, IDLE).busy:
+        return locked("busy")
+    return None
+
+
+def against_calling(call: Call | Action, robot: Robot, now: float) -> Verdict | None:
+    """Why a service may not be called or a goal not be sent: its server is not there with its type,
+    or an answer is awaited."""
+    role, name = served(call)
+    key = robot.key(name)
+    found = robot.graph.server_type(role, key)
+    if found is None:
+        return locked("no_service", name=name)
+    if found != call.type:
+        return locked("wrong_type", topic=name, found=found, wanted=call.type)
+    ready_at = robot.graph.served_since(role, key) + SERVER_SETTLE_S
+    if now < ready_at:
+        return Verdict(False, "getting_ready", say("getting_ready", name=name), ready_at)
+    known = robot.progress.get(call.id, IDLE)
+    if not known.busy:
+        return None
+    return locked("perhaps_busy") if known.outcome == "unknown" else locked("busy")
+
+
+def against_setting(of: Parameter, robot: Robot) -> Verdict | None:
+    """Why a parameter may not be set: its node is not there or has not told what may be set, or an
+    answer is awaited."""
+    if doubt := parameters_offered(of.node, robot) or unsettable(
+        of, robot.parameters.get(of.id, UNKNOWN)
+    ):
+        return doubt
+    return locked("busy") if robot.progress.get(of.id, IDLE).busy else None
+
+
+def parameters_offered(node: str, robot: Robot) -> Verdict | None:
+    """Why the parameters of a node can't be read and set, by what the graph shows."""
+    for name, wanted in (GET, DESCRIBE, SET):
+        found = robot.graph.server_type("SS", robot.key(f"{node}/{name}"))
+        if found is None:
+            return locked("no_parameters", node=node)
+        if found != wanted:
+            return locked("wrong_type", topic=f"{node}/{name}", found=found, wanted=wanted)
+    return None
+
+
+def unsettable(of: Parameter, known: Declared) -> Verdict | None:
+    """Why a parameter can't be set, by what its node says of it."""
+    code = {
+        "waiting": "parameter_waiting",
+        "cut": "parameter_waiting",
+        "silent": "parameter_silent",
+        "undeclared": "parameter_undeclared",
+        "mistyped": "parameter_mistyped",
+        "unreadable": "parameter_unreadable",
+    }.get(known.state)
+    node, name = of.node, of.parameter
+    if code == "parameter_silent" and known.wall == 0.0:
+        return Verdict(False, code, say(code, node=node, name=name) + say("cyclone_hint"))
+    if code is not None:
+        return locked(code, node=node, name=name, found=known.found, wanted=of.type)
+    if known.read_only:
+        return locked("parameter_read_only", node=node, name=name)
+    if not suits(of, known):
+        theirs = each_text(of, known.range)
+        return locked("parameter_apart", node=node, name=name, theirs=theirs, ours=ours_text(of))
+    return None
+
+
+def served(call: Call | Action) -> tuple[ServerRole, str]:
+    """What serves a call or an action, and by which name."""
+    return ("SS", call.service) if isinstance(call, Call) else ("AS", call.action)
+
+
+def misfit(role: TopicRole, of: Interlock | Published | Display, robot: Robot) -> Verdict | None:
+    """Why a topic can't be trusted, by what the graph shows: another type, a QoS that DDS would
+    not match, a bridge that does not pass it on. `role` is what the panel does with it: publish ("MP")
+    or listen ("MS")."""
+    return _misfit(robot.graph, role, robot.key(of.topic), of.topic, of.type, of.qos.on_wire)
+
+
+@remembered
+def _misfit(
+    graph: Graph, role: TopicRole, key: str, topic: str, type_name: str, qos: Qos
+) -> Verdict | None:
+    if found := graph.wrong_type(role, key, type_name):
+        return locked("wrong_type", topic=topic, found=found, wanted=type_name)
+    if code := graph.wrong_qos(role, key, qos):
+        return locked(code, topic=topic)
+    return locked("unheard", topic=topic) if role == "MS" and graph.unheard(key) else None
+
+
+@lru_cache(maxsize=256)
+def locked(code: str, **about: str | None) -> Verdict:
+    """The verdict for a sentence; the same one again for the same."""
+    return Verdict(False, code, say(code, **about))

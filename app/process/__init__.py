@@ -1,0 +1,1 @@
+"""The operating system: shutdown, listening sockets, the service manager, memory."""

@@ -1,0 +1,140 @@
+"""What a topic said last, read where the panel names a field of it.
+
+The newest counts. What takes longer to read than a turn of the event loop allows is read on in the next
+turns, one message after the other; until the newest is read, it is not known what the topic says now.
+"""
+
+import math
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, Final, Literal
+
+from app.errors import DecodeError
+from app.interfaces import FieldReader, Fields, Walk
+from app.robot.sample import Sample
+from app.robot.slices import Slices
+
+UNREAD_MOST: Final = 16  # messages of a watched topic that wait to be read; of other topics the newest
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """The latest of a topic: not seen yet, seen before a cut, not readable, not read to its end yet
+    (with what the one before said), or a message."""
+
+    status: Literal["waiting", "cut", "unreadable", "reading", "message"]
+    fields: Fields | None = None
+    at: float = -math.inf
+    wall: float = 0.0
+
+    def value(self, path: str) -> Any:
+        """The field at a path that the panel names; None where it is not there."""
+        return None if self.fields is None else self.fields.get(path)
+
+    def several(self, path: str) -> bool:
+        """Whether it is not known because more than one element has the path's key."""
+        return self.fields is not None and self.fields.several(path)
+
+
+WAITING: Final = Reading("waiting")
+
+
+class Topic:
+    """One topic of a robot."""
+
+    def __init__(
+        self,
+        reader: FieldReader,
+        slices: Slices,
+        *,
+        watched: bool,
+        unreadable: Callable[[Sample, DecodeError], None],
+        read_later: Callable[[Reading], None],
+    ) -> None:
+        """Of a `watched` one each message counts; `read_later` gets what took more than one turn."""
+        self._reader = reader
+        self._slices = slices
+        self._unreadable = unreadable
+        self._read_later = read_later
+        self._watched = watched
+        self._unread: deque[Sample] = deque(maxlen=UNREAD_MOST)
+        self._walk: _Walked | None = None  # before the unread
+        self._put_off = False
+        self._last = WAITING
+        self.sample: Sample | None = None  # the newest
+
+    def take(self, sample: Sample) -> None:
+        """A newer message."""
+        self.sample = sample
+        if self._walk is None or not self._watched:
+            self._unread.clear()
+        self._unread.append(sample)
+
+    def reading(self) -> Reading:
+        """What it says now."""
+        if not self._put_off and not self._read():
+            self._put_off = True
+            self._slices.later(self._go_on)
+        if self._walk is None and not self._unread:
+            return self._last
+        return replace(self._last, status="reading")
+
+    def cut(self) -> None:
+        """What it said no longer says what is so."""
+        if self.sample is not None:
+            self._last = replace(self.reading(), status="cut")
+            self._unread.clear()
+            self._walk = None
+
+    def _read(self) -> bool:
+        """Reads what this turn allows; whether that was all."""
+        while (walked := self._next()) is not None:
+            reading = self._read_one(walked, lambda: self._slices.read(walked.walk, walked.size))
+            if reading is None:
+                return False
+        return True
+
+    def _go_on(self, until: float) -> bool:
+        """The same in a later turn; each that is through by then is told."""
+        walked = self._next()
+        if walked is not None:
+            reading = self._read_one(walked, lambda: self._slices.read_until(walked.walk, until))
+            self._put_off = self._next() is not None
+            if reading is not None:
+                self._read_later(reading)
+        else:
+            self._put_off = False
+        return not self._put_off
+
+    def _next(self) -> "_Walked | None":
+        """The one that is to be read now."""
+        if self._walk is None and self._unread:
+            sample = self._unread.popleft()
+            data = bytes(sample.payload)
+            self._walk = _Walked(sample, self._reader.walk(data), len(data))
+        return self._walk
+
+    def _read_one(self, walked: "_Walked", read: Callable[[], Fields | None]) -> Reading | None:
+        """Its reading, which is the last then; None where it is not through."""
+        sample = walked.sample
+        try:
+            fields = read()
+        except DecodeError as error:
+            self._unreadable(sample, error)
+            self._last = Reading("unreadable", None, sample.at, sample.wall)
+        else:
+            if fields is None:
+                return None
+            self._last = Reading("message", fields, sample.at, sample.wall)
+        self._walk = None
+        return self._last
+
+
+@dataclass(frozen=True, slots=True)
+class _Walked:
+    """A message that is being read, of so many bytes."""
+
+    sample: Sample
+    walk: Walk
+    size: int

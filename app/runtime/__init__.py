@@ -1,0 +1,1 @@
+"""One session per robot, and the fleet: wires robot, permission, view, commands and transport."""

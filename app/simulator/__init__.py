@@ -1,0 +1,1 @@
+"""The demo robot: a Zenoh peer that knows nothing of the server."""

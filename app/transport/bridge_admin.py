@@ -1,0 +1,84 @@
+"""What a robot's bridges say of themselves in their admin space: that they run, their routes and
+nodes, the namespace that tells whose they are."""
+
+import asyncio
+import json
+from contextlib import suppress
+from typing import Any, Final, Protocol
+
+from app.dialect import bridge_dialect
+from app.dialect.endpoint import Endpoint
+from app.interfaces.names import type_in
+from app.robot.graph import Route
+from app.robot.state import Robot
+
+MISSES_ALLOWED: Final = 1
+
+
+class AdminSpace(Protocol):
+    """What is needed of the link: (key, payload) of each answer to a query."""
+
+    async def ask(self, selector: str, within_s: float = ...) -> list[tuple[str, bytes]]: ...
+
+
+class Bridges:
+    """Asks the bridges of one robot; what they say goes into its graph."""
+
+    def __init__(self, robot: Robot, link: AdminSpace) -> None:
+        self._robot = robot
+        self._link = link
+        self.missed = 0  # askings in a row that a bridge did not answer
+
+    async def answered(self, within_s: float) -> bool:
+        """Whether all of this robot's bridges run, asked for nothing else. LinkError without a link."""
+        answers = await self._link.ask(bridge_dialect.VERSION, within_s)
+        return self._robot.graph.bridges <= {bridge_dialect.zid_of(key) for key, _ in answers}
+
+    async def ask(self) -> None:
+        """Asks how they are, and of their routes and nodes. LinkError without a link."""
+        graph = self._robot.graph
+        answers, namespaces = await asyncio.gather(
+            self._link.ask(bridge_dialect.VERSION), self._namespaces()
+        )
+        versions = {bridge_dialect.zid_of(key): told.decode(errors="replace") for key, told in answers}
+        graph.configured(namespaces)
+        self.missed = 0 if graph.bridges <= versions.keys() else self.missed + 1
+        if self.missed == 0 or self.missed > MISSES_ALLOWED:
+            graph.answered(versions)
+        if self.missed:
+            return  # it would answer nothing else either, and each question takes its time
+        routes = [
+            r for key, told in await self._ask_json(bridge_dialect.ROUTES) if (r := _route(key, told))
+        ]
+        nodes: set[Endpoint] = set()
+        for key, told in await self._ask_json(bridge_dialect.NODES):
+            with suppress(KeyError, TypeError):  # an answer that is no node's
+                namespace = namespaces.get(bridge_dialect.zid_of(key), self._robot.namespace)
+                nodes.update(bridge_dialect.endpoints_of(key, told, namespace))
+        graph.learn(routes, nodes)
+
+    async def _namespaces(self) -> dict[str, str]:
+        """The namespace of each bridge that says it, "" for none."""
+        return {
+            bridge_dialect.zid_of(key): told["namespace"].rstrip("/")
+            for key, told in await self._ask_json(bridge_dialect.CONFIG)
+            if isinstance(told, dict) and isinstance(told.get("namespace"), str)
+        }
+
+    async def _ask_json(self, selector: str) -> list[tuple[str, Any]]:
+        """(key, answer) of each answer that is JSON; others are passed over."""
+        found = []
+        for key, told in await self._link.ask(selector):
+            with suppress(ValueError):
+                found.append((key, json.loads(told)))
+        return found
+
+
+def _route(key: str, told: Any) -> Route | None:
+    """What a bridge says of a route; None for what is none."""
+    place = bridge_dialect.route_of(key)
+    if place is None or not isinstance(told, dict) or not isinstance(told.get("ros2_type"), str):
+        return None
+    zid, direction, topic_key = place
+    whole = direction == "sub" or told.get("dds_reader") != ""
+    return Route(zid, direction, topic_key, type_in(told["ros2_type"]), whole)

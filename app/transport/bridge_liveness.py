@@ -1,0 +1,207 @@
+"""Whether a robot's bridges answer, asked again and again: a cut cable and a frozen bridge are seen by
+their silence, long before Zenoh's lease is over, and whatever lease the bridge is configured with.
+
+A question goes the way of a command, behind all that was sent before: its answer tells that this
+reached the bridge. And it comes behind all that the bridge had sent: after a standstill of the event
+loop it tells that what the robot said meanwhile is taken in.
+"""
+
+import asyncio
+import logging
+import math
+import time
+from collections import deque
+from collections.abc import Callable
+from typing import Any, Final
+
+from app.concurrency import told
+from app.dialect import bridge_dialect
+from app.errors import LinkError
+from app.robot.state import Robot
+from app.ros_logging import RobotLog
+from app.transport.bridge_admin import AdminSpace
+
+log = logging.getLogger("kiosk.pulse")
+
+EVERY_S: Final = 0.2
+SILENT_S: Final = 0.4  # without an answer, beside the time that the network takes
+TURN_S: Final = 0.02  # given to an answer that came while the loop stood still
+STOOD_STILL_S: Final = 0.4  # so late to ask: what has come meanwhile is still on its way through
+GOOD: Final = 2  # answers in time to what was asked after a silence: the bridge's news came before
+LOOKED_AT: Final = 10  # answers
+LONGEST_S: Final = 2.5  # a question is not waited for any longer
+
+
+class Silence:
+    """Questions and answers → whether there is silence; times in monotonic seconds. Pure."""
+
+    def __init__(self) -> None:
+        self.silent = False
+        self._asked: deque[float] = deque(maxlen=int(LONGEST_S / EVERY_S) * 10)
+        self._took: deque[float] = deque(maxlen=LOOKED_AT)
+        self._heard_at = math.inf  # the first answer after a silence began
+        self._good = 0
+
+    @property
+    def limit(self) -> float:
+        """How long an answer may take, by the longest that one took lately."""
+        return SILENT_S + max(self._took, default=0.0)
+
+    def ask(self, now: float) -> None:
+        self._asked.append(now)
+
+    def hear(self, asked: float, now: float) -> None:
+        """An answer: what was asked before it and is not answered does not count any more."""
+        while self._asked and self._asked[0] <= asked:
+            self._asked.popleft()
+        in_time = now - asked <= self.limit
+        # In time, or known to be late: else the loop stood still, which says nothing of the network.
+        if in_time or self.silent:
+            self._took.append(now - asked)
+        if self.silent:
+            self._good = self._good + 1 if in_time and asked > self._heard_at else 0
+            self._heard_at = min(self._heard_at, now)
+            self.silent = self._good < GOOD
+
+    def judge(self, now: float) -> None:
+        if not self.silent and self._asked and now - self._asked[0] >= self.limit:
+            self.silent, self._heard_at, self._good = True, math.inf, 0
+
+
+class Pulse:
+    """Of one robot; used on the event loop only."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        link: AdminSpace,
+        changed: Callable[[], None],
+        monotonic: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """`changed` is called when the robot's `answers` has changed."""
+        self._robot = robot
+        self._link = link
+        self._changed = changed
+        self._monotonic = monotonic
+        self._log = RobotLog(log, robot.name)
+        self._silence = Silence()
+        self._bridges: frozenset[str] = frozenset()
+        self._questions: set[asyncio.Task[bool]] = set()
+        self._awaited: set[asyncio.Task[bool]] = set()  # by who wants to know whether something arrived
+        self._silenced: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        self._asking: asyncio.Task[None] | None = None
+        self._asked_at = math.inf  # the last time
+        self._behind = 0  # answers, to what was asked `_behind_since`, until all is taken in
+        self._behind_since = 0.0
+
+    def start(self) -> None:
+        self._asking = told(self._ask_regularly(), self._log, "asking the bridges failed")
+
+    async def stop(self) -> None:
+        """Ends its tasks; what was sent to the end gets the time for an answer."""
+        if self._awaited:
+            await asyncio.wait(self._awaited, timeout=self._silence.limit)
+        tasks: list[asyncio.Task[Any]] = [*self._questions]
+        if self._asking is not None:
+            tasks.append(self._asking)
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+    async def reached(self) -> bool:
+        """Whether all that was sent until now has reached the bridges: they answer what they are asked
+        after it, and there is no silence before. It takes as long as the way there and back."""
+        question = self._ask()
+        self._awaited.add(question)
+        question.add_done_callback(self._awaited.discard)
+        ends: set[asyncio.Future[Any]] = {question, self._silenced}
+        await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
+        return question.done() and not question.cancelled() and question.result()
+
+    def look(self) -> None:
+        """Before anything is judged: whether the event loop stood still, and so may know nothing of
+        what the robot has said meanwhile."""
+        now = self._monotonic()
+        if now - self._asked_at < EVERY_S + STOOD_STILL_S:
+            return
+        if not self._behind:
+            self._log.warning("the event loop stood still for %.1f s", now - self._asked_at)
+        self._behind, self._behind_since = GOOD, now
+        self._catch_up(False)
+
+    def _hear(self, asked: float) -> None:
+        """An answer came: what the bridge sent before it is taken in, when the next one is there."""
+        if self._behind and asked >= self._behind_since:
+            self._behind, self._behind_since = self._behind - 1, self._monotonic()
+            self._catch_up(not self._behind)
+
+    def _catch_up(self, done: bool) -> None:
+        if done != self._robot.caught_up:
+            self._robot.caught_up = done
+            self._changed()
+
+    async def _ask_regularly(self) -> None:
+        while True:
+            self._ask()
+            await asyncio.sleep(EVERY_S)
+
+    def _ask(self) -> "asyncio.Task[bool]":
+        self.look()
+        self._asked_at = self._monotonic()
+        self._follow()
+        task = asyncio.get_running_loop().create_task(self._answered())
+        self._questions.add(task)
+        task.add_done_callback(self._questions.discard)
+        return task
+
+    def _follow(self) -> None:
+        """Of other bridges than before, and of a new session's, nothing is known yet; where one stays,
+        so does its silence."""
+        bridges = self._robot.graph.bridges if self._robot.link_up else frozenset()
+        if bridges != self._bridges:
+            if not bridges & self._bridges:
+                self._silence = Silence()
+            self._bridges = bridges
+            self._tell()
+
+    async def _answered(self) -> bool:
+        """One question to all bridges; whether they answered it."""
+        silence, asked = self._silence, self._monotonic()
+        answer = asyncio.ensure_future(self._all(self._bridges))
+        silence.ask(asked)
+        try:
+            await asyncio.wait({answer}, timeout=silence.limit)
+            if not answer.done():
+                await asyncio.wait({answer}, timeout=TURN_S)
+            answered = answer.done() and answer.result()
+            if not answered:
+                silence.judge(self._monotonic())
+                self._tell()
+                answered = await answer
+        finally:
+            answer.cancel()
+        if answered:
+            silence.hear(asked, self._monotonic())
+            self._tell()
+            self._hear(asked)
+        return answered
+
+    async def _all(self, bridges: frozenset[str]) -> bool:
+        questions = (self._link.ask(bridge_dialect.version(zid), LONGEST_S) for zid in bridges)
+        try:
+            return bool(bridges) and all(await asyncio.gather(*questions))
+        except LinkError:
+            return False  # there is no session at this moment
+
+    def _tell(self) -> None:
+        answers = not self._silence.silent
+        if answers == self._robot.answers:
+            return
+        self._robot.answers = answers
+        if answers:
+            self._log.info("the bridge answers")
+        else:
+            self._log.warning("the bridge does not answer")
+            self._silenced.set_result(None)
+            self._silenced = asyncio.get_running_loop().create_future()
+        self._changed()

@@ -1,0 +1,189 @@
+"""Joining the ROS graph of a bridge: with liveliness tokens, after asking what is there already.
+
+A token makes the bridge create the DDS reader or writer. Those of what the panel publishes are held
+as soon as a bridge is there, so that a topic is known before its first message and none is lost.
+Who creates a route first fixes its type and QoS for all: so a bridge that has just come gets time to
+discover the robot's nodes.
+"""
+
+import asyncio
+import logging
+import math
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Final
+
+from app.concurrency import told
+from app.errors import LinkError
+from app.interfaces import Interfaces
+from app.panel.model import Panel
+from app.robot.state import Robot
+from app.ros_logging import RobotLog
+from app.transport.bridge_admin import Bridges
+from app.transport.liveliness_tokens import Tokens
+from app.transport.zenoh_session import Link
+
+log = logging.getLogger("kiosk.joining")
+
+FAILED: Final = "joining the robot's topics failed"
+FRESH_S: Final = 1.0  # waited for a bridge that came while the kiosk ran
+FOUND_WITHIN_S: Final = 1.0  # then it was there before: its answers come after all its tokens
+SETTLE_S: Final = 0.2  # from the tokens to routes that carry the first message
+SETTLE_MOST_S: Final = 2.0  # where a listener is not reached by then, a press tells so
+ASK_EVERY_S: Final = 5.0
+ASK_AGAIN_S: Final = 0.5
+UNHEARD_ALLOWED: Final = 3  # askings that find a topic without its reader
+
+
+class Joining:
+    """Holds the panel's tokens while a bridge is there, and asks the bridges how they are."""
+
+    def __init__(
+        self,
+        panel: Panel,
+        interfaces: Interfaces,
+        robot: Robot,
+        link: Link,
+        show: Callable[[], None],
+        renew: Callable[[], None],
+    ) -> None:
+        """`show` is called when what is known has changed; `renew` opens a new session."""
+        self._panel = panel
+        self._robot = robot
+        self._log = RobotLog(log, robot.name)
+        self._link = link
+        self._show = show
+        self._renew = renew
+        self._bridges = Bridges(robot, link)
+        self._tokens = Tokens(panel, interfaces, robot)
+        self._unheard = 0
+        self._started_at = time.monotonic()
+        self._joining: asyncio.Task[None] | None = None
+        self._asking: asyncio.Task[None] | None = None
+        self._changed = asyncio.Event()
+
+    def start(self) -> None:
+        self._asking = told(self._ask_regularly(), self._log, FAILED)
+
+    async def stop(self) -> None:
+        """Ends its tasks; the tokens go with the session."""
+        tasks = [task for task in (self._joining, self._asking) if task is not None]
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+    def follow(self, came: bool) -> None:
+        """After every change of the graph; `came`: there is a bridge where there was none."""
+        if came or not self._robot.graph.bridges:
+            self._leave()
+        if came:
+            self._joining = told(self._join(), self._log, FAILED)
+        if self._joined:
+            self._hold()
+            self._changed.set()
+
+    async def answered(self, within_s: float) -> bool:
+        """Asks this robot's bridges whether they run; where one does not answer, all that is known
+        of them is asked for again soon."""
+        if await self._bridges.answered(within_s):
+            return True
+        self._changed.set()
+        return False
+
+    @property
+    def _joined(self) -> bool:
+        return self._robot.settled_at < math.inf
+
+    def _hold(self) -> None:
+        try:
+            self._link.hold(self._tokens.wanted(self._link.zid))
+        except LinkError as error:
+            self._log.warning("%s", error)
+
+    def _leave(self) -> None:
+        self._tokens.forget()
+        self._robot.settled_at = math.inf
+        if self._joining is not None:
+            self._joining.cancel()
+            self._joining = None
+        try:
+            self._link.hold(())
+        except LinkError as error:
+            self._log.warning("%s", error)
+
+    async def _join(self) -> None:
+        if time.monotonic() - self._started_at >= FOUND_WITHIN_S:
+            await asyncio.sleep(FRESH_S)
+        await self._ask_until_answered()
+        if not self._robot.graph.bridges:
+            return  # those that answered are other robots'
+        self._hold()
+        await self._settle()
+        await self._ask_until_answered()
+        self._robot.settled_at = time.monotonic()
+        self._log.info("joined the robot's topics")
+        self._show()
+
+    async def _settle(self) -> None:
+        """Until the routes carry the first message: whom the graph shows as a listener is heard of."""
+        graph = self._robot.graph
+        listened = [
+            key for key in map(self._robot.key, self._panel.publications()) if graph.on_robot("MS", key)
+        ]
+        end = time.monotonic() + SETTLE_MOST_S
+        await asyncio.sleep(SETTLE_S)
+        while time.monotonic() < end and not all(map(self._heard, listened)):
+            await asyncio.sleep(SETTLE_S)
+
+    def _heard(self, key: str) -> bool:
+        try:
+            return self._link.heard(key)
+        except LinkError:
+            return False
+
+    async def _ask_until_answered(self) -> None:
+        """What the bridges do not tell is a doubt: nothing is joined on it."""
+        while True:
+            try:
+                await self._bridges.ask()
+                if self._bridges.missed == 0:
+                    return
+            except LinkError as error:
+                self._log.warning("%s", error)
+            self._show()
+            await asyncio.sleep(ASK_AGAIN_S)
+
+    async def _ask_regularly(self) -> None:
+        """Asks as long as it runs: whatever an answer is, the next one is asked for."""
+        while True:
+            await self._pause(ASK_AGAIN_S if self._bridges.missed or self._unheard else ASK_EVERY_S)
+            if self._joined:
+                try:
+                    await self._bridges.ask()
+                    if not self._robot.graph.bridges:
+                        self._leave()
+                    elif self._joined:  # still
+                        self._hold()
+                        self._heal()
+                except LinkError as error:
+                    self._log.warning("%s", error)
+                self._show()
+
+    def _heal(self) -> None:
+        """A bridge that does not read a topic for this session does so for a new one."""
+        listened = (self._robot.key(topic) for topic in self._panel.subscriptions())
+        lost = [key for key in listened if self._robot.graph.unheard(key)]
+        self._unheard = self._unheard + 1 if lost else 0
+        if self._unheard >= UNHEARD_ALLOWED:
+            self._unheard = 0
+            self._log.error("the bridge does not pass on %s: a new session", ", ".join(lost))
+            self._renew()
+
+    async def _pause(self, longest_s: float) -> None:
+        """Until it is time to ask, or a moment after the graph has changed."""
+        with suppress(TimeoutError):
+            async with asyncio.timeout(longest_s):
+                await self._changed.wait()
+                await asyncio.sleep(ASK_AGAIN_S)
+        self._changed.clear()

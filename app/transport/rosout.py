@@ -1,0 +1,59 @@
+"""The kiosk's own log on a robot's /rosout, so that ROS tools show it."""
+
+import asyncio
+import logging
+from collections.abc import Mapping
+from contextlib import suppress
+from typing import Any, Final, Protocol
+
+from app.errors import LinkError
+from app.interfaces import Interfaces
+from app.interfaces.names import ROSOUT_TOPIC
+from app.robot.state import Robot
+from app.ros_logging import RosoutHandler
+
+LOG_TYPE: Final = "rcl_interfaces/msg/Log"
+OWN: Final = logging.getLogger("kiosk")
+
+
+class Putter(Protocol):
+    """What is needed of the link."""
+
+    def put(self, key: str, payload: bytes) -> None: ...
+
+
+class Rosout:
+    """Publishes each log record of the kiosk's between `start` and `stop`: not what its libraries say,
+    such as uvicorn of its connections."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        interfaces: Interfaces,
+        link: Putter,
+        loop: asyncio.AbstractEventLoop,
+    ) -> None:
+        self._robot = robot
+        self._interfaces = interfaces
+        self._link = link
+        self._loop = loop
+        self._handler = RosoutHandler(self._publish, robot.name)
+        self._stopped = False
+
+    def start(self) -> None:
+        OWN.addHandler(self._handler)
+
+    def stop(self) -> None:
+        self._stopped = True
+        OWN.removeHandler(self._handler)
+
+    def _publish(self, fields: Mapping[str, Any]) -> None:
+        """On whatever thread the record was written."""
+        if self._robot.link_up and not self._stopped:
+            payload = self._interfaces.encode(LOG_TYPE, fields)
+            self._loop.call_soon_threadsafe(self._put, payload)
+
+    def _put(self, payload: bytes) -> None:
+        with suppress(LinkError):  # a log that can't be sent must not become one more log
+            if not self._stopped:
+                self._link.put(self._robot.key(ROSOUT_TOPIC), payload)

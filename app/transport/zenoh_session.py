@@ -1,0 +1,357 @@
+"""The one owner of the Zenoh session. Zenoh calls back on threads of its own; what comes in goes into
+the link's inbox. Only this module and the simulator import zenoh; its errors leave here as LinkError.
+"""
+
+import asyncio
+import atexit
+import ctypes
+import json
+import os
+import re
+import threading
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any, Final
+
+import zenoh
+from zenoh.handlers import Callback
+
+from app.dialect import bridge_dialect
+from app.errors import LinkError, SettingsError
+from app.transport.inbox import NO_KEYS, Changes, Inbox
+
+Config = zenoh.Config
+
+ASK_TIMEOUT_S = 2.0
+CACHE_TIMEOUT_S = 10.0
+MOST_QUEUED = 16  # batches; Zenoh takes no more
+COPIED_MOST = 16_384  # bytes of a sample
+IN_ITS_SOURCE: Final = re.compile(r" at \S+\.rs:\d+\.?")  # where in Zenoh an error was made
+JOINED_WITHIN_MS: Final = 3_000  # by who took a connection
+BLOCKED_MOST_US = 200_000  # how long a put or a question may wait for room: less than a hold's lease
+
+# Zenoh's own setting of its threads, read when its first session opens. By default the thread that
+# waits for the network wakes another one for each message: where one does both, it costs half.
+RUNTIME: Final = "(rx: (handover: net))"
+os.environ.setdefault("ZENOH_RUNTIME", RUNTIME)
+
+
+def config_from(path: Path, connect: Sequence[str] = ()) -> zenoh.Config:
+    """A Zenoh configuration file, with other endpoints to connect to if there are any; SettingsError
+    says what is wrong with it."""
+    try:
+        config = zenoh.Config.from_file(path)
+    except zenoh.ZError as error:
+        raise SettingsError(f"{path} is not a usable Zenoh configuration: {_said(error)}") from error
+    if connect:
+        try:
+            config.insert_json5("connect/endpoints", json.dumps(list(connect)))
+        except zenoh.ZError as error:
+            endpoints = ", ".join(connect)
+            raise SettingsError(
+                f"{endpoints}: can't connect there, a Zenoh endpoint is like tcp/robot1:7447: "
+                f"{_said(error)}"
+            ) from error
+    return _fit(config)
+
+
+def config_to(endpoint: str) -> zenoh.Config:
+    """A session that connects to one endpoint and to nothing else."""
+    config = zenoh.Config()
+    for place, value in {
+        "mode": '"peer"',
+        "connect/endpoints": f'["{endpoint}"]',
+        "listen/endpoints": "[]",
+        "scouting/multicast/enabled": "false",
+        "scouting/gossip/enabled": "false",
+        "open/return_conditions/connect_scouted": "false",
+    }.items():
+        config.insert_json5(place, value)
+    return _fit(config)
+
+
+def _fit(config: zenoh.Config) -> zenoh.Config:
+    """What a kiosk needs of any configuration.
+
+    No shared memory: Zenoh keeps a segment and its file for each session that was, and a session is
+    renewed at every loss of the link. Room for a burst, as Zenoh's own two messages are few. What finds
+    no room waits for it, which stops the event loop: where that takes too long (5 s are Zenoh's own)
+    the connection is closed, once, and all is locked. Nothing is dropped in silence. And a session's
+    end waits for who takes a connection and says nothing, as a frozen bridge's port does: not for 10 s.
+    """
+    config.insert_json5("transport/unicast/open_timeout", str(JOINED_WITHIN_MS))
+    config.insert_json5("transport/shared_memory/enabled", "false")
+    config.insert_json5("transport/link/tx/queue/size/data", str(MOST_QUEUED))
+    wait = "transport/link/tx/queue/congestion_control/block/wait_before_close"
+    config.insert_json5(wait, str(BLOCKED_MOST_US))
+    return config
+
+
+def _said(error: zenoh.ZError) -> str:
+    return IN_ITS_SOURCE.sub("", str(error))
+
+
+@contextmanager
+def _translated(doing: str) -> Iterator[None]:
+    try:
+        yield
+    except zenoh.ZError as error:
+        raise LinkError(f"{doing}: {_said(error)}") from error
+
+
+def _own(payload: zenoh.ZBytes) -> bytes | zenoh.ZBytes:
+    """A payload that may be kept for long: a small one is a part of what the network was read into,
+    and would keep all of that, so that the next message has to be read into another."""
+    return payload if len(payload) > COPIED_MOST else payload.to_bytes()
+
+
+class Link:
+    """A session with its subscribers, publishers and tokens."""
+
+    def __init__(self, config: zenoh.Config, wake: Callable[[bool], None]) -> None:
+        """Opens at once, whether or not anybody is there; `wake` is the inbox's."""
+        self._config = config
+        self._inbox = Inbox(wake)
+        self._subscribe: tuple[str, ...] = ()
+        self._publish: tuple[str, ...] = ()
+        self._held: dict[str, zenoh.LivelinessToken] | None = {}  # None: between two sessions
+        self._open()
+
+    @property
+    def endpoints(self) -> tuple[str, ...]:
+        """Where it connects, as its configuration says; empty where it only looks around."""
+        found = json.loads(self._config.get_json("connect/endpoints"))
+        if isinstance(found, dict):  # for each mode
+            found = found.get(json.loads(self._config.get_json("mode")) or "peer", [])
+        return tuple(map(str, found))
+
+    def _open(self) -> None:
+        with _translated("the Zenoh session can't be opened"):
+            self._session = zenoh.open(self._config)
+        self.zid = str(self._session.zid())
+        atexit.register(self._leave)
+
+    def start(
+        self,
+        subscribe: Iterable[str],
+        publish: Iterable[str],
+        *,
+        prompt: Collection[str] = NO_KEYS,
+        watched: Collection[str] = NO_KEYS,
+        whole: Collection[str] = NO_KEYS,
+    ) -> None:
+        """Declares everything, once in a session; what is `prompt`, `watched` and `whole` of it, the
+        inbox says."""
+        self._inbox.expect(prompt, watched, whole)
+        self._subscribe, self._publish = tuple(subscribe), tuple(publish)
+        self._declare()
+
+    def renew(self) -> None:
+        """A new session with everything declared; blocks for up to some tenths of a second.
+
+        Zenoh would take up the old one by itself. But then the bridge may end for this session
+        what it had just begun again, when it notices late that the old connection is lost: it
+        would show the kiosk as a subscriber and read nothing for it. And a subscriber drops what
+        it has seen before, also when what it saw was cut off in between.
+        """
+        held, self._held = self._held, None
+        self._inbox.renew()
+        with suppress(LinkError):
+            self.close()
+        del held  # a token ends with its object: never under the lock, where Zenoh may call back
+        self._open()
+        self._declare()
+        self._held = {}
+
+    def _declare(self) -> None:
+        with _translated("the Zenoh session can't be used"):
+            self._listeners = (
+                self._session.info.declare_transport_events_listener(
+                    self._direct(self._on_transport), history=True
+                ),
+                self._session.liveliness().declare_subscriber(
+                    bridge_dialect.TOKENS, self._direct(self._on_token), history=True
+                ),
+            )
+            self._publishers = {key: self._publisher(key) for key in self._publish}
+            self._subscribers = [
+                declared for key in self._subscribe for declared in self._subscriptions(key)
+            ]
+
+    def _publisher(self, key: str) -> zenoh.Publisher:
+        return self._session.declare_publisher(
+            key,
+            congestion_control=zenoh.CongestionControl.BLOCK,
+            express=True,
+            reliability=zenoh.Reliability.RELIABLE,
+            allowed_destination=zenoh.Locality.REMOTE,
+        )
+
+    def _subscriptions(self, key: str) -> Iterator[zenoh.Subscriber[None]]:
+        """What is published from now on, and the caches of what was published before. Zenoh's own
+        subscriber with history drops what has an older stamp than what it had last: after a stamp of a
+        clock that is ahead it would be deaf."""
+        put = self._inbox.put
+        yield self._session.declare_subscriber(
+            key, self._direct(lambda sample: put(key, _own(sample.payload), sample.timestamp))
+        )
+        yield self._session.liveliness().declare_subscriber(
+            bridge_dialect.caches(key), self._direct(self._on_cache), history=True
+        )
+
+    def _ask_cache(self, token_key: str) -> None:
+        """Puts the last message of a cache into the inbox."""
+        key, put = bridge_dialect.topic_of_cache(token_key), self._inbox.put_cached
+
+        def take(reply: zenoh.Reply) -> None:
+            if reply.ok is not None:
+                put(key, _own(reply.ok.payload), reply.ok.timestamp)
+
+        with suppress(zenoh.ZError):  # a session that is closed: the next one finds the cache again
+            self._session.get(
+                bridge_dialect.newest(token_key),
+                self._direct(take),
+                target=zenoh.QueryTarget.ALL,
+                consolidation=zenoh.ConsolidationMode.NONE,
+                accept_replies=zenoh.ReplyKeyExpr.ANY,
+                timeout=CACHE_TIMEOUT_S,
+            )
+
+    def _direct(self, function: Callable[[Any], None]) -> "Callback[Any]":
+        """A handler on the receiving thread, with no thread of its own; deaf once renewed."""
+        take = self._inbox.guarded(function)
+
+        def handle(what: Any) -> None:
+            attach()
+            take(what)
+
+        return Callback(handle, indirect=False)
+
+    def hold(self, tokens: Iterable[str]) -> None:
+        """Holds exactly these liveliness tokens from now on."""
+        wanted, held = set(tokens), self._held
+        if held is None:
+            return  # the new session is not joined yet
+        with _translated("can't join the ROS graph"):
+            for token in held.keys() - wanted:
+                held.pop(token).undeclare()
+            for token in wanted - held.keys():
+                held[token] = self._session.liveliness().declare_token(token)
+
+    def put(self, key: str, payload: bytes) -> None:
+        """Sends at once or not at all: nothing is kept for later. LinkError if Zenoh refuses."""
+        with _translated(f"can't send on {key}"):
+            self._publishers[key].put(payload)
+
+    def heard(self, key: str) -> bool:
+        """Whether somebody is known to listen; not whether they act on it."""
+        with _translated(f"can't ask who listens on {key}"):
+            status: Any = self._publishers[key].matching_status  # an object, whatever the stub says
+            return bool(status.matching)
+
+    def query(self, key: str, payload: bytes, timeout_s: float) -> "asyncio.Future[bytes | None]":
+        """Asks once; the future gets the first answer, or None when there is none (any more)."""
+        loop = asyncio.get_running_loop()
+        answered: asyncio.Future[bytes | None] = loop.create_future()
+
+        def finish(answer: bytes | None) -> None:
+            if not answered.done():
+                answered.set_result(answer)
+
+        def hand_over(answer: bytes | None) -> None:
+            with suppress(RuntimeError):  # the loop is closed: nobody waits any more
+                loop.call_soon_threadsafe(finish, answer)
+
+        def on_reply(reply: zenoh.Reply) -> None:
+            if reply.ok is not None:
+                hand_over(reply.ok.payload.to_bytes())
+
+        with _translated(f"can't ask {key}"):
+            self._session.get(
+                key,
+                Callback(on_reply, lambda: hand_over(None), indirect=False),
+                payload=payload,
+                timeout=timeout_s,
+                consolidation=zenoh.ConsolidationMode.NONE,
+            )
+        return answered
+
+    async def ask(self, selector: str, timeout_s: float = ASK_TIMEOUT_S) -> list[tuple[str, bytes]]:
+        """(key, payload) of each answer to a query that comes within `timeout_s`."""
+        loop = asyncio.get_running_loop()
+        done: asyncio.Future[None] = loop.create_future()
+        answers: list[tuple[str, bytes]] = []
+
+        def on_reply(reply: zenoh.Reply) -> None:
+            if reply.ok is not None:
+                answers.append((str(reply.ok.key_expr), reply.ok.payload.to_bytes()))
+
+        def finish() -> None:
+            if not done.done():
+                done.set_result(None)
+
+        def on_end() -> None:
+            with suppress(RuntimeError):  # the loop is closed: nobody waits any more
+                loop.call_soon_threadsafe(finish)
+
+        with _translated(f"can't ask {selector}"):
+            self._session.get(selector, Callback(on_reply, on_end, indirect=False), timeout=timeout_s)
+        with suppress(TimeoutError):
+            await asyncio.wait_for(done, timeout_s + 1)
+        return answers
+
+    def respond(self) -> None:
+        """Returns when neither the inbox nor the session stands still; blocks while one does."""
+        self._inbox.respond()
+        with suppress(zenoh.ZError):  # a session that is being renewed has responded too
+            info = self._session.info
+            info.peers_zid()
+            info.routers_zid()
+
+    def drain(self) -> Changes:
+        """Takes all that came since the last call."""
+        changes = self._inbox.drain()
+        for cache in changes.caches:  # not where it was heard of: a callback may not ask
+            self._ask_cache(cache)
+        return changes
+
+    @property
+    def hurried(self) -> bool:
+        """Whether something came since the last drain that may change what is permitted."""
+        return self._inbox.hurried
+
+    def close(self) -> None:
+        """Takes everything down; blocks for up to some tenths of a second."""
+        atexit.unregister(self._leave)
+        with _translated("the Zenoh session did not close cleanly"):
+            self._session.close()
+
+    def _leave(self) -> None:
+        """Whoever ends without closing it: an interpreter that ends must not be called into."""
+        with suppress(LinkError):
+            self.close()
+
+    # Below: on Zenoh's threads, under the inbox's lock. No work here, and nothing may raise.
+
+    def _on_token(self, sample: zenoh.Sample) -> None:
+        self._inbox.token(str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT)
+
+    def _on_cache(self, sample: zenoh.Sample) -> None:
+        if sample.kind == zenoh.SampleKind.PUT:
+            self._inbox.cache(str(sample.key_expr))
+
+    def _on_transport(self, event: zenoh.TransportEvent) -> None:
+        self._inbox.transport(str(event.transport.zid), event.kind == zenoh.SampleKind.PUT)
+
+
+_KNOWN: Final[set[int]] = set()
+
+
+def attach() -> None:
+    """Called at every call from such a thread; does its work at the first one."""
+    me = threading.get_ident()
+    if me not in _KNOWN:
+        _KNOWN.add(me)
+        if all(thread.ident != me for thread in threading.enumerate()):  # those have theirs
+            ctypes.pythonapi.PyGILState_Ensure()

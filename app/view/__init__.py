@@ -1,0 +1,1 @@
+"""(panel, robot, permission) → view → bytes of events, and when to refresh it."""

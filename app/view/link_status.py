@@ -1,0 +1,202 @@
+"""The three links of the way to the robot, each with what it locks: pure, from (panel, robot, time).
+
+Browser to server, server to bridge, bridge to the robot's nodes. What a control is locked by is told
+by its verdict's code.
+"""
+
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache
+from typing import Final, Literal, TypedDict
+
+from app.clock import format_datetime
+from app.i18n import say
+from app.panel.model import Panel
+from app.permission.interlocks import NO_WAY, PERMITTED, Verdict, misfit
+from app.robot.state import Robot
+
+State = Literal["ok", "wait", "bad"]
+
+BRIDGE: Final = NO_WAY | {"unheard"}
+GONE: Final = frozenset({"no_publisher", "no_service", "no_parameters"})
+NODE: Final = GONE | {
+    "waiting",
+    "cut",
+    "stale",
+    "unreadable",
+    "new_publisher",
+    "reading",
+    "missing",
+    "several",
+    "wrong_type",
+    "publishes_best_effort",
+    "publishes_volatile",
+    "asks_for_reliable",
+    "asks_for_transient_local",
+    "getting_ready",
+    "parameter_waiting",
+    "parameter_silent",
+    "parameter_unreadable",
+}
+BRIDGE_LAMPS: Final[Mapping[str, tuple[State, str]]] = {
+    "no_link": ("bad", "lost"),
+    "no_bridge": ("bad", "absent"),
+    "no_bridge_of": ("bad", "absent"),
+    "bridge_silent": ("bad", "silent"),
+    "joining": ("wait", "pending"),
+    "catching_up": ("wait", "pausing"),
+    "permitted": ("ok", "ok"),
+}
+
+LONGEST_LIST: Final = 120  # characters of labels that are told; the rest is counted
+
+
+class Lamp(TypedDict):
+    """One light: `state` is "ok", "wait" or "bad"."""
+
+    name: str
+    state: State
+    text: str
+
+
+class LinkLamp(Lamp):
+    """A link: `since` is when it came to this state, "" where that is not known; `locks` says which
+    controls it locks, `reason` why it is as it is and what helps, "" where there is nothing to say."""
+
+    since: str
+    locks: str
+    reason: str
+
+
+def lamps(
+    panel: Panel, robot: Robot, passable: Verdict, verdicts: Mapping[str, Verdict], now: float
+) -> tuple[dict[str, LinkLamp], float]:
+    """The three links, and when (monotonic seconds) time alone would change them; `verdicts` are those
+    of all that can be pressed, by its id. The server's link is "ok" wherever it says so itself."""
+    state, text = BRIDGE_LAMPS[passable.code]
+    silence, until = silent(panel, robot, now) if passable.permitted else ("", math.inf)
+    bridge_reason = passable.reason or _first(verdicts, BRIDGE).reason or ""
+    node_state, node_text, node_reason = _node(robot, passable, verdicts, silence)
+    links = {
+        "server": _link("server", "ok", "ok", ""),
+        "bridge": _link("bridge", state, text, bridge_reason, *labels(panel, verdicts, BRIDGE)),
+        "node": _link("robot", node_state, node_text, node_reason, *labels(panel, verdicts, NODE)),
+    }
+    return links, until
+
+
+def summary(name: str, link: Mapping[str, Lamp]) -> Lamp:
+    """One light for a robot: what is wrong on the way to it, or how its nodes are."""
+    shown = link["node"] if link["bridge"]["state"] == "ok" else link["bridge"]
+    return Lamp(name=name, state=shown["state"], text=shown["text"])
+
+
+@lru_cache(maxsize=64)
+def _link(name: str, state: State, text: str, reason: str, *locked: str) -> LinkLamp:
+    """The same lamp, which nobody changes, until it is another one."""
+    return LinkLamp(
+        name=say(name), state=state, text=say(text), since="", locks=locks(locked), reason=reason
+    )
+
+
+def _node(
+    robot: Robot, passable: Verdict, verdicts: Mapping[str, Verdict], silence: str
+) -> tuple[State, str, str]:
+    """State, text and reason of the link from the bridge to the robot's nodes."""
+    if BRIDGE_LAMPS[passable.code][0] == "bad":
+        return "bad", "lost", say("node_unknown")
+    if silence:
+        return "bad", "node_silent", silence
+    gone = robot.seen.gone(robot.graph)
+    if not robot.seen.any(robot.graph):
+        reason = _gone(gone) if gone else say("node_absent") if passable.permitted else ""
+        return "wait", "no_node", reason
+    if gone and _first(verdicts, GONE).reason:
+        return "ok", "ok", _gone(gone)
+    return "ok", "ok", _first(verdicts, NODE).reason or ""
+
+
+def silent(panel: Panel, robot: Robot, now: float) -> tuple[str, float]:
+    """Why a node is taken for silent: its publisher is there by its token, but what it permits is
+    older than the panel allows. "" where none is; and when that may change. What is only shown may
+    be told of events, and looks old by itself."""
+    until = math.inf
+    for of in panel.interlocks:
+        if of.max_age_s is None:
+            continue
+        key, reading = robot.key(of.topic), robot.reading(of.topic)
+        if reading.status not in ("message", "unreadable") or not robot.graph.on_robot("MP", key):
+            continue
+        if misfit("MS", of, robot):
+            continue
+        stale_at = reading.at + of.max_age_s
+        if now >= stale_at:
+            return say("node_stale", topic=of.topic, limit=f"{of.max_age_s:g}"), math.inf
+        until = min(until, stale_at)
+    return "", until
+
+
+def labels(panel: Panel, verdicts: Mapping[str, Verdict], codes: frozenset[str]) -> list[str]:
+    """The labels of the controls that are locked for one of these codes."""
+    locked = {
+        name for name, verdict in verdicts.items() if any(one.code in codes for one in _all(verdict))
+    }
+    return [w.label for w in panel.commands if w.id in locked]
+
+
+def locks(names: Sequence[str]) -> str:
+    """Which controls a link locks, in words; of a long list the rest is counted."""
+    if not names:
+        return say("locks_nothing")
+    told = 1
+    while told < len(names) and len(", ".join(names[: told + 1])) <= LONGEST_LIST:
+        told += 1
+    shown = ", ".join(names[:told])
+    if told == len(names):
+        return say("locks", names=shown)
+    return say("locks_more", names=shown, number=len(names) - told)
+
+
+def _first(verdicts: Mapping[str, Verdict], codes: frozenset[str]) -> Verdict:
+    every = (one for verdict in verdicts.values() for one in _all(verdict))
+    return next((one for one in every if one.code in codes), PERMITTED)
+
+
+def _all(verdict: Verdict) -> tuple[Verdict, ...]:
+    return (verdict, *verdict.others)
+
+
+def _gone(names: Sequence[str]) -> str:
+    more = f" +{len(names) - 1}" if len(names) > 1 else ""
+    return say("node_gone", name=names[0] + more)
+
+
+BROWSERS_OWN = "server"  # each browser knows for itself since when it is connected
+
+
+class Since:
+    """Remembers the state of each link and when it began."""
+
+    def __init__(self, wall: Callable[[], float] = time.time) -> None:
+        """`wall` gives seconds since the epoch."""
+        self._wall = wall
+        self._began: dict[str, tuple[tuple[str, str], str]] = {}
+        self._seen: Mapping[str, LinkLamp] = {}
+        self._dated: dict[str, LinkLamp] = {}
+
+    def dated(self, links: Mapping[str, LinkLamp]) -> dict[str, LinkLamp]:
+        """The same, with `since` for those that the server knows of."""
+        if links != self._seen:
+            self._seen = links
+            self._dated = {name: self._of(name, lamp) for name, lamp in links.items()}
+        return self._dated
+
+    def _of(self, name: str, lamp: LinkLamp) -> LinkLamp:
+        if name == BROWSERS_OWN:
+            return lamp
+        state = (lamp["state"], lamp["text"])
+        known = self._began.get(name)
+        if known is None or known[0] != state:
+            known = self._began[name] = (state, format_datetime(self._wall()))
+        return {**lamp, "since": known[1]}

@@ -1,0 +1,1 @@
+"""HTTP, server-sent events, WebSockets, cookies, security headers and metrics."""

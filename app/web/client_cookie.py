@@ -1,0 +1,78 @@
+"""Which browser asks: a cookie that the server gives it, never in a path."""
+
+import re
+from dataclasses import dataclass
+from typing import Final
+
+from fastapi import Request
+from fastapi.responses import Response
+from starlette.requests import HTTPConnection
+
+from app.permission.clients import TOKEN, Browser, new_token, newcomer, stranger
+from app.web.app_state import Site
+
+COOKIE: Final = "panel_browser"
+KEPT_S: Final = 365 * 86_400
+OTHER_SITES: Final = frozenset({"cross-site", "same-site"})
+
+
+@dataclass(frozen=True, slots=True)
+class Caller:
+    """Who asks, as long as a connection lasts; `token` is "" without a cookie, or with none of ours."""
+
+    token: str
+    address: str
+
+    def seen(self, site: Site) -> Browser:
+        """The browser that this is now; without a token a stranger."""
+        if not self.token:
+            return stranger(self.address)
+        return site.browsers.seen(self.token, self.address)
+
+
+def caller(request: HTTPConnection) -> Caller:
+    token = request.cookies.get(COOKIE, "")
+    address = request.client.host if request.client else ""
+    return Caller(token if TOKEN.fullmatch(token) else "", address)
+
+
+def visitor(request: HTTPConnection, site: Site) -> Browser:
+    """The browser by its cookie; without one, or with one that is none of ours, a stranger."""
+    return caller(request).seen(site)
+
+
+def welcomed(request: Request, site: Site) -> tuple[Browser, str]:
+    """The browser, and the token that it gets with the answer, "" where it has one.
+
+    With a link on another site's page a browser does not send the cookie that it may have: it
+    gets no second one, and tells with its next request who it is.
+    """
+    browser = visitor(request, site)
+    if browser.id or request.headers.get("sec-fetch-site") in OTHER_SITES:
+        return browser, ""
+    token = new_token()
+    if by_hand(request):
+        return site.browsers.seen(token, browser.address), token
+    return newcomer(token, browser.address), token
+
+
+def keep(response: Response, request: Request, token: str) -> Response:
+    """The response, with the cookie where the browser gets one."""
+    if token:
+        response.set_cookie(
+            COOKIE,
+            token,
+            max_age=KEPT_S,
+            path="/",
+            httponly=True,
+            samesite="strict",
+            secure=request.url.scheme == "https",
+        )
+    return response
+
+
+def by_hand(request: Request) -> bool:
+    """Whether a person opened this page: no program, and no browser that fetches ahead."""
+    headers = request.headers
+    ahead = re.search("prefetch|prerender", headers.get("sec-purpose", ""))
+    return headers.get("sec-fetch-dest") == "document" and not ahead

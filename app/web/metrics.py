@@ -1,0 +1,54 @@
+"""What is counted from the start on. app/web/prometheus.py tells it to Prometheus."""
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from app.runtime.fleet import Fleet
+
+
+@dataclass(slots=True)
+class Count:
+    """How often, and since when, in seconds since the epoch."""
+
+    since: float
+    value: int = 0
+
+
+class Open:
+    """How many of a thing are open."""
+
+    def __init__(self) -> None:
+        self.count = 0
+
+    @contextmanager
+    def another(self) -> Iterator[None]:
+        self.count += 1
+        try:
+            yield
+        finally:
+            self.count -= 1
+
+
+class Metrics:
+    """Counts of one application, however often its panel is loaded anew."""
+
+    def __init__(
+        self, left_out: Callable[[], int] = lambda: 0, limited: Callable[[], int] = lambda: 0
+    ) -> None:
+        """`left_out` is how many refusals the operator's log only counts, `limited` how many presses,
+        holds and cancels were more than their limit."""
+        self.left_out = left_out
+        self.limited = limited
+        self.presses: dict[str, Count] = {}  # by outcome
+        self.streams = Open()
+        self.fleet: Fleet | None = None
+
+    def follow(self, fleet: Fleet) -> None:
+        """Reports these robots' links and topics from now on."""
+        self.fleet = fleet
+
+    def pressed(self, outcome: str) -> None:
+        """What came of a press or a hold."""
+        self.presses.setdefault(outcome, Count(time.time())).value += 1

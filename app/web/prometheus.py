@@ -1,0 +1,54 @@
+"""The counts in Prometheus's text format, gathered when it asks."""
+
+from collections.abc import Iterator
+
+from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, generate_latest
+from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
+from prometheus_client.registry import Collector
+
+from app.runtime.fleet import Fleet
+from app.web.metrics import Metrics
+
+
+def exposition(metrics: Metrics) -> tuple[bytes, str]:
+    """What is told, and its media type."""
+    registry = CollectorRegistry()
+    registry.register(_Of(metrics))
+    return generate_latest(registry), CONTENT_TYPE_LATEST
+
+
+class _Of(Collector):
+    def __init__(self, metrics: Metrics) -> None:
+        self._metrics = metrics
+
+    def collect(self) -> Iterator[Metric]:
+        metrics = self._metrics
+        told = "Refused presses that the operator's log only counts"
+        yield CounterMetricFamily("kiosk_refusals_left_out", told, value=metrics.left_out())
+        told = "Presses, holds and cancels over their limit, answered 429"
+        yield CounterMetricFamily("kiosk_presses_limited", told, value=metrics.limited())
+        presses = CounterMetricFamily("kiosk_presses", "Presses by outcome", labels=["outcome"])
+        for outcome, count in metrics.presses.items():
+            presses.add_metric([outcome], count.value, created=count.since)
+        yield presses
+        yield GaugeMetricFamily("kiosk_streams", "Open event streams", value=metrics.streams.count)
+        if metrics.fleet is not None:
+            yield from _of_fleet(metrics.fleet)
+
+
+def _of_fleet(fleet: Fleet) -> Iterator[Metric]:
+    """`robot` is the id of a `[[robot]]`, "" where there is one without."""
+    up = GaugeMetricFamily("kiosk_link_up", "1 while Zenoh has a link", labels=["robot"])
+    bridges = GaugeMetricFamily("kiosk_bridges", "ROS 2 bridges seen", labels=["robot"])
+    ready = GaugeMetricFamily("kiosk_ready", "1 while commands can reach the robot", labels=["robot"])
+    unreadable = CounterMetricFamily(
+        "kiosk_undecodable", "Samples looked at that were not their type", labels=["robot", "key"]
+    )
+    for kiosk in fleet.kiosks:
+        robot, name = kiosk.robot, kiosk.entry.id if kiosk.entry else ""
+        up.add_metric([name], int(robot.link_up))
+        bridges.add_metric([name], len(robot.graph.bridges))
+        ready.add_metric([name], int(kiosk.way.permitted))
+        for key, count in robot.undecodable.items():
+            unreadable.add_metric([name, key], count)
+    yield from (up, bridges, ready, unreadable)

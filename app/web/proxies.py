@@ -1,0 +1,37 @@
+"""Who is behind a proxy: `X-Forwarded-For` and `X-Forwarded-Proto` count from proxies that are named,
+and from nobody else."""
+
+from collections.abc import Sequence
+from typing import Any, Final
+
+from starlette.types import ASGIApp, Receive, Scope, Send
+from uvicorn.middleware.proxy_headers import ProxyHeadersMiddleware
+
+from app.permission.clients import where
+
+PEER: Final = "panel.peer"  # of the connection, in the scope
+
+
+class Proxies:
+    """The layer that puts the client's address in the place of a named proxy's."""
+
+    def __init__(self, app: ASGIApp, named: Sequence[str]) -> None:
+        """`named` are addresses and networks."""
+        self._app = app
+        behind: Any = self._behind  # the same ASGI by other names
+        self._believing: Any = ProxyHeadersMiddleware(behind, list(named))
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        scope[PEER] = scope.get("client")
+        await self._believing(scope, receive, send)
+
+    async def _behind(self, scope: Scope, receive: Receive, send: Send) -> None:
+        peer = scope.pop(PEER)
+        # A loopback address is of the proxy's machine: only where that is this one it is the kiosk's.
+        if peer and _local(scope["client"]) and not _local(peer):
+            scope["client"] = peer
+        await self._app(scope, receive, send)
+
+
+def _local(client: tuple[str, int]) -> bool:
+    return where(client[0])[1]

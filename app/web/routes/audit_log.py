@@ -1,0 +1,243 @@
+"""The operator's log, to read, to filter and to take away as CSV."""
+
+import asyncio
+import json
+import logging
+from contextlib import AsyncExitStack
+from dataclasses import replace
+from datetime import datetime
+from typing import Annotated, Final, TypedDict
+from urllib.parse import urlencode
+
+from fastapi import APIRouter, Query, Request
+from fastapi.responses import HTMLResponse, Response
+from pydantic import BaseModel, ConfigDict, Field, JsonValue
+from starlette.types import Message, Receive, Scope, Send
+
+from app.audit import Entry, Filter, OperatorLog, ReaderProcess, Row
+from app.errors import InputError, LogError, NotFound
+from app.i18n import say
+from app.panel.model import Hold, Input, Panel, Pressed
+from app.panel.widgets.parameter import Parameter
+from app.printable import printable, printable_texts
+from app.web.app_state import CurrentSite, Site
+from app.web.described import TEXT, errors
+
+log = logging.getLogger("kiosk.log")
+
+router = APIRouter()
+
+ROWS_ON_PAGE: Final = 50
+OUTCOMES: Final = (
+    "published", "confirmed", "accepted", "succeeded", "rejected", "canceled", "aborted", "timed_out",
+    "refused", "unknown", "pressed", "began", "resumed", "removed",
+)  # fmt: skip
+TAKEN_WITHIN_S: Final = 20.0  # a piece of an export: another one may be waited for
+START: Final = "http.response.start"
+BODY: Final = "http.response.body"
+
+
+# For who writes programs; what is no time of the calendar is refused with a sentence.
+A_TIME: Final[dict[str, JsonValue]] = {
+    "pattern": (
+        r"^((19[7-9]\d|20\d\d)-(0[1-9]|1[0-2])-(0[1-9]|1\d|2[0-8])"
+        r"(T([01]\d|2[0-3]):[0-5]\d(:[0-5]\d)?(Z|[+-](0\d|1[0-2]):00)?)?)?$"
+    ),
+    "examples": ["2026-11-21T10:00"],
+}
+
+
+class Wanted(BaseModel):
+    """The filter as a form sends it; times are `2026-11-21T10:00`, in the server's zone where they
+    have none of their own."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    since: Annotated[str, Field(max_length=40, json_schema_extra=A_TIME)] = ""
+    until: Annotated[str, Field(max_length=40, json_schema_extra=A_TIME)] = ""
+    widget: Annotated[str, Field(max_length=64)] = ""
+    outcome: Annotated[str, Field(max_length=20)] = ""
+    who: Annotated[str, Field(max_length=64)] = ""
+    text: Annotated[str, Field(max_length=100)] = ""
+    every: bool = False
+    before: Annotated[int, Field(ge=1, lt=2**63)] | None = None
+
+    def filter(self) -> Filter:
+        """Raises InputError for what is no time."""
+        return Filter(
+            since=_ms("since", self.since),
+            until=_ms("until", self.until),
+            **self.model_dump(include={"widget", "outcome", "who", "text", "every"}),
+        )
+
+    def query(self, before: int | None = None) -> str:
+        """The same filter as the query of an address."""
+        given = {k: v for k, v in self.model_dump(exclude={"before"}).items() if v}
+        if before is not None:
+            given["before"] = before
+        return urlencode(given)
+
+
+class LogContext(TypedDict):
+    """What `log.html` gets."""
+
+    site: Site
+    panel: Panel
+    wanted: Wanted
+    typed: dict[str, str]
+    rows: list[Row]
+    labels: dict[str, str]
+    inputs: dict[str, str]
+    outcomes: tuple[str, ...]
+    off: str
+    banner: str
+    fault: str
+    older: str
+    newest: str
+    csv: str
+
+
+@router.get(
+    "/log",
+    response_class=HTMLResponse,
+    summary="The operator's log, the newest first",
+    responses=errors(403, 422, 429, 503),
+)
+async def page(site: CurrentSite, wanted: Annotated[Wanted, Query()]) -> Response:
+    rows: list[Row] = []
+    if isinstance(site.log, OperatorLog):
+        rows = await site.log.rows(wanted.filter(), wanted.before, ROWS_ON_PAGE + 1)
+    more = len(rows) > ROWS_ON_PAGE
+    rows = [_shown(row) for row in rows[:ROWS_ON_PAGE]]
+    panel = site.fleet.panel
+    context = LogContext(
+        site=site,
+        panel=panel,
+        wanted=wanted,
+        typed=printable_texts(wanted.model_dump()),
+        rows=rows,
+        labels={w.id: w.label for w in panel.widgets() if isinstance(w, Pressed | Hold)},
+        inputs={w.id: w.label for w in panel.widgets() if isinstance(w, Input | Parameter)},
+        outcomes=OUTCOMES,
+        off="" if site.log.enabled else say("log_off"),
+        banner=site.banner,
+        fault=site.log.fault,
+        older=wanted.query(rows[-1].entry.seq) if more else "",
+        newest=wanted.query() if wanted.before else "",
+        csv=wanted.query(),
+    )
+    html = site.templates.get_template("log.html").render(
+        **context, clock_of=_clock_of, values_of=_values_of, word=_word
+    )
+    return HTMLResponse(html, headers={"cache-control": "no-store"})
+
+
+@router.get(
+    "/log.csv",
+    response_class=Response,
+    summary="What the filter shows, as CSV",
+    responses=errors(403, 404, 422, 429, 503) | {200: {"content": {"text/csv": {"schema": TEXT}}}},
+)
+async def as_csv(request: Request, site: CurrentSite, wanted: Annotated[Wanted, Query()]) -> Response:
+    if not isinstance(site.log, OperatorLog):
+        raise NotFound(say("log_off"))
+    gzip = "gzip" in request.headers.get("accept-encoding", "")
+    async with AsyncExitStack() as opened:
+        export = await opened.enter_async_context(site.log.export(wanted.filter(), wanted.before, gzip))
+        first = await export.start()
+        return Exported(export, first, gzip, opened.pop_all())
+
+
+class Exported(Response):
+    """An export, handed on piece by piece. One that breaks off, or that nobody takes, is not brought to
+    its end, so that no client takes it for whole."""
+
+    media_type = "text/csv"
+
+    def __init__(self, export: ReaderProcess, first: bytes, gzip: bool, opened: AsyncExitStack) -> None:
+        """`opened` is closed when it is over."""
+        name = f"operators-log-{datetime.now().strftime('%Y%m%d-%H%M%S')}.csv"
+        headers = {"content-disposition": f'attachment; filename="{name}"', "cache-control": "no-store"}
+        if gzip:
+            headers |= {"content-encoding": "gzip", "vary": "accept-encoding"}
+        self._export = export
+        self._first = first
+        self._opened = opened
+        self.status_code = 200
+        self.background = None
+        self.init_headers(headers)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        async with self._opened, asyncio.TaskGroup() as group:
+            going = group.create_task(self._gone(receive))
+            try:
+                await self._send(send, going)
+            except TimeoutError:
+                log.warning("an export of the operator's log was not taken for %g s", TAKEN_WITHIN_S)
+            except LogError as error:
+                if not going.done():
+                    log.warning("an export of the operator's log broke off: %s", error)
+            going.cancel()
+
+    async def _send(self, send: Send, going: "asyncio.Task[None]") -> None:
+        await _taken(send, {"type": START, "status": 200, "headers": self.raw_headers})
+        piece = self._first
+        while piece and not going.done():
+            await _taken(send, {"type": BODY, "body": piece, "more_body": True})
+            piece = await self._export.more()
+        await self._opened.aclose()  # who has it whole may ask for the next
+        await _taken(send, {"type": BODY, "body": b"", "more_body": False})
+
+    async def _gone(self, receive: Receive) -> None:
+        """Until who asked is gone."""
+        while (await receive())["type"] != "http.disconnect":
+            pass
+        self._export.cut()
+
+
+async def _taken(send: Send, message: Message) -> None:
+    """TimeoutError where nobody takes it."""
+    async with asyncio.timeout(TAKEN_WITHIN_S):
+        await send(message)
+
+
+def _time(ms: int) -> datetime:
+    return datetime.fromtimestamp(ms // 1000).replace(microsecond=ms % 1000 * 1000).astimezone()
+
+
+def _clock_of(ms: int) -> str:
+    return _time(ms).strftime("%Y-%m-%d %H:%M:%S.%f")[:-3]
+
+
+def _word(name: str, **about: object) -> str:
+    return say(f"log_page_{name}", **about)
+
+
+def _shown(row: Row) -> Row:
+    """With its texts as a page shows them, but its values: those are JSON still."""
+    cells = (
+        printable(cell) if isinstance(cell, str) and name != "values" else cell
+        for name, cell in row.entry._asdict().items()
+    )
+    return replace(row, entry=Entry._make(cells))
+
+
+def _values_of(text: str) -> list[tuple[str, str]]:
+    """The values of an entry as (name, text), but those that are empty."""
+    return [
+        (
+            printable(name),
+            printable(value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)),
+        )
+        for name, value in json.loads(text).items()
+        if value != ""
+    ]
+
+
+def _ms(name: str, given: str) -> int | None:
+    if not given:
+        return None
+    try:
+        return int(datetime.fromisoformat(given).timestamp() * 1000)
+    except (ValueError, OverflowError, OSError):
+        raise InputError(f'{name}: "{given}" is no time: it must be like 2026-11-21T10:00') from None

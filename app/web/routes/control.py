@@ -1,0 +1,162 @@
+"""Taking control of a robot, asking for it, giving it: JSON for scripts, forms without them."""
+
+import json
+from typing import Annotated, Any, Final, TypeVar
+from urllib.parse import parse_qsl
+
+from fastapi import APIRouter, Path, Request
+from fastapi.responses import JSONResponse, RedirectResponse, Response
+from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, JsonValue, ValidationError
+
+from app.errors import InputError, NotFound
+from app.i18n import say
+from app.panel.base import ID
+from app.permission.clients import Browser
+from app.permission.control_authority import LIFE_S, Refusal
+from app.runtime.robot_session import Kiosk
+from app.web.app_state import CurrentKiosk, CurrentSite
+from app.web.client_cookie import keep, visitor, welcomed
+from app.web.described import FORM, described_body, errors, fields
+from app.web.request_body import body_of
+
+router = APIRouter()
+
+ACTS: Final[list[JsonValue]] = ["take", "ask", "give", "keep", "release"]
+Act = Annotated[str, Path(json_schema_extra={"enum": ACTS})]
+ASKER: Final = r"^[0-9a-f]{0,12}$"
+
+# A form's browser shows that it is there by loading its page anew, at the latest after this time.
+FORM_LIFE_S: Final = 35.0
+
+
+class Acting(BaseModel):
+    """`to` is the id of who asks, for `give` and `keep`: the request that the operator saw; `at` is
+    when it was touched, in the server's own time."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    to: Annotated[str, Field(pattern=ASKER)] = ""
+    page: Annotated[str, Field(pattern=ID)] | None = None
+    at: AwareDatetime | None = None
+
+
+class Here(BaseModel):
+    """`touched`: the operator touched the page since it said so last."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+    touched: bool = False
+
+
+Fields = TypeVar("Fields", bound=BaseModel)
+
+
+class ControlAnswer(BaseModel):
+    """What came of an act: `browser` is the id of who asked, `reason` is "" where it was done."""
+
+    done: bool
+    reason: str
+    browser: str
+    control: dict[str, bool | str]
+
+
+@router.post(
+    "/control/here",
+    status_code=204,
+    summary="The holder's or asker's page is still there",
+    responses=errors(403, 404, 408, 413, 422),
+    openapi_extra=described_body(Here, None, required=False),
+)
+async def here(request: Request, site: CurrentSite, kiosk: CurrentKiosk) -> Response:
+    _required(kiosk)
+    kiosk.control.here(visitor(request, site), _read(Here, await _sent(request)).touched)
+    return Response(status_code=204)
+
+
+@router.post(
+    "/control/{act}",
+    response_model=ControlAnswer,
+    summary="Take, ask for, give, keep or release control of the robot",
+    responses=errors(403, 404, 408, 413, 422)
+    | {
+        303: {"description": "of a form: back to the page"},
+        409: {"model": ControlAnswer, "description": "it was not done"},
+    },
+    openapi_extra=described_body(
+        Acting, fields(to={"pattern": ASKER}, page={"pattern": ID}), required=False
+    ),
+)
+async def act(act: Act, request: Request, site: CurrentSite, kiosk: CurrentKiosk) -> Response:
+    _required(kiosk)
+    browser = visitor(request, site)
+    _, token = welcomed(request, site)  # without a cookie nothing is done yet, the next time it is
+    form = _kind(request) == FORM
+    given = _read(Acting, await _sent(request))
+    reason = "" if form or given.at is None else _late(kiosk, act, given.at.timestamp())
+    refusal = "" if reason else _done(kiosk, act, browser, given.to, FORM_LIFE_S if form else LIFE_S)
+    reason = say(refusal) if refusal else reason
+    kiosk.show()
+    if form:
+        page = kiosk.panel.page(given.page or "") or kiosk.panel.pages[0]
+        query = f"?control={refusal}" if refusal else ""
+        answer: Response = RedirectResponse(f"{kiosk.base}/pages/{page.id}{query}", status_code=303)
+    else:
+        body = {"done": not reason, "reason": reason, "browser": browser.id}
+        content = body | {"control": kiosk.control.view()}
+        answer = JSONResponse(content, status_code=409 if reason else 200)
+    return keep(answer, request, token)
+
+
+def _required(kiosk: Kiosk) -> None:
+    if not kiosk.control.rules.required:
+        raise NotFound("on this panel nobody needs control: its file has no [control] required = true")
+
+
+def _done(kiosk: Kiosk, act: str, browser: Browser, to: str, life_s: float) -> Refusal:
+    control = kiosk.control
+    match act:
+        case "take":
+            return control.take(browser, life_s)
+        case "ask":
+            return control.ask(browser, life_s)
+        case "give":
+            return control.give(browser, to)
+        case "keep":
+            return control.keep(browser, to)
+        case "release":
+            return control.release(browser)
+    raise NotFound(f'there is no "/control/{act:.40}": there is take, ask, give, keep, release, here')
+
+
+def _late(kiosk: Kiosk, act: str, at: float) -> str:
+    """Why what was touched then is not done any more; giving up is never too late."""
+    return "" if act == "release" else kiosk.doubts.late(at)
+
+
+def _kind(request: Request) -> str:
+    return request.headers.get("content-type", "").partition(";")[0].strip().lower()
+
+
+async def _sent(request: Request) -> dict[str, Any]:
+    """The fields of a body: JSON, a form, or nothing at all."""
+    kind, body = _kind(request), await body_of(request)
+    try:
+        if kind == FORM:
+            text = body.decode("ascii")
+            return dict(parse_qsl(text, keep_blank_values=True, max_num_fields=8))
+        fields = json.loads(body or b"{}")
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"the body is not what its type says: {error}") from None
+    if kind not in ("application/json", "") or not isinstance(fields, dict):
+        raise InputError(
+            f'the body must be an object of "application/json" or a "{FORM}", not "{kind}"'
+        )
+    return fields
+
+
+def _read(model: type[Fields], sent: dict[str, Any]) -> Fields:
+    try:
+        return model.model_validate(sent)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        raise InputError(f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from None

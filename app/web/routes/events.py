@@ -1,0 +1,90 @@
+"""The event stream: a snapshot first, then changes, and a heartbeat that never stops."""
+
+import asyncio
+from typing import Final
+
+from fastapi import APIRouter, Request
+from fastapi.responses import Response
+from starlette.types import Message, Receive, Scope, Send
+
+from app.view.heartbeat import beat
+from app.view.publisher import Board, told
+from app.web.app_state import CurrentKiosk, CurrentSite
+from app.web.asgi import direct
+from app.web.client_cookie import keep, welcomed
+from app.web.described import TEXT, errors
+from app.web.metrics import Open
+
+router = APIRouter()
+
+RECONNECT_MS: Final = 500
+
+HEADERS: Final = {"cache-control": "no-store", "x-accel-buffering": "no"}
+MEDIA_TYPE: Final = "text/event-stream"
+
+
+@router.get(
+    "/events",
+    response_class=Response,
+    responses=errors(403, 404, 422) | {200: {"content": {MEDIA_TYPE: {"schema": TEXT}}}},
+    summary="Server-sent events: snapshot, <interlock>-enabled-updated, update, link, control, beat",
+)
+async def events(
+    request: Request, site: CurrentSite, kiosk: CurrentKiosk, once: bool = False
+) -> Response:
+    """`once`: the snapshot alone, for a browser that has no stream to spare."""
+    board = kiosk.board
+    browser, token = welcomed(request, site) if board.view["control"]["required"] else (None, "")
+    first = told(browser.id) if browser else b""
+    answer: Response
+    if once:
+        all_of_it = board.snapshot() + first + beat()
+        answer = Response(all_of_it, media_type=MEDIA_TYPE, headers=HEADERS)
+    else:
+        answer = EventStream(board, first, site.metrics.streams)
+    return keep(answer, request, token)
+
+
+class EventStream(Response):
+    """What one browser gets, until it goes or the board is closed. It waits while the browser does
+    not read, and then skips to now."""
+
+    media_type = MEDIA_TYPE
+
+    def __init__(self, board: Board, first: bytes, streams: Open) -> None:
+        """`first` comes with the snapshot; `streams` counts it while it is open."""
+        self._board = board
+        self._first = first
+        self._streams = streams
+        self.status_code = 200
+        self.background = None
+        self.init_headers(HEADERS)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        await send({"type": "http.response.start", "status": 200, "headers": self.raw_headers})
+        with self._streams.another(), self._board.heartbeat.heard():
+            async with asyncio.TaskGroup() as group:
+                # A task of its own: waking it wakes nothing of what the request came through.
+                writing = group.create_task(self._write(direct(scope, send)))
+                while (await receive())["type"] != "http.disconnect":
+                    pass
+                writing.cancel()
+
+    async def _write(self, send: Send) -> None:
+        board, heartbeat = self._board, self._board.heartbeat
+        version, view, beats = board.version, board.view, heartbeat.count
+        retry = f"retry: {RECONNECT_MS}\n\n".encode()
+        await send(_body(retry + board.snapshot() + self._first + beat()))
+        while not board.closed:
+            await board.news(version, beats)
+            chunk = board.since(version, view) if board.version > version else b""
+            if heartbeat.count > beats:
+                chunk += heartbeat.event
+            version, view, beats = board.version, board.view, heartbeat.count
+            if chunk:
+                await send(_body(chunk))
+        await send({"type": "http.response.body", "body": b"", "more_body": False})
+
+
+def _body(chunk: bytes) -> Message:
+    return {"type": "http.response.body", "body": chunk, "more_body": True}

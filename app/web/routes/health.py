@@ -1,0 +1,67 @@
+"""For who watches the kiosk: is it up, can commands reach the robot, how much of what."""
+
+import asyncio
+from collections.abc import Callable
+
+from fastapi import APIRouter
+from fastapi.responses import JSONResponse, PlainTextResponse, Response
+from pydantic import BaseModel
+
+from app.web.app_state import CurrentSite
+from app.web.described import errors
+from app.web.metrics import Metrics
+
+router = APIRouter()
+
+
+@router.get("/healthz", summary="200 while the process serves", responses=errors(403))
+async def healthz() -> dict[str, str]:
+    return {"status": "ok"}
+
+
+class NotReady(BaseModel):
+    """`code` is the reason's stable name; of several robots each has its own in `robots`."""
+
+    status: str
+    code: str
+    reason: str
+    robots: dict[str, str] = {}
+
+
+@router.get(
+    "/readyz",
+    summary="200 while commands can reach every robot, else 503 with the reason",
+    responses=errors(403)
+    | {
+        200: {"model": dict[str, str], "description": "commands can reach every robot"},
+        503: {"model": NotReady, "description": "they can't"},
+    },
+)
+async def readyz(site: CurrentSite) -> Response:
+    kiosks = site.fleet.kiosks
+    ways = await asyncio.gather(*(kiosk.way_asked() for kiosk in kiosks))
+    way = next((way for way in ways if not way.permitted), None)
+    if way is None:
+        return JSONResponse({"status": "ready"})
+    body: dict[str, object] = {"status": "not ready", "code": way.code, "reason": way.reason}
+    robots = {k.entry.id: w.code for k, w in zip(kiosks, ways, strict=True) if k.entry}
+    return JSONResponse(body | ({"robots": robots} if robots else {}), status_code=503)
+
+
+@router.get(
+    "/metrics",
+    summary="Prometheus text format",
+    response_class=PlainTextResponse,
+    responses=errors(403) | {200: {"description": "the metrics"}},
+)
+async def metrics(site: CurrentSite) -> Response:
+    exposition = await asyncio.to_thread(_exposition)
+    text, media_type = exposition(site.metrics)
+    return Response(text, media_type=media_type)
+
+
+def _exposition() -> Callable[[Metrics], tuple[bytes, str]]:
+    """Read when it is first asked for, on a thread: it takes a while, and most kiosks never need it."""
+    from app.web.prometheus import exposition
+
+    return exposition

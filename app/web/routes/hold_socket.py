@@ -1,0 +1,279 @@
+"""A hold: one WebSocket from the press to its end, because its closing is seen at once.
+
+The server speaks first. Every message of the server's has `stamp`, its own time in ms since the socket
+opened; every message of the browser's has the last `stamp` that it got, and `after`, for how many ms it
+had it: so each one's age is known. Without an answer no browser shows that something is held.
+
+    server   {"stamp": 0.2}
+    browser  {"do": "begin", "inputs": {…}, "seen": "<boot>-<version>", "stamp": 0.2, "after": 0.9}
+    server   {"stamp": 2.1, "state": "held", "lease": "…", "reason": "Held since 10:00:00."}
+    browser  {"do": "beat", "number": 1, "lease": "…", "stamp": 2.1, "after": 80}
+    server   {"stamp": 83.0, "state": "held"}
+    browser  {"do": "end", "why": "released", "lease": "…", "stamp": 83.0, "after": 12}
+    server   {"stamp": 96.4, "state": "ended", "outcome": "published", "reason": "…"}
+
+An end without a lease is that of a browser which has no answer to its begin yet; it may come instead of
+a begin, too, and is answered as any other.
+"""
+
+import asyncio
+import json
+import secrets
+import time
+from collections.abc import Mapping
+from contextlib import suppress
+from functools import partial
+from typing import Annotated, Any, Final, Literal
+
+from fastapi import APIRouter, WebSocket, WebSocketDisconnect
+from pydantic import BaseModel, ConfigDict, Field, JsonValue, TypeAdapter, ValidationError
+from starlette.types import Message
+
+from app.audit.press_record import Noted
+from app.commands.holds.lease import sent_at
+from app.commands.holds.receipts import RELEASED, Holding
+from app.commands.press_context import SEEN
+from app.commands.receipts import By, Receipt, with_doubt
+from app.errors import InputError, LogError
+from app.i18n import say
+from app.panel.template import needed
+from app.runtime.robot_session import Kiosk
+from app.web.app_state import CurrentKiosk, CurrentSite, Site
+from app.web.client_cookie import visitor
+from app.web.request_body import json_of, received
+
+router = APIRouter()
+
+BEGIN_WITHIN_S: Final = 2.0  # from the opening of the socket
+SILENCE_S: Final = 2.0  # a hold is over long before: nobody is there
+# 4000 + HTTP's
+CLOSE: Final[Mapping[str, int]] = {
+    "interlock": 4409,
+    "input": 4422,
+    "limit": 4429,
+    "link": 4503,
+    "log": 4503,
+}
+
+# What a browser may say of why it ends a hold → the code of the sentence.
+WHYS: Final[Mapping[str, str]] = {
+    "released": RELEASED,
+    "cancel": "hold_by_cancel",
+    "sliding": "hold_by_sliding",
+    "second": "hold_by_second",
+    "menu": "hold_by_menu",
+    "blur": "hold_by_blur",
+    "hiding": "hold_by_hiding",
+    "leaving": "hold_by_leaving",
+    "lock": "hold_by_lock",
+    "escape": "hold_by_escape",
+    "silence": "hold_by_silence",
+}
+Milliseconds = Annotated[float, Field(ge=0, le=1e12, allow_inf_nan=False)]
+
+
+class Said(BaseModel):
+    """What every message of a browser has."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    stamp: Milliseconds
+    after: Milliseconds
+
+
+class Begin(Said):
+    do: Literal["begin"]
+    inputs: dict[str, JsonValue]
+    seen: Annotated[str, Field(pattern=SEEN)]
+
+
+class Beat(Said):
+    do: Literal["beat"]
+    lease: str
+    number: Annotated[int, Field(ge=1)]
+
+
+class End(Said):
+    do: Literal["end"]
+    lease: str = ""
+    why: str
+
+
+_message: TypeAdapter[Begin | Beat | End] = TypeAdapter(
+    Annotated[Begin | Beat | End, Field(discriminator="do")]
+)
+
+
+@router.websocket("/widgets/{widget}/hold")
+async def hold(socket: WebSocket, widget: str, site: CurrentSite, kiosk: CurrentKiosk) -> None:
+    kiosk.holds.widget(widget)
+    await socket.accept()
+    session = _Session(socket, site, kiosk, widget)
+    with suppress(WebSocketDisconnect), site.owed.one():
+        receipt = await session.run(widget)
+        if receipt.cause != "limit":
+            site.metrics.pressed(receipt.outcome)
+
+
+class _Session:
+    """One socket and its one hold."""
+
+    def __init__(self, socket: WebSocket, site: Site, kiosk: Kiosk, widget: str) -> None:
+        self._socket = socket
+        self._limits = site.limits
+        self._kiosk = kiosk
+        self._opened_at = time.monotonic()
+        self._ended: asyncio.Future[Receipt] = asyncio.get_running_loop().create_future()
+        self._browser = visitor(socket, site)
+        self._id = secrets.token_hex(8)  # of the hold: in the log, its receipt and its recording
+        self._by = kiosk.doubts.by(widget, self._browser)
+        self._room = kiosk.logbook.room(self._by.origin)
+        self._noted: Noted | None = None
+        self._receipt: Receipt | None = None  # of its end, when all of it is known
+        self._next: asyncio.Future[Message] | None = None  # what the browser says next
+
+    async def run(self, widget: str) -> Receipt:
+        """From the first message to the end; the receipt of the hold, of a refusal too."""
+        await self._say()
+        begun = await self._begun(widget)
+        if self._noted is not None:
+            self._noted.judged("permitted" if isinstance(begun, Holding) else begun.cause)
+        if isinstance(begun, Receipt):
+            begun = await self._refused(begun)
+            await self._say(state="refused", status=CLOSE[begun.cause] - 4000, **begun.as_json())
+            await self._close(CLOSE[begun.cause])
+            return begun
+        telling = asyncio.create_task(self._tell())
+        try:
+            if not self._ended.done():
+                await self._say(state="held", lease=begun.lease.id, reason=begun.since)
+            await self._listen(begun)
+        finally:
+            self._kiosk.holds.end(begun, "hold_by_closing")
+            await asyncio.gather(telling, return_exceptions=True)
+        return self._receipt or self._ended.result()
+
+    async def _begun(self, widget: str) -> Receipt | Holding:
+        holds, by = self._kiosk.holds, self._by
+        refuse = partial(holds.refuse, widget, hold_id=self._id, trace=self._room)
+        try:
+            async with asyncio.timeout(BEGIN_WITHIN_S):
+                said = await self._read()
+        except TimeoutError:
+            return refuse(by, say("hold_late"))
+        if not self._limits.admit(self._browser):
+            return refuse(by, say("too_often"), "limit", trace=False)
+        if isinstance(said, End):
+            return refuse(by, say("hold_let_go"))
+        if not isinstance(said, Begin):
+            return refuse(by, say("hold_by_nonsense"))
+        sent = self._sent(said)
+        inputs = self._kiosk.sending.with_defaults(holds.widget(widget), said.inputs)
+        try:
+            by = self._by = self._kiosk.doubts.by(widget, self._browser, said.seen)
+            if not self._room and (left_out := holds.refusal(widget, inputs, sent, by)):
+                return left_out
+            still_held = await self._written(widget, inputs, by)
+        except InputError as error:
+            return refuse(by, f"{error}.", "input")
+        except LogError as error:
+            return refuse(by, str(error), "log")
+        if not still_held:
+            return refuse(by, say("hold_let_go"))
+        return holds.begin(widget, inputs, sent, by, self._ended.set_result, self._id)
+
+    async def _written(self, widget: str, inputs: Mapping[str, Any], by: By) -> bool:
+        """The entry in the log, while the browser is listened to: whether it holds still."""
+        own = needed(self._kiosk.holds.widget(widget), inputs)
+        writing = asyncio.ensure_future(
+            self._kiosk.logbook.pressed(widget, own, self._id, by.origin, "hold")
+        )
+        self._next = asyncio.ensure_future(self._received())
+        await asyncio.wait({writing, self._next}, return_when=asyncio.FIRST_COMPLETED)
+        let_go = self._next.done()
+        self._noted = await writing
+        return not let_go
+
+    async def _refused(self, receipt: Receipt) -> Receipt:
+        """A hold that did not begin, in the operator's log."""
+        if self._noted is not None:
+            return await self._closed(receipt)
+        if receipt.cause == "limit":
+            return receipt
+        if not self._room:
+            self._kiosk.logbook.leave_out(self._by.origin)
+            return receipt
+        why = await self._kiosk.logbook.refused(
+            receipt.widget, receipt.inputs, receipt.id, self._by.origin, receipt.reason, "hold"
+        )
+        return with_doubt(receipt, why)
+
+    async def _closed(self, receipt: Receipt) -> Receipt:
+        """Its end in the operator's log, on the disk before it is told."""
+        why = await self._noted.closed(receipt.outcome, receipt.reason) if self._noted else ""
+        return with_doubt(receipt, why)
+
+    async def _listen(self, holding: Holding) -> None:
+        """Until the browser closes or says nothing any more: what is late gets its answer too."""
+        with suppress(TimeoutError, WebSocketDisconnect):
+            while True:
+                async with asyncio.timeout(SILENCE_S):
+                    said = await self._read()
+                if self._hear(said, holding):
+                    self._kiosk.control.touch(self._browser)
+                    await self._say(state="held")
+                elif isinstance(said, Beat) and self._receipt is not None:
+                    await self._say(state="ended", **self._receipt.as_json())
+        await self._close(1000)
+
+    def _hear(self, said: Begin | Beat | End | None, holding: Holding) -> bool:
+        """Whether the hold goes on after what was said."""
+        holds = self._kiosk.holds
+        if isinstance(said, End) and said.lease in ("", holding.lease.id):
+            holds.end(holding, WHYS.get(said.why, "hold_by_nonsense"))
+            return False
+        if not isinstance(said, Beat) or said.lease != holding.lease.id:
+            holds.end(holding, "hold_by_nonsense")
+            return False
+        return holds.beat(holding, said.number, self._sent(said))
+
+    async def _received(self) -> Message:
+        return await received(self._socket)
+
+    async def _read(self) -> Begin | Beat | End | None:
+        waiting, self._next = self._next or asyncio.ensure_future(self._received()), None
+        try:
+            message = await waiting
+        finally:
+            waiting.cancel()
+        if message["type"] == "websocket.disconnect":
+            raise WebSocketDisconnect(message.get("code", 1000))
+        return _read(message.get("text") or "")
+
+    def _sent(self, said: Said) -> float:
+        return sent_at(self._opened_at, said.stamp, said.after, time.monotonic())
+
+    async def _tell(self) -> None:
+        """The end, as soon as it is there, whatever ended it; then the browser may close."""
+        receipt = await asyncio.shield(self._ended)
+        if receipt.outcome != "unknown" and not await self._kiosk.reached():
+            receipt = self._kiosk.holds.doubted(receipt)
+        self._receipt = receipt = await self._closed(receipt)
+        with suppress(WebSocketDisconnect, RuntimeError):
+            await self._say(state="ended", **receipt.as_json())
+
+    async def _say(self, **what: Any) -> None:
+        stamp = round(1000 * (time.monotonic() - self._opened_at), 1)
+        await self._socket.send_text(json.dumps({"stamp": stamp, **what}, ensure_ascii=False))
+
+    async def _close(self, code: int) -> None:
+        with suppress(WebSocketDisconnect, RuntimeError):  # the browser was faster
+            await self._socket.close(code)
+
+
+def _read(text: str) -> Begin | Beat | End | None:
+    """A message of a browser's; None for what is none."""
+    try:
+        return _message.validate_python(json_of(text))
+    except (InputError, ValidationError):
+        return None

@@ -1,0 +1,231 @@
+"""The pages, rendered on the server from the same view that feeds the events."""
+
+import asyncio
+import secrets
+import time
+from typing import Any, TypedDict, get_args
+from urllib.parse import urlencode
+
+from fastapi import APIRouter, Request
+from fastapi.responses import HTMLResponse, RedirectResponse, Response
+from jinja2 import Environment
+
+from app import clock
+from app.clock import format_datetime, format_time
+from app.commands.receipts import Receipt
+from app.errors import NotFound
+from app.i18n import say
+from app.panel.model import Input, Page, Panel, Pressed
+from app.panel.template import inputs_of
+from app.panel.widgets.parameter import Parameter
+from app.permission.clients import Browser
+from app.permission.control_authority import Refusal
+from app.permission.control_authority_view import Role, role
+from app.printable import printable_texts
+from app.runtime.robot_session import Kiosk
+from app.view.view import View, as_seen_by
+from app.web.app_state import CurrentSite, Site
+from app.web.client_cookie import by_hand, keep, welcomed
+from app.web.described import PAGE, Described, errors
+
+router = APIRouter(include_in_schema=True)
+
+PAGES: Described = errors(403, 404, 422) | {
+    200: {"content": PAGE},
+    303: {"description": "to the same page of the first of several robots"},
+}
+
+# A page without scripts reloads itself, and loses what was typed and not sent: where there is an
+# input, rarely enough to type in.
+REFRESH_S = 5
+REFRESH_WITH_INPUTS_S = 30
+RELOADED = "reloaded"  # by itself: nobody tapped for it
+RELOADED_S = 2.0  # a press on a page that should have reloaded before is one on an old page
+# How long after a page without scripts was due it is still thought to be there.
+GRACE_S = 5
+REFUSALS = get_args(Refusal)
+WORDS = (
+    "cancel",
+    "robots",
+    "control",
+    "set",
+    "read_again",
+    "back",
+    "empty",
+    "hold_cut",
+    "hold_scripts",
+)
+LINK_WORDS = ("links", "link_state", "link_since", "link_locks")
+CONTROL_ACTS = ("take", "ask", "give", "keep", "release", "withdraw")
+
+
+# What a page is made of, and how long after the start it is compiled: when the port is open, and while
+# the link settles, which is waiting. Otherwise the first page takes that time.
+# Small ones: what a compiler takes for one, the next takes again, and the loop turns in between.
+TEMPLATES = (
+    "base.html",
+    "_inputs.html",
+    "_commands.html",
+    "_parameter.html",
+    "_displays.html",
+    "_control.html",
+    "screen.html",
+)
+COMPILED_AFTER_S = 0.1
+
+
+class PageContext(TypedDict):
+    """What `screen.html` gets."""
+
+    site: Site
+    panel: Panel
+    page: Page
+    base: str
+    robot: str
+    view: View
+    event_id: str
+    revision: str
+    clock: str
+    loaded: str
+    press_id: str
+    receipt: Receipt | None
+    inputs: dict[str, Any]
+    words: dict[str, Any]
+    lost: str
+    lost_short: str
+    locks_all: str
+    unknown: str
+    unsure: str
+    refresh_s: int
+    now: int
+    since: float | None
+    again: str
+    until: float
+    browser: str
+    over: bool
+    role: Role
+    refused: str
+
+
+@router.get(
+    "/",
+    response_class=HTMLResponse,
+    summary="The first page of the panel",
+    responses=PAGES,
+)
+async def first_page(request: Request, site: CurrentSite) -> Response:
+    if away := _to_a_robot(request, site, "/"):
+        return away
+    return _render(request, site, site.fleet.panel.pages[0])
+
+
+@router.get(
+    "/pages/{page}",
+    response_class=HTMLResponse,
+    summary="A page of the panel",
+    responses=PAGES,
+)
+async def named_page(page: str, request: Request, site: CurrentSite) -> Response:
+    if away := _to_a_robot(request, site, f"/pages/{page}"):
+        return away
+    found = site.fleet.panel.page(page)
+    if found is None:
+        raise NotFound(f'there is no page "{page}"')
+    return _render(request, site, found)
+
+
+async def compiled(templates: Environment) -> None:
+    """Makes the first page as quick as the next."""
+    await asyncio.sleep(COMPILED_AFTER_S)
+    for name in TEMPLATES:
+        templates.get_template(name)
+        await asyncio.sleep(0)
+
+
+class Ask(TypedDict):
+    """What will be done by a press, and the inputs that it takes."""
+
+    sentence: str
+    inputs: list[Input | Parameter]
+
+
+def _to_a_robot(request: Request, site: Site, path: str) -> Response | None:
+    """Where there are several robots each page is of one: without a name, of the first."""
+    first = site.fleet.first.base
+    if not first or "robot" in request.path_params:
+        return None
+    return RedirectResponse(first + path, status_code=303)
+
+
+def _render(request: Request, site: Site, page: Page) -> Response:
+    kiosk = site.fleet.kiosk(request.path_params.get("robot"))
+    typed = any(isinstance(widget, Input | Parameter) for widget in page.widgets)
+    refresh_s = REFRESH_WITH_INPUTS_S if typed else REFRESH_S
+    browser, token = welcomed(request, site)
+    if kiosk.control.rules.required:
+        kiosk.control.loaded(browser, refresh_s + GRACE_S, by_hand(request))
+        kiosk.show()
+    context = _context(request, site, kiosk, page, browser, refresh_s)
+    html = site.templates.get_template("screen.html").render(**context)
+    return keep(HTMLResponse(html, headers={"cache-control": "no-store"}), request, token)
+
+
+def _context(
+    request: Request, site: Site, kiosk: Kiosk, page: Page, browser: Browser, refresh_s: int
+) -> PageContext:
+    board, rules = kiosk.board, kiosk.control.rules
+    refusal = request.query_params.get("control", "")
+    receipt = kiosk.presses.receipt(request.query_params.get("receipt", ""))
+    again = {RELOADED: 1} | ({"receipt": receipt.id} if receipt else {})
+    now, wall = clock.server_now(), time.time()
+    return PageContext(
+        site=site,
+        panel=site.fleet.panel,
+        page=page,
+        base=kiosk.base,
+        robot=kiosk.entry.id if kiosk.entry else "",
+        view=as_seen_by(board.view, browser),
+        event_id=board.id,
+        revision=board.revision,
+        clock=format_time(wall),
+        loaded=format_datetime(wall),
+        press_id=secrets.token_hex(8),
+        receipt=receipt,
+        inputs=dict(receipt.entered) | printable_texts(receipt.entered) if receipt else {},
+        words=_words(kiosk, page),
+        lost=say("server_lost"),
+        lost_short=say("lost"),
+        locks_all=say("locks_all"),
+        unknown=say("unknown"),
+        unsure=say("server_unsure"),
+        refresh_s=refresh_s,
+        now=round(now * 1000),
+        since=None if RELOADED in request.query_params else round(now, 3),
+        again=f"{kiosk.base}/pages/{page.id}?{urlencode(again)}",
+        until=round(now + refresh_s + RELOADED_S, 3),
+        browser=browser.id,
+        over=rules.local and browser.local,
+        role=role(board.view["control"], browser, rules),
+        refused=say(refusal) if refusal and refusal in REFUSALS else "",
+    )
+
+
+def _words(kiosk: Kiosk, page: Page) -> dict[str, Any]:
+    """The words of a page by their names in its templates, and what it asks before a press."""
+    own = {"base": kiosk.base, "log": say("log_link"), "asks": asks_of(kiosk, page)}
+    plain = {word: say(word) for word in (*WORDS, *LINK_WORDS)}
+    return own | plain | {act: say(f"control_{act}") for act in CONTROL_ACTS}
+
+
+def asks_of(kiosk: Kiosk, page: Page) -> dict[str, Ask]:
+    """What is asked before the presses of a page that ask first."""
+    pressed = (w for w in page.widgets if isinstance(w, Pressed) and w.confirm_press)
+    return {widget.id: ask_of(kiosk, widget) for widget in pressed}
+
+
+def ask_of(kiosk: Kiosk, widget: Pressed) -> Ask:
+    """With the robot's name, where there are several."""
+    inputs = {w.id: w for w in kiosk.panel.widgets() if isinstance(w, Input | Parameter)}
+    robot = kiosk.entry.name if kiosk.entry else ""
+    sentence = say("ask_on" if robot else "ask", label=widget.label, robot=robot)
+    return Ask(sentence=sentence, inputs=[inputs[name] for name in inputs_of(widget)])

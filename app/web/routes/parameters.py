@@ -1,0 +1,39 @@
+"""Asking a node for its parameters once more: by itself it is asked only until it does not answer."""
+
+from fastapi import APIRouter, Request
+from fastapi.responses import JSONResponse, RedirectResponse, Response
+from pydantic import BaseModel
+
+from app.web.app_state import CurrentKiosk
+from app.web.described import FORM, errors
+from app.web.request_body import body_of
+from app.web.routes.presses import page_after
+
+router = APIRouter()
+
+
+class Asked(BaseModel):
+    """Whether the node is asked; what it answers comes with the events. `reason` is why it is not."""
+
+    asked: bool
+    reason: str
+
+
+@router.post(
+    "/widgets/{widget}/read",
+    response_model=Asked,
+    status_code=202,
+    summary="Ask the node of a parameter for it once more",
+    responses=errors(403, 404, 408, 413, 422)
+    | {
+        303: {"description": "of a form: back to the page"},
+        409: {"model": Asked, "description": "its node is not there"},
+    },
+)
+async def read(widget: str, request: Request, kiosk: CurrentKiosk) -> Response:
+    await body_of(request)  # a page without scripts sends its whole form
+    why = kiosk.read_again(widget)
+    if request.headers.get("content-type", "").startswith(FORM):
+        return RedirectResponse(page_after(kiosk, widget, ""), status_code=303)
+    answer = Asked(asked=not why, reason=why)
+    return JSONResponse(answer.model_dump(), status_code=409 if why else 202)

@@ -1,0 +1,127 @@
+"""Presses by WebSocket: one for each page that somebody touches, for all that is pressed there.
+
+A press is what a post has in its body, with its `widget`; its `id` is needed, for answers come when
+they are there, in any order. `status` is that of the answer to a post, with a receipt or an `error`:
+
+    browser  {"widget": "operation", "inputs": {…}, "id": "5f…", "seen": "<boot>-<version>", "at": "…"}
+    server   {"press": "5f…", "status": 200, "id": "5f…", "outcome": "published", "reason": "…", …}
+    server   {"press": "5f…", "status": 404, "error": "…"}
+
+Who closes it loses the answers and nothing else: what was begun is brought to its end, and logged.
+"""
+
+import asyncio
+import json
+import logging
+import re
+from contextlib import suppress
+from typing import Annotated, Any, Final
+
+from fastapi import APIRouter, WebSocket, WebSocketDisconnect
+from pydantic import Field
+from starlette.types import Message
+
+from app.errors import InputError, KioskError
+from app.i18n import say
+from app.web.app_state import CurrentKiosk, CurrentSite, Site
+from app.web.client_cookie import caller
+from app.web.request_body import as_model, json_of, received
+from app.web.routes.presses import PRESS_ID, STATUS, Press, pressed
+
+log = logging.getLogger("kiosk.presses")
+
+router = APIRouter()
+
+MOST_AT_ONCE: Final = 16  # presses of one socket that have no answer yet
+MOST_REFUSED: Final = (
+    100  # messages of one socket, one after the other, that are no press or one too many
+)
+POLICY_VIOLATION: Final = 1008  # RFC 6455
+PLACE: Final = "the message"
+
+
+class SocketPress(Press):
+    """What a client says for one press."""
+
+    widget: str
+    id: Annotated[str, Field(pattern=PRESS_ID)]
+
+
+@router.websocket("/presses")
+async def presses(socket: WebSocket, site: CurrentSite, kiosk: CurrentKiosk) -> None:
+    """`kiosk`: where there is no such robot, there is no socket."""
+    await socket.accept()
+    await _Session(socket, site).run()
+
+
+class _Session:
+    """One socket and what is pressed on it; it knows no more of the page than each press says."""
+
+    __slots__ = ("_caller", "_refused", "_site", "_socket", "_under_way")
+
+    def __init__(self, socket: WebSocket, site: Site) -> None:
+        self._socket = socket
+        self._site = site
+        self._caller = caller(socket)
+        self._under_way: set[asyncio.Task[None]] = set()
+        self._refused = 0  # one after the other
+
+    async def run(self) -> None:
+        """Until it is closed, and all that was pressed has come to its end."""
+        try:
+            while (message := await received(self._socket))["type"] == "websocket.receive":
+                await self._hear(message)
+                if self._refused >= MOST_REFUSED:
+                    await self._socket.close(POLICY_VIOLATION)
+                    break
+        finally:
+            await asyncio.gather(*self._under_way)
+
+    async def _hear(self, message: Message) -> None:
+        """Begins a press, and waits for none."""
+        given: Any = None
+        try:
+            text = message.get("text")
+            if text is None:
+                raise InputError(f"{PLACE} is not text")
+            given = json_of(text, PLACE)
+            said = as_model(SocketPress, given, PLACE)
+        except InputError as error:
+            await self._refuse(_id_in(given), error.status, str(error))
+            return
+        if len(self._under_way) >= MOST_AT_ONCE:
+            await self._refuse(said.id, 429, say("too_many_presses", most=MOST_AT_ONCE))
+            return
+        task = asyncio.create_task(self._press(said))
+        self._under_way.add(task)
+        task.add_done_callback(self._under_way.discard)
+
+    async def _press(self, said: SocketPress) -> None:
+        site, socket = self._site, self._socket
+        try:
+            kiosk = site.fleet.kiosk(socket.path_params.get("robot"))
+            receipt = await pressed(site, kiosk, self._caller.seen(site), said.widget, said)
+        except KioskError as error:
+            await self._answer(said.id, error.status, error=str(error))
+        except Exception:
+            log.exception("press %s broke off", said.id)
+            await self._answer(said.id, 500, error=say("log_broke_off"))
+        else:
+            self._refused = self._refused + 1 if receipt.cause == "limit" else 0
+            await self._answer(said.id, STATUS[receipt.cause], **receipt.as_json())
+
+    async def _refuse(self, press_id: str | None, status: int, error: str) -> None:
+        self._refused += 1
+        await self._answer(press_id, status, error=error)
+        await asyncio.sleep(0)  # much may come in one piece: others have their turn
+
+    async def _answer(self, press_id: str | None, status: int, **what: str) -> None:
+        text = json.dumps({"press": press_id, "status": status, **what}, ensure_ascii=False)
+        with suppress(WebSocketDisconnect, RuntimeError):  # nobody is there any more
+            await self._socket.send_text(text)
+
+
+def _id_in(given: object) -> str | None:
+    """The id of what is no press otherwise, if it has one."""
+    found = given.get("id") if isinstance(given, dict) else None
+    return found if isinstance(found, str) and re.fullmatch(PRESS_ID, found) else None

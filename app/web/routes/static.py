@@ -1,0 +1,23 @@
+"""Styles and scripts, under a path that changes with their content."""
+
+from fastapi import APIRouter, Request
+from fastapi.responses import Response
+
+from app.errors import NotFound
+from app.web.app_state import CurrentSite
+
+router = APIRouter()
+
+
+@router.get("/static/{revision}/{name}", include_in_schema=False)
+async def static(revision: str, name: str, request: Request, site: CurrentSite) -> Response:
+    asset = site.assets.files.get(name)
+    if asset is None:
+        raise NotFound(f'there is no file "{name}"')
+    fits = revision == site.assets.revision
+    caching = "public, max-age=31536000, immutable" if fits else "no-store"
+    headers = {"cache-control": caching}
+    if "gzip" not in request.headers.get("accept-encoding", ""):
+        return Response(asset.content, media_type=asset.media_type, headers=headers)
+    headers |= {"content-encoding": "gzip", "vary": "Accept-Encoding"}
+    return Response(asset.packed, media_type=asset.media_type, headers=headers)

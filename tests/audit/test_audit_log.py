@@ -1,0 +1,388 @@
+"""The operator's log beside the event loop: it never blocks it, and says what it can't do."""
+
+import asyncio
+import threading
+import time
+from collections.abc import Awaitable, Callable, Iterator, Sequence
+from pathlib import Path
+
+import pytest
+
+from app.audit import (
+    Entry,
+    Filter,
+    Limits,
+    OperatorLog,
+    Origin,
+    audit_log,
+    data_dir,
+    entered,
+    writer_thread,
+)
+from app.audit.queries import rows
+from app.audit.store import Store
+from app.audit.ticket import Results
+from app.audit.verify import verify
+from app.errors import FolderInUse, LogCorrupt, LogError
+from tests.support.parts import until
+
+FREE = Limits(required=False)
+
+
+def pressed(number: int = 1) -> Entry:
+    return entered("pressed", Origin(address="10.0.0.7"), {}, press=f"p{number}", action="press")
+
+
+def sent(entry: Entry | None) -> Entry:
+    assert entry is not None
+    return entry.followed("closed", "published", "Sent.")
+
+
+def kinds(folder: Path) -> list[tuple[str, str, str]]:
+    """(kind, press, outcome), the oldest first."""
+    found = [row.entry for row in rows(folder, Filter(every=True), None, 10_000)]
+    return [(entry.kind, entry.press, entry.outcome) for entry in reversed(found)]
+
+
+def run(
+    folder: Path, work: Callable[[OperatorLog], Awaitable[None]], limits: Limits | None = None
+) -> None:
+    async def opened() -> None:
+        log = OperatorLog(folder, limits or Limits())
+        await log.start()
+        try:
+            await work(log)
+        finally:
+            await log.stop()
+
+    asyncio.run(opened())
+
+
+async def until_good(log: OperatorLog) -> None:
+    async with asyncio.timeout(10):
+        while log.fault:
+            await asyncio.sleep(0.01)
+
+
+async def until_commits(disk: "Disk", count: int) -> None:
+    async with asyncio.timeout(10):
+        while disk.commits < count:
+            await asyncio.sleep(0.01)
+
+
+class Disk:
+    """The real file, with a disk that can be made slow, full or broken."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.open = threading.Event()
+        self.open.set()
+        self.sync_s = 0.0
+        self.fails: LogError | None = None
+        self.sync_fails: LogError | None = None
+        self.commits = 0
+        self.syncs = 0
+        append, sync = Store.append, Store.sync
+
+        def appended(store: Store, entries: Sequence[Entry]) -> list[Entry]:
+            self.commits += 1
+            self.open.wait(10)
+            if self.fails:
+                raise self.fails
+            return append(store, entries)
+
+        def synced(store: Store) -> None:
+            self.syncs += 1
+            time.sleep(self.sync_s)
+            if self.sync_fails:
+                raise self.sync_fails
+            sync(store)
+
+        monkeypatch.setattr(Store, "append", appended)
+        monkeypatch.setattr(Store, "sync", synced)
+
+
+@pytest.fixture
+def disk(monkeypatch: pytest.MonkeyPatch) -> Iterator[Disk]:
+    mine = Disk(monkeypatch)
+    yield mine
+    mine.open.set()
+
+
+def test_a_press_and_its_outcome_are_in_the_file(tmp_path: Path) -> None:
+    async def work(log: OperatorLog) -> None:
+        entry = await log.pressed(pressed())
+        assert kinds(tmp_path) == [("began", "", ""), ("pressed", "p1", "")]
+        assert await log.closed(sent(entry)) == ""
+        assert kinds(tmp_path)[-1] == ("closed", "p1", "published")
+
+    run(tmp_path, work)
+    assert verify(tmp_path).fault == ""
+
+
+def test_what_is_waiting_is_written_before_the_end(tmp_path: Path) -> None:
+    async def work(log: OperatorLog) -> None:
+        entry = await log.pressed(pressed())
+        log.add(sent(entry))
+
+    run(tmp_path, work)
+    assert kinds(tmp_path)[-1] == ("closed", "p1", "published")
+
+
+def test_no_press_waits_for_the_sync_of_another(tmp_path: Path, disk: Disk) -> None:
+    async def work(log: OperatorLog) -> None:
+        disk.sync_s = 0.5
+        first = asyncio.create_task(log.closed(sent(await log.pressed(pressed(1)))))
+        await asyncio.sleep(0.1)
+        await log.pressed(pressed(2))
+        assert not first.done()
+        assert await first == ""
+
+    run(tmp_path, work)
+
+
+def test_what_comes_together_shares_a_commit_and_a_sync(tmp_path: Path, disk: Disk) -> None:
+    async def work(log: OperatorLog) -> None:
+        disk.open.clear()
+        disk.commits = disk.syncs = 0
+        presses = [asyncio.create_task(log.pressed(pressed(n))) for n in range(100)]
+        await asyncio.sleep(0.1)
+        disk.open.set()
+        entries = await asyncio.gather(*presses)
+        assert [entry.press for entry in entries if entry] == [f"p{n}" for n in range(100)]
+        assert disk.commits <= 3
+        assert await asyncio.gather(*(log.closed(sent(e)) for e in entries)) == [""] * 100
+        assert disk.syncs <= 10
+
+    run(tmp_path, work)
+    assert verify(tmp_path).count == 201
+
+
+def test_a_disk_that_hangs_blocks_no_loop_and_locks(
+    tmp_path: Path, disk: Disk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(audit_log, "PRESSED_WITHIN_S", 0.5)
+    changes: list[str] = []
+
+    async def work(log: OperatorLog) -> None:
+        with log.followed(lambda: changes.append(log.lock)):
+            disk.open.clear()
+            with pytest.raises(LogError, match=r"can't be written: the disk did not take .* 0\.5 s"):
+                await log.pressed(pressed(1))
+            began = time.monotonic()
+            with pytest.raises(LogError):
+                await log.pressed(pressed(2))
+            assert time.monotonic() - began < 0.4
+            assert "the disk did not take the entry" in log.lock
+            disk.open.set()
+            await until_good(log)
+            await log.pressed(pressed(3))
+        assert changes[-1] == ""
+        assert len(changes) == 2
+
+    run(tmp_path, work)
+    # The one that came late was not sent, and the log says so; the other never was in it.
+    assert kinds(tmp_path)[1:] == [
+        ("pressed", "p1", ""),
+        ("closed", "p1", "refused"),
+        ("pressed", "p3", ""),
+    ]
+
+
+def test_a_press_that_nobody_waits_for_any_more_is_closed(tmp_path: Path, disk: Disk) -> None:
+    async def work(log: OperatorLog) -> None:
+        disk.open.clear()
+        before = disk.commits
+        task = asyncio.create_task(log.pressed(pressed(1)))
+        await until_commits(disk, before + 1)
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+        disk.open.set()
+        await until_commits(disk, before + 2)
+
+    run(tmp_path, work)
+    assert kinds(tmp_path)[1:] == [("pressed", "p1", ""), ("closed", "p1", "refused")]
+
+
+def test_a_press_that_is_called_away_as_it_was_written_is_closed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    presses: list[asyncio.Task[Entry | None]] = []
+    told = OperatorLog._told
+
+    def told_too_late(log: OperatorLog, results: Results, changed: bool) -> None:
+        told(log, results, changed)
+        for press in presses:
+            press.cancel()
+
+    async def work(log: OperatorLog) -> None:
+        monkeypatch.setattr(OperatorLog, "_told", told_too_late)
+        presses.append(asyncio.create_task(log.pressed(pressed(1))))
+        (cancelled,) = await asyncio.gather(*presses, return_exceptions=True)
+        assert isinstance(cancelled, asyncio.CancelledError)
+
+    run(tmp_path, work)
+    assert kinds(tmp_path)[1:] == [("pressed", "p1", ""), ("closed", "p1", "refused")]
+
+
+def test_too_many_at_once_are_refused_in_words(
+    tmp_path: Path, disk: Disk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(audit_log, "MOST_WAITING", 10)
+
+    async def work(log: OperatorLog) -> None:
+        disk.open.clear()
+        presses = [asyncio.create_task(log.pressed(pressed(n))) for n in range(50)]
+        await asyncio.sleep(0.1)
+        disk.open.set()
+        results = await asyncio.gather(*presses, return_exceptions=True)
+        refused = [result for result in results if isinstance(result, LogError)]
+        assert 38 <= len(refused) <= 40
+        assert "more is pressed than the disk takes" in str(refused[0])
+        assert log.fault == ""
+
+    run(tmp_path, work)
+
+
+def test_what_could_not_be_written_of_a_sent_press_is_written_later(tmp_path: Path, disk: Disk) -> None:
+    async def work(log: OperatorLog) -> None:
+        entry = await log.pressed(pressed(1))
+        disk.fails = LogError("no space left on device")
+        assert await log.closed(sent(entry)) == "no space left on device"
+        assert log.lock == "The operator's log can't be written: no space left on device."
+        with pytest.raises(LogError, match="no space left"):
+            await log.pressed(pressed(2))
+        disk.fails = None
+        await until_good(log)
+        await log.pressed(pressed(3))
+
+    run(tmp_path, work)
+    assert kinds(tmp_path)[1:] == [
+        ("pressed", "p1", ""),
+        ("closed", "p1", "published"),
+        ("resumed", "", ""),
+        ("pressed", "p3", ""),
+    ]
+    assert verify(tmp_path).fault == ""
+
+
+def test_what_is_not_known_to_be_on_the_disk_is_said(tmp_path: Path, disk: Disk) -> None:
+    async def work(log: OperatorLog) -> None:
+        entry = await log.pressed(pressed(1))
+        disk.sync_fails = LogError("input/output error")
+        assert await log.closed(sent(entry)) == "input/output error"
+        async with asyncio.timeout(5):
+            while not log.lock:
+                await asyncio.sleep(0.01)
+        disk.sync_fails = None
+        await until_good(log)
+        assert await log.closed(sent(await log.pressed(pressed(2)))) == ""
+
+    run(tmp_path, work)
+    assert verify(tmp_path).fault == ""
+
+
+def test_it_is_tried_again_ever_more_rarely(tmp_path: Path, disk: Disk) -> None:
+    async def work(log: OperatorLog) -> None:
+        disk.fails = LogError("no space left on device")
+        await asyncio.gather(log.pressed(pressed(1)), return_exceptions=True)
+        disk.commits = 0
+        await asyncio.sleep(2.0)
+        assert 1 <= disk.commits <= 3  # after 0.5 s and 1 s more
+
+    run(tmp_path, work)
+    assert writer_thread.TRIED_AGAIN_S[-1] <= 10
+
+
+def test_where_the_log_is_not_required_presses_go_on(tmp_path: Path, disk: Disk) -> None:
+    async def work(log: OperatorLog) -> None:
+        disk.fails = LogError("no space left on device")
+        assert await log.pressed(pressed(1)) is None
+        assert log.lock == ""
+        assert log.fault == (
+            "The operator's log can't be written, so nothing is logged: no space left on device."
+        )
+        disk.fails = None
+        await until_good(log)
+        assert await log.pressed(pressed(2)) is not None
+
+    run(tmp_path, work, FREE)
+    assert [press for kind, press, _ in kinds(tmp_path) if kind == "pressed"] == ["p2"]
+
+
+def test_damage_while_it_runs_begins_a_new_log_whose_numbers_go_on(tmp_path: Path, disk: Disk) -> None:
+    async def work(log: OperatorLog) -> None:
+        entry = await log.pressed(pressed(1))
+        disk.fails = LogCorrupt("the file is damaged")
+        assert "damaged" in await log.closed(sent(entry))
+        disk.fails = None
+        await until_good(log)
+
+    run(tmp_path, work)
+    (aside,) = tmp_path.glob("*damaged*.sqlite3")
+    assert aside.stat().st_size > 0
+    found = [row.entry for row in rows(tmp_path, Filter(every=True), None, 10)]
+    assert [(e.seq, e.kind, e.of) for e in reversed(found)][:2] == [
+        (3, "began", None),
+        (4, "closed", 2),
+    ]
+    assert aside.name in found[-1].reason
+    assert verify(tmp_path).fault == ""
+
+
+def test_garbage_at_the_start_is_put_aside_and_said(tmp_path: Path) -> None:
+    (tmp_path / "operators-log.sqlite3").write_bytes(b"garbage" * 1000)
+
+    async def work(log: OperatorLog) -> None:
+        assert log.fault == ""
+        await log.pressed(pressed(1))
+
+    run(tmp_path, work)
+    (aside,) = tmp_path.glob("*damaged*")
+    assert aside.read_bytes() == b"garbage" * 1000
+    assert verify(tmp_path).fault == ""
+
+
+def test_a_folder_that_can_not_be_made_locks_until_it_can(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+
+    async def work(log: OperatorLog) -> None:
+        where = tmp_path / "file"
+        assert log.lock == f"The operator's log can't be written: not a folder ({where})."
+        assert log.head is None
+        (tmp_path / "file").unlink()
+        await until_good(log)
+        await log.pressed(pressed(1))
+
+    run(tmp_path / "file/data", work)
+    assert verify(tmp_path / "file/data").count == 3
+
+
+def test_a_second_log_waits_for_the_first_to_end_and_then_gives_up(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def work(log: OperatorLog) -> None:
+        second = OperatorLog(tmp_path, Limits())
+        monkeypatch.setattr(data_dir, "HELD_BY_OTHER_S", 0.3)
+        with pytest.raises(FolderInUse, match="is in use by process"):
+            await second.start()
+        monkeypatch.setattr(data_dir, "HELD_BY_OTHER_S", 5.0)
+        starting = asyncio.create_task(second.start())
+        await asyncio.sleep(0.2)
+        assert not starting.done()
+        await log.stop()
+        await starting
+        assert second.fault == ""
+        await second.stop()
+
+    run(tmp_path, work)
+
+
+def test_no_thread_is_left(tmp_path: Path) -> None:
+    async def work(log: OperatorLog) -> None:
+        await log.rows(Filter(), None, 10)
+
+    def left() -> list[str]:
+        return [t.name for t in threading.enumerate() if t.name.startswith("operators-log")]
+
+    run(tmp_path, work)
+    until(lambda: not left(), "an idle reader ends a moment later")

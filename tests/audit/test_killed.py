@@ -1,0 +1,79 @@
+"""A server that is killed at any moment loses nothing of the operator's log."""
+
+import random
+import signal
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+import httpx
+
+from app.audit import Entry, Filter
+from app.audit.queries import rows
+from app.audit.verify import verify
+from app.i18n import say
+from tests.support.parts import Bridge, RosNode, Server, live, until
+
+KILLS = 30
+CLIENTS = 3
+LONGEST_LIFE_S = 0.5
+
+
+def all_entries(folder: Path) -> list[Entry]:
+    return [row.entry for row in rows(folder, Filter(every=True), None, 1_000_000)]
+
+
+def press_on(url: str, client: int, receipts: dict[str, str]) -> None:
+    """Presses, one after another, until the server is gone; keeps what it was told."""
+    with httpx.Client(base_url=url, timeout=10, trust_env=False) as http:
+        for number in range(100_000):
+            press_id = f"{http.base_url.port}-{client}-{number}"
+            press = {"id": press_id, "inputs": {"message": press_id}}
+            try:
+                answer = http.post("/widgets/operation", json=press)
+            except httpx.TransportError:
+                return
+            receipts[press_id] = answer.json()["outcome"]
+
+
+def killed_under_presses(server: Server, chance: random.Random, receipts: dict[str, str]) -> None:
+    until(server.ready, "ready")
+    clients = [
+        threading.Thread(target=press_on, args=(server.url, client, receipts))
+        for client in range(CLIENTS)
+    ]
+    for client in clients:
+        client.start()
+    threading.Event().wait(chance.uniform(0, LONGEST_LIFE_S))
+    server.end(signal.SIGKILL)
+    for client in clients:
+        client.join()
+
+
+def test_nothing_is_lost_by_kills_under_presses(
+    bridge: Bridge, node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    seed = random.randrange(10**9)
+    chance = random.Random(seed)
+    receipts: dict[str, str] = {}
+    before = len(node.heard("/operation"))
+    data = tmp_path / "data"
+    for _ in range(KILLS):
+        killed_under_presses(live(bridge.endpoint, tmp_path, KIOSK_DATA=str(data)), chance, receipts)
+    last = servers(live(bridge.endpoint, tmp_path, KIOSK_DATA=str(data)))
+    found = verify(data)
+    assert found.fault == "", seed
+    entries = all_entries(data)
+    assert found.count == len(entries)
+    pressed = {entry.press: entry for entry in entries if entry.kind == "pressed"}
+    closed = {entry.press: entry for entry in entries if entry.kind == "closed"}
+    assert len(receipts) > KILLS
+    assert {p: closed[p].outcome for p in receipts} == receipts, seed
+    heard = node.heard_data("/operation")[before:]
+    assert len(heard) > KILLS
+    assert [text for text in heard if text not in pressed] == [], seed
+    assert pressed.keys() == closed.keys(), seed
+    cut = {p for p, entry in closed.items() if entry.reason == say("log_ended")}
+    assert cut.isdisjoint(receipts), seed
+    until(last.ready, "ready")
+    assert last.press("operation", "after all").status_code == 200

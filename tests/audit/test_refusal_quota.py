@@ -1,0 +1,307 @@
+"""How many refusals are entries of the operator's log: by a clock that the test sets, then for real."""
+
+import asyncio
+import json
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from app.audit import Entry, Filter, Limits, OperatorLog, Origin, audit_log
+from app.audit.press_record import Logbook
+from app.audit.queries import rows
+from app.audit.refusal_quota import OF_ADDRESS, OF_ALL, OF_BROWSER, REMEMBERED, TOLD_APART, Refusals
+from app.audit.store import Store
+from app.audit.verify import verify
+from app.commands.presses import Presses
+from app.commands.receipts import RECEIPTS_KEPT, By, Receipt
+from app.errors import LogError
+from app.robot.state import Robot
+from tests.browser.test_holds_in_browser import PANEL
+from tests.support.builders import COUNT, panel_of, permits, presses_of, robot_there, small_panel
+from tests.support.parts import ROOT, Server, until
+from tests.web.test_hold_socket import opened
+
+KIM = Origin(address="10.0.0.7", browser="b1", who="Panel 1")
+LEE = Origin(address="10.0.0.8", browser="b2", who="Panel 2")
+ENOUGH = 2 * int(OF_BROWSER.at_once)
+DRIVE = """
+[[page.widget]]
+id = "drive"
+kind = "publish"
+label = "Drive"
+topic = "/drive"
+type = "std_msgs/msg/Float64"
+message = { data = "{speed}" }
+"""
+
+
+@pytest.fixture
+def demo(tmp_path: Path) -> Iterator[Server]:
+    (tmp_path / "jog.toml").write_text(PANEL + DRIVE)
+    mine = Server(ROOT, KIOSK_PANEL=str(tmp_path / "jog.toml"), KIOSK_MODE="demo")
+    until(mine.ready, "ready")
+    yield mine
+    mine.end()
+
+
+class Counted:
+    """Refusals as they come, some of them entries."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+        self.refusals = Refusals(lambda: self.now, lambda: 1_000_000.0)
+
+    def come(self, origin: Origin, times: int) -> int:
+        """How many became entries."""
+        entries = 0
+        for _ in range(times):
+            if self.refusals.room(origin):
+                self.refusals.take(origin)
+                entries += 1
+            else:
+                self.refusals.leave_out(origin)
+        return entries
+
+
+@pytest.fixture
+def counted() -> Counted:
+    return Counted()
+
+
+def test_a_browser_has_so_many_at_once_and_then_one_from_time_to_time(counted: Counted) -> None:
+    assert counted.come(KIM, ENOUGH) == OF_BROWSER.at_once
+    counted.now += 10 * OF_BROWSER.every_s
+    assert counted.come(KIM, ENOUGH) == 10
+    counted.now += 1e6
+    assert counted.come(KIM, ENOUGH) == OF_BROWSER.at_once
+
+
+def test_one_browser_takes_nothing_from_another(counted: Counted) -> None:
+    counted.come(KIM, 10_000)
+    assert counted.come(LEE, 10) == 10
+
+
+def test_an_address_that_changes_its_cookies_has_an_allowance_of_its_own(counted: Counted) -> None:
+    entries = sum(
+        counted.come(Origin(address="10.0.0.7", browser=f"b{number}"), 10) for number in range(1000)
+    )
+    assert entries == OF_ADDRESS.at_once
+    assert counted.come(LEE, 10) == 10
+
+
+def test_all_together_have_a_bound(counted: Counted) -> None:
+    entries = sum(counted.come(Origin(address=f"10.0.1.{number}"), 50) for number in range(1000))
+    assert entries == OF_ALL.at_once
+    day = 86_400
+    for _ in range(day // 10):
+        counted.now += 10
+        entries += sum(counted.come(Origin(address=f"10.0.2.{number}"), 1) for number in range(20))
+    assert entries <= OF_ALL.at_once + day / OF_ALL.every_s
+
+
+def test_it_remembers_no_more_than_it_must(counted: Counted) -> None:
+    for number in range(10_000):
+        counted.now += OF_ALL.every_s
+        counted.come(Origin(address=f"10.1.{number}", browser="b"), 1)
+    assert len(counted.refusals._left) == REMEMBERED
+
+
+def test_what_is_left_out_is_told_by_browser_and_the_rest_together(counted: Counted) -> None:
+    counted.come(KIM, 60 + 7)
+    for number in range(2 * TOLD_APART):
+        counted.come(Origin(address=f"10.0.0.{number}", browser="c"), 61)
+    told = counted.refusals.told()
+    assert len(told) == TOLD_APART + 1
+    assert told[0].reason.startswith("7 more refusals from Panel 1 (10.0.0.7) since ")
+    assert (told[0].kind, told[0].outcome, told[0].browser) == ("refused", "refused", "b1")
+    assert json.loads(told[0].values) == {"more": 7}
+    assert told[-1].reason.split(" since")[0].endswith("more refusals from others")
+    assert sum(json.loads(entry.values)["more"] for entry in told) == counted.refusals.left_out
+    assert counted.refusals.told() == []
+
+
+class Cell:
+    """A robot with its presses, on a real log."""
+
+    def __init__(self, log: OperatorLog) -> None:
+        self.log = log
+        self.sent = 0
+        self.robot: Robot = robot_there(small_panel())
+        permits(self.robot)
+        self.logbook = Logbook(log)
+        self.presses: Presses = presses_of(small_panel(), self.robot, self, logbook=self.logbook)
+
+    def put(self, key: str, payload: bytes) -> None:
+        self.sent += 1
+
+    def heard(self, key: str) -> bool:
+        return True
+
+    async def press(self, press_id: str, origin: Origin = KIM, **inputs: Any) -> Receipt:
+        by = By(origin)
+        return await self.presses.press("guarded", inputs or {"message": "hi"}, press_id, by)
+
+
+def written(folder: Path, work: Callable[[Cell], Any], limits: Limits | None = None) -> list[Entry]:
+    """All of a log, the oldest first, when the work is done."""
+
+    async def done() -> None:
+        log = OperatorLog(folder, limits or Limits())
+        await log.start()
+        try:
+            await work(Cell(log))
+        finally:
+            await log.stop()
+
+    asyncio.run(done())
+    assert verify(folder).fault == ""
+    return [row.entry for row in reversed(rows(folder, Filter(every=True), None, 10_000))]
+
+
+def test_a_flood_of_refused_presses_leaves_the_log_as_it_was(tmp_path: Path) -> None:
+    async def work(cell: Cell) -> None:
+        assert (await cell.press("first")).outcome == "published"
+        permits(cell.robot, False)
+        for number in range(2000):
+            receipt = await cell.press(f"f{number}")
+            assert (receipt.outcome, receipt.cause) == ("refused", "interlock")
+            assert "does not permit operation" in receipt.reason
+        assert cell.log.left_out == 2000 - OF_BROWSER.at_once
+        assert (await cell.press("other", LEE)).outcome == "refused"
+
+    entries = written(tmp_path, work)
+    assert len(entries) < 2 * OF_BROWSER.at_once + 10
+    assert [e.outcome for e in entries if e.press == "first"] == ["", "published"]
+    assert [e.outcome for e in entries if e.press == "other"] == ["", "refused"]
+    (more,) = [entry for entry in entries if "more refusals" in entry.reason]
+    assert json.loads(more.values) == {"more": 2000 - OF_BROWSER.at_once}
+
+
+def test_they_are_told_while_the_flood_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(audit_log, "SUMMED_UP_S", 0.05)
+
+    async def work(cell: Cell) -> None:
+        permits(cell.robot, False)
+        for number in range(ENOUGH):
+            await cell.press(f"f{number}")
+        await asyncio.sleep(0.3)
+        assert rows(tmp_path, Filter(text="more refusals", every=True), None, 10)
+
+    written(tmp_path, work)
+
+
+def test_what_is_sent_is_never_limited(tmp_path: Path) -> None:
+    """Who has used up what there is for refusals goes on pressing, and each press is in the log."""
+
+    async def work(cell: Cell) -> None:
+        permits(cell.robot, False)
+        for number in range(ENOUGH):
+            await cell.press(f"f{number}")
+        permits(cell.robot)
+        for number in range(300):
+            assert (await cell.press(f"p{number}")).outcome == "published"
+        assert cell.sent == 300
+
+    entries = written(tmp_path, work)
+    assert sum(entry.outcome == "published" for entry in entries) == 300
+
+
+@pytest.mark.parametrize("inputs", [{"message": "much too long"}, {"nothing": 1}])
+def test_bad_input_is_limited_too_and_says_what_is_wrong(tmp_path: Path, inputs: Any) -> None:
+    async def work(cell: Cell) -> None:
+        first = await cell.press("first", **inputs)
+        for number in range(ENOUGH):
+            last = await cell.press(f"f{number}", **inputs)
+        assert (last.outcome, last.cause) == ("refused", "input")
+        assert last.reason[22:] == first.reason[22:]
+        assert cell.log.left_out == ENOUGH + 1 - OF_BROWSER.at_once
+
+    written(tmp_path, work)
+
+
+def test_a_used_id_is_limited_too(tmp_path: Path) -> None:
+    async def work(cell: Cell) -> None:
+        await cell.press("p")
+        for _ in range(ENOUGH):
+            receipt = await cell.press("p", message="other")
+            assert "already used" in receipt.reason
+        assert cell.log.left_out == ENOUGH - OF_BROWSER.at_once
+
+    written(tmp_path, work)
+
+
+def test_the_same_id_is_the_same_press_and_displaces_no_other(tmp_path: Path) -> None:
+    async def work(cell: Cell) -> None:
+        sent = await cell.press("sent")
+        permits(cell.robot, False)
+        for number in range(RECEIPTS_KEPT + ENOUGH):
+            last = await cell.press(f"f{number}")
+        permits(cell.robot)
+        assert await cell.press(last.id) is last
+        assert await cell.press("sent") is sent
+        assert cell.sent == 1
+
+    written(tmp_path, work)
+
+
+def test_cancels_of_nothing_are_limited_too(tmp_path: Path) -> None:
+    async def work(cell: Cell) -> None:
+        presses = presses_of(panel_of(COUNT), robot_there(panel_of(COUNT)), cell, logbook=cell.logbook)
+        for _ in range(ENOUGH):
+            receipt = await presses.cancel("count", KIM)
+            assert receipt.reason == "there is nothing under way to cancel"
+        assert cell.log.left_out == ENOUGH - OF_BROWSER.at_once
+
+    written(tmp_path, work)
+
+
+def test_while_the_log_is_broken_they_are_kept_to_be_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(audit_log, "SUMMED_UP_S", 0.02)
+    append, broken = Store.append, asyncio.Event()
+
+    def appended(store: Store, entries: Sequence[Entry]) -> list[Entry]:
+        if broken.is_set():
+            raise LogError("no space left on device")
+        return append(store, entries)
+
+    monkeypatch.setattr(Store, "append", appended)
+
+    async def work(cell: Cell) -> None:
+        permits(cell.robot, False)
+        for number in range(int(OF_BROWSER.at_once)):
+            await cell.press(f"f{number}")
+        broken.set()
+        assert (await cell.press("p", LEE)).cause == "log"
+        cell.log.leave_out(KIM)
+        await asyncio.sleep(0.1)
+        broken.clear()
+        async with asyncio.timeout(5):
+            while cell.log.fault:
+                await asyncio.sleep(0.01)
+        await asyncio.sleep(0.1)
+
+    entries = written(tmp_path, work)
+    assert sum("1 more refusals from Panel 1" in entry.reason for entry in entries) == 1
+
+
+def test_a_flood_on_a_server(demo: Server) -> None:
+    """Presses and holds of one browser, with what they leave in the log and in the metrics."""
+
+    def held() -> dict[str, Any]:
+        with opened(demo) as socket:
+            return socket.begin(inputs={"speed": 99})
+
+    for _ in range(ENOUGH):
+        assert demo.press("drive", inputs={"speed": 99}).status_code == 422
+    for _ in range(20):
+        said = until(lambda: (one := held())["status"] != 429 and one, "there is room for a hold")
+        assert (said["state"], said["status"]) == ("refused", 422)
+        assert "Speed is 99" in said["reason"]
+    left_out = ENOUGH + 20 - OF_BROWSER.at_once
+    assert f"kiosk_refusals_left_out_total {left_out}" in demo.http.get("/metrics").text
+    entries = demo.http.get("/log.csv?outcome=refused&every=true").text.splitlines()[1:]
+    assert len(entries) == OF_BROWSER.at_once

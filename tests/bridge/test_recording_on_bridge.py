@@ -1,0 +1,199 @@
+"""A recording of what a real node said around real presses, read by MCAP's reader and by ROS 2."""
+
+import json
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import pytest
+from mcap.reader import make_reader
+from mcap.records import Channel, Message, Schema
+from mcap.stream_reader import StreamReader
+
+from tests.browser.test_holds_in_browser import PANEL
+from tests.interfaces.test_cdr_on_ros import RosCodec
+from tests.support.parts import ROOT, Bridge, RosNode, Server, live, until
+from tests.web.test_hold_socket import held, opened
+
+LOG = "rcl_interfaces/msg/Log"
+RECORD = "[record]\nbefore_s = 2\nafter_s = 1\n"
+READOUT = f"""
+[[page.widget]]
+id = "robot_log"
+kind = "readout"
+label = "Log"
+topic = "/robot_log"
+type = "{LOG}"
+field = "msg"
+"""
+Record = tuple[Schema, Channel, Message]
+
+
+@pytest.fixture
+def codec() -> Iterator[RosCodec]:
+    mine = RosCodec()
+    yield mine
+    mine.end()
+
+
+def recording(bridge: Bridge, folder: Path) -> Server:
+    """A kiosk with the shipped panel and a readout, that records."""
+    shipped = (ROOT / "app/panel.toml").read_text()
+    panel = folder / "panel.toml"
+    panel.write_text(shipped.replace("[[interlock]]", f"{RECORD}[[interlock]]", 1) + READOUT)
+    return live(bridge.endpoint, folder, KIOSK_PANEL=str(panel), KIOSK_DATA=str(folder / "data"))
+
+
+def files(folder: Path) -> list[Path]:
+    return sorted((folder / "data/recordings").glob("*.mcap"))
+
+
+def records(path: Path) -> dict[str, list[Record]]:
+    found: dict[str, list[Record]] = {}
+    with path.open("rb") as stream:
+        reader = make_reader(stream, validate_crcs=True)
+        assert reader.get_header().profile == "ros2"
+        for schema, channel, message in reader.iter_messages():
+            assert schema is not None
+            found.setdefault(channel.topic, []).append((schema, channel, message))
+    return found
+
+
+def shows(kiosk: Server, widget: str, text: str) -> bool:
+    return text in str(kiosk.widget(widget)["text"])
+
+
+def says(node: RosNode, kiosk: Server, text: str) -> None:
+    """The robot says it until the kiosk shows it."""
+    fields: Mapping[str, Any] = {"stamp": {"sec": 7, "nanosec": 8}, "level": 20, "msg": text}
+    until(
+        lambda: (node.publish("/robot_log", fields), shows(kiosk, "robot_log", text))[1],
+        f"{text} is shown",
+        every_s=0.05,
+    )
+
+
+def test_what_a_node_said_around_a_press_reads_back_with_ros_2(
+    own_bridge: Bridge,
+    own_node: RosNode,
+    tmp_path: Path,
+    servers: Callable[[Server], Server],
+    codec: RosCodec,
+) -> None:
+    kiosk = servers(recording(own_bridge, tmp_path))
+    until(kiosk.ready, "ready")
+    own_node.advertise("/robot_log", LOG)
+    says(own_node, kiosk, "before")
+    pressed = kiosk.press("operation", "hello", id="p1").json()
+    refused = kiosk.press("operation1", "no", id="p2").json()
+    assert refused["outcome"] == "refused"
+    says(own_node, kiosk, "after")
+    until(lambda: files(tmp_path), "the recording is finished")
+    (path,) = files(tmp_path)
+    assert path.name.endswith("Z-operation.mcap")
+    found = records(path)
+    assert set(found) == {"/robot_log", "/web_ui/presses"}
+    decoded = []
+    for schema, channel, message in found["/robot_log"]:
+        assert (schema.name, schema.encoding, channel.message_encoding) == (LOG, "ros2msg", "cdr")
+        assert b"\nMSG: builtin_interfaces/Time\nint32 sec\n" in schema.data
+        assert 0 <= message.log_time - message.publish_time < 1e9  # received after the bridge had it
+        decoded.append(codec.decode(schema.name, message.data))
+    assert decoded[0]["stamp"] == {"sec": 7, "nanosec": 8}
+    assert [one["msg"] for one in decoded] == sorted((one["msg"] for one in decoded), reverse=True)
+    assert {one["msg"] for one in decoded} == {"before", "after"}
+    assert presses(found) == [
+        ("p1", None, None),
+        ("p1", "published" if pressed["outcome"] == "published" else "unknown", pressed["reason"]),
+        ("p2", None, None),
+        ("p2", "refused", refused["reason"]),
+    ]
+    pressed_at = found["/web_ui/presses"][0][2].log_time
+    times = [message.log_time for _, _, message in found["/robot_log"]]
+    assert min(times) >= pressed_at - 2.1e9
+    assert min(times) < pressed_at < max(times)
+
+
+def presses(found: Mapping[str, list[Record]]) -> list[tuple[str, str | None, str | None]]:
+    told = []
+    for schema, channel, message in found["/web_ui/presses"]:
+        assert (schema.encoding, channel.message_encoding) == ("jsonschema", "json")
+        press = json.loads(message.data)
+        assert set(press) == set(json.loads(schema.data)["properties"])
+        assert press["who"] == "a program (127.0.0.1)"
+        told.append((press["id"], press["outcome"], press["reason"]))
+    return told
+
+
+def test_a_hold_is_recorded_from_its_begin_to_its_end(
+    tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    (tmp_path / "jog.toml").write_text(PANEL + RECORD)
+    data = str(tmp_path / "data")
+    kiosk = servers(
+        Server(ROOT, KIOSK_PANEL=str(tmp_path / "jog.toml"), KIOSK_MODE="demo", KIOSK_DATA=data)
+    )
+    until(kiosk.ready, "ready")
+    with opened(kiosk) as socket:
+        assert socket.begin(inputs={"speed": 99})["state"] == "refused"
+    with held(kiosk) as socket:
+        assert socket.beat()["state"] == "held"
+        socket.say(do="end", why="released", lease=socket.lease)
+        ended = socket.hear()
+    until(lambda: files(tmp_path), "the recording is finished")
+    (path,) = files(tmp_path)
+    assert path.name.endswith("Z-jog.mcap")
+    told = presses(records(path))
+    assert [one[1] for one in told[:2]] == [None, "refused"]
+    assert told[-2:] == [
+        (socket.lease, None, None),
+        (socket.lease, ended["outcome"], ended["reason"]),
+    ]
+
+
+def test_a_killed_server_leaves_a_recording_to_the_next_one(
+    own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    kiosk = servers(recording(own_bridge, tmp_path))
+    until(kiosk.ready, "ready")
+    own_node.advertise("/robot_log", LOG)
+    says(own_node, kiosk, "before")
+    kiosk.press("operation", "hello", id="p1")
+    until(lambda: list((tmp_path / "data/recordings").iterdir()), "it is being recorded")
+    (unfinished,) = (tmp_path / "data/recordings").iterdir()
+    until(lambda: presses_in(unfinished) == 2, "the press and its outcome are written")
+    kiosk.process.kill()
+    assert files(tmp_path) == []
+    servers(recording(own_bridge, tmp_path))
+    until(lambda: files(tmp_path), "it is recovered")
+    (path,) = files(tmp_path)
+    assert path.name.endswith("Z-operation.recovered.mcap")
+    assert [one[0] for one in presses(records(path))] == ["p1"] * 2
+
+
+def presses_in(unfinished: Path) -> int:
+    """How many messages of presses can be read of a recording that is still being written."""
+    topics: dict[int, str] = {}
+    count = 0
+    with unfinished.open("rb") as stream, suppress(Exception):
+        for record in StreamReader(stream).records:
+            if isinstance(record, Channel):
+                topics[record.id] = record.topic
+            elif isinstance(record, Message):
+                count += topics[record.channel_id] == "/web_ui/presses"
+    return count
+
+
+def test_without_a_disk_it_says_so_and_presses_work(
+    own_bridge: Bridge, tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    (tmp_path / "data").mkdir()
+    (tmp_path / "data/recordings").write_text("not a folder")
+    kiosk = servers(recording(own_bridge, tmp_path))
+    until(kiosk.ready, "ready")
+    assert kiosk.press("operation", "hello").status_code == 200
+    until(lambda: "Presses are not recorded" in kiosk.snapshot()["notice"]["fault"], "it is told")
+    assert kiosk.widget("operation")["enabled"]
+    assert kiosk.press("operation", "again").status_code == 200
+    assert "recording stopped, in " in kiosk.process.text

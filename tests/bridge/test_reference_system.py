@@ -1,0 +1,324 @@
+"""The reference system on the real parts: bridge, rclpy nodes, the server as users start it."""
+
+import re
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from socket import create_connection
+
+import pytest
+import zenoh
+
+from tests.support.parts import ROOT, Bridge, RosNode, Server, has_heard, live, until
+
+TEXTS = [
+    "",
+    "hello",
+    "日本語",
+    "🤖👩‍🏭",
+    "\"quotes\" 'and' `ticks`",
+    "<script>alert(1)</script>",
+    "{braces} {{double}} {message}",
+    "x" * 80,
+    "\\ % \t ~ $HOME",
+]
+STRING_HASH = "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"
+
+
+def permit(node: RosNode, value: bool = True) -> None:
+    node.once("/operation_enabled", "std_msgs/msg/Bool", {"data": value})
+
+
+def test_an_rclpy_node_sees_web_ui(node: RosNode) -> None:
+    until(lambda: "/web_ui" in node.nodes(), "/web_ui in the list of nodes")
+
+
+@pytest.mark.parametrize("text", TEXTS)
+def test_a_press_reaches_the_robot_with_its_text_intact(
+    shared_server: Server, node: RosNode, text: str
+) -> None:
+    before = len(node.heard("/operation"))
+    answer = shared_server.press("operation", text)
+    assert (answer.status_code, answer.json()["outcome"]) == (200, "published")
+    until(lambda: len(node.heard("/operation")) > before, "the robot heard it")
+    assert node.heard_data("/operation")[before:] == [text]
+
+
+def arrives(server: Server, node: RosNode) -> bool:
+    """Whether a press gets to the node; nothing of it is on its way any more."""
+    before = len(node.heard("/operation"))
+    if server.press("operation", "there?").json()["outcome"] != "published":
+        return False
+    until(partial(has_heard, node, "/operation", before + 1), "the robot heard it")
+    return True
+
+
+@contextmanager
+def known(bridge: Bridge, node: RosNode, folder: Path) -> Iterator[Server]:
+    """A kiosk on a bridge that knows what the node listens to."""
+    mine = live(bridge.endpoint, folder)
+    try:
+        until(mine.ready, "ready")
+        until(partial(arrives, mine, node), "the bridge knows what the node listens to", every_s=0.1)
+        yield mine
+    finally:
+        mine.end()
+
+
+@pytest.fixture(scope="module")
+def shared_server(
+    bridge: Bridge, node: RosNode, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Server]:
+    with known(bridge, node, tmp_path_factory.mktemp("shared")) as mine:
+        yield mine
+
+
+def test_the_graph_has_the_topic_before_the_first_press(server: Server, node: RosNode) -> None:
+    until(server.ready, "ready")
+    until(lambda: node.endpoints("/operation1"), "a publisher of /operation1")
+    assert node.topics()["/operation1"] == ["std_msgs/msg/String"]
+    (endpoint,) = node.endpoints("/operation1")
+    assert endpoint["type"] == "std_msgs/msg/String"
+    assert endpoint["reliability"] == "reliable"
+    assert STRING_HASH.removeprefix("RIHS01_") in endpoint["hash"].lower()
+
+
+def test_two_publishers_of_one_type_have_a_topic_each(server: Server, node: RosNode) -> None:
+    until(server.ready, "ready")
+    permit(node)
+    until(lambda: server.widget("operation1")["enabled"], "permitted")
+    one, two = len(node.heard("/operation1")), len(node.heard("/operation2"))
+    assert server.press("operation1", "to one").json()["outcome"] == "published"
+    assert server.press("operation2", "to two").json()["outcome"] == "published"
+    until(lambda: len(node.heard("/operation2")) > two, "heard on /operation2")
+    until(lambda: len(node.heard("/operation1")) > one, "heard on /operation1")
+    assert node.heard_data("/operation1")[one:] == ["to one"]
+    assert node.heard_data("/operation2")[two:] == ["to two"]
+
+
+def test_nothing_known_is_locked_and_says_what_it_waits_for(server: Server) -> None:
+    until(server.ready, "ready")
+    shown = server.widget("operation1")
+    assert shown["enabled"] is False
+    assert "waiting for /operation_enabled" in shown["reason"]
+    assert server.widget("operation")["enabled"] is True  # it has no interlock
+    refused = server.press("operation1", "too soon")
+    assert refused.status_code == 409
+    assert refused.json()["outcome"] == "refused"
+    assert "waiting for /operation_enabled" in refused.json()["reason"]
+
+
+def test_a_value_published_once_counts_after_its_publisher_is_gone(
+    server: Server, node: RosNode
+) -> None:
+    until(server.ready, "ready")
+    with server.stream() as stream:
+        stream.next("snapshot")
+        permit(node, True)
+        name, data, _ = stream.next("operation-enabled-updated")
+        assert (name, data) == ("operation-enabled-updated", {"enabled": True, "reason": None})
+        permit(node, False)  # by another publisher, which may be seen before it says anything
+        _, data, _ = stream.next("operation-enabled-updated")
+        assert data["enabled"] is False
+    until(
+        lambda: "does not permit" in (server.widget("operation2")["reason"] or ""),
+        "it is told that the robot forbids it",
+    )
+    refused = server.press("operation2", "forged")
+    assert refused.status_code == 409
+    assert "does not permit" in refused.json()["reason"]
+    permit(node, True)
+    until(lambda: server.widget("operation2")["enabled"], "permitted again")
+    until(lambda: not node.endpoints("/operation_enabled"), "its publisher is gone")
+    assert server.widget("operation2")["enabled"] is True
+    assert server.press("operation2", "still").json()["outcome"] == "published"
+
+
+def test_a_page_loaded_later_shows_the_true_state_in_its_html(server: Server, node: RosNode) -> None:
+    until(server.ready, "ready")
+    locked = re.compile(r'formaction="/widgets/operation1"[^>]* disabled')
+    assert locked.search(server.http.get("/").text)
+    permit(node, True)
+    until(lambda: server.widget("operation1")["enabled"], "permitted")
+    assert not locked.search(server.http.get("/").text)
+    permit(node, False)
+    until(lambda: not server.widget("operation1")["enabled"], "forbidden")
+    html = server.http.get("/pages/operation").text
+    assert locked.search(html)
+    assert "The robot does not permit operation" in html
+
+
+@pytest.mark.parametrize("robot_first", [True, False])
+def test_a_transient_local_value_arrives_whoever_starts_first(
+    own_bridge: Bridge,
+    own_node: RosNode,
+    tmp_path: Path,
+    servers: Callable[[Server], Server],
+    robot_first: bool,
+) -> None:
+    def robot_speaks() -> None:
+        latched = {"durability": "transient_local", "depth": 1}
+        own_node.advertise("/operation_enabled", "std_msgs/msg/Bool", **latched)
+        own_node.publish("/operation_enabled", {"data": True})
+
+    if robot_first:
+        robot_speaks()
+    kiosk = servers(live(own_bridge.endpoint, tmp_path))
+    until(kiosk.ready, "ready")
+    if not robot_first:
+        robot_speaks()
+    until(lambda: kiosk.widget("operation1")["enabled"], "the last value came")
+
+
+def test_fifty_starts_fifty_first_presses_received(
+    own_bridge: Bridge, own_node: RosNode, tmp_path: Path
+) -> None:
+    own_node.subscribe("/operation", "std_msgs/msg/String")
+    texts = [f"first {number}" for number in range(50)]
+    with known(own_bridge, own_node, tmp_path):
+        pass
+    before = len(own_node.heard("/operation"))
+    for number, text in enumerate(texts):
+        kiosk = live(own_bridge.endpoint, tmp_path)
+        try:
+            until(kiosk.ready, "ready", every_s=0.001)
+            assert kiosk.press("operation", text).json()["outcome"] == "published"
+            until(partial(has_heard, own_node, "/operation", before + number + 1), "heard", 5)
+        finally:
+            kiosk.end()
+    assert own_node.heard_data("/operation")[before:] == texts
+
+
+def test_what_nobody_hears_is_unknown_and_says_so(
+    own_bridge: Bridge, tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    kiosk = servers(live(own_bridge.endpoint, tmp_path))
+    until(kiosk.ready, "ready")
+    answer = kiosk.press("operation", "anybody?")
+    assert answer.status_code == 200
+    assert answer.json()["outcome"] == "unknown"
+    assert "no node is known to listen" in answer.json()["reason"]
+
+
+def test_logs_are_in_ros_format_and_on_rosout(server: Server, node: RosNode) -> None:
+    until(server.ready, "ready")
+    until(partial(arrives, server, node), "the bridge knows what the node listens to", every_s=0.1)
+    line = re.compile(r"\[(INFO|WARN|ERROR|FATAL)\] \[\d{10}\.\d{9}\] \[web_ui\]: .+|  .*")
+    assert all(line.fullmatch(text) for text in server.process.lines)
+    server.press("operation", "typed in", id="for-the-log")
+    entry = on_rosout(node, "press for-the-log of operation by a program (127.0.0.1): published: Sent")
+    assert (entry["name"], entry["level"]) == ("web_ui", 20)
+    assert any("typed in" in text for text in server.process.lines)
+
+
+def on_rosout(node: RosNode, text: str) -> dict[str, object]:
+    """The message there with this text, when it has come."""
+    found: list[dict[str, object]] = until(
+        lambda: [m for m in node.heard("/rosout") if text in str(m["msg"])], f"{text} on /rosout"
+    )
+    return found[0]
+
+
+def test_what_was_typed_and_what_uvicorn_says_is_not_on_rosout(server: Server, node: RosNode) -> None:
+    until(server.ready, "ready")
+    before = len(node.heard("/rosout"))
+    head = "POST /widgets/operation HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: application/json\r\n"
+    with create_connection(("127.0.0.1", server.port)) as one:
+        one.sendall(f"{head}Content-Length: 100\r\n\r\n{{".encode())  # and drops it
+    with server.socket() as press_socket:
+        press_socket.press(widget="operation", inputs={"message": "typed in" * 20}, id="bad")
+        press_socket.press(widget="operation", inputs={"message": "typed in"}, id="good")
+    server.press("operation", "typed in", id="good")
+    server.press("operation", "typed in otherwise", id="good")
+    server.press("operation", "typed in", id="the-last")
+    on_rosout(node, "press the-last of operation by a program (127.0.0.1): ")
+    said = [str(message["msg"]) for message in node.heard("/rosout")[before:]]
+    assert [text for text in said if text.startswith("press bad of operation by ")] == [
+        "press bad of operation by a program (127.0.0.1): refused"
+    ]
+    never = ("typed in", "Traceback", "ClientDisconnect", "WebSocket", "connection open")
+    assert [text for text in said if any(words in text for words in never)] == []
+
+
+def test_debug_is_hidden_unless_asked_for(
+    bridge: Bridge, node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    quiet = servers(live(bridge.endpoint, tmp_path))
+    loud = servers(live(bridge.endpoint, tmp_path, KIOSK_LOG_LEVEL="debug"))
+    for kiosk in (quiet, loud):
+        kiosk.http.get("/")
+    until(lambda: '"GET / HTTP/1.1"' in loud.process.text, "the request is logged")
+    assert '"GET / HTTP/1.1"' not in quiet.process.text
+
+
+@pytest.mark.parametrize("robot_first", [True, False])
+def test_another_type_on_the_robot_locks_and_says_which(
+    own_bridge: Bridge,
+    own_node: RosNode,
+    tmp_path: Path,
+    servers: Callable[[Server], Server],
+    robot_first: bool,
+) -> None:
+    def robot_joins() -> None:
+        own_node.subscribe("/operation", "std_msgs/msg/Bool")
+        own_node.advertise("/operation_enabled", "std_msgs/msg/String")
+
+    if robot_first:
+        robot_joins()
+    kiosk = servers(live(own_bridge.endpoint, tmp_path))
+    until(kiosk.answers, "answers")
+    if not robot_first:
+        until(kiosk.ready, "ready: the bridge's routes have the kiosk's types")
+        robot_joins()
+
+    def wrong(widget: str) -> bool:
+        return "is std_msgs/msg/" in (kiosk.widget(widget)["reason"] or "")
+
+    until(lambda: wrong("operation") and wrong("operation1"), "both mismatches are told")
+    assert "std_msgs/msg/Bool on the robot" in kiosk.widget("operation")["reason"]
+    assert "std_msgs/msg/String on the robot" in kiosk.widget("operation1")["reason"]
+    assert kiosk.press("operation", "x").status_code == 409
+    assert not kiosk.widget("operation2")["enabled"]
+
+
+def test_a_namespaced_robot(domain: int, tmp_path: Path, servers: Callable[[Server], Server]) -> None:
+    named = Bridge(domain + 2, namespace="/robot1")
+    named.start()
+    robot = RosNode(named.domain)
+    try:
+        robot.subscribe("/operation", "std_msgs/msg/String")
+        panel = tmp_path / "panel.toml"
+        shipped = (ROOT / "app/panel.toml").read_text()
+        panel.write_text(shipped.replace('namespace = ""', 'namespace = "/robot1"'))
+        kiosk = servers(live(named.endpoint, tmp_path, KIOSK_PANEL=str(panel)))
+        until(kiosk.ready, "ready")
+        until(
+            lambda: kiosk.press("operation", "to robot1").json()["outcome"] == "published",
+            "the robot listens",
+        )
+        until(lambda: "to robot1" in robot.heard_data("/operation"), "robot1 heard it")
+    finally:
+        robot.end()
+        named.end()
+
+
+def test_a_route_that_another_program_made_with_a_wrong_type_locks(
+    own_bridge: Bridge, tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    config = zenoh.Config()
+    config.insert_json5("mode", '"client"')
+    config.insert_json5("connect/endpoints", f'["{own_bridge.endpoint}"]')
+    with zenoh.open(config) as other:
+        key = f"@/{other.zid()}/@ros2_lv/MP/operation/std_msgs§msg§Bool/:::"
+        token = other.liveliness().declare_token(key)
+        routes = "@/*/ros2/route/topic/sub/operation"
+        until(lambda: list(other.get(routes, timeout=1)), "the wrong route is there")
+        kiosk = servers(live(own_bridge.endpoint, tmp_path))
+        until(
+            lambda: "std_msgs/msg/Bool on the robot" in (kiosk.widget("operation")["reason"] or ""),
+            "locked for the route's type",
+        )
+        assert kiosk.press("operation", "x").status_code == 409
+        token.undeclare()
+        until(lambda: kiosk.widget("operation")["enabled"], "open again", within_s=15)

@@ -1,0 +1,302 @@
+"""Control as operators see it: browsers of their own, on the demo robot. One is at the cell, the
+others come as through a proxy, which says where from."""
+
+import os
+import signal
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Browser, Error, Page, expect
+
+from tests.support.parts import CHROMIUM, CHROMIUM_FLAGS, ROOT, TAP_AGAIN_MS, Server, until
+from tests.web.test_control_over_http import PROXY, control_panel
+
+IDLE_S = 4.0
+FIRST, SECOND = "192.0.2.1", "192.0.2.2"
+
+NOBODY = "Nobody has control of the robot: take control first."
+
+Opens = Callable[..., Page]
+
+
+@pytest.fixture
+def kiosk(tmp_path: Path) -> Iterator[Server]:
+    panel = control_panel(tmp_path, f"takeover_after_s = {IDLE_S}")
+    mine = Server(ROOT, KIOSK_PANEL=str(panel), KIOSK_PROXIES=PROXY)
+    until(mine.ready, "ready")
+    yield mine
+    mine.end()
+
+
+@pytest.fixture
+def opens(kiosk: Server, chromium: Browser) -> Iterator[Opens]:
+    """Opens the panel in a browser context of its own; an error on a console fails the test."""
+    contexts = []
+    errors: list[str] = []
+
+    def opened(address: str = "", within: Browser = chromium, scripts: bool = True) -> Page:
+        headers = {"x-forwarded-for": address} if address else {}
+        context = within.new_context(
+            viewport={"width": 1280, "height": 800},
+            extra_http_headers=headers,
+            java_script_enabled=scripts,
+        )
+        contexts.append(context)
+        page = context.new_page()
+        page.on("pageerror", lambda error: errors.append(str(error)))
+        page.goto(kiosk.url)
+        return page
+
+    yield opened
+    for context in contexts:
+        if context.browser and context.browser.is_connected():
+            context.close()
+    assert errors == []
+
+
+@pytest.fixture
+def other_chromium(chromium: Browser) -> Iterator[Browser]:
+    """A browser with processes of its own, to be killed."""
+    mine = chromium.browser_type.launch(executable_path=CHROMIUM, args=CHROMIUM_FLAGS)
+    yield mine
+    if mine.is_connected():
+        mine.close()
+
+
+def button(page: Page, name: str) -> Any:
+    return page.get_by_role("button", name=name, exact=True)
+
+
+def tap(page: Page, name: str) -> None:
+    """Presses a button of the bar; what is sooner after another press is the same tap."""
+    expect(page.locator("#control")).not_to_have_attribute("aria-busy", "true")
+    button(page, name).click()
+
+
+def bar(page: Page) -> Any:
+    return page.locator("#control .who")
+
+
+def take(page: Page) -> None:
+    tap(page, "Take control")
+    expect(bar(page)).to_contain_text("This panel has control")
+
+
+def locked_by(page: Page, why: str) -> None:
+    expect(button(page, "Publish")).to_be_disabled()
+    expect(page.locator("#why-operation")).to_contain_text(why)
+    expect(bar(page)).to_contain_text(why)
+
+
+def sends(page: Page) -> None:
+    page.get_by_label("Message").fill("hello")
+    button(page, "Publish").click()
+    expect(page.locator("#receipt-operation")).to_contain_text("Sent on /operation at")
+
+
+def test_the_panel_at_the_cell_has_control_at_once(kiosk: Server, opens: Opens) -> None:
+    cell = opens()
+    expect(bar(cell)).to_have_text("This panel has control of the robot.")
+    sends(cell)
+    cell.wait_for_timeout(6000)  # longer than who is silent keeps it
+    cell.reload()
+    sends(cell)
+
+
+def test_a_touch_that_a_stopped_server_finds_late_takes_no_control(kiosk: Server, opens: Opens) -> None:
+    page = opens(FIRST)
+    locked_by(page, NOBODY)
+    kiosk.process.send(signal.SIGSTOP)
+    try:
+        with page.expect_response("**/control/take") as answered:
+            button(page, "Take control").click()
+            page.wait_for_timeout(3000)
+            kiosk.process.send(signal.SIGCONT)
+        assert answered.value.status == 409
+    finally:
+        kiosk.process.send(signal.SIGCONT)
+    locked_by(page, NOBODY)
+    take(page)
+
+
+def test_taking_looking_on_asking_keeping_and_giving(kiosk: Server, opens: Opens) -> None:
+    first, second = opens(FIRST), opens(SECOND)
+    locked_by(first, NOBODY)
+    take(first)
+    sends(first)
+    locked_by(second, "Panel 1 (192.0.2.1) has control of the robot.")
+    expect(button(second, "Take control")).to_have_count(0)
+
+    tap(second, "Ask for control")
+    expect(bar(second)).to_contain_text("Panel 1 (192.0.2.1) was asked")
+    expect(bar(first)).to_contain_text("Panel 2 (192.0.2.2) asks for control of the robot")
+    tap(first, "Keep")
+    locked_by(second, "Panel 1 (192.0.2.1) has control of the robot.")
+    expect(bar(first)).to_have_text("This panel has control of the robot.")
+    tap(second, "Ask for control")
+    expect(second.locator("#control .refused")).to_contain_text("The request was denied")
+
+    third = opens("192.0.2.3")
+    tap(third, "Ask for control")
+    tap(first, "Give")
+    expect(bar(third)).to_have_text("This panel has control of the robot.")
+    sends(third)
+    for onlooker in (first, second):
+        locked_by(onlooker, "Panel 3 (192.0.2.3) has control of the robot.")
+    tap(third, "Give up control")
+    for page in (first, second, third):
+        locked_by(page, "Nobody has control of the robot")
+
+
+def test_a_request_is_withdrawn(opens: Opens) -> None:
+    first, second = opens(FIRST), opens(SECOND)
+    take(first)
+    tap(second, "Ask for control")
+    expect(button(first, "Give")).to_be_visible()
+    tap(second, "Ask no more")
+    expect(button(first, "Give up control")).to_be_visible()
+    expect(button(first, "Give")).to_have_count(0)
+
+
+def test_an_idle_holder_gives_way_and_one_at_work_does_not(opens: Opens) -> None:
+    first, second = opens(FIRST), opens(SECOND)
+    take(first)
+    tap(second, "Ask for control")
+    expect(button(first, "Give")).to_be_visible()
+    began = time.monotonic()
+    while time.monotonic() - began < 1.5 * IDLE_S:
+        first.mouse.click(640, 700)  # on nothing at all
+        first.wait_for_timeout(500)
+    expect(bar(first)).to_contain_text("asks for control")
+    expect(bar(second)).to_contain_text("This panel has control", timeout=1000 * (IDLE_S + 3))
+    locked_by(first, "Panel 2 (192.0.2.2) has control of the robot.")
+    sends(second)
+
+
+def test_the_panel_at_the_cell_takes_over(opens: Opens) -> None:
+    first = opens(FIRST)
+    take(first)
+    cell = opens()
+    locked_by(cell, "Panel 1 (192.0.2.1) has control of the robot.")
+    take(cell)
+    sends(cell)
+    locked_by(first, "The panel at the cell has control of the robot.")
+
+
+def processes_of(browser: Browser) -> list[int]:
+    session = browser.new_browser_cdp_session()
+    return [int(p["id"]) for p in session.send("SystemInfo.getProcessInfo")["processInfo"]]
+
+
+@pytest.mark.parametrize("fault", [signal.SIGKILL, signal.SIGSTOP])
+def test_a_holder_whose_browser_is_killed_or_hangs_is_lost(
+    kiosk: Server, opens: Opens, other_chromium: Browser, fault: signal.Signals
+) -> None:
+    first, second = opens(FIRST, within=other_chromium), opens(SECOND)
+    take(first)
+    locked_by(second, "Panel 1 (192.0.2.1) has control of the robot.")
+    pids = processes_of(other_chromium)
+    began = time.monotonic()
+    try:
+        for pid in pids:
+            os.kill(pid, fault)
+        expect(bar(second)).to_contain_text("Nobody has control", timeout=8000)
+        assert 3 < time.monotonic() - began < 9
+        locked_by(second, "Nobody has control of the robot")
+        take(second)
+    finally:
+        for pid in pids if fault == signal.SIGSTOP else ():
+            os.kill(pid, signal.SIGCONT)
+    if fault == signal.SIGSTOP:
+        locked_by(first, "Panel 2 (192.0.2.2) has control of the robot.")
+    else:
+        with pytest.raises(Error):
+            first.title()
+
+
+def test_a_page_that_is_closed_frees_it_for_who_asks(opens: Opens) -> None:
+    first, second = opens(FIRST), opens(SECOND)
+    take(first)
+    tap(second, "Ask for control")
+    expect(button(first, "Give")).to_be_visible()
+    first.close()
+    expect(bar(second)).to_contain_text("This panel has control", timeout=8000)
+
+
+def test_what_was_given_up_does_not_come_back_with_a_page(opens: Opens) -> None:
+    cell = opens()
+    expect(bar(cell)).to_contain_text("This panel has control")
+    tap(cell, "Give up control")
+    locked_by(cell, "Nobody has control of the robot")
+    cell.reload()
+    locked_by(cell, "Nobody has control of the robot")
+    take(cell)
+
+
+def test_two_taps_take_control_and_do_not_give_it_up(opens: Opens) -> None:
+    first = opens(FIRST)
+    button(first, "Take control").dblclick(delay=20)
+    expect(button(first, "Give up control")).to_be_visible()
+    place = button(first, "Give up control").bounding_box()
+    assert place is not None
+    first.mouse.click(place["x"] + 5, place["y"] + 5)
+    first.wait_for_timeout(1000)
+    expect(bar(first)).to_contain_text("This panel has control")
+
+
+def test_after_a_restart_of_the_server_nobody_has_it(
+    kiosk: Server, opens: Opens, tmp_path: Path
+) -> None:
+    first = opens(FIRST)
+    take(first)
+    kiosk.process.kill()
+    expect(bar(first)).to_have_text("not known")
+    expect(button(first, "Give up control")).to_be_disabled()
+    again = Server(ROOT, kiosk.port, KIOSK_PANEL=str(tmp_path / "control.toml"), KIOSK_PROXIES=PROXY)
+    try:
+        locked_by(first, "Nobody has control of the robot")
+        take(first)
+        sends(first)
+    finally:
+        again.end()
+
+
+def test_without_scripts_forms_do_the_same(kiosk: Server, opens: Opens) -> None:
+    first, second = opens(FIRST, scripts=False), opens(SECOND, scripts=False)
+    locked_by(first, "Nobody has control of the robot")
+    tap(first, "Take control")
+    expect(bar(first)).to_contain_text("This panel has control")
+    first.wait_for_timeout(TAP_AGAIN_MS)
+    sends(first)
+    second.reload()
+    locked_by(second, "Panel 1 (192.0.2.1) has control of the robot.")
+    tap(second, "Ask for control")
+    expect(bar(second)).to_contain_text("was asked")
+    first.reload()
+    tap(first, "Give")
+    locked_by(first, "Panel 2 (192.0.2.2) has control of the robot.")
+    second.reload()
+    second.wait_for_timeout(TAP_AGAIN_MS)
+    sends(second)
+    tap(second, "Give up control")
+    locked_by(second, "Nobody has control of the robot")
+
+
+def test_a_page_that_came_by_a_link_on_another_site_learns_who_it_is(
+    kiosk: Server, opens: Opens
+) -> None:
+    first = opens(FIRST)
+    take(first)
+    linking = first.context.new_page()
+    link = f'<a href="{kiosk.url}/">panel</a>'
+    linking.route(
+        "http://wiki.example/", lambda route: route.fulfill(body=link, content_type="text/html")
+    )
+    linking.goto("http://wiki.example/")
+    linking.get_by_role("link").click()
+    expect(bar(linking)).to_have_text("This panel has control of the robot.")
+    sends(linking)
+    sends(first)

@@ -1,0 +1,101 @@
+"""What needs its place, with each set of fonts that a kiosk may have."""
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.browser.test_control_in_browser import (
+    FIRST,
+    SECOND,
+    Opens,
+    bar,
+    button,
+    kiosk,
+    opens,
+    take,
+    tap,
+)
+from tests.browser.test_links_in_browser import Keep
+from tests.browser.test_pages import SIZES
+from tests.runtime.test_several_robots import MANY, heard, ten
+from tests.support.fonts import SETS
+from tests.support.parts import ROOT, Server
+
+__all__ = ["kiosk", "opens", "ten"]  # fixtures
+
+
+@pytest.fixture(scope="module", params=SETS)
+def fonts(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+@pytest.mark.parametrize(("width", "height"), SIZES)
+def test_the_bar_fits_and_nothing_moves_when_somebody_asks(
+    opens: Opens, width: int, height: int
+) -> None:
+    first, second = opens(FIRST), opens(SECOND)
+    for page in (first, second):
+        page.set_viewport_size({"width": width, "height": height})
+    size = "() => [document.documentElement.scrollWidth, document.documentElement.scrollHeight]"
+    take(first)
+    before = button(first, "Publish").bounding_box()
+    tap(second, "Ask for control")
+    expect(button(first, "Keep")).to_be_visible()
+    assert button(first, "Publish").bounding_box() == before
+    for page in (first, second):
+        assert page.evaluate(size) <= [width, height]
+        clipped = "e => e.scrollWidth > e.clientWidth || e.scrollHeight > e.clientHeight + 1"
+        assert not bar(page).evaluate(clipped)
+        for one in page.locator("#control button:visible").all():
+            box = one.bounding_box()
+            assert box is not None
+            assert box["height"] >= 44
+            assert box["width"] * 0.22 >= 19.9
+    left, right = button(first, "Give").bounding_box(), button(first, "Keep").bounding_box()
+    assert left is not None
+    assert right is not None
+    assert (right["x"] - left["x"] - left["width"]) * 0.22 >= 4.9
+
+
+# With all lamps at their longest: where they begin and end, and where the header's last link ends.
+LONGEST = """() => {
+  const place = (name) => document.querySelector(name).getBoundingClientRect();
+  const before = place(".lamps");
+  for (const text of document.querySelectorAll(".lamps b")) text.textContent = "no connection";
+  const after = place(".lamps");
+  return [before.left, after.left, before.right, after.right, place("header > a").right];
+}"""
+
+
+@pytest.mark.parametrize(("width", "height"), SIZES)
+def test_beside_the_banner_the_lamps_keep_their_place_whatever_they_say(
+    servers: Keep, page: Page, width: int, height: int
+) -> None:
+    page.set_viewport_size({"width": width, "height": height})
+    page.goto(servers(Server(ROOT)).url)
+    expect(page.locator("#banner")).to_be_visible()
+    left, then_left, right, then_right, end = page.evaluate(LONGEST)
+    assert (left, right) == (then_left, then_right)
+    assert end <= width
+
+
+def test_ten_robots_fit_the_screen(ten: Server, page: Page) -> None:
+    page.set_viewport_size({"width": 1024, "height": 600})
+    page.goto(f"{ten.url}/robots/r10/")
+    tabs = page.locator("[data-robot]")
+    expect(tabs).to_have_count(MANY)
+    for tab in tabs.all():
+        box = tab.bounding_box()
+        assert box is not None
+        assert box["width"] >= 20 / 0.22  # millimetres
+        assert box["height"] >= 62  # as a text field has
+        name = tab.locator("span")
+        assert name.evaluate("e => e.scrollWidth <= e.clientWidth"), name.text_content()
+    last = page.get_by_role("button", name="Publish2").bounding_box()
+    assert last is not None
+    assert last["y"] + last["height"] < 500
+    page.get_by_role("link", name="Robot 7").click()
+    expect(page.locator("h1")).to_have_text("Robot 7 Robot cell 1")
+    page.get_by_label("Message").fill("from the screen")
+    page.get_by_role("button", name="Publish", exact=True).click()
+    expect(page.locator('[data-widget="last_heard"]')).to_contain_text("from the screen (/operation)")
+    assert "from the screen" not in heard(ten.robot("r10"))

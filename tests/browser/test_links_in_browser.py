@@ -1,0 +1,166 @@
+"""The three links as an operator sees them when a part breaks: real bridge, node, server, Chromium."""
+
+import re
+import signal
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, Locator, Page, expect
+
+from tests.support.parts import ROOT, Bridge, RosNode, Server, live
+
+Keep = Callable[[Server], Server]
+
+MOMENT = re.compile(r"^\d{4}-\d\d-\d\d \d\d:\d\d:\d\d$")
+CLOCK = re.compile(r"^\d\d:\d\d:\d\d$")
+AGE_S = 1.5
+DDS_LEASE_S = 20  # after which a killed node is no longer thought to be there
+SIZES = [(1280, 800), (1024, 600)]
+
+
+def panel_with_age(folder: Path) -> str:
+    """The shipped panel, whose interlock gets old."""
+    text = (ROOT / "app/panel.toml").read_text()
+    aged = text.replace("[[interlock]]\n", f"[[interlock]]\nmax_age_s = {AGE_S}\n")
+    assert aged != text
+    path = folder / "aged.toml"
+    path.write_text(aged)
+    return str(path)
+
+
+def speaking(node: RosNode) -> None:
+    node.advertise("/operation_enabled", "std_msgs/msg/Bool")
+    node.every("/operation_enabled", {"data": True}, AGE_S / 5)
+
+
+def opened(page: Page, server: Server) -> Page:
+    page.goto(server.url)
+    page.locator(".lamps").click()
+    expect(page.locator("#links")).to_be_visible()
+    return page
+
+
+def said(page: Page, link: str, what: str) -> Locator:
+    return page.locator(f'[data-link="{link}"] [data-text="{what}"]')
+
+
+def row(page: Page, link: str) -> Locator:
+    return page.locator(f'[data-link="{link}"]')
+
+
+def lamp(page: Page, link: str) -> Locator:
+    return page.locator(f'[data-lamp="{link}"]')
+
+
+def test_a_killed_bridge_is_named_with_what_it_locks(
+    own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Keep, page: Page
+) -> None:
+    speaking(own_node)
+    kiosk = servers(live(own_bridge.endpoint, tmp_path))
+    opened(page, kiosk)
+    for link in ("server", "bridge", "node"):
+        expect(row(page, link)).to_have_attribute("data-state", "ok", timeout=20_000)
+        expect(said(page, link, "locks")).to_have_text("Locks nothing.")
+        expect(said(page, link, "reason")).to_have_text("")
+        expect(said(page, link, "since")).to_have_text(MOMENT)
+    joined_at = said(page, "bridge", "since").text_content() or ""
+    page.wait_for_timeout(1100)  # so that the next state's second is another
+    own_bridge.kill()
+    expect(said(page, "bridge", "locks")).to_have_text("Locks Publish, Publish1, Publish2.")
+    expect(said(page, "bridge", "reason")).to_contain_text(
+        f"bridge can't be reached at {own_bridge.endpoint}."
+    )
+    expect(said(page, "bridge", "since")).not_to_have_text(joined_at)
+    expect(said(page, "bridge", "since")).to_have_text(MOMENT)
+    expect(said(page, "node", "text")).to_have_text("no connection")
+    expect(said(page, "node", "locks")).to_have_text("Locks nothing.")
+    expect(row(page, "server")).to_have_attribute("data-state", "ok")
+    expect(lamp(page, "bridge")).to_have_attribute("data-state", "bad")
+    own_bridge.start()
+    expect(said(page, "bridge", "locks")).to_have_text("Locks nothing.", timeout=20_000)
+    expect(said(page, "node", "locks")).to_have_text("Locks nothing.", timeout=20_000)
+
+
+def test_a_node_that_hangs_is_silent_and_one_that_died_is_gone(
+    own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Keep, page: Page
+) -> None:
+    speaking(own_node)
+    kiosk = servers(live(own_bridge.endpoint, tmp_path, KIOSK_PANEL=panel_with_age(tmp_path)))
+    opened(page, kiosk)
+    expect(said(page, "node", "text")).to_have_text("ok", timeout=20_000)
+    expect(said(page, "node", "locks")).to_have_text("Locks nothing.")
+    own_node.freeze()
+    expect(said(page, "node", "text")).to_have_text("silent")
+    expect(said(page, "node", "locks")).to_have_text("Locks Publish1, Publish2.")
+    expect(said(page, "node", "reason")).to_contain_text("Nothing new on /operation_enabled for 1.5 s")
+    expect(said(page, "node", "since")).to_have_text(MOMENT)
+    expect(said(page, "bridge", "locks")).to_have_text("Locks nothing.")
+    expect(lamp(page, "node")).to_have_attribute("data-state", "bad")
+    own_node.thaw()
+    expect(said(page, "node", "text")).to_have_text("ok")
+    expect(said(page, "node", "reason")).to_have_text("")
+    own_node.kill()
+    expect(said(page, "node", "text")).to_have_text("silent")
+    expect(said(page, "node", "text")).to_have_text("no node seen", timeout=(DDS_LEASE_S + 15) * 1000)
+    expect(said(page, "node", "reason")).to_contain_text("was there and is gone, but the bridge is not")
+    expect(row(page, "bridge")).to_have_attribute("data-state", "ok")
+
+
+def test_a_frozen_server_is_lost_since_its_last_heartbeat(
+    bridge: Bridge, node: RosNode, tmp_path: Path, page: Page
+) -> None:
+    mine = live(bridge.endpoint, tmp_path)
+    try:
+        opened(page, mine)
+        expect(said(page, "bridge", "text")).to_have_text("ok", timeout=20_000)
+        mine.process.send(signal.SIGSTOP)
+        expect(said(page, "server", "text")).to_have_text("no connection")
+        last_beat = page.locator("#clock").text_content() or ""
+        assert CLOCK.match(last_beat)
+        expect(said(page, "server", "since")).to_have_text(last_beat)
+        expect(said(page, "server", "locks")).to_have_text("Locks every control.")
+        expect(said(page, "server", "reason")).to_have_text(
+            "There is no connection to the panel's server."
+        )
+        for link in ("bridge", "node"):
+            expect(said(page, link, "text")).to_have_text("not known")
+            for what in ("since", "locks", "reason"):
+                expect(said(page, link, what)).to_have_text("")
+        page.wait_for_timeout(1100)
+        mine.process.send(signal.SIGCONT)
+        expect(said(page, "server", "text")).to_have_text("ok", timeout=15_000)
+        expect(said(page, "server", "since")).not_to_have_text(last_beat)
+        expect(said(page, "server", "since")).to_have_text(CLOCK)
+        expect(said(page, "server", "locks")).to_have_text("Locks nothing.")
+        expect(said(page, "bridge", "since")).to_have_text(MOMENT)
+    finally:
+        mine.process.send(signal.SIGCONT)
+        mine.end()
+
+
+@pytest.mark.parametrize("scripts", [True, False])
+@pytest.mark.parametrize(("width", "height"), SIZES)
+def test_the_links_open_under_a_finger_and_move_nothing(
+    server: Server, chromium: Browser, scripts: bool, width: int, height: int
+) -> None:
+    context = chromium.new_context(
+        java_script_enabled=scripts, viewport={"width": width, "height": height}
+    )
+    page = context.new_page()
+    page.goto(server.url)
+    expect(page.locator("#links")).to_be_hidden()
+    lamps = page.locator(".lamps").bounding_box()
+    assert lamps is not None
+    assert lamps["height"] >= 44
+    assert lamps["width"] * 0.22 >= 20
+    publish = page.get_by_role("button", name="Publish", exact=True)
+    place = publish.bounding_box()
+    page.locator(".lamps").click()
+    expect(page.locator("#links")).to_be_visible()
+    expect(said(page, "bridge", "locks")).to_be_visible()
+    assert page.locator(".lamps").bounding_box() == lamps
+    assert publish.bounding_box() == place
+    page.locator(".lamps").click()
+    expect(page.locator("#links")).to_be_hidden()
+    context.close()

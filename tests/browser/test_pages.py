@@ -1,0 +1,441 @@
+"""What an operator sees and touches: Debian's Chromium, on the real bridge or the demo robot."""
+
+import re
+import signal
+import time
+from collections import Counter
+from functools import partial
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Browser, Page, Request, Route, expect
+
+from tests.support.parts import TAP_AGAIN_MS, Bridge, RosNode, Server, has_heard, live, until
+
+TEXTS = [
+    "",
+    "hello",
+    "日本語",
+    "🤖👩‍🏭",
+    "\"quotes\" 'and' `ticks`",
+    "<script>alert(1)</script>",
+    "{braces} {{double}}",
+    "x" * 80,
+]
+SIZES = [(1280, 800), (1024, 600)]
+NO_SERVER = "no connection to the panel's server"
+TELL_WHEN_LOCKED = """() => new MutationObserver(() => window.lockedAt ??= Date.now()).observe(
+    document.querySelector('[data-lamp="server"]'), { attributes: true },
+)"""
+LATE_S = 1.0  # by which a busy machine runs a page's timer late
+
+
+def button(page: Page, name: str) -> Any:
+    return page.get_by_role("button", name=name, exact=True)
+
+
+def why(page: Page, widget: str) -> Any:
+    return page.locator(f"#why-{widget}")
+
+
+def permit(node: RosNode, value: bool) -> None:
+    node.once("/operation_enabled", "std_msgs/msg/Bool", {"data": value})
+
+
+def test_the_main_job(server: Server, node: RosNode, page: Page) -> None:
+    page.goto(server.url)
+    expect(button(page, "Publish1")).to_be_disabled()
+    expect(why(page, "operation1")).to_contain_text("waiting for /operation_enabled")
+    permit(node, True)
+    expect(button(page, "Publish1")).to_be_enabled()
+    expect(button(page, "Publish2")).to_be_enabled()
+    before = len(node.heard("/operation1"))
+    page.get_by_label("Message").fill("pick up")
+    button(page, "Publish1").click()
+    expect(page.locator("#receipt-operation1")).to_contain_text("Sent on /operation1 at")
+    until(lambda: node.heard_data("/operation1")[before:] == ["pick up"], "the robot has it")
+    permit(node, False)
+    for name, widget in (("Publish1", "operation1"), ("Publish2", "operation2")):
+        expect(button(page, name)).to_be_disabled()
+        expect(button(page, name)).to_have_css("background-color", "rgb(169, 169, 169)")
+        expect(button(page, name)).to_have_css("cursor", "not-allowed")
+        expect(why(page, widget)).to_contain_text("The robot does not permit operation")
+        expect(why(page, widget)).to_be_visible()
+        described = button(page, name).get_attribute("aria-describedby") or ""
+        assert f"why-{widget}" in described.split()
+    expect(button(page, "Publish")).to_be_enabled()
+    permit(node, True)
+    expect(button(page, "Publish1")).to_be_enabled()
+
+
+# What some readers take for the end of a line; in a text of the robot's it is part of it.
+SEPARATED = "one \x85 two \u2028 three \u2029 four"
+SNAPSHOT = "**/events?once=1"
+NO_STREAM_LEFT = """() => {
+    const forEver = () => new Promise(() => {});
+    for (const place of [0, 1, 2]) navigator.locks.request(`stream-${place}`, forEver);
+}"""
+
+
+@pytest.fixture
+def polling(server: Server, node: RosNode, page: Page) -> Page:
+    """An open page that asks for snapshots: its browser has no event stream to spare."""
+    other = page.context.new_page()
+    other.goto(f"{server.url}/log")
+    other.evaluate(NO_STREAM_LEFT)
+    permit(node, True)
+    until(lambda: server.widget("operation1")["enabled"], "permitted")
+    with page.expect_request(SNAPSHOT):
+        page.goto(server.url)
+    expect(button(page, "Publish1")).to_be_enabled()
+    return page
+
+
+def say(node: RosNode, server: Server, text: str) -> None:
+    node.once("/last_heard", "std_msgs/msg/String", {"data": text})
+    until(lambda: server.widget("last_heard")["text"] == text, "the server has it")
+
+
+def test_a_text_with_line_separators_keeps_no_button_open(
+    polling: Page, server: Server, node: RosNode
+) -> None:
+    say(node, server, SEPARATED)
+    expect(polling.locator('[data-widget="last_heard"] .value')).to_contain_text("four")
+    permit(node, False)
+    expect(button(polling, "Publish1")).to_be_disabled(timeout=4000)
+    expect(why(polling, "operation1")).to_contain_text("The robot does not permit operation")
+
+
+def test_line_separators_that_come_as_they_are_end_no_line_of_a_snapshot(
+    polling: Page, server: Server, node: RosNode
+) -> None:
+    def unescaped(route: Route) -> None:
+        body = route.fetch().text()
+        for separator in "\x85\u2028\u2029":
+            body = body.replace(f"\\u{ord(separator):04x}", separator)
+        route.fulfill(body=body, content_type="text/event-stream")
+
+    polling.route(SNAPSHOT, unescaped)
+    say(node, server, SEPARATED)
+    expect(polling.locator('[data-widget="last_heard"] .value')).to_contain_text("four")
+    permit(node, False)
+    expect(button(polling, "Publish1")).to_be_disabled(timeout=4000)
+    expect(why(polling, "operation1")).to_contain_text("The robot does not permit operation")
+
+
+@pytest.mark.parametrize(
+    "answer",
+    ["", 'event: beat\ndata: {"clock": "10:00:00", "now": 1}\n\n', "event: snapshot\ndata: {\n\n"],
+    ids=["nothing", "no snapshot", "half of one"],
+)
+def test_an_answer_without_its_snapshot_is_a_lost_link(polling: Page, answer: str) -> None:
+    polling.route(SNAPSHOT, lambda route: route.fulfill(body=answer, content_type="text/event-stream"))
+    expect(button(polling, "Publish1")).to_be_disabled()
+    expect(why(polling, "operation1")).to_contain_text(NO_SERVER)
+    polling.unroute(SNAPSHOT)
+    expect(button(polling, "Publish1")).to_be_enabled()
+
+
+def test_every_text_arrives_intact(server: Server, node: RosNode, page: Page) -> None:
+    page.goto(server.url)
+    expect(button(page, "Publish")).to_be_enabled()
+    before = len(node.heard("/operation"))
+    for number, text in enumerate(TEXTS):
+        page.get_by_label("Message").fill(text)
+        expect(button(page, "Publish")).not_to_have_attribute("aria-busy", "true")
+        button(page, "Publish").click()
+        heard = before + number + 1
+        until(partial(has_heard, node, "/operation", heard), f"heard {text!r}")
+    assert node.heard_data("/operation")[before:] == TEXTS
+
+
+def test_a_reload_shows_the_true_state_before_any_script(
+    server: Server, node: RosNode, chromium: Browser
+) -> None:
+    until(server.ready, "ready")
+    permit(node, True)
+    until(lambda: server.widget("operation1")["enabled"], "permitted")
+    context = chromium.new_context(java_script_enabled=False)
+    page = context.new_page()
+    page.goto(server.url)
+    expect(button(page, "Publish1")).to_be_enabled()
+    permit(node, False)
+    until(lambda: not server.widget("operation1")["enabled"], "forbidden")
+    page.reload()
+    expect(button(page, "Publish1")).to_be_disabled()
+    expect(why(page, "operation1")).to_contain_text("does not permit")
+    context.close()
+
+
+def test_without_scripts_a_press_is_a_form(server: Server, node: RosNode, chromium: Browser) -> None:
+    until(server.ready, "ready")
+    context = chromium.new_context(java_script_enabled=False)
+    page = context.new_page()
+    # One that was locked for a moment, as by a stall of the server, loads itself anew only later.
+    until(lambda: page.goto(server.url) and button(page, "Publish").is_enabled(), "it is open")
+    before = len(node.heard("/operation"))
+    page.wait_for_timeout(TAP_AGAIN_MS)
+    page.get_by_label("Message").fill("no script 日本語")
+    button(page, "Publish").click()
+    expect(page.locator("#receipt-operation")).to_contain_text("Sent on /operation at")
+    expect(page.get_by_label("Message")).to_have_value("no script 日本語")
+    until(lambda: len(node.heard("/operation")) > before, "heard")
+    page.go_back()
+    page.go_forward()
+    page.reload()
+    # The page reloads itself: a lock shows without a touch.
+    permit(node, True)
+    expect(button(page, "Publish1")).to_be_enabled(timeout=40_000)
+    assert node.heard_data("/operation")[before:] == ["no script 日本語"]
+    context.close()
+
+
+def test_enter_in_an_input_presses_nothing(server: Server, node: RosNode, chromium: Browser) -> None:
+    until(server.ready, "ready")
+    before = len(node.heard("/operation"))
+    for scripts in (True, False):
+        context = chromium.new_context(java_script_enabled=scripts)
+        page = context.new_page()
+        page.goto(server.url)
+        page.wait_for_timeout(TAP_AGAIN_MS)
+        page.get_by_label("Message").fill("oops")
+        page.get_by_label("Message").press("Enter")
+        button(page, "Publish").click()
+        expect(page.locator("#receipt-operation")).to_contain_text("Sent")
+        context.close()
+    until(lambda: len(node.heard("/operation")) == before + 2, "the two presses, and no more")
+
+
+def test_two_taps_of_a_finger_are_one_press(server: Server, node: RosNode, page: Page) -> None:
+    page.goto(server.url)
+    publish = button(page, "Publish")
+    expect(publish).to_be_enabled()
+    before = len(node.heard("/operation"))
+    page.get_by_label("Message").fill("once")
+    publish.dblclick(delay=20)
+    expect(page.locator("#receipt-operation")).to_contain_text("Sent")
+    publish.click()
+    expect(publish).not_to_have_attribute("aria-busy", "true")
+    assert len(node.heard("/operation")) == before + 1
+    publish.click()
+    until(lambda: len(node.heard("/operation")) == before + 2, "a press after that is another one")
+
+
+@pytest.mark.parametrize("fault", ["killed", "frozen"])
+def test_a_lost_server_locks_every_control_within_two_seconds(
+    bridge: Bridge, node: RosNode, tmp_path: Path, page: Page, fault: str
+) -> None:
+    mine = live(bridge.endpoint, tmp_path)
+    try:
+        page.goto(mine.url)
+        expect(button(page, "Publish")).to_be_enabled()
+        page.wait_for_function("() => document.querySelector('#clock').textContent")
+        page.evaluate(TELL_WHEN_LOCKED)
+        began = time.time()
+        mine.process.send(signal.SIGSTOP if fault == "frozen" else signal.SIGKILL)
+        expect(why(page, "operation")).to_contain_text(NO_SERVER)
+        locked_at = page.evaluate("lockedAt") / 1000
+        assert locked_at - began < 2.0 + LATE_S
+        for name in ("Publish", "Publish1", "Publish2"):
+            expect(button(page, name)).to_be_disabled()
+        expect(page.locator('[data-lamp="server"]')).to_have_attribute("data-state", "bad")
+        if fault == "frozen":
+            mine.process.send(signal.SIGCONT)
+            expect(button(page, "Publish")).to_be_enabled(timeout=15_000)
+    finally:
+        mine.process.send(signal.SIGCONT)
+        mine.end(signal.SIGKILL)
+
+
+def test_a_restarted_server_opens_by_a_fresh_snapshot(
+    bridge: Bridge, node: RosNode, tmp_path: Path, page: Page
+) -> None:
+    first = live(bridge.endpoint, tmp_path)
+    page.goto(first.url)
+    expect(button(page, "Publish")).to_be_enabled()
+    first.end(signal.SIGKILL)
+    expect(button(page, "Publish")).to_be_disabled()
+    second = live(bridge.endpoint, tmp_path, port=first.port)
+    try:
+        expect(button(page, "Publish")).to_be_enabled()
+        expect(button(page, "Publish1")).to_be_disabled()
+        expect(why(page, "operation1")).to_contain_text("waiting for /operation_enabled")
+    finally:
+        second.end()
+
+
+def test_a_post_that_gets_no_answer_is_not_known_and_not_repeated(
+    server: Server, node: RosNode, page: Page
+) -> None:
+    page.goto(server.url)
+    expect(button(page, "Publish")).to_be_enabled()
+    posts: list[Request] = []
+
+    def lose(route: Route) -> None:
+        posts.append(route.request)
+        route.abort()
+
+    page.route("**/widgets/**", lose)
+    page.route_web_socket("**/presses", lambda socket: socket.close())
+    page.reload()
+    expect(button(page, "Publish")).to_be_enabled()
+    button(page, "Publish").click()
+    expect(page.locator("#receipt-operation")).to_contain_text("not known whether this was sent")
+    page.wait_for_timeout(1500)  # long enough for a retry to show, were there one
+    assert len(posts) == 1
+
+
+def test_eight_tabs_of_one_browser_all_work(server: Server, node: RosNode, chromium: Browser) -> None:
+    context = chromium.new_context()
+    pages = [context.new_page() for _ in range(8)]
+    for page in pages:
+        page.goto(server.url)
+        expect(button(page, "Publish")).to_be_enabled()
+    permit(node, True)
+    for page in pages:
+        expect(button(page, "Publish1")).to_be_enabled()
+    permit(node, False)
+    for page in pages:
+        expect(button(page, "Publish1")).to_be_disabled()
+        expect(why(page, "operation1")).to_contain_text("does not permit")
+    for page in pages:
+        button(page, "Publish").click()
+        expect(page.locator("#receipt-operation")).to_contain_text("Sent")
+    context.close()
+
+
+def test_a_hidden_tab_gives_its_stream_back_and_takes_a_snapshot_when_shown(
+    server: Server, node: RosNode, page: Page
+) -> None:
+    def streams(count: int) -> bool:
+        return f"kiosk_streams {count}.0" in server.http.get("/metrics").text
+
+    def show(visible: bool) -> None:
+        page.evaluate(
+            "(visible) => { Object.defineProperty(document, 'hidden',"
+            " { value: !visible, configurable: true });"
+            " document.dispatchEvent(new Event('visibilitychange')); }",
+            visible,
+        )
+
+    until(server.ready, "ready")
+    permit(node, True)
+    page.goto(server.url)
+    expect(button(page, "Publish1")).to_be_enabled()
+    until(lambda: streams(1), "one stream")
+    show(False)
+    until(lambda: streams(0), "no stream")
+    expect(button(page, "Publish1")).to_be_disabled()
+    permit(node, False)
+    show(True)
+    until(lambda: streams(1), "one stream again")
+    expect(why(page, "operation1")).to_contain_text("does not permit")
+    expect(button(page, "Publish")).to_be_enabled()
+
+
+def test_hostile_text_is_only_text(server: Server, node: RosNode, page: Page) -> None:
+    hostile = "</p><img src=x onerror=alert(1)><script>document.title='owned'</script>"
+    page.goto(server.url)
+    expect(button(page, "Publish")).to_be_enabled()
+    node.once("/last_heard", "std_msgs/msg/String", {"data": hostile})
+    value = page.locator('[data-widget="last_heard"] .value')
+    expect(value).to_have_text(hostile)
+    page.reload()
+    expect(value).to_have_text(hostile)
+    assert page.title() == "Operation – Robot cell 1"
+    assert page.locator("main img").count() == 0
+
+
+def test_the_first_page_is_small_and_asks_nobody_else(demo: Server, chromium: Browser) -> None:
+    context = chromium.new_context()
+    page = context.new_page()
+    requests: list[Request] = []
+    page.on("request", lambda request: requests.append(request))
+    network = context.new_cdp_session(page)
+    network.send("Network.enable")
+    received: Counter[str] = Counter()  # bytes by request, with headers
+    network.on(
+        "Network.responseReceived",
+        lambda event: received.update({event["requestId"]: event["response"]["encodedDataLength"]}),
+    )
+    network.on(  # the stream is never finished
+        "Network.dataReceived",
+        lambda event: received.update({event["requestId"]: event["encodedDataLength"]}),
+    )
+    network.on(
+        "Network.loadingFinished",
+        lambda event: received.__setitem__(event["requestId"], event["encodedDataLength"]),
+    )
+    page.goto(demo.url)
+    expect(button(page, "Publish")).to_be_enabled()
+    page.wait_for_timeout(500)
+    urls = [request.url for request in requests if not request.url.startswith("data:")]
+    assert len(urls) <= 6, urls
+    assert all(url.startswith(demo.url) for url in urls)
+    assert len(received) == len(urls)
+    assert received.total() < 16_000
+    context.close()
+
+
+@pytest.mark.parametrize(("width", "height"), SIZES)
+def test_the_page_fits_its_screen_with_buttons_of_twenty_millimetres(
+    server: Server, node: RosNode, page: Page, width: int, height: int
+) -> None:
+    page.set_viewport_size({"width": width, "height": height})
+    page.goto(server.url)
+    expect(button(page, "Publish")).to_be_enabled()
+    permit(node, True)
+    expect(button(page, "Publish1")).to_be_enabled()
+    button(page, "Publish1").click()
+    expect(page.locator("#receipt-operation1")).to_contain_text("Sent")
+    mm_per_px = 0.22
+    places = []
+    for name in ("Publish", "Publish1", "Publish2"):
+        box = button(page, name).bounding_box()
+        assert box is not None
+        assert box["height"] * mm_per_px >= 19.9
+        assert box["width"] * mm_per_px >= 20
+        places.append(box)
+    for left, right in pairwise(places):
+        assert (right["x"] - left["x"] - left["width"]) * mm_per_px >= 4.9
+    fits = "() => [document.documentElement.scrollWidth, document.documentElement.scrollHeight]"
+    assert page.evaluate(fits) <= [width, height]
+    heading = page.locator('[data-widget="last_heard"]').bounding_box()
+    permit(node, False)
+    expect(button(page, "Publish1")).to_be_disabled()
+    # Nothing moved under a finger when the locks came.
+    assert page.locator('[data-widget="last_heard"]').bounding_box() == heading
+    assert page.evaluate(fits) <= [width, height]
+
+
+def test_a_button_acts_on_release_and_sliding_off_cancels(
+    server: Server, node: RosNode, page: Page
+) -> None:
+    page.goto(server.url)
+    expect(button(page, "Publish")).to_be_enabled()
+    before = len(node.heard("/operation"))
+    button(page, "Publish").hover()
+    page.mouse.down()
+    page.mouse.move(5, 5)
+    page.mouse.up()
+    expect(page.locator("#receipt-operation")).to_have_text("")
+    button(page, "Publish").hover()
+    page.mouse.down()
+    expect(page.locator("#receipt-operation")).to_have_text("")
+    page.mouse.up()
+    expect(page.locator("#receipt-operation")).to_contain_text("Sent")
+    until(lambda: len(node.heard("/operation")) == before + 1, "one press")
+
+
+def test_controls_have_labels_and_elements_stay_in_place(demo: Server, page: Page) -> None:
+    page.goto(demo.url)
+    page.evaluate("() => { window.kept = [...document.querySelectorAll('[data-widget]')]; }")
+    page.get_by_label("Message").fill("in place")
+    until(lambda: demo.widget("operation")["enabled"], "enabled")
+    button(page, "Publish").click()
+    expect(page.locator('[data-widget="last_heard"] .value')).to_contain_text("in place")
+    assert page.evaluate("() => window.kept.every((element) => element.isConnected)")
+    for root in page.locator("[data-widget]").all():
+        assert re.fullmatch(r"[a-z]+", root.get_attribute("data-kind") or "")

@@ -1,0 +1,360 @@
+"""How a press leaves the page: with its click, whoever made that, and before the page shows it."""
+
+import csv
+import io
+import re
+import time
+from collections.abc import Callable, Iterator
+from datetime import datetime
+from pathlib import Path
+from typing import Any, Final
+
+import pytest
+from playwright.sync_api import Browser, Page, Route, expect
+
+from tests.support.parts import ROOT, TAP_AGAIN_MS, Server, until
+
+# Each press as it leaves: in which event, and how many buttons were busy by then.
+NOTE: Final = """
+    window.left = [];
+    const note = (by, text) => {
+        const busy = document.querySelectorAll("[aria-busy]").length;
+        left.push({ by, during: event?.type, busy, ...JSON.parse(text) });
+    };
+    const send = WebSocket.prototype.send;
+    WebSocket.prototype.send = function (text) { note("socket", text); send.call(this, text); };
+    const real = fetch;
+    fetch = (url, options) => {
+        if (options?.method === "POST") note("post", options.body);
+        return real(url, options);
+    };
+"""
+CLICK: Final = "new MouseEvent('click', { bubbles: true, cancelable: true })"
+# Of a program on the page or beside it, such as one that reads the screen.
+PROGRAMS: Final = {
+    "click": "(button) => button.click()",
+    "dispatched click": f"(button) => button.dispatchEvent({CLICK})",
+    "submit": "(button) => button.form.requestSubmit(button)",
+}
+DOUBLE_TAP_MS: Final = 150
+MADE_BY: Final = ("mouse", "finger", "Enter", "Space", *PROGRAMS)
+
+
+@pytest.fixture
+def shown(demo: Server, page: Page) -> Page:
+    """Its page, that notes what leaves."""
+    page.add_init_script(NOTE)
+    page.goto(demo.url)
+    expect(publish(page)).to_be_enabled()
+    page.wait_for_function("() => document.querySelector('#clock').textContent")
+    page.get_by_label("Message").fill("once")
+    return page
+
+
+def publish(page: Page) -> Any:
+    return page.get_by_role("button", name="Publish", exact=True)
+
+
+def make(page: Page, by: str) -> None:
+    if by == "mouse":
+        publish(page).click()
+    elif by == "finger":
+        box = publish(page).bounding_box()
+        session = page.context.new_cdp_session(page)
+        where = {"x": box["x"] + box["width"] / 2, "y": box["y"] + box["height"] / 2}
+        session.send("Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": [where]})
+        session.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+    elif by in PROGRAMS:
+        publish(page).evaluate(PROGRAMS[by])
+    else:
+        publish(page).press(by)
+
+
+def receipt(page: Page) -> Any:
+    return page.locator("#receipt-operation")
+
+
+@pytest.mark.parametrize("by", MADE_BY)
+def test_a_press_leaves_once_within_its_event_and_then_shows(shown: Page, by: str, way: str) -> None:
+    if way == "post":
+        shown.route("**/line.js", lambda route: route.abort())
+    else:
+        with shown.expect_websocket():
+            shown.get_by_role("heading", name="Operation", exact=True).click()
+        shown.wait_for_timeout(300)  # it is open
+    began = shown.evaluate("Date.now()")
+    make(shown, by)
+    shown.wait_for_function("() => left.length")
+    expect(receipt(shown)).to_contain_text("Sent on /operation at", timeout=10_000)
+    (press,) = shown.evaluate("left")
+    assert press["by"] == way
+    assert press["during"] == ("submit" if by == "submit" else "click")
+    assert press["busy"] == 0
+    assert press["inputs"] == {"message": "once"}
+    assert re.fullmatch("[0-9a-f]{32}", press["id"])
+    assert re.fullmatch(r"[0-9a-z]+-\d+", press["seen"])
+    at = datetime.fromisoformat(press["at"]).timestamp() * 1000
+    assert began - 100 < at < shown.evaluate("Date.now()")
+
+
+def test_each_press_has_an_id_of_its_own(shown: Page) -> None:
+    for by in ("mouse", "Enter", "mouse"):
+        make(shown, by)
+        expect(publish(shown)).not_to_have_attribute("aria-busy", "true")
+    presses = shown.evaluate("left")
+    assert len(presses) == len({press["id"] for press in presses}) == 3
+
+
+@pytest.mark.parametrize("by", PROGRAMS)
+def test_a_locked_button_is_pressed_by_no_program(shown: Page, by: str) -> None:
+    publish(shown).evaluate("(button) => { button.disabled = true; }")
+    make(shown, by)
+    shown.evaluate("() => document.querySelector('main form').requestSubmit()")
+    publish(shown).evaluate("(button) => { button.disabled = false; }")
+    publish(shown).press("Enter")
+    expect(receipt(shown)).to_contain_text("Sent on /operation at")
+    assert len(shown.evaluate("left")) == 1
+
+
+def test_a_button_that_opens_under_a_resting_finger_is_not_pressed(shown: Page) -> None:
+    shown.evaluate(
+        "() => { window.clicks = 0;"
+        " document.querySelector('main form').addEventListener('click', () => clicks++); }"
+    )
+    publish(shown).evaluate("(button) => { button.disabled = true; }")
+    publish(shown).hover(force=True)
+    shown.mouse.down()
+    publish(shown).evaluate("(button) => { button.disabled = false; }")
+    shown.mouse.up()
+    assert shown.evaluate("[clicks, left]") == [1, []]
+    publish(shown).click()
+    expect(receipt(shown)).to_contain_text("Sent on /operation at")
+    assert len(shown.evaluate("left")) == 1
+
+
+def test_where_the_script_did_not_come_a_press_is_a_form(demo: Server, page: Page) -> None:
+    page.route("**/press.js", lambda route: route.abort())
+    page.goto(demo.url)
+    expect(publish(page)).to_be_enabled()
+    page.wait_for_timeout(TAP_AGAIN_MS)  # a form that comes sooner is a second tap
+    page.get_by_label("Message").fill("by form")
+    with page.expect_navigation():
+        publish(page).click()
+    expect(receipt(page)).to_contain_text("Sent on /operation at")
+    expect(page.get_by_label("Message")).to_have_value("by form")
+    until(lambda: "by form" in demo.widget("last_heard")["text"], "the robot has it")
+
+
+HEAD: Final = """
+title = "Cell"
+mode = "demo"
+[[page]]
+id = "main"
+title = "Main"
+"""
+WIDE: Final = """
+[[page.widget]]
+id = "go{n}"
+kind = "publish"
+label = "Start {n}"
+topic = "/operation{topic}"
+type = "std_msgs/msg/String"
+message = {{ data = "x" }}
+confirm_press = {asks}
+span = 12
+"""
+
+
+def many_buttons(folder: Path, asks: bool) -> Server:
+    """So many that there is one wherever a dialog or another page has its own."""
+    file = folder / "panel.toml"
+    kind = str(asks).lower()
+    topics = ("", "1", "2", "", "", "", "", "")
+    file.write_text(
+        HEAD + "".join(WIDE.format(n=n, topic=topic, asks=kind) for n, topic in enumerate(topics, 1))
+    )
+    return Server(ROOT, KIOSK_PANEL=str(file))
+
+
+def logged(server: Server) -> list[dict[str, str]]:
+    text = server.http.get("/log.csv?every=true").text.removeprefix("\ufeff")
+    return list(csv.DictReader(io.StringIO(text)))
+
+
+def pressed(server: Server) -> int:
+    """How many presses are in the operator's log."""
+    return sum(entry["kind"] == "pressed" for entry in logged(server))
+
+
+def start(page: Page, number: int) -> Any:
+    return page.get_by_role("button", name=f"Start {number}", exact=True)
+
+
+def double_tap(page: Page, x: float, y: float) -> None:
+    page.mouse.click(x, y)
+    page.wait_for_timeout(DOUBLE_TAP_MS)
+    page.mouse.click(x, y)
+    page.wait_for_timeout(TAP_AGAIN_MS)
+
+
+@pytest.fixture
+def without_scripts(chromium: Browser) -> Iterator[Page]:
+    context = chromium.new_context(java_script_enabled=False)
+    yield context.new_page()
+    context.close()
+
+
+Opens = Callable[[Page, bool], Server]
+
+
+@pytest.fixture
+def opens(tmp_path: Path, servers: Callable[[Server], Server]) -> Opens:
+    """Opens a page of many buttons that ask or do not, long enough ago to be read."""
+
+    def opened(page: Page, asks: bool) -> Server:
+        mine = servers(many_buttons(tmp_path, asks))
+        until(mine.ready, "ready")
+        page.goto(mine.url)
+        page.wait_for_timeout(TAP_AGAIN_MS)
+        return mine
+
+    return opened
+
+
+def test_a_key_that_is_held_down_is_one_press(opens: Opens, page: Page) -> None:
+    mine = opens(page, False)
+    start(page, 1).focus()
+    for _ in range(60):  # two seconds of a keyboard's repeats
+        page.keyboard.down("Enter")
+        page.wait_for_timeout(33)
+    page.keyboard.up("Enter")
+    expect(start(page, 1)).not_to_have_attribute("aria-busy", "true")
+    assert pressed(mine) == 1
+    start(page, 1).press("Enter")
+    until(lambda: pressed(mine) == 2, "a second press of the key is a second one")
+
+
+def over_a_button(page: Page, answer: str) -> tuple[float, float]:
+    """Where the dialog has an answer, and the page a button."""
+    start(page, 3).click()
+    dialog = page.get_by_role("dialog")
+    box = dialog.locator(answer).bounding_box()
+    assert box is not None
+    dialog.locator(".no").click()
+    page.wait_for_timeout(TAP_AGAIN_MS)
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.mouse.wheel(0, middle(page, 5) - y)
+    until(lambda: abs(middle(page, 5) - y) < 20, "a button is where the dialog has its answer")
+    return x, y
+
+
+def test_the_second_tap_of_a_press_that_asks_is_no_answer(opens: Opens, page: Page) -> None:
+    mine = opens(page, True)
+    x, y = over_a_button(page, ".yes")
+    double_tap(page, x, y)
+    expect(page.get_by_role("dialog")).to_be_visible()
+    assert pressed(mine) == 0
+    page.mouse.click(x, y)
+    until(lambda: pressed(mine) == 1, "a tap that comes later is an answer")
+
+
+@pytest.mark.parametrize(("answer", "presses"), [(".yes", 1), (".no", 0)])
+def test_the_second_tap_of_an_answer_presses_nothing_below(
+    opens: Opens, page: Page, answer: str, presses: int
+) -> None:
+    mine = opens(page, True)
+    x, y = over_a_button(page, answer)
+    page.mouse.click(x, y)
+    page.wait_for_timeout(TAP_AGAIN_MS)
+    double_tap(page, x, y)
+    expect(page.get_by_role("dialog")).not_to_be_visible()
+    assert pressed(mine) == presses
+    page.mouse.click(x, y)
+    expect(page.get_by_role("dialog")).to_be_visible()  # a later tap is a press
+
+
+def test_an_answer_that_opens_under_a_resting_finger_is_not_given(opens: Opens, page: Page) -> None:
+    mine = opens(page, True)
+    start(page, 1).click()
+    yes = page.get_by_role("dialog").locator(".yes")
+    yes.hover(force=True)
+    page.mouse.down()
+    expect(yes).to_be_enabled()
+    page.mouse.up()
+    expect(yes).to_be_visible()
+    yes.click()
+    until(lambda: pressed(mine) == 1, "a tap on the open answer is one")
+
+
+def middle(page: Page, number: int) -> float:
+    box = start(page, number).bounding_box()
+    assert box is not None
+    return float(box["y"] + box["height"] / 2)
+
+
+def test_without_scripts_too(opens: Opens, without_scripts: Page) -> None:
+    page, mine = without_scripts, opens(without_scripts, True)
+    start(page, 1).click()
+    yes = page.locator(".yes").bounding_box()
+    assert yes is not None
+    x, y = yes["x"] + 5, yes["y"] + 5
+    double_tap(page, x, y)  # the first one comes before anybody can have read the question
+    expect(page.locator(".yes")).to_be_visible()
+    assert pressed(mine) == 0
+    page.mouse.click(x, y)
+    until(lambda: pressed(mine) == 1, "a tap that comes later is an answer")
+
+
+def test_without_scripts_a_double_tap_is_one_press_and_its_receipt_stays(
+    opens: Opens, without_scripts: Page
+) -> None:
+    page, mine = without_scripts, opens(without_scripts, False)
+    box = start(page, 1).bounding_box()
+    assert box is not None
+    double_tap(page, box["x"] + 20, box["y"] + 20)
+    both = re.compile(r"Start 1: Sent on /operation at \S+ Not sent: so soon after the page came")
+    expect(page.locator("#receipt-go1")).to_have_text(both)
+    assert pressed(mine) == 1
+    page.mouse.click(box["x"] + 20, box["y"] + 20)
+    until(lambda: pressed(mine) == 2, "a later one is another press")
+
+
+def test_a_form_that_comes_as_soon_as_its_page_says_so_and_loses_nothing(demo: Server) -> None:
+    soon = {"_since": str(time.time() + 60), "message": "typed"}
+    page = demo.http.post("/widgets/operation", data=soon, follow_redirects=True)
+    assert "Not sent: so soon after the page came" in page.text
+    assert 'value="typed"' in page.text
+    before = page.url.params["receipt"]
+    again = demo.http.post("/widgets/operation", data={**soon, "_last": before}, follow_redirects=True)
+    assert again.text.count("Not sent: so soon after the page came") == 1
+    told = [entry for entry in logged(demo) if entry["press"] == before]
+    assert [(entry["kind"], entry["outcome"]) for entry in told] == [("refused", "refused")]
+
+
+def test_without_scripts_a_page_that_loaded_itself_takes_a_press_at_once(
+    opens: Opens, without_scripts: Page
+) -> None:
+    page, mine = without_scripts, opens(without_scripts, False)
+    start(page, 1).click()
+    expect(page.locator("#receipt-go1")).to_contain_text("Sent on /operation at")
+    with page.expect_navigation(timeout=15_000):
+        pass
+    expect(page.locator("#receipt-go1")).to_contain_text("Sent on /operation at")
+    assert page.locator("input[name=_since]").count() == 0
+    start(page, 2).click()
+    expect(page.locator("#receipt-go2")).to_contain_text("Sent on /operation1 at")
+    assert pressed(mine) == 2
+
+
+def test_what_a_gateway_says_is_no_refusal(shown: Page) -> None:
+    """The server may have sent it all the same."""
+
+    def times_out(route: Route) -> None:
+        route.fetch()
+        route.fulfill(status=504, json={"message": "The upstream server is timing out"})
+
+    shown.route("**/line.js", lambda route: route.abort())
+    shown.route("**/widgets/*", times_out)
+    publish(shown).click()
+    expect(receipt(shown)).to_have_attribute("data-outcome", "unknown")
+    expect(receipt(shown)).to_contain_text("not known")

@@ -1,0 +1,168 @@
+"""A page that stood still, or whose events crawl: when it goes on it shows what is so now, and nothing
+that has waited on the way."""
+
+import os
+import signal
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Final
+
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from tests.support.parts import Bridge, RosNode, Server, live, until
+
+STOOD_STILL_S: Final = 5.0
+UPDATES_PER_S: Final = 50.0
+BYTES_PER_S: Final = 1_000  # of a line that carries less than what is said
+
+TELL_WHAT_IS_SHOWN: Final = """() => {
+    const value = document.querySelector('[data-widget="last_heard"] .value');
+    window.shown = [];
+    new MutationObserver(() => shown.push(value.textContent)).observe(
+        value, { childList: true, characterData: true, subtree: true },
+    );
+}"""
+
+
+@pytest.fixture
+def kiosk(bridge: Bridge, node: RosNode, tmp_path: Path) -> Iterator[Server]:
+    mine = live(bridge.endpoint, tmp_path)
+    node.advertise("/last_heard", "std_msgs/msg/String")
+    until(lambda: node.subscribers("/last_heard"), "the bridge listens", within_s=15)
+    yield mine
+    node.withdraw("/last_heard")
+    mine.end()
+
+
+@contextmanager
+def stopped(chromium: Browser) -> Iterator[None]:
+    """The processes that run pages stand still: what comes waits in the browser and in the kernel."""
+    session = chromium.new_browser_cdp_session()
+    processes = session.send("SystemInfo.getProcessInfo")["processInfo"]
+    pages = [one["id"] for one in processes if one["type"] == "renderer"]
+    assert pages
+    for process in pages:
+        os.kill(process, signal.SIGSTOP)
+    try:
+        yield
+    finally:
+        for process in pages:
+            os.kill(process, signal.SIGCONT)
+        session.detach()
+
+
+def follows(page: Page, node: RosNode) -> None:
+    """The page shows what the robot says."""
+    value = page.locator('[data-widget="last_heard"] .value')
+
+    def shows() -> bool:
+        node.publish("/last_heard", {"data": "before"})
+        return value.text_content() == "before"
+
+    until(shows, "what the robot says is shown", every_s=0.2)
+
+
+def test_a_page_that_stood_still_shows_what_is_so_now_and_nothing_that_waited(
+    kiosk: Server, node: RosNode, chromium: Browser, page: Page
+) -> None:
+    page.goto(kiosk.url)
+    follows(page, node)
+    page.evaluate(TELL_WHAT_IS_SHOWN)
+    with stopped(chromium):
+        node.flood("/last_heard", {"data": "{n} waited"}, UPDATES_PER_S, STOOD_STILL_S)
+        node.publish("/last_heard", {"data": "now"})
+        until(lambda: kiosk.widget("last_heard")["text"] == "now", "the server knows it")
+    expect(page.locator('[data-widget="last_heard"] .value')).to_have_text("now")
+    shown = page.evaluate("shown")
+    assert [text for text in shown if "waited" in text] == []
+    assert shown[-1] == "now"
+    expect(page.get_by_role("button", name="Publish", exact=True)).to_be_enabled()
+
+
+class Line:
+    """A relay to a server that carries what the server says at a limited speed, while it is told to."""
+
+    def __init__(self, port: int) -> None:
+        self._server = port
+        self._listening = socket.create_server(("127.0.0.1", 0))
+        self.port = int(self._listening.getsockname()[1])
+        self.slow = False
+        self.opened = 0
+        self._thread = threading.Thread(target=self._accept, daemon=True)
+        self._thread.start()
+
+    def _accept(self) -> None:
+        while True:
+            try:
+                browser, _ = self._listening.accept()
+            except OSError:
+                return  # closed
+            server = socket.create_connection(("127.0.0.1", self._server))
+            self._start(self._carry, browser, server)
+            self._start(self._crawl, server, browser)
+
+    def _start(self, how: Callable[[socket.socket, socket.socket], None], *ends: socket.socket) -> None:
+        threading.Thread(target=how, args=ends, daemon=True).start()
+
+    def _carry(self, browser: socket.socket, server: socket.socket) -> None:
+        try:
+            while data := browser.recv(65_536):
+                self.opened += data.startswith(b"GET /events ")
+                server.sendall(data)
+        except OSError:
+            pass
+        finally:
+            server.close()
+
+    def _crawl(self, server: socket.socket, browser: socket.socket) -> None:
+        try:
+            while data := server.recv(BYTES_PER_S // 10 if self.slow else 65_536):
+                browser.sendall(data)
+                if self.slow:
+                    time.sleep(0.1)
+        except OSError:
+            pass
+        finally:
+            browser.close()
+
+    def close(self) -> None:
+        self._listening.shutdown(socket.SHUT_RDWR)
+        self._listening.close()
+        self._thread.join(5)
+
+
+@pytest.fixture
+def line(kiosk: Server) -> Iterator[Line]:
+    mine = Line(kiosk.port)
+    yield mine
+    mine.close()
+
+
+def test_a_page_whose_events_come_ever_later_asks_anew_and_then_follows_again(
+    kiosk: Server, node: RosNode, page: Page, line: Line
+) -> None:
+    page.goto(f"http://127.0.0.1:{line.port}")
+    follows(page, node)
+    opened = line.opened
+    line.slow = True
+    said = {"data": "{n} " + "long " * 30}
+    lost = '[data-lamp="server"][data-state="bad"]'
+    page.evaluate(
+        """(lost) => new MutationObserver(() => { window.lost ||= !!document.querySelector(lost) })
+        .observe(document.querySelector('[data-lamp="server"]'), { attributes: true })""",
+        lost,
+    )
+    until(
+        lambda: node.flood("/last_heard", said, UPDATES_PER_S, 1.0) and line.opened > opened,
+        "it asks anew",
+        within_s=40,
+    )
+    assert page.evaluate("window.lost")
+    line.slow = False
+    expect(page.get_by_role("button", name="Publish", exact=True)).to_be_enabled()
+    follows(page, node)

@@ -1,0 +1,227 @@
+"""A press is bound to what its operator saw, and to its time: it is never sent late."""
+
+import json
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from tests.support.parts import (
+    TAP_AGAIN_MS,
+    Bridge,
+    RosNode,
+    Server,
+    as_response,
+    events_in,
+    live,
+    until,
+)
+
+HOUR_MS = 3_600_000
+
+
+@pytest.fixture
+def kiosk(server: Server, node: RosNode) -> Iterator[Server]:
+    node.advertise("/operation_enabled", "std_msgs/msg/Bool")
+    until(server.ready, "ready")
+    permit(server, node, True)
+    yield server
+    node.withdraw("/operation_enabled")
+
+
+def permit(kiosk: Server, node: RosNode, value: bool) -> None:
+    def told() -> bool:
+        node.publish("/operation_enabled", {"data": value})
+        return bool(kiosk.widget("operation1")["enabled"]) is value
+
+    until(told, f"permitted: {value}", every_s=0.1)
+
+
+def server_time(kiosk: Server, later_s: float = 0.0) -> str:
+    """The server's own time as its heartbeat tells it."""
+    events = events_in(kiosk.http.get("/events?once=1").text)
+    (data,) = [data for name, data, _ in events if name == "beat"]
+    seconds = float(httpx.Response(200, text=data).json()["now"]) / 1000 + later_s
+    return datetime.fromtimestamp(seconds, UTC).isoformat()
+
+
+def test_what_changed_since_it_was_seen_is_not_pressed(kiosk: Server, node: RosNode, way: str) -> None:
+    kiosk = kiosk.by(way)
+    seen = kiosk.snapshot()["id"]
+    assert kiosk.press("operation1", "as seen", seen=seen).status_code == 200
+    permit(kiosk, node, False)
+    permit(kiosk, node, True)
+    answer = kiosk.press("operation1", "changed", seen=seen, id="changed-1")
+    assert (answer.status_code, answer.json()["outcome"]) == (409, "refused")
+    assert "changed while you pressed" in answer.json()["reason"]
+    again = kiosk.press("operation1", "changed", seen=seen, id="changed-1")
+    assert (again.status_code, again.json()) == (409, answer.json())
+    assert kiosk.press("operation", "not guarded", seen=seen).status_code == 200
+    assert kiosk.press("operation1", "anew", seen=kiosk.snapshot()["id"]).status_code == 200
+    until(lambda: node.heard_data("/operation1")[-1:] == ["anew"], "heard")
+    assert "changed" not in node.heard_data("/operation1")
+
+
+def test_a_lock_that_blinks_under_a_resting_finger_refuses_the_press(
+    kiosk: Server, node: RosNode, page: Page
+) -> None:
+    """What counts is what was seen when the finger came down."""
+    page.goto(kiosk.url)
+    publish = page.get_by_role("button", name="Publish1", exact=True)
+    expect(publish).to_be_enabled()
+    page.get_by_label("Message").fill("blinked")
+    publish.hover()
+    page.mouse.down()
+    permit(kiosk, node, False)
+    expect(publish).to_be_disabled()
+    permit(kiosk, node, True)
+    expect(publish).to_be_enabled()
+    page.mouse.up()
+    expect(page.locator("#receipt-operation1")).to_contain_text("changed while you pressed")
+    expect(publish).not_to_have_attribute("aria-busy", "true")
+    publish.click()
+    expect(page.locator("#receipt-operation1")).to_contain_text("Sent on /operation1")
+    until(lambda: "blinked" in node.heard_data("/operation1"), "heard")
+    assert node.heard_data("/operation1").count("blinked") == 1
+
+
+@pytest.mark.parametrize(
+    ("later_s", "status", "words"),
+    [(0.0, 200, "Sent"), (-1.5, 200, "Sent"), (-2.5, 409, "to get here"), (3.0, 409, "ahead of")],
+)
+def test_a_press_has_its_time(kiosk: Server, later_s: float, status: int, words: str, way: str) -> None:
+    answer = kiosk.by(way).press("operation", "timed", at=server_time(kiosk, later_s))
+    assert (answer.status_code, words in answer.json()["reason"]) == (status, True), answer.json()
+
+
+def test_a_version_that_is_not_there_yet_is_bad_input(kiosk: Server, way: str) -> None:
+    boot, _, version = kiosk.snapshot()["id"].partition("-")
+    answer = kiosk.by(way).press("operation", "x", seen=f"{boot}-{int(version) + 1000}")
+    assert answer.status_code == 422
+    assert "is not there yet" in answer.json()["error"]
+
+
+def test_the_time_until_a_press_expires_is_the_panels(
+    bridge: Bridge, tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    panel = tmp_path / "panel.toml"
+    shipped = (Path(__file__).parent.parent.parent / "app/panel.toml").read_text()
+    panel.write_text(f"press_expires_s = 10.0\n{shipped}")
+    mine = servers(live(bridge.endpoint, tmp_path, KIOSK_PANEL=str(panel)))
+    until(mine.ready, "ready")
+    assert mine.press("operation", "x", at=server_time(mine, -8)).status_code == 200
+    assert mine.press("operation", "x", at=server_time(mine, -11)).status_code == 409
+
+
+def test_a_press_that_waited_in_a_stopped_server_is_not_sent(kiosk: Server, node: RosNode) -> None:
+    at = server_time(kiosk)
+    answers: list[httpx.Response] = []
+    with kiosk.socket() as socket:
+        kiosk.process.send(signal.SIGSTOP)
+        try:
+            poster = threading.Thread(
+                target=lambda: answers.append(kiosk.press("operation", "too late", at=at))
+            )
+            poster.start()
+            press = {"widget": "operation", "id": "hung", "inputs": {"message": "too late"}, "at": at}
+            socket.say(json.dumps(press))
+            time.sleep(3)
+        finally:
+            kiosk.process.send(signal.SIGCONT)
+        poster.join(10)
+        answers.append(as_response(socket.hear()))
+    assert len(answers) == 2
+    for answer in answers:
+        assert answer.json()["outcome"] == "refused"
+    assert "too late" not in node.heard_data("/operation")
+
+
+def test_a_press_in_a_browser_waits_for_no_stopped_server(
+    kiosk: Server, node: RosNode, page: Page
+) -> None:
+    page.goto(kiosk.url)
+    expect(page.get_by_role("button", name="Publish", exact=True)).to_be_enabled()
+    page.get_by_label("Message").fill("never late")
+    page.wait_for_timeout(700)  # a heartbeat
+    kiosk.process.send(signal.SIGSTOP)
+    try:
+        page.get_by_role("button", name="Publish", exact=True).click()
+        page.wait_for_timeout(3000)
+    finally:
+        kiosk.process.send(signal.SIGCONT)
+    # Too late, or by then without a link: never sent.
+    expect(page.locator("#receipt-operation")).to_contain_text("Not sent")
+    expect(page.get_by_role("button", name="Publish", exact=True)).to_be_enabled()
+    page.get_by_role("button", name="Publish", exact=True).click()
+    expect(page.locator("#receipt-operation")).to_contain_text("Sent on /operation")
+    assert node.heard_data("/operation").count("never late") == 1
+
+
+def test_a_tablets_wrong_clock_does_not_matter(kiosk: Server, chromium: Browser) -> None:
+    for hours in (-5, 5):
+        context = chromium.new_context()
+        context.add_init_script(
+            f"const now = Date.now; Date.now = () => now() + {hours * HOUR_MS};"
+            f"const Real = Date; Date = class extends Real {{ constructor(...a) {{"
+            f" a.length ? super(...a) : super(now() + {hours * HOUR_MS}); }} }};"
+        )
+        page = context.new_page()
+        page.goto(kiosk.url)
+        page.get_by_role("button", name="Publish", exact=True).click()
+        expect(page.locator("#receipt-operation")).to_contain_text("Sent on /operation")
+        context.close()
+
+
+def test_a_press_in_a_page_that_stood_still_is_not_sent(
+    kiosk: Server, node: RosNode, page: Page
+) -> None:
+    """The page's script is busy for 3 s; the tap that came meanwhile has its own time."""
+    page.goto(kiosk.url)
+    publish = page.get_by_role("button", name="Publish", exact=True)
+    expect(publish).to_be_enabled()
+    page.get_by_label("Message").fill("stood still")
+    box: Any = publish.bounding_box()
+    session = page.context.new_cdp_session(page)
+    page.evaluate(
+        "() => addEventListener('pointerdown', () => void setTimeout(() => {"
+        " const end = performance.now() + 3000; while (performance.now() < end); }, 100))"
+    )
+    where = {"x": box["x"] + 20, "y": box["y"] + 20, "button": "left", "clickCount": 1}
+    session.send("Input.dispatchMouseEvent", {"type": "mousePressed", **where})
+    time.sleep(0.3)
+    session.send("Input.dispatchMouseEvent", {"type": "mouseReleased", **where})
+    expect(page.locator("#receipt-operation")).not_to_be_empty()
+    assert "Sent" not in (page.locator("#receipt-operation").text_content() or "")
+    assert "stood still" not in node.heard_data("/operation")
+
+
+def test_without_scripts_a_page_that_is_too_old_presses_nothing(
+    kiosk: Server, node: RosNode, chromium: Browser
+) -> None:
+    context = chromium.new_context(java_script_enabled=False)
+    page = context.new_page()
+    page.goto(kiosk.url)
+    html = page.content()
+    page.wait_for_timeout(TAP_AGAIN_MS)
+    page.get_by_label("Message").fill("fresh")
+    page.get_by_role("button", name="Publish", exact=True).click()
+    expect(page.locator("#receipt-operation")).to_contain_text("Sent")
+    context.close()
+    fields = dict(
+        part.split('" value="')
+        for part in html.replace('">', "\n").split('name="')[1:]
+        for part in [part.split("\n")[0]]
+        if part.startswith(("_seen", "_until"))
+    )
+    assert set(fields) == {"_seen", "_until"}
+    old = {**fields, "_until": str(float(fields["_until"]) - 120), "message": "old page"}
+    answer = kiosk.http.post("/widgets/operation", data=old, follow_redirects=True)
+    assert "to get here: press again" in answer.text
+    assert "old page" not in node.heard_data("/operation")

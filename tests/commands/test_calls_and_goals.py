@@ -1,0 +1,679 @@
+"""Calls and goals whose robot answers late, wrongly or not at all: without a bridge, at set times."""
+
+import asyncio
+import time
+from collections.abc import Callable, Coroutine
+from typing import Any
+
+import pytest
+
+from app.commands.actions.goals import Actions
+from app.commands.service_calls import LATE_S, LONGEST_SAID, MOST_UNANSWERED, Calls
+from app.dialect import bridge_dialect
+from app.errors import LinkError
+from app.panel.model import Action, Call, Panel
+from app.permission.interlocks import against_calling
+from app.robot.command_status import Answer, Progress
+from app.robot.state import Robot, Sample
+from tests.support.builders import BRIDGE, INTERFACES, panel_of, robot_there
+
+TRIGGER = "std_srvs/srv/Trigger"
+COUNT = "example_interfaces/action/Fibonacci"
+CALL = {"id": "reset", "kind": "call", "label": "Reset", "service": "/reset", "type": TRIGGER}
+GOAL = {
+    "id": "count",
+    "kind": "action",
+    "label": "Count",
+    "action": "/count",
+    "type": COUNT,
+    "feedback": "so far {sequence}",
+    "result": "{sequence}",
+}
+
+
+class Line:
+    """A link whose queries are answered by hand."""
+
+    def __init__(self) -> None:
+        self.asked: list[tuple[str, bytes, asyncio.Future[bytes | None]]] = []
+        self.timeouts: list[float] = []
+        self.refuses = ""  # the end of the keys that can't be asked
+
+    def query(self, key: str, payload: bytes, timeout_s: float) -> "asyncio.Future[bytes | None]":
+        if self.refuses and key.endswith(self.refuses):
+            raise LinkError(f"can't ask {key}")
+        future: asyncio.Future[bytes | None] = asyncio.get_running_loop().create_future()
+        self.asked.append((key, payload, future))
+        self.timeouts.append(timeout_s)
+        if key.endswith("send_goal"):  # as Zenoh, where nobody is waited for any longer
+            asyncio.get_running_loop().call_later(timeout_s, give_up, future)
+        return future
+
+    def answer(self, type_name: str, number: int = -1, **fields: Any) -> None:
+        self.asked[number][2].set_result(INTERFACES.encode(type_name, fields))
+
+
+def give_up(future: "asyncio.Future[bytes | None]") -> None:
+    if not future.done():
+        future.set_result(None)
+
+
+class Bench:
+    """A robot that offers a service and an action."""
+
+    def __init__(self) -> None:
+        self.panel: Panel = panel_of(
+            {**CALL, "timeout_s": 0.05},
+            {**GOAL, "goal": {"order": 3}, "progress": "sequence[0]", "timeout_s": 0.05},
+        )
+        self.robot: Robot = robot_there(self.panel)
+        self.robot.graph.apply(bridge_dialect.server_token(BRIDGE, "SS", "reset", TRIGGER), True)
+        self.robot.graph.apply(bridge_dialect.server_token(BRIDGE, "AS", "count", COUNT), True)
+        self.line = Line()
+        self.corrected: list[tuple[str, Answer]] = []
+        self.calls = Calls(INTERFACES, self.robot, self.line, lambda: None)
+        self.shows: list[Progress] = []  # what an action's widget had when it was to be shown at once
+        self.actions = Actions(
+            INTERFACES, self.robot, self.line, lambda: self.shows.append(self.robot.progress["count"])
+        )
+        call, goal = self.panel.widgets()
+        assert isinstance(call, Call)
+        assert isinstance(goal, Action)
+        self.reset, self.count = call, goal
+
+    def correct(self, press_id: str, answer: Answer) -> None:
+        self.corrected.append((press_id, answer))
+
+    def call(self, press_id: str = "p1") -> "asyncio.Task[Answer]":
+        request = INTERFACES.encode(f"{TRIGGER}_Request", {})
+        return asyncio.create_task(self.calls.call(self.reset, request, press_id, self.correct))
+
+    def send_goal(self, press_id: str = "g1") -> "asyncio.Task[Answer]":
+        goal = self.actions.start(self.count, {"order": 3}, press_id, self.correct)
+        return asyncio.create_task(goal)
+
+    @property
+    def shown(self) -> Progress:
+        return self.robot.progress["count"]
+
+    def answer_goal(self, accepted: bool) -> None:
+        response = INTERFACES.action(COUNT).send_goal_response
+        self.line.answer(response, accepted=accepted, stamp={"sec": 0, "nanosec": 0})
+
+    def lose_the_bridge(self) -> None:
+        self.robot.graph.apply(bridge_dialect.bridge_token(BRIDGE), False)
+        self.calls.follow()
+        self.actions.follow()
+
+
+Test = Callable[[Bench], Coroutine[Any, Any, None]]
+
+
+def run(test: Test) -> None:
+    asyncio.run(test(Bench()))
+
+
+async def asked(bench: Bench, count: int) -> None:
+    while len(bench.line.asked) < count:
+        await asyncio.sleep(0)
+
+
+def test_an_answer_that_can_not_be_read_is_unknown() -> None:
+    async def test(bench: Bench) -> None:
+        call = bench.call()
+        await asked(bench, 1)
+        bench.line.asked[0][2].set_result(b"\0\1\0\0")
+        answer = await call
+        assert answer.outcome == "unknown"
+        assert "the robot may have done it" in answer.text
+
+    run(test)
+
+
+def test_what_the_robot_answers_is_shown_by_its_escapes() -> None:
+    async def test(bench: Bench) -> None:
+        call = bench.call()
+        await asked(bench, 1)
+        bench.line.answer(f"{TRIGGER}_Response", success=False, message="no \u202e\x1b[2Jon")
+        assert (await call).text.endswith(": no \\u202e\\u001b[2Jon")
+
+    run(test)
+
+
+def test_a_first_timeout_hints_at_cyclone_and_a_later_one_does_not() -> None:
+    async def test(bench: Bench) -> None:
+        first = await bench.call()
+        assert first.outcome == "timed_out"
+        assert "Cyclone DDS" in first.text
+        call = bench.call("p2")
+        await asked(bench, 2)
+        bench.line.answer(f"{TRIGGER}_Response", success=True, message="")
+        assert (await call).outcome == "succeeded"
+        assert "Cyclone DDS" not in (await bench.call("p3")).text
+
+    run(test)
+
+
+def test_a_query_that_ends_without_an_answer_is_unknown() -> None:
+    async def test(bench: Bench) -> None:
+        call = bench.call()
+        await asked(bench, 1)
+        bench.line.asked[0][2].set_result(None)
+        answer = await call
+        assert answer.outcome == "unknown"
+        assert "/reset" in answer.text
+
+    run(test)
+
+
+def test_calls_that_nobody_answers_are_bounded_and_forgotten() -> None:
+    async def test(bench: Bench) -> None:
+        for number in range(MOST_UNANSWERED):
+            assert (await bench.call(f"p{number}")).outcome == "timed_out"
+        one_more = await bench.call("too many")
+        assert one_more.outcome == "refused"
+        assert len(bench.line.asked) == MOST_UNANSWERED
+        for _, _, future in bench.line.asked:
+            future.set_result(None)
+        await asyncio.sleep(0)
+        assert bench.calls.unanswered("reset") == 0
+
+    run(test)
+
+
+def test_a_late_answer_corrects_its_own_press_and_not_what_came_after() -> None:
+    async def test(bench: Bench) -> None:
+        await bench.call("p1")
+        second = bench.call("p2")
+        await asked(bench, 2)
+        bench.line.answer(f"{TRIGGER}_Response", 1, success=True, message="second")
+        await second
+        bench.line.answer(f"{TRIGGER}_Response", 0, success=False, message="first")
+        async with asyncio.timeout(5):
+            while not bench.corrected:
+                await asyncio.sleep(0)
+        ((press_id, answer),) = bench.corrected
+        assert (press_id, answer.outcome) == ("p1", "rejected")
+        assert "second" in bench.robot.progress["reset"].text
+
+    run(test)
+
+
+@pytest.mark.parametrize("what", ["call", "send_goal"])
+def test_a_bridge_that_goes_away_ends_the_waiting_at_once(what: str) -> None:
+    async def test(bench: Bench) -> None:
+        waiting = getattr(bench, what)()
+        await asked(bench, 1)
+        bench.lose_the_bridge()
+        answer = await waiting
+        assert answer.outcome == "unknown"
+        assert "the robot may have done it" in answer.text
+
+    run(test)
+
+
+def test_a_goal_cut_off_is_unknown_until_the_robot_tells_its_result() -> None:
+    async def test(bench: Bench) -> None:
+        types = INTERFACES.action(COUNT)
+        start = bench.send_goal()
+        await asked(bench, 1)
+        bench.line.answer(types.send_goal_response, accepted=True, stamp={"sec": 0, "nanosec": 0})
+        assert (await start).outcome == "accepted"
+        await asked(bench, 2)
+        bench.lose_the_bridge()
+        await in_doubt(bench)
+        outcomes = [bench.shown.outcome]
+        bench.robot.graph.apply(bridge_dialect.bridge_token(BRIDGE), True)
+        assert locked_by(bench) == "perhaps_busy"
+        await asked(bench, 3)
+        assert (locked_by(bench), bench.shown.stoppable) == ("perhaps_busy", True)
+        bench.line.answer(types.get_result_response, status=4, result={"sequence": [0, 1]})
+        while not bench.robot.progress["count"].text.startswith("Succeeded"):
+            await asyncio.sleep(0)
+        outcomes.append(bench.robot.progress["count"].outcome)
+        assert outcomes == ["unknown", "succeeded"]
+        assert [answer.outcome for _, answer in bench.corrected] == ["unknown", "succeeded"]
+        await bench.actions.stop()
+
+    run(test)
+
+
+def goal_id(bench: Bench, number: int = 0) -> bytes:
+    """The id of the goal that was asked for, as the robot got it."""
+    request = INTERFACES.action(COUNT).send_goal_request
+    return bytes(INTERFACES.decode(request, bench.line.asked[number][1]).goal_id.uuid)
+
+
+def tell_states(bench: Bench, *states: tuple[bytes, int]) -> None:
+    """The action's server publishes the states of its goals."""
+    stamp = {"sec": 0, "nanosec": 0}
+    told = [{"goal_info": {"goal_id": {"uuid": i}, "stamp": stamp}, "status": s} for i, s in states]
+    payload = INTERFACES.encode(INTERFACES.action(COUNT).status, {"status_list": told})
+    bench.actions.hear_status("/count", sample_of(payload))
+
+
+async def accepted(bench: Bench, press_id: str = "g1") -> None:
+    count = len(bench.line.asked)
+    start = bench.send_goal(press_id)
+    await asked(bench, count + 1)
+    bench.answer_goal(accepted=True)
+    assert (await start).outcome == "accepted"
+    await asked(bench, count + 2)
+
+
+async def cancel_answered(
+    bench: Bench, press_id: str, *, return_code: int = 0, listed: bool = True
+) -> tuple[Answer, bytes]:
+    """Cancels the goal of a press: what came of that, and the goal that was to be canceled."""
+    request, response = INTERFACES.service("action_msgs/srv/CancelGoal")
+    count = len(bench.line.asked)
+    cancel = asyncio.create_task(bench.actions.cancel(bench.count, press_id))
+    await asked(bench, count + 1)
+    info = INTERFACES.decode(request, bench.line.asked[-1][1]).goal_info
+    goal = {"goal_id": {"uuid": info.goal_id.uuid}, "stamp": {"sec": 0, "nanosec": 0}}
+    bench.line.answer(response, return_code=return_code, goals_canceling=[goal] if listed else [])
+    return await cancel, bytes(info.goal_id.uuid)
+
+
+async def canceled(bench: Bench, press_id: str, return_code: int = 0) -> bytes:
+    """The same, as it has to be; the id."""
+    answer, asked_for = await cancel_answered(
+        bench, press_id, return_code=return_code, listed=not return_code
+    )
+    assert answer.outcome == ("rejected" if return_code else "accepted")
+    return asked_for
+
+
+def test_a_goal_that_the_robot_does_not_list_is_not_being_canceled() -> None:
+    async def test(bench: Bench) -> None:
+        await accepted(bench)
+        tell_states(bench, (goal_id(bench), 2))
+        answer, _ = await cancel_answered(bench, "g1", listed=False)
+        assert answer.outcome == "rejected"
+        assert answer.text.startswith("The robot refused to cancel at ")
+        assert (bench.shown.goal, bench.shown.stoppable) == ("EXECUTING", True)
+        await canceled(bench, "g1")
+        assert bench.shown.goal == "CANCELING"
+        again, _ = await cancel_answered(bench, "g1", return_code=3, listed=False)
+        assert (again.outcome, again.text) == ("accepted", "Being canceled.")
+        await bench.actions.stop()
+
+    run(test)
+
+
+def test_an_answer_to_a_cancel_that_can_not_be_read_is_no_refusal() -> None:
+    async def test(bench: Bench) -> None:
+        await accepted(bench)
+        count = len(bench.line.asked)
+        cancel = asyncio.create_task(bench.actions.cancel(bench.count, "g1"))
+        await asked(bench, count + 1)
+        bench.line.asked[-1][2].set_result(b"broken")
+        answer = await cancel
+        assert answer.outcome == "unknown"
+        assert "not with action_msgs/srv/CancelGoal" in answer.text
+        assert bench.shown.goal == "ACCEPTED"
+        await bench.actions.stop()
+
+    run(test)
+
+
+def test_a_late_cancel_does_not_hit_the_next_goal() -> None:
+    async def test(bench: Bench) -> None:
+        await accepted(bench)
+        assert bench.shown.press == "g1"
+        result = INTERFACES.action(COUNT).get_result_response
+        bench.line.answer(result, status=4, result={"sequence": []})
+        await settled(bench)
+        assert bench.shown.press == ""
+        await accepted(bench, "g2")
+        late = await bench.actions.cancel(bench.count, "g1")
+        assert late.outcome == "refused"
+        assert late.text.startswith("That goal is over, or of before this server's start")
+        assert bench.shown.goal == "ACCEPTED"
+        assert await canceled(bench, "g2") == goal_id(bench, 2)
+        assert (bench.shown.goal, bench.shown.press) == ("CANCELING", "g2")
+        await bench.actions.stop()
+
+    run(test)
+
+
+def test_a_goal_of_which_nothing_is_heard_can_still_be_canceled_by_its_press() -> None:
+    async def test(bench: Bench) -> None:
+        assert (await bench.send_goal()).outcome == "timed_out"
+        await accepted(bench, "g2")
+        assert await canceled(bench, "g1", return_code=2) == goal_id(bench)
+        assert await canceled(bench, "") == goal_id(bench, 2)
+        await bench.actions.stop()
+
+    run(test)
+
+
+def test_a_goals_state_has_its_ros_name_and_only_goes_on() -> None:
+    async def test(bench: Bench) -> None:
+        await accepted(bench)
+        names = [bench.shown.goal]
+        for state in (2, 1, 3, 2, 7, -1):
+            tell_states(bench, (bytes(16), 6), (goal_id(bench), state))
+            names.append(bench.shown.goal)
+        assert names == ["ACCEPTED", *["EXECUTING"] * 2, *["CANCELING"] * 4]
+        assert bench.shown.text.startswith("Being canceled")
+        assert bench.shown.stoppable
+        tell_states(bench, (goal_id(bench), 5))
+        bench.line.answer(
+            INTERFACES.action(COUNT).get_result_response, status=5, result={"sequence": []}
+        )
+        await settled(bench)
+        assert (bench.shown.goal, bench.shown.outcome) == ("CANCELED", "canceled")
+        tell_states(bench, (goal_id(bench), 6))
+        assert bench.shown.goal == "CANCELED"
+
+    run(test)
+
+
+def test_a_state_that_comes_before_the_answer_counts() -> None:
+    async def test(bench: Bench) -> None:
+        start = bench.send_goal()
+        await asked(bench, 1)
+        tell_states(bench, (goal_id(bench), 2))
+        assert bench.shown.goal == ""  # the answer is awaited
+        bench.answer_goal(accepted=True)
+        await start
+        assert bench.shown.goal == "EXECUTING"
+        await bench.actions.stop()
+
+    run(test)
+
+
+def test_another_programs_goal_and_a_rejected_one_have_no_state() -> None:
+    async def test(bench: Bench) -> None:
+        tell_states(bench, (b"\7" * 16, 2))
+        assert "count" not in bench.robot.progress
+        start = bench.send_goal()
+        await asked(bench, 1)
+        bench.answer_goal(accepted=False)
+        assert (await start).outcome == "rejected"
+        tell_states(bench, (b"\7" * 16, 2))
+        assert (bench.shown.goal, bench.shown.busy) == ("", False)
+
+    run(test)
+
+
+def test_a_goal_that_could_not_be_sent_locks_nothing_and_hides_no_other() -> None:
+    async def test(bench: Bench) -> None:
+        bench.line.refuses = "send_goal"
+        with pytest.raises(LinkError):
+            await bench.send_goal()
+        assert "count" not in bench.robot.progress
+        bench.line.refuses = ""
+        assert (await bench.send_goal()).outcome == "timed_out"
+        bench.line.refuses = "send_goal"
+        with pytest.raises(LinkError):
+            await bench.send_goal()
+        tell_states(bench, (goal_id(bench), 2))
+        assert (bench.shown.goal, bench.shown.stoppable) == ("EXECUTING", True)
+        await bench.actions.stop()
+
+    run(test)
+
+
+def test_a_goal_without_an_answer_is_under_way_when_the_robot_says_so() -> None:
+    async def test(bench: Bench) -> None:
+        assert (await bench.send_goal()).outcome == "timed_out"
+        assert (bench.shown.goal, bench.shown.busy) == ("UNKNOWN", False)
+        tell_states(bench, (goal_id(bench), 2))
+        assert (bench.shown.goal, bench.shown.busy) == ("EXECUTING", True)
+        assert [answer.outcome for _, answer in bench.corrected] == ["accepted"]
+        await bench.actions.stop()
+
+    run(test)
+
+
+def test_a_goal_cut_off_before_its_answer_is_asked_for_when_the_bridge_is_back() -> None:
+    async def test(bench: Bench) -> None:
+        start = bench.send_goal()
+        await asked(bench, 1)
+        bench.lose_the_bridge()
+        assert (await start).outcome == "unknown"
+        assert (bench.shown.goal, bench.shown.busy) == ("UNKNOWN", True)
+        bench.robot.graph.apply(bridge_dialect.bridge_token(BRIDGE), True)
+        await asked(bench, 2)
+        assert bench.line.asked[1][0].endswith("get_result")
+        tell_states(bench, (goal_id(bench), 2))
+        assert (bench.shown.goal, bench.shown.stoppable) == ("EXECUTING", True)
+        bench.line.answer(
+            INTERFACES.action(COUNT).get_result_response, status=4, result={"sequence": [0, 1]}
+        )
+        await settled(bench)
+        assert bench.shown.text.startswith("Succeeded")
+        assert [answer.outcome for _, answer in bench.corrected] == ["accepted", "succeeded"]
+
+    run(test)
+
+
+def test_a_goal_shows_no_state_until_its_server_is_offered_again() -> None:
+    async def test(bench: Bench) -> None:
+        assert (await bench.send_goal()).outcome == "timed_out"
+        bench.lose_the_bridge()
+        await asyncio.sleep(0.01)
+        tell_states(bench, (goal_id(bench), 2))
+        assert (bench.shown.goal, bench.shown.busy) == ("UNKNOWN", False)
+        bench.robot.graph.apply(bridge_dialect.bridge_token(BRIDGE), True)
+        await asked(bench, 3)
+        assert (bench.shown.goal, bench.shown.stoppable) == ("EXECUTING", True)
+        assert [answer.outcome for _, answer in bench.corrected] == ["accepted"]
+        await bench.actions.stop()
+
+    run(test)
+
+
+def test_a_goal_that_began_and_is_cut_off_before_its_answer_is_unknown() -> None:
+    async def test(bench: Bench) -> None:
+        start = bench.send_goal()
+        await asked(bench, 1)
+        tell_states(bench, (goal_id(bench), 2))
+        bench.lose_the_bridge()
+        assert (await start).outcome == "unknown"
+        await in_doubt(bench)
+        assert bench.shown.goal == "UNKNOWN"
+        await bench.actions.stop()
+
+    run(test)
+
+
+def test_a_goal_that_nobody_answers_at_once_waits_for_the_news_of_the_cut() -> None:
+    async def test(bench: Bench) -> None:
+        start = bench.send_goal()
+        await asked(bench, 1)
+        bench.line.asked[0][2].set_result(None)
+        await asyncio.sleep(0.01)
+        bench.lose_the_bridge()
+        assert "connection was cut" in (await start).text
+        await bench.actions.stop()
+
+    run(test)
+
+
+def test_a_result_that_could_not_be_asked_for_is_asked_for_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("app.commands.actions.results.ASK_AGAIN_S", 0)
+
+    async def test(bench: Bench) -> None:
+        bench.line.refuses = "get_result"
+        start = bench.send_goal()
+        await asked(bench, 1)
+        bench.answer_goal(accepted=True)
+        await start
+        await asyncio.sleep(0.01)
+        assert (bench.shown.goal, bench.shown.stoppable) == ("ACCEPTED", True)
+        bench.line.refuses = ""
+        await asked(bench, 2)
+        bench.line.answer(
+            INTERFACES.action(COUNT).get_result_response, status=4, result={"sequence": []}
+        )
+        await settled(bench)
+        assert [answer.outcome for _, answer in bench.corrected] == ["succeeded"]
+
+    run(test)
+
+
+def test_what_breaks_while_a_goal_is_followed_leaves_it_unknown(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def fails(*_: Any) -> str:
+        raise ZeroDivisionError
+
+    async def test(bench: Bench) -> None:
+        await accepted(bench)
+        monkeypatch.setattr("app.commands.actions.results.with_fields", fails)
+        bench.line.answer(
+            INTERFACES.action(COUNT).get_result_response, status=4, result={"sequence": []}
+        )
+        await settled(bench)
+        assert (bench.shown.goal, bench.shown.busy) == ("UNKNOWN", False)
+        assert "A fault of the panel's server" in bench.shown.text
+        assert [answer.outcome for _, answer in bench.corrected] == ["unknown"]
+
+    run(test)
+
+
+def test_a_goal_that_nobody_heard_of_is_asked_for_only_for_a_while(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("app.commands.actions.client.CUT_NEWS_S", 0)
+
+    async def test(bench: Bench) -> None:
+        for number in range(MOST_UNANSWERED):
+            assert (await bench.send_goal()).outcome == "timed_out"
+            await asked(bench, 2 * (number + 1))
+        assert bench.line.timeouts[1] == LATE_S
+        assert (await bench.send_goal()).outcome == "refused"
+        assert len(bench.line.asked) == 2 * MOST_UNANSWERED
+        for _, _, future in bench.line.asked:
+            if not future.done():
+                future.set_result(None)
+        await settled(bench)
+        assert bench.corrected == []  # what was said of them stands
+        assert (await bench.send_goal()).outcome == "timed_out"
+        await bench.actions.stop()
+
+    run(test)
+
+
+def test_a_goal_whose_server_ends_is_unknown_and_asked_for_when_it_is_back() -> None:
+    async def test(bench: Bench) -> None:
+        await accepted(bench)
+        token = bridge_dialect.server_token(BRIDGE, "AS", "count", COUNT)
+        bench.robot.graph.apply(token, False)
+        bench.actions.follow()
+        await in_doubt(bench)
+        assert (bench.shown.goal, bench.shown.stoppable) == ("UNKNOWN", False)
+        assert "stopped offering /count" in bench.shown.text
+        bench.robot.graph.apply(token, True)
+        await asked(bench, 3)
+        assert locked_by(bench) == "perhaps_busy"
+        bench.line.answer(
+            INTERFACES.action(COUNT).get_result_response, status=0, result={"sequence": []}
+        )
+        await settled(bench)
+        assert "no longer knows this goal" in bench.shown.text
+        assert [answer.outcome for _, answer in bench.corrected] == ["unknown", "unknown"]
+
+    run(test)
+
+
+async def in_doubt(bench: Bench) -> None:
+    """It may be under way."""
+    while bench.shown.outcome != "unknown":
+        await asyncio.sleep(0)
+    assert bench.shown.busy
+
+
+def locked_by(bench: Bench) -> str:
+    """Why no goal is sent, long after its server was offered."""
+    verdict = against_calling(bench.count, bench.robot, time.monotonic() + 60)
+    return verdict.code if verdict else ""
+
+
+async def settled(bench: Bench) -> None:
+    """Nothing is followed any more."""
+    while bench.actions._following.goals:
+        await asyncio.sleep(0.001)
+
+
+def test_feedback_and_results_of_any_length_are_cut() -> None:
+    async def test(bench: Bench) -> None:
+        types = INTERFACES.action(COUNT)
+        await accepted(bench)
+        long = {"sequence": list(range(300_000))}
+        one = {"goal_id": {"uuid": goal_id(bench)}, "feedback": long}
+        bench.actions.hear_feedback("/count", sample_of(INTERFACES.encode(types.feedback_message, one)))
+        bench.line.answer(types.get_result_response, status=4, result=long)
+        assert bench.shown.text.startswith("Under way. so far [0, 1, 2, ")
+        assert len(bench.shown.text) < 2 * LONGEST_SAID
+        await settled(bench)
+        assert bench.shown.text.endswith("…")
+        assert len(bench.corrected[0][1].text) < 2 * LONGEST_SAID
+
+    run(test)
+
+
+def test_feedback_and_states_that_can_not_be_read_are_counted_and_fill_no_log(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    async def test(bench: Bench) -> None:
+        await accepted(bench)
+        for number in range(100):
+            garbage = Sample(b"\0\1\0\0\xff", number, number / 10, 0.0, BRIDGE)
+            bench.actions.hear_feedback("/count", garbage)
+            bench.actions.hear_status("/count", garbage)
+        counted = {"count/_action/feedback": 100, "count/_action/status": 100}
+        assert bench.robot.undecodable == counted
+        lines = [line for line in caplog.messages if "_action" in line]
+        assert len(lines) == len(counted)
+        assert bench.shown.goal == "ACCEPTED"
+        await bench.actions.stop()
+
+    run(test)
+
+
+def test_feedback_of_another_programs_goal_is_passed_over() -> None:
+    async def test(bench: Bench) -> None:
+        types = INTERFACES.action(COUNT)
+        start = bench.send_goal()
+        await asked(bench, 1)
+        bench.line.answer(types.send_goal_response, accepted=True, stamp={"sec": 0, "nanosec": 0})
+        await start
+        before = bench.robot.progress["count"]
+        other = {"goal_id": {"uuid": [7] * 16}, "feedback": {"sequence": [1]}}
+        for payload in (INTERFACES.encode(types.feedback_message, other), b"\xff" * 9):
+            bench.actions.hear_feedback("/count", sample_of(payload))
+        assert bench.robot.progress["count"] == before
+        await bench.actions.stop()
+
+    run(test)
+
+
+def test_feedback_is_taken_in_and_waits_for_the_next_frame() -> None:
+    async def test(bench: Bench) -> None:
+        types = INTERFACES.action(COUNT)
+        start = bench.send_goal()
+        await asked(bench, 1)
+        bench.answer_goal(True)
+        await start
+        await asked(bench, 2)
+        shows = len(bench.shows)
+        goal_id = INTERFACES.decode(types.get_result_request, bench.line.asked[1][1]).goal_id.uuid
+        for number in range(100):
+            feedback = {"goal_id": {"uuid": goal_id}, "feedback": {"sequence": [number]}}
+            payload = INTERFACES.encode(types.feedback_message, feedback)
+            bench.actions.hear_feedback("/count", sample_of(payload))
+        assert bench.shown.fraction == 0.99
+        assert len(bench.shows) == shows
+        await bench.actions.stop()
+
+    run(test)
+
+
+def sample_of(payload: bytes) -> Sample:
+    return Sample(payload, 1, 0.0, 0.0, BRIDGE)

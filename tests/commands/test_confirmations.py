@@ -1,0 +1,356 @@
+"""Commands whose effect shows on a topic, presses that ask first, and buttons that wait."""
+
+import asyncio
+import itertools
+import logging
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from app.commands import confirmations
+from app.commands.confirmations import Confirmations, equal
+from app.commands.receipts import Receipt
+from app.errors import PanelError
+from app.panel import load_panel
+from app.panel.model import Panel
+from app.robot.state import Passed, Robot, Sample
+from app.ros_logging import RobotLog
+from app.runtime.ingest import Intake
+from app.transport.inbox import Changes
+from tests.commands.test_presses import Way
+from tests.support.builders import (
+    BOOL,
+    BRIDGE,
+    FREE,
+    FROM,
+    HEARD,
+    INTERFACES,
+    MESSAGE,
+    TEXT,
+    presses_of,
+    robot_there,
+    says,
+    told,
+)
+from tests.support.builders import panel_of as panel_with
+from tests.support.parts import ROOT, TAP_AGAIN_MS, Server, until
+
+CONFIRM = {"topic": "/heard", "field": "data", "equals": "{message}", "within_s": 0.2}
+
+
+def panel_of(**more: Any) -> Panel:
+    return panel_with(MESSAGE, {**FREE, "confirm": CONFIRM, **more}, HEARD)
+
+
+class Desk:
+    """Presses on a robot that is there, whose topic says what it says."""
+
+    def __init__(self, panel: Panel) -> None:
+        self.now = 100.0
+        self.way = Way()
+        self.robot: Robot = robot_there(panel)
+        self.confirmations = Confirmations(self.robot, lambda: None)
+        self.presses = presses_of(
+            panel,
+            self.robot,
+            self.way,
+            confirmations=self.confirmations,
+            monotonic=lambda: self.now,
+        )
+        self._seq = itertools.count(1)
+
+    async def press(self, text: str = "on", press_id: str = "p1") -> Receipt:
+        return await self.presses.press("free", {"message": text}, press_id, FROM)
+
+    def says(self, text: str, at: float) -> None:
+        says(self.robot, "/heard", text, at=at, seq=next(self._seq))
+        self.confirmations.hear(self.robot.key("/heard"), self.robot.reading("/heard"))
+
+
+def test_a_command_is_confirmed_by_what_comes_after_it() -> None:
+    async def pressed() -> Receipt:
+        desk = Desk(panel_of())
+        desk.says("on", 99.0)
+        press = asyncio.create_task(desk.press())
+        await asyncio.sleep(0)
+        desk.says("on", 99.9)  # it was on the way before the press
+        desk.says("off", 100.1)
+        await asyncio.sleep(0)
+        assert not press.done()
+        desk.says("on", 100.2)
+        return await press
+
+    receipt = asyncio.run(pressed())
+    assert receipt.outcome == "confirmed"
+    assert receipt.reason.startswith("Confirmed by /heard at ")
+
+
+def test_what_came_unseen_confirms_by_when_it_came() -> None:
+    """All in one turn: of what came and went before the newest, only what is later than the command."""
+
+    async def pressed(came_at: float) -> Receipt:
+        panel = panel_of()
+        desk = Desk(panel)
+        deaf: Any = object()
+        intake = Intake(
+            panel,
+            desk.robot,
+            deaf,
+            desk.confirmations,
+            deaf,
+            None,
+            RobotLog(logging.getLogger("x"), ""),
+        )
+        press = asyncio.create_task(desk.press())
+        await asyncio.sleep(0)
+        on, off = (INTERFACES.encode(TEXT, {"data": text}) for text in ("on", "off"))
+        between = (Passed(on, came_at, came_at),)
+        newest = Sample(off, 9, 100.2, 100.2, BRIDGE, between=between)
+        changes = Changes({desk.robot.key("/heard"): newest}, {}, link_up=True)
+        intake.take(changes, dict, lambda: None)
+        return await press
+
+    outcomes = [asyncio.run(pressed(came_at)).outcome for came_at in (99.9, 100.1)]
+    assert outcomes == ["unknown", "confirmed"]
+
+
+def test_without_its_effect_it_is_not_known_and_later_corrected() -> None:
+    async def pressed() -> tuple[Receipt, Receipt | None, str]:
+        desk = Desk(panel_of())
+        first = await desk.press()
+        desk.says("on", 101.0)
+        await asyncio.sleep(0)
+        await asyncio.sleep(0)
+        return first, desk.presses.receipt("p1"), desk.robot.progress["free"].outcome
+
+    first, corrected, shown = asyncio.run(pressed())
+    assert first.outcome == "unknown"
+    assert first.reason.startswith("Sent on /free at ")
+    assert "/heard did not show it within 0.2 s: it is not known" in first.reason
+    assert corrected is not None
+    assert (corrected.outcome, shown) == ("confirmed", "confirmed")
+
+
+def test_of_two_commands_and_one_effect_only_what_shows_after_it_confirms() -> None:
+    """The effect of the first came before the second was sent: the second is not known."""
+
+    async def pressed() -> list[Receipt]:
+        desk = Desk(panel_of())
+        first = asyncio.create_task(desk.press())
+        await asyncio.sleep(0)
+        desk.says("on", 100.1)
+        desk.now = 100.2
+        second = asyncio.create_task(desk.press(press_id="p2"))
+        return [await first, await second]
+
+    first, second = asyncio.run(pressed())
+    assert (first.outcome, second.outcome) == ("confirmed", "unknown")
+    assert "did not show it" in second.reason
+
+
+@pytest.mark.parametrize(
+    ("said", "outcomes"),
+    [
+        (["on"], ["confirmed", "unknown"]),
+        (["on", "on"], ["confirmed", "confirmed"]),
+        (["off", "on"], ["confirmed", "unknown"]),
+    ],
+)
+def test_one_effect_confirms_one_of_two_commands(said: list[str], outcomes: list[str]) -> None:
+    async def pressed() -> list[Receipt]:
+        desk = Desk(panel_of())
+        both = [asyncio.create_task(desk.press(press_id=name)) for name in ("p1", "p2")]
+        await asyncio.sleep(0)
+        for number, text in enumerate(said):
+            desk.says(text, 100.1 + number)
+        return [await one for one in both]
+
+    assert [receipt.outcome for receipt in asyncio.run(pressed())] == outcomes
+
+
+def test_nothing_is_waited_for_in_the_long_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(confirmations, "LATE_S", 0.05)
+
+    async def pressed() -> list[Any]:
+        desk = Desk(panel_of())
+        await asyncio.gather(*(desk.press(press_id=f"p{n}") for n in range(200)))
+        await asyncio.sleep(0.1)
+        return desk.confirmations._waiting["heard"]
+
+    assert asyncio.run(pressed()) == []
+
+
+def test_a_one_shot_button_is_locked_until_its_command_is_answered() -> None:
+    async def pressed() -> list[Receipt]:
+        desk = Desk(panel_of(one_shot=True))
+        first = asyncio.create_task(desk.press())
+        await asyncio.sleep(0)
+        second = await desk.press(press_id="p2")
+        desk.says("on", 100.1)
+        await first
+        third = await desk.press(press_id="p3")
+        assert len(desk.way.sent) == 2
+        return [await first, second, third]
+
+    first, second, third = asyncio.run(pressed())
+    assert [r.outcome for r in (first, second, third)] == ["confirmed", "refused", "unknown"]
+    assert "waiting for the robot" in second.reason
+
+
+@pytest.mark.parametrize(
+    ("value", "wanted", "is_it"),
+    [
+        (True, True, True),
+        (1, True, False),
+        (0.10000000149011612, 0.1, True),
+        (0.2, 0.1, False),
+        (float("nan"), 0.1, False),
+        (2.0, 2, True),
+        ("on", "on", True),
+        (None, "on", False),
+    ],
+)
+def test_a_field_has_the_value_as_near_as_its_type_has_it(value: Any, wanted: Any, is_it: bool) -> None:
+    assert equal(value, wanted) is is_it
+
+
+PANEL = """
+title = "Cell"
+mode = "demo"
+[[page]]
+id = "main"
+title = "Main"
+[[page.widget]]
+id = "message"
+kind = "text"
+label = "Message"
+[[page.widget]]
+id = "fan"
+kind = "toggle"
+label = "Fan"
+[[page.widget]]
+id = "go"
+kind = "publish"
+label = "Start"
+topic = "/operation"
+type = "std_msgs/msg/String"
+message = { data = "{message}" }
+{more}
+"""
+CONFIRMED = 'confirm = { topic = "/last_heard", equals = "{message} (/operation)"%s }'
+TYPED = CONFIRMED % ', type = "std_msgs/msg/String"'
+
+
+def panel_file(folder: Path, more: str) -> Path:
+    path = folder / "panel.toml"
+    path.write_text(PANEL.replace("{more}", more))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("more", "fault"),
+    [
+        ("one_shot = true", "page[0].widget[2].one_shot: needs `confirm`"),
+        (CONFIRMED % "", "page[0].widget[2].confirm.type: is missing: nothing else in the panel says"),
+        (
+            'confirm = { topic = "/last_heard", type = "std_msgs/msg/Bool", equals = "x" }',
+            'page[0].widget[2].confirm.equals: must be true or false (bool), not "x"',
+        ),
+        (
+            'confirm = { topic = "/s", type = "std_msgs/msg/UInt8", equals = 300 }',
+            "page[0].widget[2].confirm.equals: 300 is out of range: uint8",
+        ),
+        (
+            'confirm = { topic = "/s", type = "std_msgs/msg/Bool", equals = "{messag}" }',
+            'page[0].widget[2].confirm.equals: no input "messag"; there is fan, message',
+        ),
+        (
+            'confirm = { topic = "/s", type = "std_msgs/msg/Bool", field = "dat", equals = true }',
+            "page[0].widget[2].confirm.field:",
+        ),
+    ],
+)
+def test_what_is_wrong_with_it_is_told_at_load(tmp_path: Path, more: str, fault: str) -> None:
+    with pytest.raises(PanelError) as caught:
+        load_panel(panel_file(tmp_path, more))
+    assert fault in told(caught.value)
+
+
+def test_the_type_is_that_which_the_panel_gives_elsewhere(tmp_path: Path) -> None:
+    interlock = f'\n[[interlock]]\nid = "a"\ntopic = "/last"\ntype = "{BOOL}"\n'
+    path = panel_file(tmp_path, 'confirm = { topic = "/last", equals = "{fan}" }' + interlock)
+    assert load_panel(path).subscriptions() == {"/last": BOOL}
+
+
+@pytest.fixture
+def asking(tmp_path: Path, servers: Callable[[Server], Server]) -> Server:
+    path = panel_file(tmp_path, f"confirm_press = true\n{TYPED}")
+    mine = servers(Server(ROOT, KIOSK_PANEL=str(path)))
+    until(mine.ready, "ready")
+    return mine
+
+
+def test_a_press_is_confirmed_by_the_robot_in_every_browser(
+    asking: Server, page: Page, chromium: Browser
+) -> None:
+    other_context = chromium.new_context()
+    other = other_context.new_page()
+    other.goto(asking.url)
+    page.goto(asking.url)
+    page.get_by_label("Message").fill("a <b>part</b>")
+    page.get_by_role("button", name="Start").click()
+    dialog = page.get_by_role("dialog")
+    expect(dialog).to_contain_text("Start: do it?")
+    expect(dialog).to_contain_text("a <b>part</b>")
+    for width, height in ((1280, 800), (1024, 600)):
+        page.set_viewport_size({"width": width, "height": height})
+        for name in ("Back", "Start"):
+            box = dialog.get_by_role("button", name=name).bounding_box()
+            assert box is not None
+            assert min(box["width"], box["height"]) >= 90  # 20 mm
+    dialog.get_by_role("button", name="Back").click()
+    expect(dialog).to_be_hidden()
+    assert asking.widget("go")["outcome"] == ""
+    page.get_by_role("button", name="Start").click()
+    dialog.get_by_role("button", name="Start").click()
+    expect(dialog).to_be_hidden()
+    for one in (page, other):
+        expect(one.locator('[data-widget="go"] .result')).to_contain_text("Confirmed by /last_heard")
+    expect(page.locator('[data-widget="go"] .receipt')).to_be_empty()
+    other_context.close()
+
+
+def test_without_scripts_the_server_asks(asking: Server, chromium: Browser) -> None:
+    context = chromium.new_context(java_script_enabled=False)
+    page = context.new_page()
+    page.goto(asking.url)
+    page.get_by_label("Message").fill("by form")
+    page.get_by_role("button", name="Start").click()
+    expect(page.locator("h2")).to_have_text("Start: do it?")
+    expect(page.locator("dd")).to_have_text("by form")
+    page.get_by_role("link", name="Back").click()
+    expect(page.get_by_label("Message")).to_be_visible()
+    assert asking.widget("go")["outcome"] == ""
+    page.get_by_label("Message").fill("by form")
+    page.get_by_role("button", name="Start").click()
+    page.wait_for_timeout(TAP_AGAIN_MS)
+    page.get_by_role("button", name="Start").click()
+    expect(page.locator('[data-widget="go"] .result')).to_contain_text("Confirmed by /last_heard")
+    context.close()
+
+
+def test_a_lock_takes_the_question_away(
+    tmp_path: Path, servers: Callable[[Server], Server], page: Page
+) -> None:
+    path = panel_file(tmp_path, "confirm_press = true")
+    mine = servers(Server(ROOT, KIOSK_PANEL=str(path)))
+    until(mine.ready, "ready")
+    page.goto(mine.url)
+    page.get_by_role("button", name="Start").click()
+    expect(page.get_by_role("dialog")).to_be_visible()
+    mine.process.kill()
+    expect(page.get_by_role("dialog")).to_be_hidden()
+    expect(page.get_by_role("button", name="Start")).to_be_disabled()

@@ -1,0 +1,604 @@
+"""Hold-to-run, by the thousand: no message without a live holder and permission, one at the end."""
+
+import logging
+import math
+import time
+from collections.abc import Callable, Mapping
+from typing import Any, Final
+
+import pytest
+from hypothesis import HealthCheck, settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
+
+from app.commands.holds.controller import Holds
+from app.commands.holds.lease import AHEAD_S, LEASE_S, Lease, sent_at
+from app.commands.holds.receipts import RELEASED, Holding
+from app.commands.receipts import Receipt
+from app.dialect import bridge_dialect
+from app.errors import LinkError, NotFound
+from app.i18n import ENGLISH
+from app.panel.model import Panel
+from app.view.view import sight
+from app.web.routes.hold_socket import WHYS
+from tests.support.builders import (
+    BRIDGE,
+    FROM,
+    INTERFACES,
+    NOW,
+    TEXT,
+    Table,
+    endpoint,
+    panel_of,
+    permits,
+    robot_there,
+    sending_of,
+)
+
+POINT: Final = "geometry_msgs/msg/Point"
+SPEED: Final[Table] = {
+    "id": "speed", "kind": "slider", "label": "Speed", "min": 0.0, "max": 1.0, "step": 0.1,
+}  # fmt: skip
+JOG: Final[Table] = {
+    "id": "jog",
+    "kind": "hold",
+    "label": "Jog",
+    "topic": "/jog",
+    "type": POINT,
+    "message": {"x": "{speed}", "y": 0, "z": 0},
+    "release": {"x": 0, "y": 0, "z": 0},
+    "interlock": "operation",
+}
+BACK: Final[Table] = {**JOG, "id": "back", "label": "Back", "message": {"x": -1, "y": 0, "z": 0}}
+ARM: Final[Table] = {**BACK, "id": "arm", "label": "Arm", "topic": "/arm"}
+HALF: Final[Table] = {"speed": 0.5}
+MOVES: Final = (0.5, 0.0, 0.0)
+STOPS: Final = (0.0, 0.0, 0.0)
+A_POINT: Final = INTERFACES.encode(POINT, {"x": 0, "y": 0, "z": 0})
+WHO: Final = "127.0.0.1"
+
+
+class Timer:
+    def __init__(self, when: float, callback: Callable[[], object]) -> None:
+        self.when, self.callback, self.cancelled = when, callback, False
+
+    def cancel(self) -> None:
+        self.cancelled = True
+
+
+class Loop:
+    """An event loop whose time is set: timers run in `pass_time`, late ones after a stall."""
+
+    def __init__(self) -> None:
+        self.now = NOW
+        self.timers: list[Timer] = []
+
+    def time(self) -> float:
+        return self.now
+
+    def call_at(self, when: float, callback: Callable[[], object]) -> Any:
+        self.timers = [timer for timer in self.timers if not timer.cancelled]
+        self.timers.append(Timer(when, callback))
+        return self.timers[-1]
+
+    def pass_time(self, seconds: float) -> None:
+        end = self.now + seconds
+        while timer := min((t for t in self.timers if not t.cancelled), key=_when, default=None):
+            if timer.when > end:
+                break
+            self.now = max(self.now, timer.when)
+            self.timers.remove(timer)
+            timer.callback()
+        self.now = end
+
+    def stall(self, seconds: float) -> None:
+        """Nothing runs; then what is due does."""
+        self.now += seconds
+
+
+def _when(timer: Timer) -> float:
+    return timer.when
+
+
+class Way:
+    """The way to the robot: it keeps what was put, and when."""
+
+    def __init__(self, loop: Loop) -> None:
+        self._loop = loop
+        self.sent: list[tuple[float, tuple[float, float, float]]] = []
+        self.payloads: list[bytes] = []
+        self.fails = ""
+        self.may_move: Callable[[], bool] = lambda: True
+
+    def put(self, key: str, payload: bytes) -> None:
+        if self.fails:
+            raise LinkError(self.fails)
+        assert key in ("jog", "arm")
+        self.payloads.append(payload)
+        if len(payload) == len(A_POINT):
+            point = INTERFACES.decode(POINT, payload)
+            self.sent.append((self._loop.now, (point.x, point.y, point.z)))
+            assert self.sent[-1][1] == STOPS or self.may_move()
+
+
+class Bench:
+    """Holds on a robot that is there and permits, at a time that is set."""
+
+    def __init__(self, *widgets: Table, panel: Panel | None = None) -> None:
+        self.panel = panel or panel_of(SPEED, *(widgets or (JOG, BACK, ARM)))
+        self.loop = Loop()
+        self.way = Way(self.loop)
+        self.robot = robot_there(self.panel)
+        permits(self.robot, at=NOW)
+        way: Any = self.way
+        checked = sending_of(self.panel, self.robot, way).checked
+        self.receipts: list[Receipt] = []
+        self.pending: list[Callable[[], None]] = []  # what has come from the robot, not taken in yet
+        self.news: Callable[[], bool] = lambda: bool(self.pending)
+        self.holds = Holds(
+            self.panel, INTERFACES, self.robot, self.way, self.loop,
+            checked=checked, take=self.take, news=lambda: self.news(), changed=lambda: None,
+        )  # fmt: skip
+
+    def take(self) -> None:
+        pending, self.pending = self.pending, []
+        for change in pending:
+            change()
+
+    def asked(
+        self, widget: str = "jog", inputs: Mapping[str, Any] = HALF, age_s: float = 0.0
+    ) -> Receipt | Holding:
+        sent = self.loop.now - age_s
+        return self.holds.begin(widget, inputs, sent, FROM, self.receipts.append)
+
+    def begun(self, widget: str = "jog") -> Holding:
+        holding = self.asked(widget)
+        assert isinstance(holding, Holding)
+        return holding
+
+    def refused(self, *arguments: Any, **named: Any) -> tuple[str, str]:
+        before = list(self.way.sent)
+        receipt = self.asked(*arguments, **named)
+        assert isinstance(receipt, Receipt)
+        assert (receipt.outcome, self.way.sent) == ("refused", before)
+        return receipt.cause, receipt.reason.partition(": ")[2]
+
+    def keep(self, holding: Holding, seconds: float, every_s: float = 0.08) -> None:
+        """Heartbeats that come at once, for some time."""
+        end = self.loop.now + seconds - 1e-9
+        while self.loop.now < end:
+            self.loop.pass_time(min(every_s, end - self.loop.now))
+            self.holds.beat(holding, holding.lease.last + 1, self.loop.now)
+
+    @property
+    def points(self) -> list[tuple[float, float, float]]:
+        return [point for _, point in self.way.sent]
+
+
+@pytest.fixture
+def bench() -> Bench:
+    return Bench()
+
+
+def test_while_it_is_held_messages_go_out_at_the_rate_and_one_at_the_end(bench: Bench) -> None:
+    holding = bench.begun()
+    bench.keep(holding, 1.0)
+    bench.holds.end(holding, RELEASED)
+    bench.loop.pass_time(10)
+    assert bench.points == [MOVES] * 20 + [STOPS]
+    times = [at - NOW for at, _ in bench.way.sent[:-1]]
+    assert times == pytest.approx([n * 0.05 for n in range(20)])
+    (receipt,) = bench.receipts
+    assert (receipt.outcome, receipt.widget, receipt.cause) == ("published", "jog", "")
+    assert receipt.reason.startswith("Released at ")
+    assert receipt.reason.endswith(", after 1.0 s.")
+
+
+def test_each_message_has_the_time_of_its_own_sending() -> None:
+    stamped = "geometry_msgs/msg/PointStamped"
+    header = {"header": {"stamp": "{now}"}}
+    jog = {**JOG, "type": stamped, "message": {**header, "point": {"x": "{speed}"}}, "release": header}
+    bench = Bench(jog)
+    before = time.time_ns()
+    holding = bench.begun()
+    bench.keep(holding, 0.2)
+    bench.holds.end(holding, RELEASED)
+    after = time.time_ns()
+    sent = [INTERFACES.decode(stamped, payload) for payload in bench.way.payloads]
+    assert [one.point.x for one in sent] == [0.5] * 4 + [0.0]
+    stamps = [one.header.stamp.sec * 10**9 + one.header.stamp.nanosec for one in sent]
+    assert stamps == sorted(set(stamps))
+    assert before <= stamps[0]
+    assert stamps[-1] <= after
+
+
+def test_a_doubt_ends_it_and_the_stop_still_goes_out(bench: Bench) -> None:
+    """Another node takes the topic for another type: who moves by it has to hear the stop."""
+    bench.begun()
+    endpoint(bench.robot, "MS", "/jog", TEXT)
+    bench.holds.judge()
+    assert bench.points == [MOVES, STOPS]
+    (receipt,) = bench.receipts
+    assert receipt.outcome == "aborted"
+    assert "is std_msgs/msg/String on the robot" in receipt.reason
+
+
+@pytest.mark.parametrize("code", sorted(set(WHYS.values()) - {RELEASED} | {"hold_by_closing"}))
+def test_every_other_end_says_why_and_wants_a_new_press(bench: Bench, code: str) -> None:
+    holding = bench.begun()
+    bench.holds.end(holding, code)
+    assert bench.points == [MOVES, STOPS]
+    (receipt,) = bench.receipts
+    assert receipt.outcome == "aborted"
+    assert f": {ENGLISH[code]} Let go and press again." in receipt.reason
+    assert bench.holds.beat(holding, 2, bench.loop.now) is False
+    bench.loop.pass_time(10)
+    assert bench.points == [MOVES, STOPS]
+
+
+def test_without_a_heartbeat_it_ends_a_quarter_of_a_second_after_the_last_was_sent(
+    bench: Bench,
+) -> None:
+    holding = bench.begun()
+    bench.loop.pass_time(0.12)
+    bench.holds.beat(holding, 1, bench.loop.now - 0.04)  # 40 ms under way
+    bench.loop.pass_time(10)
+    stopped_at, point = bench.way.sent[-1]
+    assert point == STOPS
+    assert stopped_at - NOW == pytest.approx(0.08 + LEASE_S)
+    assert max(at for at, point in bench.way.sent if point == MOVES) < stopped_at
+    assert "nothing was heard from the browser" in bench.receipts[0].reason
+
+
+def test_a_late_heartbeat_prolongs_nothing(bench: Bench) -> None:
+    holding = bench.begun()
+    bench.loop.pass_time(0.2)
+    assert bench.holds.beat(holding, 1, NOW - 0.1)  # older than the press itself
+    bench.loop.pass_time(0.049)
+    assert bench.holds.beat(holding, 2, NOW - 0.1)
+    bench.loop.pass_time(0.002)
+    assert bench.holds.beat(holding, 3, bench.loop.now) is False
+    assert bench.points[-1] == STOPS
+
+
+def test_a_heartbeat_that_was_there_already_prolongs_nothing(bench: Bench) -> None:
+    holding = bench.begun()
+    assert bench.holds.beat(holding, 5, NOW)
+    bench.loop.pass_time(0.1)
+    for number in (5, 4, 0, -1):
+        assert bench.holds.beat(holding, number, bench.loop.now)
+    bench.loop.pass_time(0.16)
+    assert bench.points.count(STOPS) == 1
+
+
+def test_lost_permission_ends_it_at_once_and_not_at_the_next_message(bench: Bench) -> None:
+    bench.begun()
+    bench.loop.pass_time(0.01)
+    permits(bench.robot, False)
+    bench.holds.judge()
+    assert bench.way.sent == [(NOW, MOVES), (NOW + 0.01, STOPS)]
+    assert "The robot does not permit operation." in bench.receipts[0].reason
+    permits(bench.robot, True)
+    bench.loop.pass_time(10)
+    assert bench.points == [MOVES, STOPS]
+
+
+def test_what_has_come_but_is_not_taken_in_yet_counts_before_a_message(bench: Bench) -> None:
+    bench.begun()
+    bench.pending.append(lambda: permits(bench.robot, False))
+    bench.loop.pass_time(0.05)
+    assert bench.points == [MOVES, STOPS]
+
+
+def test_what_comes_while_a_message_is_encoded_counts_before_it_is_sent(bench: Bench) -> None:
+    bench.begun()
+    looks: list[bool] = []
+
+    def news() -> bool:
+        """It comes between the judging and the last look."""
+        looks.append(True)
+        if len(looks) == 1:
+            bench.pending.append(lambda: permits(bench.robot, False))
+        return bool(bench.pending)
+
+    bench.news = news
+    bench.loop.pass_time(0.05)
+    assert looks
+    assert bench.points == [MOVES, STOPS]
+    assert "The robot does not permit operation." in bench.receipts[0].reason
+
+
+def test_news_without_an_end_end_a_hold(bench: Bench) -> None:
+    bench.begun()
+    bench.news = lambda: True
+    bench.loop.pass_time(0.05)
+    assert bench.points == [MOVES, STOPS]
+
+
+def test_a_permission_that_gets_too_old_ends_it_when_it_does() -> None:
+    bench = Bench(panel=panel_of(SPEED, JOG, interlock={"max_age_s": 0.5}))
+    bench.robot.settled_at = NOW - 10
+    holding = bench.begun()
+    bench.keep(holding, 0.7)
+    stopped_at, point = bench.way.sent[-1]
+    assert point == STOPS
+    assert stopped_at - NOW == pytest.approx(0.5)
+    assert "is older than 0.5 s" in bench.receipts[0].reason
+
+
+def test_without_a_way_nothing_is_said_and_nothing_is_said_later(bench: Bench) -> None:
+    bench.begun()
+    bench.robot.graph.apply(bridge_dialect.bridge_token(BRIDGE), False)
+    bench.holds.judge()
+    (receipt,) = bench.receipts
+    assert receipt.outcome == "unknown"
+    assert "The message that ends it was not sent: No connection to the robot" in receipt.reason
+    bench.robot.graph.apply(bridge_dialect.bridge_token(BRIDGE), True)
+    bench.holds.judge()
+    bench.loop.pass_time(10)
+    assert bench.points == [MOVES]
+
+
+def test_what_zenoh_refuses_ends_it(bench: Bench) -> None:
+    bench.begun()
+    bench.way.fails = "can't send on jog: gone"
+    bench.loop.pass_time(0.05)
+    assert bench.receipts[0].outcome == "unknown"
+    assert bench.receipts[0].reason.count("can't send on jog: gone.") == 2
+    bench.way.fails = ""
+    bench.loop.pass_time(10)
+    assert bench.points == [MOVES]
+
+
+def test_after_a_stall_of_the_server_it_is_over_and_nothing_is_made_up_for(bench: Bench) -> None:
+    holding = bench.begun()
+    bench.loop.stall(0.4)
+    assert bench.holds.beat(holding, 1, bench.loop.now) is False  # heartbeats waited in the socket
+    bench.loop.pass_time(10)
+    assert bench.way.sent == [(NOW, MOVES), (NOW + 0.4, STOPS)]
+    assert "the panel's server stood still" in bench.receipts[0].reason
+
+
+def test_after_a_short_stall_missed_messages_are_passed_over(bench: Bench) -> None:
+    holding = bench.begun()
+    bench.holds.beat(holding, 1, NOW)
+    bench.loop.stall(0.22)
+    bench.holds.beat(holding, 2, bench.loop.now)
+    bench.loop.pass_time(0.06)
+    times = [at - NOW for at, _ in bench.way.sent]
+    assert times == pytest.approx([0, 0.22, 0.27])
+
+
+def test_a_second_browser_is_refused_and_changes_nothing(bench: Bench) -> None:
+    holding = bench.begun()
+    assert bench.refused() == ("interlock", "held by another browser.")
+    bench.holds.end(holding, RELEASED)
+    assert isinstance(bench.asked(), Holding)
+
+
+def test_no_two_holds_send_on_one_topic(bench: Bench) -> None:
+    bench.begun()
+    assert bench.refused("back") == ("interlock", "Jog is held, which sends on /jog too.")
+    assert isinstance(bench.asked("arm"), Holding)
+
+
+def test_a_press_that_comes_late_is_refused(bench: Bench) -> None:
+    assert bench.refused(age_s=LEASE_S) == ("interlock", "the press came too late.")
+    assert bench.refused(age_s=math.inf)[1] == "the press came too late."
+
+
+def test_a_lock_bad_input_and_a_lost_way_refuse_as_with_a_press(bench: Bench) -> None:
+    assert bench.refused(inputs={"speed": 7})[0] == "input"
+    assert bench.refused(inputs={})[0] == "input"
+    permits(bench.robot, False)
+    assert bench.refused() == ("interlock", "The robot does not permit operation.")
+    bench.robot.link_up = False
+    assert bench.refused()[0] == "link"
+    with pytest.raises(NotFound, match="speed"):
+        bench.asked("speed")
+    assert bench.robot.held == {}
+
+
+def test_the_end_of_the_server_ends_all_and_refuses_more(bench: Bench) -> None:
+    bench.begun()
+    bench.begun("arm")
+    bench.holds.close()
+    assert sorted(bench.points) == sorted([MOVES, (-1, 0, 0), STOPS, STOPS])
+    assert bench.refused() == ("interlock", ENGLISH["hold_by_stopping"])
+    bench.holds.close()
+    assert all(timer.cancelled for timer in bench.loop.timers)
+
+
+def test_every_browser_sees_that_it_is_held(bench: Bench) -> None:
+    def shown() -> Any:
+        return sight(bench.panel, bench.robot, bench.loop.now).view["widgets"]["jog"]
+
+    assert shown() == {"enabled": True, "reason": None, "held": False, "holding": ""}
+    holding = bench.begun()
+    assert (shown()["held"], shown()["holding"]) == (True, holding.since)
+    bench.holds.end(holding, RELEASED)
+    assert (shown()["held"], shown()["holding"]) == (False, "")
+
+
+REGION: Final[Table] = {
+    **JOG,
+    "type": "sensor_msgs/msg/RegionOfInterest",
+    "message": {"x_offset": 1, "y_offset": 0, "do_rectify": True},
+    "release": {"x_offset": 0, "y_offset": 0, "do_rectify": False},
+    "deadline_field": "height",
+    "counter_field": "width",
+}
+
+
+@pytest.mark.parametrize(("rate_hz", "deadline_ms"), [(1.0, 3000), (20.0, 150), (100.0, 100)])
+def test_the_robot_is_told_its_deadline_and_the_count(rate_hz: float, deadline_ms: int) -> None:
+    bench = Bench({**REGION, "rate_hz": rate_hz})
+    for _ in range(2):
+        bench.keep(bench.begun(), 2 / rate_hz)
+        bench.loop.pass_time(1)
+    sent = [
+        INTERFACES.decode("sensor_msgs/msg/RegionOfInterest", payload) for payload in bench.way.payloads
+    ]
+    assert [one.width for one in sent] == list(range(1, len(sent) + 1))
+    assert {(one.x_offset, one.height) for one in sent} == {(1, deadline_ms), (0, 0)}
+    assert [one.height for one in sent].count(0) == 2
+
+
+def test_a_small_counter_begins_anew() -> None:
+    empty = {"message": {}, "release": {}, "counter_field": "data"}
+    bench = Bench({**JOG, **empty, "type": "std_msgs/msg/UInt8", "rate_hz": 100.0})
+    bench.keep(bench.begun(), 3.0)
+    sent = [INTERFACES.decode("std_msgs/msg/UInt8", payload).data for payload in bench.way.payloads]
+    assert sent[:300] == [n % 256 for n in range(1, 301)]
+
+
+def test_log_lines_say_who_how_long_and_why(bench: Bench, caplog: pytest.LogCaptureFixture) -> None:
+    caplog.set_level(logging.INFO, "kiosk.holds")
+    holding = bench.begun()
+    bench.keep(holding, 0.5)
+    bench.holds.end(holding, "hold_by_sliding")
+    bench.refused(inputs={"speed": 7})
+    begun, ended, refused = (record.getMessage() for record in caplog.records)
+    assert begun == f"hold {holding.lease.id} of jog by {WHO} with {{'speed': 0.5}} begins"
+    assert f"of jog by {WHO} ended after 0.500 s and 10 messages (hold_by_sliding): " in ended
+    assert f"hold of jog by {WHO} with {{'speed': 7}}: Not sent at " in refused
+
+
+@pytest.mark.parametrize(
+    ("stamp_ms", "after_ms", "age_s"),
+    [(0, 0, 1.0), (900, 80, 0.02), (1000, 0, 0.0), (1000, 1000 * AHEAD_S, 0.0), (1500, 0, math.inf)],
+)
+def test_the_age_of_what_a_browser_says_shows_in_the_servers_own_time(
+    stamp_ms: float, after_ms: float, age_s: float
+) -> None:
+    assert 101.0 - sent_at(100.0, stamp_ms, after_ms, 101.0) == pytest.approx(age_s)
+
+
+def test_a_lease_that_is_over_is_over() -> None:
+    lease = Lease.begun("one", 0.05, NOW, NOW)
+    assert lease.over(NOW + LEASE_S - 0.001) == ""
+    assert lease.over(NOW + LEASE_S) == "hold_by_heartbeat"
+    assert lease.over(NOW + LEASE_S + 0.2) == "hold_by_stall"
+    assert not lease.beat(1, NOW + LEASE_S, NOW + LEASE_S)
+    assert not lease.due(NOW + LEASE_S)
+
+
+AGES: Final = st.sampled_from([0.0, 0.0, 0.01, 0.1, 0.2, 0.249, 0.25, 0.4])  # seconds
+TIMES: Final = st.sampled_from([0.001, 0.02, 0.05, 0.08, 0.08, 0.2, 0.249, 0.25, 0.4, 1.0])
+
+
+class Orders(RuleBasedStateMachine):
+    """Whatever comes in whatever order."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        logging.getLogger("kiosk.holds").setLevel(logging.CRITICAL)
+        self.bench = Bench(JOG)
+        self.all: list[Holding] = []
+        self.permitted = True
+        self.beats: dict[str, float] = {}  # lease → when its newest sign of life was sent
+        self.checked = 0
+        self.bench.way.may_move = lambda: self.permitted
+
+    @property
+    def now(self) -> float:
+        return self.bench.loop.now
+
+    @property
+    def holding(self) -> Holding | None:
+        return self.all[-1] if len(self.all) > len(self.bench.receipts) else None
+
+    @rule(age_s=AGES)
+    def begin(self, age_s: float) -> None:
+        held = self.holding
+        # A lease that has run out while the loop stood still is no reason to refuse.
+        free = held is None or self.now >= self.beats[held.lease.id] + LEASE_S
+        sent = self.now - age_s
+        answer = self.bench.asked(age_s=age_s)
+        allowed = free and self.permitted and self.now < sent + LEASE_S
+        assert isinstance(answer, Holding) == allowed
+        if isinstance(answer, Holding):
+            self.all.append(answer)
+            self.beats[answer.lease.id] = sent
+
+    @precondition(lambda self: self.all)
+    @rule(data=st.data(), late_s=AGES, step=st.integers(-2, 3))
+    def beat(self, data: st.DataObject, late_s: float, step: int) -> None:
+        holding = data.draw(st.sampled_from(self.all))
+        sent, last = self.now - late_s, holding.lease.last
+        ended = holding is not self.holding or self.now >= self.beats[holding.lease.id] + LEASE_S
+        goes_on = self.bench.holds.beat(holding, last + step, sent)
+        assert not (goes_on and ended), "a hold was revived"
+        if goes_on and step > 0:
+            self.beats[holding.lease.id] = max(self.beats[holding.lease.id], sent)
+
+    @precondition(lambda self: self.all)
+    @rule(data=st.data(), code=st.sampled_from([RELEASED, "hold_by_closing", "hold_by_second"]))
+    def end(self, data: st.DataObject, code: str) -> None:
+        holding = data.draw(st.sampled_from(self.all))
+        self.bench.holds.end(holding, code)
+        if holding is self.all[-1]:
+            assert self.holding is None
+
+    @rule(permitted=st.booleans(), noticed=st.booleans())
+    def permission(self, permitted: bool, noticed: bool) -> None:
+        """What the robot says now; `noticed`: the loop runs at once, or is still to take it in."""
+        self.permitted = permitted
+        self.bench.pending.append(lambda: permits(self.bench.robot, permitted))
+        if noticed:
+            self.bench.take()
+            self.bench.holds.judge()
+            assert permitted or self.holding is None
+
+    @rule(seconds=TIMES)
+    def time_passes(self, seconds: float) -> None:
+        self.bench.loop.pass_time(seconds)
+
+    @rule(seconds=TIMES)
+    def stall(self, seconds: float) -> None:
+        self.bench.loop.stall(seconds)
+
+    @invariant()
+    def nothing_is_sent_without_a_live_holder(self) -> None:
+        for at, point in self.bench.way.sent[self.checked :]:
+            if point == MOVES:
+                assert at < self.beats_of_now + LEASE_S
+        self.checked = len(self.bench.way.sent)
+
+    @property
+    def beats_of_now(self) -> float:
+        return self.beats[self.all[-1].lease.id]
+
+    @invariant()
+    def each_hold_ends_with_one_last_message(self) -> None:
+        """Its messages, one after another: some that move, then exactly one that stops."""
+        points = self.bench.points
+        assert points.count(STOPS) == len(self.bench.receipts)
+        assert len(self.all) - len(self.bench.receipts) in (0, 1)
+        runs = [run for run in _split(points) if run]
+        assert len(runs) == len(self.all)
+        counts = [holding.sent for holding in self.all]
+        assert [run.count(MOVES) for run in runs] == counts
+
+    @invariant()
+    def at_most_one_timer_runs(self) -> None:
+        assert len([t for t in self.bench.loop.timers if not t.cancelled]) <= 1
+
+
+def _split(points: list[tuple[float, float, float]]) -> list[list[tuple[float, float, float]]]:
+    runs: list[list[tuple[float, float, float]]] = [[]]
+    for point in points:
+        runs[-1].append(point)
+        if point == STOPS:
+            runs.append([])
+    return runs
+
+
+TestOrders = Orders.TestCase
+TestOrders.settings = settings(
+    max_examples=300,
+    stateful_step_count=40,
+    deadline=None,
+    database=None,
+    suppress_health_check=list(HealthCheck),
+)

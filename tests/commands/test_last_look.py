@@ -1,0 +1,182 @@
+"""Between the judging of a press and its sending a permission can be taken back: what has come by then
+counts."""
+
+import asyncio
+import time
+from bisect import bisect
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from app.audit import Unlogged
+from app.commands.receipts import MOST_LOOKS, Receipt
+from app.dialect.bridge_dialect import server_token
+from app.robot.state import Robot
+from app.runtime.robot_session import Kiosk
+from app.transport.inbox import Inbox
+from app.transport.zenoh_session import Link, config_to
+from tests.support.builders import (
+    BRIDGE,
+    COUNT,
+    FREE,
+    FROM,
+    GUARDED,
+    MESSAGE,
+    Table,
+    panel_of,
+    permits,
+    presses_of,
+    robot_there,
+    small_panel,
+)
+from tests.support.parts import Bridge, RosNode
+
+CALL: Table = {
+    "id": "reset",
+    "kind": "call",
+    "label": "Reset",
+    "service": "/reset",
+    "type": "std_srvs/srv/Trigger",
+    "request": {},
+    "interlock": "operation",
+}
+GOAL: Table = {**COUNT, "interlock": "operation"}
+PANEL = panel_of(MESSAGE, FREE, GUARDED, CALL, GOAL)
+PRESSES = 600
+JUST_COME_S = 0.0002  # what comes in the same instant as the press is sent
+
+
+class Way:
+    """It keeps what was sent, and answers nothing."""
+
+    def __init__(self) -> None:
+        self.sent: list[str] = []
+
+    def put(self, key: str, payload: bytes) -> None:
+        self.sent.append(key)
+
+    def heard(self, key: str) -> bool:
+        return True
+
+    def query(self, key: str, payload: bytes, timeout_s: float) -> "asyncio.Future[bytes | None]":
+        self.sent.append(key)
+        answer: asyncio.Future[bytes | None] = asyncio.get_running_loop().create_future()
+        answer.set_result(None)
+        return answer
+
+
+class Late:
+    """News that come after the press was judged, so often; each is taken in by the next look."""
+
+    def __init__(self, robot: Robot, *said: bool, ends: bool = True) -> None:
+        self._robot = robot
+        self._said = list(said)
+        self._ends = ends
+        self.waiting = False
+
+    def news(self) -> bool:
+        self.waiting = bool(self._said) or not self._ends
+        return self.waiting
+
+    def catch_up(self) -> None:
+        if self.waiting and self._said:
+            permits(self._robot, self._said.pop(0))
+
+
+def robot_permits() -> Robot:
+    robot = robot_there(PANEL)
+    permits(robot)
+    robot.graph.apply(server_token(BRIDGE, "SS", "reset", CALL["type"]), True, 0.0)
+    robot.graph.apply(server_token(BRIDGE, "AS", "count", GOAL["type"]), True, 0.0)
+    return robot
+
+
+def pressed(widget: str, way: Way, late: Late, robot: Robot) -> Receipt:
+    presses = presses_of(PANEL, robot, way, asker=way, catch_up=late.catch_up, news=late.news)
+    return asyncio.run(presses.press(widget, {"message": "x"}, "p1", FROM))
+
+
+@pytest.mark.parametrize("widget", ["guarded", "reset", "count"])
+def test_a_permission_that_is_taken_back_while_it_is_encoded_stops_it(widget: str) -> None:
+    robot, way = robot_permits(), Way()
+    receipt = pressed(widget, way, Late(robot, False), robot)
+    assert (receipt.outcome, receipt.cause) == ("refused", "interlock")
+    assert "The robot does not permit operation." in receipt.reason
+    assert way.sent == []
+
+
+@pytest.mark.parametrize("widget", ["guarded", "reset", "count"])
+def test_one_that_is_given_again_lets_it_through(widget: str) -> None:
+    robot, way = robot_permits(), Way()
+    pressed(widget, way, Late(robot, True, True), robot)
+    assert len(way.sent) >= 1
+
+
+def test_news_that_come_faster_than_they_are_taken_in_stop_it() -> None:
+    robot, way = robot_permits(), Way()
+    late = Late(robot, *[True] * (MOST_LOOKS + 5), ends=False)
+    receipt = pressed("guarded", way, late, robot)
+    assert (receipt.outcome, receipt.cause, way.sent) == ("refused", "link", [])
+
+
+class Recorded:
+    """When each value of the permission came into the inbox, and when each press was put."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.came: list[tuple[float, bool]] = []
+        self.put: list[float] = []
+        add, put = Inbox.put, Link.put
+
+        def added(inbox: Inbox, key: str, payload: Any, stamp: Any) -> None:
+            add(inbox, key, payload, stamp)
+            if key == "operation_enabled":
+                self.came.append((time.monotonic(), bytes(payload)[4] == 1))
+
+        def was_put(link: Link, key: str, payload: bytes) -> None:
+            if key == "guarded":
+                self.put.append(time.monotonic())
+            put(link, key, payload)
+
+        monkeypatch.setattr(Inbox, "put", added)
+        monkeypatch.setattr(Link, "put", was_put)
+
+    def forbidden(self) -> list[float]:
+        """Of each put that came after a `false`: how many seconds after."""
+        times = [at for at, _ in self.came]
+        before = ((at, self.came[bisect(times, at) - 1]) for at in self.put)
+        return [at - came_at for at, (came_at, permitted) in before if not permitted]
+
+
+async def pressing(endpoint: str, over: Callable[[], bool]) -> None:
+    """Presses as fast as it can, one after the other."""
+    kiosk = Kiosk(small_panel(), config_to(endpoint), "revision", Unlogged())
+    await kiosk.start()
+    number = 0
+    while not over():
+        number += 1
+        await kiosk.presses.press("guarded", {"message": "x"}, f"p{number}", FROM)
+        await asyncio.sleep(0)
+    await kiosk.stop()
+
+
+def test_nothing_is_sent_after_a_false_that_is_in_the_inbox(
+    own_bridge: Bridge, own_node: RosNode, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A node permits and forbids 400 times a second, while somebody presses all the time."""
+    recorded = Recorded(monkeypatch)
+    own_node.subscribe("/guarded", "std_msgs/msg/String")
+    own_node.advertise("/operation_enabled", "std_msgs/msg/Bool")
+
+    def over() -> bool:
+        return len(recorded.put) >= PRESSES
+
+    async def toggled() -> None:
+        pressed = asyncio.ensure_future(pressing(own_bridge.endpoint, over))
+        while not pressed.done():
+            await asyncio.to_thread(own_node.toggle, "/operation_enabled", 400, 2.0)
+        await pressed
+
+    asyncio.run(asyncio.wait_for(toggled(), 120))
+    late = [seconds for seconds in recorded.forbidden() if seconds > JUST_COME_S]
+    assert late == [], f"of {len(recorded.put)} presses"

@@ -1,0 +1,366 @@
+"""Parameters that are lists or one of some options: read, entered and set in a plain form, on the real
+bridge with a robot on Cyclone DDS; and the silence of a node on Fast DDS."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, Final
+
+import httpx
+import pytest
+from playwright.sync_api import Page, expect
+
+from app.commands.parameters.values import checked, typed
+from app.errors import InputError
+from app.panel.list_text import elements, listed, quoted
+from app.panel.number_range import Range
+from app.panel.widgets.parameter import Parameter
+from app.robot.parameter_state import Declared
+from app.view.parameter_values import parameter
+from tests.panel.test_widgets import faults
+from tests.support import cyclone
+from tests.support.builders import panel_of, robot_there
+from tests.support.cyclone import CycloneRobot
+from tests.support.parts import Bridge, RosNode, Server, live, until
+
+cyclone_bridge = cyclone.cyclone_bridge
+client = cyclone.client
+robots = cyclone.robots
+robot = cyclone.robot
+
+GAINS: Final[dict[str, Any]] = {
+    "id": "gains", "kind": "parameter", "label": "Gains", "node": "/arm", "parameter": "gains",
+    "type": "double[]",
+}  # fmt: skip
+OPTIONS: Final = [{"value": 1, "label": "Slow"}, {"value": 2, "label": "Fast"}]
+SEVERAL: Final = "several with commas between them"
+TEXTS: Final = f"a text; {SEVERAL}"
+FORM: Final = {"content-type": "application/x-www-form-urlencoded"}
+
+
+def widget(**more: Any) -> Parameter:
+    return Parameter.model_validate({**GAINS, **more})
+
+
+# As it is entered.
+
+
+@pytest.mark.parametrize(
+    ("values", "text"),
+    [
+        ([], ""),
+        (["1"], "1"),
+        (["a b", "c"], "a b, c"),
+        (["a,b", ' "', "", " c "], '"a,b", " """, "", " c "'),
+        (["日本", "ü"], "日本, ü"),
+    ],
+)
+def test_a_list_is_written_as_it_is_read(values: list[str], text: str) -> None:
+    assert listed(map(quoted, values)) == text
+    assert elements(text) == values
+
+
+@pytest.mark.parametrize("text", [",", "a,", ",a", "a,,b", '"a', 'a"b', '"a"b', '"a" "b"'])
+def test_what_is_no_list_is_refused(text: str) -> None:
+    with pytest.raises(ValueError, match="of them is none"):
+        elements(text)
+    with pytest.raises(InputError, match="several with commas between them, not"):
+        checked(widget(type="string[]"), Declared("live"), text)
+
+
+@pytest.mark.parametrize(
+    ("kind", "given", "value"),
+    [
+        ("double[]", "1, 2.5,-3e2", (1.0, 2.5, -300.0)),
+        ("double[]", [1, 2.5], (1.0, 2.5)),
+        ("double[]", " ", ()),
+        ("integer[]", "1, 9007199254740993", (1, 2**53 + 1)),
+        ("integer[]", [1, "9007199254740993"], (1, 2**53 + 1)),
+        ("bool[]", "true, Off, on,FALSE", (True, False, True, False)),
+        ("bool[]", [True], (True,)),
+        ("string[]", 'a, "b, c", ""', ("a", "b, c", "")),
+        ("string[]", ["a,b", ""], ("a,b", "")),
+    ],
+)
+def test_a_list_is_typed_value_by_value(kind: str, given: Any, value: tuple[Any, ...]) -> None:
+    of = widget(type=kind)
+    found = checked(of, Declared("live"), typed(of, given) if isinstance(given, str) else given)
+    assert found == value
+    assert isinstance(found, tuple)
+    assert [type(one) for one in found] == [type(one) for one in value]
+
+
+@pytest.mark.parametrize(
+    ("more", "given", "why"),
+    [
+        ({}, "1, x", 'Gains, value 2 must be a number, 0 to 5, not "x"'),
+        ({}, "1, 7", "Gains, value 2 is 7: it must be 0 to 5"),
+        ({"min": 1, "unit": "N"}, [0.5], "Gains, value 1 is 0.5 N: it must be 1 to 5 N"),
+        ({}, [1, None], "Gains, value 2 has no number"),
+        ({}, 5, "Gains must be 0 to 5; several with commas between them, not 5"),
+        ({}, [1.0] * 1001, "Gains has 1001 values; 1000 are allowed"),
+        (
+            {"type": "bool[]"},
+            "On, maybe",
+            'Gains, value 2 must be true .On. or false .Off., not "maybe"',
+        ),
+        ({"type": "integer[]"}, "1, 1.5", "Gains, value 2 must be a number, a whole number, not"),
+        ({"type": "string[]"}, [5], "Gains, value 1 must be text of 1000 characters at most, not 5"),
+    ],
+)
+def test_each_value_of_a_list_is_checked(more: dict[str, Any], given: Any, why: str) -> None:
+    limits = Range(0.0, 5.0) if more.get("type") is None else Range()
+    with pytest.raises(InputError, match=why):
+        checked(widget(**more), Declared("live", range=limits), given)
+
+
+@pytest.mark.parametrize(
+    ("more", "given", "value"),
+    [
+        ({"type": "integer"}, "2", 2),
+        ({"type": "integer"}, 2, 2),
+        ({"type": "double"}, "1", 1.0),
+        ({"type": "double[]", "options": [{"value": [1, 2], "label": "A"}]}, "[1, 2]", (1.0, 2.0)),
+        ({"type": "string", "options": [{"value": "a", "label": "A"}]}, "a", "a"),
+    ],
+)
+def test_an_option_is_chosen_by_its_value_or_its_key(more: Any, given: Any, value: Any) -> None:
+    found = checked(widget(**{"options": OPTIONS, **more}), Declared("live"), given)
+    assert (found, type(found)) == (value, type(value))
+
+
+@pytest.mark.parametrize("given", ["", "3", 3, True, "Slow", [1]])
+def test_what_is_no_option_is_refused(given: Any) -> None:
+    with pytest.raises(InputError, match="Gains must be one of Slow, Fast, not"):
+        checked(widget(type="integer", options=OPTIONS), Declared("live"), given)
+
+
+def test_an_option_that_the_node_does_not_take_is_refused() -> None:
+    of = widget(type="integer", options=OPTIONS)
+    with pytest.raises(InputError, match="Gains is Fast: it must be 0 to 1"):
+        checked(of, Declared("live", range=Range(0, 1)), "2")
+
+
+@pytest.mark.parametrize(
+    ("more", "value", "text", "entry", "limits"),
+    [
+        ({"unit": "N"}, (1.0, 2.5), "1, 2.5 N", "1, 2.5", f"a number; {SEVERAL}"),
+        ({}, (), "(empty)", "", f"a number; {SEVERAL}"),
+        ({}, (1.0, float("nan")), "1, NaN", "", f"a number; {SEVERAL}"),
+        ({}, (0.0,) * 1001, None, "", f"a number; {SEVERAL}"),
+        ({"type": "string[]"}, ("a, b", "c"), '"a, b", c', '"a, b", c', TEXTS),
+        ({"type": "bool[]"}, (True, False), "On, Off", "On, Off", f"On or Off; {SEVERAL}"),
+        ({"type": "integer", "options": OPTIONS}, 2, "Fast", "2", ""),
+        ({"type": "integer", "options": OPTIONS}, 3, "3", "", ""),
+    ],
+)  # fmt: skip
+def test_a_list_and_an_option_show_as_they_are_entered(
+    more: dict[str, Any], value: Any, text: str | None, entry: str, limits: str
+) -> None:
+    panel = panel_of({**GAINS, **more})
+    there = robot_there(panel)
+    there.parameters["gains"] = Declared("live", value)
+    (of,) = panel.parameters()
+    shown = parameter(of, there)
+    assert shown["text"] == text if text is not None else shown["text"].endswith("…")
+    assert (shown["entry"], shown["limits"]) == (entry, limits)
+
+
+@pytest.mark.parametrize(
+    ("more", "fault"),
+    [
+        ({"type": "bool[]", "min": 0}, '.min: is for numbers; the type is "bool[]"'),
+        ({"type": "integer[]", "step": 0.5}, ".step: 0.5 must be whole: the type is integer[]"),
+        ({"min": 2, "max": 1}, ".max: 1 must be more than min (2)"),
+        ({"type": "bool", "options": OPTIONS}, ".options: a bool has none: its switch has the words"),
+        (
+            {"type": "integer", "options": OPTIONS, "min": 0},
+            ".min: is for what is entered: with options",
+        ),
+        (
+            {"type": "integer", "options": [{"value": 1.5, "label": "A"}]},
+            ".options[0].value: must be a whole number (int64), not 1.5",
+        ),
+        (
+            {"type": "double[]", "options": [{"value": 1.5, "label": "A"}]},
+            ".options[0].value: a list: each must be a number, not 1.5",
+        ),
+        (
+            {"type": "integer", "options": [OPTIONS[0], OPTIONS[0]]},
+            ".options[1].value: 1 is already options[0]",
+        ),
+    ],
+)
+def test_what_is_wrong_in_the_panel_file_is_told(more: dict[str, Any], fault: str) -> None:
+    assert any(one.startswith(f"page[0].widget[0]{fault}") for one in faults({**GAINS, **more}))
+
+
+# On the real bridge.
+
+PANEL: Final = """
+title = "Cyclone cell"
+[[page]]
+id = "setup"
+title = "Setup"
+""" + "".join(
+    f"""
+[[page.widget]]
+kind = "parameter"
+node = "/cyclone_robot"
+id = "{name}"
+label = "{label}"
+parameter = "{name}"
+type = "{kind}"
+{more}
+"""
+    for name, label, kind, more in (
+        ("gains", "Gains", "double[]", 'unit = "N"'),
+        ("axes", "Axes", "bool[]", 'on = "used"\noff = "free"'),
+        ("frames", "Frames", "string[]", ""),
+        ("slots", "Slots", "integer[]", ""),
+        ("mode", "Mode", "integer",
+         'options = [{ value = 1, label = "Slow" }, { value = 2, label = "Fast" }]'),
+    )
+)  # fmt: skip
+
+
+@pytest.fixture
+def kiosk(cyclone_bridge: Bridge, robot: CycloneRobot, tmp_path: Path) -> Iterator[Server]:
+    path = tmp_path / "setup.toml"
+    path.write_text(PANEL)
+    mine = live(cyclone_bridge.endpoint, tmp_path, KIOSK_PANEL=str(path))
+    until(lambda: mine.widget("gains")["enabled"], "the parameters are read")
+    until(lambda: robot.subscribers(topic="/parameter_events"), "events are heard")
+    yield mine
+    mine.end()
+
+
+def press(kiosk: Server, name: str, value: Any) -> httpx.Response:
+    return kiosk.http.post(f"/widgets/{name}", json={"inputs": {name: value}})
+
+
+def test_lists_and_options_are_read_and_set(kiosk: Server, robot: CycloneRobot) -> None:
+    shown = kiosk.snapshot()["widgets"]
+    assert {name: one["text"] for name, one in shown.items()} == {
+        "gains": "1, 2.5 N",
+        "axes": "used, free",
+        "frames": 'base, "tool, left"',
+        "slots": "1, 9007199254740993",
+        "mode": "Slow",
+    }
+    assert shown["gains"]["limits"] == "0 to 5 N; several with commas between them"
+    values = {
+        "gains": ("0.5, 5", [0.5, 5.0]),
+        "axes": ("free, free, used", [False, False, True]),
+        "frames": ('"a, b", c', ["a, b", "c"]),
+        "slots": ("7", [7]),
+        "mode": ("2", 2),
+    }
+    for name, (given, value) in values.items():
+        receipt = press(kiosk, name, given)
+        assert (receipt.status_code, receipt.json()["outcome"]) == (200, "succeeded"), receipt.text
+        assert robot.parameters()[name] == value
+    until(lambda: kiosk.widget("mode")["text"] == "Fast", "it shows")
+    assert "Set to 0.5, 5 N at" in kiosk.widget("gains")["result"]
+    assert press(kiosk, "gains", [1, 2]).json()["outcome"] == "succeeded"
+    assert robot.parameters()["gains"] == [1.0, 2.0]
+    refused = press(kiosk, "gains", "1, 6")
+    assert refused.status_code == 422
+    assert "Gains, value 2 is 6 N: it must be 0 to 5 N" in refused.json()["reason"]
+    robot.set_parameter(name="frames", value=["x"])
+    until(lambda: kiosk.widget("frames")["text"] == "x", "what the robot sets shows")
+
+
+def test_lists_and_options_work_by_forms(kiosk: Server, robot: CycloneRobot) -> None:
+    form = "_id=f1&gains=4%2C+3&axes=&frames=&slots=&mode=2"
+    for name in ("gains", "mode"):
+        answer = kiosk.http.post(f"/widgets/{name}", content=form, headers=FORM)
+        assert answer.status_code == 303
+    assert (robot.parameters()["gains"], robot.parameters()["mode"]) == ([4.0, 3.0], 2)
+
+
+def test_lists_and_options_are_set_with_a_browser(
+    kiosk: Server, robot: CycloneRobot, page: Page
+) -> None:
+    page.goto(kiosk.url)
+    gains, mode = (page.locator(f'[data-widget="{name}"]') for name in ("gains", "mode"))
+    expect(gains.get_by_role("textbox")).to_have_value("1, 2.5")
+    gains.get_by_role("textbox").fill("0.25, 1")
+    page.get_by_role("button", name="Set Gains", exact=True).click()
+    expect(gains.locator(".value")).to_have_text("0.25, 1 N")
+    select = mode.get_by_role("combobox")
+    expect(select).to_have_value("1")
+    select.select_option("2")
+    page.get_by_role("button", name="Set Mode", exact=True).click()
+    expect(mode.locator(".value")).to_have_text("Fast")
+    assert (robot.parameters()["gains"], robot.parameters()["mode"]) == ([0.25, 1.0], 2)
+    robot.set_parameter(name="mode", value=7)
+    expect(mode.locator(".value")).to_have_text("7")
+    expect(select).to_have_value("")  # it is none of the options
+
+
+# A node on Fast DDS never answers, and prints an error at each question.
+
+PRINTED: Final = "failed to create array for field 'names'"
+
+
+@pytest.fixture
+def errors(tmp_path: Path) -> Path:
+    return tmp_path / "errors"
+
+
+@pytest.fixture
+def fast(own_bridge: Bridge, errors: Path) -> Iterator[RosNode]:
+    with errors.open("w") as file:
+        mine = RosNode(own_bridge.domain, stderr=file)
+        yield mine
+        mine.end()
+
+
+def test_a_node_that_never_answers_is_asked_once_and_then_when_it_is_touched(
+    own_bridge: Bridge,
+    fast: RosNode,
+    errors: Path,
+    page: Page,
+    tmp_path: Path,
+    servers: Callable[[Server], Server],
+) -> None:
+    path = tmp_path / "fast.toml"
+    path.write_text(
+        PANEL.replace("/cyclone_robot", "/system_controller")
+        + """
+[[page.widget]]
+id = "heard"
+kind = "readout"
+label = "Heard"
+topic = "/heard"
+type = "std_msgs/msg/String"
+"""
+    )
+    mine = servers(live(own_bridge.endpoint, tmp_path, KIOSK_PANEL=str(path)))
+
+    def printed() -> int:
+        return errors.read_text(errors="replace").count(PRINTED)
+
+    fast.advertise("/heard", "std_msgs/msg/String")
+    page.goto(mine.url)
+    gains = page.locator('[data-widget="gains"]')
+    again = gains.get_by_role("button", name="Read Gains again")
+    expect(gains.locator(".note")).to_have_text("no answer from /system_controller", timeout=60_000)
+    expect(again).to_be_enabled()
+    expect(gains.locator(".why")).to_contain_text("“Read again” asks once more.")
+    before = printed()  # 0 where the first question was lost on its way
+    assert before <= 1
+    told: set[str] = set()  # the seconds at which it spoke, longer than it was waited to ask once more
+
+    def told_for_seconds() -> bool:
+        told.add(mine.widget("heard")["note"])
+        return len(told) > 6
+
+    fast.every("/heard", {"data": "alive"}, 0.5)
+    until(told_for_seconds, "the node goes on speaking", within_s=60, every_s=0.2)
+    assert printed() == before
+    again.click()
+    expect(again).to_be_disabled()
+    until(lambda: printed() == before + 1, "it is asked again")
+    expect(again).to_be_enabled(timeout=30_000)
+    assert printed() == before + 1

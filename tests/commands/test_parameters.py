@@ -1,0 +1,582 @@
+"""Parameters that a node tells wrongly, late, twice or not at all: without a bridge, by hand."""
+
+import asyncio
+import math
+from collections.abc import Callable, Coroutine
+from typing import Any
+
+import pytest
+
+from app.commands.parameters import client, sync
+from app.commands.parameters.sync import Parameters
+from app.commands.parameters.values import checked, typed
+from app.commands.service_calls import Calls
+from app.dialect import bridge_dialect
+from app.errors import InputError
+from app.panel.model import Panel
+from app.panel.number_range import Range, described
+from app.panel.widgets.parameter import DESCRIBE, EVENT_TYPE, GET, SET, Parameter
+from app.permission.interlocks import press_verdict
+from app.robot.command_status import Answer
+from app.robot.parameter_state import UNKNOWN, Declared, allowed, limits_text, wire
+from app.robot.state import Sample
+from app.view.parameter_values import parameter
+from tests.support.builders import BRIDGE, INTERFACES, NOW, Table, panel_of, robot_there
+
+SPEED: Table = {
+    "id": "speed", "kind": "parameter", "label": "Speed", "node": "/arm", "parameter": "speed",
+    "type": "double",
+}  # fmt: skip
+COUNT: Table = {**SPEED, "id": "count", "parameter": "count", "type": "integer"}
+DOUBLE, INTEGER, STRING = 3, 2, 4
+
+
+def widget(**more: Any) -> Parameter:
+    return Parameter.model_validate({**SPEED, **more})
+
+
+def value(kind: int, given: Any) -> dict[str, Any]:
+    types = {DOUBLE: "double", INTEGER: "integer", STRING: "string"}
+    return {**wire(widget(type="double"), 0.0), "type": kind, f"{types[kind]}_value": given}
+
+
+def descriptor(name: str, kind: int, **more: Any) -> dict[str, Any]:
+    empty = {"description": "", "additional_constraints": "", "floating_point_range": [],
+             "integer_range": []}  # fmt: skip
+    return {**empty, "name": name, "type": kind, **more}
+
+
+class Line:
+    """A link whose queries are answered by hand."""
+
+    def __init__(self) -> None:
+        self.asked: list[tuple[str, bytes, asyncio.Future[bytes | None]]] = []
+
+    def query(self, key: str, payload: bytes, timeout_s: float) -> "asyncio.Future[bytes | None]":
+        future: asyncio.Future[bytes | None] = asyncio.get_running_loop().create_future()
+        self.asked.append((key, payload, future))
+        return future
+
+    @property
+    def keys(self) -> list[str]:
+        return [key for key, _, _ in self.asked]
+
+
+class Bench:
+    """A robot with one node that offers its parameters."""
+
+    def __init__(self, *widgets: Table) -> None:
+        self.panel: Panel = panel_of(*(widgets or (SPEED,)))
+        self.robot = robot_there(self.panel)
+        self.line = Line()
+        calls = Calls(INTERFACES, self.robot, self.line, lambda: None)
+        self.parameters = Parameters(self.panel, INTERFACES, self.robot, self.line, calls, lambda: None)
+        self.calls = calls
+
+    def offer(self, alive: bool = True) -> None:
+        for name, kind in (GET, DESCRIBE, SET):
+            token = bridge_dialect.server_token(BRIDGE, "SS", f"arm/{name}", kind)
+            if not alive:
+                self.parameters.lose(token)
+            self.robot.graph.apply(token, alive)
+        self.parameters.follow()
+
+    async def asked(self, count: int) -> None:
+        async with asyncio.timeout(5):
+            while len(self.line.asked) < count:
+                await asyncio.sleep(0.001)
+
+    async def answer(self, number: int, service: tuple[str, str], **fields: Any) -> None:
+        """The answer to the query of this number, which must be of this service."""
+        await self.asked(number)
+        key, _, future = self.line.asked[number - 1]
+        assert key == f"arm/{service[0]}"
+        future.set_result(INTERFACES.encode(f"{service[1]}_Response", fields))
+        for _ in range(5):
+            await asyncio.sleep(0)
+
+    async def tell(self, first: int, given: float, **more: Any) -> None:
+        """What the node describes and holds, asked for by query number `first` and the next."""
+        described = [descriptor("speed", DOUBLE, **more)]
+        await self.answer(first, DESCRIBE, descriptors=described)
+        await self.answer(first + 1, GET, values=[value(DOUBLE, given)])
+
+    def event(self, node: str = "/arm", *, skipped: int = 0, **parts: Any) -> None:
+        told = {"new_parameters": [], "changed_parameters": [], "deleted_parameters": [], **parts}
+        fields = {"stamp": {"sec": 0, "nanosec": 0}, "node": node, **told}
+        payload = INTERFACES.encode(EVENT_TYPE, fields)
+        self.parameters.hear(Sample(payload, 1, NOW, NOW, BRIDGE, skipped))
+
+    async def until(self, what: Callable[[], bool]) -> None:
+        async with asyncio.timeout(5):
+            while not what():
+                await asyncio.sleep(0.001)
+
+    @property
+    def shown(self) -> dict[str, Any]:
+        (one,) = self.panel.parameters()
+        return parameter(one, self.robot)
+
+    def known(self, name: str = "speed") -> Declared:
+        return self.robot.parameters.get(name, UNKNOWN)
+
+    def reason(self, name: str = "speed") -> str:
+        one = next(w for w in self.panel.parameters() if w.id == name)
+        return press_verdict(one, (), self.robot, NOW).reason or ""
+
+
+def run(test: Callable[[Bench], Coroutine[Any, Any, None]], *widgets: Table) -> None:
+    async def whole() -> None:
+        bench = Bench(*widgets)
+        try:
+            await test(bench)
+        finally:
+            await bench.parameters.stop()
+
+    asyncio.run(whole())
+
+
+def change(given: float) -> list[dict[str, Any]]:
+    return [{"name": "speed", "value": value(DOUBLE, given)}]
+
+
+@pytest.fixture(autouse=True)
+def soon(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pauses of a test's length; the confirming reading far away."""
+    monkeypatch.setattr(sync, "AGAIN_S", 0.01)
+    monkeypatch.setattr(sync, "CONFIRM_S", 60.0)
+    monkeypatch.setattr(sync, "SETTLE_S", 0.0)
+
+
+def test_a_node_is_asked_when_it_is_seen_and_no_more() -> None:
+    async def test(bench: Bench) -> None:
+        bench.parameters.follow()
+        assert bench.line.keys == []
+        assert "does not offer the parameters of /arm" in bench.reason()
+        bench.offer()
+        bench.parameters.follow()
+        await bench.asked(1)
+        assert "waiting for /arm to tell its speed" in bench.reason()
+        await bench.tell(1, 0.5)
+        assert (bench.known().state, bench.known().value, bench.reason()) == ("live", 0.5, "")
+        await asyncio.sleep(0.05)
+        assert bench.line.keys == ["arm/describe_parameters", "arm/get_parameters"]
+
+    run(test)
+
+
+def test_a_node_that_appeared_is_read_once_more_when_its_events_flow(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(sync, "CONFIRM_S", 0.02)
+
+    async def test(bench: Bench) -> None:
+        bench.offer()
+        await bench.tell(1, 0.5)
+        await bench.tell(3, 0.6)
+        assert bench.known().value == 0.6
+        await asyncio.sleep(0.1)
+        assert len(bench.line.asked) == 4
+
+    run(test)
+
+
+def test_an_event_of_the_node_counts_and_one_of_another_does_not() -> None:
+    async def test(bench: Bench) -> None:
+        bench.offer()
+        await bench.tell(1, 0.5)
+        bench.event(changed_parameters=change(0.7))
+        assert bench.known().value == 0.7
+        for other in ("/arm2", "/cell/arm", "arm"):
+            bench.event(other, changed_parameters=change(9.0))
+        bench.parameters.hear(Sample(b"\xff" * 9, 1, NOW, NOW, BRIDGE))
+        assert bench.known().value == 0.7
+        assert len(bench.line.asked) == 2
+
+    run(test)
+
+
+def test_an_event_by_a_bridge_that_is_gone_does_not_count() -> None:
+    async def test(bench: Bench) -> None:
+        bench.offer()
+        await bench.tell(1, 0.5)
+        fields = {"stamp": {"sec": 0, "nanosec": 0}, "node": "/arm", "new_parameters": [],
+                  "changed_parameters": change(0.7), "deleted_parameters": []}  # fmt: skip
+        payload = INTERFACES.encode(EVENT_TYPE, fields)
+        bench.parameters.hear(Sample(payload, 1, NOW, NOW, "gone"))
+        assert bench.known().value == 0.5
+
+    run(test)
+
+
+def test_an_event_while_the_node_is_asked_goes_over_its_answer() -> None:
+    async def test(bench: Bench) -> None:
+        bench.offer()
+        await bench.answer(1, DESCRIBE, descriptors=[descriptor("speed", DOUBLE)])
+        bench.event(changed_parameters=change(0.7))
+        await bench.answer(2, GET, values=[value(DOUBLE, 0.5)])
+        assert bench.known().value == 0.7
+
+    run(test)
+
+
+@pytest.mark.parametrize("what", ["skipped", "new", "deleted"])
+def test_what_an_event_may_hide_is_asked_for(what: str) -> None:
+    async def test(bench: Bench) -> None:
+        bench.offer()
+        await bench.tell(1, 0.5)
+        if what == "skipped":
+            bench.event("/other", skipped=1)
+        else:
+            parts: dict[str, Any] = {f"{what}_parameters": change(0.7)}
+            bench.event("/arm", **parts)
+        await bench.tell(3, 0.8, read_only=True)
+        assert (bench.known().value, bench.known().read_only) == (0.8, True)
+
+    run(test)
+
+
+def test_an_answer_of_before_a_cut_does_not_count() -> None:
+    async def test(bench: Bench) -> None:
+        bench.offer()
+        await bench.answer(1, DESCRIBE, descriptors=[descriptor("speed", DOUBLE)])
+        await bench.asked(2)
+        bench.offer(alive=False)
+        bench.offer()
+        await bench.asked(3)
+        old = bench.line.asked[1][2]
+        if not old.done():
+            old.set_result(INTERFACES.encode(f"{GET[1]}_Response", {"values": [value(DOUBLE, 9.0)]}))
+        await asyncio.sleep(0.01)
+        assert bench.known().state == "waiting"
+        await bench.tell(3, 0.5)
+        assert bench.known().value == 0.5
+
+    run(test)
+
+
+def test_a_node_that_was_another_one_for_a_moment_is_asked_anew() -> None:
+    async def test(bench: Bench) -> None:
+        bench.offer()
+        await bench.tell(1, 0.5)
+        bench.parameters.lose(bridge_dialect.bridge_token(BRIDGE))
+        assert (bench.known().state, bench.known().value) == ("cut", 0.5)
+        assert "waiting for /arm" in bench.reason()
+        bench.parameters.follow()
+        await bench.tell(3, 0.6)
+        assert (bench.known().state, bench.known().value) == ("live", 0.6)
+
+    run(test)
+
+
+def test_a_node_that_does_not_answer_is_asked_again_when_it_is_touched_or_new(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Each question makes a node on Fast DDS print an error."""
+    monkeypatch.setattr(client, "ANSWER_S", 0.01)
+
+    async def test(bench: Bench) -> None:
+        (one,) = bench.panel.parameters()
+        assert "does not offer" in bench.parameters.read_again(one)
+        bench.offer()
+        await bench.asked(1)
+        assert bench.parameters.read_again(one) == ""  # it is being asked
+        await bench.until(lambda: bench.known().state == "silent")
+        assert (bench.shown["askable"], bench.shown["note"]) == (False, "waiting for /arm")
+        await bench.answer(1, DESCRIBE, descriptors=[descriptor("speed", DOUBLE)])  # late
+        await bench.until(lambda: bench.shown["askable"])
+        assert bench.known().state == "silent"
+        assert bench.shown["note"] == "no answer from /arm"
+        assert "Cyclone DDS" in bench.reason()
+        assert "“Read again” asks once more" in bench.reason()
+        for _ in range(3):  # whatever it says by itself
+            bench.event(skipped=1, changed_parameters=change(0.7), new_parameters=change(0.7))
+            bench.parameters.follow()
+            await asyncio.sleep(0.03)
+        assert len(bench.line.asked) == 1
+        assert bench.parameters.read_again(one) == ""
+        assert bench.parameters.read_again(one) == ""
+        await bench.asked(2)
+        await asyncio.sleep(0.03)
+        bench.line.asked[1][2].set_result(None)  # after its time
+        await bench.until(lambda: bench.shown["askable"])
+        await asyncio.sleep(0.03)
+        assert len(bench.line.asked) == 2
+        monkeypatch.setattr(client, "ANSWER_S", 5.0)
+        bench.offer(alive=False)
+        assert bench.shown["askable"] is False
+        bench.offer()
+        await bench.tell(3, 0.5)
+        assert bench.known().value == 0.5
+
+    run(test)
+
+
+def test_a_question_that_the_bridge_dropped_is_asked_again() -> None:
+    async def test(bench: Bench) -> None:
+        bench.offer()
+        await bench.asked(1)
+        bench.line.asked[0][2].set_result(None)  # at once: it never got to the node
+        await bench.tell(2, 0.5)
+        assert bench.known().value == 0.5
+
+    run(test)
+
+
+def test_a_node_that_was_cut_off_while_it_was_asked_can_be_asked_when_it_is_back() -> None:
+    async def test(bench: Bench) -> None:
+        bench.offer()
+        await bench.asked(1)
+        bench.offer(alive=False)
+        bench.offer()
+        await bench.asked(2)
+        assert bench.robot.asking == {"speed"}
+        await bench.tell(2, 0.5)
+        await bench.until(lambda: bench.shown["askable"])
+
+    run(test)
+
+
+def test_a_node_that_answers_without_it_is_asked_ever_more_rarely(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(sync, "AGAIN_MOST_S", 0.04)
+    paused: list[float | None] = []
+
+    async def within(event: asyncio.Event, longest_s: float | None) -> None:
+        paused.append(longest_s)
+        await asyncio.sleep(0)
+
+    monkeypatch.setattr(sync, "_within", within)
+
+    async def test(bench: Bench) -> None:
+        bench.offer()
+        for number in range(1, 9, 2):
+            await bench.answer(number, DESCRIBE, descriptors=[])
+            await bench.answer(number + 1, GET, values=[])
+        await bench.asked(9)
+        assert paused[1:8:2] == [0.01, 0.02, 0.04, 0.04]  # the others are between any two readings
+
+    run(test)
+
+
+def test_of_several_parameters_one_that_is_not_declared_spoils_no_other() -> None:
+    async def test(bench: Bench) -> None:
+        bench.offer()
+        await bench.answer(1, DESCRIBE, descriptors=[])
+        await bench.answer(2, DESCRIBE, descriptors=[descriptor("speed", DOUBLE)])
+        await bench.answer(3, DESCRIBE, descriptors=[])
+        await bench.answer(4, GET, values=[])
+        await bench.answer(5, GET, values=[value(DOUBLE, 0.5)])
+        await bench.answer(6, GET, values=[])
+        assert (bench.known().value, bench.known("count").state) == (0.5, "undeclared")
+        assert "/arm has no parameter count" in bench.reason("count")
+
+    run(test, SPEED, COUNT)
+
+
+@pytest.mark.parametrize(
+    ("described", "held", "state", "reason"),
+    [
+        (descriptor("", 0), value(DOUBLE, 0) | {"type": 0}, "undeclared", "has no parameter speed"),
+        (descriptor("speed", INTEGER), value(INTEGER, 1), "mistyped", "speed of /arm is integer"),
+        (descriptor("speed", 8), value(DOUBLE, 0) | {"type": 8}, "mistyped", "is double[]"),
+        (descriptor("speed", DOUBLE), value(DOUBLE, 0) | {"type": 0}, "missing", ""),
+        (descriptor("speed", 0, dynamic_typing=True), value(DOUBLE, 1), "live", ""),
+        (descriptor("speed", INTEGER, dynamic_typing=True), value(DOUBLE, 1), "live", ""),
+        (descriptor("speed", DOUBLE, read_only=True), value(DOUBLE, 1), "live", "Read only"),
+    ],
+)
+def test_what_a_node_says_locks_or_not(
+    described: dict[str, Any], held: dict[str, Any], state: str, reason: str
+) -> None:
+    async def test(bench: Bench) -> None:
+        bench.offer()
+        await bench.answer(1, DESCRIBE, descriptors=[described])
+        await bench.answer(2, GET, values=[held])
+        assert bench.known().state == state
+        assert reason in bench.reason()
+        assert bool(reason) == bool(bench.reason())
+
+    run(test)
+
+
+def test_what_can_not_be_read_is_said() -> None:
+    async def test(bench: Bench) -> None:
+        bench.offer()
+        await bench.asked(1)
+        bench.line.asked[0][2].set_result(b"\0\1\0\0\xff\xff")
+        await asyncio.sleep(0.005)
+        assert bench.known().state == "unreadable"
+        assert "can't be read" in bench.reason()
+
+    run(test)
+
+
+def test_after_a_set_the_node_is_asked_how_it_is() -> None:
+    async def test(bench: Bench) -> None:
+        bench.offer()
+        await bench.tell(1, 0.5)
+        (one,) = bench.panel.parameters()
+        corrected: list[tuple[str, Answer]] = []
+        setting = asyncio.create_task(
+            bench.parameters.set(
+                one, 0.7, "p1", lambda press, answer: corrected.append((press, answer))
+            )
+        )
+        await bench.asked(3)
+        assert bench.reason() == "Under way: waiting for the robot."
+        request = INTERFACES.decode(f"{SET[1]}_Request", bench.line.asked[2][1])
+        (sent,) = request.parameters
+        assert (sent.name, sent.value.type, sent.value.double_value) == ("speed", DOUBLE, 0.7)
+        await bench.answer(3, SET, results=[{"successful": False, "reason": "too fast"}])
+        answer = await setting
+        assert (answer.outcome, answer.text[-10:]) == ("rejected", ": too fast")
+        await bench.tell(4, 0.5)
+        assert bench.known().value == 0.5
+
+    run(test)
+
+
+def test_an_empty_answer_to_a_set_is_unknown() -> None:
+    async def test(bench: Bench) -> None:
+        bench.offer()
+        await bench.tell(1, 0.5)
+        (one,) = bench.panel.parameters()
+        setting = asyncio.create_task(bench.parameters.set(one, 0.7, "p1", lambda *_: None))
+        await bench.answer(3, SET, results=[])
+        assert (await setting).outcome == "unknown"
+
+    run(test)
+
+
+@pytest.mark.parametrize(
+    ("given", "kind", "value"),
+    [
+        (1, "double", 1.0),
+        (0.30000000000000004, "double", 0.30000000000000004),
+        (5.0, "integer", 5),
+        ("9007199254740993", "integer", 2**53 + 1),
+        ("", "string", ""),
+        (True, "bool", True),
+    ],
+)
+def test_a_value_is_typed(given: Any, kind: str, value: Any) -> None:
+    found = checked(widget(type=kind), Declared("live", range=Range(None, None, None)), given)
+    assert (found, type(found)) == (value, type(value))
+
+
+@pytest.mark.parametrize(
+    ("given", "kind"),
+    [
+        (math.nan, "double"),
+        (math.inf, "double"),
+        (10**400, "double"),
+        (True, "double"),
+        ("1", "double"),
+        (True, "integer"),
+        (2**63, "integer"),
+        ("9" * 30, "integer"),
+        ("1.5", "integer"),
+        (None, "integer"),
+        (0, "bool"),
+        ("true", "bool"),
+        ("x" * 1001, "string"),
+        (["x"], "string"),
+    ],
+)
+def test_a_value_of_another_type_is_refused(given: Any, kind: str) -> None:
+    with pytest.raises(InputError, match="Speed"):
+        checked(widget(type=kind), Declared("live"), given)
+
+
+@pytest.mark.parametrize(
+    ("own", "theirs", "limits", "good", "bad"),
+    [
+        ({}, Range(0.0, 2.0, 0.1), "0 to 2, in steps of 0.1", [0.3, 2.0], [0.35, 2.1, -0.1]),
+        ({}, Range(0.0, 1.0, 0.3), "0 to 1, in steps of 0.3", [0.9, 1.0], [0.95]),
+        ({"max": 1.0}, Range(0.0, 2.0, None), "0 to 1", [0.05], [1.1]),
+        ({"min": 0.25}, Range(0.0, 2.0, 0.1), "0.3 to 2, in steps of 0.1", [0.3], [0.2, 0.25]),
+        ({"step": 0.5}, Range(0.0, 2.0, 0.1), "0 to 2, in steps of 0.5", [1.5], [0.1]),
+        ({"step": 0.25}, Range(0.0, 2.0, 0.1), "0 to 2, in steps of 0.25", [0.5], [0.25]),
+        ({"min": 1}, Range(), "1 or more", [1, 9.5], [0.5]),
+        ({"max": 1}, Range(), "1 or less", [-1e9], [1.5]),
+        ({"unit": "m"}, Range(), "a number", [1e300], []),
+    ],
+)
+def test_a_panel_narrows_what_the_node_describes(
+    own: dict[str, Any], theirs: Range, limits: str, good: list[float], bad: list[float]
+) -> None:
+    of, known = widget(**own), Declared("live", range=theirs)
+    assert limits_text(of, allowed(of, known)) == limits
+    assert [checked(of, known, one) for one in good] == good
+    for one in bad:
+        with pytest.raises(InputError, match="it must be"):
+            checked(of, known, one)
+
+
+def test_no_value_that_both_allow_locks() -> None:
+    async def test(bench: Bench) -> None:
+        bench.offer()
+        limits = [{"from_value": 0.0, "to_value": 2.0, "step": 0.0}]
+        await bench.tell(1, 0.5, floating_point_range=limits)
+        assert bench.reason() == (
+            "Locked: /arm takes 0 to 2 for its speed, and this panel gives 3 or more: no value is both."
+        )
+
+    run(test, {**SPEED, "min": 3.0})
+
+
+def test_integers_are_exact_to_the_last_step() -> None:
+    of = widget(type="integer")
+    known = Declared("live", range=Range(-(2**63), 2**63 - 1, 2))
+    assert checked(of, known, str(2**53 + 2)) == 2**53 + 2
+    assert checked(of, known, str(2**63 - 1)) == 2**63 - 1  # the highest is always right
+    with pytest.raises(InputError):
+        checked(of, known, str(2**53 + 1))
+
+
+@pytest.mark.parametrize(
+    ("kind", "text", "value"),
+    [
+        ("double", "1.5", 1.5),
+        ("double", "nan", "nan"),
+        ("double", "1_0", "1_0"),
+        ("integer", "7", "7"),
+        ("bool", "true", True),
+        ("bool", "maybe", "maybe"),
+        ("string", "true", "true"),
+    ],
+)
+def test_a_forms_text_is_typed(kind: str, text: str, value: Any) -> None:
+    assert typed(widget(type=kind), text) == value
+
+
+def test_a_range_that_is_open_has_no_words() -> None:
+    assert described(Range(), "m") == ""
+    assert described(Range(step=0.5), "m") == "in steps of 0.5"
+
+
+@pytest.mark.parametrize(
+    ("kind", "value", "text", "entry"),
+    [
+        ("double", 0.5, "0.5 mm", "0.5"),
+        ("double", math.nan, "NaN mm", ""),
+        ("double", 1e22, "1e+22 mm", "1e+22"),
+        ("integer", 2**53 + 1, "9007199254740993 mm", "9007199254740993"),
+        ("string", "two\nlines", "two\nlines", ""),
+        ("string", "x" * 2000, "x" * 199 + "…", ""),
+        ("bool", True, "On", True),
+    ],
+)
+def test_a_value_shows_and_its_input_starts_from_it(
+    kind: str, value: Any, text: str, entry: Any
+) -> None:
+    unit = "mm" if kind in ("double", "integer") else ""
+    panel = panel_of({**SPEED, "type": kind, "unit": unit})
+    robot = robot_there(panel)
+    robot.parameters["speed"] = Declared("live", value)
+    (of,) = panel.parameters()
+    shown = parameter(of, robot)
+    assert (shown["text"], shown["entry"]) == (text, entry)
+    assert "does not tell of changes" in shown["note"]  # nobody publishes /parameter_events

@@ -1,0 +1,424 @@
+"""Goals of before the server's start: what the log knows of them, what is asked, shown and logged."""
+
+import asyncio
+import time
+from collections.abc import Callable, Coroutine, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from app.audit import Entry, Filter, Limits, OperatorLog, Origin, Unended, entered
+from app.audit.press_record import Logbook
+from app.audit.queries import rows, unended
+from app.audit.store import Store
+from app.commands.actions.goal import goal_id
+from app.commands.actions.recovery import LOOKED_BACK_S, Resuming
+from app.commands.actions.results import RESULT_S
+from app.commands.service_calls import LATE_S, MOST_UNANSWERED
+from app.dialect import bridge_dialect
+from app.errors import LogError
+from app.permission.interlocks import against_calling
+from app.robot.command_status import IDLE
+from tests.commands.test_calls_and_goals import COUNT, Bench, asked, sample_of, tell_states
+from tests.support.builders import BRIDGE, INTERFACES
+
+FROM = Origin(address="10.0.0.7")
+TYPES = INTERFACES.action(COUNT)
+GONE = "The operator's log can't be read: gone."
+
+
+async def opened(folder: Path) -> OperatorLog:
+    log = OperatorLog(folder, Limits())
+    await log.start()
+    return log
+
+
+async def pressed(
+    log: OperatorLog, press_id: str = "g1", *outcomes: str, robot: str = "", widget: str = "count"
+) -> Entry:
+    """A press of the server before, with what the log says came of it."""
+    about = {"robot": robot, "press": press_id, "widget": widget, "action": "press"}
+    entry = await log.pressed(entered("pressed", FROM, {}, **about))
+    assert entry is not None
+    for number, outcome in enumerate(outcomes):
+        await log.closed(entry.followed("corrected" if number else "closed", outcome, "So."))
+    return entry
+
+
+def found(folder: Path, robot: str = "", since: int = 0) -> list[Unended]:
+    return unended(folder, robot, ["count"], since)
+
+
+def test_the_log_knows_of_which_presses_it_has_no_end(tmp_path: Path) -> None:
+    async def test() -> None:
+        log = await opened(tmp_path)
+        await pressed(log, "done", "accepted", "succeeded")
+        await pressed(log, "refused", "refused")
+        await pressed(log, "another", "accepted", widget="drive")
+        await pressed(log, "of-another", "accepted", robot="arm")
+        await pressed(log, "cut off")
+        await pressed(log, "goes on", "accepted", "unknown")
+        await pressed(log, "silent", "timed_out")
+        about = {"widget": "count", "press": "x", "action": "cancel"}
+        await log.pressed(entered("pressed", FROM, {}, **about))
+        await log.stop()
+
+    asyncio.run(test())
+    told = [(one.press.press, one.outcome, one.accepted) for one in found(tmp_path)]
+    assert told == [
+        ("silent", "timed_out", False),
+        ("goes on", "unknown", True),
+        ("cut off", "", False),
+    ]
+    assert [one.press.press for one in found(tmp_path, "arm")] == ["of-another"]
+    assert found(tmp_path, since=round((time.time() + 1) * 1000)) == []
+
+
+class Rig:
+    """A server that has just started: with the log of the one before, and a robot that offers."""
+
+    def __init__(self, log: OperatorLog, folder: Path) -> None:
+        self.bench = Bench()
+        self.log = log
+        self.folder = folder
+        logbook = Logbook(log)
+        self.resuming = Resuming(
+            self.bench.panel, self.bench.robot, logbook, self.bench.actions, lambda: None, 0.01
+        )
+
+    @property
+    def lock(self) -> str:
+        verdict = against_calling(self.bench.count, self.bench.robot, time.monotonic())
+        return verdict.code if verdict else ""
+
+    async def started(self, questions: int = 1) -> None:
+        """Resumed, and the robot was asked as often."""
+        await self.resuming.start()
+        await asked(self.bench, questions)
+
+    def told(self, press_id: str = "g1") -> list[str]:
+        rows_ = reversed(rows(self.folder, Filter(every=True), None, 1000))
+        return [row.entry.outcome for row in rows_ if row.entry.press == press_id]
+
+    async def answer(self, number: int = -1, **fields: Any) -> None:
+        """The robot's answer to `get_result`, and what comes of it."""
+        self.bench.line.answer(
+            TYPES.get_result_response, number, **{"result": {"sequence": []}, **fields}
+        )
+        await self.open()
+
+    async def open(self) -> None:
+        while self.bench.shown.busy:
+            await asyncio.sleep(0.001)
+
+
+Test = Callable[[Rig, Entry], Coroutine[Any, Any, None]]
+
+
+def run(folder: Path, test: Test, *outcomes: str) -> None:
+    """A press of the server before with these outcomes; then the test with the next server."""
+
+    async def whole() -> None:
+        before = await opened(folder)
+        entry = await pressed(before, "g1", *outcomes)
+        await before.stop()
+        log = await opened(folder)
+        rig = Rig(log, folder)
+        try:
+            await test(rig, entry)
+        finally:
+            await rig.resuming.stop()
+            await rig.bench.actions.stop()
+            await log.stop()
+
+    asyncio.run(whole())
+
+
+def asked_for(rig: Rig, number: int = -1) -> bytes:
+    key, payload, _ = rig.bench.line.asked[number]
+    assert key == "count/_action/get_result"
+    return bytes(INTERFACES.decode(TYPES.get_result_request, payload).goal_id.uuid)
+
+
+def test_an_accepted_goal_is_in_doubt_and_asked_for_by_its_entry(tmp_path: Path) -> None:
+    async def test(rig: Rig, entry: Entry) -> None:
+        await rig.started()
+        shown = rig.bench.shown
+        assert "may still be under way" in shown.text
+        assert (shown.busy, shown.stoppable, shown.goal, shown.press) == (True, True, "UNKNOWN", "g1")
+        assert rig.lock == "perhaps_busy"
+        assert asked_for(rig) == goal_id(entry.hash).bytes
+        assert rig.bench.line.timeouts == [LATE_S]
+        tell_states(rig.bench, (bytes(16), 2))
+        assert rig.bench.shown == shown
+        tell_states(rig.bench, (goal_id(entry.hash).bytes, 2))
+        assert (rig.bench.shown.goal, rig.lock) == ("EXECUTING", "busy")
+        await rig.answer(status=4)
+        assert rig.bench.shown.text.startswith("Succeeded at ")
+        assert len(rig.bench.line.asked) == 1
+        await rig.log.stop()
+        assert rig.told() == ["", "accepted", "unknown", "accepted", "succeeded"]
+
+    run(tmp_path, test, "accepted")
+
+
+def test_it_is_asked_for_until_it_is_known(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("app.commands.actions.results.ASK_AGAIN_S", 0)
+
+    async def test(rig: Rig, entry: Entry) -> None:
+        await rig.started()
+        rig.bench.line.asked[0][2].set_result(None)
+        await asked(rig.bench, 2)
+        assert rig.lock == "perhaps_busy"
+        tell_states(rig.bench, (goal_id(entry.hash).bytes, 2))
+        rig.bench.line.asked[1][2].set_result(None)
+        await asked(rig.bench, 3)
+        assert rig.bench.line.timeouts == [LATE_S, LATE_S, RESULT_S]
+        assert rig.lock == "busy"
+
+    run(tmp_path, test, "accepted")
+
+
+def test_it_is_asked_for_and_can_be_canceled_only_when_its_server_is_offered(tmp_path: Path) -> None:
+    async def test(rig: Rig, entry: Entry) -> None:
+        token = bridge_dialect.server_token(BRIDGE, "AS", "count", COUNT)
+        rig.bench.robot.graph.apply(token, False)
+        await rig.started(questions=0)
+        assert (rig.bench.shown.busy, rig.bench.shown.stoppable) == (True, False)
+        tell_states(rig.bench, (goal_id(entry.hash).bytes, 2))
+        assert rig.bench.shown.goal == "UNKNOWN"
+        rig.bench.robot.graph.apply(token, True)
+        await asked(rig.bench, 1)
+        assert rig.bench.shown.goal == "EXECUTING"
+
+    run(tmp_path, test, "accepted")
+
+
+def test_a_cut_leaves_it_in_doubt(tmp_path: Path) -> None:
+    async def test(rig: Rig, entry: Entry) -> None:
+        await rig.started()
+        rig.bench.lose_the_bridge()
+        assert (rig.bench.shown.busy, rig.bench.shown.stoppable) == (True, False)
+        rig.bench.robot.graph.apply(bridge_dialect.bridge_token(BRIDGE), True)
+        await asked(rig.bench, 2)
+        assert rig.bench.shown.stoppable
+        assert asked_for(rig) == goal_id(entry.hash).bytes
+
+    run(tmp_path, test, "accepted")
+
+
+def test_its_feedback_tells_that_it_is_under_way(tmp_path: Path) -> None:
+    async def test(rig: Rig, entry: Entry) -> None:
+        await rig.started()
+        goal = {"uuid": goal_id(entry.hash).bytes}
+        said = {"goal_id": goal, "feedback": {"sequence": [1]}}
+        rig.bench.actions.hear_feedback(
+            "/count", sample_of(INTERFACES.encode(TYPES.feedback_message, said))
+        )
+        assert (rig.bench.shown.goal, rig.bench.shown.text) == ("EXECUTING", "Under way. so far [1]")
+
+    run(tmp_path, test, "accepted")
+
+
+@pytest.mark.parametrize(
+    ("before", "words"),
+    [(["accepted"], "no longer knows this goal"), ([], "does not know this goal")],
+)
+def test_what_the_robot_does_not_know_opens_and_is_logged(
+    tmp_path: Path, before: list[str], words: str
+) -> None:
+    async def test(rig: Rig, entry: Entry) -> None:
+        await rig.started()
+        await rig.answer(status=0)
+        assert words in rig.bench.shown.text
+        assert rig.lock == ""
+        await rig.log.stop()
+        assert rig.told() == ["", *before, "unknown", "unknown"]
+        assert len(found(tmp_path)) == 1
+        again = Rig(await opened(tmp_path), tmp_path)
+        await again.resuming.start()
+        assert "count" not in again.bench.robot.progress
+        await again.log.stop()
+
+    run(tmp_path, test, *before)
+
+
+def test_an_end_that_came_meanwhile_has_no_time_of_its_own(tmp_path: Path) -> None:
+    async def test(rig: Rig, entry: Entry) -> None:
+        await rig.started()
+        await rig.answer(status=5)
+        assert rig.bench.shown.text.startswith("Canceled, by ")
+
+    run(tmp_path, test, "accepted")
+
+
+def test_one_that_was_never_heard_of_locks_for_a_while_only(tmp_path: Path) -> None:
+    async def test(rig: Rig, entry: Entry) -> None:
+        await rig.started()
+        assert rig.bench.line.timeouts == [LATE_S]
+        rig.bench.line.asked[0][2].set_result(None)
+        await rig.open()
+        assert "told nothing of this goal for 60 s" in rig.bench.shown.text
+        assert rig.lock == ""
+
+    run(tmp_path, test, "timed_out")
+
+
+def test_a_cancel_finds_it_under_way(tmp_path: Path) -> None:
+    async def test(rig: Rig, entry: Entry) -> None:
+        await rig.started()
+        assert await canceled(rig, 0) == "accepted"
+        assert rig.bench.shown.goal == "CANCELING"
+        await rig.log.stop()
+        assert rig.told()[-1] == "accepted"
+
+    run(tmp_path, test, "accepted")
+
+
+def test_a_cancel_that_the_robot_knows_no_goal_for_asks_for_it_anew(tmp_path: Path) -> None:
+    async def test(rig: Rig, entry: Entry) -> None:
+        await rig.started()
+        assert await canceled(rig, 2) == "rejected"
+        await asked(rig.bench, 3)
+        assert asked_for(rig) == goal_id(entry.hash).bytes
+        await rig.answer(status=0)
+        assert rig.lock == ""
+
+    run(tmp_path, test, "accepted")
+
+
+async def canceled(rig: Rig, return_code: int) -> str:
+    request, response = INTERFACES.service("action_msgs/srv/CancelGoal")
+    cancel = asyncio.create_task(rig.bench.actions.cancel(rig.bench.count, "g1"))
+    await asked(rig.bench, 2)
+    info = INTERFACES.decode(request, rig.bench.line.asked[-1][1]).goal_info
+    goal = {"goal_id": {"uuid": info.goal_id.uuid}, "stamp": {"sec": 0, "nanosec": 0}}
+    goals = [] if return_code else [goal]
+    rig.bench.line.answer(response, return_code=return_code, goals_canceling=goals)
+    return (await cancel).outcome
+
+
+def test_a_press_id_that_was_used_twice_is_of_two_goals(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As in logs of before an id was looked up."""
+    monkeypatch.setattr(Store, "told", lambda *_: [])
+
+    async def test(rig: Rig, entry: Entry) -> None:
+        again = await pressed(rig.log, "g1", "accepted")
+        await rig.started(questions=2)
+        assert {asked_for(rig, 0), asked_for(rig, 1)} == {
+            goal_id(one.hash).bytes for one in (entry, again)
+        }
+
+    run(tmp_path, test, "accepted")
+
+
+def test_no_more_are_asked_for_than_may_be_sent_and_the_newest_is_shown(tmp_path: Path) -> None:
+    async def test(rig: Rig, entry: Entry) -> None:
+        for number in range(MOST_UNANSWERED + 1):
+            await pressed(rig.log, f"n{number}", "timed_out")
+        await rig.started(questions=MOST_UNANSWERED)
+        assert rig.bench.shown.press == f"n{MOST_UNANSWERED}"
+        await asyncio.sleep(0.02)
+        assert len(rig.bench.line.asked) == MOST_UNANSWERED
+
+    run(tmp_path, test, "accepted")
+
+
+def test_what_is_of_another_robot_or_older_than_a_day_is_not_followed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def test(rig: Rig, entry: Entry) -> None:
+        await pressed(rig.log, "g2", "accepted", robot="arm")
+        now = time.time()
+        monkeypatch.setattr(time, "time", lambda: now + LOOKED_BACK_S + 10)
+        await rig.resuming.start()
+        assert "count" not in rig.bench.robot.progress
+
+    run(tmp_path, test, "accepted")
+
+
+@contextmanager
+def unreadable(rig: Rig, monkeypatch: pytest.MonkeyPatch, *, unneeded: bool) -> Iterator[None]:
+    """A log that can't be read; `unneeded`: the panel goes on without it."""
+
+    async def gone(*about: Any) -> list[Unended]:
+        raise LogError(GONE)
+
+    with monkeypatch.context() as broken:
+        broken.setattr(rig.log, "unended", gone)
+        broken.setattr(Logbook, "unneeded", unneeded)
+        yield
+
+
+@pytest.mark.parametrize("needed", [True, False])
+def test_while_the_log_can_not_be_read_it_is_said_that_nothing_is_known(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, needed: bool
+) -> None:
+    async def test(rig: Rig, entry: Entry) -> None:
+        with unreadable(rig, monkeypatch, unneeded=not needed):
+            await rig.resuming.start()
+            assert rig.bench.shown.text.endswith(f"is not known: {GONE}")
+            assert (rig.bench.shown.busy, rig.bench.shown.stoppable) == (needed, False)
+            await asyncio.sleep(0.03)
+            assert rig.bench.line.asked == []
+        await asked(rig.bench, 1)
+        assert rig.bench.shown.press == "g1"
+
+    run(tmp_path, test, "accepted")
+
+
+def test_what_the_robot_said_while_the_log_could_not_be_read_counts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def test(rig: Rig, entry: Entry) -> None:
+        with unreadable(rig, monkeypatch, unneeded=False):
+            await rig.resuming.start()
+            tell_states(rig.bench, (goal_id(entry.hash).bytes, 2))
+        await asked(rig.bench, 1)
+        assert rig.bench.line.timeouts == [RESULT_S]
+        assert (rig.bench.shown.goal, rig.lock) == ("EXECUTING", "busy")
+
+    run(tmp_path, test)
+
+
+def test_what_was_sent_while_the_log_could_not_be_read_stays_shown(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def test(rig: Rig, entry: Entry) -> None:
+        with unreadable(rig, monkeypatch, unneeded=True):
+            await rig.resuming.start()
+            assert rig.lock == ""
+            start = rig.bench.send_goal("own")
+            await asked(rig.bench, 1)
+            rig.bench.answer_goal(accepted=True)
+            await start
+            await asked(rig.bench, 2)
+        await asked(rig.bench, 3)
+        assert asked_for(rig) == goal_id(entry.hash).bytes
+        assert (rig.bench.shown.press, rig.bench.shown.goal) == ("own", "ACCEPTED")
+
+    run(tmp_path, test, "accepted")
+
+
+def test_a_log_that_is_not_open_yet_tells_nothing(tmp_path: Path) -> None:
+    async def test() -> None:
+        log = OperatorLog(tmp_path, Limits())
+        with pytest.raises(LogError, match="can't be read"):
+            await log.unended("", ["count"], 0)
+        await log.start()
+        assert await log.unended("", ["count"], 0) == []
+        await log.stop()
+
+    asyncio.run(test())
+
+
+def test_a_panel_without_a_goal_of_before_shows_none(tmp_path: Path) -> None:
+    async def test(rig: Rig, entry: Entry) -> None:
+        await rig.resuming.start()
+        assert rig.bench.robot.progress.get("count", IDLE) == IDLE
+
+    run(tmp_path, test, "accepted", "succeeded")

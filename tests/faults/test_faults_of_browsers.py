@@ -1,0 +1,102 @@
+"""Browsers that do not read, come in hundreds, or come and go: nobody else is held up."""
+
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+from tests.faults import fixtures
+from tests.faults.browsers import Browsers, asking, storm, unread
+from tests.faults.presser import Presser, accounted
+from tests.faults.results import ms, record
+from tests.faults.rig import TEXT, Rig, several
+from tests.faults.trial import well
+from tests.faults.watch import Watch, answering, came_back, resources
+from tests.support.parts import Server, until
+
+rig = fixtures.rig
+server = fixtures.server
+
+READS_NOTHING_S = several(10, 60)
+STORM_S = several(5, 30)
+BROWSERS = 200
+UPDATES_PER_S = 200.0
+MOST_UNREAD = 400_000  # what the server and the kernel on both sides hold
+MARGIN_MB = 40.0
+
+
+def test_a_browser_that_reads_nothing(rig: Rig, server: Server) -> None:
+    """It costs no queue, and when it reads again it is told how it is now."""
+    rig.robot.advertise("/heard", TEXT)
+    until(lambda: rig.robot.subscribers("/heard"), "the bridge listens", within_s=15)
+    watch = Watch(server)
+    before = resources(server.process.pid)
+    presser = Presser(server, "guarded")
+    with answering(server), ThreadPoolExecutor(1) as pool, asking(server) as deaf:
+        well(presser)
+        said = {"data": "{n} " + "long " * 30}
+        telling = pool.submit(rig.robot.flood, "/heard", said, UPDATES_PER_S, READS_NOTHING_S)
+        until(telling.done, "the time is over", READS_NOTHING_S + 10)
+        rig.robot.publish("/heard", {"data": "now"})
+        until(lambda: watch.widgets["heard"]["text"] == "now", "who reads sees it", 2)
+        well(presser)
+        got = unread(deaf)
+    presses = presser.end()
+    rig.robot.withdraw("/heard")
+    watch.end()
+    assert len(got) < MOST_UNREAD
+    assert b'"text":"now"' in got
+    account = accounted(presses, lambda: rig.arrivals("guarded"), lambda _: True, 2.0)
+    came_back(server.process.pid, before, MARGIN_MB)
+    record(
+        f"a browser that reads nothing for {READS_NOTHING_S} s",
+        presses=account,
+        latest=ms(account.latest_s),
+        after=f"{len(got) // 1000} kB were waiting for it, then it showed what was so",
+    )
+
+
+def test_two_hundred_browsers(rig: Rig, server: Server) -> None:
+    before = resources(server.process.pid)
+    presser = Presser(server, "paced")
+    browsers = Browsers(server, BROWSERS)
+    with answering(server):
+        until(lambda: browsers.showing(b"event: snapshot") == BROWSERS, "each has a snapshot", 20)
+        well(presser)
+        browsers.forget()
+        told_at = time.monotonic()
+        rig.robot.publish("/kept", {"data": False})
+        until(lambda: browsers.showing(b'"enabled":false') == BROWSERS, "each is locked", 5)
+        locked_s = time.monotonic() - told_at
+        rig.robot.publish("/kept", {"data": True})
+        until(lambda: browsers.showing(b'"enabled":true') == BROWSERS, "each is open", 5)
+    presses = presser.end()
+    browsers.close()
+    account = accounted(presses, lambda: rig.arrivals("paced"), lambda _: True, 2.0)
+    after = came_back(server.process.pid, before, MARGIN_MB)
+    record(
+        f"{BROWSERS} browsers at once",
+        locked=f"{ms(locked_s)}, in the last of them",
+        presses=account,
+        latest=ms(account.latest_s),
+        after=f"{after.rss_mb - before.rss_mb:+.0f} MB, no more threads, no more files",
+    )
+
+
+def test_browsers_that_come_and_go(rig: Rig, server: Server) -> None:
+    storm(server, 1.0)
+    watch = Watch(server)
+    before = resources(server.process.pid)
+    presser = Presser(server, "guarded")
+    with answering(server):
+        well(presser)
+        times = storm(server, STORM_S)
+        well(presser)
+    presses = presser.end()
+    account = accounted(presses, lambda: rig.arrivals("guarded"), lambda _: True, 2.0)
+    after = came_back(server.process.pid, before, MARGIN_MB)
+    watch.end()
+    record(
+        f"{times} streams opened and dropped in {STORM_S} s",
+        presses=account,
+        latest=ms(account.latest_s),
+        after=f"{after.rss_mb - before.rss_mb:+.0f} MB, no more threads, no more files",
+    )

@@ -1,0 +1,184 @@
+"""The way to the robot breaks while somebody goes on pressing: what is shown, and what arrives."""
+
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.faults import fixtures
+from tests.faults.net import ROBOT_IP, Cable
+from tests.faults.presser import Account, Presser, accounted
+from tests.faults.results import ms, record
+from tests.faults.rig import LONG, Rig, several
+from tests.faults.trial import UNDER_WAY_S, recorded, tried, well
+from tests.faults.watch import Watch, answering
+from tests.support.parts import TESTS, Server, free_port, until
+
+rig = fixtures.rig
+server = fixtures.server
+
+DELAY_S = 0.3
+LOSS = 0.1
+SEEN_S = 1.0
+LATE_IN_BAD_WEATHER_S = 5.0
+CUTS_S = (1, 5, 30) if LONG else (1, 5)
+
+
+@pytest.fixture
+def cable() -> Iterator[Cable]:
+    """The tests are at the kiosk's end of it."""
+    mine = Cable()
+    with mine.kiosk.inside():
+        yield mine
+    mine.end()
+
+
+@pytest.fixture
+def far_rig(domain: int, cable: Cable) -> Iterator[Rig]:
+    """A robot at the other end of a cable."""
+    with cable.robot.inside():
+        mine = Rig(domain + 4, ROBOT_IP)
+    yield mine
+    mine.end()
+
+
+def test_a_killed_bridge(rig: Rig, server: Server) -> None:
+    trial = tried(rig, server, rig.bridge.kill, rig.bridge.start, locks_within_s=1.0)
+    assert "No connection to the robot" in trial.reason
+    recorded("bridge killed and started again", trial)
+
+
+def test_a_frozen_bridge(rig: Rig, server: Server) -> None:
+    trial = tried(
+        rig, server, rig.bridge.freeze, rig.bridge.thaw, locks_within_s=SEEN_S, lasts_s=4.0, late_s=5.0
+    )
+    assert "No connection to the robot" in trial.reason
+    assert trial.claimed == 0
+    recorded("bridge frozen for 4 s", trial)
+
+
+def test_a_bridge_that_comes_back_on_another_domain(rig: Rig, server: Server) -> None:
+    """Nobody of the robot is there any more: what is sent is sent to nobody, and told so."""
+    right = rig.bridge.domain
+
+    def moved(domain: int) -> None:
+        rig.bridge.kill()
+        rig.bridge.domain = domain
+        rig.bridge.start()
+
+    def moved_back() -> None:
+        until(server.ready, "the bridge of the other domain is joined", within_s=20)
+        assert "waiting for a new /kept" in server.widget("guarded")["reason"]
+        assert server.press("free", "is anybody there?").json()["outcome"] == "unknown"
+        moved(right)
+
+    trial = tried(rig, server, lambda: moved(right + 1), moved_back, locks_within_s=1.5)
+    recorded("bridge restarted on another domain, and back", trial)
+
+
+def test_a_router_between_is_killed(rig: Rig, tmp_path: Path) -> None:
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    routers = []
+
+    def start() -> None:
+        command = [sys.executable, str(TESTS / "faults/router.py"), endpoint, rig.endpoint]
+        router = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        routers.append(router)
+        assert router.stdout is not None
+        assert router.stdout.readline() == "ready\n"
+
+    def kill() -> None:
+        routers[-1].kill()
+        routers[-1].wait()
+
+    start()
+    try:
+        with rig.serving(tmp_path, endpoint) as server:
+            trial = tried(rig, server, kill, start, locks_within_s=1.0)
+    finally:
+        kill()
+        for router in routers:
+            for pipe in (router.stdin, router.stdout):
+                if pipe is not None:
+                    pipe.close()
+    assert "No connection to the robot" in trial.reason
+    recorded("Zenoh router between killed and started again", trial)
+
+
+def test_a_cable_that_is_cut(cable: Cable, far_rig: Rig, tmp_path: Path) -> None:
+    """Shorter than the silence that counts as lost, and longer."""
+    with far_rig.serving(tmp_path) as server:
+        for seconds in CUTS_S:
+            if seconds < 2:
+                short_cut(cable, far_rig, server, seconds)
+                continue
+            trial = tried(
+                far_rig,
+                server,
+                cable.cut,
+                cable.mend,
+                locks_within_s=SEEN_S,
+                lasts_s=seconds,
+                late_s=3.0,
+            )
+            assert "No connection to the robot" in trial.reason
+            assert trial.claimed == 0
+            recorded(f"cable cut for {seconds} s", trial)
+
+
+def short_cut(cable: Cable, rig: Rig, server: Server, seconds: float) -> None:
+    """The pulse is missed at once, and the bridge's answer; the connection itself lasts."""
+    trial = tried(
+        rig,
+        server,
+        cable.cut,
+        cable.mend,
+        locks_within_s=1.0,
+        lasts_s=seconds,
+        late_s=3.0,
+        interlock="pulsed",
+        widget="paced",
+    )
+    assert "older than 0.5 s" in trial.reason or "does not answer" in trial.reason
+    assert trial.claimed == 0
+    recorded(f"cable cut for {seconds} s (interlock with max_age_s = 0.5)", trial)
+
+
+def test_a_slow_and_lossy_network(cable: Cable, far_rig: Rig, tmp_path: Path) -> None:
+    """300 ms each way and every tenth frame lost: it works, late by what TCP needs."""
+    with far_rig.serving(tmp_path) as server:
+        account, locked = weathered(cable, far_rig, server, several(8, 30))
+    record(
+        "300 ms delay each way, 10 % of the frames lost",
+        locked=f"{locked} times, as pulses came late",
+        presses=account,
+        latest=ms(account.latest_s),
+    )
+
+
+def weathered(cable: Cable, rig: Rig, server: Server, seconds: float) -> tuple[Account, int]:
+    """What came of presses in bad weather, and how often an interlock that wants a pulse was locked."""
+    watch, presser = Watch(server), Presser(server, "guarded")
+    with answering(server):
+        well(presser)
+        began = time.monotonic()
+        cable.weather(delay_s=DELAY_S, loss=LOSS)
+        until(lambda: time.monotonic() > began + seconds, "the weather lasts", seconds + 1)
+        cable.weather()
+        watch.opened("kept")
+        watch.opened("pulsed")
+        cleared_at = time.monotonic()
+        well(presser)
+    presses = presser.end()
+    watch.end()
+    held = not any(not seen.enabled for seen in watch.seen["kept"] if seen.at > began)
+    account = accounted(
+        presses,
+        lambda: rig.arrivals("guarded"),
+        lambda press: held or press.answered_at < began - UNDER_WAY_S or press.at > cleared_at,
+        LATE_IN_BAD_WEATHER_S,
+    )
+    return account, sum(not seen.enabled for seen in watch.seen["pulsed"] if seen.at > began)

@@ -1,0 +1,284 @@
+"""What happens when the real bridge or node breaks: locked in time, opened by what the robot says."""
+
+import signal
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Final
+
+import pytest
+
+from tests.support.parts import ROOT, Bridge, RosNode, Server, Stream, live, until
+
+ENABLED = "operation-enabled-updated"
+FREEZES = 5
+LONG: Final = 400_000  # bytes of a message
+
+
+def speaking(node: RosNode, value: bool = True) -> None:
+    """The robot tells its permission once, so that it is kept for who comes later."""
+    node.advertise("/operation_enabled", "std_msgs/msg/Bool", durability="transient_local", depth=1)
+    node.publish("/operation_enabled", {"data": value})
+
+
+def strict(bridge: Bridge, folder: Path, condition: str) -> Server:
+    """A kiosk whose interlock has one more condition."""
+    panel = folder / "panel.toml"
+    shipped = (ROOT / "app/panel.toml").read_text()
+    panel.write_text(shipped.replace('field = "data"', f'field = "data"\n{condition}', 1))
+    return live(bridge.endpoint, folder, KIOSK_PANEL=str(panel))
+
+
+def permitted(kiosk: Server) -> bool:
+    return bool(kiosk.widget("operation1")["enabled"])
+
+
+def forbidden(kiosk: Server) -> bool:
+    return "does not permit" in (kiosk.widget("operation1")["reason"] or "")
+
+
+def opened(kiosk: Server) -> None:
+    until(lambda: permitted(kiosk), "permitted", within_s=15)
+
+
+def next_lock(stream: Stream) -> tuple[float, str]:
+    """When (monotonic seconds) the stream said that the interlock is locked, and why."""
+    while True:
+        _, data, _ = stream.next(ENABLED)
+        if not data["enabled"]:
+            return time.monotonic(), data["reason"]
+
+
+def test_a_killed_bridge_locks_within_a_second_and_its_return_opens(
+    own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    speaking(own_node)
+    kiosk = servers(live(own_bridge.endpoint, tmp_path))
+    opened(kiosk)
+    with kiosk.stream() as stream:
+        stream.next("snapshot")
+        killed_at = time.monotonic()
+        own_bridge.kill()
+        locked_at, reason = next_lock(stream)
+    assert locked_at - killed_at < 1.0
+    assert "No connection to the robot" in reason
+    assert not any(kiosk.widget(w)["enabled"] for w in ("operation", "operation1", "operation2"))
+    refused = kiosk.press("operation", "into the void")
+    assert (refused.status_code, refused.json()["outcome"]) == (503, "refused")
+    assert kiosk.http.get("/readyz").status_code == 503
+    own_bridge.start()
+    opened(kiosk)
+    assert kiosk.ready()
+
+
+def test_after_a_return_an_old_permission_does_not_count(
+    own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    kiosk = servers(live(own_bridge.endpoint, tmp_path))
+    until(kiosk.ready, "ready")
+    own_node.once("/operation_enabled", "std_msgs/msg/Bool", {"data": True})
+    opened(kiosk)
+    own_bridge.kill()
+    until(lambda: not permitted(kiosk), "locked")
+    own_bridge.start()
+    until(kiosk.ready, "the bridge is back")
+    assert "waiting for a new /operation_enabled" in kiosk.widget("operation1")["reason"]
+    # Said until it is heard: to the node the killed bridge is a subscriber for some more seconds.
+    own_node.advertise("/operation_enabled", "std_msgs/msg/Bool")
+    own_node.every("/operation_enabled", {"data": True}, 0.1)
+    opened(kiosk)
+
+
+def test_a_frozen_bridge_locks_within_three_seconds_and_opens_when_it_thaws(
+    own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    speaking(own_node)
+    kiosk = servers(live(own_bridge.endpoint, tmp_path))
+    opened(kiosk)
+    with kiosk.stream() as stream:
+        stream.next("snapshot")
+        frozen_at = time.monotonic()
+        own_bridge.freeze()
+        locked_at, reason = next_lock(stream)
+    assert locked_at - frozen_at < 3.0
+    assert "No connection to the robot" in reason
+    own_bridge.thaw()
+    opened(kiosk)
+
+
+def test_what_changed_while_the_bridge_was_frozen_is_what_counts(
+    own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    speaking(own_node)
+    kiosk = servers(live(own_bridge.endpoint, tmp_path))
+    opened(kiosk)
+    own_bridge.freeze()
+    until(lambda: not permitted(kiosk), "locked")
+    own_node.publish("/operation_enabled", {"data": False})
+    with kiosk.stream() as stream:
+        stream.next("snapshot")
+        own_bridge.thaw()
+        until(
+            lambda: "does not permit" in (kiosk.widget("operation1")["reason"] or ""),
+            "what the robot said meanwhile",
+        )
+        # On the way there it was never open.
+        while True:
+            _, data, _ = stream.next(ENABLED)
+            assert data["enabled"] is False
+            if "does not permit" in data["reason"]:
+                break
+
+
+def test_it_starts_without_a_bridge_and_keeps_trying(
+    domain: int, tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    late = Bridge(domain + 3)
+    kiosk = servers(live(late.endpoint, tmp_path))
+    assert "No connection to the robot" in kiosk.widget("operation")["reason"]
+    assert "bridge" in kiosk.http.get("/readyz").json()["reason"]
+    late.start()
+    try:
+        until(kiosk.ready, "ready once the bridge is there", within_s=15)
+        assert kiosk.widget("operation")["enabled"]
+    finally:
+        late.end()
+
+
+def test_a_required_publisher_that_goes_away_locks(
+    own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    kiosk = servers(strict(own_bridge, tmp_path, "require_publisher = true"))
+    speaking(own_node)
+    opened(kiosk)
+    own_node.withdraw("/operation_enabled")
+    until(lambda: not permitted(kiosk), "locked")
+    assert "no node of the robot publishes /operation_enabled" in kiosk.widget("operation1")["reason"]
+
+
+def test_a_value_that_grows_old_locks_and_a_fresh_one_opens(
+    own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    kiosk = servers(strict(own_bridge, tmp_path, "max_age_s = 0.5"))
+    own_node.advertise("/operation_enabled", "std_msgs/msg/Bool")
+    own_node.every("/operation_enabled", {"data": True}, 0.1)
+    opened(kiosk)
+    with kiosk.stream() as stream:
+        stream.next("snapshot")
+        own_node.kill()  # the graph shows it for up to 20 s; the age of its topic tells sooner
+        killed_at = time.monotonic()
+        locked_at, reason = next_lock(stream)
+    assert locked_at - killed_at < 1.0
+    assert "older than 0.5 s" in reason
+    refused = kiosk.press("operation1", "too late")
+    assert (refused.status_code, refused.json()["outcome"]) == (409, "refused")
+
+
+def test_what_the_robot_says_counts_after_each_of_many_freezes(
+    own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    """A session that Zenoh took up again by itself went deaf here after some of these."""
+    speaking(own_node)
+    kiosk = servers(live(own_bridge.endpoint, tmp_path))
+    for _ in range(FREEZES):
+        own_node.publish("/operation_enabled", {"data": True})
+        opened(kiosk)
+        own_bridge.freeze()
+        until(lambda: not permitted(kiosk), "locked")
+        own_bridge.thaw()
+        own_node.publish("/operation_enabled", {"data": False})
+        until(
+            lambda: "does not permit" in (kiosk.widget("operation1")["reason"] or ""), "forbidden", 15
+        )
+        assert kiosk.press("operation1", "no").status_code == 409
+
+
+def test_a_successor_of_a_required_publisher_has_to_say_it_again(
+    own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    kiosk = servers(strict(own_bridge, tmp_path, "require_publisher = true"))
+    own_node.advertise("/operation_enabled", "std_msgs/msg/Bool")
+    until(lambda: "waiting for /operation" in kiosk.widget("operation1")["reason"], "its token is seen")
+    until(lambda: own_node.subscribers("/operation_enabled"), "the bridge listens")
+    until(lambda: (own_node.publish("/operation_enabled", {"data": True}), permitted(kiosk))[1], "open")
+    own_node.withdraw("/operation_enabled")
+    until(lambda: not permitted(kiosk), "locked")
+    own_node.advertise("/operation_enabled", "std_msgs/msg/Bool")
+    until(lambda: "no node" not in kiosk.widget("operation1")["reason"], "the successor is seen")
+    assert not permitted(kiosk)
+
+
+def test_a_successor_that_came_while_the_server_stood_still_has_to_say_it_again(
+    own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    own_node.advertise("/operation_enabled", "std_msgs/msg/Bool")
+    kiosk = servers(strict(own_bridge, tmp_path, "require_publisher = true"))
+
+    def says_so() -> bool:
+        own_node.publish("/operation_enabled", {"data": True})
+        return permitted(kiosk)
+
+    until(says_so, "permitted", within_s=15, every_s=0.2)
+    kiosk.process.send(signal.SIGSTOP)
+    own_node.withdraw("/operation_enabled")
+    time.sleep(0.5)
+    own_node.advertise("/operation_enabled", "std_msgs/msg/Bool")
+    time.sleep(0.5)
+    kiosk.process.send(signal.SIGCONT)
+    until(lambda: not permitted(kiosk), "the permission went with its publisher")
+    time.sleep(1.0)
+    assert "waiting for a new /operation_enabled" in kiosk.widget("operation1")["reason"]
+    until(says_so, "permitted by the successor", within_s=15, every_s=0.2)
+
+
+@pytest.mark.parametrize("waiting", [12, 60])
+def test_what_the_robot_forbids_while_the_server_stands_still_counts_behind_all_that_waits(
+    own_bridge: Bridge,
+    own_node: RosNode,
+    tmp_path: Path,
+    servers: Callable[[Server], Server],
+    waiting: int,
+) -> None:
+    """Of 60 long messages not all find room on the way, and the permission comes last."""
+    own_node.advertise("/last_heard", "std_msgs/msg/String")
+    own_node.advertise("/operation_enabled", "std_msgs/msg/Bool")
+    own_node.subscribe("/operation1", "std_msgs/msg/String")
+    kiosk = servers(live(own_bridge.endpoint, tmp_path))
+
+    def says_so() -> bool:
+        own_node.publish("/operation_enabled", {"data": True})
+        return permitted(kiosk)
+
+    until(says_so, "permitted", within_s=15, every_s=0.2)
+    until(lambda: own_node.subscribers("/last_heard"), "the bridge listens", within_s=15)
+    with ThreadPoolExecutor(1) as hand:
+        kiosk.process.send(signal.SIGSTOP)
+        for _ in range(waiting):
+            own_node.publish_long("/last_heard", LONG)
+        own_node.publish("/operation_enabled", {"data": False})
+        time.sleep(0.7)
+        press = hand.submit(kiosk.press, "operation1", "forbidden")
+        time.sleep(0.1)
+        kiosk.process.send(signal.SIGCONT)
+        assert press.result().json()["outcome"] == "refused"
+    until(kiosk.ready, "ready again", within_s=15)
+    time.sleep(0.5)
+    # What the bridge had no room for, DDS sends again: 1.7 s were seen on a machine that did much else.
+    until(lambda: not permitted(kiosk), "nothing of it is lost")
+    assert own_node.heard("/operation1") == []
+    until(says_so, "permitted anew", within_s=15, every_s=0.2)
+
+
+def test_an_old_latched_value_is_no_fresh_one(
+    own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    speaking(own_node)
+    kiosk = servers(strict(own_bridge, tmp_path, "max_age_s = 30"))
+    until(kiosk.ready, "ready")
+    with kiosk.stream() as stream:
+        for _ in range(4):  # two seconds of beats: the latched value has come, and does not count
+            stream.next("beat")
+    assert "waiting for /operation_enabled" in kiosk.widget("operation1")["reason"]
+    own_node.publish("/operation_enabled", {"data": True})
+    opened(kiosk)

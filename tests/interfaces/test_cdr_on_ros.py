@@ -1,0 +1,159 @@
+"""The codec against ROS 2's own: every interface of the installed ROS packages, both ways.
+
+Definitions come twice: from the packages' own files, as a robot's would, and built in.
+"""
+
+import base64
+import json
+import tempfile
+from collections.abc import Iterator, Mapping
+from functools import cache
+from typing import Any, Final
+
+import pytest
+
+from app.interfaces import interfaces_of, to_plain
+from app.interfaces.packages import read_folders
+from tests.support.commanded import Commanded
+from tests.support.parts import ROS_PYTHON, TESTS
+from tests.support.samples import Edge, Samples
+
+SHARE: Final = ROS_PYTHON.parent.parent / "share"
+DISTRO: Final = "kilted"  # that of tests/ros/requirements.lock
+EDGES: Final[tuple[Edge, ...]] = ("least", "most", "random", "random", "random")
+
+OF_ROBOT: Final = interfaces_of(DISTRO, [SHARE])
+BUILT_IN: Final = interfaces_of(DISTRO)
+TYPES: Final = tuple(read_folders([SHARE]).structures)
+# These have no .msg file, only an .idl one, which is not read.
+ONLY_IDL: Final = {
+    f"test_msgs/msg/{name}"
+    for name in ("ComplexNestedKey", "KeyedLong", "KeyedString", "NonKeyedWithNestedKey")
+}
+
+
+class RosCodec(Commanded):
+    """`tests/ros/codec.py` in its own environment."""
+
+    def __init__(self) -> None:
+        super().__init__(
+            [ROS_PYTHON, TESTS / "ros/codec.py"],
+            {
+                "ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF",
+                "RMW_IMPLEMENTATION": "rmw_fastrtps_cpp",
+                "ROS_LOG_DIR": tempfile.gettempdir(),
+            },
+        )
+
+    def encode(self, type_name: str, fields: Mapping[str, Any]) -> bytes:
+        return base64.b64decode(self("encode", type=type_name, fields=fields))
+
+    def decode(self, type_name: str, data: bytes) -> Any:
+        return self("decode", type=type_name, data=base64.b64encode(data).decode())
+
+
+@pytest.fixture(scope="module")
+def ros() -> Iterator[RosCodec]:
+    codec = RosCodec()
+    yield codec
+    codec.end()
+
+
+@cache
+def hashes_of_ros() -> Mapping[str, str]:
+    """What the packages' type descriptions say, services and actions too."""
+    found: dict[str, str] = {}
+    for file in SHARE.glob("*/*/*.json"):
+        for one in json.loads(file.read_text()).get("type_hashes", ()):
+            found[one["type_name"]] = one["hash_string"]
+    return found
+
+
+def same(one: Any, other: Any) -> bool:
+    """Equal, not-a-number to itself too."""
+    return json.dumps(one, sort_keys=True) == json.dumps(other, sort_keys=True)
+
+
+def plain(fields: Any) -> Any:
+    """Fields as they were given, in the form of `to_plain`."""
+    if isinstance(fields, Mapping):
+        return {name: plain(value) for name, value in fields.items()}
+    return [plain(one) for one in fields] if isinstance(fields, list) else to_plain(fields)
+
+
+def cut(data: bytes, like: bytes) -> bytes:
+    """Without what ROS's serializer leaves after a message: it makes room before it knows."""
+    return data[: len(like) + -len(like) % 4]
+
+
+def test_the_installed_packages_are_those_that_count() -> None:
+    packages = {name.split("/")[0] for name in TYPES}
+    assert packages >= {
+        "action_msgs",
+        "builtin_interfaces",
+        "diagnostic_msgs",
+        "geometry_msgs",
+        "lifecycle_msgs",
+        "nav_msgs",
+        "rcl_interfaces",
+        "sensor_msgs",
+        "std_msgs",
+        "std_srvs",
+        "test_msgs",
+        "trajectory_msgs",
+    }
+    assert len(TYPES) >= 250
+
+
+@pytest.mark.parametrize("type_name", TYPES)
+def test_ros_reads_and_writes_what_the_codec_does(ros: RosCodec, type_name: str) -> None:
+    samples = Samples(OF_ROBOT.structures, seed=sum(type_name.encode()))
+    for edge in EDGES:
+        fields = samples.fields(type_name, edge)
+        ours = OF_ROBOT.encode(type_name, fields)
+        assert same(ros.decode(type_name, ours), fields)
+        theirs = cut(ros.encode(type_name, fields), ours)
+        assert len(ours) <= len(theirs) <= len(ours) + 3
+        # Between the values ROS leaves whatever was in its memory.
+        assert all(one in (0, other) for one, other in zip(ours, theirs, strict=False))
+        assert same(to_plain(OF_ROBOT.decode(type_name, theirs)), plain(fields))
+
+
+def test_ros_reads_and_writes_long_lists_and_texts_too(ros: RosCodec) -> None:
+    name = "test_msgs/msg/UnboundedSequences"
+    fields = Samples(OF_ROBOT.structures).fields(name, "most")
+    long = {n: v * 2000 for n, v in fields.items() if isinstance(v, list)}
+    long["uint8_values"] = [n % 256 for n in range(300_001)]
+    long["string_values"] = ["", "é" * 1_000_000]
+    data = OF_ROBOT.encode(name, {**fields, **long})
+    assert same(ros.decode(name, data), {**fields, **long})
+    theirs = cut(ros.encode(name, {**fields, **long}), data)
+    assert same(to_plain(OF_ROBOT.decode(name, theirs)), plain({**fields, **long}))
+
+
+@pytest.mark.parametrize("type_name", sorted(BUILT_IN.structures.keys() & set(TYPES)))
+def test_what_is_built_in_is_what_the_robot_has(type_name: str) -> None:
+    mine, robots = BUILT_IN.structures[type_name], OF_ROBOT.structures[type_name]
+    assert mine == robots
+
+
+def test_type_hashes_are_those_of_the_packages() -> None:
+    """Messages, parts, services and actions: as rosidl computed them when the packages were built."""
+    known = {name: value for name, value in hashes_of_ros().items() if name not in ONLY_IDL}
+    assert len(known) > 280
+    assert {name: OF_ROBOT.type_hash(name) for name in known} == known
+    built_in = [name for name in known if not name.startswith("test_msgs/")]
+    assert {name: BUILT_IN.type_hash(name) for name in built_in} == {n: known[n] for n in built_in}
+
+
+def test_type_hashes_are_those_of_publishers(ros: RosCodec) -> None:
+    messages = [name for name in TYPES if "/msg/" in name]
+    assert ros("hashes", types=messages) == {name: OF_ROBOT.type_hash(name) for name in messages}
+
+
+@pytest.mark.parametrize("type_name", TYPES)
+def test_constants_and_defaults_are_those_of_ros(ros: RosCodec, type_name: str) -> None:
+    described = ros("describe", type=type_name)
+    assert same(dict(OF_ROBOT.constants(type_name)), described["constants"])
+    left_out = ros.decode(type_name, OF_ROBOT.encode(type_name, {}))
+    assert same(left_out, described["defaults"])

@@ -1,0 +1,204 @@
+"""Fields read at their places: the same as of the whole message, whatever lies around them."""
+
+import json
+import random
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, Final
+
+import pytest
+
+from app.errors import DecodeError
+from app.interfaces import Fields, Interfaces, interfaces_of, to_plain
+from app.interfaces.definitions import FLOATS, Structure, Type
+from tests.interfaces.test_interfaces import garbage
+from tests.interfaces.test_values import FIELDS
+from tests.support.samples import Samples
+
+JAZZY: Final = interfaces_of("jazzy")
+JOINTS: Final = "sensor_msgs/msg/JointState"
+DIAGNOSTICS: Final = "diagnostic_msgs/msg/DiagnosticArray"
+HEADER: Final = {"stamp": {"sec": 1, "nanosec": 2}, "frame_id": "f"}
+UNKNOWN: Final = object()
+
+
+@pytest.fixture(scope="module")
+def cell(tmp_path_factory: pytest.TempPathFactory) -> Interfaces:
+    """Messages with all that a message may have, inside of each other."""
+    folder: Path = tmp_path_factory.mktemp("share") / "cell_msgs/msg"
+    folder.mkdir(parents=True)
+    (folder / "Everything.msg").write_text(FIELDS)
+    (folder / "Part.msg").write_text("uint8 A=1\nuint8 kind\nbool fits\nstring name\nwstring title\n")
+    (folder / "Shelf.msg").write_text(
+        "int16 number\nPart[] parts\nPart[2] pair\nEverything[<=2] more\nbool last\n"
+    )
+    (folder / "Store.msg").write_text(
+        "bool open\nShelf[] shelves\nstring[] names\nint32[] ids\nfloat64[] weights\nPart[] parts\n"
+        "uint8[3] codes\nfloat32[3] sizes\nbuiltin_interfaces/Time[] times\nint8 level\n"
+    )
+    return Interfaces("jazzy", [folder.parent])
+
+
+# What a path leads to in fields as they were encoded.
+
+
+def at_path(fields: Any, steps: list[tuple[str, Any]]) -> Any:
+    """The value that these steps lead to; UNKNOWN where it is not there, or not the only one."""
+    found, around = fields, fields
+    for how, what in steps:
+        if how == "name":
+            around, found = found, found[what]
+        elif how == "index":
+            found = found[what] if what < len(found) else UNKNOWN
+        else:
+            key, value = what
+            keys = [one[key] for one in found] if how == "key" else around[key]
+            places = [place for place, one in enumerate(keys) if one == value]
+            fits = len(places) == 1 and len(keys) == len(found)
+            found = found[places[0]] if fits else UNKNOWN
+        if found is UNKNOWN:
+            break
+    return found
+
+
+def written(steps: list[tuple[str, Any]]) -> str:
+    """The same steps as a path."""
+    text = ""
+    for how, what in steps:
+        match how:
+            case "name":
+                text += f".{what}" if text else what
+            case "index":
+                text += f"[{what}]"
+            case _:
+                key, value = what
+                quoted = json.dumps(value) if isinstance(value, bool | int) else quote(value)
+                text += f"[{key}={quoted}]"
+    return text
+
+
+def quote(text: str) -> str:
+    return "'" + text.replace("'", "''") + "'"
+
+
+class Walker:
+    """Chooses paths at random through what a type has."""
+
+    def __init__(self, interfaces: Interfaces, seed: int) -> None:
+        self._structures = interfaces.structures
+        self._chance = random.Random(seed)
+
+    def steps(self, type_name: str, fields: Any) -> list[tuple[str, Any]]:
+        made: list[tuple[str, Any]] = []
+        structure, found = self._structures[type_name], fields
+        while structure.fields:
+            one = self._chance.choice(structure.fields)
+            made.append(("name", one.name))
+            kind, around, found = one.type, found, found[one.name]
+            if kind.many != "one" and self._chance.random() < 0.8:
+                step = self._element(kind, structure, around, found)
+                made.append(step)
+                found = at_path(around, [("name", one.name), step])
+                kind = kind.element
+            if found is UNKNOWN or not kind.nested or kind.many != "one" or self._chance.random() < 0.1:
+                break
+            structure = self._structures[kind.name]
+        return made
+
+    def _element(self, kind: Type, around: Structure, there: Any, found: Any) -> tuple[str, Any]:
+        inner = self._structures[kind.name].fields if kind.nested else ()
+        own = [one.name for one in inner if _is_key(one.type)]
+        lists = [
+            one.name for one in around.fields if one.type.many != "one" and _is_key(one.type.element)
+        ]
+        lists = [name for name in lists if name not in {one.name for one in inner}]
+        if own and self._chance.random() < 0.5:
+            key = self._chance.choice(own)
+            values = [one[key] for one in found] or [self._any(inner, key)]
+            return "key", (key, self._chance.choice(values))
+        if lists and self._chance.random() < 0.5:
+            key = self._chance.choice(lists)
+            values = there[key] or [self._any(around.fields, key)]
+            return "beside", (key, self._chance.choice(values))
+        most = (kind.size or 4) - 1
+        return "index", self._chance.randint(0, most)
+
+    def _any(self, fields: Any, key: str) -> Any:
+        kind = next(one.type.element for one in fields if one.name == key)
+        return {"bool": True, "string": "x", "wstring": "x"}.get(kind.name, 1)
+
+
+def _is_key(kind: Type) -> bool:
+    return kind.many == "one" and not kind.nested and kind.name not in FLOATS
+
+
+def plain(value: Any) -> str:
+    return json.dumps(to_plain(value) if not isinstance(value, dict | list) else _plain(value))
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {name: _plain(one) for name, one in value.items()}
+    return [_plain(one) for one in value] if isinstance(value, list) else to_plain(value)
+
+
+def test_what_is_read_at_its_place_is_what_was_sent(cell: Interfaces) -> None:
+    seen = {"key": 0, "beside": 0, "index": 0, "unknown": 0}
+    for seed in range(600):
+        walker = Walker(cell, seed)
+        fields = Samples(cell.structures, seed).fields("cell_msgs/msg/Store")
+        ways = [walker.steps("cell_msgs/msg/Store", fields) for _ in range(seed % 7 + 1)]
+        reader = cell.fields("cell_msgs/msg/Store", map(written, ways))
+        found = reader.read(cell.encode("cell_msgs/msg/Store", fields))
+        for way in ways:
+            wanted, value = at_path(fields, way), found.get(written(way))
+            if wanted is UNKNOWN:
+                assert value is None, (seed, written(way))
+            else:
+                assert plain(value) == plain(wanted), (seed, written(way))
+            for how, _ in way:
+                seen[how] = seen.get(how, 0) + 1
+            seen["unknown"] += wanted is UNKNOWN
+    assert min(seen.values()) > 50, seen
+
+
+def test_of_every_type_that_is_built_in_each_field_is_read(cell: Interfaces) -> None:
+    for seed, name in enumerate(JAZZY.structures):
+        fields = Samples(JAZZY.structures, seed).fields(name)
+        reader = JAZZY.fields(name, fields)
+        found = reader.read(JAZZY.encode(name, fields))
+        for one, value in fields.items():
+            assert plain(found.get(one)) == plain(value), (name, one)
+
+
+def test_nothing_is_wanted_of_a_message_that_is_judged_all_the_same(cell: Interfaces) -> None:
+    for seed, name in enumerate(cell.structures):
+        whole = cell.encode(name, Samples(cell.structures, seed).fields(name))
+        reader = cell.fields(name, ())
+        assert isinstance(reader.read(whole), Fields)
+        for length in range(len(whole) - 3):
+            with pytest.raises(DecodeError):
+                reader.read(whole[:length])
+        with pytest.raises(DecodeError, match="it ends at"):
+            reader.read(whole + bytes(4))
+
+
+def test_damage_raises_nothing_but_a_decode_error(cell: Interfaces) -> None:
+    store = "cell_msgs/msg/Store"
+    fields = Samples(cell.structures, 5).fields(store, "most")
+    whole = cell.encode(store, fields)
+    walker = Walker(cell, 1)
+    reader = cell.fields(store, {written(walker.steps(store, fields)) for _ in range(40)})
+    chance = random.Random(2)
+    for _ in range(4000):
+        at, byte = chance.randrange(len(whole)), chance.choice((0, 1, 0x7F, 0xFF))
+        readable(reader, whole[:at] + bytes((byte,)) + whole[at + 1 :])
+    for seed, name in enumerate(cell.structures):
+        own = cell.fields(name, [one.name for one in cell.structures[name].fields])
+        for data in garbage(seed):
+            readable(own, data)
+
+
+def readable(reader: Any, data: bytes) -> None:
+    with suppress(DecodeError):
+        reader.read(data)

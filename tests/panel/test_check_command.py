@@ -1,0 +1,166 @@
+"""`python -m app.check`: what it prints, and its exit status."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from app.check import main
+from app.errors import Note
+from app.panel import load_panel
+from app.settings import PACKAGE
+from tests.support.parts import TESTS
+
+SHIPPED = PACKAGE / "panel.toml"
+NO_TITLE = SHIPPED.read_text().replace('title = "Robot cell 1"\n', "")
+
+
+@pytest.fixture
+def faulty(tmp_path: Path) -> Path:
+    path = tmp_path / "cell.toml"
+    path.write_text(NO_TITLE.replace('"/last_heard"', '"last heard"'))
+    return path
+
+
+def test_a_good_panel_is_summed_up(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([str(SHIPPED)]) == 0
+    said = capsys.readouterr()
+    first, note = said.out.splitlines()
+    assert first == f'{SHIPPED}: good: "Robot cell 1", 1 page(s), 5 widget(s)'
+    assert note.startswith('  note: interlock[0] "operation", line 10: the last value on ')
+    assert said.err == ""
+
+
+@pytest.mark.parametrize("rule", ["max_age_s = 2.0", "require_publisher = true"])
+def test_a_permission_that_is_kept_fresh_needs_no_note(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], rule: str
+) -> None:
+    path = tmp_path / "cell.toml"
+    path.write_text(SHIPPED.read_text().replace('field = "data"\n', f'field = "data"\n{rule}\n', 1))
+    assert main([str(path)]) == 0
+    assert "note:" not in capsys.readouterr().out
+
+
+def test_every_fault_is_printed_with_its_place(
+    faulty: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([str(faulty)]) == 1
+    said = capsys.readouterr()
+    assert said.out == ""
+    first, *lines = said.err.splitlines()
+    assert first == f"{faulty} can't be used:"
+    assert [line.split(": ")[0] for line in lines] == [
+        "  title",
+        '  page[0].widget[4].topic "last_heard", line 55',
+    ]
+
+
+def test_a_file_that_is_not_there_can_not_be_read(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([str(tmp_path / "none.toml")]) == 2
+    assert "No such file or directory" in capsys.readouterr().err
+
+
+def test_what_is_no_toml_can_not_be_read(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "cell.toml"
+    path.write_text("title =")
+    assert main([str(path)]) == 2
+    assert "Invalid value" in capsys.readouterr().err
+
+
+def test_without_a_name_the_panel_of_the_environment_is_checked(
+    faulty: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("KIOSK_PANEL", str(faulty))
+    assert main([]) == 1
+    assert str(faulty) in capsys.readouterr().err
+
+
+def test_a_wrong_environment_is_told_without_a_traceback(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("KIOSK_MODE", "maybe")
+    assert main([]) == 2
+    assert capsys.readouterr().err == 'KIOSK_MODE is "maybe": it must be "demo" or "live"\n'
+
+
+def test_several_panels_are_checked_and_the_worst_one_is_the_status(
+    faulty: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    none = tmp_path / "none.toml"
+    assert main([str(faulty), str(SHIPPED)]) == 1
+    said = capsys.readouterr()
+    assert said.err.startswith(f"{faulty} can't be used:")
+    assert said.out.startswith(f"{SHIPPED}: good:")
+    assert main([str(SHIPPED), str(none), str(faulty)]) == 2
+    said = capsys.readouterr()
+    assert [line for line in said.err.splitlines() if line[:1] != " "] == [
+        f"{none} can't be used:",
+        f"{faulty} can't be used:",
+    ]
+    assert main([str(SHIPPED), str(SHIPPED)]) == 0
+
+
+def test_it_tells_how_it_is_used(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["--help"])
+    assert ended.value.code == 0
+    said = capsys.readouterr().out
+    assert said.startswith("usage: python -m app.check [-h] [-v] [PANEL ...]")
+    assert "KIOSK_PANEL" in said
+    assert "Exit status" in said
+
+
+def test_a_note_is_no_fault_and_has_its_place(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    noted = [Note("interlock[0]", "is worth a look"), Note("page[0].widget[4].max_age_s", "is missing")]
+    monkeypatch.setattr("app.panel.checks.notes.notes_in", lambda *_: noted)
+    assert main([str(SHIPPED)]) == 0
+    said = capsys.readouterr()
+    assert said.err == ""
+    assert said.out.splitlines()[1:] == [
+        '  note: interlock[0] "operation", line 10: is worth a look',
+        '  note: page[0].widget[4].max_age_s "last_heard", line 52: is missing',
+    ]
+    load_panel(SHIPPED)
+
+
+def test_the_whole_message_of_each_press_is_printed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "cell.toml"
+    path.write_text((TESTS / "everything.toml").read_text())
+    jog = tmp_path / "msgs/cell_msgs/msg/Jog.msg"
+    jog.parent.mkdir(parents=True)
+    jog.write_text("float64 speed\nuint32 valid_ms\nuint16 number\n")
+    assert main(["-v", str(path)]) == 0
+    first, _, said = capsys.readouterr().out.partition("\n")
+    assert "good" in first
+    assert said == (TESTS / "everything.txt").read_text()
+
+
+@pytest.mark.parametrize(("text", "status"), [(SHIPPED.read_text(), 0), (NO_TITLE, 1), ("title =", 2)])
+def test_the_exit_status_says_good_faulty_or_unreadable(tmp_path: Path, text: str, status: int) -> None:
+    path = tmp_path / "cell.toml"
+    path.write_text(text)
+    command = [sys.executable, "-m", "app.check", str(path)]
+    ended = subprocess.run(command, cwd=PACKAGE.parent, capture_output=True, text=True, check=False)
+    assert ended.returncode == status
+    assert "Traceback" not in ended.stderr
+
+
+def test_an_interlock_that_locks_nothing_is_noted(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "cell.toml"
+    spare = '\n[[interlock]]\nid = "spare"\ntopic = "/spare"\nmax_age_s = 1.0\n'
+    path.write_text(SHIPPED.read_text() + spare)
+    assert main([str(path)]) == 0
+    line = len(path.read_text().splitlines()) - 3
+    told = [one for one in capsys.readouterr().out.splitlines() if "locks nothing" in one]
+    assert told == [
+        f'  note: interlock[1] "spare", line {line}: locks nothing: no control has interlock = "spare"'
+    ]

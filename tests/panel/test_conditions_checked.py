@@ -1,0 +1,230 @@
+"""What an interlock permits: conditions beside a bool, checked as the panel file is loaded."""
+
+import logging
+import math
+import time
+from pathlib import Path
+from typing import Any, Final
+
+import pytest
+
+from app.errors import PanelError
+from app.panel import load_panel
+from app.panel.interlock import Interlock
+from app.permission.conditions import permits
+from app.permission.interlocks import interlock_verdict
+from app.robot.state import Passed, Robot, Sample
+from app.ros_logging import RobotLog
+from app.runtime.ingest import Intake
+from app.transport.inbox import Changes
+from app.view.view import sight
+from tests.support.builders import BRIDGE, ENABLED, INTERFACES, NOW, Table, robot_there
+
+FILE: Final = """
+title = "Cell"
+[[interlock]]
+id = "air"
+label = "Air pressure"
+topic = "/operation_enabled"
+type = "{type}"
+{conditions}
+[[page]]
+id = "one"
+title = "One"
+[[page.widget]]
+id = "go"
+kind = "publish"
+label = "Go"
+topic = "/go"
+type = "std_msgs/msg/Empty"
+message = {{}}
+interlock = "air"
+"""
+BATTERY: Final[Table] = {
+    "header": {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""},
+    **dict.fromkeys(("voltage", "temperature", "current", "charge", "capacity"), 0.0),
+    **dict.fromkeys(("design_capacity", "percentage"), 0.0),
+    **dict.fromkeys(("power_supply_health", "power_supply_technology"), 0),
+    "present": True,
+    "cell_voltage": [],
+    "cell_temperature": [],
+    "location": "",
+    "serial_number": "",
+}
+LEVEL: Final[Table] = {"name": "", "message": "", "hardware_id": "", "values": []}
+
+
+def file_of(folder: Path, type_name: str, conditions: str) -> Path:
+    whole = type_name if "/" in type_name else f"std_msgs/msg/{type_name}"
+    path = folder / "cell.toml"
+    path.write_text(FILE.format(type=whole, conditions=conditions))
+    return path
+
+
+def robot_of(path: Path) -> tuple[Robot, Interlock]:
+    panel = load_panel(path)
+    return robot_there(panel), panel.interlocks[0]
+
+
+def said(robot: Robot, interlock: Interlock, fields: Table) -> str | None:
+    """The reason after the robot said this; None where it permits."""
+    payload = INTERFACES.encode(interlock.type, fields)
+    robot.take(robot.key(ENABLED), Sample(payload, 1, NOW, NOW, BRIDGE))
+    verdict = interlock_verdict(interlock, robot, NOW)
+    assert verdict.permitted is (verdict.reason is None)
+    return verdict.reason
+
+
+@pytest.mark.parametrize(
+    ("type_name", "conditions", "good", "bad", "reason"),
+    [
+        ("Float64", "min = 5\nunit = 'bar'", 5.0, 3.2, "is 3.2 bar: it must be 5 bar or more."),
+        ("Float64", "max = 0.5", 0.5, 0.75, "is 0.75: it must be 0.5 or less."),
+        ("Float64", "min = 1\nmax = 2", 1.5, 2.5, "is 2.5: it must be 1 to 2."),
+        ("Float64", "min = 5", 6.0, 4.99999999, "is 4.99999999: it must be 5 or more."),
+        ("Float64", "min = 5", math.inf, -math.inf, "is -Infinity: it must be 5 or more."),
+        ("Float64", "min = 5", 5.0, math.nan, "is NaN: it must be 5 or more."),
+        ("Float64", "not_equals = 0", 1.0, math.nan, "is NaN: it must be not 0."),
+        ("Float64", "not_equals = 0", math.inf, 0.0, "is 0: it must be not 0."),
+        ("Float64", "max = 9\nnot_equals = 0", 9.0, 0.0, "is 0: it must be 9 or less and not 0."),
+        ("Float64", "one_of = [1, 2.5, 4]", 2.5, math.nan, "is NaN: it must be 1, 2.5 or 4."),
+        ("Float64", "equals = inf", math.inf, 1e308, "is 1e+308: it must be Infinity."),
+        ("Float32", "equals = 0.1", 0.1, 0.2, "is 0.2: it must be 0.1."),
+        ("Float32", "max = 0.1", 0.1, 0.10000001, "is 0.100000009: it must be 0.1 or less."),
+        ("Float32", "min = 0.3", 0.3, 0.1, "is 0.1: it must be 0.3 or more."),
+        ("UInt8", "equals = 3", 3, 4, "is 4: it must be 3."),
+        ("UInt8", "one_of = [1]", 1, 0, "is 0: it must be 1."),
+        ("UInt8", "one_of = [1, 2]", 2, 3, "is 3: it must be 1 or 2."),
+        ("Int64", "max = 9007199254740993", 9007199254740993, 9007199254740994,
+         "is 9007199254740994: it must be 9007199254740993 or less."),
+        ("Bool", "equals = false", False, True, "is true: it must be false."),
+        ("Bool", "not_equals = true", False, True, "is true: it must be not true."),
+        ("String", "equals = 'auto'", "auto", "manual", 'is "manual": it must be "auto".'),
+        ("String", "not_equals = ''", "x", "", 'is "": it must be not "".'),
+        ("String", "one_of = ['a', 'b', 'c']", "c", "x" * 99,
+         f'is "{"x" * 39}…": it must be "a", "b" or "c".'),
+    ],
+)  # fmt: skip
+def test_a_condition_permits_or_says_what_is_and_what_must_be(
+    tmp_path: Path, type_name: str, conditions: str, good: Any, bad: Any, reason: str
+) -> None:
+    robot, interlock = robot_of(file_of(tmp_path, type_name, conditions))
+    assert said(robot, interlock, {"data": good}) is None
+    assert said(robot, interlock, {"data": bad}) == f"Air pressure {reason}"
+
+
+def test_constants_stand_for_their_values_and_are_told_by_their_names(tmp_path: Path) -> None:
+    conditions = (
+        'field = "power_supply_status"\n'
+        'one_of = ["POWER_SUPPLY_STATUS_CHARGING", "POWER_SUPPLY_STATUS_FULL"]'
+    )
+    robot, interlock = robot_of(file_of(tmp_path, "sensor_msgs/msg/BatteryState", conditions))
+    assert said(robot, interlock, {**BATTERY, "power_supply_status": 4}) is None
+    reason = said(robot, interlock, {**BATTERY, "power_supply_status": 2})
+    assert reason == "Air pressure is DISCHARGING: it must be CHARGING or FULL."
+    reason = said(robot, interlock, {**BATTERY, "power_supply_status": 77})
+    assert reason == "Air pressure is 77: it must be CHARGING or FULL."
+
+
+@pytest.mark.parametrize(
+    ("condition", "reason"),
+    [
+        ('equals = "OK"', "Air pressure is ERROR: it must be OK."),
+        ('max = "WARN"', "Air pressure is ERROR: it must be WARN or less."),
+        ("max = 1", "Air pressure is 2: it must be 1 or less."),
+    ],
+)
+def test_a_level_is_told_by_its_name_where_the_file_names_one(
+    tmp_path: Path, condition: str, reason: str
+) -> None:
+    conditions = f'field = "level"\n{condition}'
+    robot, interlock = robot_of(file_of(tmp_path, "diagnostic_msgs/msg/DiagnosticStatus", conditions))
+    assert said(robot, interlock, {**LEVEL, "level": 0}) is None
+    assert said(robot, interlock, {**LEVEL, "level": 2}) == reason
+
+
+@pytest.mark.parametrize(
+    ("type_name", "conditions", "place", "fault"),
+    [
+        ("Float64", "", "field", '"data" is float64: an interlock needs a bool, or conditions'),
+        ("UInt8", "equals = 256", "equals", "256 is out of range: uint8 goes from 0 to 255"),
+        ("UInt8", "min = -1", "min", "-1 is out of range: uint8 goes from 0 to 255"),
+        ("UInt8", "max = 2.5", "max", "must be a whole number (uint8), not 2.5"),
+        ("UInt8", "equals = true", "equals", "must be a whole number (uint8), not true"),
+        ("UInt8", "equals = 'ON'", "equals", 'the name of a constant of std_msgs/msg/UInt8, not "ON"'),
+        ("Float32", "min = 1e300", "min", "1e+300 is out of range: float32 goes to 3.40282e+38"),
+        ("Float64", "min = 3\nmax = 2", "max", "2 is less than min (3): no value permits"),
+        ("UInt8", "min = 3\nmax = 3\nnot_equals = 3", "not_equals", "3 is all that the limits leave"),
+        ("UInt8", "max = 0\nnot_equals = 0", "not_equals", "0 is all that the limits leave"),
+        ("Float64", "equals = nan", "equals", "NaN is no value that could permit"),
+        ("Float64", "one_of = [1, 1.0]", "one_of[1]", "1.0 is there already"),
+        ("Float64", "one_of = []", "one_of", "is empty: it must have one value at least"),
+        ("Float64", "one_of = 3", "one_of", "must be a list of values, not 3"),
+        ("Float64", "one_of = [1, [2]]", "one_of[1]", "must be a number, true or false, or text, not"),
+        ("Float64", "equals = 1\nmin = 0", "min", "has no meaning beside equals, which says all"),
+        ("Bool", "min = 1", "min", 'is for numbers; "data" is bool'),
+        ("Bool", "equals = 1", "equals", "must be true or false, not 1"),
+        ("Bool", "unit = 'V'", "unit", 'is for numbers; "data" is bool'),
+        ("String", "equals = 1", "equals", "must be text (string), not 1"),
+        ("String", "max = 'z'", "max", 'is for numbers; "data" is string'),
+        ("diagnostic_msgs/msg/DiagnosticStatus", 'field = "level"\nequals = "WARM"', "equals",
+         "did you mean WARN? it has OK, WARN, ERROR, STALE"),
+        ("diagnostic_msgs/msg/DiagnosticStatus", 'field = "values"\nequals = 1', "field",
+         '"values" is diagnostic_msgs/msg/KeyValue[]: an interlock judges one value of it'),
+    ],
+)  # fmt: skip
+def test_a_condition_that_can_not_hold_is_a_fault(
+    tmp_path: Path, type_name: str, conditions: str, place: str, fault: str
+) -> None:
+    with pytest.raises(PanelError) as caught:
+        load_panel(file_of(tmp_path, type_name, conditions))
+    found = {one.place: one.message for one in caught.value.faults}
+    assert fault in found.pop(f"interlock[0].{place}")
+    assert found == {}
+
+
+@pytest.mark.parametrize("value", [None, "true", 1, 1.0, [True], b"\1"])
+def test_without_a_condition_nothing_permits_but_true(value: Any) -> None:
+    assert permits(Interlock(id="a", topic="/a"), True)
+    assert not permits(Interlock(id="a", topic="/a"), value)
+
+
+def test_what_is_not_there_permits_by_no_condition() -> None:
+    for conditions in ({"not_equals": 0}, {"min": 0}, {"one_of": [0]}):
+        made = Interlock.model_validate({"id": "a", "topic": "/a", **conditions})
+        assert not permits(made, None)
+
+
+class Deaf:
+    def hear(self, *_: object) -> None: ...
+
+
+def test_a_value_that_only_changes_the_reason_waits_for_the_next_frame(tmp_path: Path) -> None:
+    """A pressure that trembles below its limit must cost no more than a readout."""
+    path = file_of(tmp_path, "Float64", "min = 5")
+    panel = load_panel(path)
+    robot = robot_there(panel)
+    deaf: Any = Deaf()
+    intake = Intake(panel, robot, deaf, deaf, deaf, None, RobotLog(logging.getLogger("x"), ""))
+    shows: list[float] = []
+
+    def take(value: float, *between: float) -> tuple[bool, bool]:
+        def encoded(one: float) -> bytes:
+            return INTERFACES.encode("std_msgs/msg/Float64", {"data": one})
+
+        passed = tuple(Passed(encoded(one), NOW, NOW) for one in between)
+        shown = sight(panel, robot, time.monotonic()).view["interlocks"]
+        sample = Sample(encoded(value), 1, NOW, NOW, BRIDGE, between=passed)
+        news = intake.take(
+            Changes({robot.key(ENABLED): sample}, {}, True), lambda: shown, lambda: shows.append(value)
+        )
+        return news.urgent, news.more
+
+    assert take(3.0) == (False, True)  # it was waited for: locked then as now
+    assert take(3.1) == (False, True)
+    assert take(3.1) == (False, False)
+    assert take(6.0) == (True, False)
+    assert take(6.1) == (False, False)
+    assert shows == []
+    assert take(6.2, 4.0) == (True, False)
+    assert shows == [6.2]

@@ -1,0 +1,177 @@
+"""What an operator entered: typed from forms, checked with a sentence that names label and limits."""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import pytest
+
+from app.errors import InputError
+from app.panel import Input
+from app.panel.input_values import checked, limits, typed
+from tests.support.builders import panel_of
+
+SPEED: Mapping[str, Any] = {
+    "id": "speed", "kind": "number", "label": "Speed", "min": -0.5, "max": 1.5, "step": 0.1,
+    "unit": "m/s",
+}  # fmt: skip
+FREE: Mapping[str, Any] = {
+    "id": "free", "kind": "slider", "label": "Free", "min": -1.0, "max": 1, "unit": "rad",
+}  # fmt: skip
+COUNT: Mapping[str, Any] = {"id": "count", "kind": "slider", "label": "Count", "min": 1, "max": 99}
+MODE: Mapping[str, Any] = {
+    "id": "mode", "kind": "select", "label": "Mode", "options": [
+        {"value": 0, "label": "Zero"},
+        {"value": True, "label": "True"},
+        {"value": 1.5, "label": "Float"},
+        {"value": "slow", "label": "Slow"},
+        {"value": {"x": 1}, "label": "Table"},
+        {"value": 2**63 - 1, "label": "Large"},
+    ],
+}  # fmt: skip
+LIGHT: Mapping[str, Any] = {"id": "light", "kind": "toggle", "label": "Light", "on": "Shines"}
+
+
+def one(table: Mapping[str, Any]) -> Input:
+    (widget,) = panel_of(table).widgets()
+    assert isinstance(widget, Input)
+    return widget
+
+
+def exactly(value: Any, wanted: Any) -> bool:
+    return value == wanted and type(value) is type(wanted)
+
+
+@pytest.mark.parametrize(
+    ("table", "given", "value"),
+    [
+        (SPEED, 0, 0.0),
+        (SPEED, -0.5, -0.5),
+        (SPEED, 1.5, 1.5),
+        (SPEED, 0.3, 0.3),
+        (SPEED, 1.1, 1.1),
+        (FREE, 0.123456789, 0.123456789),
+        (FREE, -1, -1.0),
+        (FREE, 1e-300, 1e-300),
+        (COUNT, 1, 1),
+        (COUNT, 99.0, 99),
+        (MODE, 0, 0),
+        (MODE, 0.0, 0),
+        (MODE, "0", 0),
+        (MODE, True, True),
+        (MODE, "true", True),
+        (MODE, "1.5", 1.5),
+        (MODE, "slow", "slow"),
+        (MODE, {"x": 1}, {"x": 1}),
+        (MODE, '{"x": 1}', {"x": 1}),
+        (MODE, "9223372036854775807", 2**63 - 1),
+        (LIGHT, True, True),
+        (LIGHT, False, False),
+    ],
+)
+def test_a_value_is_taken_with_the_type_of_its_input(
+    table: Mapping[str, Any], given: Any, value: Any
+) -> None:
+    assert exactly(checked(one(table), given), value)
+
+
+SPEED_LIMITS = "-0.5 to 1.5 m/s, in steps of 0.1"
+
+
+@pytest.mark.parametrize(
+    ("table", "given", "sentence"),
+    [
+        (SPEED, 1.6, f"Speed is 1.6: it must be {SPEED_LIMITS}"),
+        (SPEED, -0.6, f"Speed is -0.6: it must be {SPEED_LIMITS}"),
+        (SPEED, 0.25, f"Speed is 0.25: it must be {SPEED_LIMITS}"),
+        (SPEED, math.nan, f"Speed is nan: it must be {SPEED_LIMITS}"),
+        (SPEED, math.inf, f"Speed is inf: it must be {SPEED_LIMITS}"),
+        (SPEED, -math.inf, f"Speed is -inf: it must be {SPEED_LIMITS}"),
+        (SPEED, 10**400, "Speed is 1000"),
+        (SPEED, 1e308, f"Speed is 1e+308: it must be {SPEED_LIMITS}"),
+        (SPEED, "", f"Speed has no number: it must be {SPEED_LIMITS}"),
+        (SPEED, None, "Speed has no number"),
+        (SPEED, "fast", f'Speed must be a number, {SPEED_LIMITS}, not "fast"'),
+        (SPEED, "1", "Speed must be a number"),
+        (SPEED, True, f"Speed must be a number, {SPEED_LIMITS}, not true"),
+        (SPEED, [1], "Speed must be a number"),
+        (FREE, 1.0001, "Free is 1.0001: it must be -1 to 1 rad"),
+        (FREE, math.nan, "Free is nan: it must be -1 to 1 rad"),
+        (FREE, "", "Free has no number: it must be -1 to 1 rad"),
+        (COUNT, 1.5, "Count is 1.5: it must be 1 to 99, in steps of 1"),
+        (COUNT, 100, "Count is 100: it must be 1 to 99, in steps of 1"),
+        (MODE, 1, "Mode must be one of Zero, True, Float, Slow, Table, Large, not 1"),
+        (MODE, False, "Mode must be one of"),
+        (MODE, None, "Mode must be one of"),
+        (MODE, ["x"], "Mode must be one of"),
+        (LIGHT, 1, "Light must be true (Shines) or false (Off), not 1"),
+        (LIGHT, "true", 'Light must be true (Shines) or false (Off), not "true"'),
+        (LIGHT, None, "Light must be true (Shines) or false (Off), not null"),
+    ],
+)
+def test_what_an_input_does_not_take_is_refused_with_label_and_limits(
+    table: Mapping[str, Any], given: Any, sentence: str
+) -> None:
+    with pytest.raises(InputError) as caught:
+        checked(one(table), given)
+    assert str(caught.value).startswith(sentence)
+    assert len(str(caught.value)) < 200
+
+
+@pytest.mark.parametrize(
+    ("table", "text", "value"),
+    [
+        (SPEED, "0.5", 0.5),
+        (SPEED, "-.5", -0.5),
+        (SPEED, " 1 ", 1),
+        (SPEED, "1e-1", 0.1),
+        (COUNT, "5", 5),
+        (COUNT, "5.0", 5),
+        (SPEED, "", ""),
+        (SPEED, "nan", "nan"),
+        (SPEED, "inf", "inf"),
+        (SPEED, "1_0", "1_0"),
+        (SPEED, "٣", "٣"),
+        (SPEED, "1e999", math.inf),
+        (LIGHT, "true", True),
+        (LIGHT, "false", False),
+        (LIGHT, "on", "on"),
+        (MODE, "0", "0"),
+    ],
+)
+def test_a_forms_text_becomes_what_its_input_is(
+    table: Mapping[str, Any], text: str, value: Any
+) -> None:
+    assert exactly(typed(one(table), text), value)
+
+
+def test_limits_read_as_an_operator_says_them() -> None:
+    for table, text in ((COUNT, "1 to 99, in steps of 1"), (FREE, "-1 to 1 rad")):
+        widget: Any = one(table)
+        assert limits(widget) == text
+
+
+@pytest.mark.parametrize(
+    ("more", "step", "whole"),
+    [
+        ({"min": 0, "max": 10}, "1", True),
+        ({"min": 0.0, "max": 10}, "any", False),
+        ({"min": 0, "max": 10.0}, "any", False),
+        ({"min": -1.0, "max": 1.0}, "any", False),
+        ({"min": 0, "max": 1.5}, "any", False),
+        ({"min": 0, "max": 10, "step": 0.5}, "0.5", False),
+        ({"min": 0.0, "max": 10.0, "step": 1}, "1", True),
+        ({"min": 0.5, "max": 10.5, "step": 1}, "1", False),
+    ],
+)
+def test_limits_that_are_written_as_whole_numbers_have_whole_steps(
+    more: Mapping[str, Any], step: str, whole: bool
+) -> None:
+    widget: Any = one({"id": "n", "kind": "number", "label": "N", **more})
+    assert (widget.attributes["step"], widget.whole) == (step, whole)
+
+
+def test_every_value_on_a_step_is_taken() -> None:
+    speed = one(SPEED)
+    for number in range(-5, 16):
+        assert checked(speed, float(f"{number / 10:.1f}")) == number / 10

@@ -1,0 +1,105 @@
+"""Browsers are told apart by their tokens, and named so that an operator knows which is meant."""
+
+import pytest
+
+from app.permission.clients import (
+    BROWSERS_KEPT,
+    TOKEN,
+    Browsers,
+    new_token,
+    newcomer,
+    public_id,
+    stranger,
+)
+
+
+def token(number: int) -> str:
+    return f"{number:032x}"
+
+
+def test_a_token_is_random_and_long() -> None:
+    tokens = {new_token() for _ in range(100)}
+    assert len(tokens) == 100
+    assert all(TOKEN.fullmatch(one) for one in tokens)
+
+
+def test_what_others_see_of_a_token_is_another_thing_and_stays_the_same() -> None:
+    first = Browsers().seen(token(1), "192.0.2.7")
+    again = Browsers().seen(token(1), "192.0.2.7")
+    assert first.id == again.id == public_id(token(1))
+    assert first.id not in token(1)
+    assert public_id(token(2)) != first.id
+
+
+def test_browsers_are_numbered_as_they_come() -> None:
+    browsers = Browsers()
+    names = [browsers.seen(token(n), "192.0.2.7").name for n in (1, 2, 1, 3)]
+    assert names == ["Panel 1", "Panel 2", "Panel 1", "Panel 3"]
+
+
+def test_the_name_in_a_sentence_has_the_address_of_another_machine() -> None:
+    browsers = Browsers()
+    far = browsers.seen(token(1), "192.0.2.7")
+    near = browsers.seen(token(2), "127.0.0.1")
+    more = browsers.seen(token(3), "::1")
+    assert (far.title, str(far)) == ("Panel 1 (192.0.2.7)", "Panel 1 (192.0.2.7)")
+    assert (near.title, str(near)) == ("The panel at the cell", "the panel at the cell (127.0.0.1)")
+    assert more.title == "Browser 2 at the cell"
+
+
+@pytest.mark.parametrize(
+    ("address", "local", "shown"),
+    [
+        ("127.0.0.1", True, "127.0.0.1"),
+        ("127.8.8.8", True, "127.8.8.8"),
+        ("::1", True, "::1"),
+        ("::ffff:127.0.0.1", True, "127.0.0.1"),
+        ("::ffff:192.0.2.7", False, "192.0.2.7"),
+        ("192.0.2.7", False, "192.0.2.7"),
+        ("0.0.0.0", False, "0.0.0.0"),
+        ("fe80::1%eth0", False, "fe80::1"),
+        ("2001:db8::7", False, "2001:db8::7"),
+        ("localhost", False, "not known"),
+        ("127.0.0.1.evil.example", False, "not known"),
+        ("<script>", False, "not known"),
+        ("", False, "not known"),
+    ],
+)
+def test_only_loopback_is_at_the_cell(address: str, local: bool, shown: str) -> None:
+    for browser in (Browsers().seen(token(1), address), stranger(address)):
+        assert (browser.local, browser.address) == (local, shown)
+
+
+def test_a_token_that_is_carried_to_another_machine_is_no_longer_at_the_cell() -> None:
+    browsers = Browsers()
+    assert browsers.seen(token(1), "127.0.0.1").local
+    moved = browsers.seen(token(1), "192.0.2.7")
+    assert (moved.local, moved.name) == (False, "Panel 1")
+
+
+def test_who_moves_in_the_network_keeps_the_name() -> None:
+    browsers = Browsers()
+    browsers.seen(token(1), "192.0.2.1")
+    browsers.seen(token(2), "192.0.2.2")
+    assert str(browsers.seen(token(2), "192.0.2.9")) == "Panel 2 (192.0.2.9)"
+
+
+def test_those_not_seen_for_longest_are_forgotten_and_their_numbers_free() -> None:
+    browsers = Browsers()
+    for number in range(BROWSERS_KEPT):
+        browsers.seen(token(number), "192.0.2.7")
+    browsers.seen(token(0), "192.0.2.7")
+    assert browsers.seen(token(9999), "192.0.2.7").number == BROWSERS_KEPT + 1
+    assert browsers.seen(token(9998), "192.0.2.7").number == 2
+    assert browsers.seen(token(0), "192.0.2.7").number == 1
+
+
+def test_who_does_not_come_back_takes_no_number() -> None:
+    browsers = Browsers()
+    first = newcomer(token(1), "192.0.2.7")
+    assert (first.id, first.local) == (public_id(token(1)), False)
+    assert browsers.seen(token(2), "192.0.2.7").number == 1
+
+
+def test_a_stranger_has_no_id() -> None:
+    assert (stranger("192.0.2.7").id, str(stranger("192.0.2.7"))) == ("", "a program (192.0.2.7)")

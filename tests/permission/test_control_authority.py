@@ -1,0 +1,607 @@
+"""Who has control: one at a time, never the absent, and never by accident."""
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from hypothesis import settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
+
+from app.errors import PanelError
+from app.panel import Panel, load_panel
+from app.panel.rules import ControlRules
+from app.permission.clients import Browser, Browsers, stranger
+from app.permission.control_authority import ASK_AGAIN_S, LIFE_S, Control, Refusal
+from app.permission.control_authority_view import Role, role
+from tests.support.builders import told
+
+RULES = ControlRules(required=True)
+TAKEOVER_S = RULES.takeover_after_s
+FORM_LIFE_S = 35.0
+
+_KNOWN = Browsers()
+ANN, BOB, CY = (_KNOWN.seen(f"{n:032x}", f"192.0.2.{n}") for n in (1, 2, 3))
+CELL, CELL2 = (_KNOWN.seen(f"{n:032x}", "127.0.0.1") for n in (8, 9))
+NOBODY = stranger("192.0.2.99")
+
+
+class Room:
+    """A control whose time is set; `pass_s` lets time pass while some give signs of life."""
+
+    def __init__(self, rules: ControlRules = RULES, robot: str = "Robot 1") -> None:
+        self.now = 1000.0
+        self.told: list[str] = []
+        self.control = Control(
+            rules, robot, monotonic=lambda: self.now, wall=lambda: self.now, tell=self.told.append
+        )
+
+    def pass_s(self, seconds: float, *alive: Browser, touched: bool = False) -> None:
+        end = self.now + seconds
+        while self.now < end:
+            self.now = min(end, self.now + 1)
+            for browser in alive:
+                self.control.here(browser, touched)
+
+    def may(self, browser: Browser) -> bool:
+        return self.control.verdict(browser).permitted
+
+    def role(self, browser: Browser) -> Role:
+        return role(self.control.view(), browser, self.control.rules)
+
+
+@pytest.fixture
+def room() -> Room:
+    return Room()
+
+
+@pytest.fixture
+def held(room: Room) -> Room:
+    """Ann has control."""
+    assert room.control.take(ANN) == ""
+    return room
+
+
+@pytest.fixture
+def asked(held: Room) -> Room:
+    """Ann has control, and Bob asks for it."""
+    assert held.control.ask(BOB) == ""
+    return held
+
+
+def test_where_it_is_not_required_everybody_may_press() -> None:
+    room = Room(ControlRules(required=False))
+    assert all(room.may(one) for one in (ANN, CELL, NOBODY))
+    assert not room.control.view()["required"]
+    assert room.control.until == math.inf
+
+
+def test_at_first_nobody_has_it(room: Room) -> None:
+    assert room.control.holder is None
+    verdict = room.control.verdict(ANN)
+    assert (verdict.permitted, verdict.code) == (False, "control_free")
+    assert verdict.reason == "Nobody has control of Robot 1: take control first."
+    assert not room.may(CELL)
+
+
+def test_who_takes_it_may_press_and_all_others_read_who_has_it(held: Room) -> None:
+    assert held.may(ANN)
+    for other in (BOB, CELL, NOBODY):
+        verdict = held.control.verdict(other)
+        assert verdict.code == "control_held"
+        assert verdict.reason == "Panel 1 (192.0.2.1) has control of Robot 1."
+
+
+def test_one_robot_without_a_name_is_the_robot() -> None:
+    room = Room(robot="")
+    room.control.take(CELL)
+    assert room.control.verdict(ANN).reason == "The panel at the cell has control of the robot."
+
+
+def test_a_press_takes_nothing(room: Room) -> None:
+    room.control.touch(ANN)
+    assert room.control.holder is None
+
+
+def test_taking_twice_is_taking_once(held: Room) -> None:
+    lines = len(held.told)
+    assert held.control.take(ANN) == ""
+    assert held.control.holder == ANN
+    assert len(held.told) == lines
+
+
+def test_what_another_has_is_not_taken(held: Room) -> None:
+    assert held.control.take(BOB) == "control_taken"
+    assert held.control.holder == ANN
+
+
+def test_who_has_no_token_gets_nothing(room: Room) -> None:
+    assert room.control.take(NOBODY) == room.control.ask(NOBODY) == "control_stranger"
+    assert room.control.until == math.inf
+    room.control.take(ANN)
+    assert room.control.take(NOBODY) == room.control.ask(NOBODY) == "control_stranger"
+    assert (room.control.holder, room.control.asker) == (ANN, None)
+    assert room.control.give(NOBODY, "") == room.control.release(NOBODY) == "control_not_yours"
+
+
+def test_the_panel_at_the_cell_takes_over(asked: Room) -> None:
+    assert asked.control.take(CELL) == ""
+    assert asked.control.holder == CELL
+    assert not asked.may(ANN)
+    assert asked.control.asker == BOB  # whose request is now shown there
+
+
+def test_the_panel_at_the_cell_asks_nobody(held: Room) -> None:
+    assert held.control.ask(CELL) == ""
+    assert held.control.holder == CELL
+
+
+def test_without_local_the_panel_at_the_cell_asks_like_others() -> None:
+    room = Room(ControlRules(required=True, local=False))
+    room.control.take(ANN)
+    assert room.control.take(CELL) == "control_taken"
+    assert room.control.ask(CELL) == ""
+    assert (room.control.holder, room.control.asker) == (ANN, CELL)
+
+
+# Asking.
+
+
+def test_what_is_free_is_not_asked_for_but_taken(room: Room) -> None:
+    assert room.control.ask(BOB) == ""
+    assert room.control.holder == BOB
+
+
+def test_the_holder_asks_for_nothing(held: Room) -> None:
+    assert held.control.ask(ANN) == ""
+    assert held.control.asker is None
+
+
+def test_a_request_is_shown_to_all(asked: Room) -> None:
+    view = asked.control.view()
+    assert (view["holder"], view["asker"]) == (ANN.id, BOB.id)
+    assert view["asker_name"] == "Panel 2 (192.0.2.2)"
+    assert view["holder_text"] == (
+        "Panel 2 (192.0.2.2) asks for control of Robot 1; untouched, it goes over in 30 s."
+    )
+    assert "after 30 s without a touch" in view["asker_text"]
+    assert view["text"] == "Panel 1 (192.0.2.1) has control of Robot 1."
+    assert view["since"] == "1970-01-01T00:16:40.000+00:00"
+
+
+def test_who_asks_may_not_press(asked: Room) -> None:
+    assert asked.may(ANN)
+    assert not asked.may(BOB)
+
+
+def test_one_asks_at_a_time(asked: Room) -> None:
+    assert asked.control.ask(BOB) == ""
+    assert asked.control.ask(CY) == "control_asked_by"
+    assert asked.control.asker == BOB
+
+
+def test_the_holder_gives(asked: Room) -> None:
+    assert asked.control.give(ANN, BOB.id) == ""
+    assert (asked.control.holder, asked.control.asker) == (BOB, None)
+    assert not asked.may(ANN)
+
+
+def test_the_holder_keeps_and_the_request_can_be_repeated_later(asked: Room) -> None:
+    assert asked.control.keep(ANN, BOB.id) == ""
+    assert (asked.control.holder, asked.control.asker) == (ANN, None)
+    assert asked.control.ask(BOB) == "control_denied"
+    assert asked.control.ask(CY) == ""  # another one may
+    asked.control.keep(ANN, CY.id)
+    asked.pass_s(ASK_AGAIN_S, ANN)
+    assert asked.control.ask(BOB) == ""
+
+
+@pytest.mark.parametrize("act", [Control.give, Control.keep])
+@pytest.mark.parametrize("who", [BOB, CY, CELL, NOBODY])
+def test_only_the_holder_answers_a_request(
+    asked: Room, act: Callable[[Control, Browser, str], Refusal], who: Browser
+) -> None:
+    assert act(asked.control, who, BOB.id) == "control_not_yours"
+    assert (asked.control.holder, asked.control.asker) == (ANN, BOB)
+
+
+@pytest.mark.parametrize("act", [Control.give, Control.keep])
+@pytest.mark.parametrize("to", [CY.id, ANN.id, ""])
+def test_an_answer_is_for_the_request_that_was_on_the_screen(
+    asked: Room, act: Callable[[Control, Browser, str], Refusal], to: str
+) -> None:
+    assert act(asked.control, ANN, to) == "control_not_yours"
+    assert (asked.control.holder, asked.control.asker) == (ANN, BOB)
+
+
+def test_a_request_that_was_withdrawn_can_not_be_granted(asked: Room) -> None:
+    assert asked.control.release(BOB) == ""
+    assert asked.control.give(ANN, BOB.id) == "control_not_yours"
+    assert asked.control.holder == ANN
+
+
+def test_a_request_goes_through_without_a_touch(asked: Room) -> None:
+    asked.pass_s(TAKEOVER_S - 0.5, ANN, BOB)
+    assert asked.control.holder == ANN
+    asked.pass_s(0.5, ANN, BOB)
+    assert (asked.control.holder, asked.control.asker) == (BOB, None)
+    assert not asked.may(ANN)
+
+
+def test_the_holder_has_the_whole_time_from_the_request_on(held: Room) -> None:
+    held.pass_s(10 * TAKEOVER_S, ANN)
+    held.control.ask(BOB)
+    held.pass_s(TAKEOVER_S - 1, ANN, BOB)
+    assert held.control.holder == ANN
+
+
+def test_every_touch_makes_a_request_wait_longer(asked: Room) -> None:
+    asked.pass_s(5 * TAKEOVER_S, ANN, BOB, touched=True)
+    assert asked.control.holder == ANN
+    asked.pass_s(TAKEOVER_S, ANN, BOB)
+    assert asked.control.holder == BOB
+
+
+def test_a_touch_of_another_counts_for_nothing(asked: Room) -> None:
+    for _ in range(int(TAKEOVER_S)):
+        asked.pass_s(1, ANN)
+        asked.control.here(BOB, True)
+        asked.control.touch(CY)
+    assert asked.control.holder == BOB
+
+
+def test_a_press_is_a_touch(asked: Room) -> None:
+    asked.pass_s(TAKEOVER_S - 1, ANN, BOB)
+    asked.control.touch(ANN)
+    asked.pass_s(TAKEOVER_S - 1, ANN, BOB)
+    assert asked.control.holder == ANN
+
+
+def test_who_got_it_has_time_before_it_is_taken_again(asked: Room) -> None:
+    asked.pass_s(TAKEOVER_S, ANN, BOB)
+    asked.control.ask(ANN)
+    asked.pass_s(TAKEOVER_S - 1, ANN, BOB)
+    assert asked.control.holder == BOB
+
+
+def test_a_shorter_time_may_be_set() -> None:
+    room = Room(ControlRules(required=True, takeover_after_s=3))
+    room.control.take(ANN)
+    room.control.ask(BOB)
+    assert "after 3 s" in room.control.view()["asker_text"]
+    room.pass_s(3, ANN, BOB)
+    assert room.control.holder == BOB
+
+
+# Giving it up, and being lost.
+
+
+def test_who_gives_it_up_frees_it(held: Room) -> None:
+    assert held.control.release(ANN) == ""
+    assert held.control.holder is None
+    assert held.control.release(ANN) == "control_not_yours"
+    assert held.control.view()["since"] == ""
+
+
+def test_who_gives_it_up_while_asked_gives_it(asked: Room) -> None:
+    asked.control.release(ANN)
+    assert (asked.control.holder, asked.control.asker) == (BOB, None)
+
+
+@pytest.mark.parametrize("who", [BOB, CELL, NOBODY])
+def test_nobody_gives_up_what_another_has(held: Room, who: Browser) -> None:
+    assert held.control.release(who) == "control_not_yours"
+    assert held.control.holder == ANN
+
+
+def test_a_holder_that_is_there_holds_for_hours(held: Room) -> None:
+    held.pass_s(7200, ANN)
+    assert held.control.holder == ANN
+
+
+def test_a_lost_holder_frees_it_in_time(held: Room) -> None:
+    held.pass_s(60, ANN)
+    assert held.control.until == held.now + LIFE_S
+    held.now += LIFE_S - 0.01
+    assert held.may(ANN)
+    held.now += 0.01
+    assert not held.may(ANN)
+    assert held.control.holder is None
+
+
+def test_a_lost_holder_passes_it_to_who_asks(asked: Room) -> None:
+    asked.pass_s(LIFE_S, BOB)
+    assert (asked.control.holder, asked.control.asker) == (BOB, None)
+
+
+def test_a_request_ends_with_its_asker(asked: Room) -> None:
+    asked.pass_s(LIFE_S, ANN)
+    assert (asked.control.holder, asked.control.asker) == (ANN, None)
+
+
+def test_a_lost_holder_and_a_lost_asker_leave_it_free(asked: Room) -> None:
+    asked.now += 3600
+    assert (asked.control.holder, asked.control.asker) == (None, None)
+    assert not asked.may(BOB)
+
+
+def test_who_was_lost_takes_it_like_anybody(held: Room) -> None:
+    held.now += LIFE_S
+    held.control.here(ANN, True)
+    assert not held.may(ANN)
+    held.control.take(BOB)
+    assert held.control.take(ANN) == "control_taken"
+
+
+def test_without_scripts_each_page_lasts_until_the_next(room: Room) -> None:
+    room.control.take(ANN, FORM_LIFE_S)
+    for _ in range(10):
+        room.now += FORM_LIFE_S - 0.1
+        room.control.loaded(ANN, FORM_LIFE_S, by_hand=True)
+    assert room.may(ANN)
+    room.now += FORM_LIFE_S
+    assert not room.may(ANN)
+
+
+def test_a_page_with_scripts_is_lost_as_fast_after_a_page_load(held: Room) -> None:
+    held.control.loaded(ANN, FORM_LIFE_S, by_hand=True)
+    held.now += LIFE_S
+    assert not held.may(ANN)
+
+
+# The panel at the cell takes what is free with its first page.
+
+
+def test_the_first_page_of_the_panel_at_the_cell_takes_what_is_free(room: Room) -> None:
+    room.control.loaded(CELL, FORM_LIFE_S, by_hand=True)
+    assert room.may(CELL)
+    room.control.here(CELL, False)
+    room.now += LIFE_S
+    assert not room.may(CELL)
+
+
+@pytest.mark.parametrize(("who", "by_hand"), [(ANN, True), (CELL, False), (stranger("::1"), True)])
+def test_no_other_page_takes_anything(room: Room, who: Browser, by_hand: bool) -> None:
+    room.control.loaded(who, FORM_LIFE_S, by_hand)
+    assert room.control.holder is None
+
+
+def test_no_page_takes_what_another_has(held: Room) -> None:
+    held.control.loaded(CELL, FORM_LIFE_S, by_hand=True)
+    assert held.control.holder == ANN
+
+
+def test_no_page_takes_where_local_is_off() -> None:
+    room = Room(ControlRules(required=True, local=False))
+    room.control.loaded(CELL, FORM_LIFE_S, by_hand=True)
+    assert room.control.holder is None
+
+
+def test_what_was_given_up_is_taken_by_a_button_only(room: Room) -> None:
+    room.control.take(CELL)
+    room.control.release(CELL)
+    room.control.loaded(CELL, FORM_LIFE_S, by_hand=True)
+    assert room.control.holder is None
+    room.control.take(CELL)
+    room.now += LIFE_S
+    room.control.loaded(CELL, FORM_LIFE_S, by_hand=True)
+    assert room.control.holder == CELL
+
+
+def test_every_role_is_told_by_the_view(room: Room) -> None:
+    everybody = (ANN, BOB, CY, CELL, NOBODY)
+    assert {room.role(one) for one in everybody} == {"free"}
+    room.control.take(ANN)
+    assert [room.role(one) for one in everybody] == ["holding", "held", "held", "over", "held"]
+    room.control.ask(BOB)
+    assert [room.role(one) for one in everybody] == ["asked", "asking", "held", "over", "held"]
+
+
+def test_the_log_tells_every_change_with_who_it_was(asked: Room) -> None:
+    asked.control.give(ANN, BOB.id)
+    asked.control.take(CELL)
+    asked.now += LIFE_S
+    asked.control.advance()
+    assert asked.told == [
+        "control taken by Panel 1 (192.0.2.1)",
+        "Panel 2 (192.0.2.2) asks for control",
+        "control given by Panel 1 (192.0.2.1), now of Panel 2 (192.0.2.2)",
+        "control taken over by the panel at the cell (127.0.0.1)",
+        "control lost by the panel at the cell (127.0.0.1), now of nobody",
+    ]
+
+
+# What a panel file says of it.
+
+
+def panel_with(folder: Path, table: str) -> Panel:
+    path = folder / "cell.toml"
+    path.write_text(f'title = "Cell"\n{table}\n[[page]]\nid = "one"\ntitle = "One"\n')
+    return load_panel(path)
+
+
+def test_it_is_off_where_a_panel_does_not_ask_for_it(tmp_path: Path) -> None:
+    assert panel_with(tmp_path, "").control.required is False
+    assert panel_with(tmp_path, "[control]\nrequired = false").control.required is False
+
+
+def test_one_line_requires_it(tmp_path: Path) -> None:
+    rules = panel_with(tmp_path, "[control]\nrequired = true").control
+    assert (rules.required, rules.takeover_after_s, rules.local) == (True, 30.0, True)
+
+
+@pytest.mark.parametrize(
+    ("table", "fault"),
+    [
+        ("control = true", "control: must be a table, not true"),
+        ("[control]", "control.required: is missing"),
+        ("[control]\ntakeover_after_s = 5", "control.required: is missing"),
+        ('[control]\nrequired = "yes"', 'control.required: must be true or false, not "yes"'),
+        (
+            "[control]\nrequired = true\ntakeover_after_s = 0",
+            "control.takeover_after_s: must be more than 0, not 0",
+        ),
+        ("[control]\nrequired = true\ntakeover_after_s = nan", "control.takeover_after_s: "),
+        ("[control]\nrequired = true\ntakeover_after_s = 1e9", "control.takeover_after_s: "),
+        ("[control]\nrequired = true\nlocl = true", 'control.locl: unknown key; did you mean "local"?'),
+    ],
+)
+def test_what_is_wrong_with_the_table_is_told_with_all_else(
+    tmp_path: Path, table: str, fault: str
+) -> None:
+    with pytest.raises(PanelError) as caught:
+        panel_with(tmp_path, f'{table}\n[[interlock]]\nid = "a"\ntopic = "nowhere"\n')
+    assert fault in told(caught.value)
+    assert "interlock[0].topic" in told(caught.value)
+
+
+# Whatever they do, in whatever order.
+
+EVERYBODY = (ANN, BOB, CY, CELL, CELL2, NOBODY)
+WHO = st.sampled_from(EVERYBODY)
+SCRIPTED = st.booleans()
+SECONDS = st.floats(0, 45, allow_nan=False)
+
+
+class Everybody(RuleBasedStateMachine):
+    """Acts of six browsers in any order, beside a second book of who was heard of when."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.room = Room()
+        self.alive_until = dict.fromkeys(EVERYBODY, -math.inf)
+        self.wanted: set[str] = set()
+
+    def heard(self, who: Browser, life_s: float = LIFE_S) -> None:
+        self.alive_until[who] = max(self.alive_until[who], self.room.now + life_s)
+
+    @rule(seconds=SECONDS)
+    def time_passes(self, seconds: float) -> None:
+        self.room.now += seconds
+
+    @rule(who=WHO, scripted=SCRIPTED)
+    def take(self, who: Browser, scripted: bool) -> None:
+        life_s = LIFE_S if scripted else FORM_LIFE_S
+        before = self.room.control.holder
+        refusal = self.room.control.take(who, life_s)
+        self.heard(who, life_s)
+        self.wanted.add(who.id)
+        if before not in (None, who) and not who.local and who.id:
+            assert refusal == "control_taken"
+            assert self.room.control.holder == before
+
+    @rule(who=WHO, scripted=SCRIPTED)
+    def ask(self, who: Browser, scripted: bool) -> None:
+        life_s = LIFE_S if scripted else FORM_LIFE_S
+        before = self.room.control.holder
+        self.room.control.ask(who, life_s)
+        self.heard(who, life_s)
+        self.wanted.add(who.id)
+        if before not in (None, who) and not who.local:
+            assert self.room.control.holder == before
+
+    @rule(who=WHO, to=WHO)
+    def give(self, who: Browser, to: Browser) -> None:
+        before, asker = self.room.control.holder, self.room.control.asker
+        refusal = self.room.control.give(who, to.id)
+        granted = before == who and asker == to and bool(who.id)
+        assert (refusal == "") == granted
+        assert self.room.control.holder == (to if granted else before)
+
+    @rule(who=WHO, to=WHO)
+    def keep(self, who: Browser, to: Browser) -> None:
+        before = self.room.control.holder
+        if self.room.control.keep(who, to.id) == "":
+            assert before == who
+            assert self.room.control.asker is None
+            self.heard(who)
+        assert self.room.control.holder == before
+
+    @rule(who=WHO)
+    def release(self, who: Browser) -> None:
+        before, asker = self.room.control.holder, self.room.control.asker
+        if self.room.control.release(who) == "" and before == who:
+            assert self.room.control.holder == asker
+        else:
+            assert self.room.control.holder == before
+
+    @rule(who=WHO, touched=st.booleans())
+    def here(self, who: Browser, touched: bool) -> None:
+        self.room.control.here(who, touched)
+        self.heard(who)
+
+    @rule(who=WHO, by_hand=st.booleans())
+    def loads_a_page(self, who: Browser, by_hand: bool) -> None:
+        before = self.room.control.holder
+        self.room.control.loaded(who, FORM_LIFE_S, by_hand)
+        self.heard(who, FORM_LIFE_S)
+        if who.local:
+            self.wanted.add(who.id)
+        if before or not by_hand:
+            assert self.room.control.holder == before
+
+    @rule(who=WHO)
+    def presses(self, who: Browser) -> None:
+        before = self.room.control.holder
+        self.room.control.touch(who)
+        assert self.room.may(who) == (before == who)
+        assert self.room.control.holder == before
+        self.heard(who)
+
+    @precondition(lambda self: self.room.control.holder and self.room.control.asker)
+    @rule(touched=st.booleans())
+    def both_stay_for_the_time_of_a_takeover(self, touched: bool) -> None:
+        holder, asker = self.room.control.holder, self.room.control.asker
+        assert holder
+        assert asker
+        self.room.pass_s(TAKEOVER_S, holder, asker, touched=touched)
+        self.heard(holder)
+        self.heard(asker)
+        assert self.room.control.holder == (holder if touched else asker)
+
+    @rule()
+    def all_are_lost(self) -> None:
+        self.room.now += FORM_LIFE_S
+        assert (self.room.control.holder, self.room.control.asker) == (None, None)
+
+    @invariant()
+    def at_most_one_may_press(self) -> None:
+        holder = self.room.control.holder
+        assert [one for one in EVERYBODY if self.room.may(one)] == ([holder] if holder else [])
+        assert holder is None or holder.id
+
+    @invariant()
+    def nobody_absent_holds_or_asks(self) -> None:
+        for one in (self.room.control.holder, self.room.control.asker):
+            assert one is None or self.alive_until[one] > self.room.now
+
+    @invariant()
+    def nobody_gets_it_by_accident(self) -> None:
+        for one in (self.room.control.holder, self.room.control.asker):
+            assert one is None or one.id in self.wanted
+
+    @invariant()
+    def nobody_asks_for_what_is_free_or_own(self) -> None:
+        asker = self.room.control.asker
+        assert asker is None or self.room.control.holder not in (None, asker)
+
+    @invariant()
+    def what_time_will_change_is_known(self) -> None:
+        control = self.room.control
+        assert control.until > self.room.now
+        assert (control.until == math.inf) == (control.holder is None)
+
+    @invariant()
+    def the_view_says_the_same(self) -> None:
+        view, control = self.room.control.view(), self.room.control
+        assert view["holder"] == (control.holder.id if control.holder else "")
+        assert view["asker"] == (control.asker.id if control.asker else "")
+        roles = [self.room.role(one) for one in EVERYBODY]
+        assert sum(one in ("holding", "asked") for one in roles) == (control.holder is not None)
+
+
+TestEverybody = Everybody.TestCase
+TestEverybody.settings = settings(
+    max_examples=150, stateful_step_count=60, deadline=None, database=None, derandomize=True
+)

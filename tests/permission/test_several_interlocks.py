@@ -1,0 +1,293 @@
+"""Several interlocks of one control: all have to permit, the first reason shows, all are listed."""
+
+import signal
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, Final
+
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from app.panel.model import Panel
+from app.permission.clients import Browser as Visitor
+from app.permission.control_authority_view import NO_CONTROL, ControlView
+from app.permission.interlocks import PERMITTED, Verdict, combined, press_verdict
+from app.robot.state import Robot
+from app.view.view import as_seen_by, sight
+from tests.browser.test_pages import SIZES as LARGE
+from tests.commands.test_holds import JOG, MOVES, SPEED, STOPS
+from tests.commands.test_holds import Bench as HoldBench
+from tests.commands.test_presses import Bench as PressBench
+from tests.commands.test_presses import refused
+from tests.support.builders import (
+    BOOL,
+    FREE,
+    GUARDED,
+    MESSAGE,
+    NOW,
+    Table,
+    endpoint,
+    panel_of,
+    permits,
+    robot_there,
+    says,
+)
+from tests.support.parts import ROOT, Server, until
+
+DOORS: Final = "/doors_closed"
+AIR: Final = "/air"
+BOTH: Final = ["operation", "doors"]
+FURTHER: Final[list[Table]] = [
+    {"id": "doors", "label": "open doors", "topic": DOORS, "max_age_s": 5.0},
+    {"id": "air", "label": "Air", "topic": AIR, "type": "std_msgs/msg/Float64", "min": 5.0,
+     "unit": "bar"},
+]  # fmt: skip
+SIZES: Final = [*LARGE, (800, 480)]
+WAITS: Final = "Locked: waiting for /operation_enabled."
+FORBIDS: Final = "The robot does not permit operation."
+NO_DOORS: Final = "The robot does not permit open doors."
+
+
+def cell(*widgets: Table, **more: Any) -> Panel:
+    return panel_of(*(widgets or (MESSAGE, {**GUARDED, "interlock": BOTH})), further=FURTHER, **more)
+
+
+def closes(robot: Robot, closed: bool = True, at: float = NOW) -> None:
+    says(robot, DOORS, closed, BOOL, at=at)
+
+
+def verdict_of(robot: Robot, panel: Panel, now: float = NOW) -> Verdict:
+    (widget,) = panel.commands
+    return press_verdict(widget, panel.interlocks_of(widget), robot, now)
+
+
+@pytest.mark.parametrize("permitted", [True, False])
+@pytest.mark.parametrize("closed", [True, False])
+def test_all_have_to_permit(permitted: bool, closed: bool) -> None:
+    panel = cell()
+    robot = robot_there(panel)
+    permits(robot, permitted)
+    closes(robot, closed)
+    verdict = verdict_of(robot, panel)
+    reasons = [FORBIDS] * (not permitted) + [NO_DOORS] * (not closed)
+    assert verdict.permitted is (permitted and closed)
+    assert verdict.reasons == reasons
+    assert verdict.reason == (reasons[0] if reasons else None)
+
+
+def test_the_order_of_the_file_says_which_is_told_first() -> None:
+    panel = cell(MESSAGE, {**GUARDED, "interlock": ["doors", "operation"]})
+    robot = robot_there(panel)
+    permits(robot, False)
+    closes(robot, False)
+    assert verdict_of(robot, panel).reasons == [NO_DOORS, FORBIDS]
+
+
+def test_the_first_that_grows_old_ends_it() -> None:
+    panel = cell()
+    robot = robot_there(panel)
+    robot.settled_at = NOW - 10
+    permits(robot)
+    closes(robot)
+    assert verdict_of(robot, panel) == Verdict(True, until=NOW + 5)
+    assert verdict_of(robot, panel, NOW + 5).reasons == [
+        "Locked: the last /doors_closed is older than 5 s."
+    ]
+
+
+def test_one_reason_is_told_once() -> None:
+    locked = Verdict(False, "waiting", WAITS)
+    assert combined([locked, locked]).reasons == [WAITS]
+    assert combined([]) is combined([PERMITTED, PERMITTED]) is PERMITTED
+
+
+def test_without_a_way_nothing_else_is_told() -> None:
+    panel = cell()
+    robot = robot_there(panel)
+    robot.link_up = False
+    assert verdict_of(robot, panel).reasons == [
+        "No connection to the robot: its bridge can't be reached."
+    ]
+
+
+def test_what_is_against_the_command_itself_is_told_first() -> None:
+    panel = cell()
+    robot = robot_there(panel)
+    endpoint(robot, "MS", "/guarded", BOOL)
+    permits(robot, False)
+    closes(robot)
+    wrong, then = verdict_of(robot, panel).reasons
+    assert (wrong[:34], then) == ("/guarded is std_msgs/msg/Bool on t", FORBIDS)
+
+
+def test_a_view_lists_all_reasons_of_a_control_with_several() -> None:
+    one = {**FREE, "id": "single", "topic": "/single", "interlock": "operation"}
+    panel = cell(MESSAGE, {**GUARDED, "interlock": BOTH}, one)
+    robot = robot_there(panel)
+    closes(robot, False)
+    shown = sight(panel, robot, NOW).view["widgets"]
+    assert shown["guarded"] == {
+        "enabled": False, "reason": WAITS, "reasons": f"{WAITS}\n{NO_DOORS}", "more": "+1 more",
+    }  # fmt: skip
+    assert shown["single"] == {"enabled": False, "reason": WAITS}
+    permits(robot)
+    shown = sight(panel, robot, NOW).view["widgets"]
+    assert shown["guarded"]["reasons"] == shown["guarded"]["reason"] == NO_DOORS
+    closes(robot)
+    shown = sight(panel, robot, NOW).view["widgets"]
+    assert shown["guarded"] == {"enabled": True, "reason": None, "reasons": "", "more": ""}
+
+
+def test_who_has_not_control_is_told_that_alone() -> None:
+    panel = cell(control={"required": True})
+    robot = robot_there(panel)
+    control: ControlView = {**NO_CONTROL, "required": True, "text": "Nobody has control."}
+    view = as_seen_by(sight(panel, robot, NOW, control=control).view, Visitor("b", "", True, 1))
+    assert view["widgets"]["guarded"] == {
+        "enabled": False, "reason": "Nobody has control.", "reasons": "Nobody has control.", "more": "",
+    }  # fmt: skip
+    assert view["widgets"]["message"] == {}
+
+
+def test_a_link_that_locks_by_the_second_reason_says_so() -> None:
+    panel = cell()
+    robot = robot_there(panel)
+    permits(robot, False)
+    robot.follow_publishers()
+    link = sight(panel, robot, NOW).view["link"]["node"]
+    assert link["locks"] == "Locks Free."
+    endpoint(robot, "MP", DOORS, BOOL)
+    robot.follow_publishers()
+    link = sight(panel, robot, NOW).view["link"]["node"]
+    assert (link["locks"], link["reason"]) == ("Locks Free.", "Locked: waiting for /doors_closed.")
+
+
+def test_a_press_is_refused_by_the_second_one() -> None:
+    bench = PressBench(cell())
+    closes(bench.robot, False)
+    receipt = bench.press("guarded")
+    assert refused(bench, receipt) == ("interlock", f"Not sent: {NO_DOORS}")
+    closes(bench.robot)
+    assert bench.press("guarded", press_id="p2").outcome == "published"
+
+
+def test_a_hold_ends_by_the_second_one() -> None:
+    bench = HoldBench(panel=cell(SPEED, {**JOG, "interlock": BOTH}))
+    closes(bench.robot)
+    bench.begun()
+    bench.pending.append(lambda: closes(bench.robot, False, at=bench.loop.now))
+    bench.loop.pass_time(0.1)
+    assert bench.points == [MOVES, STOPS]
+    (receipt,) = bench.receipts
+    assert (receipt.outcome, NO_DOORS in receipt.reason) == ("aborted", True)
+    assert bench.refused() == ("interlock", NO_DOORS)
+
+
+PANEL: Final = """
+title = "Cell"
+[[interlock]]
+id = "operation"
+topic = "/operation_enabled"
+[[interlock]]
+id = "doors"
+label = "open doors"
+topic = "/doors_closed"
+[[interlock]]
+id = "air"
+topic = "/air"
+type = "std_msgs/msg/Float64"
+min = 5
+[[page]]
+id = "one"
+title = "One"
+[[page.widget]]
+id = "several"
+kind = "publish"
+label = "Several"
+topic = "/several"
+type = "std_msgs/msg/Empty"
+message = {}
+interlock = ["operation", "doors", "air"]
+[[page.widget]]
+id = "single"
+kind = "publish"
+label = "Single"
+topic = "/single"
+type = "std_msgs/msg/Empty"
+message = {}
+interlock = "operation"
+[[page.widget]]
+id = "below"
+kind = "publish"
+label = "Below"
+topic = "/below"
+type = "std_msgs/msg/Empty"
+message = {}
+span = 12
+"""
+NO_AIR: Final = "Locked: waiting for /air."
+
+
+@pytest.fixture(scope="module")
+def kiosk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    """On the robot that it simulates, which says that operation is enabled and nothing of the rest."""
+    panel = tmp_path_factory.mktemp("panel") / "cell.toml"
+    panel.write_text(PANEL)
+    mine = Server(ROOT, KIOSK_PANEL=str(panel), KIOSK_MODE="demo")
+    until(lambda: mine.widget("single")["enabled"], "operation is enabled", within_s=30)
+    yield mine
+    mine.end()
+
+
+@pytest.mark.parametrize("scripts", [True, False])
+@pytest.mark.parametrize("size", SIZES)
+def test_an_operator_with_gloves_reads_all_reasons(
+    kiosk: Server, chromium: Browser, size: tuple[int, int], scripts: bool
+) -> None:
+    width, height = size
+    context = chromium.new_context(
+        viewport={"width": width, "height": height}, java_script_enabled=scripts, has_touch=True
+    )
+    page = context.new_page()
+    page.goto(kiosk.url)
+    button = page.get_by_role("button", name="Several", exact=True)
+    why, listed = page.locator("#why-several"), page.locator("#reasons-several")
+    expect(button).to_be_disabled()
+    expect(why).to_contain_text("Locked: waiting for /doors_closed.")
+    expect(why).to_contain_text("+1 more")
+    expect(listed).to_be_hidden()
+    described = (button.get_attribute("aria-describedby") or "").split()
+    assert {"why-several", "reasons-several"} <= set(described)
+    below = page.locator('[data-widget="below"]').bounding_box()
+    target = why.bounding_box()
+    assert target is not None
+    assert target["height"] * 0.22 >= 14  # millimetres
+    why.tap()
+    expect(listed.locator("p")).to_have_text(f"Locked: waiting for /doors_closed.\n{NO_AIR}")
+    expect(listed).to_be_in_viewport()
+    assert page.locator('[data-widget="below"]').bounding_box() == below  # it moves nothing
+    why.tap()
+    expect(listed).to_be_hidden()
+    context.close()
+
+
+def test_a_page_without_its_server_tells_that_alone(
+    page: Page, servers: Callable[[Server], Server], tmp_path: Path
+) -> None:
+    panel = tmp_path / "cell.toml"
+    panel.write_text(PANEL)
+    mine = servers(Server(ROOT, KIOSK_PANEL=str(panel), KIOSK_MODE="demo"))
+    until(lambda: mine.widget("single")["enabled"], "operation is enabled", within_s=30)
+    page.goto(mine.url)
+    why = page.locator("#why-several")
+    expect(why).to_contain_text("+1 more")
+    why.click()
+    mine.process.send(signal.SIGSTOP)
+    try:
+        lost = "There is no connection to the panel's server."
+        expect(why).to_contain_text(lost)
+        expect(why.locator("b")).to_have_text("")
+        expect(page.locator("#reasons-several p")).to_have_text(lost)
+    finally:
+        mine.process.send(signal.SIGCONT)
+    expect(why).to_contain_text("+1 more")

@@ -1,0 +1,76 @@
+"""What the server listens on is found, and what it accepts keeps little unread."""
+
+import asyncio
+import socket
+from contextlib import suppress
+
+import pytest
+
+from app.process import listen_sockets
+from app.process.listen_sockets import GONE_AFTER_MS, SEND_BUFFER
+
+
+def accepted(listening: socket.socket) -> int:
+    """The send buffer of a connection to it."""
+    with socket.create_connection(listening.getsockname()), listening.accept()[0] as one:
+        return one.getsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF)
+
+
+def test_a_listening_socket_is_found_and_no_other() -> None:
+    before = listen_sockets.names()
+    with socket.create_server(("127.0.0.1", 0)) as one:
+        (found,) = listen_sockets.names() - before
+        with socket.create_connection(one.getsockname()):
+            assert listen_sockets.names() == before | {found}
+    assert listen_sockets.names() == before
+
+
+def test_who_waits_for_it_is_told_when_it_listens() -> None:
+    async def work() -> None:
+        waiting = asyncio.create_task(listen_sockets.listening(listen_sockets.names()))
+        await asyncio.sleep(0)
+        assert not waiting.done()
+        with socket.create_server(("127.0.0.1", 0)):
+            await asyncio.wait_for(waiting, 4)
+
+    asyncio.run(work())
+
+
+def test_what_listens_from_now_on_is_narrowed_and_what_listened_before_is_not() -> None:
+    async def work() -> None:
+        with socket.create_server(("127.0.0.1", 0)) as old:
+            wide = accepted(old)
+            ports: set[int] = set()
+            narrowing = asyncio.create_task(listen_sockets.narrow(ports))
+            await asyncio.sleep(0)
+            with socket.create_server(("127.0.0.1", 0)) as new:
+                assert await asyncio.wait_for(narrowing, 4) == [new.getsockname()]
+                assert ports == {new.getsockname()[1]}
+                assert accepted(new) == 2 * SEND_BUFFER < wide
+                assert accepted(old) == wide
+                gone = (socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT)
+                assert (new.getsockopt(*gone), old.getsockopt(*gone)) == (GONE_AFTER_MS, 0)
+
+    asyncio.run(work())
+
+
+def test_who_reads_nothing_is_cut_off_and_who_has_read_all_is_not() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        port = listening.getsockname()[1]
+        with (
+            socket.create_connection(("127.0.0.1", port)) as deaf,
+            listening.accept()[0] as stuck,
+            socket.create_connection(("127.0.0.1", port)) as _,
+            listening.accept()[0] as idle,
+        ):
+            stuck.setblocking(False)
+            with suppress(BlockingIOError):
+                while stuck.send(bytes(65_536)):
+                    pass
+            listen_sockets.hang_up({port + 1})
+            assert listen_sockets.unsent(stuck)
+            listen_sockets.hang_up({port})
+            with pytest.raises(BrokenPipeError):
+                stuck.send(b"more")
+            assert idle.send(b"still there") == 11
+            assert deaf.fileno() > 0

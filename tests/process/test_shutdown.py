@@ -1,0 +1,104 @@
+"""The first signal waits for what has to be told; no other one takes its place, but a second Ctrl+C."""
+
+import asyncio
+import faulthandler
+import logging
+import signal
+from collections.abc import Iterator
+from contextlib import ExitStack
+from types import FrameType
+from typing import Final
+
+import pytest
+
+from app.process.shutdown import in_order
+
+SOON_S: Final = 0.05
+INT, TERM, HUP = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
+
+
+@pytest.fixture
+def heard() -> Iterator[list[int]]:
+    """What a listener of before hears."""
+    signals: list[int] = []
+
+    def listener(number: int, frame: FrameType | None) -> None:
+        signals.append(number)
+
+    before = {n: signal.signal(n, listener) for n in (INT, TERM)} | {
+        HUP: signal.signal(HUP, signal.SIG_DFL)
+    }
+    yield signals
+    assert signal.getsignal(TERM) is listener
+    for number, handler in before.items():
+        signal.signal(number, handler)
+    faulthandler.cancel_dump_traceback_later()
+
+
+class Told:
+    """A process that was told to end, and has not told all yet."""
+
+    def __init__(self) -> None:
+        self.ending, self.may_end = asyncio.Event(), asyncio.Event()
+
+    async def end(self) -> None:
+        self.ending.set()
+        await self.may_end.wait()
+
+    async def by(self, number: signal.Signals, stack: ExitStack) -> None:
+        stack.enter_context(in_order(asyncio.get_running_loop(), self.end))
+        signal.raise_signal(number)
+        async with asyncio.timeout(1):
+            await self.ending.wait()
+
+    async def ended(self) -> None:
+        self.may_end.set()
+        await asyncio.sleep(SOON_S)
+
+
+@pytest.mark.parametrize(("by", "later"), [(TERM, TERM), (INT, TERM), (HUP, HUP), (HUP, TERM)])
+def test_who_listened_is_told_after_it_and_once(
+    heard: list[int], by: signal.Signals, later: signal.Signals
+) -> None:
+    async def run() -> None:
+        told = Told()
+        with ExitStack() as stack:
+            await told.by(by, stack)
+            signal.raise_signal(later)
+            assert heard == []
+            await told.ended()
+
+    asyncio.run(run())
+    assert heard == [INT if by is INT else TERM]
+
+
+def test_a_second_interrupt_waits_for_nothing_and_a_third_one_is_passed_on(heard: list[int]) -> None:
+    async def run() -> None:
+        told = Told()
+        with ExitStack() as stack:
+            await told.by(INT, stack)
+            signal.raise_signal(INT)
+            assert heard == [INT]
+            await told.ended()
+            assert heard == [INT]
+            signal.raise_signal(INT)
+
+    asyncio.run(run())
+    assert heard == [INT, INT]
+
+
+def test_what_fails_in_it_is_logged_and_keeps_nobody(
+    heard: list[int], caplog: pytest.LogCaptureFixture
+) -> None:
+    async def fail() -> None:
+        raise ValueError("a fault")
+
+    async def run() -> None:
+        with in_order(asyncio.get_running_loop(), fail):
+            signal.raise_signal(TERM)
+            await asyncio.sleep(SOON_S)
+
+    with caplog.at_level(logging.ERROR, "kiosk"):
+        asyncio.run(run())
+    assert heard == [TERM]
+    assert "a fault" in caplog.text

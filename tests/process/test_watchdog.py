@@ -1,0 +1,203 @@
+"""What the service manager is told, on a real socket of its protocol, by the real server."""
+
+import asyncio
+import os
+import signal
+import socket
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from itertools import pairwise
+from pathlib import Path
+
+import httpx
+import pytest
+
+from app.process.sd_notify import Manager, status
+from app.process.watchdog import Watchdog
+from tests.support.parts import ROOT, Process, Server, free_port, live, until
+
+INTERVAL_S = 1.0
+WATCHED = {"WATCHDOG_USEC": str(int(INTERVAL_S * 1e6))}
+
+# A Zenoh callback that never comes back, and has the link's lock: what the watchdog is for.
+STANDS_STILL = """
+import signal, sys, threading, time, uvicorn
+from app.main import app
+
+def link_stands_still(*_):
+    app.state.site.fleet.first.link._inbox._wake_loop = lambda _: threading.Event().wait()
+
+def loop_stands_still(*_):
+    time.sleep(60)
+
+signal.signal(signal.SIGUSR1, link_stands_still)
+signal.signal(signal.SIGUSR2, loop_stands_still)
+uvicorn.run(app, port=int(sys.argv[1]))
+"""
+
+
+class Listener:
+    """The service manager's end of the socket."""
+
+    def __init__(self, address: str) -> None:
+        self.address = address
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        self._socket.bind("\0" + address[1:] if address.startswith("@") else address)
+
+    def next(self, timeout_s: float = 10.0) -> dict[str, str]:
+        """The next message by its names; TimeoutError when none comes."""
+        self._socket.settimeout(timeout_s)
+        text = self._socket.recv(4096).decode()
+        return dict(line.split("=", 1) for line in text.split("\n"))
+
+    def until(self, name: str) -> dict[str, str]:
+        """The next message with this name."""
+        end = time.monotonic() + 20
+        while time.monotonic() < end:
+            if name in (told := self.next()):
+                return told
+        raise AssertionError(f"no {name}")
+
+    def silent_for(self, name: str, seconds: float) -> bool:
+        """Whether this name does not come for so long."""
+        end = time.monotonic() + seconds
+        while (left := end - time.monotonic()) > 0:
+            with suppress(TimeoutError):
+                if name in self.next(left):
+                    return False
+        return True
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+def ready(listener: Listener) -> bool:
+    return listener.next(20).get("STATUS", "").startswith("Ready")
+
+
+@pytest.fixture(params=["path", "abstract"])
+def address(request: pytest.FixtureRequest, tmp_path: Path) -> str:
+    return f"@kiosk-test-{os.getpid()}" if request.param == "abstract" else str(tmp_path / "notify")
+
+
+@pytest.fixture
+def listener(tmp_path: Path) -> Iterator[Listener]:
+    mine = Listener(str(tmp_path / "notify"))
+    yield mine
+    mine.close()
+
+
+def test_it_tells_ready_when_it_serves_then_how_it_is_and_that_it_ends(address: str) -> None:
+    manager = Listener(address)
+    port = free_port()
+    command = [sys.executable, "-m", "uvicorn", "app.main:app", "--port", str(port)]
+    process = Process(command, {"NOTIFY_SOCKET": address, **WATCHED, "PYTHONPATH": ""}, cwd=ROOT)
+    try:
+        assert manager.next(20) == {"READY": "1"}
+        answer = httpx.get(f"http://127.0.0.1:{port}/healthz", trust_env=False)
+        assert answer.status_code == 200  # the first request, at once
+        times = []
+        for _ in range(5):
+            told = manager.until("WATCHDOG")
+            times.append(time.monotonic())
+            assert "STATUS" in told
+        assert max(later - earlier for earlier, later in pairwise(times)) < INTERVAL_S
+        until(lambda: ready(manager), "the state in words", within_s=30)
+        process.send(signal.SIGTERM)
+        assert manager.until("STOPPING")["STATUS"] == "Stopping."
+    finally:
+        process.end()
+        manager.close()
+
+
+@pytest.fixture
+def wounded(listener: Listener) -> Iterator[tuple[Process, httpx.Client]]:
+    """A server that a signal makes stand still."""
+    port = free_port()
+    env = {"NOTIFY_SOCKET": listener.address, **WATCHED, "PYTHONPATH": str(ROOT)}
+    process = Process([sys.executable, "-c", STANDS_STILL, str(port)], env, cwd=ROOT)
+    try:
+        with httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=2, trust_env=False) as http:
+            until(lambda: ready(listener), "it is well", within_s=30)
+            yield process, http
+    finally:
+        process.kill()
+
+
+def test_no_ping_while_a_callback_holds_the_links_lock(
+    listener: Listener, wounded: tuple[Process, httpx.Client]
+) -> None:
+    process, http = wounded
+    process.send(signal.SIGUSR1)
+    until(lambda: "stands still" in listener.next()["STATUS"], "it is told")
+    assert listener.silent_for("WATCHDOG", 2 * INTERVAL_S)
+    assert http.get("/healthz").status_code == 200
+    assert process.text.count("[FATAL]") == 1
+    assert "The Zenoh link of Robot stands still" in process.text
+
+
+def test_no_ping_while_the_event_loop_stands_still(
+    listener: Listener, wounded: tuple[Process, httpx.Client]
+) -> None:
+    process, _ = wounded
+    process.send(signal.SIGUSR2)
+    listener.silent_for("WATCHDOG", 0.1)  # one may have been sent before
+    assert listener.silent_for("WATCHDOG", 2 * INTERVAL_S)
+
+
+def test_a_robot_that_is_away_is_no_failure_of_the_server(
+    listener: Listener, tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    nowhere = f"tcp/127.0.0.1:{free_port()}"
+    servers(live(nowhere, tmp_path, NOTIFY_SOCKET=listener.address, WATCHDOG_USEC="600000"))
+    for _ in range(5):
+        assert "No connection to the robot" in listener.until("WATCHDOG")["STATUS"]
+
+
+def test_without_a_watchdog_nothing_is_pinged(
+    listener: Listener, servers: Callable[[Server], Server]
+) -> None:
+    servers(Server(ROOT, NOTIFY_SOCKET=listener.address))
+    assert listener.next() == {"READY": "1"}
+    assert set(listener.next()) == {"STATUS"}
+
+
+# The protocol's corners.
+
+
+@pytest.mark.parametrize(
+    ("env", "interval_s"),
+    [
+        ({"WATCHDOG_USEC": "3000000"}, 3.0),
+        ({"WATCHDOG_USEC": "3000000", "WATCHDOG_PID": str(os.getpid())}, 3.0),
+        ({"WATCHDOG_USEC": "3000000", "WATCHDOG_PID": "1"}, None),
+        ({"WATCHDOG_USEC": "soon"}, None),
+        ({"WATCHDOG_USEC": "0"}, None),
+        ({}, None),
+    ],
+)
+def test_the_interval_is_this_processs_own(env: dict[str, str], interval_s: float | None) -> None:
+    assert Manager({"NOTIFY_SOCKET": "/run/x", **env}).interval_s == interval_s
+    assert Manager(env).interval_s is None
+
+
+def test_a_manager_that_does_not_listen_is_told_of_once(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    manager = Manager({"NOTIFY_SOCKET": str(tmp_path / "nobody")})
+    manager.tell("READY=1")
+    manager.tell("WATCHDOG=1")
+    assert len(caplog.records) == 1
+    assert not Manager({"NOTIFY_SOCKET": "vsock:2:1"}).listens
+    assert not Manager({}).listens
+
+
+def test_a_state_is_one_line() -> None:
+    assert status("r1: ready\nr2:  lost") == "STATUS=r1: ready r2: lost"
+    assert len(status("x" * 10_000)) < 4096
+
+
+def test_nothing_runs_where_nobody_asked() -> None:
+    asyncio.run(asyncio.wait_for(Watchdog(Manager({}), lambda: (), lambda: "").run(), 1))

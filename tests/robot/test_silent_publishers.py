@@ -1,0 +1,260 @@
+"""A publisher of a permission that appears and says nothing: what was said before is a doubt."""
+
+import asyncio
+import logging
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+
+import pytest
+
+from app.commands.actions.goals import Actions
+from app.commands.confirmations import Confirmations
+from app.commands.parameters.sync import Parameters
+from app.commands.service_calls import Calls
+from app.dialect.bridge_dialect import token
+from app.dialect.endpoint import Endpoint
+from app.interfaces.names import Qos
+from app.permission.interlocks import Verdict, interlock_verdict
+from app.robot.silent_publishers import BEFORE_LATCHED_S, BEFORE_S, SilentPublishers
+from app.robot.state import Robot
+from app.ros_logging import RobotLog
+from app.runtime.ingest import Intake
+from app.transport.inbox import Inbox
+from app.view.view import Enabled
+from tests.support.builders import (
+    BOOL,
+    BRIDGE,
+    ENABLED,
+    INTERFACES,
+    KIOSK,
+    Nobody,
+    robot_there,
+    small_panel,
+)
+
+KEY = ENABLED[1:]
+OTHER = "b2"
+TRUE, FALSE = b"\0\1\0\0\1", b"\0\1\0\0\0"
+PUBLISHER = Endpoint(BRIDGE, "MP", KEY, BOOL)
+SHOWN: dict[str, Enabled] = {"operation": {"enabled": False, "reason": None}}
+
+
+@pytest.fixture
+def known() -> SilentPublishers:
+    return SilentPublishers([KEY])
+
+
+def silent(known: SilentPublishers, *bridges: str) -> bool:
+    return known.any(KEY, bridges or [BRIDGE])
+
+
+def test_a_publisher_that_appears_and_says_nothing_is_silent(known: SilentPublishers) -> None:
+    known.message(KEY, BRIDGE, 1, 0.0)
+    known.appeared(PUBLISHER, 2, 10.0)
+    assert silent(known)
+    known.message(KEY, BRIDGE, 3, 10.1)
+    assert not silent(known)
+
+
+def test_one_that_came_and_went_silent_leaves_a_doubt(known: SilentPublishers) -> None:
+    known.message(KEY, BRIDGE, 1, 0.0)
+    known.appeared(PUBLISHER, 2, 10.0)
+    known.lost(PUBLISHER, 3)
+    assert silent(known)
+
+
+@pytest.mark.parametrize(
+    ("latched", "before_s", "is_silent"),
+    [
+        (False, 0.0, False),
+        (False, BEFORE_S, False),
+        (False, BEFORE_S + 0.1, True),
+        (True, BEFORE_S + 0.1, False),  # it loses nothing, and says nothing twice
+        (True, BEFORE_LATCHED_S + 0.1, True),
+    ],
+)
+def test_a_message_just_before_its_publisher_appears_is_its_own(
+    known: SilentPublishers, latched: bool, before_s: float, is_silent: bool
+) -> None:
+    known.message(KEY, BRIDGE, 1, 10.0)
+    known.appeared(replace(PUBLISHER, transient_local=latched), 2, 10.0 + before_s)
+    assert silent(known) is is_silent
+
+
+def test_a_message_is_one_publishers_own(known: SilentPublishers) -> None:
+    known.message(KEY, BRIDGE, 1, 10.0)
+    known.appeared(PUBLISHER, 2, 10.05)
+    known.lost(PUBLISHER, 3)
+    known.appeared(PUBLISHER, 4, 10.1)
+    assert silent(known)
+
+
+def test_a_message_of_one_that_was_there_is_not_the_next_ones(known: SilentPublishers) -> None:
+    known.appeared(PUBLISHER, 1, 10.0)
+    known.message(KEY, BRIDGE, 2, 10.1)
+    known.lost(PUBLISHER, 3)
+    known.appeared(PUBLISHER, 4, 10.2)
+    assert silent(known)
+
+
+def test_a_message_counts_that_was_taken_in_before_the_token_that_came_before_it(
+    known: SilentPublishers,
+) -> None:
+    known.message(KEY, BRIDGE, 5, 99.0)
+    known.appeared(PUBLISHER, 4, 10.0)
+    assert not silent(known)
+
+
+def test_only_the_bridge_of_the_publisher_can_bring_its_message(known: SilentPublishers) -> None:
+    known.message(KEY, OTHER, 1, 10.0)
+    known.appeared(PUBLISHER, 2, 10.0)
+    known.message(KEY, OTHER, 3, 10.1)
+    assert silent(known)
+    assert not silent(known, OTHER)
+    known.message(KEY, None, 4, 10.2)  # a bridge that does not say who it is
+    assert not silent(known)
+
+
+def test_a_bridge_that_goes_leaves_its_doubt_to_the_next_message(known: SilentPublishers) -> None:
+    known.message(KEY, OTHER, 1, 0.0)
+    known.appeared(PUBLISHER, 2, 10.0)
+    known.lose_bridge(BRIDGE)
+    assert silent(known, OTHER)
+    known.message(KEY, OTHER, 3, 10.1)
+    assert not silent(known, OTHER)
+
+
+def test_other_topics_and_what_is_no_publisher_are_passed_over(known: SilentPublishers) -> None:
+    known.appeared(Endpoint(BRIDGE, "MP", "heard", BOOL), 1, 10.0)
+    known.appeared(Endpoint(BRIDGE, "MS", KEY, BOOL), 2, 10.0)
+    known.appeared(Endpoint(BRIDGE), 3, 10.0)
+    known.message("heard", BRIDGE, 4, 10.0)
+    known.lost(Endpoint(BRIDGE, "MS", KEY, BOOL), 5)
+    assert not silent(known)
+    assert not known.any("heard", [BRIDGE])
+
+
+@dataclass
+class Incoming:
+    """What comes by the link, and what an interlock makes of it."""
+
+    inbox: Inbox
+    intake: Intake
+    robot: Robot
+
+    def says(self, payload: bytes) -> None:
+        self.inbox.put(KEY, payload, Stamp())
+
+    def publisher(self, alive: bool, zid: str = BRIDGE) -> None:
+        self.inbox.token(token(zid, "MP", KEY, BOOL, Qos(), INTERFACES.type_hash(BOOL)), alive)
+
+    @property
+    def verdict(self) -> Verdict:
+        self.intake.take(self.inbox.drain(), lambda: SHOWN, lambda: None)
+        (interlock,) = small_panel().interlocks
+        return interlock_verdict(interlock, self.robot, 1e9)
+
+
+class Stamp:
+    def get_id(self) -> str:
+        return BRIDGE
+
+    def get_time(self) -> datetime:
+        return datetime.fromtimestamp(0, UTC)
+
+
+@pytest.fixture
+def incoming() -> Iterator[Incoming]:
+    with asyncio.Runner() as runner:  # some parts need a loop to be made on
+        yield runner.run(made())
+
+
+async def made() -> Incoming:
+    panel, nobody = small_panel(), Nobody()
+    robot = robot_there(panel)
+    calls = Calls(INTERFACES, robot, nobody, lambda: None)
+    inbox = Inbox(lambda _: None)
+    inbox.expect([], [KEY], [])
+    intake = Intake(
+        panel,
+        robot,
+        Actions(INTERFACES, robot, nobody, lambda: None),
+        Confirmations(robot, lambda: None),
+        Parameters(panel, INTERFACES, robot, nobody, calls, lambda: None),
+        None,
+        RobotLog(logging.getLogger("test"), ""),
+    )
+    return Incoming(inbox, intake, robot)
+
+
+Event = Callable[[Incoming], None]
+
+
+def true(incoming: Incoming) -> None:
+    incoming.says(TRUE)
+
+
+def false(incoming: Incoming) -> None:
+    incoming.says(FALSE)
+
+
+def appears(incoming: Incoming) -> None:
+    incoming.publisher(True)
+
+
+def goes(incoming: Incoming) -> None:
+    incoming.publisher(False)
+
+
+def looked(incoming: Incoming) -> None:
+    assert incoming.verdict
+
+
+ORDERS: list[tuple[tuple[Event, ...], str]] = [
+    ((true, appears), "permitted"),
+    ((appears, true), "permitted"),
+    ((true, appears, goes), "permitted"),
+    ((true, appears, goes, appears), "new_publisher"),
+    ((true, appears, goes, appears, goes), "new_publisher"),
+    ((true, appears, goes, true, appears), "permitted"),
+    ((true, appears, goes, false, appears), "forbidden"),
+    ((true, appears, goes, appears, false), "forbidden"),
+    ((true, appears, goes, appears, true), "permitted"),
+    ((appears, true, goes, appears), "new_publisher"),
+    ((appears, goes), "waiting"),
+    ((true, appears, appears), "permitted"),  # told twice
+]
+
+
+@pytest.mark.parametrize(("events", "code"), ORDERS)
+@pytest.mark.parametrize("look", ["at_the_end", "each_time"])
+def test_a_permission_in_each_order_of_tokens_and_messages(
+    incoming: Incoming, events: tuple[Event, ...], code: str, look: str
+) -> None:
+    for event in events:
+        event(incoming)
+        if look == "each_time":
+            looked(incoming)
+    assert incoming.verdict.code == code
+
+
+def test_the_reason_names_the_topic(incoming: Incoming) -> None:
+    for event in (true, appears, goes, appears):
+        event(incoming)
+    assert incoming.verdict.reason == f"A new publisher of {ENABLED} has not said anything yet."
+
+
+def test_a_new_session_starts_without_the_doubts_of_the_last(incoming: Incoming) -> None:
+    for event in (true, appears, goes, appears, looked):
+        event(incoming)
+    incoming.robot.lose()
+    assert not incoming.robot.silent.any(KEY, [BRIDGE])
+
+
+def test_the_panels_own_publisher_is_none_of_the_robots(incoming: Incoming) -> None:
+    true(incoming)
+    looked(incoming)
+    incoming.publisher(True, KIOSK)
+    incoming.publisher(False, KIOSK)
+    assert incoming.verdict.permitted

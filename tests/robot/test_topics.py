@@ -1,0 +1,303 @@
+"""What is large is read in slices: nothing waits for it, nothing is permitted by a part of it, the
+newest counts, and what came while another one was read is read too."""
+
+import asyncio
+import time
+from collections.abc import Callable, Coroutine
+from typing import Any, Final
+
+import pytest
+
+from app.errors import DecodeError
+from app.panel.model import Panel
+from app.permission.interlocks import interlock_verdict
+from app.robot.slices import Slices
+from app.robot.state import Reading, Robot, Sample
+from app.robot.topics import UNREAD_MOST
+from app.view.view import sight
+from tests.support.builders import (
+    BRIDGE,
+    ENABLED,
+    FREE,
+    HEARD,
+    INTERFACES,
+    KIOSK,
+    MESSAGE,
+    NOW,
+    Table,
+    panel_of,
+)
+from tests.support.large import KINDS, LITTLE, TEN_MB, diagnostics, garbage
+
+LONGEST_TURN_S: Final = 0.05
+DIAGNOSTICS: Final = "diagnostic_msgs/msg/DiagnosticArray"
+SIZE: Final = 200_000  # of a message that takes several turns of a clock that runs fast
+LEVEL: Final[Table] = {
+    "type": DIAGNOSTICS, "field": "status[name=drive].level", "max": 1,
+}  # fmt: skip
+SHOWN: Final[Table] = {**HEARD, "type": DIAGNOSTICS, "field": "status[name=drive].level"}
+CONFIRM: Final[Table] = {
+    "topic": "/heard", "type": DIAGNOSTICS, "field": "status[name=drive].level", "equals": 1,
+}  # fmt: skip
+
+
+class Clock:
+    """Ten milliseconds pass with every look at it."""
+
+    def __init__(self) -> None:
+        self.now = NOW
+
+    def __call__(self) -> float:
+        self.now += 0.01
+        return self.now
+
+
+class Cell:
+    """A robot that is there, whose large messages take several turns."""
+
+    def __init__(self, *widgets: Table, interlock: Table = LEVEL) -> None:
+        self.panel: Panel = panel_of(*(widgets or (MESSAGE, FREE, SHOWN)), interlock=interlock)
+        self.robot = Robot(self.panel, INTERFACES, KIOSK, None, Slices(Clock()))
+        self.robot.link_up, self.robot.settled_at = True, 0.0
+        self.robot.graph.apply(f"@/{BRIDGE}/@ros2_lv", True)
+        self.read: list[tuple[str, Any]] = []
+        self.robot.read_later = self._read_later
+        self._seq = 0
+
+    def _read_later(self, key: str, reading: Reading) -> None:
+        self.read.append((key, reading.value("status[name=drive].level")))
+
+    def says(self, level: int | None, topic: str = ENABLED, size: int = SIZE) -> None:
+        """A large message; None is one that is no message, which shows at its end."""
+        self._seq += 1
+        data = diagnostics(size, b"drive").data
+        assert data.count(b"drive\0") == 1
+        data = bytes(data) if level is None else _with_level(data, level)
+        data += bytes(8) if level is None else b""
+        self.robot.take(self.robot.key(topic), Sample(data, self._seq, NOW, NOW, BRIDGE))
+
+    @property
+    def locked_by(self) -> str:
+        return interlock_verdict(self.panel.interlocks[0], self.robot, NOW).code
+
+    @property
+    def shown(self) -> tuple[str, str]:
+        view = sight(self.panel, self.robot, NOW).view["widgets"]["heard"]
+        return view["state"], view["text"]
+
+    async def all_read(self, topic: str = ENABLED) -> None:
+        async with asyncio.timeout(20):
+            while self.robot.reading(topic).status == "reading":
+                await asyncio.sleep(0)
+
+
+def _with_level(data: bytes, level: int) -> bytes:
+    at = data.index(b"\6\0\0\0drive\0") - 4
+    return data[:at] + bytes([level]) + data[at + 1 :]
+
+
+def run(test: Callable[[], Coroutine[Any, Any, None]]) -> None:
+    asyncio.run(test())
+
+
+def test_until_it_is_read_it_permits_nothing_and_then_as_it_says() -> None:
+    async def test() -> None:
+        cell = Cell()
+        cell.says(0)
+        assert cell.locked_by == "reading"
+        await asyncio.sleep(0)
+        assert cell.locked_by == "reading"  # a part of it was read
+        await cell.all_read()
+        assert cell.locked_by == "permitted"
+        cell.says(2)
+        assert cell.locked_by == "reading"  # what was said before is not so any more
+        await cell.all_read()
+        assert cell.locked_by == "unmet"
+        assert cell.read == [("operation_enabled", 0), ("operation_enabled", 2)]
+
+    run(test)
+
+
+def test_what_is_small_is_read_at_once_though_something_large_is_read() -> None:
+    async def test() -> None:
+        cell = Cell()
+        cell.says(0, "/heard")
+        cell.robot.reading("/heard")
+        cell.says(0, size=1000)
+        assert cell.locked_by == "permitted"
+        cell.says(2, size=1000)
+        assert cell.locked_by == "unmet"
+
+    run(test)
+
+
+def test_what_can_not_be_read_to_its_end_locks() -> None:
+    async def test() -> None:
+        cell = Cell()
+        cell.says(None)
+        assert cell.locked_by == "reading"
+        await cell.all_read()
+        assert cell.locked_by == "unreadable"
+        assert cell.robot.undecodable == {"operation_enabled": 1}
+
+    run(test)
+
+
+def test_a_small_message_behind_a_large_one_is_the_newest() -> None:
+    async def test() -> None:
+        for levels in ((0, 2), (2, 0)):
+            cell = Cell()
+            cell.says(levels[0])
+            assert cell.locked_by == "reading"
+            cell.says(levels[1], size=1000)
+            assert cell.locked_by == "reading"
+            await cell.all_read()
+            assert cell.locked_by == ("unmet" if levels[1] else "permitted")
+
+    run(test)
+
+
+def test_a_readout_shows_what_was_said_before_until_the_newest_is_read() -> None:
+    async def test() -> None:
+        cell = Cell()
+        cell.says(0, "/heard")
+        assert cell.shown == ("waiting", "—")
+        await cell.all_read("/heard")
+        assert cell.shown == ("live", "0")
+        for level in (1, 2, 3):  # the ones between are passed over
+            cell.says(level, "/heard")
+            assert cell.shown == ("live", "0")
+        await cell.all_read("/heard")
+        assert cell.shown == ("live", "3")
+        assert [value for _, value in cell.read] == [0, 1, 3]
+
+    run(test)
+
+
+def test_of_a_watched_topic_each_is_read_in_its_order() -> None:
+    async def test() -> None:
+        cell = Cell(MESSAGE, {**FREE, "confirm": CONFIRM})
+        for level in range(5):
+            cell.says(level, "/heard")
+            cell.robot.reading("/heard")
+        await cell.all_read("/heard")
+        assert [value for _, value in cell.read] == [0, 1, 2, 3, 4]
+        for level in range(3 * UNREAD_MOST):
+            cell.says(level, "/heard")
+            cell.robot.reading("/heard")
+        await cell.all_read("/heard")
+        found = [value for _, value in cell.read][5:]
+        assert found == [0, *range(2 * UNREAD_MOST, 3 * UNREAD_MOST)]
+
+    run(test)
+
+
+@pytest.mark.parametrize("how", ["cut", "lose", "doubt"])
+def test_what_was_being_read_when_it_stopped_to_count_never_counts(how: str) -> None:
+    async def test() -> None:
+        cell = Cell()
+        cell.says(0)
+        assert cell.locked_by == "reading"
+        if how == "cut":
+            cell.robot.cut(BRIDGE, 99)
+        elif how == "doubt":
+            cell.robot.doubt("operation_enabled")
+        else:
+            cell.robot.lose()
+        for _ in range(1000):
+            await asyncio.sleep(0)
+        assert cell.robot.reading(ENABLED).status == "cut"
+        assert cell.robot.reading(ENABLED).value("status[name=drive].level") is None
+        assert cell.read == []
+
+    run(test)
+
+
+# How long a turn of the loop takes, by the processor's time: another program may stop this one.
+
+
+async def longest_turn(work: Callable[[], bool]) -> float:
+    """Calls `work` each turn until it is through; the longest time between two turns."""
+    longest, before = 0.0, time.thread_time()
+    through = False
+    async with asyncio.timeout(120):
+        while not through:
+            through = work()
+            await asyncio.sleep(0)
+            now = time.thread_time()
+            longest, before = max(longest, now - before), now
+    return longest
+
+
+@pytest.mark.parametrize("kind", list(KINDS))
+def test_ten_megabytes_of_anything_hold_up_nothing(kind: str) -> None:
+    large = KINDS[kind](TEN_MB)
+    assert len(large.data) > 0.99 * TEN_MB
+    panel = panel_of({**HEARD, "type": large.type, "field": large.path})
+    robot = Robot(panel, INTERFACES, KIOSK)
+    robot.take("heard", Sample(large.data, 1, NOW, NOW, None))
+
+    def is_read() -> bool:
+        return robot.reading("/heard").status == "message"
+
+    async def test() -> None:
+        assert await longest_turn(is_read) < LONGEST_TURN_S
+        assert robot.reading("/heard").value(large.path) == large.value
+
+    run(test)
+
+
+def test_ten_megabytes_of_garbage_hold_up_nothing() -> None:
+    large = garbage(TEN_MB)
+    panel = panel_of({**HEARD, "type": large.type, "field": large.path})
+    robot = Robot(panel, INTERFACES, KIOSK)
+    robot.take("heard", Sample(large.data, 1, NOW, NOW, None))
+
+    async def test() -> None:
+        assert (
+            await longest_turn(lambda: robot.reading("/heard").status == "unreadable") < LONGEST_TURN_S
+        )
+
+    run(test)
+
+
+@pytest.mark.parametrize("kind", ["diagnostics by name", "nested lists", "a text"])
+def test_an_answer_of_any_size_is_read_while_all_else_goes_on(kind: str) -> None:
+    large = KINDS[kind](TEN_MB)
+    reader = INTERFACES.fields(large.type, [large.path])
+
+    async def test() -> None:
+        reading = asyncio.ensure_future(Slices().whole(reader, large.data))
+        assert await longest_turn(reading.done) < LONGEST_TURN_S
+        assert reading.result().get(large.path) == large.value
+
+    run(test)
+
+
+def test_what_is_no_answer_says_so_and_keeps_no_other_waiting() -> None:
+    large = diagnostics(1_000_000)
+    reader = INTERFACES.fields(large.type, [large.path])
+
+    async def test() -> None:
+        slices = Slices()
+        short = asyncio.ensure_future(slices.whole(reader, large.data[:-40]))
+        whole = asyncio.ensure_future(slices.whole(reader, large.data))
+        with pytest.raises(DecodeError):
+            await short
+        assert (await whole).get(large.path) == large.value
+
+    run(test)
+
+
+def test_a_whole_message_of_many_elements_is_not_built() -> None:
+    """Such as a status of goals: what lists them may be anybody's."""
+    many = "action_msgs/msg/GoalStatusArray"
+    status = bytes(28)
+    few = LITTLE + (1000).to_bytes(4, "little") + status * 999 + status[:25]
+    assert len(INTERFACES.decode(many, few).status_list) == 1000
+    count = TEN_MB // 28
+    data = LITTLE + count.to_bytes(4, "little") + status * count
+    before = time.thread_time()
+    with pytest.raises(DecodeError, match="more than 4000 elements"):
+        INTERFACES.decode(many, data)
+    assert time.thread_time() - before < LONGEST_TURN_S

@@ -1,0 +1,324 @@
+"""Where one part meets another: what fails in one must not make another act on a doubt."""
+
+import asyncio
+import itertools
+import logging
+import time
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import pytest
+
+from app.audit import Unlogged
+from app.commands.holds.receipts import Holding
+from app.commands.receipts import LONGEST_KEPT, By, Receipt
+from app.commands.service_calls import with_fields
+from app.panel.model import Panel
+from app.permission.clients import stranger
+from app.permission.interlocks import interlock_verdict
+from app.robot.state import Passed, Robot, Sample
+from app.ros_logging import RobotLog
+from app.runtime import robot_session
+from app.runtime.ingest import Intake
+from app.simulator import zenoh_peer
+from app.transport.inbox import Changes, Token
+from app.transport.zenoh_session import config_to
+from app.view.view import Enabled, sight
+from tests.commands.test_holds import HALF, JOG, POINT, SPEED
+from tests.commands.test_presses import Bench, Way
+from tests.support.builders import (
+    BOOL,
+    BRIDGE,
+    COUNT,
+    ENABLED,
+    FROM,
+    HEARD,
+    INTERFACES,
+    NOW,
+    endpoint,
+    panel_of,
+    permits,
+    presses_of,
+    robot_there,
+    small_panel,
+)
+
+
+def flag(value: bool) -> bytes:
+    return INTERFACES.encode(BOOL, {"data": value})
+
+
+def sample(payload: bytes, *between: bytes) -> Sample:
+    passed = tuple(Passed(one, NOW, NOW) for one in between)
+    return Sample(payload, 9, NOW, NOW, BRIDGE, between=passed)
+
+
+class Broken:
+    """A part that fails at whatever it hears."""
+
+    def __getattr__(self, name: str) -> Any:
+        raise RuntimeError(name)
+
+
+class Deaf:
+    def hear(self, *_: object) -> None: ...
+    def lose(self, *_: object) -> None: ...
+
+
+def intake_of(panel: Panel, robot: Robot, actions: Any) -> Intake:
+    deaf: Any = Deaf()
+    return Intake(panel, robot, actions, deaf, deaf, None, RobotLog(logging.getLogger("x"), ""))
+
+
+class Page:
+    """The permissions as they were last shown."""
+
+    def __init__(self, panel: Panel, robot: Robot) -> None:
+        self._panel = panel
+        self._robot = robot
+        self.said: list[bool] = []
+        self.show()
+
+    def show(self) -> None:
+        self._view = sight(self._panel, self._robot, time.monotonic()).view["interlocks"]
+        if (said := self._robot.reading(ENABLED).value("data")) is not None:
+            self.said.append(said)
+
+    def shown(self) -> Mapping[str, Enabled]:
+        return self._view
+
+
+def test_what_fails_at_a_sample_keeps_no_lock_from_closing(caplog: pytest.LogCaptureFixture) -> None:
+    panel = panel_of(COUNT)
+    robot = robot_there(panel)
+    permits(robot)
+    broken: Any = Broken()
+    intake = intake_of(panel, robot, broken)
+    feedback = next(key for key in intake.keys if key.endswith("/feedback"))
+    changes = Changes({feedback: sample(b""), robot.key(ENABLED): sample(flag(False))}, {}, True)
+    page = Page(panel, robot)
+    news = intake.take(changes, page.shown, page.show)
+    assert (news.urgent, news.came) == (True, False)
+    assert robot.reading(ENABLED).value("data") is False
+    assert "was not taken in whole" in caplog.text
+
+
+def test_a_permission_that_blinked_is_shown_in_between() -> None:
+    panel = small_panel()
+    robot = robot_there(panel)
+    intake = intake_of(panel, robot, Deaf())
+    page = Page(panel, robot)
+    blink = Changes({robot.key(ENABLED): sample(flag(True), flag(True), flag(False))}, {}, True)
+    intake.take(blink, page.shown, page.show)
+    assert page.said == [True, False]
+    assert robot.reading(ENABLED).value("data") is True
+
+
+def test_of_what_a_permission_said_too_fast_to_be_kept_nothing_is_taken_for_true() -> None:
+    panel = small_panel()
+    robot = robot_there(panel)
+    permits(robot)
+    page = Page(panel, robot)
+    shown: list[bool] = []
+
+    def show() -> None:
+        page.show()
+        shown.append(page.shown()["operation"]["enabled"])
+
+    overrun = sample(flag(True), flag(True))._replace(overrun=True)
+    intake_of(panel, robot, Deaf()).take(
+        Changes({robot.key(ENABLED): overrun}, {}, True), page.shown, show
+    )
+    assert shown == [False, True]
+
+
+def test_a_permission_that_is_said_again_is_not_urgent() -> None:
+    """A node may say it a hundred times a second: nothing but a change is shown at once."""
+    panel = small_panel(interlock={"max_age_s": 1.0})
+    robot = robot_there(panel)
+    intake = intake_of(panel, robot, Deaf())
+    key, page = robot.key(ENABLED), Page(panel, robot)
+
+    def said(permitted: bool) -> tuple[bool, set[str]]:
+        changes = Changes({key: sample(flag(permitted))}, {}, True)
+        news = intake.take(changes, page.shown, page.show)
+        page.show()
+        return news.urgent, news.values
+
+    assert said(False) == (True, {key})
+    assert said(False) == (False, {key})
+    assert said(True) == (True, {key})
+    assert said(True) == (False, {key})
+    assert robot.reading(ENABLED).value("data") is True
+
+
+def test_what_cannot_be_read_as_a_permission_is_urgent() -> None:
+    panel = small_panel()
+    robot = robot_there(panel)
+    permits(robot)
+    intake = intake_of(panel, robot, Deaf())
+    changes = Changes({robot.key(ENABLED): sample(b"broken")}, {}, True)
+    page = Page(panel, robot)
+    assert intake.take(changes, page.shown, page.show).urgent
+
+
+def test_each_sample_that_is_kept_whole_is_recorded_and_no_other() -> None:
+    class Tape(Deaf):
+        keys = frozenset({"heard"})
+        heard: ClassVar[list[bytes]] = []
+
+        def hear(self, *about: Any) -> None:
+            self.heard.append(about[1].payload)
+
+    panel = small_panel()
+    tape: Any = Tape()
+    deaf: Any = Deaf()
+    log = RobotLog(logging.getLogger("x"), "")
+    robot = robot_there(panel)
+    intake = Intake(panel, robot, deaf, deaf, deaf, tape, log)
+    assert intake.whole == tape.keys
+    kept = [("heard", sample(said)) for said in (b"1", b"2", b"3")]
+    page = Page(panel, robot)
+    intake.take(Changes({"heard": kept[-1][1]}, {}, True, kept), page.shown, page.show)
+    assert tape.heard == [b"1", b"2", b"3"]
+
+
+def test_a_list_that_is_too_short_is_shown_as_nothing() -> None:
+    type_name = "sensor_msgs/msg/JointState"
+    names = INTERFACES.fields(type_name, ["name[0]", "name[1]"])
+    payload = INTERFACES.encode(type_name, JOINTS)
+    assert with_fields("{name[0]}, {name[1]}", names.read(payload)) == "a, —"
+
+
+JOINTS = {
+    "header": {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""},
+    "name": ["a"],
+    "position": [],
+    "velocity": [],
+    "effort": [],
+}
+
+
+def test_a_large_press_leaves_no_large_receipt() -> None:
+    bench = Bench()
+    large = {"message": "x" * (LONGEST_KEPT + 1)}
+    refused = bench.press(inputs=large)
+    assert (refused.cause, refused.inputs) == ("input", {})
+    assert bench.press(inputs=large) == refused
+    other = bench.press(inputs={"message": "y" * (LONGEST_KEPT + 1)})
+    assert "already used" in other.reason
+
+
+def test_a_press_in_doubt_is_not_answered_with_another_press() -> None:
+    panel = small_panel()
+    robot = robot_there(panel)
+    permits(robot)
+    presses = presses_of(panel, robot, Way())
+    late = By(FROM.origin, doubt=lambda: "the page showed another robot.")
+
+    async def pressed() -> None:
+        first = await presses.press("free", {"message": "a"}, "p1", FROM)
+        other = await presses.press("guarded", {"message": "a"}, "p1", late)
+        assert (first.outcome, other.outcome, other.widget) == ("published", "refused", "guarded")
+        assert "already used" in other.reason
+        new = await presses.press("guarded", {"message": "a"}, "p2", late)
+        assert (new.outcome, new.cause) == ("refused", "interlock")
+        assert "another robot" in new.reason
+
+    asyncio.run(pressed())
+
+
+def test_a_link_that_is_lost_while_it_is_renewed_is_renewed_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """And whatever Zenoh makes of it, it is tried until there is a session."""
+    monkeypatch.setattr(robot_session, "RENEW_AGAIN_S", 0.01)
+    renewals: list[str] = []
+
+    async def lost() -> None:
+        one = robot_session.Kiosk(small_panel(), config_to("tcp/127.0.0.1:1"), "r1", Unlogged())
+
+        def renew() -> None:
+            renewals.append("renewed")
+            time.sleep(0.05)
+            if len(renewals) == 2:
+                raise RuntimeError("no session")
+
+        monkeypatch.setattr(one.link, "renew", renew)
+        one.renew()
+        await asyncio.sleep(0.01)
+        one.renew()
+        await asyncio.sleep(0.4)
+        assert len(renewals) == 3
+        one.renew()
+        await asyncio.sleep(0.2)
+        await one.stop()
+
+    asyncio.run(lost())
+    assert len(renewals) == 4
+
+
+def test_a_publisher_that_was_replaced_between_two_turns_has_to_say_it_again() -> None:
+    panel = small_panel({"require_publisher": True})
+    robot = robot_there(panel)
+    interlock = panel.interlocks[0]
+    token = endpoint(robot, "MP", ENABLED, BOOL)
+    robot.follow_publishers()
+    permits(robot)
+    intake = intake_of(panel, robot, Deaf())
+    page = Page(panel, robot)
+    key = robot.key(ENABLED)
+    old, new = Sample(flag(True), 6, NOW, NOW, BRIDGE), Sample(flag(True), 8, NOW, NOW, BRIDGE)
+    for said, permitted in ((old, False), (new, True)):
+        intake.take(Changes({key: said}, {token: Token(True, 7)}, True), page.shown, page.show)
+        robot.follow_publishers()
+        assert interlock_verdict(interlock, robot, NOW).permitted is permitted
+
+
+def test_a_kiosk_that_gives_its_session_up_ends_what_is_held_before(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    async def scene() -> None:
+        panel = panel_of(SPEED, JOG, {**HEARD, "topic": "/last_heard"}, mode="demo")
+        with zenoh_peer.in_process("", panel.distro) as there:
+            one = robot_session.Kiosk(panel, config_to(there), "r1", Unlogged())
+            await one.start()
+            sent: list[float] = []
+            put = one.link.put
+
+            def noted(key: str, payload: bytes) -> None:
+                if key == "jog":
+                    sent.append(INTERFACES.decode(POINT, payload).x)
+                put(key, payload)
+
+            monkeypatch.setattr(one.link, "put", noted)
+            ended: list[Receipt] = []
+            async with asyncio.timeout(20):
+                while not one.board.view["widgets"]["jog"]["enabled"]:
+                    await asyncio.sleep(0.05)
+                hold = one.holds.begin("jog", HALF, time.monotonic(), FROM, ended.append)
+                assert isinstance(hold, Holding)
+                lost = one.robot.key("/last_heard")
+                monkeypatch.setattr(type(one.robot.graph), "unheard", lambda _, key: key == lost)
+                for number in itertools.count(1):
+                    if ended:
+                        break
+                    one.holds.beat(hold, number, time.monotonic())
+                    await asyncio.sleep(0.05)
+            assert sent[-1] == 0.0
+            assert "the connection to it is made anew" in ended[0].reason
+            await one.stop()
+
+    asyncio.run(scene())
+
+
+def test_who_ends_or_takes_a_new_panel_sends_nothing_more() -> None:
+    async def pressed() -> None:
+        one = robot_session.Kiosk(small_panel(), config_to("tcp/127.0.0.1:1"), "r1", Unlogged())
+        permits(one.robot)
+        by = one.doubts.by("free", stranger("192.0.2.1"))
+        assert by.controls().permitted
+        await one.stop()
+        assert by.controls().code == "ending"
+
+    asyncio.run(pressed())

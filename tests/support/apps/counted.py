@@ -1,0 +1,40 @@
+"""The kiosk's application with one path more, `/sizes`: how much it holds, for a test of memory.
+
+It waits for late answers for `LATE_S` only, so that a test sees the end of that, and takes presses as
+fast as they come.
+"""
+
+import asyncio
+import gc
+from collections.abc import Iterator, Sized
+from typing import Any
+
+from fastapi import Request
+
+from app.commands import press_limits, service_calls
+from app.main import app
+from app.rate_limit import Quota
+from app.web.app_state import site_of
+
+LATE_S = 0.5
+UNLIMITED = Quota(1e9, 1e9)
+vars(service_calls)["LATE_S"] = LATE_S  # Final in what is shipped
+vars(press_limits).update(OF_CLIENT=UNLIMITED, OF_ADDRESS=UNLIMITED)
+
+
+@app.get("/sizes")
+async def sizes(request: Request) -> dict[str, int]:
+    """Objects, tasks, and the length of everything that the kiosk and its parts hold."""
+    kiosk = site_of(request).fleet.first
+    gc.collect()
+    held = {"objects": len(gc.get_objects()), "tasks": len(asyncio.all_tasks())}
+    parts = [one for one in vars(kiosk).values() if type(one).__module__.startswith("app.")]
+    for part in (kiosk, *parts, kiosk.link._inbox, kiosk.robot.graph, kiosk.presses._receipts):
+        held |= {f"{type(part).__name__}.{name}": len(one) for name, one in sized(part)}
+    return held
+
+
+def sized(part: Any) -> Iterator[tuple[str, Sized]]:
+    for name, one in vars(part).items():
+        if isinstance(one, Sized) and not isinstance(one, str):
+            yield name, one

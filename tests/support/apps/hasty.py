@@ -1,0 +1,9 @@
+"""The application with little time and few places, for `uvicorn tests.support.apps.hasty:app`."""
+
+from app import main
+from app.web import connections, request_body
+from tests.support.apps.small import CONNECTIONS
+
+vars(connections).update(HEAD_WITHIN_S=0.5, CONNECTIONS_MOST=CONNECTIONS)
+vars(request_body)["BODY_WITHIN_S"] = 0.5
+app = main.app

@@ -1,0 +1,6 @@
+"""Limits as small as tests need them, of `tests.support.apps.hasty` and `tests.support.apps.strict`."""
+
+from typing import Final
+
+CONNECTIONS: Final = 20
+PRESSES: Final = 10

@@ -1,0 +1,18 @@
+"""The application with a link that never closes, for `uvicorn tests.support.apps.standing:app`."""
+
+import time
+
+from app import main
+from app.process import shutdown
+from app.runtime import robot_session
+from app.transport.zenoh_session import Link
+
+
+class Standing(Link):
+    def close(self) -> None:
+        time.sleep(60)
+
+
+vars(robot_session)["Link"] = Standing
+vars(shutdown)["ENDED_WITHIN_S"] = 1.0
+app = main.app

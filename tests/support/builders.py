@@ -1,0 +1,183 @@
+"""Small real things that unit tests are made of: a panel, a robot that is there, what it says."""
+
+import asyncio
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, Final, Protocol
+
+from app.audit import Origin, Unlogged
+from app.audit.press_record import Logbook
+from app.commands.actions.goals import Actions
+from app.commands.confirmations import Confirmations
+from app.commands.dispatch import Sending
+from app.commands.parameters.sync import Parameters
+from app.commands.presses import Presses
+from app.commands.receipts import By
+from app.commands.service_calls import Asker, Calls
+from app.dialect import bridge_dialect
+from app.dialect.endpoint import TopicRole
+from app.errors import PanelError
+from app.interfaces import interfaces_of
+from app.interfaces.names import Qos
+from app.panel.model import Panel
+from app.robot.state import Robot, Sample
+
+Table = Mapping[str, Any]
+
+INTERFACES: Final = interfaces_of("jazzy")
+BOOL: Final = "std_msgs/msg/Bool"
+TEXT: Final = "std_msgs/msg/String"
+BRIDGE: Final = "b1"
+KIOSK: Final = "c1"
+ENABLED: Final = "/operation_enabled"
+NOW: Final = 1000.0  # monotonic seconds
+FROM: Final = By(Origin(address="127.0.0.1"))
+NOTHING: Final[Table] = {}
+
+INTERLOCK: Final[Table] = {"id": "operation", "topic": ENABLED}
+MESSAGE: Final[Table] = {"id": "message", "kind": "text", "label": "Message", "max_length": 8}
+FREE: Final[Table] = {
+    "id": "free",
+    "kind": "publish",
+    "label": "Free",
+    "topic": "/free",
+    "type": TEXT,
+    "message": {"data": "{message}"},
+}
+GUARDED: Final[Table] = {**FREE, "id": "guarded", "topic": "/guarded", "interlock": "operation"}
+HEARD: Final[Table] = {
+    "id": "heard",
+    "kind": "readout",
+    "label": "Heard",
+    "topic": "/heard",
+    "type": TEXT,
+}
+COUNT: Final[Table] = {
+    "id": "count",
+    "kind": "action",
+    "label": "Count",
+    "action": "/count",
+    "type": "example_interfaces/action/Fibonacci",
+    "goal": {"order": 3},
+}
+
+
+def told(error: PanelError) -> str:
+    """The faults of a panel file, a line for each, without what only helps to find them."""
+    return "\n".join(f"{fault.place}: {fault.message}" for fault in error.faults)
+
+
+def panel_of(
+    *widgets: Table, interlock: Table = NOTHING, further: Iterable[Table] = (), **more: Any
+) -> Panel:
+    """A panel of one page; `interlock` changes the one that it has, `further` are others."""
+    page = {"id": "one", "title": "One", "widget": list(widgets)}
+    tables = {"title": "Cell", "interlock": [{**INTERLOCK, **interlock}, *further], "page": [page]}
+    return Panel.model_validate({**tables, **more})
+
+
+def small_panel(interlock: Table = NOTHING, **more: Any) -> Panel:
+    """One widget of each kind, and a button behind the interlock."""
+    return panel_of(MESSAGE, FREE, GUARDED, HEARD, interlock=interlock, **more)
+
+
+def robot_there(panel: Panel) -> Robot:
+    """A robot that commands can reach: a link, a bridge, joined; it has said nothing yet."""
+    robot = Robot(panel, INTERFACES, KIOSK)
+    robot.link_up = True
+    robot.settled_at = 0.0
+    robot.graph.apply(bridge_dialect.bridge_token(BRIDGE), True)
+    return robot
+
+
+def endpoint(
+    robot: Robot,
+    role: TopicRole,
+    topic: str,
+    type_name: str,
+    zid: str = BRIDGE,
+    alive: bool = True,
+    qos: Qos | None = None,
+) -> str:
+    """A publisher ("MP") or subscriber ("MS") appears behind a bridge, or ends; its token."""
+    type_hash = INTERFACES.type_hash(type_name)
+    token = bridge_dialect.token(zid, role, robot.key(topic), type_name, qos or Qos(), type_hash)
+    robot.graph.apply(token, alive)
+    return token
+
+
+def says(
+    robot: Robot,
+    topic: str,
+    data: Any,
+    type_name: str = TEXT,
+    *,
+    at: float = NOW,
+    seq: int = 1,
+    source: str | None = BRIDGE,
+) -> None:
+    """The robot publishes a message whose only field is `data`."""
+    payload = INTERFACES.encode(type_name, {"data": data})
+    robot.take(robot.key(topic), Sample(payload, seq, at, at, source))
+
+
+def permits(robot: Robot, permitted: bool = True, *, at: float = NOW) -> None:
+    """The robot says whether operation is permitted."""
+    says(robot, ENABLED, permitted, BOOL, at=at)
+
+
+class Nobody:
+    """A link on which no service is ever asked."""
+
+    def query(self, key: str, payload: bytes, timeout_s: float) -> "asyncio.Future[bytes | None]":
+        raise AssertionError(f"{key} was asked")
+
+
+class Asked(Protocol):
+    """The link as a test has it: what is put and what is asked."""
+
+    def put(self, key: str, payload: bytes) -> None: ...
+    def heard(self, key: str) -> bool: ...
+
+
+def sending_of(
+    panel: Panel,
+    robot: Robot,
+    way: Asked,
+    *,
+    asker: Asker | None = None,
+    calls: Calls | None = None,
+    confirmations: Confirmations | None = None,
+    monotonic: Callable[[], float] = lambda: NOW,
+    **more: Any,
+) -> Sending:
+    """What is sent to a robot, with all that is needed for it and a test does not care for."""
+    asker = asker or Nobody()
+    calls = calls or Calls(INTERFACES, robot, asker, lambda: None)
+    return Sending(
+        panel,
+        INTERFACES,
+        robot,
+        way,
+        calls,
+        Actions(INTERFACES, robot, asker, lambda: None),
+        confirmations or Confirmations(robot, lambda: None),
+        Parameters(panel, INTERFACES, robot, asker, calls, lambda: None),
+        monotonic,
+        **more,
+    )
+
+
+def presses_of(
+    panel: Panel,
+    robot: Robot,
+    way: Asked,
+    *,
+    logbook: Logbook | None = None,
+    monotonic: Callable[[], float] = lambda: NOW,
+    catch_up: Callable[[], None] = lambda: None,
+    news: Callable[[], bool] = lambda: False,
+    **more: Any,
+) -> Presses:
+    """The presses of a robot; `more` is for `sending_of`."""
+    sending = sending_of(panel, robot, way, monotonic=monotonic, **more)
+    return Presses(panel, robot, sending, logbook or Logbook(Unlogged()), monotonic, catch_up, news)

@@ -1,0 +1,423 @@
+"""The real parts that tests are made of: bridge, ROS 2 nodes, kiosk servers. Each is a process of
+its own, on loopback, and each is ended by who started it."""
+
+import json
+import os
+import secrets
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from copy import copy
+from pathlib import Path
+from typing import Any, ClassVar
+
+import httpx
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import ClientConnection, connect
+
+from tests.support.commanded import Commanded
+
+# Without scripts, what comes within 700 ms of its page is a second tap; a busy driver waits less.
+TAP_AGAIN_MS = 1000
+ROOT = Path(__file__).resolve().parent.parent.parent
+TESTS = ROOT / "tests"
+BRIDGE = Path(
+    os.environ.get("TEST_BRIDGE") or Path.home() / ".cache/operator-panel/bridge/release/test-bridge"
+)
+ROS_PYTHON = Path(os.environ.get("TEST_ROS_PYTHON") or ROOT / ".venv-ros/bin/python")
+CHROMIUM = "/usr/bin/chromium"
+CHROMIUM_FLAGS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+
+# Bridge and nodes find each other on loopback only, whatever else is on this machine's network.
+CYCLONE_ON_LOOPBACK = (
+    "<CycloneDDS><Domain><General><Interfaces>"
+    '<NetworkInterface name="lo"/>'
+    "</Interfaces></General></Domain></CycloneDDS>"
+)
+
+
+STOOD = "Timeout (0:00:20)!"  # a server stood still as it ended, and left
+
+
+def until(what: Callable[[], Any], why: str, within_s: float = 10.0, every_s: float = 0.01) -> Any:
+    """Waits for a condition and returns its value; fails with `why` when time is up."""
+    end = time.monotonic() + within_s
+    while True:
+        if found := what():
+            return found
+        if time.monotonic() > end:
+            raise AssertionError(f"not within {within_s} s: {why}")
+        time.sleep(every_s)
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+class Process:
+    """A child process whose stderr is kept as lines."""
+
+    latest: ClassVar[deque["Process"]] = deque(maxlen=6)  # what a failed test shows
+
+    def __init__(self, command: Sequence[str], env: Mapping[str, str], **options: Any) -> None:
+        self._process = subprocess.Popen(
+            command, env={**os.environ, **env}, stderr=subprocess.PIPE, text=True, **options
+        )
+        self.lines: list[str] = []
+        self.began = time.monotonic()
+        self.latest.append(self)
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def _read(self) -> None:
+        assert self._process.stderr is not None
+        for line in self._process.stderr:
+            self.lines.append(line.rstrip("\n"))
+
+    @property
+    def text(self) -> str:
+        return "\n".join(self.lines)
+
+    @property
+    def pid(self) -> int:
+        return self._process.pid
+
+    @property
+    def running(self) -> bool:
+        return self._process.poll() is None
+
+    def told(self, lines: int = 40) -> str:
+        """Which one it is, and the last that it said."""
+        state = "runs" if self.running else f"ended with {self._process.returncode}"
+        return "\n".join([f"{self.pid}, {state}: {self._process.args!r}", *self.lines[-lines:]])
+
+    def send(self, number: signal.Signals) -> None:
+        self._process.send_signal(number)
+
+    def wait(self, timeout_s: float) -> int:
+        return self._process.wait(timeout_s)
+
+    def kill(self) -> None:
+        self.end(signal.SIGKILL)
+
+    def end(self, number: signal.Signals = signal.SIGTERM, timeout_s: float = 25) -> int:
+        """Ends it and waits; it is killed if it does not end in time."""
+        if self.running:
+            self.send(number)
+        try:
+            status = self._process.wait(timeout_s)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+            raise AssertionError(f"{self._process.args!r} did not end:\n{self.text}") from None
+        self._reader.join(5)
+        for pipe in (self._process.stdin, self._process.stdout, self._process.stderr):
+            if pipe is not None:
+                pipe.close()
+        assert STOOD not in self.text, self.text
+        return status
+
+
+class Bridge:
+    """The real bridge, with the shipped configuration; ports and domain are of this test alone."""
+
+    def __init__(self, domain: int, namespace: str = "/") -> None:
+        self.domain = domain
+        self.port = free_port()
+        self.endpoint = f"tcp/127.0.0.1:{self.port}"
+        self._namespace = namespace
+        self._process: Process | None = None
+
+    def start(self) -> None:
+        self._process = Process(
+            [
+                str(BRIDGE),
+                str(ROOT / "deploy/bridge.json5"),
+                f'listen/endpoints=["{self.endpoint}"]',
+                f"plugins/ros2dds/domain={self.domain}",
+                f'plugins/ros2dds/namespace="{self._namespace}"',
+                'plugins/ros2dds/ros_automatic_discovery_range="LOCALHOST"',
+            ],
+            {"CYCLONEDDS_URI": CYCLONE_ON_LOOPBACK, "ROS_DISTRO": "jazzy"},
+        )
+        process = self._process
+        until(lambda: "running" in process.text or not process.running, "the bridge runs")
+        assert process.running, process.text
+
+    @property
+    def process(self) -> Process:
+        assert self._process is not None
+        return self._process
+
+    def kill(self) -> None:
+        self.process.kill()
+
+    def freeze(self) -> None:
+        self.process.send(signal.SIGSTOP)
+
+    def thaw(self) -> None:
+        self.process.send(signal.SIGCONT)
+
+    def end(self) -> None:
+        if self._process is not None and self._process.running:
+            self.thaw()
+            self._process.end()
+
+
+class RosNode(Commanded):
+    """A real rclpy node in its own environment; see `tests/ros/node.py` for what it can do."""
+
+    def __init__(self, domain: int, name: str = "system_controller", **options: Any) -> None:
+        super().__init__(
+            [ROS_PYTHON, TESTS / "ros/node.py", name],
+            {
+                "ROS_DOMAIN_ID": str(domain),
+                "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+                "RMW_IMPLEMENTATION": "rmw_fastrtps_cpp",
+                "RCUTILS_LOGGING_USE_STDOUT": "0",
+                "ROS_LOG_DIR": tempfile.gettempdir(),
+            },
+            **options,
+        )
+
+    def __getattr__(self, name: str) -> Callable[..., Any]:
+        def do(*arguments: Any, **named: Any) -> Any:
+            return self(name, **dict(zip(ORDERS[name], arguments, strict=False)), **named)
+
+        return do
+
+    def heard_data(self, topic: str) -> list[Any]:
+        """The `data` field of all that a subscription heard."""
+        return [message["data"] for message in self.heard(topic)]
+
+    def kill(self) -> None:
+        shared = self._shared_memory()
+        super().kill()
+        for path in shared:
+            path.unlink(missing_ok=True)
+
+    def _shared_memory(self) -> set[Path]:
+        """What Fast DDS would remove when it ends: the files whose lock this process has."""
+        opened = {path.resolve() for path in Path(f"/proc/{self.pid}/fd").iterdir()}
+        locks = {path for path in opened if path.match("/dev/shm/fastdds_*_el")}
+        segments = {path.with_name(path.name.removesuffix("_el")) for path in locks}
+        return locks | segments | {path.with_name(f"sem.{path.name}_mutex") for path in segments}
+
+
+def has_heard(node: RosNode, topic: str, count: int) -> bool:
+    return len(node.heard(topic)) >= count
+
+
+ORDERS: Mapping[str, tuple[str, ...]] = {
+    "subscribe": ("topic", "type"),
+    "heard": ("topic",),
+    "heard_at": ("topic",),
+    "arrivals": ("topic",),
+    "toggle": ("topic", "per_s", "for_s"),
+    "flood": ("topic", "fields", "per_s", "for_s"),
+    "publish_long": ("topic", "length"),
+    "advertise": ("topic", "type"),
+    "publish": ("topic", "fields"),
+    "every": ("topic", "fields", "period_s"),
+    "once": ("topic", "type", "fields"),
+    "withdraw": ("topic",),
+    "subscribers": ("topic",),
+    "nodes": (),
+    "topics": (),
+    "endpoints": ("topic",),
+}
+
+
+class Server:
+    """The kiosk under uvicorn, as users start it."""
+
+    def __init__(
+        self,
+        folder: Path,
+        port: int = 0,
+        *,
+        python: str = sys.executable,
+        options: Sequence[str] = (),
+        app: str = "app.main:app",
+        before: Sequence[str] = (),
+        **environment: str,
+    ) -> None:
+        """`before` is a command that starts it, such as `unshare`; without a KIOSK_DATA it has a
+        data folder of its own, which goes with it."""
+        self._own_data = tempfile.TemporaryDirectory(prefix="kiosk-data-")
+        self.data = Path(environment.setdefault("KIOSK_DATA", self._own_data.name))
+        self.base = ""
+        self.way = "post"
+        self.port = port or free_port()
+        self.url = f"http://127.0.0.1:{self.port}"
+        self.http = httpx.Client(base_url=self.url, timeout=10, trust_env=False)
+        command = [*before, python, "-m", "uvicorn", app, "--port", str(self.port), *options]
+        self.process = Process(command, {**environment, "PYTHONPATH": ""}, cwd=folder)
+        try:
+            until(self.answers, "the server answers", within_s=20)
+        except BaseException:
+            self.end(signal.SIGKILL)
+            raise
+
+    def robot(self, name: str) -> "Server":
+        """The same server, asked for one of its robots."""
+        one = copy(self)
+        one.base = f"/robots/{name}"
+        return one
+
+    def by(self, way: str) -> "Server":
+        """The same server, with its presses by "post" or by "socket"."""
+        one = copy(self)
+        one.way = way
+        return one
+
+    def answers(self) -> bool:
+        assert self.process.running, self.process.text
+        try:
+            return self.http.get("/healthz").status_code == 200
+        except httpx.TransportError:
+            return False
+
+    def ready(self) -> bool:
+        return self.http.get("/readyz").status_code == 200
+
+    def snapshot(self) -> dict[str, Any]:
+        text = self.http.get(f"{self.base}/events?once=1").text
+        found: dict[str, Any] = json.loads(events_in(text)[0][1])
+        return found
+
+    def widget(self, name: str) -> dict[str, Any]:
+        found: dict[str, Any] = self.snapshot()["widgets"][name]
+        return found
+
+    def press(self, widget: str, message: str = "", **more: Any) -> httpx.Response:
+        """What comes of it; one that was more than a client may is made again, as programs do."""
+        press = {"inputs": {"message": message}, **more}
+
+        def pressed() -> httpx.Response | None:
+            answer = self._press(widget, press)
+            return None if answer.status_code == 429 else answer
+
+        found: httpx.Response = until(pressed, "there is room for a press", every_s=0.05)
+        return found
+
+    def _press(self, widget: str, press: Mapping[str, Any]) -> httpx.Response:
+        if self.way == "socket":
+            with self.socket() as socket:
+                return socket.press(widget=widget, **press)
+        return self.http.post(f"{self.base}/widgets/{widget}", json=press)
+
+    @contextmanager
+    def socket(self, **headers: str) -> Iterator["PressSocket"]:
+        """A socket for presses, of a client that has the same cookies."""
+        kept = "; ".join(f"{name}={value}" for name, value in self.http.cookies.items())
+        headers = {**({"cookie": kept} if kept else {}), **headers}
+        host = headers.pop("host", f"127.0.0.1:{self.port}")
+        way = socket.create_connection(("127.0.0.1", self.port))
+        url = f"ws://{host}{self.base}/presses"
+        with connect(url, sock=way, additional_headers=headers) as connection:
+            yield PressSocket(connection)
+
+    @contextmanager
+    def stream(self) -> Iterator["Stream"]:
+        with self.http.stream("GET", f"{self.base}/events", timeout=5) as response:
+            yield Stream(response)
+
+    def end(self, number: signal.Signals = signal.SIGTERM, timeout_s: float = 25) -> int:
+        self.http.close()
+        try:
+            return self.process.end(number, timeout_s)
+        finally:
+            self._own_data.cleanup()
+
+
+class PressSocket:
+    """One socket for presses, spoken by hand."""
+
+    def __init__(self, connection: ClientConnection) -> None:
+        self._connection = connection
+
+    def say(self, text: str | bytes | list[str]) -> None:
+        """A list is one message in pieces."""
+        self._connection.send(text)
+
+    def closed(self) -> int:
+        """The code that the server closes with, after whatever it says before."""
+        with suppress(ConnectionClosed):
+            while True:
+                self._connection.recv(10)
+        assert self._connection.close_code is not None
+        return self._connection.close_code
+
+    def hear(self, timeout_s: float = 10) -> dict[str, Any]:
+        said: dict[str, Any] = json.loads(self._connection.recv(timeout_s))
+        return said
+
+    def press(self, **press: Any) -> httpx.Response:
+        """Its answer as that to a post; nothing else may be under way."""
+        self.say(json.dumps({"id": secrets.token_hex(8), **press}))
+        return as_response(self.hear())
+
+
+def as_response(said: dict[str, Any]) -> httpx.Response:
+    return httpx.Response(said.pop("status"), json={k: v for k, v in said.items() if k != "press"})
+
+
+class Stream:
+    """The events of one open stream, as (name, data, id)."""
+
+    def __init__(self, response: httpx.Response) -> None:
+        self._chunks = response.iter_text()
+        self._text = ""
+
+    def next(self, *names: str) -> tuple[str, Any, str]:
+        """The next event with one of these names; beats and others are passed over."""
+        while True:
+            while "\n\n" not in self._text:
+                self._text += next(self._chunks)
+            block, self._text = self._text.split("\n\n", 1)
+            for name, data, event_id in events_in(block + "\n\n"):
+                if name in names:
+                    return name, json.loads(data), event_id
+
+
+def events_in(text: str) -> list[tuple[str, str, str]]:
+    """(event, data, id) of each whole event in a text."""
+    events = []
+    for block in text.split("\n\n"):
+        fields = dict(line.split(": ", 1) for line in block.split("\n") if ": " in line)
+        if "data" in fields:
+            events.append((fields.get("event", ""), fields["data"], fields.get("id", "")))
+    return events
+
+
+def zenoh_file(folder: Path, endpoint: str) -> Path:
+    """The shipped zenoh.json5, connecting to another place."""
+    shipped = (ROOT / "zenoh.json5").read_text()
+    path = folder / "zenoh.json5"
+    path.write_text(shipped.replace("tcp/127.0.0.1:7447", endpoint))
+    assert endpoint in path.read_text()
+    return path
+
+
+def live(endpoint: str, folder: Path, port: int = 0, **environment: str) -> Server:
+    """A kiosk with the shipped panel, on the robot behind a bridge."""
+    zenoh = str(zenoh_file(folder, endpoint))
+    return Server(ROOT, port, KIOSK_MODE="live", KIOSK_ZENOH=zenoh, **environment)

@@ -1,0 +1,290 @@
+"""The bridges' silence: by a clock that the test sets, on a link that answers when it is told to."""
+
+import asyncio
+import time
+from collections.abc import Callable, Coroutine
+from typing import Any
+
+import pytest
+
+from app.dialect import bridge_dialect
+from app.errors import LinkError
+from app.permission.interlocks import way
+from app.robot.state import Robot
+from app.transport import bridge_liveness
+from app.transport.bridge_liveness import EVERY_S, GOOD, LONGEST_S, LOOKED_AT, Pulse, Silence
+from tests.support.builders import BRIDGE, FROM, presses_of, robot_there, small_panel
+
+LAN_S = 0.001
+
+
+def network(silence: Silence, took_s: float, begin: float, count: int) -> float:
+    """Questions of which each is answered after so long; returns when the last one was."""
+    events = [(begin + n * EVERY_S, None) for n in range(count)]
+    heard = [(asked + took_s, asked) for asked, _ in events]
+    for now, asked in sorted([*events, *heard], key=lambda one: one[0]):
+        if asked is None:
+            silence.ask(now)
+        else:
+            silence.hear(asked, now)
+        silence.judge(now)
+    return max(now for now, _ in heard)
+
+
+def test_a_bridge_that_answers_is_not_silent() -> None:
+    silence = Silence()
+    network(silence, LAN_S, 0.0, 100)
+    assert not silence.silent
+
+
+def test_no_answer_is_silence_after_its_limit() -> None:
+    silence = Silence()
+    end = network(silence, LAN_S, 0.0, 10)
+    silence.ask(end)
+    silence.judge(end + silence.limit - 0.01)
+    assert not silence.silent
+    silence.judge(end + silence.limit + LAN_S)
+    assert silence.silent
+
+
+def test_nothing_was_asked_is_no_silence() -> None:
+    """A server that stood still has not asked meanwhile."""
+    silence = Silence()
+    end = network(silence, LAN_S, 0.0, 10)
+    silence.judge(end + 60)
+    assert not silence.silent
+
+
+def test_it_is_over_with_answers_to_what_was_asked_since_and_in_time() -> None:
+    silence = Silence()
+    end = network(silence, LAN_S, 0.0, 10)
+    for n in range(20):
+        silence.ask(end + n * EVERY_S)
+        silence.judge(end + n * EVERY_S)
+    thaw = end + 20 * EVERY_S
+    for n in range(18):  # all that waited comes at once
+        silence.hear(end + n * EVERY_S, thaw)
+    assert silence.silent
+    for n in range(GOOD):
+        assert silence.silent
+        silence.ask(thaw + 1 + n)
+        silence.hear(thaw + 1 + n, thaw + 1 + n + LAN_S)
+    assert not silence.silent
+
+
+def test_a_slow_network_is_silence_until_it_is_known_to_be_slow() -> None:
+    silence = Silence()
+    end = network(silence, LAN_S, 0.0, 50)
+    end = network(silence, 0.7, end, LOOKED_AT // 2)
+    assert silence.silent
+    end = network(silence, 0.7, end, LOOKED_AT + 10)
+    assert not silence.silent
+    network(silence, LAN_S, end, LOOKED_AT)
+    assert silence.limit < bridge_liveness.SILENT_S + 0.01
+
+
+def test_a_loop_that_stood_still_is_no_slow_network() -> None:
+    silence = Silence()
+    end = network(silence, LAN_S, 0.0, LOOKED_AT)
+    silence.ask(end)
+    silence.hear(end, end + 2.0)  # nobody judged meanwhile
+    assert not silence.silent
+    assert silence.limit < bridge_liveness.SILENT_S + 0.01
+
+
+class Line:
+    """A link on which each question waits until the test answers it."""
+
+    def __init__(self) -> None:
+        self.asked: list[tuple[str, asyncio.Future[bool]]] = []
+        self.answers = True
+        self.frozen = ""  # a bridge that does not answer
+        self.fails = False
+
+    async def ask(self, selector: str, within_s: float = 2.0) -> list[tuple[str, bytes]]:
+        if self.fails:
+            raise LinkError("no session")
+        assert within_s == LONGEST_S
+        answered = asyncio.get_running_loop().create_future()
+        self.asked.append((selector, answered))
+        if self.answers and not (self.frozen and selector == bridge_dialect.version(self.frozen)):
+            answered.set_result(True)
+        return [(selector, b"1")] if await answered else []
+
+    def put(self, key: str, payload: bytes) -> None: ...
+
+    def heard(self, key: str) -> bool:
+        return True
+
+
+def run(test: Callable[[Line, Robot, Pulse, list[bool]], Coroutine[Any, Any, None]]) -> None:
+    async def benched() -> None:
+        line, robot = Line(), robot_there(small_panel())
+        told: list[bool] = []
+        mine = Pulse(robot, line, lambda: told.append(robot.answers))
+        mine.start()
+        try:
+            await test(line, robot, mine, told)
+        finally:
+            await mine.stop()
+        assert len(asyncio.all_tasks()) == 1
+
+    asyncio.run(benched())
+
+
+@pytest.fixture(autouse=True)
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bridge_liveness, "EVERY_S", 0.02)
+    monkeypatch.setattr(bridge_liveness, "SILENT_S", 0.1)
+
+
+async def until(what: Callable[[], object]) -> None:
+    async with asyncio.timeout(5):
+        while not what():
+            await asyncio.sleep(0.005)
+
+
+def test_each_bridge_is_asked_again_and_again() -> None:
+    async def test(line: Line, robot: Robot, mine: Pulse, told: list[bool]) -> None:
+        await until(lambda: len(line.asked) > 5)
+        assert {selector for selector, _ in line.asked} == {bridge_dialect.version(BRIDGE)}
+        assert (robot.answers, told) == (True, [])
+
+    run(test)
+
+
+def test_silence_is_told_and_its_end() -> None:
+    async def test(line: Line, robot: Robot, mine: Pulse, told: list[bool]) -> None:
+        line.answers = False
+        await until(lambda: not robot.answers)
+        line.answers = True
+        await until(lambda: robot.answers)
+        assert told == [False, True]
+
+    run(test)
+
+
+def test_another_bridge_is_not_the_silent_one() -> None:
+    async def test(line: Line, robot: Robot, mine: Pulse, told: list[bool]) -> None:
+        line.answers = False
+        await until(lambda: not robot.answers)
+        robot.lose()
+        await until(lambda: robot.answers)
+
+    run(test)
+
+
+def test_without_a_session_nothing_is_asked_and_nothing_arrives() -> None:
+    async def test(line: Line, robot: Robot, mine: Pulse, told: list[bool]) -> None:
+        line.fails = True
+        assert not await mine.reached()
+
+    run(test)
+
+
+def test_a_loop_that_stood_still_is_no_silence(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The answer came in time, and was only looked at late."""
+    clock = 0.0
+
+    async def benched() -> None:
+        nonlocal clock
+        line, robot = Line(), robot_there(small_panel())
+        mine = Pulse(robot, line, lambda: None, lambda: clock)
+        line.answers = False
+        mine.start()
+        loop = asyncio.get_running_loop()
+        await until(lambda: line.asked)
+
+        def stand_still() -> None:
+            """Its time is up before anybody looks at the answer."""
+            nonlocal clock
+            time.sleep(0.15)
+            clock = 3.0
+            line.asked[0][1].set_result(True)
+
+        loop.call_soon(stand_still)
+        await asyncio.sleep(0.01)
+        assert robot.answers
+        await mine.stop()
+
+    asyncio.run(benched())
+
+
+def test_a_press_is_published_when_the_bridge_has_answered_after_it() -> None:
+    async def test(line: Line, robot: Robot, mine: Pulse, told: list[bool]) -> None:
+        presses = presses_of(small_panel(), robot, line, reached=mine.reached)
+
+        async def press(press_id: str) -> str:
+            receipt = await presses.press("free", {"message": "hi"}, press_id, FROM)
+            return f"{receipt.outcome}: {receipt.reason}"
+
+        assert (await press("p1")).startswith("published: Sent on /free")
+        line.answers = False
+        told_so = await press("p2")
+        assert told_so.startswith("unknown: Sent on /free")
+        assert "has not answered since" in told_so
+
+    run(test)
+
+
+def test_a_frozen_bridge_stays_silent_when_another_comes_or_goes() -> None:
+    async def test(line: Line, robot: Robot, mine: Pulse, told: list[bool]) -> None:
+        robot.graph.apply(bridge_dialect.bridge_token("b2"), True)
+        await until(lambda: bridge_dialect.version("b2") in {selector for selector, _ in line.asked})
+        line.frozen = BRIDGE
+        await until(lambda: told == [False])
+        robot.graph.apply(bridge_dialect.bridge_token("b2"), False)
+        await asyncio.sleep(5 * bridge_liveness.EVERY_S)
+        robot.graph.apply(bridge_dialect.bridge_token("b3"), True)
+        await asyncio.sleep(5 * bridge_liveness.EVERY_S)
+        assert told == [False]
+        line.frozen = ""
+        await until(lambda: told == [False, True])
+
+    run(test)
+
+
+def test_after_a_standstill_all_that_waited_is_taken_in_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What was asked before it is answered before what waited; so is what was asked at its end."""
+    monkeypatch.setattr(bridge_liveness, "STOOD_STILL_S", 0.1)
+    clock = 0.0
+
+    async def benched() -> None:
+        nonlocal clock
+        line, robot = Line(), robot_there(small_panel())
+        told: list[str] = []
+
+        def tell() -> None:
+            told.append(way(robot, clock).code)
+
+        mine = Pulse(robot, line, tell, lambda: clock)
+        line.answers = False
+        mine.start()
+
+        async def asked(count: int) -> None:
+            await until(lambda: len(line.asked) >= count)
+
+        def answer(number: int) -> None:
+            line.asked[number - 1][1].set_result(True)
+
+        await asked(1)
+        clock += 0.1
+        mine.look()
+        assert robot.caught_up
+        clock += 3.0
+        mine.look()  # as it is before each press is judged
+        before = len(line.asked)
+        assert told == ["catching_up"]
+        answer(1)
+        await asked(before + 1)
+        answer(before + 1)
+        await asked(before + 2)
+        assert not robot.caught_up
+        clock += 0.01
+        later = len(line.asked)
+        await asked(later + 1)
+        answer(later + 1)
+        await until(lambda: robot.caught_up)
+        await mine.stop()
+
+    asyncio.run(benched())

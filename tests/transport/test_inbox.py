@@ -1,0 +1,184 @@
+"""What a link's threads put in, and what the event loop takes out: no Zenoh, no threads."""
+
+from datetime import UTC, datetime
+
+import pytest
+
+from app.transport.inbox import BETWEEN_BYTES, BETWEEN_MOST, KEPT_BYTES, KEPT_MOST, Inbox
+
+
+class Sent:
+    """A time stamp of the clock of `source`."""
+
+    def __init__(self, time: float, source: str = "b1") -> None:
+        self.time = time
+        self.source = source
+
+    def get_id(self) -> str:
+        return self.source
+
+    def get_time(self) -> datetime:
+        return datetime.fromtimestamp(self.time, UTC)
+
+
+@pytest.fixture
+def woken() -> list[bool]:
+    return []
+
+
+@pytest.fixture
+def inbox(woken: list[bool]) -> Inbox:
+    """`permit` is watched, `status` prompt, and `taped` is kept whole."""
+    mine = Inbox(woken.append)
+    mine.expect(["status"], ["permit"], ["taped"])
+    return mine
+
+
+def test_of_a_topic_the_newest_is_kept_and_what_was_skipped_counted(inbox: Inbox) -> None:
+    for said in (b"one", b"two", b"three"):
+        inbox.put("heard", said, None)
+    sample = inbox.drain().samples["heard"]
+    assert (sample.payload, sample.skipped, sample.between) == (b"three", 2, ())
+    assert inbox.drain().samples == {}
+
+
+def test_a_sample_has_its_source_and_its_time_there(inbox: Inbox) -> None:
+    inbox.put("heard", b"", Sent(7.5))
+    inbox.put("unstamped", b"", None)
+    samples = inbox.drain().samples
+    assert (samples["heard"].source, samples["heard"].sent) == ("b1", None)  # asked for recordings only
+    assert (samples["unstamped"].source, samples["unstamped"].sent) == (None, None)
+
+
+def test_values_wake_the_loop_once_until_they_are_taken(inbox: Inbox, woken: list[bool]) -> None:
+    for _ in range(1000):
+        inbox.put("heard", b"", None)
+    assert woken == [False]
+    inbox.drain()
+    inbox.put("heard", b"", None)
+    assert woken == [False, False]
+
+
+@pytest.mark.parametrize("key", ["permit", "status"])
+def test_what_is_prompt_waits_for_no_value(inbox: Inbox, woken: list[bool], key: str) -> None:
+    inbox.put("heard", b"", None)
+    inbox.put(key, b"", None)
+    inbox.put(key, b"", None)
+    inbox.put("heard", b"", None)
+    assert woken == [False, True]
+
+
+def test_the_graph_and_the_link_are_prompt(inbox: Inbox, woken: list[bool]) -> None:
+    inbox.put("heard", b"", None)
+    inbox.token("t", True)
+    inbox.drain()
+    inbox.transport("z", True)
+    assert woken == [False, True, True]
+
+
+def test_samples_and_losses_are_in_order(inbox: Inbox) -> None:
+    inbox.put("before", b"", None)
+    inbox.token("t", True)
+    inbox.token("t", False)
+    inbox.token("t", True)
+    inbox.put("after", b"", None)
+    changes = inbox.drain()
+    token = changes.tokens["t"]
+    assert token.alive
+    order = [changes.samples["before"].seq, token.lost_seq, token.came_seq]
+    assert sorted(order) == order
+    assert token.came_seq < changes.samples["after"].seq
+    assert token.lost_before == token.lost_seq
+
+
+def test_what_is_published_is_never_dropped_for_its_stamp(inbox: Inbox) -> None:
+    """A clock that was an hour ahead and was set right made all that came later "older"."""
+    inbox.put("permit", b"true", Sent(3600.0))
+    assert inbox.drain().samples["permit"].payload == b"true"
+    for time in (1.0, 2.0, 3601.0, 3.0):
+        inbox.put("permit", b"%d" % time, Sent(time))
+        assert inbox.drain().samples["permit"].payload == b"%d" % time
+
+
+def test_what_a_cache_has_counts_until_its_source_publishes(inbox: Inbox) -> None:
+    inbox.put_cached("heard", b"cached", Sent(9.0))
+    assert inbox.drain().samples["heard"].payload == b"cached"
+    inbox.put("heard", b"new", Sent(2.0))
+    inbox.put_cached("heard", b"cached", Sent(9.0))
+    assert inbox.drain().samples["heard"].payload == b"new"
+    inbox.put_cached("heard", b"of another bridge", Sent(1.0, "b2"))
+    assert inbox.drain().samples["heard"].payload == b"of another bridge"
+
+
+def test_what_a_cache_has_without_a_stamp_counts_before_anything_is_published(inbox: Inbox) -> None:
+    inbox.put_cached("heard", b"cached", None)
+    assert inbox.drain().samples["heard"].payload == b"cached"
+    inbox.put("heard", b"new", None)
+    inbox.put_cached("heard", b"cached", None)
+    assert inbox.drain().samples["heard"].payload == b"new"
+
+
+def test_a_cache_is_told_once_and_at_once(inbox: Inbox, woken: list[bool]) -> None:
+    inbox.cache("heard/@adv/pub/b1/uhlc/_")
+    assert (inbox.drain().caches, woken) == (["heard/@adv/pub/b1/uhlc/_"], [True])
+    assert inbox.drain().caches == []
+
+
+def test_of_a_watched_topic_each_change_in_between_is_kept(inbox: Inbox) -> None:
+    for said in (b"yes", b"no", b"no", b"yes"):
+        inbox.put("permit", said, None)
+    sample = inbox.drain().samples["permit"]
+    assert ([one.payload for one in sample.between], sample.overrun) == ([b"yes", b"no"], False)
+    assert sorted(one.at for one in sample.between) == [one.at for one in sample.between]
+    assert sample.between[-1].at <= sample.at
+
+
+def test_of_too_many_changes_it_is_said_that_some_are_not_known(inbox: Inbox) -> None:
+    for number in range(BETWEEN_MOST + 1):
+        inbox.put("permit", b"%d" % number, None)
+    assert not inbox.drain().samples["permit"].overrun
+    for number in range(BETWEEN_MOST + 2):
+        inbox.put("permit", b"%d" % number, None)
+    sample = inbox.drain().samples["permit"]
+    assert [one.payload for one in sample.between] == [b"%d" % n for n in range(1, BETWEEN_MOST + 1)]
+    assert sample.overrun
+    for number in range(5):
+        inbox.put("permit", b"%d" % number * (BETWEEN_BYTES // 2), None)
+    sample = inbox.drain().samples["permit"]
+    assert (len(sample.between), sample.overrun) == (2, True)
+
+
+def test_what_is_kept_whole_has_every_sample_in_order(inbox: Inbox) -> None:
+    for number in range(3):
+        inbox.put("taped", b"%d" % number, None)
+        inbox.put("heard", b"x", None)
+    changes = inbox.drain()
+    assert [(key, one.payload) for key, one in changes.kept] == [
+        ("taped", b"0"),
+        ("taped", b"1"),
+        ("taped", b"2"),
+    ]
+    assert list(inbox.drain().kept) == []
+
+
+def test_what_is_kept_whole_is_bounded_by_its_number_and_its_bytes(inbox: Inbox) -> None:
+    for number in range(KEPT_MOST + 10):
+        inbox.put("taped", b"%d" % number, None)
+    kept = list(inbox.drain().kept)
+    assert (len(kept), kept[0][1].payload) == (KEPT_MOST, b"10")
+    large = bytes(KEPT_BYTES // 4)
+    for _ in range(10):
+        inbox.put("taped", large, None)
+    assert len(list(inbox.drain().kept)) == 4
+
+
+def test_of_a_session_that_was_nothing_comes_in(inbox: Inbox) -> None:
+    old = inbox.guarded(lambda said: inbox.put("heard", said, None))
+    inbox.put("heard", b"", None)
+    inbox.transport("z", True)
+    inbox.renew()
+    old(b"late")
+    changes = inbox.drain()
+    assert (changes.samples, changes.link_up) == ({}, False)
+    inbox.guarded(lambda said: inbox.put("heard", said, None))(b"new")
+    assert inbox.drain().samples["heard"].payload == b"new"

@@ -1,0 +1,85 @@
+"""Whether the bridges answer now: asked rarely, however many want to know."""
+
+import asyncio
+from collections.abc import Awaitable, Callable
+
+from app.errors import LinkError
+from app.transport.readiness import EVERY_S, LIMIT_S, Asked
+
+
+class Bridges:
+    """Bridges that answer when they are let; the questions are counted."""
+
+    def __init__(self) -> None:
+        self.questions = 0
+        self.answer: bool | LinkError = True
+        self.asleep = False
+
+    async def ask(self) -> bool:
+        self.questions += 1
+        await asyncio.sleep(60 if self.asleep else 0)
+        if isinstance(self.answer, LinkError):
+            raise self.answer
+        return self.answer
+
+
+def run(test: Callable[[Bridges, Asked], Awaitable[None]]) -> None:
+    async def both() -> None:
+        bridges = Bridges()
+        asked = Asked(bridges.ask)
+        await test(bridges, asked)
+        await asked.stop()
+
+    asyncio.run(both())
+
+
+def test_who_asks_at_once_shares_one_question() -> None:
+    async def test(bridges: Bridges, asked: Asked) -> None:
+        assert await asyncio.gather(*(asked.answers() for _ in range(100))) == [True] * 100
+        assert bridges.questions == 1
+
+    run(test)
+
+
+def test_there_are_two_questions_a_second_at_most() -> None:
+    async def test(bridges: Bridges, asked: Asked) -> None:
+        loop = asyncio.get_running_loop()
+        end = loop.time() + 2.2 * EVERY_S
+        while loop.time() < end:
+            assert await asked.answers()
+            await asyncio.sleep(0.01)
+        assert bridges.questions == 3
+
+    run(test)
+
+
+def test_what_is_told_is_not_older_than_that() -> None:
+    async def test(bridges: Bridges, asked: Asked) -> None:
+        assert await asked.answers()
+        bridges.answer = False
+        await asyncio.sleep(EVERY_S)
+        assert not await asked.answers()
+
+    run(test)
+
+
+def test_no_answer_takes_a_second_at_most_and_one_who_leaves_stops_nobody() -> None:
+    async def test(bridges: Bridges, asked: Asked) -> None:
+        bridges.asleep = True
+        began = asyncio.get_running_loop().time()
+        leaving, staying = (asyncio.ensure_future(asked.answers()) for _ in range(2))
+        await asyncio.sleep(0.1)
+        leaving.cancel()
+        assert await staying is False
+        assert asyncio.get_running_loop().time() - began < LIMIT_S + 1
+        assert bridges.questions == 1
+
+    run(test)
+
+
+def test_a_link_that_can_not_ask_has_no_answer() -> None:
+    async def test(bridges: Bridges, asked: Asked) -> None:
+        bridges.answer = LinkError("no session")
+        assert not await asked.answers()
+
+    run(test)

@@ -1,0 +1,313 @@
+"""The link alone, between two Zenoh sessions of this process."""
+
+import asyncio
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+from datetime import UTC, datetime, timedelta
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pytest
+import zenoh
+from zenoh.ext import CacheConfig, declare_advanced_publisher
+from zenoh.handlers import Callback
+
+from app.dialect import bridge_dialect
+from app.errors import SettingsError
+from app.interfaces.names import Qos
+from app.robot.state import Sample
+from app.transport.zenoh_session import BLOCKED_MOST_US, Link, config_from, config_to
+from tests.support.parts import free_port, until
+
+RENEWALS = 30
+BURST = 500
+
+
+def matched(publisher: zenoh.Publisher) -> bool:
+    """Whether somebody is known to listen: an object of Zenoh's, whatever its stub says."""
+    status: Any = publisher.matching_status
+    return bool(status.matching)
+
+
+def resident_kb() -> int:
+    status = Path("/proc/self/status").read_text()
+    return next(int(line.split()[1]) for line in status.splitlines() if line.startswith("VmRSS"))
+
+
+def tokens(zid: str, count: int) -> list[str]:
+    return [
+        bridge_dialect.token(zid, "MP", f"topic{n}", "std_msgs/msg/String", Qos(), "")
+        for n in range(count)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("content", "why"),
+    [(None, "No such file or directory"), ('{ mode: "pear" }', "unknown variant `pear`"), ("{", "1:2")],
+)
+def test_a_configuration_that_can_not_be_used_is_told_in_the_users_terms(
+    tmp_path: Path, content: str | None, why: str
+) -> None:
+    path = tmp_path / "zenoh.json5"
+    if content is not None:
+        path.write_text(content)
+    with pytest.raises(SettingsError, match=re.escape(why)) as caught:
+        config_from(path)
+    assert str(path) in str(caught.value)
+    assert ".rs:" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("connect", "endpoints"),
+    [
+        ('["tcp/127.0.0.1:9", "tcp/127.0.0.1:10"]', ("tcp/127.0.0.1:9", "tcp/127.0.0.1:10")),
+        ('{ peer: ["tcp/127.0.0.1:9"], router: ["tcp/127.0.0.1:10"] }', ("tcp/127.0.0.1:9",)),
+        ("[]", ()),
+    ],
+)
+def test_a_link_tells_where_it_connects(connect: str, endpoints: tuple[str, ...]) -> None:
+    config = config_to("tcp/127.0.0.1:9")
+    config.insert_json5("connect/endpoints", connect)
+    link = Link(config, lambda _: None)
+    assert link.endpoints == endpoints
+    link.close()
+
+
+def test_a_session_is_renewed_in_the_middle_of_what_comes_in(
+    peer: tuple[str, zenoh.Session],
+) -> None:
+    """A token that ended under the link's lock, while Zenoh called back, stopped the process."""
+    endpoint, session = peer
+    over = threading.Event()
+
+    def flood() -> None:
+        while not over.is_set():
+            held = [session.liveliness().declare_token(t) for t in tokens(str(session.zid()), 20)]
+            for token in held:
+                token.undeclare()
+
+    link = Link(config_to(endpoint), lambda _: None)
+    link.start(["a"], ["b"])
+
+    def renew() -> None:
+        for _ in range(RENEWALS):
+            link.hold(tokens(link.zid, 10))
+            link.renew()
+            link.drain()
+
+    threads = [threading.Thread(target=work, daemon=True) for work in (flood, renew)]
+    for thread in threads:
+        thread.start()
+    threads[1].join(30)
+    stuck = threads[1].is_alive()
+    over.set()
+    assert not stuck, "renewing the session stands still"
+    threads[0].join(5)
+    link.close()
+
+
+def test_a_burst_is_not_dropped(peer: tuple[str, zenoh.Session]) -> None:
+    """With Zenoh's own queue some of these were lost, more on a busy machine, and nobody was told."""
+    endpoint, session = peer
+    heard: list[bytes] = []
+
+    def hear(sample: zenoh.Sample) -> None:
+        heard.append(bytes(sample.payload))
+
+    session.declare_subscriber("b", Callback(hear, indirect=False))
+    link = Link(config_to(endpoint), lambda _: None)
+    link.start([], ["b"])
+    until(lambda: link.heard("b"), "the subscriber is known")
+    for number in range(BURST):
+        link.put("b", str(number).encode())
+    until(lambda: len(heard) == BURST, f"all came, of {BURST}: {len(heard)}")
+    link.close()
+    assert heard == [str(number).encode() for number in range(BURST)]
+
+
+LISTENER = """
+import sys, zenoh
+config = zenoh.Config()
+config.insert_json5("listen/endpoints", f'["{sys.argv[1]}"]')
+config.insert_json5("scouting/multicast/enabled", "false")
+session = zenoh.open(config)
+listener = session.declare_subscriber("b", lambda sample: None)
+print("ready", flush=True)
+sys.stdin.read()
+"""
+
+
+def test_a_link_that_takes_nothing_stops_the_loop_once_and_not_for_long() -> None:
+    """A peer that is frozen: the kernel's buffers fill, and then what is sent, and what is asked."""
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    command = [sys.executable, "-c", LISTENER, endpoint]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as peer:
+        assert peer.stdout is not None
+        assert peer.stdout.readline() == b"ready\n"
+        link = Link(config_to(endpoint), lambda urgent: None)
+        link.start([], ["b"])
+        until(lambda: link.heard("b"), "the subscriber is known")
+        peer.send_signal(signal.SIGSTOP)
+        took = []
+        for _ in range(2000):
+            began = time.monotonic()
+            link.put("b", bytes(20_000))
+            took.append(time.monotonic() - began)
+        began = time.monotonic()
+        asyncio.run(asked(link))
+        took.append(time.monotonic() - began)
+        peer.kill()
+        link.close()
+    long = [one for one in took if one > 0.1]
+    assert len(long) == 1, "it waits for room once"
+    assert long[0] < 2 * BLOCKED_MOST_US / 1e6
+
+
+async def asked(link: Link) -> None:
+    """A question is sent, and not waited for."""
+    link.query("b", b"", 0.1).cancel()
+
+
+def test_nothing_is_left_of_the_sessions_that_were(peer: tuple[str, zenoh.Session]) -> None:
+    """Zenoh kept a shared memory segment of each: a thousand losses of the link, and no file more."""
+    link = Link(config_to(peer[0]), lambda _: None)
+    link.start(["a"], ["b"])
+
+    def files() -> int:
+        return len(list(Path("/proc/self/fd").iterdir()))
+
+    link.renew()
+    until(lambda: link.drain().link_up, "linked")
+    before = files()
+    for _ in range(8):
+        link.renew()
+    until(lambda: files() <= before, f"no more files than {before}")
+    link.close()
+
+
+def test_tokens_are_held_by_the_new_session_when_they_are_wanted_again(
+    peer: tuple[str, zenoh.Session],
+) -> None:
+    endpoint, session = peer
+    link = Link(config_to(endpoint), lambda _: None)
+    link.start([], [])
+    link.hold(tokens(link.zid, 1))
+    link.renew()
+    wanted = tokens(link.zid, 2)
+    link.hold(wanted)
+
+    def found() -> set[str]:
+        replies = session.liveliness().get(bridge_dialect.TOKENS, timeout=1)
+        return {str(reply.ok.key_expr) for reply in replies if reply.ok is not None}
+
+    until(lambda: found() == set(wanted), "the tokens of the new session are there")
+    link.close()
+
+
+def test_of_a_watched_topic_what_came_and_went_between_two_drains_is_kept(
+    peer: tuple[str, zenoh.Session],
+) -> None:
+    endpoint, session = peer
+    link = Link(config_to(endpoint), lambda _: None)
+    link.start(["a", "b"], [], watched=["a"])
+    until(lambda: link.drain().link_up, "a link")
+    said = [b"yes", b"no", b"no", b"yes", *(b"%d" % n for n in range(100)), b"yes"]
+    for key in ("a", "b"):
+        for payload in said:
+            session.put(key, payload)
+    time.sleep(0.5)
+    samples = link.drain().samples
+    watched, other = samples["a"], samples["b"]
+    assert bytes(watched.payload) == bytes(other.payload) == b"yes"
+    changes = [b"yes", b"no", b"yes", *(b"%d" % n for n in range(100))]
+    assert [bytes(one.payload) for one in watched.between] == changes
+    assert other.between == ()
+    for payload in (b"yes", b"no", b"no", b"yes"):
+        session.put("a", payload)
+    time.sleep(0.5)
+    assert [bytes(one.payload) for one in link.drain().samples["a"].between] == [b"yes", b"no"]
+    link.close()
+
+
+def test_a_stamp_of_a_clock_that_is_ahead_makes_the_link_deaf_to_nothing(
+    peer: tuple[str, zenoh.Session],
+) -> None:
+    endpoint, session = peer
+    link = Link(config_to(endpoint), lambda _: None)
+    link.start(["a"], [], watched=["a"])
+    until(partial(matched, publisher := session.declare_publisher("a")), "it is subscribed")
+    own = session.new_timestamp().get_id()
+    now = datetime.now(UTC)
+    for payload, ahead_s in ((b"true", 3600), *((b"false%d" % n, n / 100) for n in range(25))):
+        publisher.put(payload, timestamp=zenoh.Timestamp(now + timedelta(seconds=ahead_s), own))
+    heard: list[bytes] = []
+
+    def all_heard() -> bool:
+        if sample := link.drain().samples.get("a"):
+            heard.extend(bytes(one.payload) for one in sample.between)
+            heard.append(bytes(sample.payload))
+        return len(heard) >= 26
+
+    until(all_heard, "each value came")
+    link.close()
+    assert heard == [b"true", *(b"false%d" % n for n in range(25))]
+
+
+def test_a_late_link_gets_the_last_value_of_a_cache_and_nothing_older_than_what_it_heard(
+    peer: tuple[str, zenoh.Session],
+) -> None:
+    endpoint, session = peer
+    latched = declare_advanced_publisher(
+        session, "a", cache=CacheConfig(max_samples=1), publisher_detection=True
+    )
+    latched.put(b"old")
+    latched.put(b"last")
+    link = Link(config_to(endpoint), lambda _: None)
+    link.start(["a"], [])
+    heard: list[bytes] = []
+
+    def came(payload: bytes) -> bool:
+        if sample := link.drain().samples.get("a"):
+            heard.append(bytes(sample.payload))
+        return payload in heard
+
+    until(partial(came, b"last"), "the last value came")
+    latched.put(b"new")
+    until(partial(came, b"new"), "a new value came")
+    latched.undeclare()
+    again = declare_advanced_publisher(
+        session, "a", cache=CacheConfig(max_samples=1), publisher_detection=True
+    )
+    again.put(b"of the next")
+    until(partial(came, b"of the next"), "the next publisher is heard")
+    link.close()
+    assert heard == [b"last", b"new", b"of the next"]
+
+
+def test_a_small_message_does_not_keep_all_that_it_was_read_with(
+    peer: tuple[str, zenoh.Session],
+) -> None:
+    """The latest of each topic stays for long: each kept a buffer of 64 kB, of which some was used."""
+    endpoint, session = peer
+    topics = [f"topic{number}" for number in range(300)]
+    link = Link(config_to(endpoint), lambda _: None)
+    link.start(topics, [])
+    until(lambda: link.drain().link_up, "a link")
+    before = resident_kb()
+    kept: dict[str, Sample] = {}
+
+    def came() -> int:
+        kept.update(link.drain().samples)
+        return len(kept)
+
+    for number, topic in enumerate(topics, 1):  # each in a message of its own
+        session.put(topic, b"small")
+        until(partial(lambda wanted: came() == wanted, number), f"{topic} came")
+    grown_kb = resident_kb() - before
+    link.close()
+    assert grown_kb < len(topics) * 4

@@ -1,0 +1,107 @@
+"""One heartbeat for all streams: its timer, what it tells, and when it goes along with news."""
+
+import asyncio
+import json
+import re
+from collections.abc import Awaitable, Callable
+
+import pytest
+
+from app import clock
+from app.view import heartbeat
+from app.view.heartbeat import Heartbeat, beat
+from tests.support.parts import events_in
+
+
+def run(work: Callable[[], Awaitable[None]]) -> None:
+    async def whole() -> None:
+        async with asyncio.timeout(10):
+            await work()
+
+    asyncio.run(whole())
+
+
+class Beating:
+    """A heartbeat, and a wait for the next beats of its own accord."""
+
+    def __init__(self) -> None:
+        self.woken = asyncio.Event()
+        self.heart = Heartbeat(self.woken.set)
+
+    async def next(self) -> None:
+        self.woken.clear()
+        await self.woken.wait()
+
+
+def test_it_tells_the_time_and_has_no_id() -> None:
+    before = clock.server_now()
+    ((name, data, event_id),) = events_in(beat().decode())
+    told = json.loads(data)
+    assert (name, event_id) == ("beat", "")
+    assert re.fullmatch(r"\d\d:\d\d:\d\d", told["clock"])
+    assert round(before * 1000) <= told["now"] <= round(clock.server_now() * 1000)
+
+
+def test_it_beats_while_somebody_hears_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(heartbeat, "BEAT_S", 0.01)
+
+    async def work() -> None:
+        beating = Beating()
+        with beating.heart.heard():
+            for count in (1, 2, 3):
+                await beating.next()
+                assert beating.heart.count == count
+
+    run(work)
+
+
+def test_all_who_hear_it_get_the_same_bytes_of_one_timer(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(heartbeat, "BEAT_S", 0.01)
+
+    async def work() -> None:
+        beating = Beating()
+        with beating.heart.heard(), beating.heart.heard(), beating.heart.heard():
+            await beating.next()
+            assert beating.heart.count == 1
+            assert events_in(beating.heart.event.decode())[0][0] == "beat"
+
+    run(work)
+
+
+def test_with_the_last_who_hears_it_its_timer_ends() -> None:
+    async def work() -> None:
+        beating = Beating()
+        with beating.heart.heard():
+            with beating.heart.heard():
+                pass
+            assert beating.heart._timer is not None
+        assert beating.heart._timer is None
+        with beating.heart.heard():
+            assert beating.heart._timer is not None
+
+    run(work)
+
+
+def test_a_beat_that_is_nearly_due_goes_along_and_wakes_nobody_itself() -> None:
+    async def work() -> None:
+        beating = Beating()
+        with beating.heart.heard():
+            beating.heart.along()
+            assert beating.heart.count == 0  # it is not due yet
+            await asyncio.sleep(heartbeat.BEAT_S - heartbeat.EARLY_S + 0.01)
+            beating.heart.along()
+            if not beating.woken.is_set():  # else the machine stood still
+                assert beating.heart.count == 1
+                beating.heart.along()
+                assert beating.heart.count == 1
+
+    run(work)
+
+
+def test_where_nobody_hears_it_none_goes_along() -> None:
+    async def work() -> None:
+        beating = Beating()
+        beating.heart.along()
+        assert beating.heart.count == 0
+
+    run(work)

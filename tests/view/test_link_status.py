@@ -1,0 +1,296 @@
+"""The three links: which of them locks a control, what is said of each, when a node is silent."""
+
+import ast
+import math
+from typing import Any
+
+import pytest
+
+from app.dialect.bridge_dialect import bridge_token, server_token
+from app.interfaces.names import Qos
+from app.panel.model import Panel
+from app.panel.number_range import Range
+from app.panel.widgets.parameter import DESCRIBE, GET, SET
+from app.permission.interlocks import PERMITTED, Verdict
+from app.robot.parameter_state import Declared
+from app.robot.state import Robot
+from app.settings import PACKAGE
+from app.view.link_status import BRIDGE, LONGEST_LIST, NODE, LinkLamp, labels, lamps, locks
+from app.view.view import sight
+from tests.support.builders import (
+    BOOL,
+    ENABLED,
+    FREE,
+    HEARD,
+    MESSAGE,
+    NOTHING,
+    NOW,
+    TEXT,
+    Table,
+    endpoint,
+    panel_of,
+    permits,
+    robot_there,
+    says,
+)
+from tests.support.builders import BRIDGE as BRIDGE_ZID
+
+GUARDED = {**FREE, "id": "guarded", "label": "Guarded", "topic": "/guarded", "interlock": "operation"}
+AGED = {**HEARD, "max_age_s": 5.0}
+
+
+SPEED = {
+    "id": "speed",
+    "kind": "parameter",
+    "label": "Speed",
+    "node": "/arm",
+    "parameter": "speed",
+    "type": "double",
+    "max": 2.0,
+}
+
+
+def cell(interlock: Table = NOTHING) -> Panel:
+    return panel_of(MESSAGE, FREE, GUARDED, HEARD, interlock=interlock)
+
+
+def links_of(panel: Panel, robot: Robot, now: float = NOW, **more: Any) -> dict[str, LinkLamp]:
+    robot.follow_publishers()
+    return sight(panel, robot, now, **more).view["link"]
+
+
+def codes_of(module: str) -> set[str]:
+    """The codes of all verdicts that a module makes: the text that `locked` or `Verdict` is given."""
+    tree = ast.parse((PACKAGE / f"{module}.py").read_text())
+    calls = (node for node in ast.walk(tree) if isinstance(node, ast.Call))
+    made = [c for c in calls if isinstance(c.func, ast.Name) and c.func.id in ("locked", "Verdict")]
+    found = {n.value for c in made for a in c.args for n in ast.walk(a) if isinstance(n, ast.Constant)}
+    return {code for code in found if isinstance(code, str)}
+
+
+# By the operator's own side or the robot's word: no link is to blame.
+NO_LINK = frozenset(
+    {
+        "permitted",
+        "forbidden",
+        "unmet",
+        "busy",
+        "perhaps_busy",
+        "log",
+        "control",
+        "parameter_undeclared",
+        "parameter_mistyped",
+        "parameter_read_only",
+        "parameter_apart",
+    }
+)
+
+
+def test_every_verdict_has_its_link_or_none() -> None:
+    assert len(BRIDGE | NODE | NO_LINK) == len(BRIDGE) + len(NODE) + len(NO_LINK)
+    made = codes_of("permission/interlocks")
+    assert {"no_link", "stale", "forbidden", "joining"} <= made
+    assert made - {"", "cyclone_hint", "no_link_at"} <= BRIDGE | NODE | NO_LINK
+
+
+@pytest.mark.parametrize("code", sorted(BRIDGE | NODE | NO_LINK))
+def test_a_verdict_locks_by_its_link_only(code: str) -> None:
+    panel = panel_of(FREE)
+    verdicts = {"free": Verdict(code == "permitted", code)}
+    by = [labels(panel, verdicts, codes) for codes in (BRIDGE, NODE)]
+    assert by == [["Free"] if code in codes else [] for codes in (BRIDGE, NODE)]
+
+
+def test_without_a_bridge_it_locks_all_and_the_node_nothing() -> None:
+    panel = cell()
+    robot = robot_there(panel)
+    robot.graph.apply(bridge_token(BRIDGE_ZID), False)
+    link = links_of(panel, robot)
+    assert link["bridge"]["locks"] == "Locks Free, Guarded."
+    assert link["bridge"]["reason"] == (
+        "No connection to the robot: Zenoh answers, but no ROS 2 bridge is there."
+    )
+    assert (link["node"]["locks"], link["server"]["locks"]) == ("Locks nothing.", "Locks nothing.")
+    assert link["node"]["reason"].startswith("While the bridge can't be reached")
+
+
+def test_a_value_that_is_waited_for_locks_by_the_node() -> None:
+    panel = cell()
+    robot = robot_there(panel)
+    endpoint(robot, "MP", ENABLED, BOOL)
+    link = links_of(panel, robot)
+    assert link["bridge"]["locks"] == "Locks nothing."
+    assert link["node"]["locks"] == "Locks Guarded."
+    assert link["node"]["reason"] == "Locked: waiting for /operation_enabled."
+    assert link["node"]["state"] == "ok"
+
+
+def test_what_the_robot_forbids_is_no_fault_of_a_link() -> None:
+    panel = cell()
+    robot = robot_there(panel)
+    endpoint(robot, "MP", ENABLED, BOOL)
+    permits(robot, False)
+    link = links_of(panel, robot)
+    assert {lamp["locks"] for lamp in link.values()} == {"Locks nothing."}
+    assert {lamp["reason"] for lamp in link.values()} == {""}
+
+
+@pytest.mark.parametrize(
+    ("known", "reason"),
+    [
+        (Declared("live", 1.0, read_only=True), "Read only"),
+        (Declared("undeclared"), "has no parameter speed"),
+        (Declared("mistyped", found="string"), "is string"),
+        (Declared("live", 1.0, range=Range(5.0, 6.0)), "no value is both"),
+    ],
+)
+def test_a_parameter_that_can_not_be_set_is_no_fault_of_a_link(known: Declared, reason: str) -> None:
+    panel = panel_of(SPEED)
+    robot = robot_there(panel)
+    for name, type_name in (GET, DESCRIBE, SET):
+        robot.graph.apply(server_token(BRIDGE_ZID, "SS", f"arm/{name}", type_name), True)
+    robot.parameters["speed"] = known
+    seen = sight(panel, robot, NOW).view
+    assert reason in seen["widgets"]["speed"]["reason"]
+    assert {lamp["locks"] for lamp in seen["link"].values()} == {"Locks nothing."}
+    assert {lamp["reason"] for lamp in seen["link"].values()} == {""}
+
+
+def test_what_the_log_locks_is_no_fault_of_a_link() -> None:
+    panel = cell()
+    link = links_of(panel, robot_there(panel), lock="The disk is full.")
+    assert {lamp["locks"] for lamp in link.values()} == {"Locks nothing."}
+
+
+@pytest.mark.parametrize("silent_for", [4.9, 5.0])
+def test_a_node_that_stops_talking_is_silent_though_its_token_is_there(silent_for: float) -> None:
+    panel = cell(interlock={"max_age_s": 5.0})
+    robot = robot_there(panel)
+    endpoint(robot, "MP", ENABLED, BOOL)
+    permits(robot)
+    node = links_of(panel, robot, NOW + silent_for)["node"]
+    assert (node["state"], node["text"]) == (("bad", "silent") if silent_for >= 5 else ("ok", "ok"))
+    assert node["reason"].startswith("Nothing new on /operation_enabled for 5 s") is (silent_for >= 5)
+
+
+def test_an_old_value_that_is_only_shown_is_no_silence() -> None:
+    panel = panel_of(AGED, GUARDED, MESSAGE, interlock={"max_age_s": 5.0})
+    robot = robot_there(panel)
+    endpoint(robot, "MP", "/heard", TEXT)
+    endpoint(robot, "MP", ENABLED, BOOL)
+    says(robot, "/heard", "hello", at=NOW)
+    permits(robot, at=NOW + 60)
+    seen = sight(panel, robot, NOW + 60)
+    assert seen.view["widgets"]["heard"]["state"] == "old"
+    assert (seen.view["link"]["node"]["state"], seen.view["link"]["node"]["reason"]) == ("ok", "")
+
+
+def test_a_forbidding_interlock_gets_old_too_and_time_shows_it() -> None:
+    panel = panel_of(GUARDED, MESSAGE, interlock={"max_age_s": 2.0})
+    robot = robot_there(panel)
+    endpoint(robot, "MP", ENABLED, BOOL)
+    permits(robot, False)
+    assert sight(panel, robot, NOW + 1).until == NOW + 2
+    assert links_of(panel, robot, NOW + 2)["node"]["text"] == "silent"
+
+
+def test_the_node_is_not_blamed_for_what_its_bridge_or_a_type_keeps_back() -> None:
+    panel = panel_of(HEARD, interlock={"max_age_s": 5.0})
+    robot = robot_there(panel)
+    permits(robot)
+    endpoint(robot, "MP", ENABLED, TEXT)
+    assert links_of(panel, robot, NOW + 60)["node"]["text"] == "ok"
+
+
+def test_an_old_value_without_a_publisher_is_no_silence() -> None:
+    panel = panel_of(HEARD, interlock={"max_age_s": 5.0})
+    robot = robot_there(panel)
+    permits(robot)
+    assert links_of(panel, robot, NOW + 60)["node"]["text"] == "no node seen"
+
+
+def test_a_node_that_was_never_seen_is_to_be_started() -> None:
+    panel = cell()
+    node = links_of(panel, robot_there(panel))["node"]
+    assert (node["state"], node["text"]) == ("wait", "no node seen")
+    assert node["reason"].endswith("start it, with the ROS domain of the bridge.")
+
+
+def test_a_node_that_was_there_and_went_without_its_bridge_has_its_remedy() -> None:
+    panel = cell()
+    robot = robot_there(panel)
+    endpoint(robot, "MP", "/heard", TEXT)
+    links_of(panel, robot)
+    endpoint(robot, "MP", "/heard", TEXT, alive=False)
+    node = links_of(panel, robot)["node"]
+    assert (node["state"], node["text"]) == ("wait", "no node seen")
+    assert node["reason"].startswith("/heard was there and is gone, but the bridge is not")
+    assert "restart the node or the bridge" in node["reason"]
+    endpoint(robot, "MP", "/heard", TEXT)
+    assert links_of(panel, robot)["node"]["reason"] == "Locked: waiting for /operation_enabled."
+
+
+def test_a_publisher_that_went_has_its_remedy_while_others_are_there() -> None:
+    panel = cell(interlock={"require_publisher": True})
+    robot = robot_there(panel)
+    endpoint(robot, "MP", "/heard", TEXT)
+    endpoint(robot, "MP", ENABLED, BOOL)
+    links_of(panel, robot)
+    endpoint(robot, "MP", ENABLED, BOOL, alive=False)
+    node = links_of(panel, robot)["node"]
+    assert (node["text"], node["locks"]) == ("ok", "Locks Guarded.")
+    assert node["reason"].startswith("/operation_enabled was there and is gone")
+
+
+def test_a_node_that_went_with_its_bridge_is_not_lost_by_it() -> None:
+    panel = cell()
+    robot = robot_there(panel)
+    endpoint(robot, "MP", "/heard", TEXT)
+    links_of(panel, robot)
+    endpoint(robot, "MP", "/heard", TEXT, alive=False)
+    robot.graph.apply(bridge_token(BRIDGE_ZID), False)
+    robot.graph.apply(bridge_token("b2"), True)
+    assert "start it" in links_of(panel, robot)["node"]["reason"]
+
+
+def test_a_lost_link_forgets_which_nodes_were_there() -> None:
+    panel = cell()
+    robot = robot_there(panel)
+    endpoint(robot, "MP", "/heard", TEXT)
+    links_of(panel, robot)
+    robot.lose()
+    robot.link_up, robot.settled_at = True, 0.0
+    robot.graph.apply(bridge_token(BRIDGE_ZID), True)
+    assert "start it" in links_of(panel, robot)["node"]["reason"]
+
+
+def test_a_qos_that_does_not_match_is_the_nodes() -> None:
+    panel = cell(interlock={"qos": {"reliability": "reliable"}})
+    robot = robot_there(panel)
+    endpoint(robot, "MP", ENABLED, BOOL, qos=Qos(reliable=False))
+    link = links_of(panel, robot)
+    assert link["node"]["locks"] == "Locks Guarded."
+    assert "best effort" in link["node"]["reason"]
+
+
+def test_what_the_bridge_does_not_pass_on_is_the_bridges() -> None:
+    panel = cell()
+    verdicts = {"free": PERMITTED, "guarded": Verdict(False, "unheard", "Not passed on.")}
+    link, until = lamps(panel, robot_there(panel), PERMITTED, verdicts, NOW)
+    assert (link["bridge"]["locks"], link["bridge"]["reason"]) == ("Locks Guarded.", "Not passed on.")
+    assert (link["bridge"]["state"], until) == ("ok", math.inf)
+
+
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [
+        ([], "Locks nothing."),
+        (["One"], "Locks One."),
+        (["One", "Two"], "Locks One, Two."),
+        (["x" * 120, "Two"], f"Locks {'x' * 120} and 1 more."),
+        (["x" * 30] * 40, f"Locks {', '.join(['x' * 30] * 3)} and 37 more."),
+    ],
+)
+def test_a_long_list_is_cut_with_the_number_of_the_rest(names: list[str], said: str) -> None:
+    assert locks(names) == said
+    assert len(said) < LONGEST_LIST + 30

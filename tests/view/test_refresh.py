@@ -1,0 +1,156 @@
+"""Values in frames, as often as the panel says; permissions and the graph at once."""
+
+import asyncio
+import time
+from collections.abc import Coroutine
+from typing import Any
+
+from hypothesis import given
+from hypothesis import strategies as some
+
+from app.audit import Unlogged
+from app.panel.model import Display, Panel
+from app.permission.control_authority import Control
+from app.robot.state import Robot, Sample
+from app.view.publisher import Board
+from app.view.refresh import Alone, Showing
+from app.view.view import Sight, refreshed, sight
+from tests.support.builders import (
+    BOOL,
+    BRIDGE,
+    ENABLED,
+    GUARDED,
+    HEARD,
+    NOW,
+    TEXT,
+    endpoint,
+    panel_of,
+    permits,
+    robot_there,
+    says,
+)
+
+AGED = {**HEARD, "id": "aged", "topic": "/aged", "max_age_s": 2.0}
+LAMP = {
+    "id": "lamp",
+    "kind": "indicator",
+    "label": "Lamp",
+    "topic": "/lamp",
+    "type": BOOL,
+    "max_age_s": 3.0,
+    "states": [{"value": True, "text": "On", "shape": "circle"}],
+}
+PANEL = panel_of(GUARDED, HEARD, AGED, LAMP, interlock={"max_age_s": 60.0})
+TOPICS = {"/heard": TEXT, "/aged": TEXT, "/lamp": BOOL}
+SLOW = panel_of(GUARDED, HEARD, display_hz=1)
+
+
+def there(panel: Panel) -> Robot:
+    """A robot whose node is heard of and permits."""
+    robot = robot_there(panel)
+    endpoint(robot, "MP", ENABLED, BOOL)
+    permits(robot)
+    return robot
+
+
+Said = tuple[str, Any, float]  # a topic, what it says (None: no message), and seconds since the last
+SAID = some.tuples(
+    some.sampled_from(sorted(TOPICS)), some.sampled_from(["x", "y", None]), some.floats(0.0, 1.5)
+)
+
+
+def say(robot: Robot, topic: str, word: str | None, at: float) -> None:
+    if word is None:
+        robot.take(robot.key(topic), Sample(b"broken", 1, at, at, BRIDGE))
+    else:
+        says(robot, topic, word == "x" if TOPICS[topic] is BOOL else word, TOPICS[topic], at=at)
+
+
+@given(some.lists(SAID, max_size=20))
+def test_a_frame_of_values_is_what_a_look_at_everything_would_show(story: list[Said]) -> None:
+    robot = there(PANEL)
+    now = NOW
+    seen = sight(PANEL, robot, now)
+    displays = [w for w in PANEL.widgets() if isinstance(w, Display)]
+    for topic, word, later in story:
+        now += later
+        say(robot, topic, word, now)
+        if now >= seen.rest:
+            seen = sight(PANEL, robot, now)
+        else:
+            stale = [w for w in displays if w.topic == topic or seen.displays[w.id] <= now]
+            seen = refreshed(seen, stale, robot, now)
+        whole = sight(PANEL, robot, now)
+        assert seen.view == whole.view
+        assert seen.displays == whole.displays
+        assert seen.rest <= whole.rest  # or it is looked at earlier than need be
+
+
+def showing_of(panel: Panel, robot: Robot) -> Showing:
+    control = Control(panel.control, "", tell=lambda *_: None)
+    return Showing(
+        panel,
+        robot,
+        "r1",
+        control,
+        Unlogged(),
+        Alone(),
+        before=lambda: None,
+        recordings_fault=lambda: "",
+        simulated=False,
+        fault="",
+    )
+
+
+async def newer(board: Board, version: int) -> None:
+    async with asyncio.timeout(10):
+        while board.version <= version:
+            await board.news(version, board.heartbeat.count)
+
+
+def run(work: Coroutine[Any, Any, None]) -> None:
+    asyncio.run(work)
+
+
+def test_values_wait_for_the_frame_and_come_together() -> None:
+    async def shown() -> None:
+        robot = there(SLOW)
+        showing = showing_of(SLOW, robot)
+        showing.now()
+        began, version = time.monotonic(), showing.board.version
+        for number in range(100):
+            says(robot, "/heard", str(number))
+            showing.values({robot.key("/heard")})
+        assert showing.board.version == version
+        await newer(showing.board, version)
+        assert time.monotonic() - began >= 1 / SLOW.display_hz - 0.01
+        assert showing.board.version == version + 1
+        assert showing.board.view["widgets"]["heard"]["text"] == "99"
+        showing.stop()
+
+    run(shown())
+
+
+def test_a_permission_waits_for_no_frame_and_takes_the_values_along() -> None:
+    async def shown() -> None:
+        robot = there(SLOW)
+        showing = showing_of(SLOW, robot)
+        showing.now()
+        says(robot, "/heard", "hello")
+        showing.values({robot.key("/heard")})
+        permits(robot, False)
+        showing.now()
+        widgets = showing.board.view["widgets"]
+        assert (widgets["guarded"]["enabled"], widgets["heard"]["text"]) == (False, "hello")
+        showing.stop()
+
+    run(shown())
+
+
+def test_a_sight_changes_when_the_first_of_its_parts_does() -> None:
+    robot = there(PANEL)
+    says(robot, "/aged", "x")
+    says(robot, "/lamp", True, BOOL)
+    seen: Sight = sight(PANEL, robot, NOW)
+    assert seen.until == NOW + 2.0
+    assert seen.displays == {"heard": float("inf"), "aged": NOW + 2.0, "lamp": NOW + 3.0}

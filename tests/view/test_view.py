@@ -1,0 +1,291 @@
+"""What the page shows of the robot: lights, permissions, readouts, and when time changes them."""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from app.clock import format_time
+from app.dialect.bridge_dialect import DEMO_VERSION, bridge_token, server_token
+from app.robot.state import Robot, Sample
+from app.view.display_values import LONGEST_TEXT, readout, written
+from app.view.view import View, sight
+from tests.support.builders import (
+    BOOL,
+    BRIDGE,
+    ENABLED,
+    HEARD,
+    INTERFACES,
+    NOW,
+    endpoint,
+    panel_of,
+    permits,
+    robot_there,
+    says,
+    small_panel,
+)
+
+PANEL = small_panel()
+
+
+@pytest.fixture
+def robot() -> Robot:
+    return robot_there(PANEL)
+
+
+def view_of(robot: Robot, now: float = NOW, **more: Any) -> View:
+    return sight(PANEL, robot, now, **more).view
+
+
+def heard(robot: Robot, now: float = NOW, **widget: Any) -> tuple[dict[str, Any], float]:
+    """The readout of /heard, and when time changes it."""
+    panel = panel_of({**HEARD, **widget})
+    seen = sight(panel, robot, now)
+    return seen.view["widgets"]["heard"], seen.until
+
+
+def test_a_view_has_every_widget_and_interlock(robot: Robot) -> None:
+    view = view_of(robot)
+    assert list(view["widgets"]) == ["message", "free", "guarded", "heard"]
+    assert list(view["interlocks"]) == ["operation"]
+
+
+def test_a_widget_shows_that_it_can_be_pressed(robot: Robot) -> None:
+    permits(robot)
+    assert view_of(robot)["widgets"]["guarded"] == {"enabled": True, "reason": None}
+
+
+def test_a_locked_widget_shows_the_reason_of_its_interlock(robot: Robot) -> None:
+    view = view_of(robot)
+    assert view["widgets"]["guarded"] == view["interlocks"]["operation"]
+    assert view["widgets"]["guarded"] == {
+        "enabled": False,
+        "reason": "Locked: waiting for /operation_enabled.",
+    }
+
+
+def test_an_interlock_locks_no_widget_but_its_own(robot: Robot) -> None:
+    assert view_of(robot)["widgets"]["free"] == {"enabled": True, "reason": None}
+
+
+def test_a_text_input_shows_nothing_of_the_robot(robot: Robot) -> None:
+    assert view_of(robot)["widgets"]["message"] == {}
+
+
+@pytest.mark.parametrize(("simulated", "banner"), [(True, "SIMULATED ROBOT"), (False, "")])
+def test_a_demo_shows_its_banner(robot: Robot, simulated: bool, banner: str) -> None:
+    assert view_of(robot, simulated=simulated)["notice"]["banner"] == banner
+
+
+def test_a_demo_robot_behind_a_live_panel_shows_the_banner_too(robot: Robot) -> None:
+    robot.graph.answered({BRIDGE: DEMO_VERSION})
+    assert view_of(robot)["notice"]["banner"] == "SIMULATED ROBOT"
+
+
+def test_the_banner_of_a_demo_is_there_while_nothing_is_connected() -> None:
+    view = view_of(Robot(PANEL, INTERFACES), simulated=True)
+    assert view["notice"]["banner"] == "SIMULATED ROBOT"
+
+
+def test_a_fault_of_the_panel_file_is_shown(robot: Robot) -> None:
+    assert (
+        view_of(robot, fault="cell.toml can't be used")["notice"]["fault"] == "cell.toml can't be used"
+    )
+
+
+def no_link(robot: Robot) -> None:
+    robot.link_up = False
+
+
+def no_bridge(robot: Robot) -> None:
+    robot.graph.apply(bridge_token(BRIDGE), False)
+
+
+def silent(robot: Robot) -> None:
+    robot.graph.answered({})
+
+
+def joining(robot: Robot) -> None:
+    robot.settled_at = math.inf
+
+
+def node(robot: Robot) -> None:
+    endpoint(robot, "MS", "/free", "std_msgs/msg/String")
+
+
+def nothing(robot: Robot) -> None:
+    pass
+
+
+@pytest.mark.parametrize(
+    ("change", "bridge", "on_robot"),
+    [
+        (no_link, ("bad", "no connection"), ("bad", "no connection")),
+        (no_bridge, ("bad", "not there"), ("bad", "no connection")),
+        (silent, ("bad", "no answer"), ("bad", "no connection")),
+        (joining, ("wait", "joining"), ("wait", "no node seen")),
+        (nothing, ("ok", "ok"), ("wait", "no node seen")),
+        (node, ("ok", "ok"), ("ok", "ok")),
+    ],
+)
+def test_the_lights_show_how_far_the_way_goes(
+    robot: Robot, change: Callable[[Robot], None], bridge: tuple[str, str], on_robot: tuple[str, str]
+) -> None:
+    change(robot)
+    link = view_of(robot)["link"]
+    assert [(lamp["state"], lamp["text"]) for lamp in link.values()] == [("ok", "ok"), bridge, on_robot]
+    assert [lamp["name"] for lamp in link.values()] == ["Server", "Bridge", "Robot"]
+
+
+@pytest.mark.parametrize(
+    ("role", "topic", "seen"),
+    [
+        ("MP", "/heard", True),
+        ("MP", ENABLED, True),
+        ("MS", "/guarded", True),
+        ("MS", "/heard", False),
+        ("MP", "/free", False),
+        ("MP", "/other", False),
+    ],
+)
+def test_a_node_is_one_that_the_panel_talks_with(
+    robot: Robot, role: Any, topic: str, seen: bool
+) -> None:
+    endpoint(robot, role, topic, BOOL)
+    assert (view_of(robot)["link"]["node"]["state"] == "ok") is seen
+
+
+@pytest.mark.parametrize(("service", "state"), [("reset", "ok"), ("other", "wait")])
+def test_a_node_that_only_serves_is_seen_too(service: str, state: str) -> None:
+    trigger = "std_srvs/srv/Trigger"
+    reset = {"id": "reset", "kind": "call", "label": "R", "service": "/reset", "type": trigger}
+    panel = panel_of(reset)
+    robot = robot_there(panel)
+    robot.graph.apply(server_token(BRIDGE, "SS", service, trigger), True)
+    assert sight(panel, robot, NOW).view["link"]["node"]["state"] == state
+
+
+def test_a_readout_waits_for_its_topic(robot: Robot) -> None:
+    assert heard(robot) == (
+        {"state": "waiting", "text": "—", "note": "waiting for /heard"},
+        math.inf,
+    )
+
+
+@pytest.mark.usefixtures("utc")
+def test_a_readout_shows_value_and_time_of_reception(robot: Robot) -> None:
+    says(robot, "/heard", "hello", at=3661.0)
+    assert heard(robot, 9999.0) == (
+        {"state": "live", "text": "hello", "note": "received 01:01:01"},
+        math.inf,
+    )
+
+
+@pytest.mark.usefixtures("utc")
+def test_a_readout_from_before_a_cut_says_so(robot: Robot) -> None:
+    says(robot, "/heard", "hello", at=3661.0)
+    robot.cut(BRIDGE, 2)
+    shown, _ = heard(robot)
+    assert shown == {
+        "state": "old",
+        "text": "hello",
+        "note": "from before the connection was cut, received 01:01:01",
+    }
+
+
+def test_a_readout_that_can_not_be_read_says_so(robot: Robot) -> None:
+    robot.take("heard", Sample(b"broken", 1, NOW, NOW, BRIDGE))
+    shown, _ = heard(robot)
+    assert (shown["state"], shown["text"]) == ("unreadable", "—")
+    assert shown["note"] == "/heard can't be read: what arrives is not std_msgs/msg/String"
+
+
+def test_a_readout_of_a_topic_of_another_type_says_so(robot: Robot) -> None:
+    says(robot, "/heard", "hello")
+    endpoint(robot, "MP", "/heard", BOOL)
+    shown, _ = heard(robot)
+    assert shown["state"] == "unreadable"
+    assert shown["note"].startswith("/heard is std_msgs/msg/Bool on the robot")
+
+
+def test_what_was_unreadable_before_a_cut_is_waited_for(robot: Robot) -> None:
+    robot.take("heard", Sample(b"broken", 1, NOW, NOW, BRIDGE))
+    robot.cut(BRIDGE, 2)
+    assert heard(robot)[0]["state"] == "waiting"
+
+
+@pytest.mark.parametrize(
+    ("age", "state", "note", "changes_at"),
+    [
+        (0.0, "live", None, 5.0),
+        (4.9, "live", None, 5.0),
+        (5.0, "old", "5 s old", 6.0),
+        (59.5, "old", "59 s old", 60.0),
+        (60.0, "old", "1 min old", 120.0),
+        (7200.0, "old", "2 h old", 7260.0),
+    ],
+)
+def test_a_readout_with_a_greatest_age_tells_its_age(
+    robot: Robot, age: float, state: str, note: str | None, changes_at: float
+) -> None:
+    says(robot, "/heard", "hello", at=NOW)
+    shown, until = heard(robot, NOW + age, max_age_s=5)
+    assert (shown["state"], shown["text"]) == (state, "hello")
+    assert shown["note"] == (note or f"received {format_time(NOW)}")
+    assert until == NOW + changes_at
+
+
+def test_a_readout_shows_a_field_inside() -> None:
+    header = "std_msgs/msg/Header"
+    panel = panel_of({**HEARD, "type": header, "field": "stamp.sec"})
+    robot = robot_there(panel)
+    payload = INTERFACES.encode(header, {"stamp": {"sec": 5, "nanosec": 0}, "frame_id": ""})
+    robot.take("heard", Sample(payload, 1, NOW, NOW, BRIDGE))
+    assert sight(panel, robot, NOW).view["widgets"]["heard"]["text"] == "5"
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (True, "true"),
+        (False, "false"),
+        (-7, "-7"),
+        (0.5, "0.5"),
+        (math.nan, "NaN"),
+        (math.inf, "Infinity"),
+        (-math.inf, "-Infinity"),
+        (2**64 - 1, "18446744073709551615"),
+        (-(2**63), "-9223372036854775808"),
+        (None, "—"),
+        ("", ""),
+        ("<b>\n", "<b>\n"),
+        ("x" * LONGEST_TEXT, "x" * LONGEST_TEXT),
+        ("x" * (LONGEST_TEXT + 1), "x" * (LONGEST_TEXT - 1) + "…"),
+    ],
+)
+def test_a_value_is_written_as_text(value: Any, text: str) -> None:
+    assert written(value) == text
+
+
+def test_the_view_changes_when_the_first_of_its_times_comes(robot: Robot) -> None:
+    panel = panel_of({**HEARD, "max_age_s": 9}, interlock={"max_age_s": 2})
+    permits(robot, at=NOW)
+    says(robot, "/heard", "hello", at=NOW)
+    assert sight(panel, robot, NOW + 1).until == NOW + 2
+    assert sight(panel, robot, NOW + 3).until == NOW + 9
+
+
+def test_a_view_that_time_does_not_change_needs_no_timer(robot: Robot) -> None:
+    permits(robot)
+    assert sight(PANEL, robot, NOW).until == math.inf
+
+
+def test_joining_shows_again_when_it_is_over(robot: Robot) -> None:
+    robot.settled_at = NOW + 1
+    assert sight(PANEL, robot, NOW).until == NOW + 1
+
+
+def test_a_readout_alone_gives_attributes_and_time(robot: Robot) -> None:
+    widget: Any = next(w for w in PANEL.widgets() if w.id == "heard")
+    assert readout(widget, robot, NOW)[0]["state"] == "waiting"

@@ -1,0 +1,140 @@
+"""The static files in memory: the stylesheet in its order, and a name that changes with any of them."""
+
+import gzip
+from pathlib import Path
+
+import pytest
+
+from app.panel.model import KINDS
+from app.settings import shipped
+from app.web.assets import LAYERS, OF_KINDS, OWN_PAGE, Assets, load_assets
+from tests.support.parts import ROOT
+
+
+@pytest.fixture
+def static(tmp_path: Path) -> Path:
+    folder = tmp_path / "static"
+    for part in ("css", "js"):
+        (folder / part).mkdir(parents=True)
+    for layer in (*LAYERS, *OF_KINDS, OWN_PAGE):
+        style = f".{layer} a :is(b, i) {{\n    top: 0;\n  }}\n"
+        (folder / "css" / f"{layer}.css").write_text(f"/* Why. */\n  {style}")
+    (folder / "js/main.js").write_text("main();\n")
+    (folder / "js/press.js").write_text("press();\n")
+    (folder / "js/notes.txt").write_text("no script\n")
+    return folder
+
+
+@pytest.fixture
+def templates(tmp_path: Path) -> Path:
+    folder = tmp_path / "templates"
+    folder.mkdir()
+    (folder / "screen.html").write_text("<p>")
+    return folder
+
+
+def loaded(static: Path, templates: Path, mm_per_px: float = 0.25, *kinds: str) -> Assets:
+    return load_assets(static, templates, mm_per_px, kinds)
+
+
+def test_the_stylesheet_is_its_layers_in_order_with_the_millimetre(
+    static: Path, templates: Path
+) -> None:
+    layers = "".join(f"\n.{layer} a :is(b,i){{top:0;}}" for layer in LAYERS)
+    sent = loaded(static, templates).files["kiosk.css"].content.decode()
+    assert sent == f"{layers}:root{{--mm:4.0000px}}"
+
+
+@pytest.mark.parametrize(
+    ("kinds", "needed"),
+    [((), False), (("text", "publish", "select"), False)]
+    + [((kind,), True) for kind in ("number", "slider", "toggle", "parameter")],
+)
+def test_the_stylesheet_has_what_the_panels_widgets_need(
+    static: Path, templates: Path, kinds: tuple[str, ...], needed: bool
+) -> None:
+    sent = loaded(static, templates, 0.25, *kinds).files["kiosk.css"].content.decode()
+    assert (".entries a" in sent) is needed
+
+
+def test_scripts_keep_their_names(static: Path, templates: Path) -> None:
+    files = loaded(static, templates).files
+    assert set(files) == {"kiosk.css", "log.css", "main.js", "press.js"}
+    assert files["main.js"].content == b"main();\n"
+    assert files["log.css"].content == b"\n.log a :is(b,i){top:0;}"
+
+
+def test_scripts_go_out_without_comments_on_the_lines_where_they_were_written(
+    static: Path, templates: Path
+) -> None:
+    (static / "js/main.js").write_text('// Why.\nf("http://a"); // beside\n  // More.\n  g();\n')
+    sent = loaded(static, templates).files["main.js"].content
+    assert sent == b'\nf("http://a"); // beside\n\ng();\n'
+
+
+def test_no_script_has_a_text_over_several_lines_that_a_comment_could_be_taken_from() -> None:
+    for script in (ROOT / "static/js").glob("*.js"):
+        assert all(line.count("`") % 2 == 0 for line in script.read_text().splitlines()), script
+
+
+def test_each_file_is_packed_once_and_for_all(static: Path, templates: Path) -> None:
+    first, again = (loaded(static, templates).files for _ in range(2))
+    for name, asset in first.items():
+        assert gzip.decompress(asset.packed) == asset.content
+        assert asset.packed == again[name].packed
+
+
+def test_browsers_are_told_what_a_file_is(static: Path, templates: Path) -> None:
+    files = loaded(static, templates).files
+    assert (files["kiosk.css"].media_type, files["main.js"].media_type) == (
+        "text/css",
+        "text/javascript",
+    )
+
+
+def test_the_same_files_have_the_same_revision(static: Path, templates: Path) -> None:
+    assert loaded(static, templates).revision == loaded(static, templates).revision
+
+
+@pytest.mark.parametrize("name", ["static/css/base.css", "static/js/press.js", "templates/screen.html"])
+def test_every_change_of_a_file_is_a_new_revision(
+    static: Path, templates: Path, tmp_path: Path, name: str
+) -> None:
+    before = loaded(static, templates).revision
+    (tmp_path / name).write_text("changed")
+    assert loaded(static, templates).revision != before
+
+
+@pytest.mark.parametrize("name", ["static/js/more.js", "templates/more.html"])
+def test_a_new_file_is_a_new_revision(static: Path, templates: Path, tmp_path: Path, name: str) -> None:
+    before = loaded(static, templates).revision
+    (tmp_path / name).write_text("")
+    assert loaded(static, templates).revision != before
+
+
+def test_another_screen_is_a_new_revision(static: Path, templates: Path) -> None:
+    assert loaded(static, templates, 0.25).revision != loaded(static, templates, 0.3).revision
+
+
+def test_the_shipped_files_are_complete() -> None:
+    assets = load_assets(shipped("static"), shipped("templates"), 0.22, ())
+    assert "main.js" in assets.files
+    style = assets.files["kiosk.css"].content.decode()
+    assert style.index("@layer tokens{") < style.index("@layer base{") < style.index("@layer widgets{")
+
+
+def test_no_shipped_file_loads_anything_from_elsewhere() -> None:
+    assets = load_assets(shipped("static"), shipped("templates"), 0.22, KINDS)
+    for name, asset in assets.files.items():
+        assert b"http:" not in asset.content, name
+        assert b"https:" not in asset.content, name
+        assert b"@import" not in asset.content, name
+
+
+def test_only_a_panel_that_needs_it_gets_the_look_of_several_reasons() -> None:
+    several, single = (
+        load_assets(shipped("static"), shipped("templates"), 0.22, kinds).files["kiosk.css"].content
+        for kinds in (("publish", "interlocks"), tuple(KINDS))
+    )
+    assert b"button.why" in several
+    assert b"button.why" not in single

@@ -1,0 +1,340 @@
+"""Control over HTTP: several real clients on one server with the demo robot. Those that are not at
+the cell come as through a proxy, which says where from."""
+
+import re
+import time
+from collections.abc import Callable, Iterator
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import httpx
+import pytest
+
+from app.web.client_cookie import COOKIE
+from tests.runtime.test_several_robots import entry, panel_file
+from tests.support.parts import ROOT, Server, until
+
+FAST_S = 2.0
+PROXY = "127.0.0.1"  # through which those who are not at the cell come
+
+
+def control_panel(folder: Path, more: str = "", panel: str | None = None) -> Path:
+    """The shipped panel, which needs control to press."""
+    text = panel or (ROOT / "app/panel.toml").read_text()
+    path = folder / "control.toml"
+    path.write_text(
+        text.replace("[[interlock]]", f"[control]\nrequired = true\n{more}\n[[interlock]]", 1)
+    )
+    return path
+
+
+class Client:
+    """A browser without scripts, or a program: it keeps its cookie."""
+
+    def __init__(self, server: Server, address: str = "", base: str = "") -> None:
+        headers = {"x-forwarded-for": address} if address else {}
+        self.http = httpx.Client(base_url=server.url + base, headers=headers, trust_env=False)
+        self.http.get("/pages/operation")
+
+    def control(self, act: str, **body: object) -> httpx.Response:
+        return self.http.post(f"/control/{act}", json=body)
+
+    def take(self) -> bool:
+        return bool(self.control("take").json()["done"])
+
+    def press(self, widget: str = "operation") -> httpx.Response:
+        return self.http.post(f"/widgets/{widget}", json={"inputs": {"message": "hello"}})
+
+    @property
+    def id(self) -> str:
+        found = re.search(r'data-me="([0-9a-f]*)"', self.http.get("/pages/operation").text)
+        assert found
+        return found[1]
+
+
+@pytest.fixture
+def kiosk(tmp_path: Path) -> Iterator[Server]:
+    path = control_panel(tmp_path, f"takeover_after_s = {FAST_S}")
+    mine = Server(ROOT, KIOSK_PANEL=str(path), KIOSK_PROXIES=PROXY)
+    until(mine.ready, "ready")
+    yield mine
+    mine.end()
+
+
+@pytest.fixture
+def client(kiosk: Server) -> Iterator[Callable[..., Client]]:
+    """Makes clients that are closed with the test."""
+    made: list[Client] = []
+
+    def make(address: str = "", base: str = "") -> Client:
+        made.append(Client(kiosk, address, base))
+        return made[-1]
+
+    yield make
+    for one in made:
+        one.http.close()
+
+
+def test_a_press_needs_control(client: Callable[..., Client], kiosk: Server) -> None:
+    ann, bob = client("192.0.2.1"), client("192.0.2.2")
+    free = ann.press()
+    assert (free.status_code, free.json()["outcome"]) == (409, "refused")
+    assert "Nobody has control of the robot: take control first." in free.json()["reason"]
+    assert ann.take()
+    assert ann.press().json()["outcome"] == "published"
+    refused = bob.press()
+    assert (refused.status_code, refused.json()["outcome"]) == (409, "refused")
+    assert "Panel 1 (192.0.2.1) has control of the robot." in refused.json()["reason"]
+    assert kiosk.press("operation", "no cookie at all").status_code == 409
+    assert kiosk.by("socket").press("operation", "no cookie at all").status_code == 409
+    address = {"x-forwarded-for": "192.0.2.1"}
+    for token, status in ((ann.http.cookies[COOKIE], 200), (bob.http.cookies[COOKIE], 409)):
+        with kiosk.socket(cookie=f"{COOKIE}={token}", **address) as socket:
+            answer = socket.press(widget="operation", inputs={"message": "by socket"})
+            assert answer.status_code == status, answer.json()
+    names = ("Panel 1 (192.0.2.1)", "Panel 2 (192.0.2.2)", "a program (127.0.0.1)")
+    until(lambda: all(f"by {n} with" in kiosk.process.text for n in names), "the log names each")
+
+
+def test_only_one_of_many_gets_it(client: Callable[..., Client]) -> None:
+    clients = [client(f"192.0.2.{n}") for n in range(1, 9)]
+    assert [one.take() for one in clients] == [True] + [False] * 7
+    assert [one.press().status_code for one in clients] == [200] + [409] * 7
+
+
+def test_asking_granting_and_giving_up(client: Callable[..., Client], kiosk: Server) -> None:
+    ann, bob = client("192.0.2.1"), client("192.0.2.2")
+    ann.take()
+    assert bob.control("ask").json()["done"]
+    assert kiosk.snapshot()["control"]["asker"] == bob.id
+    assert kiosk.snapshot()["control"]["asker_name"] == "Panel 2 (192.0.2.2)"
+    assert bob.control("give", to=bob.id).status_code == 409
+    granted = ann.control("give", to=bob.id)
+    assert granted.json()["control"]["holder"] == bob.id
+    assert (ann.press().status_code, bob.press().status_code) == (409, 200)
+    assert bob.control("release").json()["done"]
+    assert kiosk.snapshot()["control"]["holder"] == ""
+    assert bob.press().status_code == 409
+
+
+def test_what_was_touched_long_ago_is_not_done_any_more(client: Callable[..., Client]) -> None:
+    """A server that stood still takes in later what was touched meanwhile."""
+    late = client()
+    long_ago = (datetime.now(UTC) - timedelta(seconds=4)).isoformat()
+    answer = late.control("take", at=long_ago)
+    assert (answer.status_code, answer.json()["done"]) == (409, False)
+    assert "s to get here: press again." in answer.json()["reason"]
+    assert answer.json()["control"]["holder"] == ""
+    assert late.control("take", at=datetime.now(UTC).isoformat()).json()["done"]
+    assert late.control("release", at=long_ago).json()["done"]
+    assert late.control("take", at="yesterday").status_code == 422
+
+
+def test_a_denied_request(client: Callable[..., Client]) -> None:
+    ann, bob = client("192.0.2.1"), client("192.0.2.2")
+    ann.take()
+    bob.control("ask")
+    assert ann.control("keep", to=bob.id).json()["done"]
+    again = bob.control("ask")
+    assert (again.status_code, again.json()["done"]) == (409, False)
+    assert again.json()["reason"].startswith("The request was denied")
+
+
+def test_a_request_goes_through_while_nobody_touches(
+    client: Callable[..., Client], kiosk: Server
+) -> None:
+    ann, bob = client("192.0.2.1"), client("192.0.2.2")
+    ann.take()
+    began = time.monotonic()
+    bob.control("ask")
+
+    def bob_has_it(touched: bool = False) -> bool:
+        ann.control("here", touched=touched)
+        bob.control("here")
+        return bool(kiosk.snapshot()["control"]["holder"] == bob.id)
+
+    while time.monotonic() - began < 2 * FAST_S:
+        assert not bob_has_it(touched=True)
+    until(bob_has_it, "Bob has it", within_s=FAST_S + 1)
+
+
+def test_a_lost_holder_frees_it(client: Callable[..., Client], kiosk: Server) -> None:
+    ann = client("192.0.2.1")
+    with kiosk.stream() as stream:
+        stream.next("snapshot")
+        ann.take()
+        assert stream.next("control")[1]["holder"] == ann.id
+        began = time.monotonic()
+        ann.control("here")
+        assert stream.next("control")[1]["holder"] == ""
+        assert 4.5 < time.monotonic() - began < 9
+    assert ann.press().status_code == 409
+
+
+def test_the_panel_at_the_cell_takes_over(client: Callable[..., Client]) -> None:
+    ann, cell = client("192.0.2.1"), client()
+    ann.take()
+    assert cell.take()
+    reason = ann.press().json()["reason"]
+    assert "The panel at the cell has control of the robot." in reason
+
+
+def test_an_address_that_a_client_makes_up_is_not_the_cell(client: Callable[..., Client]) -> None:
+    ann = client("192.0.2.1")
+    ann.take()
+    forged = client("127.0.0.1, 192.0.2.66")
+    assert not forged.take()
+
+
+def test_the_first_page_of_the_panel_at_the_cell_takes_control(
+    client: Callable[..., Client], kiosk: Server
+) -> None:
+    cell = client()
+    assert kiosk.snapshot()["control"]["holder"] == ""  # by a program nothing is taken
+    html = cell.http.get("/pages/operation", headers={"sec-fetch-dest": "document"}).text
+    assert "This panel has control of the robot." in html
+    assert kiosk.snapshot()["control"]["holder"] == cell.id
+
+
+def test_the_page_is_right_for_each_before_any_script(client: Callable[..., Client]) -> None:
+    ann, bob = client("192.0.2.1"), client("192.0.2.2")
+    ann.take()
+    until(lambda: ann.press().status_code == 200, "pressed")
+    locked = re.compile(r'aria-describedby="why-operation receipt-operation" disabled')
+    assert not locked.search(ann.http.get("/pages/operation").text)
+    html = bob.http.get("/pages/operation").text
+    assert locked.search(html)
+    assert "Panel 1 (192.0.2.1) has control of the robot." in html
+
+
+def test_the_cookie_is_the_browsers_own(client: Callable[..., Client], kiosk: Server) -> None:
+    answer = httpx.get(f"{kiosk.url}/", headers={"x-forwarded-for": "192.0.2.1"}, trust_env=False)
+    cookie = answer.headers["set-cookie"]
+    assert {"HttpOnly", "Path=/", "SameSite=strict"} <= set(cookie.split("; "))
+    token = answer.cookies["panel_browser"]
+    assert token not in answer.text
+    ann = client("192.0.2.1")
+    assert "set-cookie" not in ann.http.get("/").headers
+    ann.take()
+    with kiosk.stream() as stream:
+        snapshot = str(stream.next("snapshot")[1])
+    for secret in ann.http.cookies.values():
+        assert secret not in snapshot
+        assert secret not in kiosk.process.text
+
+
+def test_a_cookie_that_is_none_of_ours_is_replaced(kiosk: Server) -> None:
+    for wrong in ("x", "A" * 32, "0" * 33, "<script>"):
+        answer = httpx.get(f"{kiosk.url}/", headers={"cookie": f"panel_browser={wrong}"})
+        assert re.fullmatch(r"[0-9a-f]{32}", answer.cookies["panel_browser"])
+
+
+def test_a_link_on_another_site_does_not_change_who_somebody_is(kiosk: Server) -> None:
+    answer = httpx.get(f"{kiosk.url}/", headers={"sec-fetch-site": "cross-site"}, trust_env=False)
+    assert answer.status_code == 200
+    assert "set-cookie" not in answer.headers
+    assert 'data-me=""' in answer.text
+
+
+def test_without_a_cookie_control_is_not_taken_but_a_cookie_given(kiosk: Server) -> None:
+    with httpx.Client(base_url=kiosk.url, trust_env=False) as program:
+        first = program.post("/control/take", json={})
+        assert (first.status_code, first.json()["done"]) == (409, False)
+        assert program.post("/control/take", json={}).json()["done"]
+
+
+def test_pages_of_other_sites_get_no_control(kiosk: Server, client: Callable[..., Client]) -> None:
+    ann = client("192.0.2.1")
+    foreign = [
+        {"origin": "http://evil.example"},
+        {"origin": "null"},
+        {"sec-fetch-site": "cross-site"},
+        {"sec-fetch-site": "same-site"},
+        {"host": "evil.example"},
+    ]
+    for act in ("take", "ask", "give", "keep", "release", "here"):
+        for headers in foreign:
+            path = f"/control/{act}"
+            assert ann.http.post(path, headers=headers, json={}).status_code == 403
+            assert ann.http.post(path, headers=headers, data={"to": ""}).status_code == 403
+    assert kiosk.snapshot()["control"]["holder"] == ""
+
+
+def test_what_is_no_act_is_refused_in_words(client: Callable[..., Client]) -> None:
+    ann = client("192.0.2.1")
+    unknown = ann.control("steal")
+    assert unknown.status_code == 404
+    assert "there is take, ask, give, keep, release" in unknown.json()["error"]
+    assert "to:" in ann.control("give", to="<script>").json()["error"]
+    assert "extra" in ann.control("take", force=True).json()["error"].lower()
+    for body in (b"{", b"[]", b"1", b"\xff", b"[" * 50_000):
+        answer = ann.http.post("/control/take", content=body)
+        assert answer.status_code == 422
+        assert "the body" in answer.json()["error"]
+    plain = ann.http.post("/control/take", content=b"{}", headers={"content-type": "text/plain"})
+    assert plain.status_code == 422
+    assert "touched" in ann.control("here", touched="yes").json()["error"]
+    assert ann.http.get("/control/take").status_code == 405
+
+
+def test_forms_lead_back_to_their_page_with_what_was_refused(client: Callable[..., Client]) -> None:
+    ann, bob = client("192.0.2.1"), client("192.0.2.2")
+    done = ann.http.post("/control/take", data={"to": "", "page": "operation"})
+    assert (done.status_code, done.headers["location"]) == (303, "/pages/operation")
+    assert "This panel has control" in ann.http.get(done.headers["location"]).text
+    refused = bob.http.post("/control/take", data={"to": "", "page": "operation"})
+    assert "Another panel has control" in bob.http.get(refused.headers["location"]).text
+    odd = bob.http.get("/pages/operation?control=<script>").text
+    assert "<script>" not in odd.split('<form class="control"')[1]
+
+
+def test_each_robot_has_its_own_control(tmp_path: Path) -> None:
+    robots = panel_file(tmp_path, entry(1), entry(2)).read_text()
+    kiosk = Server(ROOT, KIOSK_PANEL=str(control_panel(tmp_path, panel=robots)), KIOSK_PROXIES=PROXY)
+    try:
+        until(kiosk.ready, "ready", within_s=20)
+        ann = Client(kiosk, "192.0.2.1", "/robots/r1")
+        bob = Client(kiosk, "192.0.2.2", "/robots/r2")
+        assert ann.take()
+        assert bob.take()
+        assert (ann.press().status_code, bob.press().status_code) == (200, 200)
+        ann.http.base_url = httpx.URL(f"{kiosk.url}/robots/r2")
+        assert "Panel 2 (192.0.2.2) has control of Robot 2." in ann.press().json()["reason"]
+        assert kiosk.http.post("/control/take", json={}).status_code == 404
+    finally:
+        ann.http.close()
+        bob.http.close()
+        kiosk.end()
+
+
+def test_after_a_restart_nobody_has_it(
+    client: Callable[..., Client], kiosk: Server, tmp_path: Path
+) -> None:
+    ann = client("192.0.2.1")
+    ann.take()
+    kiosk.process.end()
+    again = Server(ROOT, kiosk.port, KIOSK_PANEL=str(tmp_path / "control.toml"), KIOSK_PROXIES=PROXY)
+    try:
+        until(again.ready, "ready")
+        ann.control("here", touched=True)
+        assert again.snapshot()["control"]["holder"] == ""
+        assert ann.press().status_code == 409
+        assert ann.take()  # its cookie is as good as before
+    finally:
+        again.end()
+
+
+def test_a_panel_without_control_is_as_it_was() -> None:
+    kiosk = Server(ROOT)
+    try:
+        until(kiosk.ready, "ready")
+        assert kiosk.press("operation", "free for all").status_code == 200
+        assert kiosk.snapshot()["control"]["required"] is False
+        assert 'id="control"' not in kiosk.http.get("/").text
+        refused = kiosk.http.post("/control/take", json={})
+        assert refused.status_code == 404
+        assert "[control]" in refused.json()["error"]
+        with kiosk.stream() as stream:
+            assert stream.next("browser", "beat")[0] == "beat"
+    finally:
+        kiosk.end()

@@ -1,0 +1,427 @@
+"""The WebSocket of a hold, with the demo robot: who may open it, and what it answers."""
+
+import csv
+import io
+import json
+import signal
+import sqlite3
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from socket import create_connection
+from typing import Any, Final
+
+import pytest
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import ClientConnection, connect
+
+from app.audit.database import NAME
+from tests.browser.test_holds_in_browser import PANEL, jogging, permit
+from tests.support.parts import ROOT, Bridge, RosNode, Server, until
+
+TRIES: Final = 5
+
+
+def in_demo(folder: Path, **more: Any) -> Server:
+    """A server whose demo robot can be jogged, by the panel `jog.toml`."""
+    panel = folder / "jog.toml"
+    panel.write_text(PANEL)
+    return Server(ROOT, KIOSK_PANEL=str(panel), KIOSK_MODE="demo", **more)
+
+
+@pytest.fixture(scope="module")
+def demo(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    mine = in_demo(tmp_path_factory.mktemp("panel"))
+    until(mine.ready, "ready")
+    yield mine
+    mine.end()
+
+
+class Socket:
+    """One hold, spoken by hand."""
+
+    def __init__(self, connection: ClientConnection, seen: str) -> None:
+        self._connection = connection
+        self.seen = seen
+        self.number = 0
+        self.lease = ""
+        self.hear()
+
+    def hear(self) -> dict[str, Any]:
+        said: dict[str, Any] = json.loads(self._connection.recv(timeout=5))
+        self.stamp, self.at = said["stamp"], time.monotonic()
+        return said
+
+    def say(self, **what: Any) -> None:
+        after = 1000 * (time.monotonic() - self.at)
+        self._connection.send(json.dumps({"stamp": self.stamp, "after": after, **what}))
+
+    def begin(self, **more: Any) -> dict[str, Any]:
+        self.say(do="begin", **{"inputs": {"speed": 0.5}, "seen": self.seen, **more})
+        said = self.hear()
+        self.lease = said.get("lease", "")
+        return said
+
+    def beat(self, **more: Any) -> dict[str, Any]:
+        self.number += 1
+        self.say(do="beat", **{"number": self.number, "lease": self.lease, **more})
+        return self.hear()
+
+    def beat_until_it_ends(self) -> dict[str, Any]:
+        """As a browser does, which sends on until it is told."""
+        while (said := self.beat())["state"] == "held":
+            time.sleep(0.05)
+        return said
+
+    def closed(self) -> int:
+        """The code that the server closes with."""
+        with pytest.raises(ConnectionClosed) as closed:
+            self.hear()
+        assert closed.value.rcvd is not None
+        return closed.value.rcvd.code
+
+
+@contextmanager
+def opened(server: Server, **headers: str) -> Iterator[Socket]:
+    until(lambda: server.widget("jog")["enabled"], "the demo robot permits", within_s=40)
+    seen = server.snapshot()["id"]
+    url = f"ws://127.0.0.1:{server.port}{server.base}/widgets/jog/hold"
+    with connect(url, additional_headers=headers) as connection:
+        yield Socket(connection, seen)
+
+
+@contextmanager
+def held(server: Server) -> Iterator[Socket]:
+    """A hold that has begun; on a busy machine the time from press to hold may be too long."""
+    for _ in range(TRIES):
+        with opened(server) as socket:
+            if socket.begin()["state"] == "held":
+                yield socket
+                return
+    raise AssertionError("no hold began")
+
+
+def test_a_hold_is_begun_kept_and_let_go(demo: Server) -> None:
+    with held(demo) as socket:
+        assert socket.beat()["state"] == "held"
+        assert demo.widget("jog")["held"] is True
+        socket.say(do="end", why="released", lease=socket.lease)
+        said = socket.hear()
+        assert (said["state"], said["widget"], said["id"]) == ("ended", "jog", socket.lease)
+        until(lambda: not demo.widget("jog")["held"], "no longer held")
+    log = csv.DictReader(io.StringIO(demo.http.get("/log.csv?every=true").text.removeprefix("\ufeff")))
+    assert {"pressed", "closed"} == {entry["kind"] for entry in log if entry["press"] == said["id"]}
+
+
+def test_an_input_with_a_default_may_be_left_out(demo: Server) -> None:
+    with opened(demo) as socket:
+        said = socket.begin(inputs={})
+        assert said.get("status") in (None, 409)  # on a busy machine it may come too late, and no worse
+    log = csv.DictReader(io.StringIO(demo.http.get("/log.csv?every=true").text.removeprefix("\ufeff")))
+    values = {row["values"] for row in log if row["press"] == said.get("lease", said.get("id"))}
+    assert values - {""} == {'{"speed": 0.5}'}
+
+
+def test_a_hold_is_let_go_by_who_has_no_answer_yet(demo: Server) -> None:
+    for _ in range(TRIES):
+        with opened(demo) as socket:
+            socket.begin()
+            socket.say(do="end", why="released")
+            said = socket.hear()
+            if said["state"] == "ended" and said["outcome"] == "published":
+                assert said["reason"].startswith("Released at")
+                return
+    raise AssertionError(said)
+
+
+def test_who_lets_go_before_a_hold_begins_is_told_that_it_did_not(demo: Server) -> None:
+    with opened(demo) as socket:
+        socket.say(do="end", why="released")
+        said = socket.hear()
+        assert (said["state"], said["status"], said["outcome"]) == ("refused", 409, "refused")
+        assert said["reason"].endswith("it was let go before it began: hold it longer.")
+        assert socket.closed() == 4409
+
+
+def test_a_heartbeat_for_a_hold_that_is_over_is_told_so_and_revives_nothing(demo: Server) -> None:
+    with held(demo) as socket:
+        time.sleep(0.4)
+        said = socket.hear()
+        assert (said["state"], said["outcome"]) == ("ended", "aborted")
+        for _ in range(3):
+            again = socket.beat()
+            assert (again["state"], again["reason"]) == ("ended", said["reason"])
+        assert demo.widget("jog")["held"] is False
+        assert socket.closed() == 1000
+
+
+def test_a_second_holder_is_refused(demo: Server) -> None:
+    with held(demo) as first, opened(demo) as second:
+        first.beat()
+        said = second.begin()
+        if first.beat()["state"] == "held":  # else the machine stood still: nothing to compare
+            assert (said["state"], said["status"], said["outcome"]) == ("refused", 409, "refused")
+            assert said["reason"].endswith("held by another browser.")
+            assert second.closed() == 4409
+
+
+@pytest.mark.parametrize(
+    ("more", "status", "reason"),
+    [
+        ({"stamp": 0, "after": 0, "do": "beat", "lease": "x", "number": 1}, 409, "can't be understood"),
+        ({"seen": "abc-1"}, 409, "started anew"),
+        ({"inputs": {"speed": 7}}, 422, "Speed is 7"),
+        ({"inputs": []}, 409, "can't be understood"),
+        ({"stamp": 1e9}, 409, "too late"),
+    ],
+)
+def test_what_can_not_be_begun_is_refused(
+    demo: Server, more: dict[str, Any], status: int, reason: str
+) -> None:
+    with opened(demo) as socket:
+        if more.get("do") == "beat":
+            socket.say(**more)
+            said = socket.hear()
+        else:
+            said = socket.begin(**more)
+        assert (said["state"], said["status"]) == ("refused", status)
+        assert reason in said["reason"]
+        assert socket.closed() == 4000 + status
+
+
+def test_each_refused_hold_is_in_the_log(demo: Server) -> None:
+    """One that was judged has two entries, what could not be judged has one."""
+
+    def refused() -> list[dict[str, str]]:
+        text = demo.http.get("/log.csv?outcome=refused&widget=jog&every=true").text
+        return list(csv.DictReader(io.StringIO(text.removeprefix("\ufeff"))))
+
+    before = len(refused())
+    with opened(demo) as socket:
+        socket.begin(inputs={"speed": 7})
+    with opened(demo) as socket:
+        socket.say(do="beat", lease="x", number=1)
+        socket.hear()
+    new = refused()[: len(refused()) - before]
+    assert [(one["kind"], one["action"], one["outcome"]) for one in new] == [
+        ("refused", "hold", "refused"),
+        ("closed", "hold", "refused"),
+    ]
+    nonsense, judged = new
+    assert "can't be understood" in nonsense["reason"]
+    assert "Speed is 7" in judged["reason"]
+    assert (judged["values"], judged["verdict"]) == ('{"speed": 7}', "input")
+    assert judged["of"] != ""
+    assert nonsense["of"] == ""
+
+
+def test_who_lets_go_while_the_entry_is_written_holds_nothing(demo: Server) -> None:
+    """The disk takes the entry only after the finger was lifted."""
+    for _ in range(TRIES):
+        with opened(demo) as socket:
+            db = sqlite3.connect(demo.data / NAME, isolation_level=None)
+            db.execute("BEGIN IMMEDIATE")
+            socket.say(do="begin", inputs={"speed": 0.5}, seen=socket.seen)
+            socket.say(do="end", why="released", lease="")
+            time.sleep(0.1)
+            assert demo.widget("jog")["held"] is False
+            db.execute("ROLLBACK")
+            db.close()
+            said = socket.hear()
+            assert (said["state"], said["status"]) == ("refused", 409)
+            assert "let go before it began" in said["reason"]
+            assert socket.closed() == 4409
+        assert demo.widget("jog")["held"] is False
+
+
+def test_a_begin_that_was_long_on_its_way_is_refused(demo: Server) -> None:
+    with opened(demo) as socket:
+        time.sleep(0.3)
+        said = socket.begin(after=0.0)
+        assert (said["state"], "too late" in said["reason"]) == ("refused", True)
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{", '{"do":"dance"}', '"\ud800"'])
+def test_nonsense_ends_a_hold(demo: Server, text: str) -> None:
+    with held(demo) as socket:
+        socket._connection.send(text.encode("utf-8", "replace").decode())
+        said = socket.hear()
+        assert (said["state"], said["outcome"]) == ("ended", "aborted")
+
+
+def test_a_message_that_is_too_large_closes_a_hold_at_once(demo: Server) -> None:
+    with held(demo) as socket:
+        socket._connection.send(["9" * 60_000, "9" * 6_000])  # in pieces: all is read when it closes
+        assert socket.closed() == 1009
+    until(lambda: not demo.widget("jog")["held"], "it is over")
+
+
+@pytest.mark.parametrize("header", ["Origin: http://evil.example", "Sec-Fetch-Site: cross-site"])
+def test_the_doors_are_shut_for_other_sites(demo: Server, header: str) -> None:
+    name, _, value = header.partition(": ")
+    with pytest.raises(InvalidStatus) as refused, opened(demo, **{name: value}):
+        raise AssertionError("it opened")
+    assert refused.value.response.status_code == 403
+
+
+def test_the_doors_are_shut_under_other_names(demo: Server) -> None:
+    way = create_connection(("127.0.0.1", demo.port))
+    url = f"ws://evil.example:{demo.port}/widgets/jog/hold"
+    with pytest.raises(InvalidStatus) as refused, connect(url, sock=way):
+        raise AssertionError("it opened")
+    assert refused.value.response.status_code == 403
+
+
+def test_what_can_not_be_held_is_not_found(demo: Server) -> None:
+    url = f"ws://127.0.0.1:{demo.port}/widgets/speed/hold"
+    with pytest.raises(InvalidStatus) as refused, connect(url):
+        raise AssertionError("it opened")
+    assert refused.value.response.status_code == 404
+    assert b"can be held" in (refused.value.response.body or b"")
+
+
+def test_each_of_several_robots_is_held_on_its_own(tmp_path: Path) -> None:
+    robots = "".join(
+        f'[[robot]]\nid = "{one}"\nname = "{one}"\nnamespace = "/{one}"\n' for one in ("r1", "r2")
+    )
+    panel = tmp_path / "two.toml"
+    panel.write_text(PANEL.replace("[[interlock]]", robots + "[[interlock]]"))
+    server = Server(ROOT, KIOSK_PANEL=str(panel), KIOSK_MODE="demo")
+    try:
+        until(server.ready, "ready")
+        with held(server.robot("r2")) as socket:
+            assert server.robot("r1").widget("jog")["held"] is False
+            assert server.robot("r2").widget("jog")["held"] is True
+            socket.say(do="end", why="released", lease=socket.lease)
+            assert socket.hear()["state"] == "ended"
+        for path in ("/robots/r3/widgets/jog/hold", "/widgets/jog/hold"):
+            with pytest.raises(InvalidStatus), connect(f"ws://127.0.0.1:{server.port}{path}"):
+                raise AssertionError("it opened")
+    finally:
+        server.end()
+
+
+def test_a_lost_bridge_ends_it_and_what_could_not_be_said_is_not_said_later(
+    own_bridge: Bridge, own_node: RosNode, tmp_path: Path
+) -> None:
+    own_node.subscribe("/jog", "geometry_msgs/msg/Point", depth=1000)
+    own_node.advertise("/operation_enabled", "std_msgs/msg/Bool")
+    server = jogging(own_bridge, own_node, tmp_path)
+    try:
+        with held(server) as socket:
+            until(lambda: own_node.heard("/jog"), "it moves", every_s=0.001)
+            own_bridge.kill()
+            said = socket.beat_until_it_ends()
+            assert said["outcome"] == "unknown"
+            assert "The message that ends it was not sent: No connection" in said["reason"]
+        own_bridge.start()
+        until(server.ready, "ready again", within_s=30)
+        permit(server, own_node, True)
+        xs = [point["x"] for point in own_node.heard("/jog")]
+        assert set(xs) == {0.5}
+    finally:
+        server.end()
+
+
+def test_a_release_that_may_not_have_reached_the_bridge_is_not_published(
+    own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    own_node.advertise("/operation_enabled", "std_msgs/msg/Bool")
+    kiosk = servers(jogging(own_bridge, own_node, tmp_path))
+    with held(kiosk) as socket:
+        socket.beat()
+        own_bridge.freeze()
+        socket.say(do="end", why="released", lease=socket.lease)
+        said = socket.hear()
+        own_bridge.thaw()
+    assert (said["state"], said["outcome"]) == ("ended", "unknown")
+    assert said["reason"].startswith("Released at")
+    assert "it is not known whether the robot got the message that ends it" in said["reason"]
+    assert said["reason"] in kiosk.http.get("/log.csv").text
+
+
+def test_a_server_that_stood_still_has_ended_it_when_it_wakes(demo: Server) -> None:
+    with held(demo) as socket:
+        demo.process.send(signal.SIGSTOP)
+        time.sleep(0.5)
+        socket.say(do="beat", number=1, lease=socket.lease)
+        demo.process.send(signal.SIGCONT)
+        said = socket.hear()
+        assert (said["state"], said["outcome"]) == ("ended", "aborted")
+        assert "the panel's server stood still" in said["reason"]
+
+
+@pytest.fixture
+def at_a_terminal() -> Iterator[None]:
+    """The tests themselves may run under nohup, which what they start would inherit."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    yield
+    signal.signal(signal.SIGHUP, before)
+
+
+@pytest.mark.usefixtures("at_a_terminal")
+def test_a_terminal_that_closes_ends_it_as_any_end_of_the_server(
+    tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    mine = servers(in_demo(tmp_path))
+    until(mine.ready, "ready")
+    with held(mine) as socket:
+        mine.process.send(signal.SIGHUP)
+        said = socket.beat_until_it_ends()
+    assert said["outcome"] == "aborted"
+    assert "the panel's server stops" in said["reason"]
+
+
+def test_a_server_that_ends_tells_it_though_the_robot_has_to_be_asked_first(
+    own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    own_node.advertise("/operation_enabled", "std_msgs/msg/Bool")
+    kiosk = servers(jogging(own_bridge, own_node, tmp_path))
+    with held(kiosk) as socket:
+        socket.beat()
+        own_bridge.freeze()
+        kiosk.process.send(signal.SIGTERM)
+        said = socket.beat_until_it_ends()
+        own_bridge.thaw()
+    assert said["outcome"] == "unknown"
+    assert "it is not known whether the robot got the message that ends it" in said["reason"]
+    kiosk.process.wait(10)
+
+
+def test_a_server_that_ends_waits_for_no_browser_that_does_not_close(
+    tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    mine = servers(in_demo(tmp_path))
+    with held(mine) as socket:
+        began = time.monotonic()
+        mine.process.send(signal.SIGTERM)
+        assert socket.beat_until_it_ends()["state"] == "ended"
+        assert socket.closed() in (1000, 1012)
+        mine.process.wait(10)
+        assert time.monotonic() - began < 6
+
+
+def test_a_new_panel_ends_what_is_held_by_the_old_one(tmp_path: Path) -> None:
+    server, panel = in_demo(tmp_path, KIOSK_DEV="1"), tmp_path / "jog.toml"
+    try:
+        until(server.ready, "ready")
+        for attempt in range(TRIES):
+            with held(server) as socket:
+                panel.write_text(PANEL.replace('"Jog"', f'"Jog {attempt}"'))
+                said = socket.beat_until_it_ends()
+            if "stood still" not in said["reason"]:
+                break
+        assert (said["state"], said["outcome"]) == ("ended", "aborted")
+        assert "takes a new panel" in said["reason"]
+    finally:
+        server.end()
+
+
+def test_nobody_presses_a_hold(demo: Server) -> None:
+    assert demo.http.post("/widgets/jog", json={"inputs": {"speed": 0.5}}).status_code == 404
+
+
+def test_no_hold_leaves_anything_behind(demo: Server, tmp_path: Path) -> None:
+    assert "Traceback" not in demo.process.text
+    assert demo.http.get("/healthz").status_code == 200

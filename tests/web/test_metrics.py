@@ -1,0 +1,115 @@
+"""What Prometheus reads, of a kiosk that is really there (with no bridge to reach)."""
+
+import asyncio
+from collections.abc import Callable
+
+from prometheus_client.parser import text_string_to_metric_families
+
+from app.audit import Unlogged
+from app.dialect.bridge_dialect import bridge_token
+from app.robot.state import Sample
+from app.runtime.fleet import Fleet
+from app.runtime.robot_session import Kiosk
+from app.transport.zenoh_session import config_to
+from app.web.metrics import Metrics
+from app.web.prometheus import exposition
+from tests.support.builders import BRIDGE, small_panel
+
+Samples = dict[tuple[str, tuple[str, ...]], float]
+
+NOWHERE = "tcp/127.0.0.1:1"
+
+
+def read(metrics: Metrics) -> Samples:
+    """(name, values of its labels) → value; the one robot of these panels has no name."""
+    families = text_string_to_metric_families(exposition(metrics)[0].decode())
+    samples = [sample for family in families for sample in family.samples]
+    found = {(s.name, tuple(s.labels.values())): s.value for s in samples}
+    assert len(found) == len(samples), "a sample is there twice"
+    return found
+
+
+def nowhere() -> Fleet:
+    return Fleet(small_panel(), lambda _: config_to(NOWHERE), "r1", Unlogged())
+
+
+def of_kiosk(change: Callable[[Kiosk], None]) -> Samples:
+    """What is read of a kiosk after a change."""
+
+    async def followed() -> Samples:
+        fleet = nowhere()
+        try:
+            metrics = Metrics()
+            metrics.follow(fleet)
+            change(fleet.first)
+            return read(metrics)
+        finally:
+            await fleet.stop()
+
+    return asyncio.run(followed())
+
+
+def test_a_kiosk_without_a_link_is_not_ready() -> None:
+    samples = of_kiosk(lambda kiosk: None)
+    assert samples["kiosk_link_up", ("",)] == 0
+    assert samples["kiosk_bridges", ("",)] == 0
+    assert samples["kiosk_ready", ("",)] == 0
+
+
+def test_a_kiosk_that_can_send_is_ready() -> None:
+    def connect(kiosk: Kiosk) -> None:
+        kiosk.robot.link_up = True
+        kiosk.robot.settled_at = 0.0
+        kiosk.robot.graph.apply(bridge_token(BRIDGE), True)
+
+    samples = of_kiosk(connect)
+    assert samples["kiosk_link_up", ("",)] == 1
+    assert samples["kiosk_bridges", ("",)] == 1
+    assert samples["kiosk_ready", ("",)] == 1
+
+
+def test_samples_that_were_not_their_type_are_counted_by_key() -> None:
+    def hear(kiosk: Kiosk) -> None:
+        for seq in (1, 2):
+            kiosk.robot.take("heard", Sample(b"broken", seq, 0.0, 0.0, BRIDGE))
+            kiosk.robot.reading("/heard")
+
+    assert of_kiosk(hear)["kiosk_undecodable_total", ("heard", "")] == 2
+
+
+def test_presses_are_counted_by_outcome() -> None:
+    metrics = Metrics()
+    for outcome in ("published", "published", "refused"):
+        metrics.pressed(outcome)
+    samples = read(metrics)
+    assert samples["kiosk_presses_total", ("published",)] == 2
+    assert samples["kiosk_presses_total", ("refused",)] == 1
+
+
+def test_open_streams_are_counted() -> None:
+    metrics = Metrics()
+    with metrics.streams.another(), metrics.streams.another():
+        assert read(metrics)["kiosk_streams", ()] == 2
+    assert read(metrics)["kiosk_streams", ()] == 0
+
+
+def test_counts_go_on_when_the_panel_is_loaded_anew() -> None:
+    async def followed() -> Samples:
+        metrics = Metrics()
+        for _ in range(2):
+            fleet = nowhere()
+            metrics.follow(fleet)
+            metrics.pressed("published")
+            await fleet.stop()
+        fleet.first.robot.link_up = True
+        return read(metrics)
+
+    samples = asyncio.run(followed())
+    assert samples["kiosk_presses_total", ("published",)] == 2
+    assert samples["kiosk_link_up", ("",)] == 1
+
+
+def test_two_applications_count_for_themselves() -> None:
+    one, other = Metrics(), Metrics()
+    one.pressed("published")
+    assert ("kiosk_presses_total", ("published",)) not in read(other)

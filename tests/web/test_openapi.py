@@ -1,0 +1,118 @@
+"""What openapi.json says is what the server does: held against it by hand, and by Schemathesis."""
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.support.parts import ROOT, Server, until
+
+CONTROL = "\n[control]\nrequired = true\n"
+EXAMPLES = "20"  # of each operation
+SEED = "20261122"
+
+
+@pytest.fixture(scope="module")
+def panel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The shipped one, where browsers take control."""
+    path = tmp_path_factory.mktemp("panel") / "panel.toml"
+    path.write_text((ROOT / "app/panel.toml").read_text() + CONTROL)
+    return path
+
+
+@pytest.fixture(scope="module")
+def kiosk(panel: Path) -> Iterator[Server]:
+    mine = Server(ROOT, KIOSK_PANEL=str(panel))
+    until(mine.ready, "ready")
+    yield mine
+    mine.end()
+
+
+@pytest.fixture(scope="module")
+def described(kiosk: Server) -> dict[str, Any]:
+    found: dict[str, Any] = kiosk.http.get("/openapi.json").json()
+    return found
+
+
+def tables(of: Any) -> Iterator[dict[str, Any]]:
+    """Every table in it, itself too."""
+    if isinstance(of, dict):
+        yield of
+    for inner in of.values() if isinstance(of, dict) else of if isinstance(of, list) else ():
+        yield from tables(inner)
+
+
+def test_every_reference_leads_somewhere(described: dict[str, Any]) -> None:
+    for table in tables(described):
+        assert "$defs" not in table
+        if "$ref" in table:
+            found = described
+            for step in table["$ref"].removeprefix("#/").split("/"):
+                found = found[step]
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "statuses"),
+    [
+        ("get", "/", "200 303 403 404"),
+        ("get", "/pages/{page}", "200 303 403 404"),
+        ("get", "/events", "200 403 404 422"),
+        ("post", "/widgets/{widget}", "200 303 403 404 408 409 413 422 429 503 504"),
+        ("post", "/widgets/{widget}/cancel", "200 303 403 404 408 409 413 422 429 503"),
+        ("post", "/control/{act}", "200 303 403 404 408 409 413 422"),
+        ("post", "/control/here", "204 403 404 408 413 422"),
+        ("get", "/readyz", "200 403 503"),
+        ("get", "/metrics", "200 403"),
+    ],
+)
+def test_every_status_is_described(
+    described: dict[str, Any], method: str, path: str, statuses: str
+) -> None:
+    found = described["paths"][path][method]["responses"]
+    assert set(statuses.split()) <= set(found)
+    assert "HTTPValidationError" not in str(found)
+
+
+def test_metrics_are_text_and_too_many_presses_say_when_to_come_again(
+    described: dict[str, Any],
+) -> None:
+    metrics = described["paths"]["/metrics"]["get"]["responses"]["200"]["content"]
+    assert list(metrics) == ["text/plain"]
+    press = described["paths"]["/widgets/{widget}"]["post"]
+    assert press["responses"]["429"]["headers"]["Retry-After"]["schema"] == {"type": "integer"}
+    assert set(press["requestBody"]["content"]) == {
+        "application/json",
+        "application/x-www-form-urlencoded",
+    }
+
+
+def test_what_does_not_fit_the_description_is_told_as_any_error(kiosk: Server) -> None:
+    answer = kiosk.http.get("/events?once=perhaps")
+    assert answer.status_code == 422
+    assert answer.json()["error"].startswith("once: Input should be a valid boolean")
+
+
+def test_schemathesis_finds_nothing(kiosk: Server, tmp_path: Path) -> None:
+    """All of its checks, on everything but the stream that never ends."""
+    done = subprocess.run(
+        [
+            str(Path(sys.executable).with_name("schemathesis")),
+            "run",
+            f"{kiosk.url}/openapi.json",
+            "--checks=all",
+            "--exclude-path-regex=/events$",
+            f"--max-examples={EXAMPLES}",
+            f"--seed={SEED}",
+        ],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout
+    assert "Selected: 17/19" in done.stdout
+    assert "Traceback" not in kiosk.process.text

@@ -1,0 +1,27 @@
+"""The pages' templates: compiled before the first page is asked for."""
+
+import asyncio
+from collections.abc import Iterator
+
+from jinja2 import Environment, FileSystemLoader
+from jinja2.meta import find_referenced_templates
+
+from app.settings import shipped
+from app.web.routes.pages import compiled
+
+
+def needed(environment: Environment, name: str) -> Iterator[str]:
+    """The template, and all that it extends, imports and includes."""
+    assert environment.loader is not None
+    yield name
+    source = environment.loader.get_source(environment, name)[0]
+    for inner in find_referenced_templates(environment.parse(source)):
+        assert inner is not None
+        yield from needed(environment, inner)
+
+
+def test_all_that_a_page_is_made_of_is_compiled_at_the_start() -> None:
+    environment = Environment(loader=FileSystemLoader(shipped("templates")))
+    asyncio.run(compiled(environment))
+    assert environment.cache is not None
+    assert {key[1] for key in environment.cache} == set(needed(environment, "screen.html"))
