@@ -1,6 +1,7 @@
 """Parameters that are lists or one of some options: read, entered and set in a plain form, on the real
 bridge with a robot on Cyclone DDS; and the silence of a node on Fast DDS."""
 
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, Final
@@ -65,6 +66,14 @@ def test_what_is_no_list_is_refused(text: str) -> None:
         elements(text)
     with pytest.raises(InputError, match="several with commas between them, not"):
         checked(widget(type="string[]"), Declared("live"), text)
+
+
+@pytest.mark.parametrize("text", ['{}"a', 'a{}"', 'a,{}"', '"a{}', '"a"{}"'])
+def test_spaces_that_end_in_a_mistake_take_no_time(text: str) -> None:
+    began = time.process_time()
+    with pytest.raises(InputError, match="several with commas between them, not"):
+        checked(widget(type="string[]"), Declared("live"), text.format(" " * 995))
+    assert time.process_time() - began < 1  # it took 6 s, of the whole server
 
 
 @pytest.mark.parametrize(
