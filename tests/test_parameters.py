@@ -311,6 +311,28 @@ def test_a_node_that_does_not_answer_is_asked_again_when_it_is_touched_or_new(
     run(test)
 
 
+def test_a_node_that_has_just_answered_is_not_asked_as_often_as_somebody_wants_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A program that read again and again had the node asked hundreds of times a second."""
+
+    async def test(bench: Bench) -> None:
+        (one,) = bench.panel.parameters()
+        monkeypatch.setattr(parameters, "AGAIN_S", 60.0)
+        bench.offer()
+        await bench.tell(1, 0.5)
+        for _ in range(20):
+            assert bench.parameters.read_again(one) == ""
+            await asyncio.sleep(0.001)
+        assert len(bench.line.asked) == 2
+        monkeypatch.setattr(parameters, "AGAIN_S", 0.0)
+        assert bench.parameters.read_again(one) == ""
+        await bench.tell(3, 0.6)
+        assert bench.known().value == 0.6
+
+    run(test)
+
+
 def test_a_question_that_the_bridge_dropped_is_asked_again() -> None:
     async def test(bench: Bench) -> None:
         bench.offer()
