@@ -141,15 +141,20 @@ class Parameters:
         if not (self._nodes and passed_on):
             return
         if sample.skipped:
-            for node in self._nodes.values():
-                node.wanted.set()
+            self._missed()
         try:
             event = self._interfaces.decode(EVENT_TYPE, bytes(sample.payload))
         except DecodeError as error:
             self._log.debug("%s", error)
+            self._missed()
             return
         if (teller := self._nodes.get(event.node)) and teller.task is not None:
             self._take_event(teller, event, sample.wall)
+
+    def _missed(self) -> None:
+        """Whatever an event said that nobody read: its node may be any."""
+        for node in self._nodes.values():
+            node.wanted.set()
 
     def _take_event(self, node: _Node, event: Any, wall: float) -> None:
         redeclared = {one.name for one in (*event.new_parameters, *event.deleted_parameters)}

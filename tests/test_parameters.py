@@ -219,13 +219,16 @@ def test_an_event_while_the_node_is_asked_goes_over_its_answer() -> None:
     run(test)
 
 
-@pytest.mark.parametrize("what", ["skipped", "new", "deleted"])
+@pytest.mark.parametrize("what", ["skipped", "new", "deleted", "too large"])
 def test_what_an_event_may_hide_is_asked_for(what: str) -> None:
     async def test(bench: Bench) -> None:
         bench.offer()
         await bench.tell(1, 0.5)
         if what == "skipped":
             bench.event("/other", skipped=1)
+        elif what == "too large":  # to be read at once
+            texts = {**value(DOUBLE, 0.0), "type": 9, "string_array_value": [""] * 10_000}
+            bench.event("/arm", changed_parameters=[*change(0.7), {"name": "list", "value": texts}])
         else:
             parts: dict[str, Any] = {f"{what}_parameters": change(0.7)}
             bench.event("/arm", **parts)
