@@ -22,7 +22,7 @@ import httpx
 import pytest
 
 from app.errors import LogError, TooMany
-from app.log import Filter, Limits, OperatorLog, Origin, entered, readers, reading
+from app.log import Filter, Limits, OperatorLog, Origin, entered, process, readers, reading
 from app.log.export import FIELDS, lines
 from app.log.file import NAME
 from app.log.store import Store
@@ -332,6 +332,24 @@ def test_an_export_of_what_can_not_be_read_says_why(tmp_path: Path) -> None:
         mine.stop()
 
     asyncio.run(work())
+
+
+def test_where_no_process_can_be_begun_an_export_says_why_and_leaves_its_place(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    large(tmp_path, 10)
+
+    async def work(log: OperatorLog) -> None:
+        with monkeypatch.context() as patch:
+            patch.setattr(process, "COMMAND", (str(tmp_path / "gone"),))
+            for _ in range(2):
+                async with log.export(Filter(), None, False) as export:
+                    with pytest.raises(LogError, match="can't be read: No such file or directory"):
+                        await export.start()
+        async with log.export(Filter(), None, False) as export:
+            assert (await export.start()).startswith(b"\xef\xbb\xbfseq,at,")
+
+    run(tmp_path, work)
 
 
 def test_a_search_that_takes_long_is_done_by_another_process(
