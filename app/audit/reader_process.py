@@ -60,16 +60,10 @@ class ReaderProcess:
         return self._loop.run_in_executor(self._thread, work)
 
     def _started(self) -> bytes:
-        path = os.pathsep.join(filter(None, (str(PACKAGE.parent), os.environ.get("PYTHONPATH"))))
-        self._process = process = subprocess.Popen(
-            COMMAND,
-            bufsize=0,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            env={**os.environ, "PYTHONPATH": path},
-            start_new_session=True,  # what a terminal tells the server is not for this one
-        )
+        try:
+            self._process = process = _begun()
+        except OSError as error:  # such as memory or open files that are used up
+            raise LogError(say("log_unreadable", why=error.strerror or error)) from error
         if self._cut:
             process.kill()
         assert process.stdin is not None
@@ -97,3 +91,16 @@ class ReaderProcess:
         if self._process is not None:
             with self._process:
                 self._process.kill()
+
+
+def _begun() -> "subprocess.Popen[bytes]":
+    path = os.pathsep.join(filter(None, (str(PACKAGE.parent), os.environ.get("PYTHONPATH"))))
+    return subprocess.Popen(
+        COMMAND,
+        bufsize=0,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        env={**os.environ, "PYTHONPATH": path},
+        start_new_session=True,  # what a terminal tells the server is not for this one
+    )

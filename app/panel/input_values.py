@@ -10,7 +10,8 @@ from app.panel.model import Input
 from app.panel.widgets.check_inputs import on_step
 from app.panel.widgets.inputs import MOST, Numeric, SelectInput, TextInput, ToggleInput, digits, same
 
-DECIMAL: Final = re.compile(r"\s*[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?\s*", re.ASCII)
+# Reads each character once, however long a text is: what two parts could take is tried again and again.
+DECIMAL: Final = re.compile(r"\s*[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?\s*", re.ASCII)
 SWITCHED: Final = {"true": True, "false": False}
 
 

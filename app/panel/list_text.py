@@ -7,7 +7,8 @@ import re
 from collections.abc import Iterable
 from typing import Final
 
-_ELEMENT: Final = re.compile(r'\s*(?:"(?P<quoted>(?:[^"]|"")*)"|(?P<plain>[^",]*?))\s*(?P<end>,|$)')
+# No part can take what another one could: else a long text would be tried again and again.
+_ELEMENT: Final = re.compile(r'(?:\s*"(?P<quoted>(?:[^"]|"")*)"\s*|(?P<plain>[^",]*))(?P<end>,|\Z)')
 _PLAIN: Final = re.compile(r'[^\s",](?:[^",]*[^\s",])?')
 
 
@@ -28,9 +29,9 @@ def elements(text: str) -> list[str]:
     more = bool(text.strip())
     while more:
         match = _ELEMENT.match(text, at)
-        if match is None or match["plain"] == "":
+        plain, given = ("", None) if match is None else match.group("plain", "quoted")
+        if match is None or (given is None and not plain.strip()):
             raise ValueError(f"the {len(found) + 1}. of them is none")
-        given = match["quoted"]
-        found.append(match["plain"] if given is None else given.replace('""', '"'))
+        found.append(plain.strip() if given is None else given.replace('""', '"'))
         at, more = match.end(), match["end"] == ","
     return found

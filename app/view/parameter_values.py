@@ -7,7 +7,7 @@ from app.clock import format_time
 from app.i18n import say
 from app.panel.number_range import decimal
 from app.panel.widgets.check_parameters import LONGEST_TEXT
-from app.panel.widgets.parameter import EVENT_TYPE, EVENTS, Parameter, Value
+from app.panel.widgets.parameter import EVENT_TYPE, EVENTS, One, Parameter, Value
 from app.permission.interlocks import parameters_offered
 from app.printable import printable
 from app.robot.parameter_state import LONGEST_LIST, UNKNOWN, Declared, allowed, limits_text
@@ -37,7 +37,7 @@ def parameter(of: Parameter, robot: Robot) -> dict[str, Any]:
     limits = allowed(of, known)
     return {
         "state": "waiting" if never_told(known) else LOOKS[known.state],
-        "text": NOTHING if known.value is None else written(of.written(known.value)),
+        "text": NOTHING if known.value is None else _text(of, known.value),
         "note": _note(of, known, robot),
         "hint": printable(known.hint[:LONGEST_HINT])[:LONGEST_HINT],
         "limits": limits_text(of, limits),
@@ -50,6 +50,28 @@ def parameter(of: Parameter, robot: Robot) -> dict[str, Any]:
             "step": ANY_STEP[of.element == "integer"] if limits.step is None else decimal(limits.step),
         },
     }
+
+
+def _text(of: Parameter, value: Value) -> str:
+    option = of.option(value)
+    return written(of.unchosen(_beginning(value)) if option is None else option.label)
+
+
+def _beginning(value: Value) -> Value:
+    """The whole value, or as much of it as has more characters than are ever shown or entered: it is
+    written anew with every change, and a robot's texts may have megabytes."""
+    if isinstance(value, str):
+        return value[: LONGEST_TEXT + 1]
+    if not isinstance(value, tuple):
+        return value
+    found: list[One] = []
+    size = 0
+    for one in value:
+        found.append(one[: LONGEST_TEXT + 1] if isinstance(one, str) else one)
+        size += len(one) if isinstance(one, str) else 1
+        if size > LONGEST_TEXT:
+            break
+    return tuple(found)
 
 
 def never_told(known: Declared) -> bool:
@@ -95,6 +117,6 @@ def _entry(of: Parameter, value: Value | None) -> bool | str:
     if value is None or unusual or len(several) > LONGEST_LIST:
         return ""
     if isinstance(value, str | tuple):
-        text = of.entered(value)
+        text = of.entered(_beginning(value))
         return text if len(text) <= LONGEST_TEXT and text.isprintable() else ""
     return value if isinstance(value, bool) else decimal(value)

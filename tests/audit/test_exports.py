@@ -21,7 +21,7 @@ from typing import Any
 import httpx
 import pytest
 
-from app.audit import Filter, Limits, OperatorLog, Origin, entered, queries, readers
+from app.audit import Filter, Limits, OperatorLog, Origin, entered, queries, reader_process, readers
 from app.audit.database import NAME
 from app.audit.export import FIELDS, lines
 from app.audit.store import Store
@@ -332,6 +332,24 @@ def test_an_export_of_what_can_not_be_read_says_why(tmp_path: Path) -> None:
         mine.stop()
 
     asyncio.run(work())
+
+
+def test_where_no_process_can_be_begun_an_export_says_why_and_leaves_its_place(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    large(tmp_path, 10)
+
+    async def work(log: OperatorLog) -> None:
+        with monkeypatch.context() as patch:
+            patch.setattr(reader_process, "COMMAND", (str(tmp_path / "gone"),))
+            for _ in range(2):
+                async with log.export(Filter(), None, False) as export:
+                    with pytest.raises(LogError, match="can't be read: No such file or directory"):
+                        await export.start()
+        async with log.export(Filter(), None, False) as export:
+            assert (await export.start()).startswith(b"\xef\xbb\xbfseq,at,")
+
+    run(tmp_path, work)
 
 
 def test_a_search_that_takes_long_is_done_by_another_process(

@@ -1,6 +1,7 @@
 """Parameters that are lists or one of some options: read, entered and set in a plain form, on the real
 bridge with a robot on Cyclone DDS; and the silence of a node on Fast DDS."""
 
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, Final
@@ -65,6 +66,14 @@ def test_what_is_no_list_is_refused(text: str) -> None:
         elements(text)
     with pytest.raises(InputError, match="several with commas between them, not"):
         checked(widget(type="string[]"), Declared("live"), text)
+
+
+@pytest.mark.parametrize("text", ['{}"a', 'a{}"', 'a,{}"', '"a{}', '"a"{}"'])
+def test_spaces_that_end_in_a_mistake_take_no_time(text: str) -> None:
+    began = time.process_time()
+    with pytest.raises(InputError, match="several with commas between them, not"):
+        checked(widget(type="string[]"), Declared("live"), text.format(" " * 995))
+    assert time.process_time() - began < 1  # it took 6 s, of the whole server
 
 
 @pytest.mark.parametrize(
@@ -163,6 +172,30 @@ def test_a_list_and_an_option_show_as_they_are_entered(
     shown = parameter(of, there)
     assert shown["text"] == text if text is not None else shown["text"].endswith("…")
     assert (shown["entry"], shown["limits"]) == (entry, limits)
+
+
+@pytest.mark.parametrize(
+    ("value", "entered"),
+    [
+        (("a" * 500, "b" * 498), True),
+        (("a" * 500, "b" * 499), False),
+        (("a" * 10_000_000,), False),
+        (("a" * 5_000,) * 1001, False),
+    ],
+)  # fmt: skip
+def test_a_list_shows_its_beginning_however_long_its_texts_are(
+    value: tuple[str, ...], entered: bool
+) -> None:
+    panel = panel_of({**GAINS, "type": "string[]"})
+    there = robot_there(panel)
+    there.parameters["gains"] = Declared("live", value)
+    (of,) = panel.parameters()
+    began = time.process_time()
+    for _ in range(50):  # with every change of anything on the page
+        shown = parameter(of, there)
+    assert time.process_time() - began < 1  # it took 5 s, of the whole server
+    assert shown["text"] == "a" * 199 + "…"
+    assert shown["entry"] == (", ".join(value) if entered else "")
 
 
 @pytest.mark.parametrize(

@@ -220,13 +220,16 @@ def test_an_event_while_the_node_is_asked_goes_over_its_answer() -> None:
     run(test)
 
 
-@pytest.mark.parametrize("what", ["skipped", "new", "deleted"])
+@pytest.mark.parametrize("what", ["skipped", "new", "deleted", "too large"])
 def test_what_an_event_may_hide_is_asked_for(what: str) -> None:
     async def test(bench: Bench) -> None:
         bench.offer()
         await bench.tell(1, 0.5)
         if what == "skipped":
             bench.event("/other", skipped=1)
+        elif what == "too large":  # to be read at once
+            texts = {**value(DOUBLE, 0.0), "type": 9, "string_array_value": [""] * 10_000}
+            bench.event("/arm", changed_parameters=[*change(0.7), {"name": "list", "value": texts}])
         else:
             parts: dict[str, Any] = {f"{what}_parameters": change(0.7)}
             bench.event("/arm", **parts)
@@ -308,6 +311,28 @@ def test_a_node_that_does_not_answer_is_asked_again_when_it_is_touched_or_new(
         bench.offer()
         await bench.tell(3, 0.5)
         assert bench.known().value == 0.5
+
+    run(test)
+
+
+def test_a_node_that_has_just_answered_is_not_asked_as_often_as_somebody_wants_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A program that read again and again had the node asked hundreds of times a second."""
+
+    async def test(bench: Bench) -> None:
+        (one,) = bench.panel.parameters()
+        monkeypatch.setattr(sync, "AGAIN_S", 60.0)
+        bench.offer()
+        await bench.tell(1, 0.5)
+        for _ in range(20):
+            assert bench.parameters.read_again(one) == ""
+            await asyncio.sleep(0.001)
+        assert len(bench.line.asked) == 2
+        monkeypatch.setattr(sync, "AGAIN_S", 0.0)
+        assert bench.parameters.read_again(one) == ""
+        await bench.tell(3, 0.6)
+        assert bench.known().value == 0.6
 
     run(test)
 

@@ -1,6 +1,7 @@
 """What an operator entered: typed from forms, checked with a sentence that names label and limits."""
 
 import math
+import time
 from collections.abc import Mapping
 from typing import Any
 
@@ -143,6 +144,13 @@ def test_a_forms_text_becomes_what_its_input_is(
     table: Mapping[str, Any], text: str, value: Any
 ) -> None:
     assert exactly(typed(one(table), text), value)
+
+
+@pytest.mark.parametrize("text", ["1" * 15_000 + "x", "1" * 7_500 + "." + "1" * 7_500 + "x"])
+def test_digits_that_end_in_a_mistake_take_no_time(text: str) -> None:
+    began = time.process_time()
+    assert typed(one(SPEED), text) == text
+    assert time.process_time() - began < 1  # it took 10 s, of the whole server
 
 
 def test_limits_read_as_an_operator_says_them() -> None:

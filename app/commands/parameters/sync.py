@@ -8,6 +8,7 @@ error. What was asked of a bridge or a node that went away meanwhile no longer c
 
 import asyncio
 import logging
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -48,7 +49,8 @@ AGAIN_MOST_S: Final = 600.0  # the pause between tries doubles up to this
 class _Node:
     """A node with the panel's parameters; `heard` are values of events while it is being asked.
 
-    `wanted` is set when it is to be asked again, `urgent` when that is not to wait for `AGAIN_S`.
+    `wanted` is set when it is to be asked again, `urgent` when that is not to wait for `AGAIN_S`;
+    `told_at` (monotonic seconds) is when it answered last.
     """
 
     name: str
@@ -56,6 +58,7 @@ class _Node:
     wanted: asyncio.Event = field(default_factory=asyncio.Event)
     urgent: asyncio.Event = field(default_factory=asyncio.Event)
     heard: dict[str, Any] = field(default_factory=dict)
+    told_at: float = -math.inf
     task: "asyncio.Task[None] | None" = None
 
     def ask_now(self) -> None:
@@ -139,15 +142,20 @@ class Parameters:
         if not (self._nodes and passed_on):
             return
         if sample.skipped:
-            for node in self._nodes.values():
-                node.wanted.set()
+            self._missed()
         try:
             event = self._interfaces.decode(EVENT_TYPE, bytes(sample.payload))
         except DecodeError as error:
             self._log.debug("%s", error)
+            self._missed()
             return
         if (teller := self._nodes.get(event.node)) and teller.task is not None:
             self._take_event(teller, event, sample.wall)
+
+    def _missed(self) -> None:
+        """Whatever an event said that nobody read: its node may be any."""
+        for node in self._nodes.values():
+            node.wanted.set()
 
     def _take_event(self, node: _Node, event: Any, wall: float) -> None:
         redeclared = {one.name for one in (*event.new_parameters, *event.deleted_parameters)}
@@ -212,6 +220,7 @@ class Parameters:
             self._log.error("%s: %s", node.name, error)
             self._learn_all(node, lambda known: Declared("unreadable", wall=time.time()))
             return "partly"
+        node.told_at = time.monotonic()
         self._calls.mark_answered(f"{node.name}/{SET[0]}")
         values |= node.heard  # told after it was asked
         for widget in node.widgets:
@@ -226,11 +235,13 @@ class Parameters:
         self._robot.asking -= {widget.id for widget in node.widgets}
 
     def read_again(self, widget: Parameter) -> str:
-        """Asks the node of a parameter once more, unless it is being asked; why it can't be, or ""."""
+        """Asks the node of a parameter once more, unless it is being asked or has just answered; why it
+        can't be, or "". However often anybody wants it, a node has no more than `AGAIN_S` allows."""
         node = self._nodes[widget.node]
         if node.task is None:
             return say("no_parameters", node=widget.node)
-        if widget.id not in self._robot.asking:
+        fresh = time.monotonic() - node.told_at < AGAIN_S
+        if widget.id not in self._robot.asking and not fresh:
             node.ask_now()
         return ""
 

@@ -95,8 +95,11 @@ class Parameter(Stepped):
 
     def written(self, value: Value) -> str:
         """A value as an operator reads it, exactly."""
-        if (option := self.option(value)) is not None:
-            return option.label
+        option = self.option(value)
+        return self.unchosen(value) if option is None else option.label
+
+    def unchosen(self, value: Value) -> str:
+        """The same of a value that is no option's."""
         text = self.entered(value)
         if value == ():
             return say("empty")
