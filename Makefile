@@ -44,7 +44,7 @@ FAULTS_RESULTS := $(CACHE)/faults.jsonl
 faults: test-parts
 	mkdir -p $(CACHE)
 	rm -f $(FAULTS_RESULTS)
-	FAULTS=$(FORM) FAULTS_RESULTS=$(FAULTS_RESULTS) .venv/bin/pytest tests/test_faults_of_*.py tests/permission/test_at_random.py $(ARGS)
+	FAULTS=$(FORM) FAULTS_RESULTS=$(FAULTS_RESULTS) .venv/bin/pytest tests/faults/test_faults_of_*.py tests/permission/test_at_random.py $(ARGS)
 	FAULTS=$(FORM) .venv/bin/python -m tests.faults.results $(FAULTS_RESULTS) README.md
 
 soak: test-parts
