@@ -1,7 +1,8 @@
 # make run   the panel with a simulated robot, at http://127.0.0.1:8000
 # make test  everything, on the real bridge, real ROS 2 nodes and a real browser
 # make check types and style
-# make faults every fault in its long form, and what was measured as a table in the README
+# make docs  the documentation as a site, in build/docs; a dead link fails
+# make faults every fault in its long form, and what was measured as a table in docs/reliability.md
 # make soak  an ordinary day for SOAK_S seconds (an hour)
 # make bench  this panel and its rivals side by side (25 minutes); QUICK=1 only shows that it works
 # make bench-setup  what the benchmark's rivals need, into the cache
@@ -19,7 +20,7 @@ export TEST_ROS_PYTHON := $(CURDIR)/.venv-ros/bin/python
 # The limits of app/web/serving.py.
 LIMITS := --ws-max-size 65536 --ws-max-queue 2 --ws-per-message-deflate false --no-proxy-headers
 
-.PHONY: run test check dev wheel faults soak bench bench-setup test-parts bridge lock clean
+.PHONY: run test check dev docs wheel faults soak bench bench-setup test-parts bridge lock clean
 .DELETE_ON_ERROR:
 
 run: .venv/run
@@ -34,9 +35,15 @@ test: $(if $(ARGS),.venv/test,test-parts)
 	.venv/bin/pytest $(ARGS)
 
 check: .venv/test
-	.venv/bin/ruff check app tests bench
-	.venv/bin/ruff format --check app tests bench
+	.venv/bin/ruff check app tests bench docs
+	.venv/bin/ruff format --check app tests bench docs
 	.venv/bin/mypy
+
+# Warnings are errors. What the pages take from the code is written first.
+docs: .venv-docs/ready
+	.venv-docs/bin/python -m docs._generate
+	.venv-docs/bin/sphinx-build -W -n -E -a --keep-going --quiet --doctree-dir build/doctrees docs build/docs
+	@echo "build/docs/index.html"
 
 # FORM=short: as in `make test`.
 FORM ?= long
@@ -45,7 +52,7 @@ faults: test-parts
 	mkdir -p $(CACHE)
 	rm -f $(FAULTS_RESULTS)
 	FAULTS=$(FORM) FAULTS_RESULTS=$(FAULTS_RESULTS) .venv/bin/pytest tests/faults/test_faults_of_*.py tests/permission/test_at_random.py $(ARGS)
-	FAULTS=$(FORM) .venv/bin/python -m tests.faults.results $(FAULTS_RESULTS) README.md
+	FAULTS=$(FORM) .venv/bin/python -m tests.faults.results $(FAULTS_RESULTS) docs/reliability.md
 
 soak: test-parts
 	.venv/bin/python -m tests.faults.soak
@@ -74,6 +81,12 @@ NEW_ENOUGH := $(PYTHON) -c 'import sys; sys.exit(None if sys.version_info >= (3,
 	.venv/bin/python $(PIP_INSTALL) $<
 	touch $@
 
+.venv-docs/ready: docs/requirements.lock
+	@$(NEW_ENOUGH)
+	$(PYTHON) -m venv --clear .venv-docs
+	.venv-docs/bin/python $(PIP_INSTALL) $<
+	touch $@
+
 .venv/test: tests/requirements.lock | .venv/bin/python
 	.venv/bin/python $(PIP_INSTALL) $<
 	touch $@ .venv/run
@@ -92,7 +105,7 @@ bench: .venv/test bridge $(BENCH)/kiosk/ready
 	rm -rf $(BENCH)/kiosk/dist
 	.venv/bin/python -m build --wheel --no-isolation --outdir $(BENCH)/kiosk/dist >/dev/null
 	$(BENCH)/kiosk/bin/python -m pip install --disable-pip-version-check --quiet --no-deps --force-reinstall $(BENCH)/kiosk/dist/*.whl
-	.venv/bin/python -m bench $(if $(QUICK),--results $(BENCH)/quick,--readme README.md) $(ARGS)
+	.venv/bin/python -m bench $(if $(QUICK),--results $(BENCH)/quick,--page docs/benchmark.md) $(ARGS)
 
 # This panel, the robot, then the rivals: each in an environment of its own. See bench/README.md.
 bench-setup: system .venv/test bridge $(addprefix $(BENCH)/,kiosk/ready robot/ready rosbridge/ready nicegui/ready pages/ready router)
@@ -139,9 +152,10 @@ $(BENCH)/router: system
 lock:
 	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 pyproject.toml -o deploy/requirements.lock
 	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 pyproject.toml --group test -o tests/requirements.lock
+	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 pyproject.toml --group docs -o docs/requirements.lock
 	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 tests/ros/requirements.in -o tests/ros/requirements.lock
 	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 bench/peers/rosbridge_rs/requirements.in -o bench/peers/rosbridge_rs/requirements.lock
 	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 bench/peers/nicegui_zenoh/requirements.in -o bench/peers/nicegui_zenoh/requirements.lock
 
 clean:
-	rm -rf .venv .venv-ros dist .mypy_cache .ruff_cache
+	rm -rf .venv .venv-ros .venv-docs dist build .mypy_cache .ruff_cache

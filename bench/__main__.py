@@ -146,7 +146,7 @@ def main(arguments: Sequence[str]) -> int:
     parser.add_argument("phases", nargs="*", metavar="PHASE", help=", ".join(PHASES))
     parser.add_argument("--peers", help="ids with commas between; this panel and the floor always are")
     parser.add_argument("--results", type=Path, default=ROOT / "bench", help="folder to write to")
-    parser.add_argument("--readme", type=Path, help="page whose section is written anew")
+    parser.add_argument("--page", type=Path, help="page whose section is written again")
     given = parser.parse_args(arguments)
     if unknown := set(given.phases) - set(PHASES):
         parser.error(f"no such phase: {', '.join(sorted(unknown))}; there are {', '.join(PHASES)}")
@@ -169,7 +169,7 @@ def main(arguments: Sequence[str]) -> int:
         return 1
     finally:
         titles = {peer.id: peer.title for peer in (KIOSK, *PEERS)}
-        write(store.results, titles, given.results, given.readme)
+        write(store.results, titles, given.results, given.page)
     ours = [where for where in store.results["faults"] if KIOSK.id in where or "growth" in where]
     return 1 if ours else 0
 

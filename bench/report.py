@@ -1,4 +1,4 @@
-"""What was measured as Markdown: tables for the README, and all of it beside the results."""
+"""What was measured as Markdown: tables for docs/benchmark.md, and all of it beside the results."""
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -13,27 +13,26 @@ from bench.targets import FLOOR, FLOOR_AGAIN, Grown, grown, targets
 BEGIN: Final = "<!-- bench -->"
 END: Final = "<!-- /bench -->"
 NONE: Final = "–"
-PICTURE: Final = "![Latency of this panel, the floor and its rivals](bench/results.svg)"
+PICTURE: Final = "![Latency of this panel, the floor and its rivals](../bench/results.svg)"
 
 Titles = Mapping[str, str]
 Cell = Callable[[str], str]
 
 
-def write(results: Results, titles: Titles, folder: Path, readme: Path | None) -> None:
-    """results.md and results.svg in a folder; the README's section, if it is named."""
+def write(results: Results, titles: Titles, folder: Path, page: Path | None) -> None:
+    """results.md and results.svg in a folder; the section of a page, if one is named."""
     (folder / "results.svg").write_text(picture(results, titles))
     (folder / "results.md").write_text(whole(results, titles))
-    if readme is not None:
-        page = readme.read_text()
-        before, begin, rest = page.partition(BEGIN)
+    if page is not None:
+        before, begin, rest = page.read_text().partition(BEGIN)
         _, end, after = rest.partition(END)
         if not begin or not end:
-            raise ValueError(f"{readme} has no section between {BEGIN} and {END}")
-        readme.write_text(f"{before}{BEGIN}\n{section(results, titles)}\n{END}{after}")
+            raise ValueError(f"{page} has no section between {BEGIN} and {END}")
+        page.write_text(f"{before}{BEGIN}\n{section(results, titles)}\n{END}{after}")
 
 
 def section(results: Results, titles: Titles) -> str:
-    """What the README shows."""
+    """What docs/benchmark.md shows."""
     parts = [PICTURE, main_table(results, titles), targets_table(results), faults(results, titles)]
     return "\n\n".join(filter(None, [machine(results), *parts]))
 

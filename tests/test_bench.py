@@ -163,25 +163,25 @@ def test_growth_is_told_for_each_axis_that_was_measured() -> None:
 
 
 def test_the_results_are_told_with_whatever_there_is(tmp_path: Path) -> None:
-    readme = tmp_path / "README.md"
-    readme.write_text(f"before\n{BEGIN}\nwhat was there\n{END}\nafter\n")
+    page = tmp_path / "benchmark.md"
+    page.write_text(f"before\n{BEGIN}\nwhat was there\n{END}\nafter\n")
     found = results(up=phase(kiosk={"p50": 1.0, "p99": 2.5}), faults={"nicegui": "not installed"})
-    write(found, TITLES, tmp_path, readme)
-    page = readme.read_text()
-    assert page.startswith(f"before\n{BEGIN}\n")
-    assert page.endswith(f"{END}\nafter\n")
-    assert "what was there" not in page
-    assert "| this panel | – | – | 1.00 / 2.50 |" in page
-    assert "NiceGUI: not installed" in page
+    write(found, TITLES, tmp_path, page)
+    text = page.read_text()
+    assert text.startswith(f"before\n{BEGIN}\n")
+    assert text.endswith(f"{END}\nafter\n")
+    assert "what was there" not in text
+    assert "| this panel | – | – | 1.00 / 2.50 |" in text
+    assert "NiceGUI: not installed" in text
     assert whole(found, TITLES) == (tmp_path / "results.md").read_text()
 
 
-def test_a_readme_without_the_section_stays_as_it_is(tmp_path: Path) -> None:
-    readme = tmp_path / "README.md"
-    readme.write_text("nothing here\n")
+def test_a_page_without_the_section_stays_as_it_is(tmp_path: Path) -> None:
+    page = tmp_path / "benchmark.md"
+    page.write_text("nothing here\n")
     with pytest.raises(ValueError, match="has no section"):
-        write(results(), TITLES, tmp_path, readme)
-    assert readme.read_text() == "nothing here\n"
+        write(results(), TITLES, tmp_path, page)
+    assert page.read_text() == "nothing here\n"
 
 
 def test_the_picture_has_a_bar_for_each_peer_that_was_measured() -> None:

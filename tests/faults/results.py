@@ -1,6 +1,6 @@
 """What the faults measured, as lines of JSON in the file that `FAULTS_RESULTS` names, and as a table.
 
-`python -m tests.faults.results RESULTS [README]` prints the table; with a README it is written there,
+`python -m tests.faults.results RESULTS [PAGE]` prints the table; with a page it is written there,
 between its two markers.
 """
 
@@ -47,15 +47,21 @@ def table(rows: list[dict[str, str]]) -> str:
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
-def main(results: str, readme: str = "") -> None:
+def main(results: str, page: str = "") -> None:
     rows = [json.loads(line) for line in Path(results).read_text().splitlines()]
     text = table(rows)
     print(text)
-    if readme:
-        page = Path(readme).read_text()
-        before, _, rest = page.partition(BEGIN)
-        _, _, after = rest.partition(END)
-        Path(readme).write_text(f"{before}{BEGIN}\n{text}\n{END}{after}")
+    if page:
+        write(text, Path(page))
+
+
+def write(text: str, page: Path) -> None:
+    """Puts the table between the page's two markers; ValueError where it has none."""
+    before, begin, rest = page.read_text().partition(BEGIN)
+    _, end, after = rest.partition(END)
+    if not begin or not end:
+        raise ValueError(f"{page} has no section between {BEGIN} and {END}")
+    page.write_text(f"{before}{BEGIN}\n{text}\n{END}{after}")
 
 
 if __name__ == "__main__":

@@ -1,0 +1,150 @@
+"""Where things are in the code: paths of HTTP, tables of the panel file, sentences.
+
+Read from the code as it stands, so that the tables of docs/architecture.md and
+docs/reference/sentences.md follow every move.
+"""
+
+import ast
+import inspect
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from typing import Any, Final, get_args
+
+from pydantic import BaseModel
+
+from app import i18n
+from app.i18n import ENGLISH
+from app.panel import Panel
+from docs._generate.locks import shown
+from docs._generate.schema import ROOT
+
+PROJECT: Final = Path(__file__).parents[2]
+METHODS: Final = ("get", "post", "head", "put", "delete", "websocket")
+CATALOGUE: Final = Path(inspect.getfile(i18n)).parent
+
+
+@cache
+def modules() -> dict[Path, ast.Module]:
+    """Every module of `app/` but the catalogue of sentences."""
+    found = sorted((PROJECT / "app").rglob("*.py"))
+    return {
+        path: ast.parse(path.read_text(encoding="utf-8"))
+        for path in found
+        if CATALOGUE not in path.parents
+    }
+
+
+def place(path: Path) -> str:
+    return f"`{path.relative_to(PROJECT)}`"
+
+
+def paths_table() -> str:
+    """Each path of HTTP, with the function that answers."""
+    rows = [("Path", "Function", "File"), ("---",) * 3]
+    for path, tree in modules().items():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.AsyncFunctionDef | ast.FunctionDef):
+                rows += [(f"`{route}`", f"`{node.name}`", place(path)) for route in _routes(node)]
+    return _markdown(sorted(rows[2:]), rows[:2])
+
+
+def _routes(function: ast.AsyncFunctionDef | ast.FunctionDef) -> Iterator[str]:
+    for decorator in function.decorator_list:
+        match decorator:
+            case ast.Call(
+                func=ast.Attribute(attr=method), args=[ast.Constant(value=str(route)), *_]
+            ) if method in METHODS and route.startswith("/"):
+                yield f"{'WebSocket' if method == 'websocket' else method.upper()} {route}"
+
+
+def models_table() -> str:
+    """Each table of the panel file, with the class that it becomes."""
+    rows = [
+        (f"[`{name}`](reference/panel-file.md#{_slug(name)})", f"`{model.__name__}`", _file_of(model))
+        for name, model in models().items()
+    ]
+    return _markdown(rows, [("Table of the file, or kind of widget", "Class", "File"), ("---",) * 3])
+
+
+def _slug(name: str) -> str:
+    return "top-level" if name == ROOT else name
+
+
+def models() -> dict[str, type[BaseModel]]:
+    """The classes of the tables, by the names that the file gives them."""
+    found: dict[str, type[BaseModel]] = {ROOT: Panel}
+
+    def walk(model: type[BaseModel]) -> None:
+        for key, field in model.model_fields.items():
+            for inner in _models_in(field.annotation):
+                kind = inner.model_fields.get("kind")
+                name = get_args(kind.annotation)[0] if kind else field.alias or key
+                if name not in found:
+                    found[name] = inner
+                    walk(inner)
+
+    walk(Panel)
+    return found
+
+
+def _models_in(annotation: Any) -> Iterator[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    for inner in get_args(annotation):
+        yield from _models_in(inner)
+
+
+def _file_of(of: type) -> str:
+    return place(Path(inspect.getfile(of)))
+
+
+def sentences_table() -> str:
+    """Each sentence, with its code and the modules that say it."""
+    rows = []
+    for code, sentence in ENGLISH.items():
+        told = [path for path, names in _said().items() if _says(names, code)]
+        named = told or [path for path, tree in modules().items() if _has(tree, code)]
+        rows.append((shown(sentence), f"`{code}`", ", ".join(map(place, named))))
+    return _markdown(rows, [("Sentence", "Code", "Said in"), ("---",) * 3])
+
+
+def _has(tree: ast.Module, code: str) -> bool:
+    """Whether it stands there, for a code that comes by a variable and is an ordinary word."""
+    return any(isinstance(node, ast.Constant) and node.value == code for node in ast.walk(tree))
+
+
+@cache
+def _said() -> dict[Path, frozenset[str]]:
+    """The codes that each module names; "lamp_*" for those that it puts together."""
+    return {path: frozenset(_codes(tree)) for path, tree in modules().items()}
+
+
+def _says(names: frozenset[str], code: str) -> bool:
+    return code in names or any(name[-1] == "*" and code.startswith(name[:-1]) for name in names)
+
+
+def _codes(tree: ast.Module) -> Iterator[str]:
+    for node in ast.walk(tree):
+        match node:
+            case ast.Constant(value=str(code)) if "_" in code and code in ENGLISH:
+                yield code
+            case ast.JoinedStr(values=[ast.Constant(value=str(begin)), ast.FormattedValue(), *_]) if (
+                begin.endswith("_") and any(code.startswith(begin) for code in ENGLISH)
+            ):
+                yield f"{begin}*"
+            case ast.Call(args=arguments, keywords=keywords) if _may_say(node.func):
+                for one in (*arguments, *(word.value for word in keywords)):
+                    for inner in ast.walk(one):
+                        if isinstance(inner, ast.Constant) and inner.value in ENGLISH:
+                            yield str(inner.value)
+
+
+def _may_say(function: ast.expr) -> bool:
+    """Whether a code that is also an ordinary word is one here."""
+    name = function.attr if isinstance(function, ast.Attribute) else getattr(function, "id", "")
+    return name in ("say", "locked", "Text", "Verdict")
+
+
+def _markdown(rows: list[Any], head: list[Any]) -> str:
+    return "\n".join(f"| {' | '.join(row)} |" for row in (*head, *rows))

@@ -1,0 +1,192 @@
+"""The JSON Schema of a panel file, made from its models, with the descriptions of panel_keys.toml.
+
+It is for editors: it finds what is wrong with one key. What other keys or the robot's types tell,
+`python -m app.check` finds.
+"""
+
+import tomllib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, Final
+
+from app.interfaces.names import ACTION_TYPE, MESSAGE_TYPE, SERVICE_TYPE, TOPIC
+from app.panel import Panel
+
+Schema = dict[str, Any]
+
+FILE: Final = Path(__file__).parent.parent / "panel.schema.json"
+WORDS: Final[Mapping[str, Any]] = tomllib.loads(
+    Path(__file__).with_name("panel_keys.toml").read_text(encoding="utf-8")
+)
+ROOT: Final = "panel"
+WIDGET: Final = "widget"
+REF: Final = "#/definitions/"
+
+# What a text is, by "table.key" or "key" alone, and its pattern where the name alone decides.
+FORMATS: Final[Mapping[str, tuple[str, str]]] = {
+    "id": ("id", ""),
+    "topic": ("topic name", TOPIC.pattern),
+    "topics": ("topic name", TOPIC.pattern),
+    "service": ("service name", TOPIC.pattern),
+    "action.action": ("action name", TOPIC.pattern),
+    "node": ("node name", TOPIC.pattern),
+    "type": ("message type", MESSAGE_TYPE.pattern),
+    "call.type": ("service type", SERVICE_TYPE.pattern),
+    "action.type": ("action type", ACTION_TYPE.pattern),
+    "parameter.type": ("", ""),
+    "namespace": ("namespace", ""),
+    "connect": ("Zenoh endpoint", ""),
+    "interfaces": ("folder", ""),
+    "field": ("field path", ""),
+    "success": ("field path", ""),
+    "call.message": ("field path", ""),
+    "progress": ("field path", ""),
+    "deadline_field": ("field path", ""),
+    "counter_field": ("field path", ""),
+}
+
+
+def panel_schema() -> Schema:
+    """The whole schema, as draft 7 has it: that is what the editors' plugins know."""
+    root = Panel.model_json_schema(ref_template=REF + "{model}")
+    definitions = root.pop("$defs")
+    tables = named_tables(root, definitions)
+    for name, table in tables.items():
+        _finish(name, table)
+    by_name = {name: table for name, table in tables.items() if name != ROOT}
+    models = {id(table): name for name, table in by_name.items()}
+    names = {REF + model: REF + models[id(table)] for model, table in definitions.items()}
+    kinds = kinds_of(tables)
+    by_name["page"]["properties"]["widget"]["items"] = {"$ref": REF + WIDGET}
+    by_name[WIDGET] = _widget(kinds)
+    whole = {
+        "$schema": "http://json-schema.org/draft-07/schema#",
+        "title": "A panel file",
+        **tables[ROOT],
+    }
+    found: Schema = _renamed(whole | {"definitions": dict(sorted(by_name.items()))}, names)
+    return found
+
+
+def named_tables(root: Schema, definitions: Mapping[str, Schema]) -> dict[str, Schema]:
+    """The tables by the names that the file gives them: a widget's is its kind."""
+    found = {ROOT: root}
+
+    def walk(table: Schema) -> None:
+        for key, prop in table["properties"].items():
+            for ref in _refs(prop):
+                inner = definitions[ref.removeprefix(REF)]
+                name = inner["properties"].get("kind", {}).get("const", key)
+                if name not in found:
+                    found[name] = inner
+                    walk(inner)
+                elif found[name] is not inner:
+                    raise ValueError(f'two tables that differ are called "{name}"')
+
+    walk(root)
+    return found
+
+
+def kinds_of(tables: Mapping[str, Schema]) -> dict[str, Schema]:
+    return {name: table for name, table in tables.items() if "kind" in table["properties"]}
+
+
+def _refs(of: Any) -> Iterator[str]:
+    if isinstance(of, Mapping):
+        if "$ref" in of:
+            yield of["$ref"]
+        for key, value in of.items():
+            if key != "discriminator":
+                yield from _refs(value)
+    elif isinstance(of, list):
+        for value in of:
+            yield from _refs(value)
+
+
+def _finish(name: str, table: Schema) -> None:
+    """Descriptions, names of formats, and no more than an editor needs."""
+    properties = table["properties"]
+    properties.pop("revision", None)  # of the file, not in it
+    table["title"], table["description"] = name, WORDS["tables"][name]
+    for key, prop in properties.items():
+        properties[key] = {**_plain(name, key, prop), "description": about(name, key)}
+
+
+def about(table: str, key: str) -> str:
+    """What a key means; KeyError where nobody has said it."""
+    for place in (table, "any"):
+        if (said := WORDS.get(place, {}).get(key)) is not None:
+            return str(said)
+    raise KeyError(f'docs/_generate/panel_keys.toml does not say what "{key}" of "{table}" means')
+
+
+def _plain(table: str, key: str, prop: Schema) -> Schema:
+    """Without null, which TOML does not have, and without titles that repeat the key."""
+    made = {name: value for name, value in prop.items() if name != "title"}
+    one_of = [one for one in made.pop("anyOf", []) if one != {"type": "null"}]
+    if {"type": "integer"} in one_of and {"type": "number"} in one_of:
+        one_of.remove({"type": "integer"})
+    made |= one_of[0] if len(one_of) == 1 else {"anyOf": one_of} if one_of else {}
+    if made.get("default") is None or made["default"] == [] or isinstance(made["default"], dict):
+        made.pop("default", None)
+    if table != ROOT and key == "interlock":
+        return _one_or_more({"type": "string", "title": "id of an interlock"})
+    title, pattern = FORMATS.get(f"{table}.{key}", FORMATS.get(key, ("", "")))
+    text = made["items"] if made.get("type") == "array" else made
+    text.pop("format", None)  # of a folder, which must be there
+    if title:
+        text["title"] = title
+    if pattern:
+        text["pattern"] = f"^{pattern}$"
+    if (table, key) in (("select", "options"), ("indicator", "states")):
+        made["minItems"] = 1
+    return made
+
+
+def _one_or_more(one: Schema) -> Schema:
+    several = {"type": "array", "items": one, "minItems": 1, "uniqueItems": True}
+    return {"anyOf": [one, several]}
+
+
+def _widget(kinds: Mapping[str, Schema]) -> Schema:
+    """One kind's table, chosen by `kind`. The keys of all kinds stand beside that: editors complete
+    what is a property, but do not look into conditions."""
+    keys: dict[str, list[Schema]] = {}
+    for table in kinds.values():
+        for key, prop in table["properties"].items():
+            known = keys.setdefault(key, [])
+            if _bare(prop) not in map(_bare, known):
+                known.append(prop)
+    properties = {key: _any_of(props) for key, props in keys.items()}
+    properties["kind"] = {"enum": list(kinds), "description": about(WIDGET, "kind")}
+    chosen = [
+        {"if": {"properties": {"kind": {"const": kind}}}, "then": {"$ref": REF + kind}}
+        for kind in kinds
+    ]
+    return {
+        "title": WIDGET,
+        "description": WORDS["tables"][WIDGET],
+        "type": "object",
+        "properties": properties,
+        "required": ["id", "kind", "label"],
+        "allOf": chosen,
+    }
+
+
+def _bare(prop: Schema) -> Schema:
+    return {key: value for key, value in prop.items() if key not in ("description", "default")}
+
+
+def _any_of(props: list[Schema]) -> Schema:
+    """A key of several kinds: the conditions say which it is."""
+    told = list(dict.fromkeys(prop["description"] for prop in props))
+    bare = [_bare(prop) for prop in props]
+    return {"description": "\n\n".join(told), **(bare[0] if len(bare) == 1 else {"anyOf": bare})}
+
+
+def _renamed(of: Any, names: Mapping[str, str]) -> Any:
+    if isinstance(of, list):
+        return [_renamed(value, names) for value in of]
+    if not isinstance(of, dict):
+        return of
+    return {key: names.get(v, v) if key == "$ref" else _renamed(v, names) for key, v in of.items()}

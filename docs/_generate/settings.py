@@ -1,0 +1,34 @@
+"""The table of `KIOSK_…` variables in docs/reference/settings.md, made from app/settings.py."""
+
+from typing import Final
+
+from app.settings import LOG_LEVELS, NAMES, PREFIX
+
+ABOUT: Final = {
+    "PANEL": ("The panel file.", "`app/panel.toml`, the shipped one"),
+    "ZENOH": ("The Zenoh configuration file, in Zenoh's own syntax.", "`zenoh.json5`, the shipped one"),
+    "MODE": ("`demo` or `live`. Overrides `mode` of the panel file.", "as the panel file says"),
+    "DATA": (
+        "The folder for the operator's log, recordings and message definitions that were read before.",
+        "`$XDG_STATE_HOME/operator-panel`, else `~/.local/state/operator-panel`; "
+        "in demo mode its subfolder `demo`",
+    ),
+    "HOSTS": (
+        "More host names under which browsers may open the panel, with commas between them, without "
+        "ports. An IPv6 address stands in brackets.",
+        "only `127.0.0.1`, `localhost` and `[::1]`",
+    ),
+    "PROXIES": (
+        "Proxies whose `X-Forwarded-For` and `X-Forwarded-Proto` headers count: addresses or networks, "
+        "with commas between them.",
+        "none",
+    ),
+    "LOG_LEVEL": (", ".join(f"`{level}`" for level in LOG_LEVELS) + ".", "`info`"),
+    "DEV": ("`1` for development: changes of files are taken over as they are saved.", "off"),
+}
+
+
+def settings_table() -> str:
+    rows = [(f"`{PREFIX}{name}`", *ABOUT[name]) for name in NAMES]
+    lines = [("Variable", "What it sets", "Default"), ("---",) * 3, *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)

@@ -1,0 +1,238 @@
+"""What docs/ shows can be used as it stands there."""
+
+import json
+import re
+import shlex
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Final
+
+import pytest
+
+from app.panel import load_panel
+from app.settings import NAMES, PREFIX
+from app.web.serving import OPTIONS
+from bench.report import BEGIN, END
+from tests.support.parts import ROOT, Server, as_response, until
+from tests.test_imports import ROOMS
+
+DOCS: Final = ROOT / "docs"
+PAGES: Final = {
+    path.relative_to(DOCS).as_posix(): path.read_text(encoding="utf-8")
+    for path in sorted(DOCS.rglob("*.md"))
+}
+JOG: Final = "float64 speed\nuint32 valid_ms\nuint16 number\n"
+# What an example that is a part of a panel may name and not have itself.
+PAGE: Final = '[[page]]\nid = "example"\ntitle = "Example"\n'
+INTERLOCKS: Final = {
+    "operation": '[[interlock]]\nid = "operation"\ntopic = "/operation_enabled"\n',
+}
+BATTERY: Final = """[[page.widget]]
+id = "battery"
+kind = "readout"
+label = "Battery"
+topic = "/battery"
+type = "sensor_msgs/msg/BatteryState"
+field = "percentage"
+"""
+INPUTS: Final = {
+    "message": '[[page.widget]]\nid = "message"\nkind = "text"\nlabel = "Message"\n',
+    "speed": '[[page.widget]]\nid = "speed"\nkind = "slider"\nlabel = "Speed"\nmin = 0.0\nmax = 1.0\n',
+}
+
+
+def blocks(language: str) -> list[Any]:
+    """The code of a language in all pages, as parameters that are named by page and number."""
+    return [
+        pytest.param(block, id=f"{page}-{number}")
+        for page in PAGES
+        for number, block in enumerate(shown(page, language), 1)
+    ]
+
+
+def shown(page: str, language: str) -> list[str]:
+    """The code of a language in one page."""
+    return re.findall(rf"^```{language}\n(.*?)^```", PAGES[page], re.DOTALL | re.MULTILINE)
+
+
+def completed(example: str) -> str:
+    """An example of a panel file with what it leaves to the rest of the file."""
+    text = example
+    page, widget = text.find("[[page]]"), text.find("[[page.widget]]")
+    if page < 0 and widget >= 0:
+        text = text[:widget] + PAGE + text[widget:]
+    elif page < 0:
+        text += PAGE
+    tables = tomllib.loads(text)
+    if "title" not in tables:
+        text = f'title = "Example"\n{text}'
+    if "cell_msgs/" in text and "interfaces" not in tables:
+        text = f'interfaces = ["cell_msgs"]\n{text}'
+    if "/battery" in tables.get("record", {}).get("topics", ()):
+        text += BATTERY
+    widgets = {one["id"] for each in tables["page"] for one in each.get("widget", [])}
+    named = set(re.findall(r'"\{(\w+)\}"', text)) - widgets
+    text += "".join(INPUTS[name] for name in sorted(named & set(INPUTS)))
+    locks = set(re.findall(r'^interlock = "(\w+)"', text, re.MULTILINE))
+    there = {one["id"] for one in tables.get("interlock", [])}
+    return text + "".join(INTERLOCKS[name] for name in sorted(locks - there))
+
+
+@pytest.mark.parametrize("example", blocks("toml"))
+def test_each_example_of_a_panel_is_good(example: str, tmp_path: Path) -> None:
+    messages = tmp_path / "cell_msgs/msg"
+    messages.mkdir(parents=True)
+    (messages / "Jog.msg").write_text(JOG)
+    panel = tmp_path / "cell1.toml"
+    panel.write_text(completed(example))
+    assert load_panel(panel).pages
+
+
+@pytest.mark.parametrize("example", blocks("json"))
+def test_each_example_of_json_is_json(example: str) -> None:
+    assert isinstance(json.loads(example), dict)
+
+
+@pytest.fixture(scope="module")
+def kiosk() -> Iterator[Server]:
+    """The shipped panel's, where the example of a press can be made."""
+    mine = Server(ROOT, KIOSK_MODE="demo")
+    until(mine.ready, "ready")
+    until(lambda: mine.widget("operation")["enabled"], "the button is open")
+    yield mine
+    mine.end()
+
+
+def test_a_press_is_answered_as_its_example_shows(kiosk: Server) -> None:
+    command = shlex.split(shown("reference/http.md", "sh")[0])
+    url, body = command[2], command[-1]
+    assert command[:2] == ["curl", "-s"]
+    answer = kiosk.http.post(url.partition(":8000")[2], json=json.loads(body))
+    assert answer.status_code == 200
+    example = json.loads(shown("reference/http.md", "json")[0])
+    assert set(answer.json()) == set(example)
+    assert answer.json()["outcome"] in ("published", "unknown")  # nobody may listen in the demo
+    assert example["widget"] == answer.json()["widget"]
+
+
+def test_a_press_by_websocket_is_answered_as_its_example_shows(kiosk: Server) -> None:
+    asked, expected = shown("reference/http.md", "json")[1:3]
+    with kiosk.socket() as socket:
+        socket.say(asked)
+        said = socket.hear()
+    assert set(said) == set(json.loads(expected))
+    assert as_response(said).status_code == 200
+
+
+def test_the_example_of_a_snapshot_can_be_asked_for(kiosk: Server) -> None:
+    *_, url = shlex.split(shown("reference/http.md", "sh")[1])
+    assert kiosk.http.get(url.partition(":8000")[2]).text.count("event: snapshot") == 1
+
+
+def test_the_log_is_verified_as_its_page_shows(kiosk: Server) -> None:
+    _, *command = shlex.split(shown("operators-log.md", "sh")[0])
+    run = subprocess.run(
+        [sys.executable, *command, "--data", str(kiosk.data)],
+        cwd=ROOT, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert (run.returncode, run.stdout[:4]) == (0, "ok, "), run.stderr
+
+
+def test_the_events_have_the_names_that_the_reference_has(kiosk: Server) -> None:
+    rows = re.findall(r"^\| `([a-z<>-]+)` \|", PAGES["reference/http.md"].split("## Events")[1], re.M)
+    text = kiosk.http.get("/events?once=1").text
+    names = set(re.findall(r"^event: (.+)$", text, re.M))
+    assert {"snapshot", "beat"} <= names
+    assert names <= {name.replace("<interlock>", "operation") for name in rows}
+    snapshot = kiosk.snapshot()
+    assert set(snapshot["link"]) == {"server", "bridge", "node"}
+    table = PAGES["reference/http.md"].split("### Links")[1].split("### Control")[0]
+    keys = set(re.findall(r"`(\w+)`", "".join(re.findall(r"^\| (.+?) \|", table, re.M))))
+    assert set(snapshot["link"]["bridge"]) == keys
+    assert set(snapshot["control"]) <= set(re.findall(r"`(\w+)`", PAGES["reference/http.md"]))
+
+
+def test_the_messages_of_a_hold_are_json() -> None:
+    said = re.findall(r"^\| (?:server|client) \| `(.+)` \|$", PAGES["reference/http.md"], re.MULTILINE)
+    assert [json.loads(one).get("do") or json.loads(one).get("state") for one in said] == [
+        *(None, "begin", "held", "beat", "held", "end", "ended")
+    ]
+
+
+def test_the_commands_of_the_reference_work(tmp_path: Path) -> None:
+    panel = tmp_path / "cell1.toml"
+    panel.write_text(shown("reference/panel-file.md", "toml")[0])
+    for line in shown("reference/panel-file.md", "sh")[0].splitlines():
+        _, *command = shlex.split(line, comments=True)
+        run = subprocess.run(
+            [sys.executable, *[str(panel) if word == panel.name else word for word in command]],
+            cwd=ROOT, capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        assert run.returncode == 0, run.stderr
+
+
+def test_every_place_in_the_code_is_there() -> None:
+    """Paths in backticks that begin with a folder of the project."""
+    found = set(
+        re.findall(r"`((?:app|bench|deploy|docs|static|templates|tests)/[\w./-]*)`", str(PAGES))
+    )
+    assert {"app/settings.py", "docs/panel.schema.json"} <= found
+    assert sorted(path for path in found if not (ROOT / path).exists()) == []
+
+
+LINK: Final = re.compile(r"\]\((?!https?:|mailto:)([^)#\s]*)(?:#([^)\s]+))?\)")
+
+
+def anchors(page: Path) -> set[str]:
+    """The anchors of a page's headings, as the site and repositories make them."""
+    text = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
+    titles = re.findall(r"^#+ (.+)$", text, re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
+
+
+@pytest.mark.parametrize("page", [*PAGES, "../README.md", "../bench/README.md"])
+def test_every_link_leads_somewhere(page: str) -> None:
+    here = DOCS / page
+    for name, anchor in LINK.findall(here.read_text(encoding="utf-8")):
+        there = here.parent / name if name else here
+        assert there.exists(), name
+        assert not anchor or anchor in anchors(there), f"{name}#{anchor}"
+
+
+def test_the_architecture_has_every_room() -> None:
+    table = PAGES["architecture.md"].split("| room |")[1].split("\n\n")[0]
+    rooms = re.findall(r"^\| `(\w+)/` \|", table, re.MULTILINE)
+    assert rooms == list(ROOMS)
+    drawn = (DOCS / "rooms.svg").read_text()
+    assert [room for room in ROOMS if f">{room}<" not in drawn] == []
+
+
+def test_the_settings_page_starts_the_server_with_its_limits() -> None:
+    flags = f"--ws-max-size {OPTIONS['ws_max_size']} --ws-max-queue {OPTIONS['ws_max_queue']}"
+    flags += " --ws-per-message-deflate false --no-proxy-headers"
+    assert flags in PAGES["reference/settings.md"]
+
+
+def test_every_variable_is_a_setting() -> None:
+    named = set(re.findall(rf"\b{PREFIX}([A-Z_]*[A-Z])\b", str(PAGES)))
+    assert named <= set(NAMES)
+
+
+def test_every_target_of_make_is_one() -> None:
+    makefile = (ROOT / "Makefile").read_text()
+    named = set(re.findall(r"\bmake ([a-z][a-z-]*)", "\n".join(blocks_of_sh())))
+    assert "bench" in named
+    assert [one for one in sorted(named) if not re.search(rf"^{one}:", makefile, re.MULTILINE)] == []
+
+
+def blocks_of_sh() -> Iterator[str]:
+    for page in PAGES:
+        yield from shown(page, "sh")
+
+
+def test_the_benchmark_has_its_section() -> None:
+    assert f"\n{BEGIN}\n" in PAGES["benchmark.md"]
+    assert f"\n{END}\n" in PAGES["benchmark.md"]

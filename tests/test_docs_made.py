@@ -1,0 +1,198 @@
+"""What the documentation takes from the code: complete, up to date, and true of panel files."""
+
+import json
+import re
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Final
+
+import pytest
+from jsonschema_rs import Draft7Validator
+
+from app.i18n import ENGLISH
+from app.settings import NAMES
+from docs._generate import locks, places, schema
+from docs._generate import settings as variables
+from docs._generate.__main__ import filled, out_of_date
+from docs._generate.keys import examples_of
+from tests.faults import results
+from tests.support.parts import ROOT, TESTS
+
+SCHEMA: Final[dict[str, Any]] = schema.panel_schema()
+TABLES: Final = {schema.ROOT: SCHEMA, **SCHEMA["definitions"]}
+VALIDATOR: Final = Draft7Validator(SCHEMA)
+EVERYTHING: Final = (TESTS / "everything.toml").read_text()
+MISTAKES: Final = tomllib.loads((TESTS / "mistakes.toml").read_text())["mistake"]
+EXAMPLES: Final = sorted((ROOT / "docs").rglob("*.toml"))
+PANELS: Final = [
+    ROOT / "app/panel.toml",
+    TESTS / "everything.toml",
+    *(path for path in EXAMPLES if not path.parent.name.startswith("_")),
+]
+
+
+def keys() -> Iterator[tuple[str, str]]:
+    """Every key of the panel file, with its table."""
+    for name, table in TABLES.items():
+        if name != schema.WIDGET:  # all kinds together
+            yield from ((name, key) for key in table["properties"])
+
+
+def test_the_pages_and_the_schema_are_as_the_code_is() -> None:
+    assert out_of_date() == [], "run `make docs`, or `.venv/bin/python -m docs._generate`"
+
+
+def test_a_page_without_the_section_is_named() -> None:
+    with pytest.raises(ValueError, match=r"page\.md has no section between <!-- keys log -->"):
+        filled("nothing\n", {"keys log": "| Key |"}, "page.md")
+
+
+def test_each_model_of_the_panel_file_is_a_table_of_the_reference() -> None:
+    assert set(places.models()) == set(TABLES) - {schema.WIDGET}
+
+
+@pytest.mark.parametrize(("table", "key"), list(keys()))
+def test_each_key_has_a_description_and_an_example_that_it_takes(table: str, key: str) -> None:
+    assert schema.about(table, key)[-1] in ".`"
+    prop = TABLES[table]["properties"][key]
+    example = examples_of(TABLES).get(f"{table}.{key}")
+    assert example is not None
+    one = {"definitions": SCHEMA["definitions"], "properties": {key: prop}}
+    assert [str(error) for error in Draft7Validator(one).iter_errors({key: example})] == []
+
+
+def test_a_key_that_nobody_has_described_is_named() -> None:
+    with pytest.raises(KeyError, match='does not say what "colour" of "panel" means'):
+        schema.about("panel", "colour")
+
+
+def test_nothing_is_described_that_is_no_key() -> None:
+    known = {f"{table}.{key}" for table, key in keys()}
+    any_table = {key for _, key in keys()}
+    for table, described in schema.WORDS.items():
+        if table in ("tables", "examples"):
+            continue
+        for key in described:
+            there = key in any_table if table in ("any", schema.WIDGET) else f"{table}.{key}" in known
+            assert there, f"{table}.{key}"
+    assert set(schema.WORDS["tables"]) == set(TABLES)
+    assert set(schema.WORDS["examples"]) <= known
+
+
+@pytest.mark.parametrize("path", PANELS, ids=lambda path: path.name)
+def test_good_panels_are_good_by_the_schema(path: Path) -> None:
+    errors = VALIDATOR.iter_errors(tomllib.loads(path.read_text()))
+    assert [str(error) for error in errors] == []
+
+
+def test_the_shipped_panel_names_the_schema() -> None:
+    first = (ROOT / "app/panel.toml").read_text().splitlines()[0]
+    named = first.removeprefix("#:schema ")
+    assert json.loads((ROOT / "app" / named).read_text()) == SCHEMA
+
+
+def found_by_schema(mistake: dict[str, str]) -> bool:
+    tables = tomllib.loads(EVERYTHING.replace(mistake["old"], mistake["new"]))
+    return not VALIDATOR.is_valid(tables)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "must not be empty",  # a text's length
+        'did you mean "live"?',  # one of some words
+        'did you mean "robot"?',  # an unknown key, and what was meant
+        "60 or less, not 1000",  # a limit
+        'must be a number, not "512"',  # another type
+        "is not a ROS 2 service type",
+        "is not the absolute name of a ROS 2 node",
+        '"text" has no "min", "max", "step" and "u',  # keys of another kind
+        'unknown kind "button"; one of text,',
+        "is missing: of a best-effort topic",
+    ],
+)
+def test_mistakes_of_one_key_are_found_by_the_schema(words: str) -> None:
+    (mistake,) = (one for one in MISTAKES if one["words"] == words)
+    needs_another_key = "best-effort" in words
+    assert found_by_schema(mistake) is not needs_another_key
+
+
+def test_a_third_of_all_mistakes_is_found_while_one_types() -> None:
+    found = [mistake for mistake in MISTAKES if found_by_schema(mistake)]
+    assert len(found) > len(MISTAKES) / 3  # the others need the types, or another key
+
+
+def test_every_table_but_those_of_messages_is_closed() -> None:
+    for name, table in TABLES.items():
+        if name != schema.WIDGET:  # its kinds are
+            assert table["additionalProperties"] is False, name
+
+
+def test_each_sentence_locks_and_has_advice_or_is_known_to_lock_nothing() -> None:
+    assert locks.unexplained() == [], f"say in {locks.FILE.name} what to do about them"
+
+
+def test_advice_is_for_sentences_that_are_there() -> None:
+    told = {code for group, codes in locks.ADVICE.items() if group != locks.OTHERS for code in codes}
+    plain = {code for code in locks.ADVICE[locks.OTHERS]["codes"] if "*" not in code}
+    assert told | plain <= set(ENGLISH)
+    assert told.isdisjoint(plain)
+
+
+def test_what_the_code_locks_by_has_advice() -> None:
+    source = "".join(path.read_text() for path in places.modules())
+    codes = set(re.findall(r'\b(?:locked\(|Verdict\(False, )"(\w+)"', source)) & set(ENGLISH)
+    assert {"joining", "forbidden", "busy"} <= codes
+    told = {code for group, codes in locks.ADVICE.items() if group != locks.OTHERS for code in codes}
+    assert codes <= told
+
+
+def test_each_sentence_leads_to_the_modules_that_say_it() -> None:
+    rows = [row.split(" | ") for row in places.sentences_table().splitlines()[2:]]
+    assert len(rows) == len(ENGLISH)
+    assert [row for row in rows if "`app/" not in row[2]] == []
+
+
+def test_a_new_sentence_without_advice_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(locks, "ENGLISH", {**ENGLISH, "on_fire": "Locked: {name} is on fire."})
+    assert locks.unexplained() == ["on_fire"]
+
+
+def test_each_setting_is_described() -> None:
+    assert set(variables.ABOUT) == set(NAMES)
+
+
+def test_each_dependency_has_its_reason() -> None:
+    described = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    asked = [*described["project"]["dependencies"]]
+    asked += [one for group in described["dependency-groups"].values() for one in group]
+    names = {match[0] for one in asked if isinstance(one, str) and (match := re.match(r"[\w-]+", one))}
+    rows = (ROOT / "docs/architecture.md").read_text().split("## Dependencies")[1]
+    assert [name for name in sorted(names) if not re.search(rf"\b{name}\b", rows)] == []
+
+
+def test_each_path_of_http_is_in_its_reference() -> None:
+    page = (ROOT / "docs/reference/http.md").read_text()
+    routes = [row.split("`")[1] for row in places.paths_table().splitlines()[2:]]
+    assert "POST /widgets/{widget}" in routes
+    for route in routes:
+        method, path = route.split()
+        if not path.startswith("/static/"):  # what pages load
+            written = f"`{path}`" if method == "WebSocket" else f"{method} {path}"
+            assert written.replace("{act}", "take") in page, route
+
+
+def test_what_faults_measured_is_written_to_its_page(tmp_path: Path) -> None:
+    page = tmp_path / "reliability.md"
+    page.write_text((ROOT / "docs/reliability.md").read_text())
+    results.write("| what breaks |", page)
+    assert f"\n{results.BEGIN}\n| what breaks |\n{results.END}\n" in page.read_text()
+
+
+def test_a_page_without_the_faults_stays_as_it_is(tmp_path: Path) -> None:
+    page = tmp_path / "README.md"
+    page.write_text("nothing here\n")
+    with pytest.raises(ValueError, match="has no section"):
+        results.write("| what breaks |", page)
+    assert page.read_text() == "nothing here\n"
