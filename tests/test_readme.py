@@ -5,10 +5,26 @@ import tomllib
 from pathlib import Path
 from typing import Final
 
+import pytest
+
 from app.panel import load_panel
 from tests.parts import ROOT
 
 TEXT: Final = (ROOT / "README.md").read_text()
+
+
+def links(name: str) -> set[str]:
+    """The files that a page at the top links to."""
+    found = re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", (ROOT / name).read_text())
+    return set(found)
+
+
+@pytest.mark.parametrize("name", ["README.md", "CONTRIBUTING.md"])
+def test_each_link_leads_to_a_page_of_the_documentation_or_to_a_file(name: str) -> None:
+    pages = re.findall(r"^[a-z][\w/-]*$", (ROOT / "docs/index.md").read_text(), re.MULTILINE)
+    known = {f"docs/{page}.md" for page in pages}  # `make docs` looks whether they are there
+    assert len(links(name)) >= 3
+    assert [one for one in links(name) - known if not (ROOT / one).is_file()] == []
 
 
 def test_its_panel_is_good_as_it_is(tmp_path: Path) -> None:
