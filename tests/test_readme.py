@@ -1,31 +1,57 @@
 """What the README shows can be used as it stands there."""
 
 import re
+import tomllib
 from pathlib import Path
+from typing import Final
+
+import pytest
 
 from app.panel import load_panel
 from tests.support.parts import ROOT
 
-EXAMPLES = re.findall(
-    r"^```toml\n(.*?)^```", (ROOT / "README.md").read_text(), re.DOTALL | re.MULTILINE
-)
-OWN = '# interfaces = ["cell_msgs"]'
-JOG = "float64 speed\nuint32 valid_ms\nuint16 number\n"
+TEXT: Final = (ROOT / "README.md").read_text()
 
 
-def test_the_first_panel_is_good_as_it_is(tmp_path: Path) -> None:
-    panel = tmp_path / "cell1.toml"
-    panel.write_text(EXAMPLES[0])
-    assert load_panel(panel).title == "Robot cell 1"
+def links(name: str) -> set[str]:
+    """The files that a page at the top links to."""
+    found = re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", (ROOT / name).read_text())
+    return set(found)
 
 
-def test_all_examples_together_are_a_panel(tmp_path: Path) -> None:
-    messages = tmp_path / "cell_msgs/msg"
-    messages.mkdir(parents=True)
-    (messages / "Jog.msg").write_text(JOG)
-    whole = "\n".join(EXAMPLES)
-    assert OWN in whole
-    panel = tmp_path / "cell1.toml"
-    panel.write_text(whole.replace(OWN, OWN.removeprefix("# ")))
-    kinds = {widget.kind for widget in load_panel(panel).widgets()}
-    assert {"text", "publish", "readout", "slider", "call", "action", "parameter", "hold"} <= kinds
+@pytest.mark.parametrize("name", ["README.md", "CONTRIBUTING.md"])
+def test_each_link_leads_to_a_page_of_the_documentation_or_to_a_file(name: str) -> None:
+    pages = re.findall(r"^[a-z][\w/-]*$", (ROOT / "docs/index.md").read_text(), re.MULTILINE)
+    known = {f"docs/{page}.md" for page in pages}  # `make docs` looks whether they are there
+    assert len(links(name)) >= 3
+    assert [one for one in links(name) - known if not (ROOT / one).is_file()] == []
+
+
+def test_its_panel_is_good_as_it_is(tmp_path: Path) -> None:
+    (example,) = re.findall(r"^```toml\n(.*?)^```", TEXT, re.DOTALL | re.MULTILINE)
+    path = tmp_path / "cell1.toml"
+    path.write_text(example)
+    panel = load_panel(path)
+    assert (panel.mode, [widget.id for widget in panel.widgets()]) == ("live", ["start"])
+
+
+def test_it_stays_short() -> None:
+    assert len(TEXT.splitlines()) <= 150
+
+
+def test_each_make_target_that_it_names_is_one() -> None:
+    makefile = (ROOT / "Makefile").read_text()
+    targets = set(re.findall(r"\bmake ([a-z]+)", TEXT))
+    assert {"run", "test"} <= targets
+    assert [one for one in targets if not re.search(rf"^{one}:", makefile, re.MULTILINE)] == []
+
+
+def test_each_dependency_has_its_reason() -> None:
+    with (ROOT / "pyproject.toml").open("rb") as file:
+        described = tomllib.load(file)
+    groups = described["dependency-groups"]
+    asked = [*described["project"]["dependencies"], *groups["dev"]]
+    asked += [one for one in groups["test"] if isinstance(one, str)]
+    rows = TEXT.split("## Dependencies")[1]
+    names = {re.match(r"[\w-]+", one)[0] for one in asked}  # type: ignore[index]
+    assert [name for name in sorted(names) if not re.search(rf"\b{name}\b", rows)] == []

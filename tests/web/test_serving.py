@@ -218,7 +218,9 @@ def test_what_is_tighter_stays() -> None:
     assert bounded(asyncio.Queue[dict[str, str]]().get) is None  # another server's
 
 
-@pytest.mark.parametrize("name", ["deploy/operator-panel.service", "Makefile", "README.md"])
+@pytest.mark.parametrize(
+    "name", ["deploy/operator-panel.service", "Makefile", "docs/how-to/service.md"]
+)
 def test_what_starts_the_server_gives_it_the_same_limits(name: str) -> None:
     flags = f"--ws-max-size {OPTIONS['ws_max_size']} --ws-max-queue {OPTIONS['ws_max_queue']}"
     flags += " --ws-per-message-deflate false --no-proxy-headers"
