@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, Page, Request, Route, expect
 
+from app.printable import printable
 from tests.support.parts import TAP_AGAIN_MS, Bridge, RosNode, Server, has_heard, live, until
 
 TEXTS = [
@@ -95,7 +96,7 @@ def polling(server: Server, node: RosNode, page: Page) -> Page:
 
 def say(node: RosNode, server: Server, text: str) -> None:
     node.once("/last_heard", "std_msgs/msg/String", {"data": text})
-    until(lambda: server.widget("last_heard")["text"] == text, "the server has it")
+    until(lambda: server.widget("last_heard")["text"] == printable(text), "the server has it")
 
 
 def test_a_text_with_line_separators_keeps_no_button_open(
@@ -114,7 +115,7 @@ def test_line_separators_that_come_as_they_are_end_no_line_of_a_snapshot(
     def unescaped(route: Route) -> None:
         body = route.fetch().text()
         for separator in "\x85\u2028\u2029":
-            body = body.replace(f"\\u{ord(separator):04x}", separator)
+            body = body.replace(f"\\\\u{ord(separator):04x}", separator)
         route.fulfill(body=body, content_type="text/event-stream")
 
     polling.route(SNAPSHOT, unescaped)

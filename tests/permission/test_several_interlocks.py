@@ -186,9 +186,6 @@ def test_a_hold_ends_by_the_second_one() -> None:
 PANEL: Final = """
 title = "Cell"
 [[interlock]]
-id = "operation"
-topic = "/operation_enabled"
-[[interlock]]
 id = "doors"
 label = "open doors"
 topic = "/doors_closed"
@@ -207,7 +204,7 @@ label = "Several"
 topic = "/several"
 type = "std_msgs/msg/Empty"
 message = {}
-interlock = ["operation", "doors", "air"]
+interlock = ["doors", "air"]
 [[page.widget]]
 id = "single"
 kind = "publish"
@@ -215,7 +212,6 @@ label = "Single"
 topic = "/single"
 type = "std_msgs/msg/Empty"
 message = {}
-interlock = "operation"
 [[page.widget]]
 id = "below"
 kind = "publish"
@@ -230,11 +226,11 @@ NO_AIR: Final = "Locked: waiting for /air."
 
 @pytest.fixture(scope="module")
 def kiosk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    """On the robot that it simulates, which says that operation is enabled and nothing of the rest."""
+    """On the robot that it simulates, which says nothing of doors and air."""
     panel = tmp_path_factory.mktemp("panel") / "cell.toml"
     panel.write_text(PANEL)
     mine = Server(ROOT, KIOSK_PANEL=str(panel), KIOSK_MODE="demo")
-    until(lambda: mine.widget("single")["enabled"], "operation is enabled", within_s=30)
+    until(lambda: mine.widget("single")["enabled"], "the robot is there", within_s=30)
     yield mine
     mine.end()
 
@@ -277,7 +273,7 @@ def test_a_page_without_its_server_tells_that_alone(
     panel = tmp_path / "cell.toml"
     panel.write_text(PANEL)
     mine = servers(Server(ROOT, KIOSK_PANEL=str(panel), KIOSK_MODE="demo"))
-    until(lambda: mine.widget("single")["enabled"], "operation is enabled", within_s=30)
+    until(lambda: mine.widget("single")["enabled"], "the robot is there", within_s=30)
     page.goto(mine.url)
     why = page.locator("#why-several")
     expect(why).to_contain_text("+1 more")
