@@ -14,7 +14,7 @@ from app.interfaces.cdr.writer import Write, message_writer
 from app.interfaces.definitions import PLACEHOLDER, Field, Structure, Type
 
 FEW_BYTES: Final = 20_000  # have few elements
-MOST_ELEMENTS: Final = 4_000  # of a message that is read whole
+MOST_ELEMENTS: Final = 2_000  # of a message that is read whole
 
 
 class Codec:
