@@ -29,10 +29,18 @@ run: .venv/run
 dev: .venv/test
 	KIOSK_DEV=1 KIOSK_LOG_LEVEL=debug .venv/bin/uvicorn app.main:app $(LIMITS) --reload --reload-dir app
 
-# ARGS: of pytest. Tests that need neither bridge nor ROS nor browser are run without them.
+# Everything: what measures real time alone and at last, the rest by WORKERS at once. With ARGS, of
+# pytest, only those tests, one after the other; such as need neither bridge nor ROS nor browser are run
+# without them.
+WORKERS ?= 4
 test: $(if $(ARGS),.venv/test,test-parts)
-	$(if $(ARGS),$(MAKE) --no-print-directory .venv/test $$(.venv/bin/python -m tests.needs $(ARGS)))
+ifdef ARGS
+	$(MAKE) --no-print-directory .venv/test $$(.venv/bin/python -m tests.needs $(ARGS))
 	.venv/bin/pytest $(ARGS)
+else
+	.venv/bin/pytest --real-time=without -n $(WORKERS) --dist loadfile --no-loadscope-reorder; first=$$?; \
+	.venv/bin/pytest --real-time=only && exit $$first
+endif
 
 check: .venv/test
 	.venv/bin/ruff check app tests bench docs
@@ -51,7 +59,7 @@ FAULTS_RESULTS := $(CACHE)/faults.jsonl
 faults: test-parts
 	mkdir -p $(CACHE)
 	rm -f $(FAULTS_RESULTS)
-	FAULTS=$(FORM) FAULTS_RESULTS=$(FAULTS_RESULTS) .venv/bin/pytest tests/faults/test_faults_of_*.py tests/permission/test_at_random.py $(ARGS)
+	FAULTS=$(FORM) FAULTS_RESULTS=$(FAULTS_RESULTS) .venv/bin/pytest --timeout 0 tests/faults/test_faults_of_*.py tests/permission/test_at_random.py $(ARGS)
 	FAULTS=$(FORM) .venv/bin/python -m tests.faults.results $(FAULTS_RESULTS) docs/reliability.md
 
 soak: test-parts

@@ -10,15 +10,16 @@ from pathlib import Path
 
 import pytest
 import zenoh
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Page, expect, sync_playwright
 
-from tests.needs import needs_parts
-from tests.support.domains import FIRST
+from tests.needs import needs_part, needs_parts
+from tests.support import domains
 from tests.support.fonts import fonts_file
 from tests.support.parts import (
     BRIDGE,
     CHROMIUM,
     CHROMIUM_FLAGS,
+    ENOUGH_S,
     ROOT,
     ROS_PYTHON,
     Bridge,
@@ -29,6 +30,30 @@ from tests.support.parts import (
     live,
     until,
 )
+
+expect.set_options(timeout=1000 * ENOUGH_S)
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--real-time", choices=("only", "without"), help="tests that measure real time")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Tests of real time are tried once more where they fail, and no others; files that wait for real
+    parts begin, so that what only computes fills the rest."""
+    wanted = config.getoption("--real-time")
+    for item in items:
+        assert not item.get_closest_marker("flaky"), f"{item.nodeid}: only `real_time` may be repeated"
+        if item.get_closest_marker("real_time"):
+            item.add_marker(pytest.mark.flaky(reruns=1))
+    if wanted:
+        left_out = [
+            one for one in items if (one.get_closest_marker("flaky") is None) is (wanted == "only")
+        ]
+        config.hook.pytest_deselected(items=left_out)
+        items[:] = [one for one in items if one not in set(left_out)]
+    waiting = {one.path for one in items if needs_part(one)}
+    items.sort(key=lambda one: one.path not in waiting)
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:
@@ -64,7 +89,7 @@ def temporary_files(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 
 @pytest.fixture(scope="session")
 def domain() -> int:
-    return FIRST
+    return domains.first()
 
 
 @pytest.fixture(scope="session")
@@ -184,7 +209,7 @@ def chromium(fonts: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[B
 def page(chromium: Browser) -> Iterator[Page]:
     """A page in a browser context of its own; an error on its console fails the test."""
     context = chromium.new_context(viewport={"width": 1280, "height": 800})
-    context.set_default_timeout(10_000)
+    context.set_default_timeout(1000 * ENOUGH_S)
     page = context.new_page()
     errors: list[str] = []
     page.on("pageerror", lambda error: errors.append(str(error)))

@@ -11,9 +11,13 @@ import pytest
 PARTS = {"domain", "cyclone_bridge", "own_cyclone_bridge", "robots", "ros", "chromium"}
 
 
+def needs_part(item: pytest.Item) -> bool:
+    return bool(PARTS.intersection(getattr(item, "fixturenames", ())))
+
+
 def needs_parts(session: pytest.Session) -> bool:
     """Whether a test that was collected needs a real part."""
-    return any(PARTS.intersection(getattr(item, "fixturenames", ())) for item in session.items)
+    return any(map(needs_part, session.items))
 
 
 class Collected:

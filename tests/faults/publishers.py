@@ -16,9 +16,9 @@ import zenoh
 
 from app.dialect import bridge_dialect
 from tests.faults.rig import kiosk
+from tests.support import domains
 from tests.support.commanded import Commanded
 from tests.support.cyclone import CYCLONE
-from tests.support.domains import FIRST
 from tests.support.parts import ROS_PYTHON, TESTS, Bridge, Server, until
 
 Vendor = Literal["fast", "cyclone"]
@@ -217,7 +217,7 @@ def main(times: int = 20) -> None:
     with tempfile.TemporaryDirectory() as folder:
         rmws: tuple[tuple[Vendor, str], ...] = (("fast", "Fast DDS"), ("cyclone", "Cyclone DDS"))
         for kind in KINDS:
-            with closing(Publishers(FIRST, Path(folder), kind.durability)) as rig:
+            with closing(Publishers(domains.first(), Path(folder), kind.durability)) as rig:
                 for vendor, rmw in rmws:
                     found = [rig.trial(vendor, kind).outcome for _ in range(times)]
                     counts = [str(found.count(one)) for one in ("heard", "locked", "unnoticed")]

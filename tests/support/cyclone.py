@@ -13,8 +13,8 @@ import pytest
 import zenoh
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+from tests.support import domains
 from tests.support.commanded import Commanded
-from tests.support.domains import CYCLONE as DOMAINS
 from tests.support.parts import ROS_PYTHON, TESTS, Bridge, until
 
 NODE = "cyclone_robot"
@@ -217,7 +217,7 @@ def cyclone_bridge() -> Iterator[Bridge]:
     It ends with the file, as the next file's is on the same domain: a bridge takes another one's
     readers and writers for a robot's.
     """
-    shared = Bridge(DOMAINS[0])
+    shared = Bridge(domains.cyclone()[0])
     shared.start()
     yield shared
     shared.end()
@@ -225,7 +225,7 @@ def cyclone_bridge() -> Iterator[Bridge]:
 
 @pytest.fixture
 def own_cyclone_bridge() -> Iterator[Bridge]:
-    mine = Bridge(DOMAINS[1])
+    mine = Bridge(domains.cyclone()[1])
     mine.start()
     yield mine
     mine.end()

@@ -22,7 +22,9 @@ import httpx
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
+from tests.support import domains
 from tests.support.commanded import Commanded
+from tests.support.forked import Forked, can_fork
 
 # Without scripts, what comes within 700 ms of its page is a second tap; a busy driver waits less.
 TAP_AGAIN_MS = 1000
@@ -54,7 +56,11 @@ CYCLONE_ON_LOOPBACK = (
 STOOD = "Timeout (0:00:20)!"  # a server stood still as it ended, and left
 
 
-def until(what: Callable[[], Any], why: str, within_s: float = 10.0, every_s: float = 0.01) -> Any:
+# What happens at once happens within this time also where much else runs.
+ENOUGH_S = 40.0
+
+
+def until(what: Callable[[], Any], why: str, within_s: float = ENOUGH_S, every_s: float = 0.01) -> Any:
     """Waits for a condition and returns its value; fails with `why` when time is up."""
     end = time.monotonic() + within_s
     while True:
@@ -66,9 +72,14 @@ def until(what: Callable[[], Any], why: str, within_s: float = 10.0, every_s: fl
 
 
 def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
+    """A port of this process's own: below those that the system gives away, so that none is taken
+    before its server listens."""
+    for port in domains.ports():
+        with socket.socket() as probe, suppress(OSError):
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            probe.bind(("127.0.0.1", port))
+            return port
+    raise RuntimeError("no port is free")
 
 
 class Process:
@@ -77,9 +88,13 @@ class Process:
     latest: ClassVar[deque["Process"]] = deque(maxlen=6)  # what a failed test shows
 
     def __init__(self, command: Sequence[str], env: Mapping[str, str], **options: Any) -> None:
-        self._process = subprocess.Popen(
-            command, env={**os.environ, **env}, stderr=subprocess.PIPE, text=True, **options
-        )
+        self._process: subprocess.Popen[str] | Forked
+        if can_fork(command, env, options.get("cwd")):
+            self._process = Forked(command, env)
+        else:
+            self._process = subprocess.Popen(
+                command, env={**os.environ, **env}, stderr=subprocess.PIPE, text=True, **options
+            )
         self.lines: list[str] = []
         self.began = time.monotonic()
         self.latest.append(self)
@@ -267,11 +282,11 @@ class Server:
         self.way = "post"
         self.port = port or free_port()
         self.url = f"http://127.0.0.1:{self.port}"
-        self.http = httpx.Client(base_url=self.url, timeout=10, trust_env=False)
+        self.http = httpx.Client(base_url=self.url, timeout=ENOUGH_S, trust_env=False)
         command = [*before, python, "-m", "uvicorn", app, "--port", str(self.port), *options]
         self.process = Process(command, {**environment, "PYTHONPATH": ""}, cwd=folder)
         try:
-            until(self.answers, "the server answers", within_s=20)
+            until(self.answers, "the server answers", within_s=60)
         except BaseException:
             self.end(signal.SIGKILL)
             raise

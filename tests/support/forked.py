@@ -1,0 +1,104 @@
+"""Kiosks that are forked from one process (see `kiosk_parent`), each as a `subprocess.Popen` would be."""
+
+import atexit
+import json
+import os
+import select
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Mapping, Sequence
+from functools import cache
+from pathlib import Path
+from typing import IO, Final
+
+ROOT: Final = Path(__file__).resolve().parent.parent.parent
+# What is read when a process begins.
+AT_BEGIN: Final = ("LD_", "MALLOC", "PYTHON")
+FORKED_TOO: Final = {"PYTHONFAULTHANDLER": "1", "PYTHONPATH": ""}
+
+
+def can_fork(command: Sequence[str], env: Mapping[str, str], folder: object) -> bool:
+    """Whether that is the server of this project, by this Python, and nothing special about it."""
+    if list(command[:4]) != [sys.executable, "-m", "uvicorn", "app.main:app"] or folder != ROOT:
+        return False
+    special = {name: value for name, value in env.items() if name.startswith(AT_BEGIN)}
+    return "--reload" not in command and special.items() <= FORKED_TOO.items()
+
+
+@cache
+def _parent() -> socket.socket:
+    """Where orders go."""
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    for end in (ours, theirs):
+        end.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 1 << 18)
+    process = subprocess.Popen(
+        [sys.executable, "-m", "tests.support.kiosk_parent", str(theirs.fileno())],
+        cwd=ROOT,
+        env={**os.environ, "PYTHONPATH": ""},
+        pass_fds=[theirs.fileno()],
+    )
+    theirs.close()
+
+    def end() -> None:
+        ours.close()
+        process.wait()
+
+    atexit.register(end)
+    return ours
+
+
+class Forked:
+    """What of a `Popen` is used."""
+
+    stdin = stdout = None
+
+    def __init__(self, command: Sequence[str], env: Mapping[str, str]) -> None:
+        self.args = command
+        self.returncode: int | None = None
+        self._lock = threading.Lock()
+        stderr, said = os.pipe2(os.O_CLOEXEC)
+        self._told, tells = os.pipe2(os.O_CLOEXEC)
+        order = json.dumps({"arguments": list(command[3:]), "env": {**os.environ, **env}})
+        socket.send_fds(_parent(), [order.encode()], [said, tells])
+        os.close(said)
+        os.close(tells)
+        self.stderr: IO[str] = open(stderr, encoding="utf-8")  # noqa: SIM115 - whoever reads it closes it
+        self._text = b""
+        self.pid = int(self._line(None) or 0)
+
+    def _line(self, timeout_s: float | None) -> bytes | None:
+        """The next that is told, within that time; nothing more after the exit code."""
+        if not select.select([self._told], [], [], timeout_s)[0]:
+            return None
+        line = bytearray()
+        while not line.endswith(b"\n"):
+            byte = os.read(self._told, 1)
+            assert byte, f"the parent of the kiosks has ended before {self.args!r}"
+            line += byte
+        return bytes(line)
+
+    def _ended(self, timeout_s: float | None) -> int | None:
+        with self._lock:
+            if self.returncode is None and (line := self._line(timeout_s)):
+                self.returncode = int(line)
+                os.close(self._told)
+            return self.returncode
+
+    def poll(self) -> int | None:
+        return self._ended(0)
+
+    def wait(self, timeout: float | None = None) -> int:
+        status = self._ended(timeout)
+        if status is None:
+            raise subprocess.TimeoutExpired(self.args, timeout or 0)
+        return status
+
+    def send_signal(self, number: signal.Signals) -> None:
+        if self.poll() is None:
+            os.kill(self.pid, number)
+
+    def kill(self) -> None:
+        self.send_signal(signal.SIGKILL)

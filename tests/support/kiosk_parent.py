@@ -1,0 +1,120 @@
+"""A process that has read the server's libraries once, and begins kiosks by forking: reading them anew
+takes a second of work for each.
+
+It is `python -m tests.support.kiosk_parent FD` in the project's folder. FD is a socket: each message is an
+order in JSON with two files, the kiosk's stderr and where its pid and then its exit code are written. It
+ends when the other end is closed.
+"""
+
+import ast
+import faulthandler
+import json
+import os
+import runpy
+import select
+import signal
+import socket
+import sys
+import threading
+import time
+from collections.abc import Mapping
+from importlib import import_module
+from pathlib import Path
+from typing import Any, Final
+
+MAIN: Final = Path("app/main.py")
+COLLECTOR: Final = "app.process.collector"  # it acts when it is imported: that is the kiosk's
+UVICORN: Final = (
+    "main",
+    "lifespan.on",
+    "loops.auto",
+    "protocols.http.auto",
+    "protocols.websockets.auto",
+)
+LONGEST: Final = 1 << 18
+
+
+def read_libraries() -> dict[str, str]:
+    """All that `app.main` imports, but not itself; and what that put into the environment."""
+    before = dict(os.environ)
+    for name in UVICORN:
+        import_module(f"uvicorn.{name}")
+    for statement in ast.parse(MAIN.read_text()).body:
+        if isinstance(statement, ast.Import):
+            for name in statement.names:
+                import_module(name.name)
+        elif isinstance(statement, ast.ImportFrom) and statement.module not in (None, COLLECTOR):
+            package = import_module(str(statement.module))
+            for part in statement.names:
+                if not hasattr(package, part.name):
+                    import_module(f"{statement.module}.{part.name}")
+    assert COLLECTOR not in sys.modules
+    assert len(list(Path("/proc/self/task").iterdir())) == threading.active_count() == 1
+    return {name: value for name, value in os.environ.items() if before.get(name) != value}
+
+
+class Parent:
+    """Forks, and tells how each one ended."""
+
+    def __init__(self, orders: socket.socket) -> None:
+        self._orders = orders
+        self._added = read_libraries()
+        self._told: dict[int, int] = {}  # where a child's end is told, by pid
+        self._woken, self._wakes = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        signal.signal(signal.SIGCHLD, lambda *_: None)
+        signal.set_wakeup_fd(self._wakes, warn_on_full_buffer=False)
+
+    def run(self) -> None:
+        while True:
+            ready, _, _ = select.select([self._orders, self._woken], [], [])
+            if self._woken in ready:
+                os.read(self._woken, 4096)
+            self._reap()
+            if self._orders in ready:
+                text, files, _, _ = socket.recv_fds(self._orders, LONGEST, 2)
+                if not text:
+                    return
+                self._begin(json.loads(text), *files)
+
+    def _reap(self) -> None:
+        while self._told:
+            pid, status = os.waitpid(-1, os.WNOHANG)
+            if not pid:
+                return
+            told = self._told.pop(pid)
+            os.write(told, f"{os.waitstatus_to_exitcode(status)}\n".encode())
+            os.close(told)
+
+    def _begin(self, order: Mapping[str, Any], stderr: int, told: int) -> None:
+        pid = os.fork()
+        if pid:
+            self._told[pid] = told
+            os.write(told, f"{pid}\n".encode())
+            os.close(stderr)
+            return
+        signal.set_wakeup_fd(-1)
+        signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        self._orders.close()
+        for file in (told, self._woken, self._wakes, *self._told.values()):
+            os.close(file)
+        os.dup2(stderr, 2)
+        os.close(stderr)
+        os.environ.clear()
+        os.environ.update({**self._added, **order["env"]})
+        become(order["arguments"])
+
+
+def become(arguments: list[str]) -> None:
+    """As `python -m uvicorn ARGUMENTS` in this folder."""
+    time.tzset()
+    if os.environ.get("PYTHONFAULTHANDLER"):
+        faulthandler.enable()
+    sys.argv = ["uvicorn", *arguments]
+    runpy.run_module("uvicorn", run_name="__main__", alter_sys=True)
+    sys.exit(0)
+
+
+if __name__ == "__main__":
+    Parent(socket.socket(fileno=int(sys.argv[1]))).run()
