@@ -37,7 +37,7 @@ def _place() -> int:
 
 def first() -> int:
     """The first of `EACH` domains of this process."""
-    return FIRSTS[_place()]
+    return int(FIRSTS[_place()])
 
 
 @cache

@@ -1,4 +1,4 @@
-"""Kiosks that are forked from one process (see `kiosk_parent`), each as a `subprocess.Popen` would be."""
+"""Kiosks that are forked from one process, see `kiosk_parent`; each is as a `Popen` would be."""
 
 import atexit
 import json
@@ -32,8 +32,8 @@ def can_fork(command: Sequence[str], env: Mapping[str, str], folder: object) -> 
 def _parent() -> socket.socket:
     """Where orders go."""
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    for end in (ours, theirs):
-        end.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 1 << 18)
+    for one in (ours, theirs):
+        one.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 1 << 18)
     process = subprocess.Popen(
         [sys.executable, "-m", "tests.support.kiosk_parent", str(theirs.fileno())],
         cwd=ROOT,

@@ -1,9 +1,9 @@
 """A process that has read the server's libraries once, and begins kiosks by forking: reading them anew
 takes a second of work for each.
 
-It is `python -m tests.support.kiosk_parent FD` in the project's folder. FD is a socket: each message is an
-order in JSON with two files, the kiosk's stderr and where its pid and then its exit code are written. It
-ends when the other end is closed.
+It is `python -m tests.support.kiosk_parent FD` in the project's folder. FD is a socket: each message is
+an order in JSON with two files, the kiosk's stderr and where its pid and then its exit code are told.
+It ends when the other end is closed.
 """
 
 import ast
@@ -41,8 +41,8 @@ def read_libraries() -> dict[str, str]:
         import_module(f"uvicorn.{name}")
     for statement in ast.parse(MAIN.read_text()).body:
         if isinstance(statement, ast.Import):
-            for name in statement.names:
-                import_module(name.name)
+            for module in statement.names:
+                import_module(module.name)
         elif isinstance(statement, ast.ImportFrom) and statement.module not in (None, COLLECTOR):
             package = import_module(str(statement.module))
             for part in statement.names:
@@ -67,11 +67,11 @@ class Parent:
 
     def run(self) -> None:
         while True:
-            ready, _, _ = select.select([self._orders, self._woken], [], [])
+            ready, _, _ = select.select([self._orders.fileno(), self._woken], [], [])
             if self._woken in ready:
                 os.read(self._woken, 4096)
             self._reap()
-            if self._orders in ready:
+            if self._orders.fileno() in ready:
                 text, files, _, _ = socket.recv_fds(self._orders, LONGEST, 2)
                 if not text:
                     return
