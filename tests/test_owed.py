@@ -4,6 +4,8 @@ import asyncio
 import time
 from typing import Final
 
+import pytest
+
 from app.concurrency import Owed
 
 SOON_S: Final = 0.05
@@ -26,6 +28,7 @@ async def _until_all_are_told() -> None:
         await told
 
 
+@pytest.mark.real_time
 def test_it_waits_no_longer_than_it_may() -> None:
     asyncio.run(_no_longer_than_it_may())
 

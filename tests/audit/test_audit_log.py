@@ -157,6 +157,7 @@ def test_what_comes_together_shares_a_commit_and_a_sync(tmp_path: Path, disk: Di
     assert verify(tmp_path).count == 201
 
 
+@pytest.mark.real_time
 def test_a_disk_that_hangs_blocks_no_loop_and_locks(
     tmp_path: Path, disk: Disk, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -182,6 +182,7 @@ def holds(kiosk: Server) -> bool:
     return False
 
 
+@pytest.mark.real_time
 def test_exports_and_searches_disturb_neither_presses_nor_holds(kiosk: Server) -> None:
     alone = press_s(kiosk)
     with exporting(kiosk), searching(kiosk) as statuses, unread(kiosk, 50):
@@ -250,6 +251,7 @@ def test_who_goes_leaves_no_process_and_no_line(kiosk: Server) -> None:
     assert "Traceback" not in kiosk.process.text
 
 
+@pytest.mark.real_time
 def test_the_end_of_the_server_waits_for_no_export(kiosk: Server) -> None:
     with exporting(kiosk):
         until(lambda: children(kiosk), "its process runs")

@@ -503,6 +503,7 @@ def test_pages_follow_by_number_while_more_is_written(store: Store, tmp_path: Pa
     assert all(row.pressed_at is not None for row in first)
 
 
+@pytest.mark.real_time
 def test_a_reader_never_holds_up_the_writer(store: Store, tmp_path: Path) -> None:
     fill(store, 10)
     reader = sqlite3.connect(f"{(tmp_path / NAME).as_uri()}?mode=ro", uri=True)

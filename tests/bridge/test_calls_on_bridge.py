@@ -162,6 +162,7 @@ def test_the_robot_says_no_with_its_words(kiosk: Server, robot: CycloneRobot) ->
     assert robot.requests("/set_enabled") == [{"data": True}] * 2
 
 
+@pytest.mark.real_time
 def test_no_such_service_is_told_at_once(kiosk: Server) -> None:
     assert "does not offer /nowhere" in kiosk.widget("nowhere")["reason"]
     began = time.monotonic()
@@ -215,6 +216,7 @@ def heard_after_s(kiosk: Server, robot: CycloneRobot, words: str) -> float:
     return time.monotonic() - began
 
 
+@pytest.mark.real_time
 def test_calls_that_wait_hold_up_no_press(
     cyclone_bridge: Bridge,
     robot: CycloneRobot,

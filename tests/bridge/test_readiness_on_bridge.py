@@ -10,6 +10,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import httpx
+import pytest
 import zenoh
 
 from tests.support.parts import ROOT, Bridge, Process, Server, free_port, live, until
@@ -65,6 +66,7 @@ def some_time_passes(kiosk: Server) -> None:
             stream.next("beat")
 
 
+@pytest.mark.real_time
 def test_a_bridge_whose_main_loop_hangs_is_seen_at_the_request(
     own_bridge: Bridge, tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:

@@ -191,6 +191,7 @@ def processes_of(browser: Browser) -> list[int]:
     return [int(p["id"]) for p in session.send("SystemInfo.getProcessInfo")["processInfo"]]
 
 
+@pytest.mark.real_time
 @pytest.mark.parametrize("fault", [signal.SIGKILL, signal.SIGSTOP])
 def test_a_holder_whose_browser_is_killed_or_hangs_is_lost(
     kiosk: Server, opens: Opens, other_chromium: Browser, fault: signal.Signals

@@ -30,6 +30,8 @@ from tests.support.parts import (
     until,
 )
 
+pytestmark = pytest.mark.real_time
+
 PANEL: Final = """
 title = "Jog"
 [[interlock]]

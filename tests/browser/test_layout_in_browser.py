@@ -119,6 +119,7 @@ def shown(demo: Server, page: Page, request: pytest.FixtureRequest) -> Page:
 
 
 def box(page: Page, selector: str) -> Any:
+    expect(page.locator(selector)).to_be_visible()
     found = page.locator(selector).bounding_box()
     assert found is not None, selector
     return found

@@ -3,6 +3,8 @@
 import time
 from concurrent.futures import ThreadPoolExecutor
 
+import pytest
+
 from tests.faults import fixtures
 from tests.faults.browsers import Browsers, asking, storm, unread
 from tests.faults.presser import Presser, accounted
@@ -11,6 +13,8 @@ from tests.faults.rig import TEXT, Rig, several
 from tests.faults.trial import well
 from tests.faults.watch import Watch, answering, came_back, resources
 from tests.support.parts import Server, until
+
+pytestmark = pytest.mark.real_time
 
 rig = fixtures.rig
 server = fixtures.server

@@ -4,6 +4,8 @@ import random
 import secrets
 from pathlib import Path
 
+import pytest
+
 from tests.faults import fixtures
 from tests.faults.kills import Life, kill_at_random_moments
 from tests.faults.presser import accounted
@@ -11,6 +13,8 @@ from tests.faults.results import ms, record
 from tests.faults.rig import Rig, kiosk, several
 from tests.faults.trial import UNDER_WAY_S
 from tests.support.parts import free_port
+
+pytestmark = pytest.mark.real_time
 
 rig = fixtures.rig
 

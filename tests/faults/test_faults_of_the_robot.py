@@ -9,6 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from typing import Any
 
+import pytest
 import zenoh
 
 from tests.faults import fixtures
@@ -18,6 +19,8 @@ from tests.faults.rig import BOOL, LISTENED_TO, MAX_AGE_S, TEXT, Rig, permitting
 from tests.faults.trial import recorded, tried, well
 from tests.faults.watch import Resources, Watch, answering, came_back, resources
 from tests.support.parts import RosNode, Server, until
+
+pytestmark = pytest.mark.real_time
 
 rig = fixtures.rig
 server = fixtures.server

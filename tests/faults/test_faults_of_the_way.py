@@ -17,6 +17,8 @@ from tests.faults.trial import UNDER_WAY_S, recorded, tried, well
 from tests.faults.watch import Watch, answering
 from tests.support.parts import TESTS, Server, free_port, until
 
+pytestmark = pytest.mark.real_time
+
 rig = fixtures.rig
 server = fixtures.server
 

@@ -50,6 +50,7 @@ def next_lock(stream: Stream) -> tuple[float, str]:
             return time.monotonic(), data["reason"]
 
 
+@pytest.mark.real_time
 def test_a_killed_bridge_locks_within_a_second_and_its_return_opens(
     own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:
@@ -90,6 +91,7 @@ def test_after_a_return_an_old_permission_does_not_count(
     opened(kiosk)
 
 
+@pytest.mark.real_time
 def test_a_frozen_bridge_locks_within_three_seconds_and_opens_when_it_thaws(
     own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:
@@ -157,6 +159,7 @@ def test_a_required_publisher_that_goes_away_locks(
     assert "no node of the robot publishes /operation_enabled" in kiosk.widget("operation1")["reason"]
 
 
+@pytest.mark.real_time
 def test_a_value_that_grows_old_locks_and_a_fresh_one_opens(
     own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:
@@ -270,6 +273,7 @@ def test_what_the_robot_forbids_while_the_server_stands_still_counts_behind_all_
     until(says_so, "permitted anew", within_s=15, every_s=0.2)
 
 
+@pytest.mark.real_time
 def test_an_old_latched_value_is_no_fresh_one(
     own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:

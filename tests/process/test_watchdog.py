@@ -89,6 +89,7 @@ def listener(tmp_path: Path) -> Iterator[Listener]:
     mine.close()
 
 
+@pytest.mark.real_time
 def test_it_tells_ready_when_it_serves_then_how_it_is_and_that_it_ends(address: str) -> None:
     manager = Listener(address)
     port = free_port()

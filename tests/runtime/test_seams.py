@@ -275,6 +275,7 @@ def test_a_publisher_that_was_replaced_between_two_turns_has_to_say_it_again() -
         assert interlock_verdict(interlock, robot, NOW).permitted is permitted
 
 
+@pytest.mark.real_time
 def test_a_kiosk_that_gives_its_session_up_ends_what_is_held_before(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

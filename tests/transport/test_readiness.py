@@ -3,6 +3,8 @@
 import asyncio
 from collections.abc import Awaitable, Callable
 
+import pytest
+
 from app.errors import LinkError
 from app.transport.readiness import EVERY_S, LIMIT_S, Asked
 
@@ -63,6 +65,7 @@ def test_what_is_told_is_not_older_than_that() -> None:
     run(test)
 
 
+@pytest.mark.real_time
 def test_no_answer_takes_a_second_at_most_and_one_who_leaves_stops_nobody() -> None:
     async def test(bridges: Bridges, asked: Asked) -> None:
         bridges.asleep = True

@@ -158,6 +158,7 @@ def test_a_request_goes_through_while_nobody_touches(
     until(bob_has_it, "Bob has it", within_s=FAST_S + 1)
 
 
+@pytest.mark.real_time
 def test_a_lost_holder_frees_it(client: Callable[..., Client], kiosk: Server) -> None:
     ann = client("192.0.2.1")
     with kiosk.stream() as stream:

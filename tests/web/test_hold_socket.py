@@ -20,6 +20,8 @@ from app.audit.database import NAME
 from tests.browser.test_holds_in_browser import PANEL, jogging, permit
 from tests.support.parts import ROOT, Bridge, RosNode, Server, until
 
+pytestmark = pytest.mark.real_time
+
 TRIES: Final = 5
 
 

@@ -54,6 +54,7 @@ def test_the_demo_robot_answers_with_what_it_heard(demo: Server) -> None:
     assert "hello <b>" not in html
 
 
+@pytest.mark.real_time
 def test_every_connection_starts_with_a_snapshot_and_then_beats(demo: Server) -> None:
     with demo.stream() as stream:
         name, data, event_id = stream.next("snapshot", "update", "link", "beat")
@@ -275,6 +276,7 @@ def test_openapi_describes_the_paths(demo: Server) -> None:
     assert "409" in paths["/widgets/{widget}"]["post"]["responses"]
 
 
+@pytest.mark.real_time
 def test_it_ends_soon_with_fifty_streams_and_sockets_open(
     servers: Callable[[Server], Server],
 ) -> None:
@@ -301,6 +303,7 @@ def test_it_ends_soon_with_fifty_streams_and_sockets_open(
     assert "Traceback" not in mine.process.text
 
 
+@pytest.mark.real_time
 def test_it_ends_while_it_connects_to_what_says_nothing(tmp_path: Path) -> None:
     with socket.socket() as deaf:
         deaf.bind(("127.0.0.1", 0))
