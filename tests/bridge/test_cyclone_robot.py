@@ -7,6 +7,7 @@ from functools import partial
 from typing import Any
 
 import numpy
+import pytest
 import zenoh.ext
 
 from tests.support import cyclone
@@ -94,6 +95,7 @@ def test_calls_under_way_get_each_its_own_reply(robot: CycloneRobot, client: Cli
     assert [r["a"] for r in robot.requests("/add_two_ints")] == numbers
 
 
+@pytest.mark.real_time
 def test_a_slow_answer_comes_late_and_holds_nobody_up(robot: CycloneRobot, client: Client) -> None:
     robot.answer_slow(seconds=2)
     asked_at = time.monotonic()
@@ -104,6 +106,7 @@ def test_a_slow_answer_comes_late_and_holds_nobody_up(robot: CycloneRobot, clien
     assert time.monotonic() - asked_at >= 2
 
 
+@pytest.mark.real_time
 def test_no_answer_is_a_timeout_and_no_server_is_nothing_at_once(
     robot: CycloneRobot, client: Client
 ) -> None:

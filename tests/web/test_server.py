@@ -159,7 +159,12 @@ def test_bad_input_on_a_socket_is_named_too_and_loses_nothing(
         said = socket.hear()
         assert said["status"] == 422, said
         assert names.replace("body", "message").removeprefix("not JSON") in json.dumps(said)
-        assert socket.press(widget="operation", inputs={"message": "x"}).status_code == 200
+
+        def comes_through() -> bool:
+            """A machine that does much else may have locked it for a moment."""
+            return socket.press(widget="operation", inputs={"message": "x"}).status_code == 200
+
+        until(comes_through, "a press comes through", every_s=0.2)
 
 
 def test_only_what_can_be_pressed_can_be_pressed(demo: Server) -> None:
