@@ -33,6 +33,9 @@ dev: .venv/test
 # pytest, only those tests, one after the other; such as need neither bridge nor ROS nor browser are run
 # without them.
 WORKERS ?= 4
+# What is read of the tests is kept, wherever else nothing of Python's is: to prepare it anew takes each
+# worker as long as all that it does with it.
+test: export PYTHONDONTWRITEBYTECODE :=
 test: $(if $(ARGS),.venv/test,test-parts)
 ifdef ARGS
 	$(MAKE) --no-print-directory .venv/test $$(.venv/bin/python -m tests.needs $(ARGS))
