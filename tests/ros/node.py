@@ -53,11 +53,16 @@ class Commands:
     def __init__(self, name: str) -> None:
         self.node = rclpy.create_node(name)
         self.heard_on: dict[str, list[dict[str, Any]]] = {}
+        self.subscribed: set[tuple[str, str]] = set()
         self.came_at: dict[str, list[float]] = {}
         self.publishers: dict[str, Any] = {}
         self.timers: dict[str, Any] = {}
 
     def subscribe(self, topic: str, type: str, **qos: Any) -> None:
+        """Once, however many files of tests ask for it: each subscription would hear each message."""
+        if (topic, type) in self.subscribed:
+            return
+        self.subscribed.add((topic, type))
         heard = self.heard_on.setdefault(topic, [])
         came_at = self.came_at.setdefault(topic, [])
 
