@@ -20,7 +20,7 @@ rig = fixtures.rig
 server = fixtures.server
 
 READS_NOTHING_S = several(10, 60)
-STORM_S = several(5, 30)
+STORM_S = several(3, 30)
 BROWSERS = 200
 UPDATES_PER_S = 200.0
 MOST_UNREAD = 400_000  # what the server and the kernel on both sides hold

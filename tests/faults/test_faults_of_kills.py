@@ -18,7 +18,7 @@ pytestmark = pytest.mark.real_time
 
 rig = fixtures.rig
 
-KILLS = several(10, 200)
+KILLS = several(5, 200)
 LATE_S = 1.0
 
 

@@ -25,8 +25,8 @@ pytestmark = pytest.mark.real_time
 rig = fixtures.rig
 server = fixtures.server
 
-RESTARTS = several(8, 100)
-FLOOD_S = several(6, 30)
+RESTARTS = several(4, 100)
+FLOOD_S = several(4, 30)
 FLOOD_PER_S = 2000.0
 LONG_MESSAGES = several(6, 60)
 LONG_MESSAGE = 10_000_000
