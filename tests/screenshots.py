@@ -16,7 +16,7 @@ SETTLED_S = 0.8  # a press is acknowledged and its highlight gone
 def main() -> None:
     server = Server(ROOT, KIOSK_PANEL=str(PANEL))
     try:
-        until(server.ready, "ready", within_s=30)
+        until(server.ready, "ready")
         take(server.url)
     finally:
         server.end()

@@ -87,7 +87,7 @@ def test_the_mistake_is_named_as_the_tutorial_shows(tmp_path: Path) -> None:
 
 def test_the_demo_robot_hears_the_buttons(panel: Path, servers: Callable[[Server], Server]) -> None:
     mine = servers(Server(ROOT, KIOSK_PANEL=str(panel)))
-    until(mine.ready, "ready", within_s=30)
+    until(mine.ready, "ready")
     assert "SIMULATED" in mine.http.get("/").text
     (curl,) = (shlex.split(one) for one in COMMANDS if one.startswith("curl "))
     assert curl[:2] == ["curl", "-s"]
@@ -112,7 +112,7 @@ def test_a_robot_behind_the_bridge_hears_the_button(
     own_node.advertise("/operation_enabled", "std_msgs/msg/Bool")
     zenoh = str(zenoh_file(tmp_path, own_bridge.endpoint))
     mine = servers(Server(ROOT, KIOSK_PANEL=str(panel), KIOSK_ZENOH=zenoh))
-    until(mine.ready, "ready", within_s=30)
+    until(mine.ready, "ready")
     assert not mine.widget("load")["enabled"]
     assert "SIMULATED" not in mine.http.get("/").text
     own_node.every("/operation_enabled", {"data": True}, 0.5)

@@ -163,7 +163,7 @@ def started(data: Path, *options: str, **env: str) -> Iterator[Process]:
 
 def test_a_second_server_on_the_folder_does_not_start(demo: Server) -> None:
     with started(demo.data) as second:
-        until(lambda: not second.running, "it ends", within_s=20)
+        until(lambda: not second.running, "it ends")
         assert second.wait(1) != 0
         until(lambda: "startup failed" in second.text, "all is said")
     assert f"{demo.data} is in use by process {demo.process.pid} since 2" in second.text
@@ -176,7 +176,7 @@ def test_a_second_server_on_the_folder_does_not_start(demo: Server) -> None:
 def test_a_second_worker_does_not_start(tmp_path: Path, log: str) -> None:
     panel = panel_with(tmp_path, log)
     with started(tmp_path, "--workers", "2", KIOSK_PANEL=panel) as server:
-        until(lambda: f"{tmp_path} is in use by process" in server.text, "it is said", within_s=30)
+        until(lambda: f"{tmp_path} is in use by process" in server.text, "it is said")
         assert "one worker" in server.text
         assert "Traceback" not in server.text
 

@@ -467,7 +467,7 @@ def test_a_goal_whose_answer_was_cut_off_is_found_again_and_can_be_canceled(
     own_cyclone_bridge.start()
     locked_until_found(own_kiosk)
     assert press(own_kiosk, "count", id="goal-1").json()["outcome"] == "accepted"
-    until(lambda: robot.requests("/fibonacci/_action/get_result"), "its end is asked for", within_s=30)
+    until(lambda: robot.requests("/fibonacci/_action/get_result"), "its end is asked for")
     assert cancel(own_kiosk, press="goal-1").status_code == 200
     until(lambda: own_kiosk.widget("count")["outcome"] == "canceled", "canceled")
     assert len(robot.goals()) == 1
@@ -481,7 +481,7 @@ def locked_until_found(kiosk: Server) -> None:
         assert not shown["enabled"], shown
         return bool(shown["goal"] == "EXECUTING")
 
-    until(found, "it is found again", within_s=30)
+    until(found, "it is found again")
     assert kiosk.widget("count")["stoppable"]
 
 

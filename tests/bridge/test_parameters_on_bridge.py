@@ -240,7 +240,7 @@ def test_a_node_that_comes_back_is_read_anew(kiosk: Server, robot: CycloneRobot)
     assert "does not offer the parameters" in kiosk.widget("speed")["reason"]
     assert press(kiosk, "speed", 0.9).status_code == 503
     robot.start()
-    until(lambda: kiosk.widget("speed")["enabled"], "it is read again", within_s=20)
+    until(lambda: kiosk.widget("speed")["enabled"], "it is read again")
     assert (kiosk.widget("speed")["state"], kiosk.widget("speed")["text"]) == ("live", "0.5 m/s")
 
 
@@ -267,7 +267,7 @@ def test_a_bridge_lost_while_setting_leaves_it_unknown(
     assert (shown["state"], shown["text"], shown["enabled"]) == ("old", "cyclone", False)
     until(lambda: robot.parameters()["name"] == "later", "the robot did it")
     own_cyclone_bridge.start()
-    until(lambda: kiosk.widget("name")["enabled"], "back", within_s=30)
+    until(lambda: kiosk.widget("name")["enabled"], "back")
     assert (kiosk.widget("name")["state"], kiosk.widget("name")["text"]) == ("live", "later")
 
 

@@ -184,7 +184,7 @@ def test_fifty_starts_fifty_first_presses_received(
         try:
             until(kiosk.ready, "ready", every_s=0.001)
             assert kiosk.press("operation", text).json()["outcome"] == "published"
-            until(partial(has_heard, own_node, "/operation", before + number + 1), "heard", 5)
+            until(partial(has_heard, own_node, "/operation", before + number + 1), "heard")
         finally:
             kiosk.end()
     assert own_node.heard_data("/operation")[before:] == texts
@@ -321,4 +321,4 @@ def test_a_route_that_another_program_made_with_a_wrong_type_locks(
         )
         assert kiosk.press("operation", "x").status_code == 409
         token.undeclare()
-        until(lambda: kiosk.widget("operation")["enabled"], "open again", within_s=15)
+        until(lambda: kiosk.widget("operation")["enabled"], "open again")

@@ -123,7 +123,7 @@ def jogging(bridge: Bridge, node: RosNode, folder: Path) -> Server:
     panel = folder / "jog.toml"
     panel.write_text(PANEL)
     mine = live(bridge.endpoint, folder, KIOSK_PANEL=str(panel))
-    until(mine.ready, "ready", within_s=20)
+    until(mine.ready, "ready")
     permit(mine, node, True)
     return mine
 
@@ -362,7 +362,7 @@ def own_chromium(chromium: Browser, folder: Path) -> Iterator[tuple[Browser, int
             except Error:  # it does not listen yet
                 return None
 
-        yield until(connect, "the browser listens", within_s=30, every_s=0.2), process.pid
+        yield until(connect, "the browser listens", every_s=0.2), process.pid
     finally:
         os.killpg(process.pid, signal.SIGKILL)
         process.wait()

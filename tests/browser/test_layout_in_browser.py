@@ -104,7 +104,7 @@ def demo(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     panel = tmp_path_factory.mktemp("panel") / "all.toml"
     panel.write_text(PANEL)
     mine = Server(ROOT, KIOSK_PANEL=str(panel), KIOSK_MODE="demo")
-    until(mine.ready, "ready", within_s=30)
+    until(mine.ready, "ready")
     yield mine
     mine.end()
 

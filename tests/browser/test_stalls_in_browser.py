@@ -33,7 +33,7 @@ TELL_WHAT_IS_SHOWN: Final = """() => {
 def kiosk(bridge: Bridge, node: RosNode, tmp_path: Path) -> Iterator[Server]:
     mine = live(bridge.endpoint, tmp_path)
     node.advertise("/last_heard", "std_msgs/msg/String")
-    until(lambda: node.subscribers("/last_heard"), "the bridge listens", within_s=15)
+    until(lambda: node.subscribers("/last_heard"), "the bridge listens")
     yield mine
     node.withdraw("/last_heard")
     mine.end()

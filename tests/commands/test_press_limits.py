@@ -130,7 +130,7 @@ def test_a_page_without_scripts_shows_the_reason(strict: Server, chromium: Brows
         page.get_by_role("button", name="Free", exact=True).click()
         return page.locator("#receipt-free").inner_text()
 
-    until(lambda: TOO_OFTEN in said(), "it is one too many", within_s=30)
+    until(lambda: TOO_OFTEN in said(), "it is one too many")
     context.close()
 
 

@@ -139,7 +139,7 @@ class Publishers:
         self._bridge = Bridge(domain)
         self._bridge.start()
         self._server: Server = kiosk(self._bridge.endpoint, folder)
-        until(self._server.ready, "ready", within_s=20)
+        until(self._server.ready, "ready")
         self._observer = Observer(self._bridge.endpoint)
         self._by: dict[Vendor, Publisher] = {
             "fast": Publisher("fast", domain),

@@ -155,6 +155,5 @@ def permitted(server: Server) -> None:
     until(
         lambda: all(server.widget(name)["enabled"] for name in SENT_ON),
         "everything is permitted",
-        within_s=20,
         every_s=0.05,
     )

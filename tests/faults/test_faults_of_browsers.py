@@ -30,7 +30,7 @@ MARGIN_MB = 40.0
 def test_a_browser_that_reads_nothing(rig: Rig, server: Server) -> None:
     """It costs no queue, and when it reads again it is told how it is now."""
     rig.robot.advertise("/heard", TEXT)
-    until(lambda: rig.robot.subscribers("/heard"), "the bridge listens", within_s=15)
+    until(lambda: rig.robot.subscribers("/heard"), "the bridge listens")
     watch = Watch(server)
     before = resources(server.process.pid)
     presser = Presser(server, "guarded")
@@ -63,7 +63,7 @@ def test_two_hundred_browsers(rig: Rig, server: Server) -> None:
     presser = Presser(server, "paced")
     browsers = Browsers(server, BROWSERS)
     with answering(server):
-        until(lambda: browsers.showing(b"event: snapshot") == BROWSERS, "each has a snapshot", 20)
+        until(lambda: browsers.showing(b"event: snapshot") == BROWSERS, "each has a snapshot")
         well(presser)
         browsers.forget()
         told_at = time.monotonic()

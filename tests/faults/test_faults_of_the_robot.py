@@ -81,7 +81,6 @@ def test_a_publisher_that_is_replaced_by_one_of_another_type(rig: Rig, server: S
         until(
             lambda: "std_msgs/msg/String" in (server.widget("paced")["reason"] or ""),
             "the other type is told",
-            within_s=10,
         )
         rig.robot.withdraw("/pulsed")
         rig.robot.advertise("/pulsed", BOOL)
@@ -139,7 +138,7 @@ def flooded(
     rig: Rig, server: Server, topic: str, node: RosNode, fields: dict[str, Any]
 ) -> tuple[Account, int, Watch]:
     """What came of presses while a node said something 2,000 times a second; how often it did."""
-    until(lambda: node.subscribers(topic), "the bridge listens", within_s=15)
+    until(lambda: node.subscribers(topic), "the bridge listens")
     watch = Watch(server)
     before = resources(server.process.pid)
     presser = Presser(server, "guarded")
@@ -187,7 +186,7 @@ def test_a_flood_on_a_readout(rig: Rig, server: Server) -> None:
 
 def test_messages_of_ten_megabytes(rig: Rig, server: Server) -> None:
     rig.robot.advertise("/heard", TEXT)
-    until(lambda: rig.robot.subscribers("/heard"), "the bridge listens", within_s=15)
+    until(lambda: rig.robot.subscribers("/heard"), "the bridge listens")
     before = resources(server.process.pid)
     watch, presser = Watch(server), Presser(server, "guarded")
     began = time.monotonic()

@@ -39,7 +39,7 @@ def forbidden(kiosk: Server) -> bool:
 
 
 def opened(kiosk: Server) -> None:
-    until(lambda: permitted(kiosk), "permitted", within_s=15)
+    until(lambda: permitted(kiosk), "permitted")
 
 
 def next_lock(stream: Stream) -> tuple[float, str]:
@@ -142,7 +142,7 @@ def test_it_starts_without_a_bridge_and_keeps_trying(
     assert "bridge" in kiosk.http.get("/readyz").json()["reason"]
     late.start()
     try:
-        until(kiosk.ready, "ready once the bridge is there", within_s=15)
+        until(kiosk.ready, "ready once the bridge is there")
         assert kiosk.widget("operation")["enabled"]
     finally:
         late.end()
@@ -222,7 +222,7 @@ def test_a_successor_that_came_while_the_server_stood_still_has_to_say_it_again(
         own_node.publish("/operation_enabled", {"data": True})
         return permitted(kiosk)
 
-    until(says_so, "permitted", within_s=15, every_s=0.2)
+    until(says_so, "permitted", every_s=0.2)
     kiosk.process.send(signal.SIGSTOP)
     own_node.withdraw("/operation_enabled")
     time.sleep(0.5)
@@ -232,7 +232,7 @@ def test_a_successor_that_came_while_the_server_stood_still_has_to_say_it_again(
     until(lambda: not permitted(kiosk), "the permission went with its publisher")
     time.sleep(1.0)
     assert "waiting for a new /operation_enabled" in kiosk.widget("operation1")["reason"]
-    until(says_so, "permitted by the successor", within_s=15, every_s=0.2)
+    until(says_so, "permitted by the successor", every_s=0.2)
 
 
 @pytest.mark.parametrize("waiting", [12, 60])
@@ -253,8 +253,8 @@ def test_what_the_robot_forbids_while_the_server_stands_still_counts_behind_all_
         own_node.publish("/operation_enabled", {"data": True})
         return permitted(kiosk)
 
-    until(says_so, "permitted", within_s=15, every_s=0.2)
-    until(lambda: own_node.subscribers("/last_heard"), "the bridge listens", within_s=15)
+    until(says_so, "permitted", every_s=0.2)
+    until(lambda: own_node.subscribers("/last_heard"), "the bridge listens")
     with ThreadPoolExecutor(1) as hand:
         kiosk.process.send(signal.SIGSTOP)
         for _ in range(waiting):
@@ -265,12 +265,12 @@ def test_what_the_robot_forbids_while_the_server_stands_still_counts_behind_all_
         time.sleep(0.1)
         kiosk.process.send(signal.SIGCONT)
         assert press.result().json()["outcome"] == "refused"
-    until(kiosk.ready, "ready again", within_s=15)
+    until(kiosk.ready, "ready again")
     time.sleep(0.5)
     # What the bridge had no room for, DDS sends again: 1.7 s were seen on a machine that did much else.
     until(lambda: not permitted(kiosk), "nothing of it is lost")
     assert own_node.heard("/operation1") == []
-    until(says_so, "permitted anew", within_s=15, every_s=0.2)
+    until(says_so, "permitted anew", every_s=0.2)
 
 
 @pytest.mark.real_time

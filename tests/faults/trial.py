@@ -86,5 +86,4 @@ def well(presser: Presser) -> None:
     until(
         lambda: presser.count("published", since) >= WELL,
         f"presses are published: {presser.presses[-1:]}",
-        within_s=20,
     )

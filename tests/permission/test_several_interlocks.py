@@ -230,7 +230,7 @@ def kiosk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     panel = tmp_path_factory.mktemp("panel") / "cell.toml"
     panel.write_text(PANEL)
     mine = Server(ROOT, KIOSK_PANEL=str(panel), KIOSK_MODE="demo")
-    until(lambda: mine.widget("single")["enabled"], "the robot is there", within_s=30)
+    until(lambda: mine.widget("single")["enabled"], "the robot is there")
     yield mine
     mine.end()
 
@@ -273,7 +273,7 @@ def test_a_page_without_its_server_tells_that_alone(
     panel = tmp_path / "cell.toml"
     panel.write_text(PANEL)
     mine = servers(Server(ROOT, KIOSK_PANEL=str(panel), KIOSK_MODE="demo"))
-    until(lambda: mine.widget("single")["enabled"], "the robot is there", within_s=30)
+    until(lambda: mine.widget("single")["enabled"], "the robot is there")
     page.goto(mine.url)
     why = page.locator("#why-several")
     expect(why).to_contain_text("+1 more")

@@ -105,7 +105,7 @@ def test_it_tells_ready_when_it_serves_then_how_it_is_and_that_it_ends(address: 
             times.append(time.monotonic())
             assert "STATUS" in told
         assert max(later - earlier for earlier, later in pairwise(times)) < INTERVAL_S
-        until(lambda: ready(manager), "the state in words", within_s=30)
+        until(lambda: ready(manager), "the state in words")
         process.send(signal.SIGTERM)
         assert manager.until("STOPPING")["STATUS"] == "Stopping."
     finally:
@@ -121,7 +121,7 @@ def wounded(listener: Listener) -> Iterator[tuple[Process, httpx.Client]]:
     process = Process([sys.executable, "-c", STANDS_STILL, str(port)], env, cwd=ROOT)
     try:
         with httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=2, trust_env=False) as http:
-            until(lambda: ready(listener), "it is well", within_s=30)
+            until(lambda: ready(listener), "it is well")
             yield process, http
     finally:
         process.kill()

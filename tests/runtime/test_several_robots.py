@@ -52,7 +52,7 @@ def ten(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     folder = tmp_path_factory.mktemp("ten")
     path = panel_file(folder, *(entry(number + 1) for number in range(MANY)))
     mine = Server(ROOT, KIOSK_PANEL=str(path))
-    until(mine.ready, "every robot is ready", within_s=30)
+    until(mine.ready, "every robot is ready")
     yield mine
     mine.end()
 
@@ -141,7 +141,7 @@ def two(
             )
         path = panel_file(tmp_path, *(entry(n + 1, b.endpoint) for n, b in enumerate(bridges)))
         kiosk = servers(live("tcp/127.0.0.1:1", tmp_path, KIOSK_PANEL=str(path)))
-        until(kiosk.ready, "both robots are ready", within_s=20)
+        until(kiosk.ready, "both robots are ready")
         yield kiosk, bridges, nodes
     finally:
         for node in nodes:
@@ -176,11 +176,12 @@ def test_each_of_two_robots_has_its_own_bridge_permission_and_presses(
     assert first.press("operation1", "late").status_code == 503
     assert kiosk.http.get("/readyz").json()["robots"] == {"r1": "no_link", "r2": "permitted"}
     bridges[0].start()
-    until(kiosk.ready, "joined again", 20)
+    until(kiosk.ready, "joined again")
     assert second.widget("operation1")["enabled"]
     assert nodes[0].heard_data("/operation1") == ["one"]
 
 
+@pytest.mark.real_time
 def test_a_frozen_bridge_of_one_robot_locks_that_robot_only(
     two: tuple[Server, list[Bridge], list[RosNode]],
 ) -> None:
@@ -194,7 +195,7 @@ def test_a_frozen_bridge_of_one_robot_locks_that_robot_only(
     assert robots[0].widget("operation1")["enabled"]
     bridges[1].thaw()
     nodes[1].publish("/operation_enabled", {"data": False})
-    until(lambda: "does not permit" in (robots[1].widget("operation1")["reason"] or ""), "heard", 20)
+    until(lambda: "does not permit" in (robots[1].widget("operation1")["reason"] or ""), "heard")
     assert robots[0].widget("operation1")["enabled"]
 
 
@@ -205,7 +206,7 @@ def test_one_bridge_may_carry_robots_with_namespaces_of_their_own(
         node.subscribe(topic, TEXT)
     path = panel_file(tmp_path, entry(1), entry(2))
     kiosk = servers(live(bridge.endpoint, tmp_path, KIOSK_PANEL=str(path)))
-    until(kiosk.ready, "ready", within_s=20)
+    until(kiosk.ready, "ready")
     second = kiosk.robot("r2")
     # The node listens since a moment ago: until the bridge knows, a press says that nobody hears it.
     until(
@@ -224,7 +225,7 @@ def test_a_bridge_with_another_namespace_is_not_this_robots(
     try:
         path = panel_file(tmp_path, entry(1), entry(2))
         kiosk = servers(live(other.endpoint, tmp_path, KIOSK_PANEL=str(path)))
-        until(lambda: kiosk.robot("r2").widget("operation")["enabled"], "the bridge of robot 2", 20)
+        until(lambda: kiosk.robot("r2").widget("operation")["enabled"], "the bridge of robot 2")
         reason = kiosk.robot("r1").widget("operation")["reason"]
         assert "no ROS 2 bridge of its namespace" in reason
         assert kiosk.robot("r1").press("operation", "whose?").status_code == 503

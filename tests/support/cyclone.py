@@ -206,7 +206,7 @@ def served(robot: CycloneRobot, client: Client) -> None:
     The first call would be lost before that. The bridge makes a service's readers and writers,
     then its queryable, then its token.
     """
-    until(lambda: not robot.unmatched(), "the bridge found the robot", within_s=20)
+    until(lambda: not robot.unmatched(), "the bridge found the robot")
     until(lambda: set(client.tokens()) >= GRAPH, "the robot's services are announced")
 
 

@@ -26,7 +26,7 @@ def can_fork(command: Sequence[str], env: Mapping[str, str], folder: object) -> 
     """Whether that is the server of this project, by this Python, and nothing special about it."""
     if list(command[:4]) != [sys.executable, "-m", "uvicorn", "app.main:app"] or folder != ROOT:
         return False
-    if NETWORK.stat().st_ino != OURS:
+    if NETWORK.stat().st_ino != OURS or os.environ.get("FAULTS") == "long":
         return False
     special = {name: value for name, value in env.items() if name.startswith(AT_BEGIN)}
     return "--reload" not in command and special.items() <= FORKED_TOO.items()

@@ -293,7 +293,7 @@ def test_each_robot_has_its_own_control(tmp_path: Path) -> None:
     robots = panel_file(tmp_path, entry(1), entry(2)).read_text()
     kiosk = Server(ROOT, KIOSK_PANEL=str(control_panel(tmp_path, panel=robots)), KIOSK_PROXIES=PROXY)
     try:
-        until(kiosk.ready, "ready", within_s=20)
+        until(kiosk.ready, "ready")
         ann = Client(kiosk, "192.0.2.1", "/robots/r1")
         bob = Client(kiosk, "192.0.2.2", "/robots/r2")
         assert ann.take()

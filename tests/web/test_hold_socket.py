@@ -318,7 +318,7 @@ def test_a_lost_bridge_ends_it_and_what_could_not_be_said_is_not_said_later(
             assert said["outcome"] == "unknown"
             assert "The message that ends it was not sent: No connection" in said["reason"]
         own_bridge.start()
-        until(server.ready, "ready again", within_s=30)
+        until(server.ready, "ready again")
         permit(server, own_node, True)
         xs = [point["x"] for point in own_node.heard("/jog")]
         assert set(xs) == {0.5}

@@ -398,7 +398,7 @@ def test_the_demo_robot_as_a_program_of_its_own_can_not_be_mistaken(
     robot = Process([sys.executable, "-m", "app.simulator", endpoint], {}, cwd=ROOT)
     try:
         kiosk = servers(live(endpoint, tmp_path))
-        until(lambda: kiosk.widget("operation1")["enabled"], "the demo robot permits", within_s=15)
+        until(lambda: kiosk.widget("operation1")["enabled"], "the demo robot permits")
         assert kiosk.snapshot()["notice"]["banner"] == "SIMULATED ROBOT"
         assert kiosk.press("operation1", "apart").json()["outcome"] == "published"
         until(lambda: "apart" in kiosk.widget("last_heard")["text"], "heard")
