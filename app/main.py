@@ -13,11 +13,8 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from fastapi import Depends, FastAPI
-from fastapi.exceptions import RequestValidationError
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
-from starlette.exceptions import HTTPException
 from starlette.middleware.gzip import GZipMiddleware
-from starlette.requests import ClientDisconnect
 from uvicorn import Config as ServerConfig
 
 from app import hot_reload, ros_logging
@@ -34,10 +31,11 @@ from app.runtime.fleet import Fleet
 from app.settings import Settings, shipped
 from app.simulator import zenoh_peer
 from app.transport.zenoh_session import Config, config_from, config_to
-from app.web.app_state import Site, named_robot, on_gone, on_http_error, on_invalid, on_kiosk_error
+from app.web.app_state import Site, named_robot
 from app.web.asgi import Application, InWords
 from app.web.assets import Assets, load_assets
 from app.web.described import errors
+from app.web.error_pages import HANDLERS
 from app.web.metrics import Metrics
 from app.web.proxies import Proxies
 from app.web.request_body import LONGEST
@@ -126,12 +124,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         docs_url=None,  # they load scripts from elsewhere
         redoc_url=None,
         max_body_size=LONGEST,
-        exception_handlers={
-            KioskError: on_kiosk_error,
-            HTTPException: on_http_error,
-            ClientDisconnect: on_gone,
-            RequestValidationError: on_invalid,
-        },
+        exception_handlers=HANDLERS,
     )
     if settings.dev:
         app.add_exception_handler(Exception, hot_reload.on_error)
