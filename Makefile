@@ -6,7 +6,7 @@
 # make soak  an ordinary day for SOAK_S seconds (an hour)
 # make bench  this panel and its rivals side by side (25 minutes); QUICK=1 only shows that it works
 # make bench-setup  what the benchmark's rivals need, into the cache
-# make dev   the panel, taking every change as it is saved
+# make dev   the panel, which starts again with every change that is saved
 
 PYTHON ?= python3
 CACHE := $(or $(XDG_CACHE_HOME),$(HOME)/.cache)/operator-panel
@@ -26,8 +26,11 @@ LIMITS := --ws-max-size 65536 --ws-max-queue 2 --ws-per-message-deflate false --
 run: .venv/run
 	.venv/bin/uvicorn app.main:app $(LIMITS)
 
+# A panel in another folder: `KIOSK_PANEL=… make dev`.
+WATCHED := $(addprefix --reload-dir=,app templates static $(if $(KIOSK_PANEL),$(realpath $(dir $(KIOSK_PANEL)))))
+WATCHED += $(patsubst %,'--reload-include=*.%',toml json5 html css js msg srv action)
 dev: .venv/test
-	KIOSK_DEV=1 KIOSK_LOG_LEVEL=debug .venv/bin/uvicorn app.main:app $(LIMITS) --reload --reload-dir app
+	KIOSK_DEV=1 KIOSK_LOG_LEVEL=debug .venv/bin/uvicorn app.main:app --reload $(WATCHED)
 
 # ARGS: of pytest. Tests that need neither bridge nor ROS nor browser are run without them.
 test: $(if $(ARGS),.venv/test,test-parts)

@@ -41,7 +41,7 @@ COMMON = {
     "app.ros_logging",
     "app.settings",
 }
-WIRING = {"app.main", "app.check", "app.hot_reload", "app.log"}  # these may import every room
+WIRING = {"app.main", "app.check", "app.log"}  # these may import every room
 SPEAK_ZENOH = {"app.transport.zenoh_session", "app.simulator.zenoh_peer"}
 KNOWN_TO_THE_SIMULATOR = ("app.simulator", "app.interfaces", "app.dialect", "app.errors")
 

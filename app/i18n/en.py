@@ -10,7 +10,7 @@ ENGLISH: Final[Mapping[str, str]] = {
     "and_more": "{names} and {number} more",
     "no_bridge": "No connection to the robot: Zenoh answers, but no ROS 2 bridge is there.",
     "no_bridge_of": "No connection to {name}: Zenoh answers, but no ROS 2 bridge of its namespace.",
-    "ending": "The panel's server is ending, or takes a new panel.",
+    "ending": "The panel's server is ending.",
     "joining": "Joining the robot's topics: a moment.",
     "catching_up": "The panel's server stood still: it takes in what the robot said meanwhile.",
     "bridge_silent": (
@@ -226,7 +226,7 @@ ENGLISH: Final[Mapping[str, str]] = {
     "log_abandoned": "Not sent: the entry was written too late.",
     "log_not_on_disk": "{said} (Not safely in the operator's log: {why}.)",
     "log_ended": "the panel's server ended before it knew",
-    "press_by_stopping": "the panel's server stops or takes a new panel. Press again.",
+    "press_by_stopping": "the panel's server stops. Press again.",
     "server_ends": "The panel's server ends: it is not known what came of this.",
     "log_broke_off": "A fault of the panel's server: it is not known whether this was sent.",
     "log_began": "The panel's server started.",
@@ -290,7 +290,7 @@ ENGLISH: Final[Mapping[str, str]] = {
     "hold_by_closing": "the connection to the browser was closed.",
     "hold_by_stall": "the panel's server stood still.",
     "hold_by_nonsense": "the browser sent what can't be understood.",
-    "hold_by_stopping": "the panel's server stops or takes a new panel.",
+    "hold_by_stopping": "the panel's server stops.",
     "hold_elsewhere": "held by another browser.",
     "hold_same_topic": "{label} is held, which sends on {topic} too.",
     "hold_late": "the press came too late.",
@@ -299,6 +299,9 @@ ENGLISH: Final[Mapping[str, str]] = {
     "hold_cut": "The connection to the panel's server was lost while this was held.",
     # Recordings.
     "not_recorded": "Presses are not recorded: {why}. They work as always.",
+    # In development, where the panel file has a fault.
+    "fault_page": "Panel file",
+    "fault_page_waits": "The panel is loaded as soon as the file is saved without a fault.",
     # What the service manager is told.
     "ready": "Ready: commands can reach the robot.",
     "ready_of": "{name}: {state}",

@@ -21,13 +21,12 @@ from app.web.metrics import Metrics
 
 @dataclass(slots=True)
 class Site:
-    """All that a request needs; in development `fleet` and `assets` are replaced together."""
+    """All that a request needs."""
 
     fleet: Fleet
     assets: Assets
     templates: Environment
     metrics: Metrics
-    dev: bool
     log: OperatorLog | Unlogged
     limits: PressLimits
     browsers: Browsers = field(default_factory=Browsers)

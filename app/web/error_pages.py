@@ -1,17 +1,20 @@
 """Answers for errors: a page for a browser, JSON for a program."""
 
+import traceback
 from collections.abc import Callable
 from typing import Any, Final
 
 from fastapi import Request
 from fastapi.exceptions import RequestValidationError
-from fastapi.responses import HTMLResponse, JSONResponse, Response
+from fastapi.responses import HTMLResponse, JSONResponse, PlainTextResponse, Response
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 
 from app.errors import KioskError, TooMany, TooSlow
 from app.printable import printable
 from app.web.app_state import site_of
+
+TRY_AGAIN: Final = {"refresh": "1"}  # seconds
 
 
 def error_answer(request: Request, status: int, message: str) -> Response:
@@ -58,6 +61,12 @@ async def on_http_error(request: Request, error: Exception) -> Response:
     if answer.headers.get("allow") == "GET":
         answer.headers["allow"] = "GET, HEAD"
     return answer
+
+
+async def on_error_in_development(request: Request, error: Exception) -> Response:
+    """The traceback; the browser requests the page again until the fault is mended."""
+    text = "".join(traceback.format_exception(error))
+    return PlainTextResponse(text, 500, headers=TRY_AGAIN if request.method == "GET" else None)
 
 
 HANDLERS: Final[dict[int | type[Exception], Callable[..., Any]]] = {
