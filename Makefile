@@ -17,14 +17,11 @@ export BENCH_CACHE := $(BENCH)
 export TEST_BRIDGE := $(CACHE)/bridge/release/test-bridge
 export TEST_ROS_PYTHON := $(CURDIR)/.venv-ros/bin/python
 
-# The limits of app/web/serving.py.
-LIMITS := --ws-max-size 65536 --ws-max-queue 2 --ws-per-message-deflate false --no-proxy-headers
-
 .PHONY: run test check dev docs wheel faults soak bench bench-setup test-parts bridge lock clean
 .DELETE_ON_ERROR:
 
 run: .venv/run
-	.venv/bin/uvicorn app.main:app $(LIMITS)
+	.venv/bin/python -m app.cli run
 
 # A panel in another folder: `KIOSK_PANEL=… make dev`.
 WATCHED := $(addprefix --reload-dir=,app templates static $(if $(KIOSK_PANEL),$(realpath $(dir $(KIOSK_PANEL)))))
