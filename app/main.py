@@ -1,9 +1,7 @@
 """`uvicorn app.main:app`: the only wiring."""
 
-from app.process.collector import resume
-
-# isort: split
 import asyncio
+import gc
 import logging
 import secrets
 import sys
@@ -20,7 +18,7 @@ from app import ros_logging
 from app.commands.press_limits import PressLimits
 from app.errors import KioskError, PanelError
 from app.panel import Panel, load_panel
-from app.process import heap, listen_sockets
+from app.process import listen_sockets
 from app.process.sd_notify import Manager
 from app.process.shutdown import in_order
 from app.process.watchdog import Watchdog
@@ -86,7 +84,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
                 works = (
                     watchdog.run(),
                     _listening(app.state.server, ports, settings.hosts),
-                    _made_ready(site.templates),
+                    pages.compiled(site.templates),
                 )
                 tasks = [asyncio.create_task(work) for work in works]
                 try:
@@ -148,12 +146,6 @@ async def _listening(server: ServerConfig | None, ports: set[int], hosts: Sequen
         log.info("the panel is at %s", ", ".join(urls(server, listening, hosts)))
 
 
-async def _made_ready(templates: Environment) -> None:
-    """What can wait until the port is open."""
-    await pages.compiled(templates)
-    heap.trim()  # a compiler leaves much behind
-
-
 def _watchdog(site: Site) -> Watchdog:
     """What tells the service manager of the robots that the site has at the time."""
     return Watchdog(
@@ -192,4 +184,4 @@ def _app_or_exit() -> FastAPI:
 
 
 app = _app_or_exit()
-resume()
+gc.freeze()  # a collection of all modules would stop the event loop for 25 to 50 ms

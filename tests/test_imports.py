@@ -127,6 +127,15 @@ def test_a_start_reads_no_library_that_most_kiosks_never_need(tmp_path: Path) ->
     assert {"mcap", "prometheus_client", *of_faults} & set(read.split()) == set()
 
 
+def test_what_a_start_makes_is_left_alone_by_the_garbage_collector(tmp_path: Path) -> None:
+    env = {**os.environ, "KIOSK_DATA": str(tmp_path)}
+    code = "import app.main, gc; print(gc.isenabled(), gc.get_freeze_count(), len(gc.get_objects()))"
+    said = subprocess.check_output([sys.executable, "-c", code], cwd=PACKAGE.parent, env=env, text=True)
+    enabled, frozen, watched = said.split()
+    assert enabled == "True"
+    assert int(frozen) > 20 * int(watched)
+
+
 def test_the_interfaces_know_nothing_but_errors() -> None:
     own = {module for module in MODULES if room_of(module) == "interfaces"}
     assert {name for module in own for name in of_project(module)} - own <= {"app.errors"}
