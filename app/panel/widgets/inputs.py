@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Mapping
+from functools import partial
 from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, Field, model_validator
@@ -134,8 +135,8 @@ class SelectInput(Placed):
 class ToggleInput(Placed):
     kind: Literal["toggle"]
     span: Span = 6
-    on: Label = say("on")
-    off: Label = say("off")
+    on: Label = Field(default_factory=partial(say, "on"))
+    off: Label = Field(default_factory=partial(say, "off"))
     default: bool = False
 
     @property

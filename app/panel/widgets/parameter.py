@@ -1,5 +1,6 @@
 """The description of a ROS 2 parameter of a node, shown and set."""
 
+from functools import partial
 from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, Field
@@ -47,8 +48,8 @@ class Parameter(Stepped):
     min: Number | None = None
     max: Number | None = None
     step: Annotated[Number, Field(gt=0)] | None = None
-    on: Label = say("on")
-    off: Label = say("off")
+    on: Label = Field(default_factory=partial(say, "on"))
+    off: Label = Field(default_factory=partial(say, "off"))
     interlocks: Interlocks = Field(default=(), alias="interlock")
     timeout_s: Seconds = 5.0
     confirm_press: bool = False
