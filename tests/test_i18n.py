@@ -13,7 +13,7 @@ from app.clock import format_age
 from app.i18n import ENGLISH, say
 from app.settings import PACKAGE, shipped
 
-SPEAKERS = ("say", "locked", "refused")  # functions whose first argument is a code
+SPEAKERS = ("say", "said", "locked", "refused")  # functions whose first argument is a code
 PREFIXES = ("control_", "lamp_", "log_page_")  # of codes that are put together
 
 

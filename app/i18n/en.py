@@ -299,9 +299,6 @@ ENGLISH: Final[Mapping[str, str]] = {
     "hold_cut": "The connection to the panel's server was lost while this was held.",
     # Recordings.
     "not_recorded": "Presses are not recorded: {why}. They work as always.",
-    # In development, where the panel file has a fault.
-    "fault_page": "Panel file",
-    "fault_page_waits": "The panel is loaded as soon as the file is saved without a fault.",
     # What the service manager is told.
     "ready": "Ready: commands can reach the robot.",
     "ready_of": "{name}: {state}",

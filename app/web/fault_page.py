@@ -9,10 +9,9 @@ import logging
 from collections.abc import Iterable
 from typing import Final
 
-from fastapi import FastAPI
-from fastapi.responses import HTMLResponse, Response
+from fastapi import FastAPI, Request
+from fastapi.responses import HTMLResponse, JSONResponse, Response
 
-from app.i18n import say
 from app.printable import printable
 from app.web.error_pages import TRY_AGAIN
 from app.web.security import Doors
@@ -21,6 +20,7 @@ log = logging.getLogger("kiosk.development")
 
 # An open page of the panel loads again when a snapshot has another revision than its own.
 NO_PANEL: Final = 'event: snapshot\ndata: {"revision": ""}\n\n'
+NOT_KEPT: Final = {"cache-control": "no-store"}
 
 
 def fault_page(fault: str, hosts: Iterable[str]) -> FastAPI:
@@ -28,22 +28,17 @@ def fault_page(fault: str, hosts: Iterable[str]) -> FastAPI:
     log.error("%s", fault)
     title, *lines = map(printable, fault.splitlines())
     page = _page(title, lines)
+
+    async def answer(request: Request) -> Response:
+        path = request.url.path
+        if path == "/healthz":
+            return JSONResponse({"status": "ok"})
+        if path.endswith("/events"):
+            return Response(NO_PANEL, media_type="text/event-stream", headers=NOT_KEPT)
+        return HTMLResponse(page, status_code=503, headers=NOT_KEPT | TRY_AGAIN)
+
     app = FastAPI(openapi_url=None)
-
-    @app.get("/healthz")
-    async def healthz() -> dict[str, str]:
-        return {"status": "ok"}
-
-    @app.get("/events")
-    @app.get("/robots/{robot}/events")
-    async def events() -> Response:
-        return Response(NO_PANEL, media_type="text/event-stream", headers={"cache-control": "no-store"})
-
-    @app.get("/{path:path}")
-    async def every_page() -> Response:
-        headers = {"cache-control": "no-store", **TRY_AGAIN}
-        return HTMLResponse(page, status_code=503, headers=headers)
-
+    app.add_route("/{path:path}", answer)
     app.add_middleware(Doors, hosts=hosts)
     return app
 
@@ -51,6 +46,7 @@ def fault_page(fault: str, hosts: Iterable[str]) -> FastAPI:
 def _page(title: str, lines: Iterable[str]) -> str:
     items = "".join(f"<li>{html.escape(line.strip())}</li>" for line in lines)
     return (
-        f"<!doctype html><html lang=en><meta charset=utf-8><title>{say('fault_page')}</title>"
-        f"<h1>{html.escape(title)}</h1><ul>{items}</ul><p>{say('fault_page_waits')}</p>"
+        "<!doctype html><html lang=en><meta charset=utf-8><title>Panel file</title>"
+        f"<h1>{html.escape(title)}</h1><ul>{items}</ul>"
+        "<p>The panel is loaded as soon as the file is saved without a fault.</p>"
     )

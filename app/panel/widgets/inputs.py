@@ -2,13 +2,12 @@
 
 import json
 from collections.abc import Mapping
-from functools import partial
 from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
 from app.i18n import say
-from app.panel.base import Description, Label, Placed, Span, some
+from app.panel.base import Description, Label, Placed, Span, said, some
 
 MOST: Final = 2.0**53  # beyond this a browser's numbers are not exact
 
@@ -135,8 +134,8 @@ class SelectInput(Placed):
 class ToggleInput(Placed):
     kind: Literal["toggle"]
     span: Span = 6
-    on: Label = Field(default_factory=partial(say, "on"))
-    off: Label = Field(default_factory=partial(say, "off"))
+    on: Label = said("on")
+    off: Label = said("off")
     default: bool = False
 
     @property
