@@ -6,7 +6,7 @@
 # make soak  an ordinary day for SOAK_S seconds (an hour)
 # make bench  this panel and its rivals side by side (25 minutes); QUICK=1 only shows that it works
 # make bench-setup  what the benchmark's rivals need, into the cache
-# make dev   the panel, taking every change as it is saved
+# make dev   the panel, which starts again with every change that is saved
 
 PYTHON ?= python3
 CACHE := $(or $(XDG_CACHE_HOME),$(HOME)/.cache)/operator-panel
@@ -17,17 +17,17 @@ export BENCH_CACHE := $(BENCH)
 export TEST_BRIDGE := $(CACHE)/bridge/release/test-bridge
 export TEST_ROS_PYTHON := $(CURDIR)/.venv-ros/bin/python
 
-# The limits of app/web/serving.py.
-LIMITS := --ws-max-size 65536 --ws-max-queue 2 --ws-per-message-deflate false --no-proxy-headers
-
 .PHONY: run test check dev docs wheel faults soak bench bench-setup test-parts bridge lock clean
 .DELETE_ON_ERROR:
 
 run: .venv/run
-	.venv/bin/uvicorn app.main:app $(LIMITS)
+	.venv/bin/python -m app.cli run
 
+# A panel in another folder: `KIOSK_PANEL=… make dev`.
+WATCHED := $(addprefix --reload-dir=,app templates static $(if $(KIOSK_PANEL),$(realpath $(dir $(KIOSK_PANEL)))))
+WATCHED += $(patsubst %,'--reload-include=*.%',toml json5 html css js msg srv action)
 dev: .venv/test
-	KIOSK_DEV=1 KIOSK_LOG_LEVEL=debug .venv/bin/uvicorn app.main:app $(LIMITS) --reload --reload-dir app
+	KIOSK_DEV=1 KIOSK_LOG_LEVEL=debug .venv/bin/uvicorn app.main:app --reload $(WATCHED)
 
 # Everything: what measures real time alone and at last, the rest by WORKERS at once. With ARGS, of
 # pytest, only those tests, one after the other; such as need neither bridge nor ROS nor browser are run

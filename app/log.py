@@ -1,8 +1,8 @@
-"""`python -m app.log`: the command of `app.audit`, under the name that users know."""
+"""`python -m app.log`: the same as `operator-panel log`."""
 
 import sys
 
-from app.audit.__main__ import main
+from app.cli.log import main
 
 if __name__ == "__main__":
     sys.exit(main(sys.argv[1:]))

@@ -51,9 +51,17 @@ fi
 
 [ -n "$missing" ] || exit 0
 if [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
-    apt-get update -qq
+    echo "installing$missing (once, by apt-get)"
+    # What apt-get says is of interest only where it fails: debconf complains on every small system.
+    said=$(mktemp)
+    trap 'rm -f "$said"' EXIT
     # shellcheck disable=SC2086  # a list of packages
-    DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $missing >/dev/null
+    { apt-get update -qq &&
+        DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $missing; } >"$said" 2>&1 || {
+        cat "$said" >&2
+        echo "apt-get could not install$missing: install them, then run this again" >&2
+        exit 1
+    }
 else
     echo "missing:$missing (Debian's names): install them, then run this again" >&2
     exit 1

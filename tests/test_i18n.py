@@ -2,6 +2,8 @@
 
 import ast
 import re
+import subprocess
+import sys
 from collections.abc import Iterator
 from string import Formatter
 
@@ -11,7 +13,7 @@ from app.clock import format_age
 from app.i18n import ENGLISH, say
 from app.settings import PACKAGE, shipped
 
-SPEAKERS = ("say", "locked", "refused")  # functions whose first argument is a code
+SPEAKERS = ("say", "said", "locked", "refused")  # functions whose first argument is a code
 PREFIXES = ("control_", "lamp_", "log_page_")  # of codes that are put together
 
 
@@ -51,6 +53,26 @@ def test_every_sentence_is_said_somewhere() -> None:
     words = set(re.findall(r"\w+", "\n".join(path.read_text() for path in sources)))
     ends = {code: code.removeprefix(next(filter(code.startswith, PREFIXES), "")) for code in ENGLISH}
     assert [code for code, end in ends.items() if not words & {code, end}] == []
+
+
+def test_no_sentence_is_said_while_modules_are_imported() -> None:
+    """One that is could never be in a reader's language."""
+    code = """
+import importlib, pkgutil
+import app, app.i18n
+
+def say(code, **about):
+    raise AssertionError(f"{code} is said at import")
+
+app.i18n.say = say
+for module in pkgutil.walk_packages(app.__path__, "app."):
+    if not module.name.endswith("__main__") and module.name != "app.main":
+        importlib.import_module(module.name)
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=PACKAGE.parent, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 def test_a_sentence_is_filled_in() -> None:

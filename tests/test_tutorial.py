@@ -60,7 +60,7 @@ def test_each_command_is_one_that_these_tests_know() -> None:
     made = subprocess.run(
         ["make", "--dry-run", "run"], cwd=ROOT, capture_output=True, text=True, check=True
     ).stdout
-    assert ".venv/bin/uvicorn app.main:app" in made
+    assert ".venv/bin/python -m app.cli run" in made
 
 
 @pytest.mark.parametrize("text", STEPS)

@@ -4,7 +4,12 @@ import subprocess
 import sys
 from pathlib import Path
 
-from tests.support.parts import ROOT, Server, until
+import httpx
+
+from app.settings import PACKAGE
+from tests.support.parts import ROOT, Process, Server, free_port, until
+
+SHIPPED = PACKAGE / "panel.toml"
 
 
 def test_an_installed_wheel_serves_from_any_folder(tmp_path: Path) -> None:
@@ -41,6 +46,20 @@ def test_an_installed_wheel_serves_from_any_folder(tmp_path: Path) -> None:
         [str(python), "-m", "app.check"], cwd=elsewhere, capture_output=True, text=True, check=False
     )
     assert check.returncode == 0, check.stderr
+    command = str(venv / "bin/operator-panel")
+    told = subprocess.run(
+        [command, "--version"], cwd=elsewhere, capture_output=True, text=True, check=True
+    )
+    assert told.stdout.split()[1] == wheel.name.split("-")[1]
+    panel, port = elsewhere / "cell1.toml", free_port()
+    panel.write_text(SHIPPED.read_text().replace("Publish1", "Pick up"))
+    run = [command, "run", panel.name, f"--port={port}", f"--data={tmp_path / 'data'}"]
+    served = Process(run, {"PYTHONPATH": ""}, cwd=elsewhere)
+    try:
+        until(lambda: "the panel is at" in served.text, "it listens", within_s=30)
+        assert "Pick up" in httpx.get(f"http://127.0.0.1:{port}/", trust_env=False).text
+    finally:
+        served.end()
     services = (
         "from app.interfaces import interfaces_of as of; of('jazzy').service('std_srvs/srv/SetBool')"
     )

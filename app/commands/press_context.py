@@ -19,6 +19,8 @@ from app.view.publisher import Board
 
 AHEAD_S: Final = 1.0  # a press can't be from later than now, but for rounding and drift
 SEEN: Final = r"^[0-9a-f]{1,32}-[0-9]{1,18}$"  # <boot>-<version>, an event's id
+LONGEST_ID: Final = 64
+PRESS_ID: Final = rf"^[A-Za-z0-9_.:-]{{1,{LONGEST_ID}}}$"
 _is_seen: Final = re.compile(SEEN).fullmatch
 
 

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Final, Literal, Self
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo
 
 from app.errors import InterfaceError
+from app.i18n import say
 from app.interfaces.field_path import Key, steps
 from app.interfaces.names import ACTION_TYPE, MESSAGE_TYPE, NAMESPACE, SERVICE_TYPE, TOPIC, Qos
 from app.interfaces.validation import shown
@@ -45,6 +46,15 @@ def _action(given: str) -> str:
             f"{shown(given)} is no ROS 2 action type: it must be like nav2_msgs/action/NavigateToPose"
         )
     return given
+
+
+def said(code: str) -> Any:
+    """A field whose default is a sentence of the catalogue: it is said when a panel is loaded."""
+
+    def described(schema: dict[str, Any]) -> None:
+        schema["default"] = say(code)
+
+    return Field(default_factory=lambda: say(code), json_schema_extra=described)
 
 
 def namespace_of(given: str) -> str:

@@ -36,7 +36,6 @@ class Fleet:
         *,
         recordings: "Recordings | None" = None,
         simulated: bool = False,
-        fault: str = "",
     ) -> None:
         """One robot without a name, or the panel's `[[robot]]` entries."""
         self.panel = panel
@@ -53,7 +52,6 @@ class Fleet:
                 recordings=recordings,
                 slices=slices,
                 simulated=simulated,
-                fault=fault,
             )
 
     async def start(self) -> None:
@@ -75,11 +73,6 @@ class Fleet:
         """Ends the waiting of what was pressed."""
         for kiosk in self.kiosks:
             kiosk.presses.give_up()
-
-    def show_fault(self, text: str) -> None:
-        """A fault of the panel file, shown on every page; "" takes it away."""
-        for kiosk in self.kiosks:
-            kiosk.show_fault(text)
 
     @property
     def kiosks(self) -> list[Kiosk]:

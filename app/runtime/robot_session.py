@@ -61,11 +61,9 @@ class Kiosk:
         recordings: "Recordings | None" = None,
         slices: Slices | None = None,
         simulated: bool = False,
-        fault: str = "",
     ) -> None:
         """`entry` is which of the panel's robots this is for, where it has several, `others` are
-        then all of them. `revision` is of all that a page loads; `fault` stands above it until
-        there is none."""
+        then all of them. `revision` is of all that a page loads."""
         self.panel = panel
         self.entry = entry
         self.base = f"/robots/{entry.id}" if entry else ""
@@ -89,7 +87,6 @@ class Kiosk:
             before=lambda: self.holds.judge(),
             recordings_fault=lambda: recordings.fault if recordings else "",
             simulated=simulated,
-            fault=fault,
         )
         self.show = self.showing.now
         self.board = self.showing.board
@@ -264,11 +261,6 @@ class Kiosk:
                 await asyncio.sleep(RENEW_AGAIN_S)
         self.robot.graph.own_zid = self.link.zid
         self._renewing = None
-
-    def show_fault(self, text: str) -> None:
-        """A fault of the panel file, shown on every page; "" takes it away."""
-        self.showing.fault = text
-        self.show()
 
     # Down.
 

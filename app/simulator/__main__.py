@@ -1,8 +1,8 @@
-"""`python -m app.simulator`: the demo robot alone."""
+"""`python -m app.simulator`: the same as `operator-panel simulate`."""
 
 import sys
 
-from app.simulator.zenoh_peer import main
+from app.cli.simulate import main
 
 if __name__ == "__main__":
     sys.exit(main(sys.argv[1:]))

@@ -2,18 +2,15 @@
 
 It has the keys, CDR bytes, liveliness tokens and admin space that a real robot has behind
 zenoh-bridge-ros2dds, so that the kiosk can't tell the difference; it knows nothing of the server.
-`python -m app.simulator [ENDPOINT [NAMESPACE]]` runs it alone, where the shipped zenoh.json5
-connects.
+`operator-panel simulate` runs it alone, where the shipped zenoh.json5 connects.
 """
 
 import json
-import signal
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import zenoh
 from zenoh.ext import CacheConfig, declare_advanced_publisher
@@ -21,14 +18,11 @@ from zenoh.handlers import Callback
 
 from app.dialect import bridge_dialect
 from app.dialect.endpoint import TopicRole
-from app.errors import DecodeError
+from app.errors import DecodeError, LinkError
 from app.interfaces import Interfaces, interfaces_of
-from app.interfaces.names import NAMESPACE, Qos
+from app.interfaces.names import Qos
 from app.simulator.parameters import EVENT_TYPE, EVENTS, SERVICES
 from app.simulator.robot import COUNT, COUNT_TYPE, LISTENS, SERVES, SPEAKS, DemoRobot
-
-if TYPE_CHECKING:
-    from argparse import Namespace
 
 ENDPOINT: Final = "tcp/127.0.0.1:7447"
 ANY_PORT: Final = "tcp/127.0.0.1:0"
@@ -263,40 +257,14 @@ def in_process(namespace: str, distro: str) -> Iterator[str]:
         yield robot.endpoint
 
 
-def _given(arguments: list[str]) -> "Namespace":
-    import argparse  # not with the server, which has this robot within
+def serve(endpoint: str, namespace: str, ends: threading.Event, listening: Callable[[], None]) -> None:
+    """A demo robot at this endpoint until `ends` is set; calls `listening` when it is there.
 
-    parser = argparse.ArgumentParser(
-        prog="python -m app.simulator",
-        description="The demo robot as a Zenoh peer of its own, for panels to connect to.",
-    )
-    parser.add_argument(
-        "endpoint",
-        nargs="?",
-        default=ENDPOINT,
-        metavar="ENDPOINT",
-        help="where it listens, as Zenoh names it; default: %(default)s",
-    )
-    parser.add_argument(
-        "namespace", nargs="?", default="", metavar="NAMESPACE", help="of its topics, such as /robot1"
-    )
-    return parser.parse_args(arguments)
-
-
-def main(arguments: list[str]) -> int:
-    given = _given(arguments)
-    endpoint, namespace = given.endpoint, given.namespace.rstrip("/")
-    if not NAMESPACE.fullmatch(namespace):
-        print(f'demo robot: "{namespace}" is not a ROS 2 namespace, like /robot1', file=sys.stderr)
-        return 2
-    ends = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: ends.set())
+    Raises LinkError where it can't listen there.
+    """
     try:
         with Simulator(endpoint, namespace):
-            print(f"demo robot: listening at {endpoint}", file=sys.stderr)
+            listening()
             ends.wait()
     except zenoh.ZError as error:
-        print(f"demo robot: can't listen at {endpoint}: {error}", file=sys.stderr)
-        return 1
-    return 0
+        raise LinkError(f"can't listen at {endpoint}: {error}") from error

@@ -58,10 +58,8 @@ class Showing:
         before: Callable[[], None],
         recordings_fault: Callable[[], str],
         simulated: bool,
-        fault: str,
     ) -> None:
-        """`before` is called first, whenever it is shown; `fault` stands above the page until
-        there is none."""
+        """`before` is called first, whenever it is shown."""
         self._panel = panel
         self._robot = robot
         self._control = control
@@ -70,7 +68,6 @@ class Showing:
         self._before = before
         self._recordings_fault = recordings_fault
         self._simulated = simulated
-        self.fault = fault
         self._since = Since()
         self._frame_s = 1 / panel.display_hz
         self._displays = [(robot.key(w.topic), w) for w in panel.displays]
@@ -152,7 +149,7 @@ class Showing:
 
     def _sight(self) -> Sight:
         unlogged = self._operators_log.fault
-        faults = (self.fault, unlogged, self._recordings_fault())
+        faults = (unlogged, self._recordings_fault())
         seen = sight(
             self._panel,
             self._robot,

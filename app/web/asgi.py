@@ -1,5 +1,6 @@
-"""Wrappers around the ASGI application: errors of the start in words; the server's own `send`."""
+"""Wrappers around the ASGI application: HEAD, errors of the start in words, the server's own `send`."""
 
+import asyncio
 import sys
 from typing import Final
 
@@ -13,7 +14,7 @@ KEY: Final = "panel.send"
 
 
 class Application(FastAPI):
-    """With that layer around all others: FastAPI has some of its own around those that are added.
+    """With `Heads` and `Direct` around all others: FastAPI has layers of its own around those added.
 
     `state.server` is the configuration of the server from the start on; None where it is not uvicorn's.
     """
@@ -24,7 +25,47 @@ class Application(FastAPI):
         await super().__call__(scope, receive, send)
 
     def build_middleware_stack(self) -> ASGIApp:
-        return Direct(super().build_middleware_stack())
+        return Heads(Direct(super().build_middleware_stack()))
+
+
+class Heads:
+    """Answers HEAD as GET without the body (RFC 9110, 9.3.2), whatever route it is.
+
+    The route is told that the client is gone once its head is sent: an event stream ends there.
+    """
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] == "http" and scope["method"] == "HEAD":
+            head = _Head(receive, send)
+            await self._app({**scope, "method": "GET"}, head.receive, head.send)
+        else:
+            await self._app(scope, receive, send)
+
+
+class _Head:
+    """One HEAD request."""
+
+    def __init__(self, receive: Receive, send: Send) -> None:
+        self._receive = receive
+        self._send = send
+        self._received = False
+        self._sent = asyncio.Event()
+
+    async def receive(self) -> Message:
+        if not self._received:
+            self._received = True
+            return await self._receive()
+        await self._sent.wait()
+        return {"type": "http.disconnect"}
+
+    async def send(self, message: Message) -> None:
+        if message["type"] == "http.response.start":
+            await self._send(message)
+            await self._send({"type": "http.response.body", "body": b"", "more_body": False})
+            self._sent.set()
 
 
 class Direct:

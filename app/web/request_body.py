@@ -1,8 +1,9 @@
-"""What a client says as JSON, in a body or on a socket: read with the same care everywhere."""
+"""What a client sends, as JSON in a body or on a socket or as a form: read in one way everywhere."""
 
 import asyncio
 import json
 from typing import Any, Final, TypeVar
+from urllib.parse import parse_qsl
 
 from fastapi import Request, WebSocket
 from pydantic import BaseModel, ValidationError
@@ -12,6 +13,7 @@ from app.errors import InputError, TooSlow
 
 LONGEST: Final = 64 * 1024  # bytes of a body; bytes or characters of a message on a socket
 BODY_WITHIN_S: Final = 10.0
+FIELDS_MOST: Final = 200  # of a form
 TOO_BIG: Final = 1009  # RFC 6455
 
 Model = TypeVar("Model", bound=BaseModel)
@@ -24,6 +26,27 @@ async def body_of(request: Request) -> bytes:
             return await request.body()
     except TimeoutError:
         raise TooSlow(f"the body took longer than {BODY_WITHIN_S:g} s") from None
+
+
+def kind_of(request: Request) -> str:
+    """The media type of the body, as its header says; "" without one."""
+    return request.headers.get("content-type", "").partition(";")[0].strip().lower()
+
+
+def form_of(body: bytes, most: int = FIELDS_MOST) -> dict[str, str]:
+    """The fields of a form; InputError for what is none, has more than `most`, or has one twice."""
+    try:
+        text = body.decode("ascii")
+        pairs = parse_qsl(text, keep_blank_values=True, errors="strict", max_num_fields=most)
+    except ValueError as error:
+        raise InputError(f"the body is not a form: {error}") from None
+    fields: dict[str, str] = {}
+    for name, value in pairs:
+        # A toggle that is on comes after the hidden field that is there when it is off.
+        if name in fields and (fields[name], value) != ("false", "true"):
+            raise InputError("a field is in the form twice")
+        fields[name] = value
+    return fields
 
 
 async def received(socket: WebSocket) -> Message:

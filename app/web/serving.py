@@ -1,7 +1,7 @@
 """The limits of the HTTP server: one set, however it was started.
 
-`OPTIONS` are uvicorn's own, for `uvicorn.run`; unit, Makefile and README have them as flags. A uvicorn
-that was started without them gets them as the application starts, before it listens.
+`OPTIONS` are uvicorn's own, for `uvicorn.run`: `operator-panel run` passes them. A uvicorn that was
+started without them gets them as the application starts, before it listens.
 """
 
 from collections.abc import Sequence

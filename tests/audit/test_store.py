@@ -12,7 +12,6 @@ from typing import Any
 
 import pytest
 
-from app.audit.__main__ import main
 from app.audit.data_dir import LOCK, Folder
 from app.audit.database import NAME, Head, set_aside
 from app.audit.entry import LONGEST_VALUES, Entry, Origin, as_json, entered, plain
@@ -21,6 +20,7 @@ from app.audit.queries import Filter, rows
 from app.audit.store import DAY_MS, REMOVED_AT_ONCE, Store
 from app.audit.verify import verify
 from app.audit.writer_thread import HOUR_S, Steady
+from app.cli.log import main
 from app.errors import FolderInUse, LogCorrupt, LogError
 
 FROM = Origin(address="10.0.0.7", browser="b1", who="Kim", seen="boot-7")

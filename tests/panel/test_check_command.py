@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from app.check import main
+from app.cli.check import main
 from app.errors import Note
 from app.panel import load_panel
 from app.settings import PACKAGE

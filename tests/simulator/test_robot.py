@@ -189,7 +189,7 @@ def test_a_command_tells_how_it_is_used(command: str) -> None:
 def test_a_command_that_is_used_wrongly_says_so() -> None:
     words = [sys.executable, "-m", "app.simulator", "tcp/127.0.0.1:0", "/r1", "more"]
     done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False, timeout=30)
-    assert (done.returncode, "unrecognized arguments: more" in done.stderr) == (2, True)
+    assert (done.returncode, '"more" is one argument too many' in done.stderr) == (2, True)
 
 
 COUNTS = """

@@ -98,7 +98,6 @@ def showing_of(panel: Panel, robot: Robot) -> Showing:
         before=lambda: None,
         recordings_fault=lambda: "",
         simulated=False,
-        fault="",
     )
 
 

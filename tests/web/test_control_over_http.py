@@ -117,6 +117,35 @@ def test_asking_granting_and_giving_up(client: Callable[..., Client], kiosk: Ser
     assert bob.press().status_code == 409
 
 
+@pytest.mark.parametrize(
+    ("body", "fault"),
+    [
+        (b'{"to": NaN}', "the body is not JSON: NaN is not a number of JSON"),
+        (b'{"at": -Infinity}', "the body is not JSON: -Infinity is not a number of JSON"),
+        (rb'{"\ud800": 1}', "the body has half of a surrogate pair, which is not Unicode text"),
+        (rb'{"to": "\ud800"}', "the body has half of a surrogate pair, which is not Unicode text"),
+        ('{"to": ""}'.encode("utf-16"), "the body is not JSON: "),
+        (b"[]", "the body: Input should be a valid dictionary"),
+        (b"[" * 30_000, "the body is not JSON: "),
+    ],
+)
+@pytest.mark.parametrize("act", ["take", "here"])
+def test_json_is_read_as_that_of_a_press_is(
+    client: Callable[..., Client], act: str, body: bytes, fault: str
+) -> None:
+    answer = client().http.post(
+        f"/control/{act}", content=body, headers={"content-type": "application/json"}
+    )
+    assert (answer.status_code, answer.json()["error"][: len(fault)]) == (422, fault)
+
+
+@pytest.mark.parametrize("body", [b"to=%ff", b"to=1&to=2", b"\xff", b"a=1&" * 9])
+def test_a_form_is_read_as_that_of_a_press_is(client: Callable[..., Client], body: bytes) -> None:
+    kind = {"content-type": "application/x-www-form-urlencoded"}
+    answer = client().http.post("/control/take", content=body, headers=kind)
+    assert answer.status_code == 422
+
+
 def test_what_was_touched_long_ago_is_not_done_any_more(client: Callable[..., Client]) -> None:
     """A server that stood still takes in later what was touched meanwhile."""
     late = client()

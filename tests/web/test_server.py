@@ -347,6 +347,45 @@ def test_it_ends_though_somebody_reads_nothing_of_what_they_asked_for() -> None:
         mine.end(signal.SIGTERM)
 
 
+@pytest.mark.parametrize(
+    "path",
+    ["/", "/pages/operation", "/healthz", "/readyz", "/log", "/openapi.json", "/pages/none", "/none"],
+)
+@pytest.mark.parametrize("packed", ["gzip", "identity"])
+def test_head_answers_as_get_without_a_body(demo: Server, path: str, packed: str) -> None:
+    def asked(method: str) -> httpx.Response:
+        return demo.http.request(method, path, headers={"accept-encoding": packed})
+
+    head, got = asked("HEAD"), asked("GET")
+    assert (head.status_code, head.content) == (got.status_code, b"")
+    changing = {"date", "set-cookie", *(["content-length"] if packed == "gzip" else [])}
+    for name in set(got.headers) - changing:
+        assert head.headers[name] == got.headers[name]
+    assert int(head.headers["content-length"]) > 0
+
+
+def test_head_of_a_static_file_tells_its_length(demo: Server) -> None:
+    found = re.search(r"/static/\w+/kiosk\.css", demo.http.get("/").text)
+    assert found
+    head, got = demo.http.head(found[0]), demo.http.get(found[0])
+    assert {**got.headers, "date": head.headers["date"]} == dict(head.headers)
+    assert head.content == b""
+
+
+@pytest.mark.parametrize("path", ["/events", "/events?once=1", "/log.csv", "/metrics"])
+def test_head_of_what_is_long_ends_at_once(demo: Server, path: str) -> None:
+    until(lambda: "kiosk_streams 0.0" in demo.http.get("/metrics").text, "no stream")
+    assert (demo.http.head(path).status_code, demo.http.head(path).content) == (200, b"")
+    until(lambda: "kiosk_streams 0.0" in demo.http.get("/metrics").text, "the stream is gone")
+    assert "Traceback" not in demo.process.text
+
+
+def test_what_only_takes_posts_or_gets_says_so(demo: Server) -> None:
+    for method, path, allowed in (("HEAD", "/widgets/operation", "POST"), ("POST", "/", "GET, HEAD")):
+        answer = demo.http.request(method, path)
+        assert (answer.status_code, answer.headers["allow"]) == (405, allowed)
+
+
 def test_a_client_that_reads_nothing_holds_up_nobody(demo: Server) -> None:
     with demo.http.stream("GET", "/events", timeout=30) as stalled:
         assert stalled.status_code == 200

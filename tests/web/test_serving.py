@@ -19,7 +19,7 @@ from uvicorn import Config
 
 from app.web.connections import FILES_WANTED
 from app.web.proxies import Proxies
-from app.web.serving import OPTIONS, bounded, urls
+from app.web.serving import bounded, urls
 from tests.support.apps.small import CONNECTIONS
 from tests.support.parts import ROOT, Server, free_port, until
 
@@ -218,17 +218,10 @@ def test_what_is_tighter_stays() -> None:
     assert bounded(asyncio.Queue[dict[str, str]]().get) is None  # another server's
 
 
-@pytest.mark.parametrize(
-    "name", ["deploy/operator-panel.service", "Makefile", "docs/how-to/service.md"]
-)
-def test_what_starts_the_server_gives_it_the_same_limits(name: str) -> None:
-    flags = f"--ws-max-size {OPTIONS['ws_max_size']} --ws-max-queue {OPTIONS['ws_max_queue']}"
-    flags += " --ws-per-message-deflate false --no-proxy-headers"
-    assert set(OPTIONS) == {"ws_max_size", "ws_max_queue", "ws_per_message_deflate", "proxy_headers"}
-    text = (ROOT / name).read_text()
-    assert flags in text
-    if name.startswith("deploy"):
-        assert f"LimitNOFILE={FILES_WANTED}" in text
+def test_the_unit_starts_the_server_and_gives_it_the_files_that_it_wants() -> None:
+    unit = (ROOT / "deploy/operator-panel.service").read_text()
+    assert "\nExecStart=/opt/panel/bin/operator-panel run\n" in unit
+    assert f"\nLimitNOFILE={FILES_WANTED}\n" in unit
 
 
 # Who is behind a proxy.

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import AfterValidator, Field, model_validator
 
 from app.i18n import say
-from app.panel.base import Description, Label, Placed, Span, some
+from app.panel.base import Description, Label, Placed, Span, said, some
 
 MOST: Final = 2.0**53  # beyond this a browser's numbers are not exact
 
@@ -134,8 +134,8 @@ class SelectInput(Placed):
 class ToggleInput(Placed):
     kind: Literal["toggle"]
     span: Span = 6
-    on: Label = say("on")
-    off: Label = say("off")
+    on: Label = said("on")
+    off: Label = said("off")
     default: bool = False
 
     @property

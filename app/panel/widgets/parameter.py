@@ -7,7 +7,7 @@ from pydantic import AfterValidator, Field
 from app.i18n import say
 from app.interfaces.names import TOPIC
 from app.interfaces.validation import shown
-from app.panel.base import Interlocks, Label, Seconds, Span
+from app.panel.base import Interlocks, Label, Seconds, Span, said
 from app.panel.list_text import listed, quoted
 from app.panel.number_range import decimal
 from app.panel.widgets.inputs import Number, Option, Stepped, Unit, same
@@ -47,8 +47,8 @@ class Parameter(Stepped):
     min: Number | None = None
     max: Number | None = None
     step: Annotated[Number, Field(gt=0)] | None = None
-    on: Label = say("on")
-    off: Label = say("off")
+    on: Label = said("on")
+    off: Label = said("off")
     interlocks: Interlocks = Field(default=(), alias="interlock")
     timeout_s: Seconds = 5.0
     confirm_press: bool = False

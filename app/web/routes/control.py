@@ -1,12 +1,10 @@
 """Taking control of a robot, asking for it, giving it: JSON for scripts, forms without them."""
 
-import json
-from typing import Annotated, Any, Final, TypeVar
-from urllib.parse import parse_qsl
+from typing import Annotated, Final, TypeVar
 
 from fastapi import APIRouter, Path, Request
 from fastapi.responses import JSONResponse, RedirectResponse, Response
-from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, JsonValue, ValidationError
+from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, JsonValue
 
 from app.errors import InputError, NotFound
 from app.i18n import say
@@ -16,8 +14,8 @@ from app.permission.control_authority import LIFE_S, Refusal
 from app.runtime.robot_session import Kiosk
 from app.web.app_state import CurrentKiosk, CurrentSite
 from app.web.client_cookie import keep, visitor, welcomed
-from app.web.described import FORM, described_body, errors, fields
-from app.web.request_body import body_of
+from app.web.described import FORM, JSON, described_body, errors, fields
+from app.web.request_body import as_model, body_of, form_of, json_of, kind_of
 
 router = APIRouter()
 
@@ -27,6 +25,7 @@ ASKER: Final = r"^[0-9a-f]{0,12}$"
 
 # A form's browser shows that it is there by loading its page anew, at the latest after this time.
 FORM_LIFE_S: Final = 35.0
+FORM_FIELDS_MOST: Final = 8
 
 
 class Acting(BaseModel):
@@ -69,7 +68,7 @@ class ControlAnswer(BaseModel):
 )
 async def here(request: Request, site: CurrentSite, kiosk: CurrentKiosk) -> Response:
     _required(kiosk)
-    kiosk.control.here(visitor(request, site), _read(Here, await _sent(request)).touched)
+    kiosk.control.here(visitor(request, site), (await _given(Here, request)).touched)
     return Response(status_code=204)
 
 
@@ -90,8 +89,8 @@ async def act(act: Act, request: Request, site: CurrentSite, kiosk: CurrentKiosk
     _required(kiosk)
     browser = visitor(request, site)
     _, token = welcomed(request, site)  # without a cookie nothing is done yet, the next time it is
-    form = _kind(request) == FORM
-    given = _read(Acting, await _sent(request))
+    form = kind_of(request) == FORM
+    given = await _given(Acting, request)
     reason = "" if form or given.at is None else _late(kiosk, act, given.at.timestamp())
     refusal = "" if reason else _done(kiosk, act, browser, given.to, FORM_LIFE_S if form else LIFE_S)
     reason = say(refusal) if refusal else reason
@@ -133,30 +132,11 @@ def _late(kiosk: Kiosk, act: str, at: float) -> str:
     return "" if act == "release" else kiosk.doubts.late(at)
 
 
-def _kind(request: Request) -> str:
-    return request.headers.get("content-type", "").partition(";")[0].strip().lower()
-
-
-async def _sent(request: Request) -> dict[str, Any]:
-    """The fields of a body: JSON, a form, or nothing at all."""
-    kind, body = _kind(request), await body_of(request)
-    try:
-        if kind == FORM:
-            text = body.decode("ascii")
-            return dict(parse_qsl(text, keep_blank_values=True, max_num_fields=8))
-        fields = json.loads(body or b"{}")
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"the body is not what its type says: {error}") from None
-    if kind not in ("application/json", "") or not isinstance(fields, dict):
-        raise InputError(
-            f'the body must be an object of "application/json" or a "{FORM}", not "{kind}"'
-        )
-    return fields
-
-
-def _read(model: type[Fields], sent: dict[str, Any]) -> Fields:
-    try:
-        return model.model_validate(sent)
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        raise InputError(f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from None
+async def _given(model: type[Fields], request: Request) -> Fields:
+    """The body as a model: JSON, a form, or nothing at all."""
+    kind, body = kind_of(request), await body_of(request)
+    if kind == FORM:
+        return as_model(model, form_of(body, FORM_FIELDS_MOST))
+    if kind not in (JSON, ""):
+        raise InputError(f'the body must be "{JSON}" or "{FORM}", not "{kind}"')
+    return as_model(model, json_of(body or b"{}"))

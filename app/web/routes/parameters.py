@@ -6,8 +6,8 @@ from pydantic import BaseModel
 
 from app.web.app_state import CurrentKiosk
 from app.web.described import FORM, errors
-from app.web.request_body import body_of
-from app.web.routes.presses import page_after
+from app.web.request_body import body_of, kind_of
+from app.web.routes.press_forms import page_after
 
 router = APIRouter()
 
@@ -33,7 +33,7 @@ class Asked(BaseModel):
 async def read(widget: str, request: Request, kiosk: CurrentKiosk) -> Response:
     await body_of(request)  # a page without scripts sends its whole form
     why = kiosk.read_again(widget)
-    if request.headers.get("content-type", "").startswith(FORM):
+    if kind_of(request) == FORM:
         return RedirectResponse(page_after(kiosk, widget, ""), status_code=303)
     answer = Asked(asked=not why, reason=why)
     return JSONResponse(answer.model_dump(), status_code=409 if why else 202)

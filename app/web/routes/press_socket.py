@@ -21,12 +21,13 @@ from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 from pydantic import Field
 from starlette.types import Message
 
+from app.commands.press_context import PRESS_ID
 from app.errors import InputError, KioskError
 from app.i18n import say
 from app.web.app_state import CurrentKiosk, CurrentSite, Site
 from app.web.client_cookie import caller
 from app.web.request_body import as_model, json_of, received
-from app.web.routes.presses import PRESS_ID, STATUS, Press, pressed
+from app.web.routes.presses import STATUS, Press, pressed
 
 log = logging.getLogger("kiosk.presses")
 

@@ -1,21 +1,24 @@
-"""`python -m app.log verify [--data FOLDER] [--head HASH]`: is the operator's log as it was written?
+"""`operator-panel log verify [--data FOLDER] [--head HASH]`: is the operator's log as it was written?
 
 Exit status: 0 it is, 1 an entry was changed, removed, reordered or inserted, 2 it can't be read.
 """
 
-import argparse
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 from app.audit.verify import verify
+from app.cli.parser import Parser
 from app.errors import KioskError
 from app.panel import load_panel
 from app.settings import Settings
 
+PROG = "python -m app.log"
 
-def main(arguments: list[str]) -> int:
-    parser = argparse.ArgumentParser(prog="python -m app.log", description="The operator's log.")
-    commands = parser.add_subparsers(dest="command", required=True)
+
+def main(arguments: Sequence[str], prog: str = PROG) -> int:
+    parser = Parser(prog=prog, description="The operator's log.")
+    commands = parser.add_subparsers(metavar="COMMAND", required=True)
     check = commands.add_parser("verify", help="check that no entry was changed")
     check.add_argument(
         "--data", type=Path, metavar="FOLDER", help="where the log is; default: KIOSK_DATA's folder"
@@ -42,7 +45,3 @@ def _usual_folder() -> Path:
     if settings.data is not None:  # a panel file with a fault is no reason not to look
         return settings.data
     return settings.data_folder(settings.mode or load_panel(settings.panel).mode)
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,66 @@
+"""`operator-panel check [PANEL …]`: every fault of panel files, with its place.
+
+Exit status, of the worst file: 0 good, 1 faults, 2 unreadable.
+"""
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from app.cli.parser import Parser
+from app.errors import KioskError, PanelError
+from app.panel import Panel, check_panel
+from app.settings import Settings
+
+PROG = "python -m app.check"
+GOOD, FAULTY, UNREADABLE = range(3)
+
+
+def main(arguments: Sequence[str], prog: str = PROG) -> int:
+    given = _parser(prog).parse_args(arguments)
+    try:
+        paths = given.panel or [Settings.from_environment().panel]
+    except KioskError as error:
+        print(error, file=sys.stderr)
+        return UNREADABLE
+    return max(checked(path, given.verbose) for path in paths)
+
+
+def checked(path: Path, verbose: bool = False) -> int:
+    """Prints what there is to say of one panel file; its exit status."""
+    try:
+        found = check_panel(path)
+    except PanelError as error:
+        print(error, file=sys.stderr, flush=True)
+        return UNREADABLE if error.unreadable else FAULTY
+    said = [_summary(path, found.panel), *map(str, found.notes)]
+    if verbose:
+        said += [line for remark in found.sent for line in str(remark).splitlines()]
+    print("\n  ".join(said), flush=True)
+    return GOOD
+
+
+def _summary(path: Path, panel: Panel) -> str:
+    widgets = sum(1 for _ in panel.widgets())
+    robots = f"{len(panel.robots)} robot(s), " if panel.robots else ""
+    what = f'"{panel.title}", {robots}{len(panel.pages)} page(s), {widgets} widget(s)'
+    return f"{path}: good: {what}"
+
+
+def _parser(prog: str) -> Parser:
+    parser = Parser(
+        prog=prog,
+        description="Tells every fault of panel files, with its place and what would be right.",
+        epilog="Exit status, of the worst file: 0 good (notes are no faults), 1 faults, 2 unreadable.",
+    )
+    parser.add_argument(
+        "-v", "--verbose", action="store_true", help="print the whole message that each press will send"
+    )
+    parser.add_argument(
+        "panel",
+        nargs="*",
+        type=Path,
+        metavar="PANEL",
+        help="a panel file; without any, the one of KIOSK_PANEL or else the shipped one",
+    )
+    return parser

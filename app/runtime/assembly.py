@@ -1,0 +1,94 @@
+"""What a server is made of, opened and closed in its order: operator's log, recordings, robots."""
+
+import asyncio
+import logging
+from collections.abc import AsyncIterator, Callable
+from contextlib import AbstractContextManager, ExitStack, asynccontextmanager
+from typing import TYPE_CHECKING
+
+from app.audit import Limits, OperatorLog, Unlogged
+from app.panel import Panel
+from app.panel.model import RobotEntry
+from app.runtime.fleet import Fleet
+from app.settings import Mode, Settings
+from app.transport.zenoh_session import Config, config_from, config_to
+
+if TYPE_CHECKING:
+    from app.recording import Recordings
+
+log = logging.getLogger("kiosk")
+
+# (namespace, distribution) → a simulated robot that runs while it is entered, by its endpoint.
+SimulatedRobot = Callable[[str, str], AbstractContextManager[str]]
+
+
+def mode_of(settings: Settings, panel: Panel) -> Mode:
+    """`KIOSK_MODE`, else what the panel file says."""
+    return settings.mode or panel.mode
+
+
+def check_zenoh(settings: Settings, panel: Panel) -> None:
+    """Raises KioskError for a Zenoh configuration that can't be used."""
+    if mode_of(settings, panel) == "live":
+        for entry in panel.robots or (None,):
+            config_from(settings.zenoh, entry.connect if entry else ())
+
+
+@asynccontextmanager
+async def open_log(settings: Settings, panel: Panel) -> AsyncIterator[OperatorLog | Unlogged]:
+    """The operator's log; FolderInUse where another server has its folder."""
+    mode, rules = mode_of(settings, panel), panel.log
+    folder = settings.data_folder(mode)
+    oplog: OperatorLog | Unlogged = Unlogged(folder)
+    if rules.enabled:
+        limits = Limits(days=rules.days, size_mb=rules.size_mb, required=rules.required)
+        oplog = OperatorLog(folder, limits, mode)
+    await oplog.start()
+    try:
+        yield oplog
+    finally:
+        await oplog.stop()
+
+
+@asynccontextmanager
+async def open_fleet(
+    settings: Settings,
+    panel: Panel,
+    revision: str,
+    oplog: OperatorLog | Unlogged,
+    simulated_robot: SimulatedRobot,
+) -> AsyncIterator[Fleet]:
+    """The robots of the panel, real or simulated. `revision` is of all that a page loads."""
+    demo = mode_of(settings, panel) == "demo"
+    with ExitStack() as stack:
+
+        def config_of(entry: RobotEntry | None) -> Config:
+            if not demo:
+                return config_from(settings.zenoh, entry.connect if entry else ())
+            namespace = entry.namespace if entry else panel.namespace
+            return config_to(stack.enter_context(simulated_robot(namespace, panel.distro)))
+
+        recordings = _recordings(settings, panel)
+        fleet = Fleet(panel, config_of, revision, oplog, recordings=recordings, simulated=demo)
+        try:
+            if recordings is not None:
+                recordings.start()
+            await fleet.start()
+            by = "simulated" if demo else f"live by {settings.zenoh}"
+            folder = settings.data_folder(mode_of(settings, panel))
+            log.info('panel "%s" (%s), robot %s, data in %s', panel.title, settings.panel, by, folder)
+            yield fleet
+        finally:
+            await fleet.stop()
+            if recordings is not None:
+                await asyncio.to_thread(recordings.stop)
+
+
+def _recordings(settings: Settings, panel: Panel) -> "Recordings | None":
+    """Imported only where the panel records: what writes MCAP takes time and memory."""
+    if panel.record is None:
+        return None
+    from app.recording import Recordings
+
+    folder = settings.data_folder(mode_of(settings, panel)) / "recordings"
+    return Recordings(folder, panel.record.max_mb, len(panel.robots) or 1)

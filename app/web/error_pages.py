@@ -1,0 +1,77 @@
+"""Answers for errors: a page for a browser, JSON for a program."""
+
+import traceback
+from collections.abc import Callable
+from typing import Any, Final
+
+from fastapi import Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import HTMLResponse, JSONResponse, PlainTextResponse, Response
+from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
+
+from app.errors import KioskError, TooMany, TooSlow
+from app.printable import printable
+from app.web.app_state import site_of
+
+TRY_AGAIN: Final = {"refresh": "1"}  # seconds
+
+
+def error_answer(request: Request, status: int, message: str) -> Response:
+    """An error for whom it is: a page for who reads pages, JSON for programs."""
+    site = site_of(request)
+    if "text/html" not in request.headers.get("accept", ""):
+        return JSONResponse({"error": message}, status_code=status)
+    context = {"site": site, "panel": site.fleet.panel, "status": status, "message": message}
+    html = site.templates.get_template("error.html").render(**context)
+    return HTMLResponse(html, status_code=status, headers={"cache-control": "no-store"})
+
+
+async def on_kiosk_error(request: Request, error: Exception) -> Response:
+    status = error.status if isinstance(error, KioskError) else 500
+    answer = error_answer(request, status, str(error))
+    if isinstance(error, TooSlow):
+        answer.headers["connection"] = "close"  # nobody waits for the rest
+    if isinstance(error, TooMany):
+        answer.headers["retry-after"] = str(error.again_s)
+    return answer
+
+
+async def on_invalid(request: Request, error: Exception) -> Response:
+    """A path or a query that is not what the description says: the first fault, with its place."""
+    if not isinstance(error, RequestValidationError):
+        raise error
+    first = error.errors()[0]
+    where = ".".join(str(step) for step in first["loc"][1:])
+    return error_answer(request, 422, f"{where}: {first['msg']}")
+
+
+async def on_gone(request: Request, error: Exception) -> Response:
+    """Of who dropped the connection before the request was whole: nobody reads this."""
+    return Response(status_code=400)
+
+
+async def on_http_error(request: Request, error: Exception) -> Response:
+    """Starlette's own: no such path, wrong method, body too large."""
+    if not isinstance(error, HTTPException):
+        raise error
+    message = printable(f"{error.detail}: {request.url.path}")
+    answer = error_answer(request, error.status_code, message)
+    answer.headers.update(error.headers or {})
+    if answer.headers.get("allow") == "GET":
+        answer.headers["allow"] = "GET, HEAD"
+    return answer
+
+
+async def on_error_in_development(request: Request, error: Exception) -> Response:
+    """The traceback; the browser requests the page again until the fault is mended."""
+    text = "".join(traceback.format_exception(error))
+    return PlainTextResponse(text, 500, headers=TRY_AGAIN if request.method == "GET" else None)
+
+
+HANDLERS: Final[dict[int | type[Exception], Callable[..., Any]]] = {
+    KioskError: on_kiosk_error,
+    HTTPException: on_http_error,
+    ClientDisconnect: on_gone,
+    RequestValidationError: on_invalid,
+}

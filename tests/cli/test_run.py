@@ -1,0 +1,116 @@
+"""`operator-panel run`: a panel without any variable of the environment; mistakes in a sentence."""
+
+import os
+import socket
+import subprocess
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+import uvicorn
+
+from app.cli import run
+from app.cli.command import main
+from app.settings import PACKAGE
+from app.web.serving import OPTIONS
+from tests.support.parts import ROOT, Process, free_port, until
+
+SHIPPED = PACKAGE / "panel.toml"
+RUN = [sys.executable, "-m", "app.cli", "run"]
+
+
+def said(*words: str, status: int, env: Mapping[str, str] | None = None) -> str:
+    """What a start that fails says."""
+    done = subprocess.run(
+        [*RUN, *words], cwd=ROOT, env=env, capture_output=True, text=True, timeout=60, check=False
+    )
+    assert (done.returncode, done.stdout) == (status, "")
+    assert "Traceback" not in done.stderr
+    return done.stderr
+
+
+def test_a_panel_file_is_all_that_it_needs(tmp_path: Path) -> None:
+    panel, port = tmp_path / "cell1.toml", free_port()
+    panel.write_text(SHIPPED.read_text().replace('title = "Robot cell 1"', 'title = "My cell"'))
+    options = ["--port", str(port), "--data", str(tmp_path / "data"), "--name", "cell1.local"]
+    env = {"KIOSK_PANEL": str(SHIPPED)}  # what is said on the command line goes before it
+    process = Process([*RUN, str(panel), *options], env, cwd=ROOT)
+    try:
+        until(lambda: f"the panel is at http://127.0.0.1:{port}" in process.text, "it listens", 30)
+        page = httpx.get(f"http://127.0.0.1:{port}/", headers={"host": "cell1.local"}, trust_env=False)
+        assert (page.status_code, "My cell" in page.text) == (200, True)
+        assert (tmp_path / "data").is_dir()
+    finally:
+        process.end()
+
+
+def test_the_server_gets_the_limits(monkeypatch: pytest.MonkeyPatch) -> None:
+    given: dict[str, Any] = {}
+    monkeypatch.setattr(uvicorn, "run", lambda app, **options: given.update(options, app=app))
+    monkeypatch.setattr(os, "environ", {})
+    port = free_port()
+    assert main(["run", "--port", str(port)]) == 0
+    assert (given["app"], given["host"], given["port"]) == ("app.main:app", "127.0.0.1", port)
+    assert OPTIONS.items() <= given.items()
+
+
+def test_an_option_is_a_variable() -> None:
+    words = "cell.toml --zenoh z.json5 --mode live --data d --name a --name b --proxy 192.0.2.1"
+    given = run._parser("x").parse_args([*words.split(), "--log-level", "debug"])
+    assert run._environment(vars(given)) == {
+        "KIOSK_PANEL": "cell.toml",
+        "KIOSK_ZENOH": "z.json5",
+        "KIOSK_MODE": "live",
+        "KIOSK_DATA": "d",
+        "KIOSK_HOSTS": "a,b",
+        "KIOSK_PROXIES": "192.0.2.1",
+        "KIOSK_LOG_LEVEL": "debug",
+    }
+    assert run._environment(vars(run._parser("x").parse_args([]))) == {}
+
+
+def test_a_port_in_use_is_one_sentence() -> None:
+    port = free_port()
+    with socket.create_server(("127.0.0.1", port)):
+        text = said("--port", str(port), status=1)
+    assert text.startswith(f"can't listen on 127.0.0.1 port {port}: another program does, perhaps")
+    assert text.count("\n") == 1
+
+
+def test_a_faulty_panel_file_is_told_with_its_places(tmp_path: Path) -> None:
+    panel = tmp_path / "bad.toml"
+    panel.write_text(SHIPPED.read_text().replace('kind = "text"', 'kind = "txt"'))
+    text = said(str(panel), "--port", str(free_port()), status=1)
+    assert text.splitlines()[0] == f"{panel} can't be used:"
+    assert 'page[0].widget[0].kind "message", line 22: unknown kind "txt"' in text
+    missing = said(str(tmp_path / "none.toml"), "--port", str(free_port()), status=1)
+    assert missing == f"{tmp_path / 'none.toml'} can't be used:\n  No such file or directory\n"
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "sentence"),
+    [
+        ("--prot 9000", 2, "--prot is not an option of this command: did you mean --port?"),
+        ("--reload", 2, "--reload is not an option of this command"),
+        ("--port 99999", 2, 'argument --port: "99999" is not a port: 1 to 65535, or 0'),
+        ("--port", 2, "argument --port: expected one argument"),
+        ("one.toml two.toml", 2, '"two.toml" is one argument too many'),
+        ("--mode simulated", 2, "argument --mode: invalid choice: 'simulated'"),
+        ("--ssl-certfile a.pem", 2, "--ssl-certfile and --ssl-keyfile are given together"),
+        ("--ssl-certfile /none --ssl-keyfile /none", 1, "No such file or directory: '/none'"),
+        ("--name http://cell1", 1, 'KIOSK_HOSTS has "http://cell1": names or addresses'),
+        ("--host 192.0.2.1", 1, "can't listen on 192.0.2.1 port 8000: cannot assign"),
+    ],
+)
+def test_a_mistake_is_one_sentence(words: str, status: int, sentence: str) -> None:
+    text = said(*words.split(), status=status)
+    assert sentence in text
+    assert text.count("\n") == 1
+
+
+def test_a_wrong_variable_is_one_sentence() -> None:
+    text = said(status=1, env={"KIOSK_MODE": "simulated", "PATH": "/usr/bin:/bin"})
+    assert text == 'KIOSK_MODE is "simulated": it must be "demo" or "live"\n'

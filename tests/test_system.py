@@ -1,0 +1,54 @@
+"""What `make run` says while it installs what is missing on a bare Debian."""
+
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from tests.support.parts import ROOT
+
+DEBCONF = "debconf: delaying package configuration, since apt-utils is not installed"
+
+
+def installed(folder: Path, apt_get: str, user: int = 0) -> subprocess.CompletedProcess[str]:
+    """`tests/system.sh python3-venv` where Python has no ensurepip."""
+    commands = {"apt-get": apt_get, "id": f"echo {user}", "no-python": "exit 1"}
+    for name, script in commands.items():
+        (folder / name).write_text(f"#!/bin/sh\n{script}\n")
+        (folder / name).chmod(0o755)
+    env = {"PATH": f"{folder}:{os.environ['PATH']}", "PYTHON": "no-python", "TMPDIR": str(folder)}
+    return subprocess.run(
+        ["sh", "tests/system.sh", "python3-venv"],
+        cwd=ROOT,
+        env=env,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def test_what_is_installed_is_said_calmly(tmp_path: Path) -> None:
+    done = installed(tmp_path, f'echo "{DEBCONF}" >&2; echo "$@" >>{tmp_path}/called')
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout == "installing python3-venv (once, by apt-get)\n"
+    update, install = (tmp_path / "called").read_text().splitlines()
+    assert update == "update -qq"
+    assert install.endswith("--no-install-recommends python3-venv")
+    assert not list(tmp_path.glob("tmp.*"))
+
+
+@pytest.mark.parametrize("step", ["update", "install"])
+def test_what_can_not_be_installed_is_said_with_the_reason(tmp_path: Path, step: str) -> None:
+    done = installed(tmp_path, f'[ "$1" != {step} ] || {{ echo "E: no network" >&2; exit 100; }}')
+    assert done.returncode == 1
+    assert done.stderr.splitlines() == [
+        "E: no network",
+        "apt-get could not install python3-venv: install them, then run this again",
+    ]
+
+
+def test_who_may_install_nothing_is_told_what_is_missing(tmp_path: Path) -> None:
+    done = installed(tmp_path, "exit 9", user=1000)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr.startswith("missing: python3-venv (Debian's names): install them")
