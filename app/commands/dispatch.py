@@ -14,9 +14,12 @@ from app.errors import InputError, NotFound
 from app.i18n import say
 from app.interfaces import Interfaces
 from app.panel.input_values import checked, default_of, typed
-from app.panel.model import Action, Call, Hold, Input, Panel, Pressed, Publish
+from app.panel.model import Input, Panel, Pressed
 from app.panel.template import filled, inputs_of, with_now
+from app.panel.widgets.hold import Hold
 from app.panel.widgets.parameter import SET, Parameter
+from app.panel.widgets.publish import Publish
+from app.panel.widgets.service_action import Action, Call
 from app.robot.command_status import Answer, Corrected, LastLook, no_look
 from app.robot.state import Robot
 

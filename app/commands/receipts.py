@@ -11,8 +11,9 @@ from typing import Any, Final, Protocol, cast
 from app.audit import Entry, Origin
 from app.errors import Cause
 from app.i18n import say
-from app.panel.model import Hold, Panel, Pressed
+from app.panel.model import Panel, Pressed
 from app.panel.template import needed
+from app.panel.widgets.hold import Hold
 from app.panel.widgets.parameter import Parameter
 from app.permission.interlocks import NO_WAY, PERMITTED, Verdict, press_verdict, way
 from app.robot.command_status import Answer, Outcome

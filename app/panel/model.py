@@ -2,138 +2,19 @@
 
 from collections.abc import Iterator, Mapping
 from functools import cached_property
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Final, Literal
 
 from pydantic import AfterValidator, Field
 
-from app.panel.base import (
-    ActionType,
-    Description,
-    Endpoint,
-    FieldPath,
-    Folder,
-    Id,
-    Interlocks,
-    Label,
-    Placed,
-    Seconds,
-    ServiceType,
-    Span,
-    Topic,
-    TopicQos,
-    Type,
-    WrittenField,
-    namespace_of,
-)
+from app.panel.base import Description, Endpoint, Folder, Id, Label, Placed, TopicQos, namespace_of
 from app.panel.interlock import Interlock
 from app.panel.rules import ControlRules, LogRules, RecordRules
 from app.panel.widgets.displays import Indicator, Readout
+from app.panel.widgets.hold import Hold
 from app.panel.widgets.inputs import NumberInput, SelectInput, SliderInput, TextInput, ToggleInput
 from app.panel.widgets.parameter import EVENT_TYPE, EVENTS, Parameter
-
-
-class Confirm(Description):
-    """A field of the robot's that shows that a command took effect: it comes to have the value
-    `equals` (or that of an input, `"{id}"`) in time. The type is that which the panel gives for
-    the topic elsewhere, if there is none here."""
-
-    topic: Topic
-    type: Type | None = None
-    field: FieldPath = "data"
-    equals: Any
-    within_s: Seconds = 2.0
-
-
-class Publish(Placed):
-    """A command; with `one_shot` it is locked until its effect is confirmed, or did not show."""
-
-    kind: Literal["publish"]
-    topic: Topic
-    type: Type
-    message: dict[str, Any]
-    interlocks: Interlocks = Field(default=(), alias="interlock")
-    qos: TopicQos = TopicQos()
-    confirm: Confirm | None = None
-    one_shot: bool = False
-    confirm_press: bool = False
-    span: Span = 4
-
-    @property
-    def template(self) -> dict[str, Any]:
-        return self.message
-
-
-class Hold(Placed):
-    """Published `rate_hz` times a second while its button is held, and `release` once after.
-
-    `deadline_field` gets the milliseconds within which the next message must come, 0 in the last
-    one; `counter_field` counts the messages.
-    """
-
-    kind: Literal["hold"]
-    topic: Topic
-    type: Type
-    message: dict[str, Any]
-    release: dict[str, Any]
-    interlocks: Interlocks = Field(alias="interlock")
-    rate_hz: Annotated[float, Field(ge=1, le=100)] = 20.0
-    deadline_field: WrittenField | None = None
-    counter_field: WrittenField | None = None
-    qos: TopicQos = TopicQos()
-    span: Span = 4
-
-    @property
-    def period_s(self) -> float:
-        return 1 / self.rate_hz
-
-    @property
-    def deadline_ms(self) -> int:
-        """Three periods, 100 ms at least: two messages may be late or lost before the robot stops."""
-        return max(100, round(3000 / self.rate_hz))
-
-
-class Call(Placed):
-    """A service call; `success` and `message` are fields of the response, found by themselves
-    where it has a bool and a string of these names; `answer` is shown with `{field}` filled in."""
-
-    kind: Literal["call"]
-    service: Topic
-    type: ServiceType
-    request: dict[str, Any] = Field(default_factory=dict)
-    interlocks: Interlocks = Field(default=(), alias="interlock")
-    timeout_s: Seconds = 5.0
-    success: FieldPath | None = None
-    message: FieldPath | None = None
-    answer: str = ""
-    confirm_press: bool = False
-    span: Span = 4
-
-    @property
-    def template(self) -> dict[str, Any]:
-        return self.request
-
-
-class Action(Placed):
-    """An action's goal with a cancel button; `progress` is a field of the feedback that goes from
-    0 to `progress_max`; `feedback` and `result` are shown with `{field}` filled in."""
-
-    kind: Literal["action"]
-    action: Topic
-    type: ActionType
-    goal: dict[str, Any] = Field(default_factory=dict)
-    interlocks: Interlocks = Field(default=(), alias="interlock")
-    timeout_s: Seconds = 5.0
-    progress: FieldPath | None = None
-    progress_max: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 100.0
-    feedback: str = ""
-    result: str = ""
-    confirm_press: bool = False
-    span: Span = 6
-
-    @property
-    def template(self) -> dict[str, Any]:
-        return self.goal
-
+from app.panel.widgets.publish import Confirm, Publish
+from app.panel.widgets.service_action import Action, Call
 
 Input = TextInput | NumberInput | SliderInput | SelectInput | ToggleInput
 Pressed = Publish | Call | Action | Parameter

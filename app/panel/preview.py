@@ -10,10 +10,13 @@ from app.interfaces.validation import shown
 from app.panel.checks.calls import sent
 from app.panel.checks.holds import with_own_fields
 from app.panel.message_text import Comments, message_lines
-from app.panel.model import Action, Call, Hold, Input, Panel, Publish
+from app.panel.model import Input, Panel
 from app.panel.template import NOW
+from app.panel.widgets.hold import Hold
 from app.panel.widgets.inputs import SelectInput, TextInput, ToggleInput, digits
 from app.panel.widgets.parameter import Parameter
+from app.panel.widgets.publish import Publish
+from app.panel.widgets.service_action import Action, Call
 
 
 def previews(panel: Panel, interfaces: Interfaces) -> Iterator[Remark]:

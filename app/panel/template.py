@@ -8,7 +8,9 @@ from string import Formatter
 from typing import Any, Final
 
 from app.errors import FieldError
-from app.panel.model import Hold, Pressed, Publish
+from app.panel.model import Pressed
+from app.panel.widgets.hold import Hold
+from app.panel.widgets.publish import Publish
 
 # In what is shown of an answer: a path in its type. (In what is sent: the id of an input.)
 PLACE: Final = re.compile(r"\{([^{}]*)\}")

@@ -14,8 +14,11 @@ from app.dialect.endpoint import ServerRole, TopicRole
 from app.i18n import say
 from app.interfaces.names import Qos
 from app.panel.interlock import Interlock
-from app.panel.model import Action, Call, Display, Hold, Pressed, Publish, Published
+from app.panel.model import Display, Pressed, Published
+from app.panel.widgets.hold import Hold
 from app.panel.widgets.parameter import DESCRIBE, GET, SET, Parameter
+from app.panel.widgets.publish import Publish
+from app.panel.widgets.service_action import Action, Call
 from app.permission.conditions import permits, unmet
 from app.robot.command_status import IDLE
 from app.robot.graph import Graph, remembered

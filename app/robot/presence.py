@@ -4,8 +4,9 @@ went though their bridge stayed."""
 from collections.abc import Iterator, Mapping
 
 from app.dialect.endpoint import Role
-from app.panel.model import Action, Call, Panel
+from app.panel.model import Panel
 from app.panel.widgets.parameter import DESCRIBE, GET, SET
+from app.panel.widgets.service_action import Action, Call
 from app.robot.graph import Graph, remembered
 
 End = tuple[Role, str]

@@ -10,10 +10,13 @@ from typing import Any, Final, NamedTuple, TypedDict
 
 from app.i18n import say
 from app.panel.input_values import limits
-from app.panel.model import Action, Call, Display, Hold, Input, Panel, Pressed, Publish
+from app.panel.model import Display, Input, Panel, Pressed
 from app.panel.widgets.displays import Readout
+from app.panel.widgets.hold import Hold
 from app.panel.widgets.inputs import Numeric
 from app.panel.widgets.parameter import Parameter
+from app.panel.widgets.publish import Publish
+from app.panel.widgets.service_action import Action, Call
 from app.permission.clients import Browser
 from app.permission.control_authority_view import NO_CONTROL, ControlView
 from app.permission.interlocks import Verdict, command_verdict, interlock_verdict, way

@@ -14,25 +14,16 @@ from app.panel.checks.templates import NOW_IS, template_faults
 from app.panel.checks.types import own_type_faults, type_fault
 from app.panel.faults.wording import listing
 from app.panel.interlock import Interlock
-from app.panel.model import (
-    Action,
-    Call,
-    Confirm,
-    Display,
-    Hold,
-    Input,
-    Panel,
-    Pressed,
-    Publish,
-    Published,
-    RobotEntry,
-)
+from app.panel.model import Display, Input, Panel, Pressed, Published, RobotEntry
 from app.panel.template import NOW
 from app.panel.widgets.check_displays import display_faults
 from app.panel.widgets.check_inputs import input_faults
 from app.panel.widgets.check_parameters import parameter_faults, type_faults
 from app.panel.widgets.displays import Indicator, Readout
+from app.panel.widgets.hold import Hold
 from app.panel.widgets.parameter import Parameter
+from app.panel.widgets.publish import Confirm, Publish
+from app.panel.widgets.service_action import Action, Call
 
 
 def faults_in(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = ()) -> Iterator[Fault]:

@@ -5,8 +5,10 @@ from collections.abc import Iterator
 
 from app.errors import Fault, InterfaceError
 from app.interfaces import Interfaces
-from app.panel.model import Action, Call, Pressed, Publish
+from app.panel.model import Pressed
 from app.panel.template import PLACE
+from app.panel.widgets.publish import Publish
+from app.panel.widgets.service_action import Action, Call
 
 NUMBER = r"u?int(8|16|32|64)|float(32|64)|byte|char"
 WORDS = {NUMBER: "a number"}

@@ -6,9 +6,10 @@ from collections.abc import Collection, Iterator, Mapping
 from app.errors import Fault, FieldError
 from app.interfaces import Interfaces
 from app.panel.checks.templates import NOW_IS, examples, unknown
-from app.panel.model import Confirm, Input, Panel, Publish
+from app.panel.model import Input, Panel
 from app.panel.template import NOW, filled, named
 from app.panel.widgets.check_displays import field_faults, misfit
+from app.panel.widgets.publish import Confirm, Publish
 
 
 def confirm_faults(

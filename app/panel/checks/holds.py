@@ -8,8 +8,9 @@ from app.errors import Fault, FieldError, InterfaceError
 from app.interfaces import Interfaces
 from app.panel.checks.templates import template_faults
 from app.panel.checks.types import type_fault
-from app.panel.model import Hold, Input
+from app.panel.model import Input
 from app.panel.template import placed
+from app.panel.widgets.hold import Hold
 
 DEADLINE: Final = (r"uint(16|32|64)|float(32|64)", "uint16, uint32, uint64, float32 or float64")
 COUNTER: Final = (r"uint(8|16|32|64)", "uint8, uint16, uint32 or uint64")

@@ -11,7 +11,8 @@ from app.interfaces.validation import shown
 from app.panel.faults.places import place_of
 from app.panel.faults.toml_lines import Path
 from app.panel.faults.wording import near
-from app.panel.model import KINDS, Hold, Panel
+from app.panel.model import KINDS, Panel
+from app.panel.widgets.hold import Hold
 
 Model = type[BaseModel]
 

@@ -12,8 +12,9 @@ from app.panel.checks.types import type_fault
 from app.panel.constants import holder, value_of_state
 from app.panel.faults.wording import listing
 from app.panel.interlock import Interlock
-from app.panel.model import Confirm, Display
+from app.panel.model import Display
 from app.panel.widgets.displays import Indicator, Readout
+from app.panel.widgets.publish import Confirm
 
 NUMBERS: Final = frozenset({*INTEGERS, "float32", "float64"})
 SHAPE_AND_TEXT: Final = "only the colour would tell them apart"

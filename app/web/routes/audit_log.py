@@ -17,7 +17,8 @@ from starlette.types import Message, Receive, Scope, Send
 from app.audit import Entry, Filter, OperatorLog, ReaderProcess, Row
 from app.errors import InputError, LogError, NotFound
 from app.i18n import say
-from app.panel.model import Hold, Input, Panel, Pressed
+from app.panel.model import Input, Panel, Pressed
+from app.panel.widgets.hold import Hold
 from app.panel.widgets.parameter import Parameter
 from app.printable import printable, printable_texts
 from app.web.app_state import CurrentSite, Site
