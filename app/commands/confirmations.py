@@ -13,7 +13,7 @@ from typing import Any, Final
 
 from app.clock import format_time
 from app.i18n import say
-from app.panel.widgets.inputs import same
+from app.panel.values import same
 from app.panel.widgets.publish import Confirm, Publish
 from app.robot.command_status import Answer, Corrected, Progress
 from app.robot.state import Reading, Robot

@@ -1,40 +1,19 @@
 """The descriptions that a panel file becomes. What a key means is in the README."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from functools import cached_property
 from typing import Annotated, Final, Literal
 
 from pydantic import AfterValidator, Field
 
-from app.panel.base import Description, Endpoint, Folder, Id, Label, Placed, TopicQos, namespace_of
+from app.panel.base import Description, Endpoint, Folder, Id, Label, TopicQos, namespace_of
 from app.panel.interlock import Interlock
 from app.panel.rules import ControlRules, LogRules, RecordRules
-from app.panel.widgets.displays import Indicator, Readout
-from app.panel.widgets.hold import Hold
-from app.panel.widgets.inputs import NumberInput, SelectInput, SliderInput, TextInput, ToggleInput
+from app.panel.widgets.families import Command, Display, OnTopic, Placed, Published
+from app.panel.widgets.kinds import Widget
 from app.panel.widgets.parameter import EVENT_TYPE, EVENTS, Parameter
 from app.panel.widgets.publish import Confirm, Publish
-from app.panel.widgets.service_action import Action, Call
-
-Input = TextInput | NumberInput | SliderInput | SelectInput | ToggleInput
-Pressed = Publish | Call | Action | Parameter
-Display = Readout | Indicator
-Published = Publish | Hold
-Widget = Annotated[Input | Pressed | Hold | Display, Field(discriminator="kind")]
-KINDS: Final[Mapping[str, type[Placed]]] = {
-    "text": TextInput,
-    "number": NumberInput,
-    "slider": SliderInput,
-    "select": SelectInput,
-    "toggle": ToggleInput,
-    "publish": Publish,
-    "hold": Hold,
-    "call": Call,
-    "action": Action,
-    "parameter": Parameter,
-    "readout": Readout,
-    "indicator": Indicator,
-}
+from app.panel.widgets.service_action import Action
 
 
 class RobotEntry(Description):
@@ -76,17 +55,17 @@ class Panel(Description):
     # Of the file, not in it: changes when what a browser has loaded is out of date.
     revision: Annotated[str, Field(exclude=True)] = ""
 
-    def widgets(self) -> Iterator[Input | Pressed | Hold | Display]:
+    def widgets(self) -> Iterator[Placed]:
         for page in self.pages:
             yield from page.widgets
 
     @cached_property
-    def commands(self) -> "tuple[Pressed | Hold, ...]":
+    def commands(self) -> tuple[Command, ...]:
         """All that can be pressed."""
-        return tuple(w for w in self.widgets() if isinstance(w, Pressed | Hold))
+        return tuple(w for w in self.widgets() if isinstance(w, Command))
 
     @cached_property
-    def displays(self) -> "tuple[Display, ...]":
+    def displays(self) -> tuple[Display, ...]:
         return tuple(w for w in self.widgets() if isinstance(w, Display))
 
     def page(self, page_id: str) -> Page | None:
@@ -95,7 +74,7 @@ class Panel(Description):
     def interlock(self, interlock_id: str) -> Interlock | None:
         return next((i for i in self.interlocks if i.id == interlock_id), None)
 
-    def interlocks_of(self, widget: "Pressed | Hold") -> tuple[Interlock, ...]:
+    def interlocks_of(self, widget: Command) -> tuple[Interlock, ...]:
         """Those that all have to permit a press, in the order of the file."""
         known = {one.id: one for one in self.interlocks}
         return tuple(known[name] for name in widget.interlocks)
@@ -139,6 +118,6 @@ class Panel(Description):
 
     def qos(self, topic: str) -> TopicQos:
         """A topic's QoS, which is the same wherever the panel names it."""
-        speaking = (w for w in self.widgets() if isinstance(w, Published))
-        named = (of.qos for of in (*self.listening(), *speaking) if of.topic == topic)
-        return next(named, OF_EVENTS if topic == EVENTS else TopicQos())
+        named = {w.topic: w.qos for w in self.widgets() if isinstance(w, OnTopic)}
+        named |= {one.topic: one.qos for one in self.interlocks}
+        return named.get(topic, OF_EVENTS if topic == EVENTS else TopicQos())

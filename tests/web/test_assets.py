@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from app.panel.model import KINDS
+from app.panel.widgets.kinds import KINDS
 from app.settings import shipped
 from app.web.assets import LAYERS, OF_KINDS, OWN_PAGE, Assets, load_assets
 from tests.support.parts import ROOT

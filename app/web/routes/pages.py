@@ -15,9 +15,9 @@ from app.clock import format_datetime, format_time
 from app.commands.receipts import Receipt
 from app.errors import NotFound
 from app.i18n import say
-from app.panel.model import Input, Page, Panel, Pressed
+from app.panel.model import Page, Panel
 from app.panel.template import inputs_of
-from app.panel.widgets.parameter import Parameter
+from app.panel.widgets.families import Entered, Pressed
 from app.permission.clients import Browser
 from app.permission.control_authority import Refusal
 from app.permission.control_authority_view import Role, role
@@ -146,7 +146,7 @@ class Ask(TypedDict):
     """What will be done by a press, and the inputs that it takes."""
 
     sentence: str
-    inputs: list[Input | Parameter]
+    inputs: list[Entered]
 
 
 def _to_a_robot(request: Request, site: Site, path: str) -> Response | None:
@@ -159,7 +159,7 @@ def _to_a_robot(request: Request, site: Site, path: str) -> Response | None:
 
 def _render(request: Request, site: Site, page: Page) -> Response:
     kiosk = site.fleet.kiosk(request.path_params.get("robot"))
-    typed = any(isinstance(widget, Input | Parameter) for widget in page.widgets)
+    typed = any(isinstance(widget, Entered) for widget in page.widgets)
     refresh_s = REFRESH_WITH_INPUTS_S if typed else REFRESH_S
     browser, token = welcomed(request, site)
     if kiosk.control.rules.required:
@@ -225,7 +225,7 @@ def asks_of(kiosk: Kiosk, page: Page) -> dict[str, Ask]:
 
 def ask_of(kiosk: Kiosk, widget: Pressed) -> Ask:
     """With the robot's name, where there are several."""
-    inputs = {w.id: w for w in kiosk.panel.widgets() if isinstance(w, Input | Parameter)}
+    inputs = {w.id: w for w in kiosk.panel.widgets() if isinstance(w, Entered)}
     robot = kiosk.entry.name if kiosk.entry else ""
     sentence = say("ask_on" if robot else "ask", label=widget.label, robot=robot)
     return Ask(sentence=sentence, inputs=[inputs[name] for name in inputs_of(widget)])
