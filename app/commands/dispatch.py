@@ -17,7 +17,7 @@ from app.panel.template import filled, inputs_of, with_now
 from app.panel.widgets.families import Command, Entered, Input, Pressed
 from app.panel.widgets.kinds import row_of
 from app.panel.widgets.parameter import SET, Parameter
-from app.panel.widgets.publish import Publish
+from app.panel.widgets.publish import Publishing
 from app.panel.widgets.service_action import Action, Call
 from app.robot.command_status import Answer, Corrected, LastLook, no_look
 from app.robot.state import Robot
@@ -76,19 +76,19 @@ class Sending:
         self._parameters = parameters
         self._monotonic = monotonic
         # How each kind, or family, is sent; why it would not be; and how what is entered is checked.
-        self._send: Mapping[type[Pressed], Callable[[Any, Outgoing], Awaitable[Answer]]] = {
-            Publish: self._publish,
+        self.senders: Mapping[type[Pressed], Callable[[Any, Outgoing], Awaitable[Answer]]] = {
+            Publishing: self._publish,
             Call: self._call,
             Action: self._start,
             Parameter: self._set,
         }
-        self._refusals: Mapping[type[Pressed], Callable[[Any, dict[str, Any]], str]] = {
-            Publish: self._unpublished,
+        self.refusals: Mapping[type[Pressed], Callable[[Any, dict[str, Any]], str]] = {
+            Publishing: self._unpublished,
             Call: self._uncalled,
             Action: lambda widget, _: self._actions.full(widget.action),
             Parameter: lambda widget, _: self._calls.full(f"{widget.node}/{SET[0]}"),
         }
-        self._checks: Mapping[type[Entered], Callable[[Any, Any], Any]] = {
+        self.checks: Mapping[type[Entered], Callable[[Any, Any], Any]] = {
             Input: lambda widget, given: widget.checked(given),
             Parameter: self._parameters.checked,
         }
@@ -136,15 +136,15 @@ class Sending:
         """
         values = self.checked(self._needs[widget.id], inputs)
         fields = filled(widget.template, with_now(values))
-        send = row_of(self._send, widget)
+        send = row_of(self.senders, widget)
         return await send(widget, Outgoing(values, fields, press_id, correct, entry, look))
 
     def refusal(self, widget: Pressed, inputs: Mapping[str, Any]) -> str:
         """Why `send` would refuse it now, "" if it would not; FieldError or InputError as there."""
         values = self.checked(self._needs[widget.id], inputs)
-        return row_of(self._refusals, widget)(widget, filled(widget.template, with_now(values)))
+        return row_of(self.refusals, widget)(widget, filled(widget.template, with_now(values)))
 
-    async def _publish(self, widget: Publish, going: Outgoing) -> Answer:
+    async def _publish(self, widget: Publishing, going: Outgoing) -> Answer:
         if widget.confirm is None:
             return await self._arrived(widget, self._published(widget, going.fields, going.look))
         equals = filled(widget.confirm.equals, going.values)
@@ -154,7 +154,7 @@ class Sending:
             widget, equals, going.press_id, since, answer.text, going.correct
         )
 
-    def _unpublished(self, widget: Publish, fields: dict[str, Any]) -> str:
+    def _unpublished(self, widget: Publishing, fields: dict[str, Any]) -> str:
         self._interfaces.encode(widget.type, fields)
         return ""
 
@@ -176,7 +176,7 @@ class Sending:
         value = going.fields["value"]
         return await self._parameters.set(widget, value, going.press_id, going.correct, going.look)
 
-    def _published(self, widget: Publish, fields: dict[str, Any], look: LastLook) -> Answer:
+    def _published(self, widget: Publishing, fields: dict[str, Any], look: LastLook) -> Answer:
         payload = self._interfaces.encode(widget.type, fields)
         key = self._robot.key(widget.topic)
         heard = self._way.heard(key)
@@ -186,7 +186,7 @@ class Sending:
         text = say(sentence, topic=widget.topic, time=format_time(time.time()))
         return Answer("published" if heard else "unknown", text)
 
-    async def _arrived(self, widget: Publish, answer: Answer) -> Answer:
+    async def _arrived(self, widget: Publishing, answer: Answer) -> Answer:
         """What was `published` is on its way until the bridge has answered."""
         at = format_time(time.time())
         if answer.outcome != "published" or await self._reached():
@@ -203,7 +203,7 @@ class Sending:
             field = self._widgets[name]
             if name not in inputs:
                 raise InputError(f'the input "{name}" is missing')
-            values[name] = row_of(self._checks, field)(field, inputs[name])
+            values[name] = row_of(self.checks, field)(field, inputs[name])
         return values
 
     def over(self, widget: Action, press_id: str) -> str:

@@ -12,7 +12,7 @@ from app.panel.rules import ControlRules, LogRules, RecordRules
 from app.panel.widgets.families import Command, Display, OnTopic, Placed, Published
 from app.panel.widgets.kinds import Widget
 from app.panel.widgets.parameter import EVENT_TYPE, EVENTS, Parameter
-from app.panel.widgets.publish import Confirm, Publish
+from app.panel.widgets.publish import Confirm, Publishing
 from app.panel.widgets.service_action import Action
 
 
@@ -97,7 +97,7 @@ class Panel(Description):
     def confirms(self) -> Iterator[Confirm]:
         """All that shows that a command took effect."""
         for widget in self.widgets():
-            if isinstance(widget, Publish) and widget.confirm is not None:
+            if isinstance(widget, Publishing) and widget.confirm is not None:
                 yield widget.confirm
 
     def listening(self) -> Iterator[Interlock | Display]:

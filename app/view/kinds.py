@@ -11,7 +11,7 @@ from app.panel.widgets.hold import Hold
 from app.panel.widgets.kinds import row_of
 from app.panel.widgets.numbers import Numeric
 from app.panel.widgets.parameter import Parameter
-from app.panel.widgets.publish import Publish
+from app.panel.widgets.publish import Publishing
 from app.permission.interlocks import PERMITTED, Verdict
 from app.robot.command_status import IDLE, Progress
 from app.robot.state import Robot
@@ -71,7 +71,7 @@ def _pressed(widget: Pressed, robot: Robot, verdict: Verdict, _: float) -> Shown
     return {**lock(widget, verdict), **came}, math.inf
 
 
-def _published(widget: Publish, robot: Robot, verdict: Verdict, now: float) -> Shown:
+def _published(widget: Publishing, robot: Robot, verdict: Verdict, now: float) -> Shown:
     if widget.confirm is not None:
         return _pressed(widget, robot, verdict, now)
     return lock(widget, verdict), math.inf
@@ -91,7 +91,7 @@ SHOWN: Final[Mapping[type[Placed], Callable[[Any, Robot, Verdict, float], Shown]
     Input: lambda of, robot, verdict, now: ({}, math.inf),
     Numeric: lambda of, robot, verdict, now: ({"limits": of.limits}, math.inf),
     Pressed: _pressed,
-    Publish: _published,
+    Publishing: _published,
     Hold: _held,
     Parameter: _parameter,
     Display: lambda of, robot, verdict, now: value(of, robot, now),

@@ -15,7 +15,7 @@ from app.panel.model import Panel, RobotEntry
 from app.panel.template import NOW
 from app.panel.widgets.families import Checking, Entered, Input, OnTopic, Placed
 from app.panel.widgets.parameter import Parameter, type_faults
-from app.panel.widgets.publish import Confirm, Publish
+from app.panel.widgets.publish import Confirm, Publishing
 
 
 def faults_in(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = ()) -> Iterator[Fault]:
@@ -167,7 +167,7 @@ def _topics_of_two_kinds(panel: Panel, told: Sequence[str]) -> Iterator[Fault]:
     for place, widget in _placed(panel):
         if isinstance(widget, OnTopic):
             places.append((place, widget))
-        if isinstance(widget, Publish) and widget.confirm and widget.confirm.type:
+        if isinstance(widget, Publishing) and widget.confirm and widget.confirm.type:
             confirms.append((f"{place}.confirm", widget.confirm))
     firsts: dict[str, tuple[str, Interlock | OnTopic | Confirm]] = {}
     for place, one in (*places, *confirms):

@@ -27,10 +27,10 @@ class Confirm(Description):
     within_s: Seconds = 2.0
 
 
-class Publish(Templated, Published):
-    """A command; with `one_shot` it is locked until its effect is confirmed, or did not show."""
+class Publishing(Templated, Published):
+    """A press that publishes a message; with `one_shot` it is locked until its effect is confirmed, or
+    did not show."""
 
-    kind: Literal["publish"]
     message: dict[str, Any]
     confirm: Confirm | None = None
     one_shot: bool = False
@@ -55,7 +55,7 @@ class Publish(Templated, Published):
         return self.type
 
     def templates(self) -> list[Any]:
-        return [self.message, *([self.confirm.equals] if self.confirm else [])]
+        return [self.template, *([self.confirm.equals] if self.confirm else [])]
 
     def answer_faults(self, place: str, checking: Checking) -> Iterator[Fault]:
         if self.confirm is not None:
@@ -63,6 +63,10 @@ class Publish(Templated, Published):
         elif self.one_shot:
             what = "needs `confirm`: without it nothing tells when the command was answered"
             yield Fault(f"{place}.one_shot", what)
+
+
+class Publish(Publishing):
+    kind: Literal["publish"]
 
 
 def _confirm_faults(place: str, confirm: Confirm, checking: Checking) -> Iterator[Fault]:

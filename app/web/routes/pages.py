@@ -3,6 +3,7 @@
 import asyncio
 import secrets
 import time
+from collections.abc import Sequence
 from typing import Any, TypedDict, get_args
 from urllib.parse import urlencode
 
@@ -23,6 +24,7 @@ from app.permission.control_authority import Refusal
 from app.permission.control_authority_view import Role, role
 from app.printable import printable_texts
 from app.runtime.robot_session import Kiosk
+from app.view.sections import SECTIONS, Section
 from app.view.view import View, as_seen_by
 from app.web.app_state import CurrentSite, Site
 from app.web.client_cookie import by_hand, keep, welcomed
@@ -59,19 +61,11 @@ LINK_WORDS = ("links", "link_state", "link_since", "link_locks")
 CONTROL_ACTS = ("take", "ask", "give", "keep", "release", "withdraw")
 
 
-# What a page is made of, and how long after the start it is compiled: when the port is open, and while
-# the link settles, which is waiting. Otherwise the first page takes that time.
+# How long after the start what a page is made of is compiled: when the port is open, and while the link
+# settles, which is waiting. Otherwise the first page takes that time.
 # Small ones: what a compiler takes for one, the next takes again, and the loop turns in between.
-TEMPLATES = (
-    "base.html",
-    "_inputs.html",
-    "_commands.html",
-    "_parameter.html",
-    "_displays.html",
-    "_control.html",
-    "screen.html",
-)
 COMPILED_AFTER_S = 0.1
+OTHER_PAGES = ("ask.html", "error.html", "log.html")
 
 
 class PageContext(TypedDict):
@@ -83,6 +77,7 @@ class PageContext(TypedDict):
     base: str
     robot: str
     view: View
+    sections: Sequence[Section]
     event_id: str
     revision: str
     clock: str
@@ -137,7 +132,7 @@ async def named_page(page: str, request: Request, site: CurrentSite) -> Response
 async def compiled(templates: Environment) -> None:
     """Makes the first page as quick as the next."""
     await asyncio.sleep(COMPILED_AFTER_S)
-    for name in TEMPLATES:
+    for name in templates.list_templates(filter_func=lambda name: name not in OTHER_PAGES):
         templates.get_template(name)
         await asyncio.sleep(0)
 
@@ -185,6 +180,7 @@ def _context(
         base=kiosk.base,
         robot=kiosk.entry.id if kiosk.entry else "",
         view=as_seen_by(board.view, browser),
+        sections=SECTIONS,
         event_id=board.id,
         revision=board.revision,
         clock=format_time(wall),
