@@ -95,9 +95,7 @@ def test_what_does_not_fit_the_description_is_told_as_any_error(kiosk: Server) -
     assert answer.json()["error"].startswith("once: Input should be a valid boolean")
 
 
-def test_schemathesis_finds_nothing(
-    kiosk: Server, described: dict[str, Any], tmp_path: Path
-) -> None:
+def test_schemathesis_finds_nothing(kiosk: Server, described: dict[str, Any], tmp_path: Path) -> None:
     """All of its checks, on everything but the stream that never ends."""
     done = subprocess.run(
         [
