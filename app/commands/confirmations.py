@@ -13,8 +13,8 @@ from typing import Any, Final
 
 from app.clock import format_time
 from app.i18n import say
-from app.panel.model import Confirm, Publish
-from app.panel.widgets.inputs import same
+from app.panel.values import same
+from app.panel.widgets.publish import Confirm, Publishing
 from app.robot.command_status import Answer, Corrected, Progress
 from app.robot.state import Reading, Robot
 from app.ros_logging import RobotLog
@@ -29,7 +29,7 @@ CLOSE: Final = 1e-6  # a float32 comes back as the nearest one
 class _Waiting:
     """A command that was sent at `since` (monotonic seconds) and is not confirmed yet."""
 
-    widget: Publish
+    widget: Publishing
     confirm: Confirm
     equals: Any
     press_id: str
@@ -51,7 +51,7 @@ class Confirmations:
 
     async def awaited(
         self,
-        widget: Publish,
+        widget: Publishing,
         equals: Any,
         press_id: str,
         since: float,
@@ -123,7 +123,7 @@ class Confirmations:
         if self._latest.get(waiting.widget.id) == waiting.press_id:
             self._show(waiting.widget, Progress(outcome=answer.outcome, text=answer.text))
 
-    def _show(self, widget: Publish, progress: Progress) -> None:
+    def _show(self, widget: Publishing, progress: Progress) -> None:
         self._robot.progress[widget.id] = progress
         self._changed()
 

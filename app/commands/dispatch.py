@@ -2,21 +2,23 @@
 
 import time
 from collections.abc import Awaitable, Callable, Iterable, Mapping
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from app.clock import format_time
 from app.commands.actions.goals import Actions
 from app.commands.confirmations import Confirmations
-from app.commands.parameters import values
 from app.commands.parameters.sync import Parameters
 from app.commands.service_calls import Calls
 from app.errors import InputError, NotFound
 from app.i18n import say
 from app.interfaces import Interfaces
-from app.panel.input_values import checked, default_of, typed
-from app.panel.model import Action, Call, Hold, Input, Panel, Pressed, Publish
+from app.panel.model import Panel
 from app.panel.template import filled, inputs_of, with_now
+from app.panel.widgets.families import Command, Entered, Input, Pressed
+from app.panel.widgets.kinds import row_of
 from app.panel.widgets.parameter import SET, Parameter
+from app.panel.widgets.publish import Publishing
+from app.panel.widgets.service_action import Action, Call
 from app.robot.command_status import Answer, Corrected, LastLook, no_look
 from app.robot.state import Robot
 
@@ -31,6 +33,18 @@ class Way(Protocol):
 async def taken_for_reached() -> bool:
     """Where nobody asks whether something arrives."""
     return True
+
+
+class Outgoing(NamedTuple):
+    """What is sent by a press: the checked `values` of its inputs and the `fields` that they fill in,
+    and what `Sending.send` gets beside them."""
+
+    values: dict[str, Any]
+    fields: dict[str, Any]
+    press_id: str
+    correct: Corrected
+    entry: str
+    look: LastLook
 
 
 class Sending:
@@ -61,6 +75,23 @@ class Sending:
         self._confirmations = confirmations
         self._parameters = parameters
         self._monotonic = monotonic
+        # How each kind, or family, is sent; why it would not be; and how what is entered is checked.
+        self.senders: Mapping[type[Pressed], Callable[[Any, Outgoing], Awaitable[Answer]]] = {
+            Publishing: self._publish,
+            Call: self._call,
+            Action: self._start,
+            Parameter: self._set,
+        }
+        self.refusals: Mapping[type[Pressed], Callable[[Any, dict[str, Any]], str]] = {
+            Publishing: self._unpublished,
+            Call: self._uncalled,
+            Action: lambda widget, _: self._actions.full(widget.action),
+            Parameter: lambda widget, _: self._calls.full(f"{widget.node}/{SET[0]}"),
+        }
+        self.checks: Mapping[type[Entered], Callable[[Any, Any], Any]] = {
+            Input: lambda widget, given: widget.checked(given),
+            Parameter: self._parameters.checked,
+        }
 
     def widget(self, widget_id: str) -> Pressed:
         """What can be pressed; NotFound for everything else."""
@@ -75,19 +106,17 @@ class Sending:
 
     def _typed(self, name: str, text: str) -> Any:
         field = self._widgets.get(name)
-        if isinstance(field, Parameter):
-            return values.typed(field, text)
-        return typed(field, text) if isinstance(field, Input) else text
+        return field.typed(text) if isinstance(field, Entered) else text
 
     def needed(self, widget: Pressed, inputs: Mapping[str, Any]) -> dict[str, Any]:
         """Of all that came with a press, the inputs that it needs."""
         return {name: inputs[name] for name in self._needs[widget.id] if name in inputs}
 
-    def with_defaults(self, widget: Pressed | Hold, inputs: Mapping[str, Any]) -> dict[str, Any]:
+    def with_defaults(self, widget: Command, inputs: Mapping[str, Any]) -> dict[str, Any]:
         """What came with a press, and the defaults of other inputs that it needs, where the panel file
         gives one."""
         fields = ((name, self._widgets[name]) for name in inputs_of(widget) if name not in inputs)
-        missing = {name: default_of(field) for name, field in fields if isinstance(field, Input)}
+        missing = {name: field.default_value for name, field in fields if isinstance(field, Entered)}
         return {name: value for name, value in missing.items() if value is not None} | {**inputs}
 
     async def send(
@@ -107,42 +136,47 @@ class Sending:
         """
         values = self.checked(self._needs[widget.id], inputs)
         fields = filled(widget.template, with_now(values))
-        match widget:
-            case Publish():
-                if widget.confirm is None:
-                    return await self._arrived(widget, self._published(widget, fields, look))
-                equals = filled(widget.confirm.equals, values)
-                since = self._monotonic()
-                answer = self._published(widget, fields, look)
-                return await self._confirmations.awaited(
-                    widget, equals, press_id, since, answer.text, correct
-                )
-            case Call():
-                request, _ = self._interfaces.service(widget.type)
-                payload = self._interfaces.encode(request, fields)
-                return await self._calls.call(widget, payload, press_id, correct, look)
-            case Action():
-                return await self._actions.start(widget, fields, press_id, correct, entry, look)
-            case Parameter():
-                return await self._parameters.set(widget, fields["value"], press_id, correct, look)
+        send = row_of(self.senders, widget)
+        return await send(widget, Outgoing(values, fields, press_id, correct, entry, look))
 
     def refusal(self, widget: Pressed, inputs: Mapping[str, Any]) -> str:
         """Why `send` would refuse it now, "" if it would not; FieldError or InputError as there."""
         values = self.checked(self._needs[widget.id], inputs)
-        fields = filled(widget.template, with_now(values))
-        match widget:
-            case Publish():
-                self._interfaces.encode(widget.type, fields)
-            case Call():
-                self._interfaces.encode(self._interfaces.service(widget.type)[0], fields)
-                return self._calls.full(widget.service)
-            case Action():
-                return self._actions.full(widget.action)
-            case Parameter():
-                return self._calls.full(f"{widget.node}/{SET[0]}")
+        return row_of(self.refusals, widget)(widget, filled(widget.template, with_now(values)))
+
+    async def _publish(self, widget: Publishing, going: Outgoing) -> Answer:
+        if widget.confirm is None:
+            return await self._arrived(widget, self._published(widget, going.fields, going.look))
+        equals = filled(widget.confirm.equals, going.values)
+        since = self._monotonic()
+        answer = self._published(widget, going.fields, going.look)
+        return await self._confirmations.awaited(
+            widget, equals, going.press_id, since, answer.text, going.correct
+        )
+
+    def _unpublished(self, widget: Publishing, fields: dict[str, Any]) -> str:
+        self._interfaces.encode(widget.type, fields)
         return ""
 
-    def _published(self, widget: Publish, fields: dict[str, Any], look: LastLook) -> Answer:
+    async def _call(self, widget: Call, going: Outgoing) -> Answer:
+        request, _ = self._interfaces.service(widget.type)
+        payload = self._interfaces.encode(request, going.fields)
+        return await self._calls.call(widget, payload, going.press_id, going.correct, going.look)
+
+    def _uncalled(self, widget: Call, fields: dict[str, Any]) -> str:
+        self._interfaces.encode(self._interfaces.service(widget.type)[0], fields)
+        return self._calls.full(widget.service)
+
+    async def _start(self, widget: Action, going: Outgoing) -> Answer:
+        return await self._actions.start(
+            widget, going.fields, going.press_id, going.correct, going.entry, going.look
+        )
+
+    async def _set(self, widget: Parameter, going: Outgoing) -> Answer:
+        value = going.fields["value"]
+        return await self._parameters.set(widget, value, going.press_id, going.correct, going.look)
+
+    def _published(self, widget: Publishing, fields: dict[str, Any], look: LastLook) -> Answer:
         payload = self._interfaces.encode(widget.type, fields)
         key = self._robot.key(widget.topic)
         heard = self._way.heard(key)
@@ -152,7 +186,7 @@ class Sending:
         text = say(sentence, topic=widget.topic, time=format_time(time.time()))
         return Answer("published" if heard else "unknown", text)
 
-    async def _arrived(self, widget: Publish, answer: Answer) -> Answer:
+    async def _arrived(self, widget: Publishing, answer: Answer) -> Answer:
         """What was `published` is on its way until the bridge has answered."""
         at = format_time(time.time())
         if answer.outcome != "published" or await self._reached():
@@ -162,17 +196,14 @@ class Sending:
     def checked(self, names: Iterable[str], inputs: Mapping[str, Any]) -> dict[str, Any]:
         """The values of the inputs with these ids."""
         for name in inputs:
-            if not isinstance(self._widgets.get(name), Input | Parameter):
+            if not isinstance(self._widgets.get(name), Entered):
                 raise InputError(f'there is no input "{name:.60}" on this panel')
         values: dict[str, Any] = {}
         for name in names:
             field = self._widgets[name]
             if name not in inputs:
                 raise InputError(f'the input "{name}" is missing')
-            if isinstance(field, Input):
-                values[name] = checked(field, inputs[name])
-            elif isinstance(field, Parameter):
-                values[name] = self._parameters.checked(field, inputs[name])
+            values[name] = row_of(self.checks, field)(field, inputs[name])
         return values
 
     def over(self, widget: Action, press_id: str) -> str:

@@ -39,7 +39,9 @@ from app.commands.repeated import Recall
 from app.concurrency import Waits
 from app.errors import Cause, FieldError, InputError, LinkError, LogError, NotFound, PressRefused
 from app.i18n import say
-from app.panel.model import Action, Panel, Pressed
+from app.panel.model import Panel
+from app.panel.widgets.families import Pressed
+from app.panel.widgets.service_action import Action
 from app.permission.interlocks import Verdict
 from app.robot.command_status import Answer
 from app.robot.state import Robot

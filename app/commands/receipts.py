@@ -11,9 +11,9 @@ from typing import Any, Final, Protocol, cast
 from app.audit import Entry, Origin
 from app.errors import Cause
 from app.i18n import say
-from app.panel.model import Hold, Panel, Pressed
+from app.panel.model import Panel
 from app.panel.template import needed
-from app.panel.widgets.parameter import Parameter
+from app.panel.widgets.families import Command, Entered, Pressed
 from app.permission.interlocks import NO_WAY, PERMITTED, Verdict, press_verdict, way
 from app.robot.command_status import Answer, Outcome
 from app.robot.state import Robot
@@ -73,7 +73,7 @@ class By:
     doubt: Callable[[], str] = no_doubt
 
 
-def judged(widget: Pressed | Hold, by: By, panel: Panel, robot: Robot, now: float) -> Verdict:
+def judged(widget: Command, by: By, panel: Panel, robot: Robot, now: float) -> Verdict:
     """Whether a widget may be pressed or held by somebody now. The first that locks is told: the way to
     the robot, who has control, the widget's interlocks."""
     for verdict in (way(robot, now), by.controls()):
@@ -146,7 +146,7 @@ def _keep(receipts: OrderedDict[str, Receipt], receipt: Receipt) -> list[str]:
 
 
 def receipt_of(
-    widget: Pressed | Hold,
+    widget: Command,
     inputs: Mapping[str, Any],
     press_id: str,
     answer: Answer,
@@ -186,9 +186,9 @@ def corrected(receipt: Receipt, answer: Answer) -> Receipt:
     return replace(receipt, outcome=answer.outcome, reason=answer.text, cause="")
 
 
-def untyped(widget: Pressed | Hold, receipt: Receipt) -> str:
+def untyped(widget: Command, receipt: Receipt) -> str:
     """The outcome, with its reason where that repeats nothing of what was typed in."""
-    if receipt.cause == "input" or isinstance(widget, Parameter):
+    if receipt.cause == "input" or isinstance(widget, Entered):
         return receipt.outcome
     return f"{receipt.outcome}: {receipt.reason}"
 

@@ -13,7 +13,7 @@ from app.clock import format_time
 from app.commands.dispatch import Sending
 from app.commands.receipts import Receipt, Receipts, named, receipt_of, untyped, with_doubt
 from app.i18n import say
-from app.panel.model import Pressed
+from app.panel.widgets.families import Pressed
 from app.robot.command_status import Answer
 from app.ros_logging import RobotLog, on_rosout
 

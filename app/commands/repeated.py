@@ -9,7 +9,7 @@ from app.commands.receipts import Receipt, cause_of, named, recalled
 from app.commands.refusals import Unjudged
 from app.errors import Cause, FieldError, InputError
 from app.i18n import say
-from app.panel.model import Pressed
+from app.panel.widgets.families import Pressed
 from app.permission.interlocks import PERMITTED, Verdict
 from app.ros_logging import RobotLog
 

@@ -17,8 +17,8 @@ from app.concurrency import told
 from app.errors import DecodeError
 from app.i18n import say
 from app.interfaces import Fields, Interfaces, text_of
-from app.panel.model import Call
 from app.panel.template import PLACE
+from app.panel.widgets.service_action import Call
 from app.printable import printable
 from app.robot.command_status import Answer, Corrected, LastLook, Progress, no_look
 from app.robot.state import Robot

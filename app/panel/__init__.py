@@ -2,9 +2,13 @@
 
 from app.panel.interlock import Interlock
 from app.panel.load import Checked, check_panel, load_panel
-from app.panel.model import Display, Hold, Input, Page, Panel, Publish
+from app.panel.model import Page, Panel
 from app.panel.widgets.displays import Indicator, LampState, Readout
-from app.panel.widgets.inputs import NumberInput, SelectInput, SliderInput, TextInput, ToggleInput
+from app.panel.widgets.families import Display, Input
+from app.panel.widgets.hold import Hold
+from app.panel.widgets.inputs import SelectInput, TextInput, ToggleInput
+from app.panel.widgets.numbers import NumberInput, SliderInput
+from app.panel.widgets.publish import Publish
 
 __all__ = [
     "Checked",

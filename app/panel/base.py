@@ -151,14 +151,6 @@ class Description(BaseModel):
         return copied
 
 
-class Placed(Description):
-    """What every widget has; `span` is its width in twelfths of the page."""
-
-    id: Id
-    label: Label
-    span: Span = 12
-
-
 class TopicQos(Description):
     """A topic's QoS; no durability means volatile to publish, and the publisher's to listen."""
 

@@ -1,29 +1,32 @@
-"""Names of constants in a panel file: what they stand for, by the message that a field is in."""
+"""Values that a panel file names of a field: what constants' names stand for, and what never fits."""
 
 from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
 from itertools import takewhile
-from typing import Any
+from typing import Any, Final, Protocol
 
 from app.interfaces import INTEGERS, TEXTS, Interfaces, Type, around, name_of
+from app.interfaces.validation import shown
+from app.panel.faults.wording import listing
 from app.panel.interlock import Interlock
-from app.panel.model import Panel
 from app.panel.number_range import single
-from app.panel.widgets.displays import Indicator, Readout
+
+NUMBERS: Final = frozenset({*INTEGERS, "float32", "float64"})
 
 
-def holder(of: Readout | Indicator | Interlock, interfaces: Interfaces) -> str:
+class HasField(Protocol):
+    """An interlock or a display."""
+
+    @property
+    def type(self) -> str: ...
+    @property
+    def field(self) -> str: ...
+
+
+def holder(of: HasField, interfaces: Interfaces) -> str:
     """The type whose constants a field's values have: that of the message around it."""
     where = around(of.field)
     return interfaces.field_type(of.type, where) if where else of.type
-
-
-def value_of_state(given: bool | int | str, kind: str, constants: Mapping[str, Any]) -> Any:
-    """What a lamp's state is for: a text is a constant's name where the field is a whole number.
-
-    A name that there is no constant of stays what it is.
-    """
-    named = isinstance(given, str) and kind in INTEGERS
-    return constants.get(str(given), given) if named else given
 
 
 def meant(given: Any, kind: Type, constants: Mapping[str, Any]) -> Any:
@@ -41,17 +44,8 @@ def compared(given: Any, kind: Type, constants: Mapping[str, Any]) -> Any:
     return single(value) if kind.name == "float32" else value
 
 
-def resolved(panel: Panel, interfaces: Interfaces) -> Panel:
-    """The checked panel, with the value of each constant that a lamp or an interlock names."""
-    pages = []
-    for page in panel.pages:
-        lamps = (_lamp(w, interfaces) if isinstance(w, Indicator) else w for w in page.widgets)
-        pages.append(page.model_copy(update={"widgets": tuple(lamps)}))
-    interlocks = tuple(_interlock(one, interfaces) for one in panel.interlocks)
-    return panel.model_copy(update={"pages": tuple(pages), "interlocks": interlocks})
-
-
-def _interlock(of: Interlock, interfaces: Interfaces) -> Interlock:
+def resolved_interlock(of: Interlock, interfaces: Interfaces) -> Interlock:
+    """The same with the values of the constants that its conditions name."""
     kind = interfaces.type_at(of.type, of.field)
     constants = interfaces.constants(holder(of, interfaces))
     values = {
@@ -89,11 +83,28 @@ def _each(given: Any) -> tuple[Any, ...]:
     return given if isinstance(given, tuple) else (given,)
 
 
-def _lamp(lamp: Indicator, interfaces: Interfaces) -> Indicator:
-    kind = interfaces.field_type(lamp.type, lamp.field)
-    constants = interfaces.constants(holder(lamp, interfaces))
-    states = [
-        one.model_copy(update={"value": value_of_state(one.value, kind, constants)})
-        for one in lamp.states
-    ]
-    return lamp.model_copy(update={"states": tuple(states)})
+def misfit(value: Any, kind: str) -> str | None:
+    """Why a field of this type never has this value."""
+    if kind in ("float32", "float64"):
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        return None if number else f"must be a number ({kind}), not {shown(value)}"
+    if kind == "bool":
+        return None if isinstance(value, bool) else f"must be true or false (bool), not {shown(value)}"
+    if kind in INTEGERS:
+        low, high = INTEGERS[kind]
+        if isinstance(value, bool) or not isinstance(value, int):
+            return f"must be a whole number ({kind}), not {shown(value)}"
+        inside = low <= value <= high
+        return None if inside else f"{value} is out of range: {kind} goes from {low} to {high}"
+    return None if isinstance(value, str) else f"must be text ({kind}), not {shown(value)}"
+
+
+def no_constant(name: str, kind: str, type_name: str, constants: Mapping[str, Any]) -> str:
+    """What would be right where a whole number is meant, and a text is no constant's name."""
+    what = (
+        f"must be a whole number ({kind}) or the name of a constant of {type_name}, not {shown(name)}"
+    )
+    fitting = [one for one, value in constants.items() if misfit(value, kind) is None]
+    near = get_close_matches(name, fitting, n=1, cutoff=0.5)
+    has = f"it has {listing(fitting)}"
+    return f"{what}; did you mean {near[0]}? {has}" if near else f"{what}; {has}"

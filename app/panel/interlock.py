@@ -7,7 +7,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr
 
 from app.interfaces.validation import shown
 from app.panel.base import Description, FieldPath, Id, Label, Seconds, Topic, TopicQos, Type
-from app.panel.widgets.inputs import Unit
+from app.panel.widgets.numbers import Unit
 
 CONDITIONS: Final = ("equals", "not_equals", "min", "max", "one_of")
 

@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 from pydantic import ValidationError
 
 from app.errors import Fault, InterfaceError, Note, PanelError, Remark
-from app.interfaces import interfaces_of, read_distribution
-from app.panel.checks import faults_in
-from app.panel.constants import resolved
+from app.interfaces import Interfaces, interfaces_of, read_distribution
+from app.panel.checks.panel import faults_in
+from app.panel.constants import resolved_interlock
 from app.panel.faults.toml_file import TomlFile, read_toml
 from app.panel.model import Panel
 
@@ -58,7 +58,17 @@ def _panel(file: TomlFile, kept: Kept = lambda _: None) -> Panel:
         faults += _faults_with_types(panel)
     if faults:
         raise PanelError(str(file.path), _told(faults, file))
-    return resolved(panel, interfaces_of(panel.distro, panel.interfaces))
+    return _resolved(panel, interfaces_of(panel.distro, panel.interfaces))
+
+
+def _resolved(panel: Panel, interfaces: Interfaces) -> Panel:
+    """The checked panel, with the value of each constant that a lamp or an interlock names."""
+    pages = [
+        page.model_copy(update={"widgets": tuple(w.resolved(interfaces) for w in page.widgets)})
+        for page in panel.pages
+    ]
+    interlocks = tuple(resolved_interlock(one, interfaces) for one in panel.interlocks)
+    return panel.model_copy(update={"pages": tuple(pages), "interlocks": interlocks})
 
 
 def _faults_with_types(panel: Panel, faulty: Collection[str] = ()) -> Iterator[Fault]:

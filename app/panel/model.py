@@ -1,159 +1,19 @@
 """The descriptions that a panel file becomes. What a key means is in the README."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from functools import cached_property
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Final, Literal
 
 from pydantic import AfterValidator, Field
 
-from app.panel.base import (
-    ActionType,
-    Description,
-    Endpoint,
-    FieldPath,
-    Folder,
-    Id,
-    Interlocks,
-    Label,
-    Placed,
-    Seconds,
-    ServiceType,
-    Span,
-    Topic,
-    TopicQos,
-    Type,
-    WrittenField,
-    namespace_of,
-)
+from app.panel.base import Description, Endpoint, Folder, Id, Label, TopicQos, namespace_of
 from app.panel.interlock import Interlock
 from app.panel.rules import ControlRules, LogRules, RecordRules
-from app.panel.widgets.displays import Indicator, Readout
-from app.panel.widgets.inputs import NumberInput, SelectInput, SliderInput, TextInput, ToggleInput
+from app.panel.widgets.families import Command, Display, OnTopic, Placed, Published
+from app.panel.widgets.kinds import Widget
 from app.panel.widgets.parameter import EVENT_TYPE, EVENTS, Parameter
-
-
-class Confirm(Description):
-    """A field of the robot's that shows that a command took effect: it comes to have the value
-    `equals` (or that of an input, `"{id}"`) in time. The type is that which the panel gives for
-    the topic elsewhere, if there is none here."""
-
-    topic: Topic
-    type: Type | None = None
-    field: FieldPath = "data"
-    equals: Any
-    within_s: Seconds = 2.0
-
-
-class Publish(Placed):
-    """A command; with `one_shot` it is locked until its effect is confirmed, or did not show."""
-
-    kind: Literal["publish"]
-    topic: Topic
-    type: Type
-    message: dict[str, Any]
-    interlocks: Interlocks = Field(default=(), alias="interlock")
-    qos: TopicQos = TopicQos()
-    confirm: Confirm | None = None
-    one_shot: bool = False
-    confirm_press: bool = False
-    span: Span = 4
-
-    @property
-    def template(self) -> dict[str, Any]:
-        return self.message
-
-
-class Hold(Placed):
-    """Published `rate_hz` times a second while its button is held, and `release` once after.
-
-    `deadline_field` gets the milliseconds within which the next message must come, 0 in the last
-    one; `counter_field` counts the messages.
-    """
-
-    kind: Literal["hold"]
-    topic: Topic
-    type: Type
-    message: dict[str, Any]
-    release: dict[str, Any]
-    interlocks: Interlocks = Field(alias="interlock")
-    rate_hz: Annotated[float, Field(ge=1, le=100)] = 20.0
-    deadline_field: WrittenField | None = None
-    counter_field: WrittenField | None = None
-    qos: TopicQos = TopicQos()
-    span: Span = 4
-
-    @property
-    def period_s(self) -> float:
-        return 1 / self.rate_hz
-
-    @property
-    def deadline_ms(self) -> int:
-        """Three periods, 100 ms at least: two messages may be late or lost before the robot stops."""
-        return max(100, round(3000 / self.rate_hz))
-
-
-class Call(Placed):
-    """A service call; `success` and `message` are fields of the response, found by themselves
-    where it has a bool and a string of these names; `answer` is shown with `{field}` filled in."""
-
-    kind: Literal["call"]
-    service: Topic
-    type: ServiceType
-    request: dict[str, Any] = Field(default_factory=dict)
-    interlocks: Interlocks = Field(default=(), alias="interlock")
-    timeout_s: Seconds = 5.0
-    success: FieldPath | None = None
-    message: FieldPath | None = None
-    answer: str = ""
-    confirm_press: bool = False
-    span: Span = 4
-
-    @property
-    def template(self) -> dict[str, Any]:
-        return self.request
-
-
-class Action(Placed):
-    """An action's goal with a cancel button; `progress` is a field of the feedback that goes from
-    0 to `progress_max`; `feedback` and `result` are shown with `{field}` filled in."""
-
-    kind: Literal["action"]
-    action: Topic
-    type: ActionType
-    goal: dict[str, Any] = Field(default_factory=dict)
-    interlocks: Interlocks = Field(default=(), alias="interlock")
-    timeout_s: Seconds = 5.0
-    progress: FieldPath | None = None
-    progress_max: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 100.0
-    feedback: str = ""
-    result: str = ""
-    confirm_press: bool = False
-    span: Span = 6
-
-    @property
-    def template(self) -> dict[str, Any]:
-        return self.goal
-
-
-Input = TextInput | NumberInput | SliderInput | SelectInput | ToggleInput
-Pressed = Publish | Call | Action | Parameter
-Display = Readout | Indicator
-Published = Publish | Hold
-Widget = Annotated[Input | Pressed | Hold | Display, Field(discriminator="kind")]
-KINDS: Final[Mapping[str, type[Placed]]] = {
-    "text": TextInput,
-    "number": NumberInput,
-    "slider": SliderInput,
-    "select": SelectInput,
-    "toggle": ToggleInput,
-    "publish": Publish,
-    "hold": Hold,
-    "call": Call,
-    "action": Action,
-    "parameter": Parameter,
-    "readout": Readout,
-    "indicator": Indicator,
-}
+from app.panel.widgets.publish import Confirm, Publishing
+from app.panel.widgets.service_action import Action
 
 
 class RobotEntry(Description):
@@ -195,17 +55,17 @@ class Panel(Description):
     # Of the file, not in it: changes when what a browser has loaded is out of date.
     revision: Annotated[str, Field(exclude=True)] = ""
 
-    def widgets(self) -> Iterator[Input | Pressed | Hold | Display]:
+    def widgets(self) -> Iterator[Placed]:
         for page in self.pages:
             yield from page.widgets
 
     @cached_property
-    def commands(self) -> "tuple[Pressed | Hold, ...]":
+    def commands(self) -> tuple[Command, ...]:
         """All that can be pressed."""
-        return tuple(w for w in self.widgets() if isinstance(w, Pressed | Hold))
+        return tuple(w for w in self.widgets() if isinstance(w, Command))
 
     @cached_property
-    def displays(self) -> "tuple[Display, ...]":
+    def displays(self) -> tuple[Display, ...]:
         return tuple(w for w in self.widgets() if isinstance(w, Display))
 
     def page(self, page_id: str) -> Page | None:
@@ -214,7 +74,7 @@ class Panel(Description):
     def interlock(self, interlock_id: str) -> Interlock | None:
         return next((i for i in self.interlocks if i.id == interlock_id), None)
 
-    def interlocks_of(self, widget: "Pressed | Hold") -> tuple[Interlock, ...]:
+    def interlocks_of(self, widget: Command) -> tuple[Interlock, ...]:
         """Those that all have to permit a press, in the order of the file."""
         known = {one.id: one for one in self.interlocks}
         return tuple(known[name] for name in widget.interlocks)
@@ -237,7 +97,7 @@ class Panel(Description):
     def confirms(self) -> Iterator[Confirm]:
         """All that shows that a command took effect."""
         for widget in self.widgets():
-            if isinstance(widget, Publish) and widget.confirm is not None:
+            if isinstance(widget, Publishing) and widget.confirm is not None:
                 yield widget.confirm
 
     def listening(self) -> Iterator[Interlock | Display]:
@@ -258,6 +118,6 @@ class Panel(Description):
 
     def qos(self, topic: str) -> TopicQos:
         """A topic's QoS, which is the same wherever the panel names it."""
-        speaking = (w for w in self.widgets() if isinstance(w, Published))
-        named = (of.qos for of in (*self.listening(), *speaking) if of.topic == topic)
-        return next(named, OF_EVENTS if topic == EVENTS else TopicQos())
+        named = {w.topic: w.qos for w in self.widgets() if isinstance(w, OnTopic)}
+        named |= {one.topic: one.qos for one in self.interlocks}
+        return named.get(topic, OF_EVENTS if topic == EVENTS else TopicQos())

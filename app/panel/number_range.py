@@ -14,7 +14,7 @@ from typing import Final
 
 from app.i18n import say
 from app.interfaces import to_plain
-from app.panel.widgets.inputs import digits
+from app.panel.values import digits
 
 # rclcpp takes a double for on a step when it is this near, in units of the last place.
 NEAR_ULP: Final = 100

@@ -8,7 +8,7 @@ from string import Formatter
 from typing import Any, Final
 
 from app.errors import FieldError
-from app.panel.model import Hold, Pressed, Publish
+from app.panel.widgets.families import Command
 
 # In what is shown of an answer: a path in its type. (In what is sent: the id of an input.)
 PLACE: Final = re.compile(r"\{([^{}]*)\}")
@@ -96,17 +96,12 @@ def named(template: Any, where: str = "") -> Iterator[tuple[str, str]]:
         yield from ((where, name) for _, name in _parts(template, where) if name is not None)
 
 
-def inputs_of(widget: Pressed | Hold) -> list[str]:
-    """The ids of the inputs that a press or a hold needs."""
-    if isinstance(widget, Hold):
-        return names_in([widget.message, widget.release])
-    templates: list[Any] = [widget.template]
-    if isinstance(widget, Publish) and widget.confirm is not None:
-        templates.append(widget.confirm.equals)
-    return names_in(templates)
+def inputs_of(widget: Command) -> list[str]:
+    """The ids of the inputs that a command needs."""
+    return names_in(widget.templates())
 
 
-def needed(widget: Pressed | Hold, given: Mapping[str, Any]) -> dict[str, Any]:
+def needed(widget: Command, given: Mapping[str, Any]) -> dict[str, Any]:
     """Of all that came with a press or a hold, the inputs that it needs."""
     return {name: given[name] for name in inputs_of(widget) if name in given}
 

@@ -6,7 +6,7 @@ from typing import Any, Final
 from app.i18n import say
 from app.panel.interlock import Interlock
 from app.panel.number_range import decimal, shortest
-from app.panel.widgets.inputs import same
+from app.panel.values import same
 
 LONGEST_TEXT: Final = 40  # characters of a text that stands in a reason
 DIGITS: Final = (6, 9)  # a float32 has nine at most

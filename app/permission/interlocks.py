@@ -5,17 +5,19 @@ reason an operator reads.
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Final
+from typing import Any, Final
 
-from app.dialect.endpoint import ServerRole, TopicRole
+from app.dialect.endpoint import TopicRole
 from app.i18n import say
 from app.interfaces.names import Qos
 from app.panel.interlock import Interlock
-from app.panel.model import Action, Call, Display, Hold, Pressed, Publish, Published
+from app.panel.widgets.families import Command, OnTopic, Published
+from app.panel.widgets.kinds import row_of
 from app.panel.widgets.parameter import DESCRIBE, GET, SET, Parameter
+from app.panel.widgets.service_action import Served
 from app.permission.conditions import permits, unmet
 from app.robot.command_status import IDLE
 from app.robot.graph import Graph, remembered
@@ -124,7 +126,7 @@ def _forbidden(interlock: Interlock, reading: Reading) -> Verdict:
 
 
 def press_verdict(
-    widget: Pressed | Hold, interlocks: Iterable[Interlock], robot: Robot, now: float
+    widget: Command, interlocks: Iterable[Interlock], robot: Robot, now: float
 ) -> Verdict:
     """Whether a widget may be pressed: a way, nothing of its own against it, and its interlocks."""
     permissions = [interlock_verdict(one, robot, now) for one in interlocks]
@@ -132,7 +134,7 @@ def press_verdict(
 
 
 def command_verdict(
-    widget: Pressed | Hold,
+    widget: Command,
     passable: Verdict,
     permissions: Sequence[Verdict],
     robot: Robot,
@@ -156,28 +158,23 @@ def combined(verdicts: Sequence[Verdict]) -> Verdict:
     return replace(locking[0], until=until, others=tuple(locking[1:]))
 
 
-def _against(widget: Pressed | Hold, robot: Robot, now: float) -> Verdict | None:
-    match widget:
-        case Publish() | Hold():
-            return against_publishing(widget, robot)
-        case Parameter():
-            return against_setting(widget, robot)
-    return against_calling(widget, robot, now)
+def _against(widget: Command, robot: Robot, now: float) -> Verdict | None:
+    return row_of(AGAINST, widget)(widget, robot, now)
 
 
-def against_publishing(publish: Published, robot: Robot) -> Verdict | None:
+def against_publishing(of: Published, robot: Robot) -> Verdict | None:
     """Why a message may not be published: another type, or the last one's effect is awaited."""
-    if doubt := misfit("MP", publish, robot):
+    if doubt := misfit("MP", of, robot):
         return doubt
-    if isinstance(publish, Publish) and publish.one_shot and robot.progress.get(publish.id, IDLE).busy:
+    if of.one_at_a_time and robot.progress.get(of.id, IDLE).busy:
         return locked("busy")
     return None
 
 
-def against_calling(call: Call | Action, robot: Robot, now: float) -> Verdict | None:
+def against_calling(call: Served, robot: Robot, now: float) -> Verdict | None:
     """Why a service may not be called or a goal not be sent: its server is not there with its type,
     or an answer is awaited."""
-    role, name = served(call)
+    role, name = call.role, call.server
     key = robot.key(name)
     found = robot.graph.server_type(role, key)
     if found is None:
@@ -237,12 +234,7 @@ def unsettable(of: Parameter, known: Declared) -> Verdict | None:
     return None
 
 
-def served(call: Call | Action) -> tuple[ServerRole, str]:
-    """What serves a call or an action, and by which name."""
-    return ("SS", call.service) if isinstance(call, Call) else ("AS", call.action)
-
-
-def misfit(role: TopicRole, of: Interlock | Published | Display, robot: Robot) -> Verdict | None:
+def misfit(role: TopicRole, of: Interlock | OnTopic, robot: Robot) -> Verdict | None:
     """Why a topic can't be trusted, by what the graph shows: another type, a QoS that DDS would
     not match, a bridge that does not pass it on. `role` is what the panel does with it: publish ("MP")
     or listen ("MS")."""
@@ -264,3 +256,11 @@ def _misfit(
 def locked(code: str, **about: str | None) -> Verdict:
     """The verdict for a sentence; the same one again for the same."""
     return Verdict(False, code, say(code, **about))
+
+
+# What the robot may have against a command, beside the way to it and its interlocks: by family.
+AGAINST: Final[Mapping[type[Any], Callable[[Any, Robot, float], Verdict | None]]] = {
+    Published: lambda of, robot, _: against_publishing(of, robot),
+    Served: against_calling,
+    Parameter: lambda of, robot, _: against_setting(of, robot),
+}

@@ -2,30 +2,23 @@
 went though their bridge stayed."""
 
 from collections.abc import Iterator, Mapping
+from typing import Final
 
 from app.dialect.endpoint import Role
-from app.panel.model import Action, Call, Panel
-from app.panel.widgets.parameter import DESCRIBE, GET, SET
+from app.panel.model import Panel
 from app.robot.graph import Graph, remembered
 
 End = tuple[Role, str]
+ORDER: Final[Mapping[Role, int]] = {"MP": 0, "MS": 1, "SS": 2, "AS": 2}
 
 
 def ends(panel: Panel) -> Iterator[End]:
     """What the panel talks with, as (role, ROS name). Every node publishes its parameters' events:
     they show none of the panel's."""
-    for of in panel.listening():
-        yield "MP", of.topic
-    for topic in panel.publications():
-        yield "MS", topic
-    for widget in panel.widgets():
-        if isinstance(widget, Call):
-            yield "SS", widget.service
-        elif isinstance(widget, Action):
-            yield "AS", widget.action
-    for parameter in panel.parameters():
-        for name, _ in (GET, DESCRIBE, SET):
-            yield "SS", f"{parameter.node}/{name}"
+    for interlock in panel.interlocks:
+        yield "MP", interlock.topic
+    of_widgets = (end for widget in panel.widgets() for end in widget.endpoints())
+    yield from sorted(of_widgets, key=lambda end: ORDER[end[0]])
 
 
 class Seen:

@@ -16,7 +16,8 @@ from app.errors import DecodeError
 from app.interfaces import Interfaces
 from app.interfaces.names import ROSOUT_TOPIC
 from app.panel.constants import holder
-from app.panel.model import Display, Panel, RobotEntry
+from app.panel.model import Panel, RobotEntry
+from app.panel.widgets.families import Display
 from app.robot.command_status import Progress
 from app.robot.graph import Graph
 from app.robot.parameter_state import Declared

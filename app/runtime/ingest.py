@@ -17,7 +17,7 @@ from app.permission.interlocks import Verdict, interlock_verdict
 from app.robot.state import Reading, Robot, Sample
 from app.ros_logging import RobotLog
 from app.transport.inbox import Changes, Token
-from app.view.view import Enabled, enabled
+from app.view.kinds import Enabled, enabled
 
 if TYPE_CHECKING:
     from app.recording import Recorder

@@ -7,8 +7,9 @@ from typing import Any, Final, Literal
 
 from app.clock import format_age, format_time
 from app.i18n import say
+from app.panel.values import same
 from app.panel.widgets.displays import Indicator, Readout
-from app.panel.widgets.inputs import same
+from app.panel.widgets.families import Display
 from app.permission.interlocks import misfit
 from app.printable import printable
 from app.robot.state import Robot
@@ -32,7 +33,7 @@ class Look:
     until: float = math.inf
 
 
-def look(widget: Readout | Indicator, robot: Robot, now: float) -> Look:
+def look(widget: Display, robot: Robot, now: float) -> Look:
     """What is known of a widget's field at `now`."""
     topic = widget.topic
     if doubt := misfit("MS", widget, robot):
@@ -58,6 +59,13 @@ def look(widget: Readout | Indicator, robot: Robot, now: float) -> Look:
     step = 1 if old < 60 else 60
     until = reading.at + (old // step + 1) * step
     return replace(seen, state="old", note=say("readout_old", age=format_age(old)), until=until)
+
+
+def value(widget: Display, robot: Robot, now: float) -> tuple[dict[str, Any], float]:
+    """Attributes of any display: `state`, `text` (its value as it is) and `note`; and when they
+    change."""
+    seen = look(widget, robot, now)
+    return {"state": seen.state, "text": written(seen.value), "note": seen.note}, seen.until
 
 
 def readout(widget: Readout, robot: Robot, now: float) -> tuple[dict[str, Any], float]:

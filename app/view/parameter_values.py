@@ -6,8 +6,7 @@ from typing import Any, Final
 from app.clock import format_time
 from app.i18n import say
 from app.panel.number_range import decimal
-from app.panel.widgets.check_parameters import LONGEST_TEXT
-from app.panel.widgets.parameter import EVENT_TYPE, EVENTS, One, Parameter, Value
+from app.panel.widgets.parameter import EVENT_TYPE, EVENTS, LONGEST_TEXT, One, Parameter, Value
 from app.permission.interlocks import parameters_offered
 from app.printable import printable
 from app.robot.parameter_state import LONGEST_LIST, UNKNOWN, Declared, allowed, limits_text

@@ -13,12 +13,11 @@ from typing import Any, Final
 from pydantic_core import to_json
 
 from app.view.heartbeat import Heartbeat
+from app.view.sections import Events, difference
 from app.view.view import View
 
 # What some readers take for the end of a line, and JSON leaves as it is.
 SEPARATORS: Final = {c.encode(): b"\\u%04x" % ord(c) for c in "\x85\u2028\u2029"}
-
-Events = dict[str, Mapping[str, Any]]  # the data of each by its name, in their order
 
 
 def encoded(data: Mapping[str, Any]) -> bytes:
@@ -114,32 +113,3 @@ class Board:
 def told(browser: str) -> bytes:
     """Tells a page the id of its browser: it knows by it what `control` means for it."""
     return b"event: browser\ndata: %b\n\n" % encoded({"id": browser})
-
-
-def difference(old: View, new: View) -> Events:
-    """What brings a browser from one view to another: nothing where they are the same."""
-    events: Events = {
-        f"{name}-enabled-updated": state
-        for name, state in new["interlocks"].items()
-        if old["interlocks"].get(name) != state
-    }
-    widgets = {
-        name: _changed(known, attributes)
-        for name, attributes in new["widgets"].items()
-        if (known := old["widgets"].get(name, {})) != attributes
-    }
-    if widgets:
-        events["update"] = widgets
-    if old["link"] != new["link"]:
-        events["link"] = new["link"]
-    if old["control"] != new["control"]:
-        events["control"] = new["control"]
-    if old["notice"] != new["notice"]:
-        events["notice"] = new["notice"]
-    if old["robots"] != new["robots"]:
-        events["robots"] = new["robots"]
-    return events
-
-
-def _changed(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in new.items() if key not in old or old[key] != value}

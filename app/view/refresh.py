@@ -10,7 +10,8 @@ from collections.abc import Callable, Collection, Mapping
 from typing import Protocol
 
 from app.audit.press_record import Log
-from app.panel.model import Display, Panel
+from app.panel.model import Panel
+from app.panel.widgets.families import Display
 from app.permission.control_authority import Control
 from app.robot.state import Robot
 from app.view.link_status import Lamp, Since

@@ -2,8 +2,9 @@
 
 The stylesheet is the layers of `static/css` in their order, with what the panel's kinds of widgets need
 and its millimetres: one request instead of five; what only the log's page needs is a file of its own.
-Scripts keep their names, so that modules find each other, and their lines. Comments, what lines are
-indented by and what only sets styles apart stay here.
+Scripts keep their names, so that modules find each other, and their lines. A kind of widgets may have
+`css/kinds/<kind>.css` and `js/kinds/<kind>.js`. Comments, what lines are indented by and what only sets
+styles apart stay here.
 """
 
 import gzip
@@ -17,7 +18,6 @@ from typing import Final
 LAYERS: Final = ("tokens", "base", "layout", "widgets")
 OF_KINDS: Final = {
     "entries": frozenset({"number", "slider", "toggle", "parameter"}),
-    "parameters": frozenset({"parameter"}),
     "reasons": frozenset({"interlocks"}),
 }
 OWN_PAGE: Final = "log"
@@ -49,6 +49,7 @@ class Assets:
 
     files: dict[str, Asset]
     revision: str
+    scripts: frozenset[str] = frozenset()  # the kinds of widgets that have a script of their own
 
 
 def load_assets(static: Path, templates: Path, mm_per_px: float, kinds: Collection[str]) -> Assets:
@@ -59,15 +60,19 @@ def load_assets(static: Path, templates: Path, mm_per_px: float, kinds: Collecti
     """
     needed = [name for name, of in OF_KINDS.items() if not of.isdisjoint(kinds)]
     layers = [(static / "css" / f"{name}.css").read_bytes() for name in (*LAYERS, *needed)]
+    of_kinds = [static / "css/kinds" / f"{kind}.css" for kind in sorted(kinds)]
+    layers += [file.read_bytes() for file in of_kinds if file.is_file()]
     millimetre = f":root{{--mm:{1 / mm_per_px:.4f}px}}\n".encode()
     files = {"kiosk.css": asset(b"".join([*layers, millimetre]), ".css")}
     own = (static / "css" / f"{OWN_PAGE}.css").read_bytes()
     files[f"{OWN_PAGE}.css"] = asset(own, ".css")
-    for script in sorted((static / "js").glob("*.js")):
-        files[script.name] = asset(script.read_bytes(), ".js")
+    scripts = static / "js"
+    for script in sorted(scripts.rglob("*.js")):
+        files[script.relative_to(scripts).as_posix()] = asset(script.read_bytes(), ".js")
     digest = hashlib.sha256()
     for name, file in sorted(files.items()):
         digest.update(name.encode() + b"\0" + file.content + b"\0")
-    for template in sorted(templates.glob("*.html")):
+    for template in sorted(templates.rglob("*.html")):
         digest.update(template.read_bytes() + b"\0")
-    return Assets(files, digest.hexdigest()[:12])
+    own_scripts = {script.stem for script in (scripts / "kinds").glob("*.js")}
+    return Assets(files, digest.hexdigest()[:12], frozenset(own_scripts))

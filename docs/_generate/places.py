@@ -143,7 +143,7 @@ def _codes(tree: ast.Module) -> Iterator[str]:
 def _may_say(function: ast.expr) -> bool:
     """Whether a code that is also an ordinary word is one here."""
     name = function.attr if isinstance(function, ast.Attribute) else getattr(function, "id", "")
-    return name in ("say", "locked", "Text", "Verdict")
+    return name in ("say", "said", "locked", "Text", "Verdict")
 
 
 def _markdown(rows: list[Any], head: list[Any]) -> str:

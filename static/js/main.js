@@ -13,7 +13,15 @@ function setText(element, text) {
   if (element && element.textContent !== text) element.textContent = text;
 }
 
-// How each attribute of a widget is shown; what is not here is a text with its own place.
+// How each attribute of a widget is shown; what is not here has places of its own: `data-text` for a text,
+// `data-value` for the value of an element such as a meter, and an attribute of the widget's root.
+function showInPlace(root, name, value) {
+  setText(root.querySelector(`[data-text="${name}"]`), value ?? "");
+  const measured = root.querySelector(`[data-value="${name}"]`);
+  if (measured) measured.value = value ?? measured.min;
+  if (root.hasAttribute(`data-${name}`)) root.setAttribute(`data-${name}`, value ?? "");
+}
+
 const SHOW = {
   enabled: (root, value) => {
     root.querySelector("button[type=submit], .hold").disabled = !value;
@@ -33,9 +41,6 @@ const SHOW = {
     setText(list?.querySelector("p"), value);
     if (!value) list?.hidePopover();
   },
-  state: (root, value) => (root.dataset.state = value),
-  shape: (root, value) => (root.dataset.shape = value),
-  colour: (root, value) => (root.dataset.colour = value),
   outcome: (root, value) => (root.querySelector(".result").dataset.outcome = value),
   busy: (root, value) => {
     const bar = root.querySelector("progress");
@@ -57,7 +62,7 @@ function showWidget(id, attributes) {
   if (!root) return;
   for (const [name, value] of Object.entries(control.over(id, attributes))) {
     if (name in SHOW) SHOW[name](root, value);
-    else setText(root.querySelector(`[data-text="${name}"]`), value ?? "");
+    else showInPlace(root, name, value);
   }
 }
 
@@ -136,6 +141,15 @@ function lockAll() {
   }
 }
 
+// The sections of a snapshot, in the order in which they are shown; each comes alone when it changes.
+const SECTIONS = {
+  control: (state) => control.show(state),
+  widgets: showWidgets,
+  link: showLink,
+  notice: showNotice,
+  robots: showRobots,
+};
+
 const source = new Source({
   snapshot(all) {
     if (!source.whole || all.revision !== body.dataset.revision) {
@@ -146,17 +160,10 @@ const source = new Source({
     }
     back = "cut" in body.dataset;
     delete body.dataset.cut;
-    control.show(all.control);
-    showWidgets(all.widgets);
-    showLink(all.link);
-    showNotice(all.notice);
-    showRobots(all.robots);
+    for (const [name, show] of Object.entries(SECTIONS)) show(all[name]);
   },
   update: showWidgets,
-  link: showLink,
-  notice: showNotice,
-  robots: showRobots,
-  control: (state) => control.show(state),
+  ...SECTIONS,
   browser: (mine) => control.browser(mine), // comes only where control is required
   beat(now) {
     setText(clock, now.clock);
@@ -168,7 +175,13 @@ const source = new Source({
 });
 
 if (document.querySelector("[data-step]")) source.load("./inputs.js", () => {});
-const holds = document.querySelectorAll('[data-kind="hold"]');
-if (holds.length) source.load("./hold.js", ({ Hold }) => holds.forEach((root) => new Hold(root, source)));
+// Kinds of widgets with a script of their own: it equips each of them, and may show attributes.
+for (const kind of body.dataset.scripts.split(" ").filter(Boolean)) {
+  const roots = document.querySelectorAll(`[data-kind="${kind}"]`);
+  source.load(`./kinds/${kind}.js`, ({ equip, show }) => {
+    Object.assign(SHOW, show);
+    for (const root of roots) equip?.(root, source);
+  });
+}
 const presser = new Presser(widgets, source, { unsure: body.dataset.unsure });
 source.start();

@@ -8,7 +8,6 @@ const OPEN_AGAIN_MS = 3000;
 // A browser opens six connections to one server; pages and presses need some of them.
 const STREAMS_PER_BROWSER = 3;
 const DRIFT_MS = 0.1; // by which two clocks may go apart from one beat to the next
-const EVENTS = ["snapshot", "update", "link", "notice", "robots", "control", "browser", "beat"];
 const BASE = document.body.dataset.base; // of the robot that this page shows
 
 // Those of an answer that came whole. Only "\n" ends a line: a text may have other separators.
@@ -80,8 +79,7 @@ export class Source {
   // For good: the page is about to go.
   stop() {
     this.#close();
-    this.#on = Object.fromEntries(EVENTS.map((name) => [name, () => {}]));
-    this.#on.lost = () => {};
+    this.#on = Object.fromEntries(Object.keys(this.#on).map((name) => [name, () => {}]));
   }
 
   // A hidden page gives its stream back. It is locked when it shows again, until a fresh snapshot.
@@ -129,7 +127,7 @@ export class Source {
 
   #listen() {
     this.#stream = new EventSource(`${BASE}/events`);
-    for (const name of EVENTS) {
+    for (const name of Object.keys(this.#on)) {
       this.#stream.addEventListener(name, (event) => this.#streamed(name, event));
     }
     // Permissions come under the names of their interlocks too; the widgets' own state is in `update`.

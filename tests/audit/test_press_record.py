@@ -15,8 +15,9 @@ from app.audit.queries import rows
 from app.commands.receipts import By, Receipt
 from app.errors import LogError
 from app.i18n import say
-from app.panel.model import Hold, Panel
+from app.panel.model import Panel
 from app.panel.template import needed
+from app.panel.widgets.hold import Hold
 from app.robot.command_status import IDLE
 from tests.support.builders import (
     COUNT,

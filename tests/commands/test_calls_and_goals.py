@@ -11,7 +11,8 @@ from app.commands.actions.goals import Actions
 from app.commands.service_calls import LATE_S, LONGEST_SAID, MOST_UNANSWERED, Calls
 from app.dialect import bridge_dialect
 from app.errors import LinkError
-from app.panel.model import Action, Call, Panel
+from app.panel.model import Panel
+from app.panel.widgets.service_action import Action, Call
 from app.permission.interlocks import against_calling
 from app.robot.command_status import Answer, Progress
 from app.robot.state import Robot, Sample

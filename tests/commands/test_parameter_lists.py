@@ -10,7 +10,7 @@ import httpx
 import pytest
 from playwright.sync_api import Page, expect
 
-from app.commands.parameters.values import checked, typed
+from app.commands.parameters.values import checked
 from app.errors import InputError
 from app.panel.list_text import elements, listed, quoted
 from app.panel.number_range import Range
@@ -92,7 +92,7 @@ def test_spaces_that_end_in_a_mistake_take_no_time(text: str) -> None:
 )
 def test_a_list_is_typed_value_by_value(kind: str, given: Any, value: tuple[Any, ...]) -> None:
     of = widget(type=kind)
-    found = checked(of, Declared("live"), typed(of, given) if isinstance(given, str) else given)
+    found = checked(of, Declared("live"), of.typed(given) if isinstance(given, str) else given)
     assert found == value
     assert isinstance(found, tuple)
     assert [type(one) for one in found] == [type(one) for one in value]

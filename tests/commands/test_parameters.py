@@ -9,7 +9,7 @@ import pytest
 
 from app.commands.parameters import client, sync
 from app.commands.parameters.sync import Parameters
-from app.commands.parameters.values import checked, typed
+from app.commands.parameters.values import checked
 from app.commands.service_calls import Calls
 from app.dialect import bridge_dialect
 from app.errors import InputError
@@ -574,7 +574,7 @@ def test_integers_are_exact_to_the_last_step() -> None:
     ],
 )
 def test_a_forms_text_is_typed(kind: str, text: str, value: Any) -> None:
-    assert typed(widget(type=kind), text) == value
+    assert widget(type=kind).typed(text) == value
 
 
 def test_a_range_that_is_open_has_no_words() -> None:

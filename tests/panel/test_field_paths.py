@@ -13,7 +13,7 @@ from app.errors import InterfaceError, PanelError
 from app.interfaces import around, interfaces_of, name_of
 from app.interfaces.field_path import Key, steps
 from app.panel import load_panel
-from app.panel.checks import faults_in
+from app.panel.checks.panel import faults_in
 from app.panel.template import PLACE
 from app.permission.interlocks import interlock_verdict
 from app.robot.state import Robot, Sample

@@ -15,7 +15,8 @@ from app.errors import Fault, PanelError
 from app.panel import load_panel
 from app.panel.faults.table_keys import inner, known
 from app.panel.interlock import CONDITIONS
-from app.panel.model import KINDS, Panel
+from app.panel.model import Panel
+from app.panel.widgets.kinds import KINDS
 from tests.support.parts import TESTS
 
 GOOD: Final = (TESTS / "everything.toml").read_text()

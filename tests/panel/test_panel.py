@@ -13,7 +13,8 @@ from app.commands.actions.goals import STATUS
 from app.errors import PanelError
 from app.interfaces import DISTROS
 from app.panel import Panel, Publish, Readout, TextInput, check_panel, load_panel
-from app.panel.checks.types import OF_ACTIONS, ROSOUT
+from app.panel.checks.types import ROSOUT
+from app.panel.widgets.service_action import OF_ACTIONS
 from app.settings import PACKAGE
 from app.transport.rosout import LOG_TYPE
 from tests.support.builders import FREE, GUARDED, HEARD, INTERLOCK, MESSAGE, TEXT, Table, small_panel

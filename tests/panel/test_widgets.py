@@ -9,7 +9,7 @@ from pydantic import ValidationError
 from app.errors import Fault
 from app.interfaces import DISTROS, interfaces_of
 from app.panel.base import TopicQos
-from app.panel.checks import faults_in
+from app.panel.checks.panel import faults_in
 from app.panel.widgets.parameter import DESCRIBE, EVENT_TYPE, GET, SET
 from tests.support.builders import ENABLED, FREE, GUARDED, HEARD, INTERFACES, MESSAGE, TEXT, panel_of
 

@@ -8,7 +8,8 @@ import pytest
 from app.dialect.bridge_dialect import bridge_token, server_token
 from app.interfaces.names import Qos
 from app.panel.interlock import Interlock
-from app.panel.model import Call, Publish
+from app.panel.widgets.publish import Publish
+from app.panel.widgets.service_action import Call
 from app.permission.interlocks import SERVER_SETTLE_S, Verdict, interlock_verdict, press_verdict, way
 from app.robot.state import Robot, Sample
 from tests.support.builders import (

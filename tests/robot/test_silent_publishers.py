@@ -21,7 +21,7 @@ from app.robot.state import Robot
 from app.ros_logging import RobotLog
 from app.runtime.ingest import Intake
 from app.transport.inbox import Inbox
-from app.view.view import Enabled
+from app.view.kinds import Enabled
 from tests.support.builders import (
     BOOL,
     BRIDGE,

@@ -23,7 +23,8 @@ from app.runtime.ingest import Intake
 from app.simulator import zenoh_peer
 from app.transport.inbox import Changes, Token
 from app.transport.zenoh_session import config_to
-from app.view.view import Enabled, sight
+from app.view.kinds import Enabled
+from app.view.view import sight
 from tests.commands.test_holds import HALF, JOG, POINT, SPEED
 from tests.commands.test_presses import Bench, Way
 from tests.support.builders import (

@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as some
 
 from app.audit import Unlogged
-from app.panel.model import Display, Panel
+from app.panel.model import Panel
+from app.panel.widgets.families import Display
 from app.permission.control_authority import Control
 from app.robot.state import Robot, Sample
 from app.view.publisher import Board

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from app.panel.model import KINDS
+from app.panel.widgets.kinds import KINDS
 from app.settings import shipped
 from app.web.assets import LAYERS, OF_KINDS, OWN_PAGE, Assets, load_assets
 from tests.support.parts import ROOT
@@ -57,6 +57,18 @@ def test_the_stylesheet_has_what_the_panels_widgets_need(
     assert (".entries a" in sent) is needed
 
 
+def test_a_kind_may_have_styles_and_a_script_of_its_name(static: Path, templates: Path) -> None:
+    for suffix in ("css", "js"):
+        (static / suffix / "kinds").mkdir()
+    (static / "css/kinds/dial.css").write_text(".dial {}\n")
+    (static / "js/kinds/dial.js").write_text("dial();\n")
+    with_it, without = loaded(static, templates, 0.25, "dial"), loaded(static, templates, 0.25, "text")
+    assert b".dial" in with_it.files["kiosk.css"].content
+    assert b".dial" not in without.files["kiosk.css"].content
+    assert with_it.files["kinds/dial.js"].content == b"dial();\n"
+    assert with_it.scripts == {"dial"}
+
+
 def test_scripts_keep_their_names(static: Path, templates: Path) -> None:
     files = loaded(static, templates).files
     assert set(files) == {"kiosk.css", "log.css", "main.js", "press.js"}
@@ -73,7 +85,7 @@ def test_scripts_go_out_without_comments_on_the_lines_where_they_were_written(
 
 
 def test_no_script_has_a_text_over_several_lines_that_a_comment_could_be_taken_from() -> None:
-    for script in (ROOT / "static/js").glob("*.js"):
+    for script in (ROOT / "static/js").rglob("*.js"):
         assert all(line.count("`") % 2 == 0 for line in script.read_text().splitlines()), script
 
 

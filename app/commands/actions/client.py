@@ -15,8 +15,8 @@ from app.commands.service_calls import CUT_NEWS_S, Asker
 from app.errors import DecodeError
 from app.i18n import say
 from app.interfaces import Fields, Interfaces
-from app.panel.model import Action
 from app.panel.template import PLACE
+from app.panel.widgets.service_action import Action
 from app.robot.command_status import Answer
 from app.robot.state import Robot
 from app.ros_logging import RobotLog

@@ -13,7 +13,7 @@ from typing import Final
 from app.commands.service_calls import with_fields
 from app.i18n import say
 from app.interfaces import Fields
-from app.panel.model import Action
+from app.panel.widgets.service_action import Action
 from app.robot.command_status import Answer, Outcome, Progress
 
 FEEDBACK: Final = "feedback."  # where it is in the message that has it

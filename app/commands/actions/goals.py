@@ -19,8 +19,8 @@ from app.dialect import bridge_dialect
 from app.errors import DecodeError
 from app.i18n import say
 from app.interfaces import Fields, Interfaces
-from app.panel.model import Action
 from app.panel.template import PLACE
+from app.panel.widgets.service_action import Action
 from app.robot.command_status import IDLE, Answer, Corrected, LastLook, Progress, no_look
 from app.robot.state import Reading, Robot, Sample
 from app.robot.topics import Topic

@@ -19,7 +19,8 @@ from app.commands.actions.goals import Actions
 from app.concurrency import told
 from app.errors import LogError
 from app.i18n import say
-from app.panel.model import Action, Panel
+from app.panel.model import Panel
+from app.panel.widgets.service_action import Action
 from app.robot.command_status import IDLE, Answer, Progress
 from app.robot.state import Robot
 from app.ros_logging import RobotLog

@@ -19,8 +19,9 @@ from app.commands.receipts import MOST_LOOKS, By, Receipt, Witness, cause_of, ju
 from app.errors import Cause, FieldError, InputError, LinkError, NotFound, PressRefused
 from app.i18n import say
 from app.interfaces import Interfaces
-from app.panel.model import Hold, Panel
+from app.panel.model import Panel
 from app.panel.template import needed
+from app.panel.widgets.hold import Hold
 from app.permission.interlocks import Verdict
 from app.robot.state import Robot
 

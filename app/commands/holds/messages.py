@@ -6,9 +6,8 @@ from typing import Any, Protocol
 
 from app.errors import LinkError
 from app.interfaces import INTEGERS, Interfaces
-from app.panel.checks.holds import with_own_fields
-from app.panel.model import Hold
 from app.panel.template import filled, inputs_of, with_now
+from app.panel.widgets.hold import Hold, with_own_fields
 from app.permission.interlocks import way
 from app.robot.command_status import LastLook, no_look
 from app.robot.state import Robot

@@ -13,8 +13,8 @@ from app.commands.holds.messages import Values
 from app.commands.receipts import LONGEST_LOGGED, By, Receipt, Witness, named, receipt_of, untyped
 from app.errors import Cause
 from app.i18n import say
-from app.panel.model import Hold
 from app.panel.template import needed
+from app.panel.widgets.hold import Hold
 from app.robot.command_status import Answer, Outcome
 from app.ros_logging import RobotLog, on_rosout
 

@@ -8,25 +8,12 @@ from app.errors import InputError
 from app.i18n import say
 from app.interfaces import INTEGERS
 from app.interfaces.validation import shown
-from app.panel.input_values import DECIMAL
 from app.panel.list_text import elements
-from app.panel.widgets.check_parameters import LONGEST_TEXT
-from app.panel.widgets.parameter import One, Parameter, Value
+from app.panel.widgets.numbers import DECIMAL
+from app.panel.widgets.parameter import LONGEST_TEXT, One, Parameter, Value
 from app.robot.parameter_state import LONGEST_LIST, Declared, allowed, each_text, limits_text
 
 WHOLE: Final = re.compile(r"\s*[+-]?[0-9]{1,19}\s*", re.ASCII)
-
-
-def typed(of: Parameter, text: str) -> Any:
-    """A form's text as a value of this parameter's type; as it is where it is none."""
-    if of.options or of.many:
-        return text
-    match of.type:
-        case "bool":
-            return {"true": True, "false": False}.get(text, text)
-        case "double":
-            return float(text) if DECIMAL.fullmatch(text) else text
-    return text
 
 
 def checked(of: Parameter, known: Declared, given: Any) -> Value:

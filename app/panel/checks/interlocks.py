@@ -8,10 +8,10 @@ from typing import Any, Final
 from app.errors import Fault, FieldError
 from app.interfaces import INTEGERS, Interfaces, Type
 from app.interfaces.validation import scalar_check, shown
-from app.panel.constants import compared, holder, meant
+from app.panel.checks.types import field_faults
+from app.panel.constants import NUMBERS, compared, holder, meant, no_constant
 from app.panel.interlock import Interlock
-from app.panel.widgets.check_displays import NUMBERS, field_faults, no_constant
-from app.panel.widgets.inputs import same
+from app.panel.values import same
 
 BEST_EFFORT: Final = (
     "is missing: of a best-effort topic any message may be lost, the one that forbids too; "
@@ -26,7 +26,7 @@ UNCONDITIONED: Final = (
 def interlock_faults(place: str, of: Interlock, interfaces: Interfaces) -> Iterator[Fault]:
     if of.qos.reliability == "best_effort" and of.max_age_s is None:
         yield Fault(f"{place}.max_age_s", BEST_EFFORT)
-    faults = list(field_faults(place, of, interfaces))
+    faults = list(field_faults(place, of.type, of.field, interfaces))
     yield from faults
     if faults:
         return

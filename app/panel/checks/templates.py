@@ -6,50 +6,37 @@ from typing import Any, Final
 
 from app.errors import Fault, FieldError, InterfaceError
 from app.interfaces import Interfaces
-from app.interfaces.validation import shown
 from app.panel.faults.wording import listing
-from app.panel.model import Input
 from app.panel.template import NOW, TIME, at, filled, named, with_now
-from app.panel.widgets.inputs import SelectInput, TextInput, ToggleInput
+from app.panel.widgets.families import Checking, Input
 
 NOW_IS: Final = f'"{{{NOW}}}", alone, is the time of sending and fills a {TIME}'
 ELSEWHERE: Final = " on this page: an input is read from the page it is on"
 
 
-def examples(of: Input) -> list[Any]:
-    """The values at which a template would fail first: limits, every option, true and false."""
-    match of:
-        case TextInput():
-            return ["x" * of.max_length]
-        case SelectInput():
-            return [option.value for option in of.options]
-        case ToggleInput():
-            return [False, True]
-    return [of.typed(of.min), of.typed(of.max)]
-
-
 def template_faults(
-    place: str,
-    template: Mapping[str, Any],
-    type_name: str,
-    inputs: Mapping[str, Input],
-    anywhere: Collection[str],
-    interfaces: Interfaces,
-    faulty: Collection[str] = (),
+    place: str, template: Mapping[str, Any], type_name: str, checking: Checking
 ) -> Iterator[Fault]:
-    """The first fault of a template for a type, at `place`; `inputs` are those of its page,
-    `anywhere` all ids of inputs. One that names a `faulty` input is not tried: that is told already.
-    """
+    """The first fault of a template for a type, at `place`. One that names an input that is faulty is
+    not tried: that is told already."""
+    interfaces, inputs = checking.interfaces, checking.inputs
     try:
         names = list(named(template))
-        faults = list(unknown(place, names, inputs, anywhere))
-        if not {name for _, name in names} & set(faulty):
+        faults = list(unknown(place, names, inputs, checking.anywhere))
+        if not {name for _, name in names} & set(checking.faulty):
             faults += _misplaced_now(place, template, type_name, names, interfaces)
             known = {name: inputs[name] for _, name in names if name in inputs}
             faults += [] if faults else _tried(place, template, type_name, known, interfaces)
         yield from faults
     except FieldError as error:
         yield Fault(f"{place}.{error.field}".rstrip("."), error.message)
+
+
+def tries(inputs: Mapping[str, Input]) -> Iterator[dict[str, Any]]:
+    """Values of inputs by their ids, with each example of each once at least."""
+    tried = {name: one.examples() for name, one in inputs.items()}
+    for turn in range(max(map(len, tried.values()), default=1)):
+        yield {name: some[min(turn, len(some) - 1)] for name, some in tried.items()}
 
 
 def unknown(
@@ -83,9 +70,7 @@ def _tried(
     inputs: Mapping[str, Input],
     interfaces: Interfaces,
 ) -> Iterator[Fault]:
-    tried = {name: examples(one) for name, one in inputs.items()}
-    for turn in range(max(map(len, tried.values()), default=1)):
-        values = {name: some[min(turn, len(some) - 1)] for name, some in tried.items()}
+    for values in tries(inputs):
         try:
             interfaces.encode(type_name, filled(template, with_now(values)))
         except FieldError as error:
@@ -116,9 +101,7 @@ def _message(
     if written != f"{{{names[0]}}}":
         return error.message if _why(error) else f'"{written}" makes text; the field is {field}'
     one = inputs[names[0]]
-    gives = shown(values[one.id]) if isinstance(one, SelectInput) or _why(error) else one.gives
-    if isinstance(one, TextInput):
-        gives = "text" if not _why(error) else f"up to {one.max_length} characters"
+    gives = one.gives_for(values[one.id], narrow=bool(_why(error)))
     return f'input "{one.id}" gives {gives}; the field is {field}{_why(error)}'
 
 

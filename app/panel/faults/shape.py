@@ -12,7 +12,8 @@ from app.panel.faults.places import place_of
 from app.panel.faults.table_keys import Keys, Model, inner, key_faults
 from app.panel.faults.toml_lines import Path
 from app.panel.faults.wording import near, worded
-from app.panel.model import KINDS, Panel
+from app.panel.model import Panel
+from app.panel.widgets.kinds import KINDS
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,14 +11,12 @@ from app.interfaces.validation import shown
 from app.panel.faults.places import place_of
 from app.panel.faults.toml_lines import Path
 from app.panel.faults.wording import near
-from app.panel.model import KINDS, Hold, Panel
+from app.panel.model import Panel
+from app.panel.widgets.families import Placed
+from app.panel.widgets.kinds import KINDS
 
 Model = type[BaseModel]
 
-NEEDED: Final[Mapping[str, str]] = {
-    "interlock": "a hold needs the interlock whose loss ends it",
-    "release": "a hold needs the message that is published when it ends",
-}
 WHOLE_WIDGET: Final = 4  # steps of its path
 ITS_HEADER: Final = "is its header missing above?"
 
@@ -172,7 +170,8 @@ def _left(table: Keys) -> list[Fault]:
         more = f", as {_listed(unknown[1:])}" if len(unknown) > 1 else ""
         faults.append(table.fault(unknown[0], f"unknown key{more}; {here}"))
     if len(missing) == 1:
-        why = NEEDED.get(missing[0]) if table.model is Hold else None
+        model = table.model
+        why = model.why_needed.get(missing[0]) if issubclass(model, Placed) else None
         faults.append(table.fault(missing[0], f"is missing: {why}" if why else "is missing"))
     elif missing:
         faults.append(table.fault("", f"{_listed(missing)} are missing"))

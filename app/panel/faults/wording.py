@@ -6,7 +6,7 @@ from difflib import get_close_matches
 from typing import Any, Final
 
 from app.interfaces.validation import shown
-from app.panel.widgets.inputs import digits
+from app.panel.values import digits
 
 LIKE_A_NAME: Final = 0.7
 MOST_LISTED: Final = 12

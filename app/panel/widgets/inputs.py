@@ -1,21 +1,22 @@
-"""Descriptions of inputs: what an operator enters, and what a message takes by an input's id."""
+"""Inputs of texts and choices: what an operator enters, and what is checked of it."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Sequence
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field
 
+from app.errors import Fault, InputError
 from app.i18n import say
-from app.panel.base import Description, Label, Placed, Span, said, some
+from app.interfaces.validation import shown
+from app.panel.base import Description, Label, Span, said, some
+from app.panel.values import same
+from app.panel.widgets.families import Checking, Input
 
-MOST: Final = 2.0**53  # beyond this a browser's numbers are not exact
-
-Number = Annotated[float, Field(ge=-MOST, le=MOST)]
-Unit = Annotated[str, Field(max_length=20)]
+SWITCHED: Final = {"true": True, "false": False}
 
 
-class TextInput(Placed):
+class TextInput(Input):
     kind: Literal["text"]
     max_length: Annotated[int, Field(ge=1, le=1000)] = 80
     default: Annotated[str, Field(pattern=r"^[^\x00]*$")] = ""
@@ -24,74 +25,32 @@ class TextInput(Placed):
     def gives(self) -> str:
         return "text"
 
-
-class Stepped(Placed):
-    """What has − and + beside it."""
-
-    @property
-    def less(self) -> str:
-        return say("less", label=self.label)
+    def gives_for(self, value: Any, *, narrow: bool) -> str:
+        return f"up to {self.max_length} characters" if narrow else self.gives
 
     @property
-    def more(self) -> str:
-        return say("more", label=self.label)
-
-
-class Numeric(Stepped):
-    """A number with limits; whole numbers, if its lowest and its step are whole.
-
-    Without a `step` any number between the limits is taken; but limits that are written as whole
-    numbers, as 0 and not as 0.0, are those of whole numbers.
-    """
-
-    min: Number
-    max: Number
-    step: Annotated[Number, Field(gt=0)] | None = None
-    unit: Unit = ""
-    default: Number | None = None
-    span: Span = 6
-
-    @model_validator(mode="before")
-    @classmethod
-    def _stepped(cls, given: Any) -> Any:
-        """Only here it shows how the limits are written."""
-        limits = [given.get(key) for key in ("min", "max")] if isinstance(given, Mapping) else []
-        whole = limits and all(type(limit) is int for limit in limits)
-        return {"step": 1, **given} if whole else given
+    def about(self) -> str:
+        return f"text, {shown(self.default)} at first"
 
     @property
-    def whole(self) -> bool:
-        return self.step is not None and self.step.is_integer() and self.min.is_integer()
+    def default_value(self) -> str | None:
+        return self.default if "default" in self.model_fields_set else None
 
-    @property
-    def gives(self) -> str:
-        return "whole numbers" if self.whole else "numbers"
+    def examples(self) -> list[Any]:
+        return ["x" * self.max_length]
 
-    @property
-    def attributes(self) -> dict[str, str]:
-        """Limits and step as HTML has them."""
-        step = "any" if self.step is None else digits(self.step)
-        return {"min": digits(self.min), "max": digits(self.max), "step": step}
+    def checked(self, given: Any) -> str:
+        """Lengths count characters, as an operator does."""
+        if not isinstance(given, str):
+            raise InputError(f'{self.label} ("{self.id}") must be text, not {shown(given)}')
+        if len(given) > self.max_length:
+            what = f"is {len(given)} characters long; {self.max_length} are allowed"
+            raise InputError(f"{self.label} {what}")
+        return given
 
-    def typed(self, value: float) -> int | float:
-        """A value of this input, as a message takes it."""
-        return int(value) if self.whole else value
-
-
-class NumberInput(Numeric):
-    kind: Literal["number"]
-
-    @property
-    def start(self) -> str:
-        return "" if self.default is None else digits(self.default)
-
-
-class SliderInput(Numeric):
-    kind: Literal["slider"]
-
-    @property
-    def start(self) -> str:
-        return digits(self.min if self.default is None else self.default)
+    def faults(self, place: str, checking: Checking) -> Iterator[Fault]:
+        if len(self.default) > self.max_length:
+            yield Fault(f"{place}.default", f"is longer than max_length ({self.max_length})")
 
 
 def _plain(given: Any) -> Any:
@@ -114,7 +73,7 @@ class Option(Description):
         return self.value if isinstance(self.value, str) else json.dumps(self.value)
 
 
-class SelectInput(Placed):
+class SelectInput(Input):
     kind: Literal["select"]
     span: Span = 6
     options: Annotated[tuple[Option, ...], Field(strict=False), AfterValidator(some)]
@@ -130,8 +89,36 @@ class SelectInput(Placed):
     def gives(self) -> str:
         return "the values of its options"
 
+    def gives_for(self, value: Any, *, narrow: bool) -> str:
+        return shown(value)
 
-class ToggleInput(Placed):
+    @property
+    def about(self) -> str:
+        return f"one of {', '.join(shown(option.value) for option in self.options)}"
+
+    @property
+    def default_value(self) -> Any:
+        return self.default
+
+    def examples(self) -> list[Any]:
+        return [option.value for option in self.options]
+
+    def checked(self, given: Any) -> Any:
+        """The option whose value was given, or whose key: so it comes from a form and a browser."""
+        for option in self.options:
+            if same(option.value, given) or option.key == given:
+                return option.value
+        options = ", ".join(option.label for option in self.options)
+        raise InputError(say("no_option", label=self.label, options=options, given=shown(given)))
+
+    def faults(self, place: str, checking: Checking) -> Iterator[Fault]:
+        yield from option_faults(place, self.options)
+        if self.default is not None and not any(same(o.value, self.default) for o in self.options):
+            there = ", ".join(shown(option.value) for option in self.options)
+            yield Fault(f"{place}.default", f"{shown(self.default)} is no option; there is {there}")
+
+
+class ToggleInput(Input):
     kind: Literal["toggle"]
     span: Span = 6
     on: Label = said("on")
@@ -142,12 +129,34 @@ class ToggleInput(Placed):
     def gives(self) -> str:
         return "true or false"
 
+    @property
+    def about(self) -> str:
+        return f"true or false, {shown(self.default)} at first"
 
-def digits(number: float) -> str:
-    """A number as it is written and as HTML has it: "5", "0.25", "1e-07"."""
-    return str(int(number)) if number.is_integer() else repr(number)
+    @property
+    def default_value(self) -> bool | None:
+        return self.default if "default" in self.model_fields_set else None
+
+    def examples(self) -> list[Any]:
+        return [False, True]
+
+    def typed(self, text: str) -> bool | str:
+        return SWITCHED.get(text, text)
+
+    def checked(self, given: Any) -> bool:
+        if isinstance(given, bool):
+            return given
+        what = say("no_toggle", label=self.label, on=self.on, off=self.off, given=shown(given))
+        raise InputError(what)
 
 
-def same(one: Any, other: Any) -> bool:
-    """Whether two values are one, as TOML and JSON see it: 1 is 1.0, but not true."""
-    return one == other and isinstance(one, bool) == isinstance(other, bool)
+def option_faults(place: str, options: Sequence[Option]) -> Iterator[Fault]:
+    """Options that can't be told apart."""
+    keys = [option.key for option in options]
+    labels = [option.label for option in options]
+    for i, (key, label) in enumerate(zip(keys, labels, strict=True)):
+        if key in keys[:i]:
+            yield Fault(f"{place}.options[{i}].value", f"{key} is already options[{keys.index(key)}]")
+        if label in labels[:i]:
+            what = f'"{label}" is already the label of options[{labels.index(label)}]'
+            yield Fault(f"{place}.options[{i}].label", what)

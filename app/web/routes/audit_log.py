@@ -17,8 +17,8 @@ from starlette.types import Message, Receive, Scope, Send
 from app.audit import Entry, Filter, OperatorLog, ReaderProcess, Row
 from app.errors import InputError, LogError, NotFound
 from app.i18n import say
-from app.panel.model import Hold, Input, Panel, Pressed
-from app.panel.widgets.parameter import Parameter
+from app.panel.model import Panel
+from app.panel.widgets.families import Command, Entered
 from app.printable import printable, printable_texts
 from app.web.app_state import CurrentSite, Site
 from app.web.described import TEXT, errors
@@ -116,8 +116,8 @@ async def page(site: CurrentSite, wanted: Annotated[Wanted, Query()]) -> Respons
         wanted=wanted,
         typed=printable_texts(wanted.model_dump()),
         rows=rows,
-        labels={w.id: w.label for w in panel.widgets() if isinstance(w, Pressed | Hold)},
-        inputs={w.id: w.label for w in panel.widgets() if isinstance(w, Input | Parameter)},
+        labels={w.id: w.label for w in panel.widgets() if isinstance(w, Command)},
+        inputs={w.id: w.label for w in panel.widgets() if isinstance(w, Entered)},
         outcomes=OUTCOMES,
         off="" if site.log.enabled else say("log_off"),
         banner=site.banner,

@@ -3,6 +3,7 @@
 import asyncio
 import secrets
 import time
+from collections.abc import Sequence
 from typing import Any, TypedDict, get_args
 from urllib.parse import urlencode
 
@@ -15,14 +16,15 @@ from app.clock import format_datetime, format_time
 from app.commands.receipts import Receipt
 from app.errors import NotFound
 from app.i18n import say
-from app.panel.model import Input, Page, Panel, Pressed
+from app.panel.model import Page, Panel
 from app.panel.template import inputs_of
-from app.panel.widgets.parameter import Parameter
+from app.panel.widgets.families import Entered, Pressed
 from app.permission.clients import Browser
 from app.permission.control_authority import Refusal
 from app.permission.control_authority_view import Role, role
 from app.printable import printable_texts
 from app.runtime.robot_session import Kiosk
+from app.view.sections import SECTIONS, Section
 from app.view.view import View, as_seen_by
 from app.web.app_state import CurrentSite, Site
 from app.web.client_cookie import by_hand, keep, welcomed
@@ -59,19 +61,11 @@ LINK_WORDS = ("links", "link_state", "link_since", "link_locks")
 CONTROL_ACTS = ("take", "ask", "give", "keep", "release", "withdraw")
 
 
-# What a page is made of, and how long after the start it is compiled: when the port is open, and while
-# the link settles, which is waiting. Otherwise the first page takes that time.
+# How long after the start what a page is made of is compiled: when the port is open, and while the link
+# settles, which is waiting. Otherwise the first page takes that time.
 # Small ones: what a compiler takes for one, the next takes again, and the loop turns in between.
-TEMPLATES = (
-    "base.html",
-    "_inputs.html",
-    "_commands.html",
-    "_parameter.html",
-    "_displays.html",
-    "_control.html",
-    "screen.html",
-)
 COMPILED_AFTER_S = 0.1
+OTHER_PAGES = ("ask.html", "error.html", "log.html")
 
 
 class PageContext(TypedDict):
@@ -83,6 +77,7 @@ class PageContext(TypedDict):
     base: str
     robot: str
     view: View
+    sections: Sequence[Section]
     event_id: str
     revision: str
     clock: str
@@ -137,7 +132,7 @@ async def named_page(page: str, request: Request, site: CurrentSite) -> Response
 async def compiled(templates: Environment) -> None:
     """Makes the first page as quick as the next."""
     await asyncio.sleep(COMPILED_AFTER_S)
-    for name in TEMPLATES:
+    for name in templates.list_templates(filter_func=lambda name: name not in OTHER_PAGES):
         templates.get_template(name)
         await asyncio.sleep(0)
 
@@ -146,7 +141,7 @@ class Ask(TypedDict):
     """What will be done by a press, and the inputs that it takes."""
 
     sentence: str
-    inputs: list[Input | Parameter]
+    inputs: list[Entered]
 
 
 def _to_a_robot(request: Request, site: Site, path: str) -> Response | None:
@@ -159,7 +154,7 @@ def _to_a_robot(request: Request, site: Site, path: str) -> Response | None:
 
 def _render(request: Request, site: Site, page: Page) -> Response:
     kiosk = site.fleet.kiosk(request.path_params.get("robot"))
-    typed = any(isinstance(widget, Input | Parameter) for widget in page.widgets)
+    typed = any(isinstance(widget, Entered) for widget in page.widgets)
     refresh_s = REFRESH_WITH_INPUTS_S if typed else REFRESH_S
     browser, token = welcomed(request, site)
     if kiosk.control.rules.required:
@@ -185,6 +180,7 @@ def _context(
         base=kiosk.base,
         robot=kiosk.entry.id if kiosk.entry else "",
         view=as_seen_by(board.view, browser),
+        sections=SECTIONS,
         event_id=board.id,
         revision=board.revision,
         clock=format_time(wall),
@@ -225,7 +221,7 @@ def asks_of(kiosk: Kiosk, page: Page) -> dict[str, Ask]:
 
 def ask_of(kiosk: Kiosk, widget: Pressed) -> Ask:
     """With the robot's name, where there are several."""
-    inputs = {w.id: w for w in kiosk.panel.widgets() if isinstance(w, Input | Parameter)}
+    inputs = {w.id: w for w in kiosk.panel.widgets() if isinstance(w, Entered)}
     robot = kiosk.entry.name if kiosk.entry else ""
     sentence = say("ask_on" if robot else "ask", label=widget.label, robot=robot)
     return Ask(sentence=sentence, inputs=[inputs[name] for name in inputs_of(widget)])

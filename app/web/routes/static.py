@@ -9,7 +9,7 @@ from app.web.app_state import CurrentSite
 router = APIRouter()
 
 
-@router.get("/static/{revision}/{name}", include_in_schema=False)
+@router.get("/static/{revision}/{name:path}", include_in_schema=False)
 async def static(revision: str, name: str, request: Request, site: CurrentSite) -> Response:
     asset = site.assets.files.get(name)
     if asset is None:

@@ -1,6 +1,6 @@
 // A button that acts while it is held. It ends by whatever may mean that nobody holds it any more,
 // and only a new press begins again. What it shows is what the server answered, nothing else.
-import { entered } from "./press.js";
+import { entered } from "../press.js";
 
 // From this page's own thread on purpose: a page that stands still must not keep a hold alive.
 const BEAT_MS = 80;
@@ -10,7 +10,10 @@ const SILENCE_MS = 500;
 const LAST_ANSWER_MS = 3000;
 const KEYS = [" ", "Enter"];
 
-export class Hold {
+// Called for each widget of this kind.
+export const equip = (root, source) => new Hold(root, source);
+
+class Hold {
   #root;
   #button;
   #source;

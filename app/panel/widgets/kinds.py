@@ -1,0 +1,47 @@
+"""The kinds of widgets that a panel file may name: a row for each."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any, Final, TypeVar, Union
+
+from pydantic import Field
+
+from app.panel.widgets.displays import Indicator, Readout
+from app.panel.widgets.families import Placed
+from app.panel.widgets.hold import Hold
+from app.panel.widgets.inputs import SelectInput, TextInput, ToggleInput
+from app.panel.widgets.numbers import NumberInput, SliderInput
+from app.panel.widgets.parameter import Parameter
+from app.panel.widgets.publish import Publish
+from app.panel.widgets.service_action import Action, Call
+
+KINDS: Final[Mapping[str, type[Placed]]] = {
+    "text": TextInput,
+    "number": NumberInput,
+    "slider": SliderInput,
+    "select": SelectInput,
+    "toggle": ToggleInput,
+    "publish": Publish,
+    "hold": Hold,
+    "call": Call,
+    "action": Action,
+    "parameter": Parameter,
+    "readout": Readout,
+    "indicator": Indicator,
+}
+
+# What a table of a panel file becomes, by its "kind".
+if TYPE_CHECKING:
+    Widget = Placed
+else:
+    Widget = Annotated[Union[tuple(KINDS.values())], Field(discriminator="kind")]  # noqa: UP007
+
+Row = TypeVar("Row")
+
+
+def row_of(rows: Mapping[type[Any], Row], widget: Placed) -> Row:
+    """What a table of rows by kinds or families has for a widget: the row of its kind, else that of
+    the nearest family. TypeError where there is none."""
+    for of in type(widget).__mro__:
+        if of in rows:
+            return rows[of]
+    raise TypeError(f'there is no row for a widget of the kind "{widget.kind}"')

@@ -1,0 +1,100 @@
+"""How each kind of widget is shown: pure, from (widget, robot, verdict, time). A row for each."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Final, TypedDict
+
+from app.i18n import say
+from app.panel.widgets.displays import Indicator, Readout
+from app.panel.widgets.families import Command, Display, Input, Placed, Pressed
+from app.panel.widgets.hold import Hold
+from app.panel.widgets.kinds import row_of
+from app.panel.widgets.numbers import Numeric
+from app.panel.widgets.parameter import Parameter
+from app.panel.widgets.publish import Publishing
+from app.permission.interlocks import PERMITTED, Verdict
+from app.robot.command_status import IDLE, Progress
+from app.robot.state import Robot
+from app.view.display_values import indicator, readout, value
+from app.view.parameter_values import parameter
+
+# The attributes of a widget, and when (monotonic seconds) time alone would change them.
+Attributes = dict[str, Any]
+Shown = tuple[Attributes, float]
+
+
+class Enabled(TypedDict):
+    enabled: bool
+    reason: str | None
+
+
+def show(widget: Placed, robot: Robot, now: float, verdict: Verdict = PERMITTED) -> Shown:
+    """The attributes of a widget at `now` (monotonic seconds), and when time alone would change them;
+    `verdict` is that of a command: a change of it is no change by time alone."""
+    return row_of(SHOWN, widget)(widget, robot, verdict, now)
+
+
+def enabled(verdict: Verdict) -> Enabled:
+    return {"enabled": verdict.permitted, "reason": verdict.reason}
+
+
+def lock(widget: Command, verdict: Verdict) -> Attributes:
+    """Attributes of a control; one with several interlocks tells all reasons."""
+    several = told(verdict.reasons) if len(widget.interlocks) > 1 else {}
+    return {**enabled(verdict), **several}
+
+
+def told(reasons: Sequence[str]) -> dict[str, str]:
+    """`reasons` are all, a line each, and `more` says how many there are beside the first."""
+    more = say("more_reasons", number=len(reasons) - 1) if len(reasons) > 1 else ""
+    return {"reasons": "\n".join(reasons), "more": more}
+
+
+def progress(of: Progress) -> Attributes:
+    """Attributes of a call or an action: `progress` from 0 to 1, None where it is not known; `goal`
+    is the state of an action's goal as ROS names it, `press` the id of the press that a cancel is for,
+    both "" where there is none."""
+    return {
+        "busy": of.busy,
+        "outcome": of.outcome,
+        "result": of.text,
+        "progress": of.fraction,
+        "stoppable": of.stoppable,
+        "goal": of.goal,
+        "press": of.press,
+    }
+
+
+def _pressed(widget: Pressed, robot: Robot, verdict: Verdict, _: float) -> Shown:
+    """The lock, and what came of the last press."""
+    came = progress(robot.progress.get(widget.id, IDLE))
+    return {**lock(widget, verdict), **came}, math.inf
+
+
+def _published(widget: Publishing, robot: Robot, verdict: Verdict, now: float) -> Shown:
+    if widget.confirm is not None:
+        return _pressed(widget, robot, verdict, now)
+    return lock(widget, verdict), math.inf
+
+
+def _held(widget: Hold, robot: Robot, verdict: Verdict, _: float) -> Shown:
+    holding = robot.held.get(widget.id, "")
+    return {**lock(widget, verdict), "held": bool(holding), "holding": holding}, math.inf
+
+
+def _parameter(widget: Parameter, robot: Robot, verdict: Verdict, now: float) -> Shown:
+    pressed, until = _pressed(widget, robot, verdict, now)
+    return pressed | parameter(widget, robot), until
+
+
+SHOWN: Final[Mapping[type[Placed], Callable[[Any, Robot, Verdict, float], Shown]]] = {
+    Input: lambda of, robot, verdict, now: ({}, math.inf),
+    Numeric: lambda of, robot, verdict, now: ({"limits": of.limits}, math.inf),
+    Pressed: _pressed,
+    Publishing: _published,
+    Hold: _held,
+    Parameter: _parameter,
+    Display: lambda of, robot, verdict, now: value(of, robot, now),
+    Readout: lambda of, robot, verdict, now: readout(of, robot, now),
+    Indicator: lambda of, robot, verdict, now: indicator(of, robot, now),
+}

@@ -1,0 +1,59 @@
+"""The sections of a view: a row for each, the same for a page, a snapshot and the events after it."""
+
+from collections.abc import Callable, Mapping
+from typing import Any, Final, NamedTuple
+
+Events = dict[str, Mapping[str, Any]]  # the data of each by its name, in their order
+
+
+class Section(NamedTuple):
+    """`name` is its key in a view and in a snapshot, `events` what brings a browser from one content
+    to another. `template` is its part of a page between the header and the widgets, "" where it has
+    its place elsewhere; `shown` says for which content that is there."""
+
+    name: str
+    events: Callable[[str, Any, Any], Events]
+    template: str = ""
+    shown: Callable[[Any], bool] = bool
+
+
+def whole(name: str, old: Any, new: Any) -> Events:
+    """One event with all of it."""
+    return {} if old == new else {name: new}
+
+
+def _interlocks(_: str, old: Mapping[str, Any], new: Mapping[str, Any]) -> Events:
+    """One event for each permission."""
+    return {f"{name}-enabled-updated": state for name, state in new.items() if old.get(name) != state}
+
+
+def _widgets(_: str, old: Mapping[str, Any], new: Mapping[str, Any]) -> Events:
+    """One event with the attributes that changed, of the widgets that did."""
+    changed = {
+        name: _changed(known, attributes)
+        for name, attributes in new.items()
+        if (known := old.get(name, {})) != attributes
+    }
+    return {"update": changed} if changed else {}
+
+
+def _changed(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in new.items() if key not in old or old[key] != value}
+
+
+SECTIONS: Final = (
+    Section("interlocks", _interlocks),
+    Section("widgets", _widgets),
+    Section("link", whole, "sections/link.html"),
+    Section("notice", whole, "sections/notice.html"),
+    Section("robots", whole, "sections/robots.html"),
+    Section("control", whole, "sections/control.html", shown=lambda control: control["required"]),
+)
+
+
+def difference(old: Mapping[str, Any], new: Mapping[str, Any]) -> Events:
+    """What brings a browser from one view to another: nothing where they are the same."""
+    events: Events = {}
+    for section in SECTIONS:
+        events |= section.events(section.name, old[section.name], new[section.name])
+    return events

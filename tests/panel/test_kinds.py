@@ -1,0 +1,67 @@
+"""Every kind of widgets has its row in each table, and a macro of its name."""
+
+import pytest
+from jinja2 import Environment, FileSystemLoader
+
+from app.commands.dispatch import Sending
+from app.panel.widgets.families import Command, Entered, Placed, Pressed
+from app.panel.widgets.kinds import KINDS, row_of
+from app.permission.interlocks import AGAINST
+from app.settings import shipped
+from app.view.kinds import SHOWN
+from tests.support.builders import panel_of, robot_there, sending_of
+
+EACH = pytest.mark.parametrize(("kind", "of"), KINDS.items())
+
+
+class Unsent:
+    """A link by which nothing is sent."""
+
+    def put(self, key: str, payload: bytes) -> None:
+        raise AssertionError(f"{key} was put")
+
+    def heard(self, key: str) -> bool:
+        return True
+
+
+@pytest.fixture(scope="module")
+def sending() -> Sending:
+    panel = panel_of()
+    return sending_of(panel, robot_there(panel), Unsent())
+
+
+def widget(of: type[Placed], kind: str) -> Placed:
+    return of.model_construct(id="one", label="One", kind=kind)
+
+
+@EACH
+def test_a_kind_is_the_one_that_its_class_names(kind: str, of: type[Placed]) -> None:
+    assert of.model_json_schema()["properties"]["kind"]["const"] == kind
+
+
+@EACH
+def test_a_kind_is_shown(kind: str, of: type[Placed]) -> None:
+    assert callable(row_of(SHOWN, widget(of, kind)))
+
+
+@EACH
+def test_a_kind_has_a_macro_of_its_name(kind: str, of: type[Placed]) -> None:
+    environment = Environment(loader=FileSystemLoader(shipped("templates")))
+    macro = getattr(environment.get_template(f"widgets/{kind}.html").module, kind)
+    assert macro.arguments == ("widget", "shown", "inputs", "receipt", "words")
+
+
+@EACH
+def test_a_command_is_judged_and_sent(kind: str, of: type[Placed], sending: Sending) -> None:
+    if issubclass(of, Command):
+        assert callable(row_of(AGAINST, widget(of, kind)))
+    if issubclass(of, Pressed):
+        assert callable(row_of(sending.senders, widget(of, kind)))
+        assert callable(row_of(sending.refusals, widget(of, kind)))
+    if issubclass(of, Entered):
+        assert callable(row_of(sending.checks, widget(of, kind)))
+
+
+def test_a_kind_without_a_row_is_named() -> None:
+    with pytest.raises(TypeError, match='no row for a widget of the kind "text"'):
+        row_of(AGAINST, widget(KINDS["text"], "text"))
