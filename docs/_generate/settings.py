@@ -24,7 +24,10 @@ ABOUT: Final = {
         "none",
     ),
     "LOG_LEVEL": (", ".join(f"`{level}`" for level in LOG_LEVELS) + ".", "`info`"),
-    "DEV": ("`1` for development: changes of files are taken over as they are saved.", "off"),
+    "DEV": (
+        "`1` for development: a fault of the panel file is shown on a page, and pages reload when a file is saved.",
+        "off",
+    ),
 }
 
 
