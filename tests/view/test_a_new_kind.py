@@ -16,7 +16,7 @@ import pytest
 from tests.support.parts import ROOT, Server, until
 
 GUIDE: Final = ROOT / "docs/adding-a-widget-kind.md"
-BLOCK: Final = re.compile(r'^```\w+ title="([^"]+)"\n(.*?)^```$', re.DOTALL | re.MULTILINE)
+BLOCK: Final = re.compile(r'^```[\w+]+ title="([^"]+)"\n(.*?)^```$', re.DOTALL | re.MULTILINE)
 
 
 def add(path: Path, code: str) -> None:
