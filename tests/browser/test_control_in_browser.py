@@ -237,6 +237,7 @@ def test_what_was_given_up_does_not_come_back_with_a_page(opens: Opens) -> None:
     take(cell)
 
 
+@pytest.mark.real_time
 def test_two_taps_take_control_and_do_not_give_it_up(opens: Opens) -> None:
     first = opens(FIRST)
     button(first, "Take control").dblclick(delay=20)

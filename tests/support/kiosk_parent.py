@@ -23,7 +23,6 @@ from pathlib import Path
 from typing import Any, Final
 
 MAIN: Final = Path("app/main.py")
-COLLECTOR: Final = "app.process.collector"  # it acts when it is imported: that is the kiosk's
 UVICORN: Final = (
     "main",
     "lifespan.on",
@@ -43,12 +42,11 @@ def read_libraries() -> dict[str, str]:
         if isinstance(statement, ast.Import):
             for module in statement.names:
                 import_module(module.name)
-        elif isinstance(statement, ast.ImportFrom) and statement.module not in (None, COLLECTOR):
+        elif isinstance(statement, ast.ImportFrom) and statement.module is not None:
             package = import_module(str(statement.module))
             for part in statement.names:
                 if not hasattr(package, part.name):
                     import_module(f"{statement.module}.{part.name}")
-    assert COLLECTOR not in sys.modules
     assert len(list(Path("/proc/self/task").iterdir())) == threading.active_count() == 1
     return {name: value for name, value in os.environ.items() if before.get(name) != value}
 
@@ -62,6 +60,7 @@ class Parent:
         self._told: dict[int, int] = {}  # where a child's end is told, by pid
         self._woken, self._wakes = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
         signal.signal(signal.SIGINT, signal.SIG_IGN)
+        signal.signal(signal.SIGHUP, signal.SIG_DFL)  # the tests may run under nohup
         signal.signal(signal.SIGCHLD, lambda *_: None)
         signal.set_wakeup_fd(self._wakes, warn_on_full_buffer=False)
 
