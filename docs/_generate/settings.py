@@ -25,7 +25,7 @@ ABOUT: Final = {
     ),
     "LOG_LEVEL": (", ".join(f"`{level}`" for level in LOG_LEVELS) + ".", "`info`"),
     "DEV": (
-        "`1` for development: a page shows a fault of the panel file; pages reload when a file is saved.",
+        "`1` for development: a page shows a fault of the panel file, and pages reload on each save.",
         "off",
     ),
 }
