@@ -92,9 +92,16 @@ def locked_by(page: Page, why: str) -> None:
 
 
 def sends(page: Page) -> None:
-    page.get_by_label("Message").fill("hello")
-    button(page, "Publish").click()
-    expect(page.locator("#receipt-operation")).to_contain_text("Sent on /operation at")
+    """Again where the robot took its permission back, or the machine stood still, in between."""
+    receipt = page.locator("#receipt-operation")
+
+    def sent() -> bool:
+        page.get_by_label("Message").fill("hello")
+        button(page, "Publish").click()
+        expect(receipt).not_to_be_empty()
+        return "Sent on /operation at" in receipt.inner_text()
+
+    until(sent, "it is sent", every_s=0.5)
 
 
 def test_the_panel_at_the_cell_has_control_at_once(kiosk: Server, opens: Opens) -> None:
