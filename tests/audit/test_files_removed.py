@@ -14,6 +14,7 @@ from app.audit.database import NAME
 from app.audit.queries import rows
 from app.audit.verify import verify
 from app.errors import FolderInUse, LogError
+from tests.audit.test_audit_log import until_good
 from tests.support.parts import ROOT, Server, until
 
 LOGROTATE = f"{NAME}.1"
@@ -44,12 +45,6 @@ def run(folder: Path, work: Callable[[OperatorLog], Awaitable[None]], *, require
             await log.stop()
 
     asyncio.run(opened())
-
-
-async def until_good(log: OperatorLog) -> None:
-    async with asyncio.timeout(10):
-        while log.fault:
-            await asyncio.sleep(0.01)
 
 
 async def until_locked(log: OperatorLog) -> None:

@@ -46,11 +46,6 @@ class Wanted:
     beside: "dict[str, dict[Any, Wanted]]" = field(default_factory=dict)
     lookup: Lookup | None = None  # it is a key itself
 
-    @property
-    def chooses(self) -> bool:
-        """Whether elements of it are looked at, one by one."""
-        return bool(self.indexes or self.keys or self.lookup)
-
     def all_paths(self) -> Iterable[str]:
         """The paths of all that is wanted in it."""
         yield from self.paths
