@@ -135,8 +135,8 @@ def test_no_ping_while_a_callback_holds_the_links_lock(
     until(lambda: "stands still" in listener.next()["STATUS"], "it is told")
     assert listener.silent_for("WATCHDOG", 2 * INTERVAL_S)
     assert http.get("/healthz").status_code == 200
-    assert process.text.count("[FATAL]") == 1
-    assert "The Zenoh link of Robot stands still" in process.text
+    assert process.count("[FATAL]") == 1
+    assert process.count("The Zenoh link of Robot stands still")
 
 
 def test_no_ping_while_the_event_loop_stands_still(

@@ -110,6 +110,11 @@ class Process:
     def text(self) -> str:
         return "\n".join(self.lines)
 
+    def count(self, words: str) -> int:
+        """How often it wrote the words: at least once, for its lines come after its answers."""
+        until(lambda: words in self.text, f"it writes {words!r}")
+        return self.text.count(words)
+
     @property
     def pid(self) -> int:
         return self._process.pid

@@ -104,7 +104,7 @@ def test_the_same_id_is_the_same_press_whatever_way_it_comes(demo: Server) -> No
     ways = ("post", "socket", "post", "socket")
     presses = [demo.by(w).press("operation", "once only", id="one-press").json() for w in ways]
     assert presses == [presses[0]] * len(ways)
-    assert demo.process.text.count("press one-press of") == 1
+    assert demo.process.count("press one-press of") == 1
 
 
 def test_what_was_seen_before_a_restart_does_not_count(demo: Server, way: str) -> None:
@@ -185,7 +185,7 @@ def test_a_form_post_goes_back_to_the_page_with_its_receipt(demo: Server) -> Non
     assert 'value="from a form 日本語"' in html
     again = demo.http.post("/widgets/operation", content=form, headers=FORM)
     assert again.headers["location"] == answer.headers["location"]
-    assert demo.process.text.count("press f00d.operation of") == 1
+    assert demo.process.count("press f00d.operation of") == 1
 
 
 def test_other_kinds_of_body_are_named(demo: Server) -> None:

@@ -190,9 +190,8 @@ def test_one_address_takes_half_of_the_places_and_no_more(hasty: Server) -> None
             "half of the places are taken",
         )
         assert httpx.get(f"{hasty.url}/healthz", trust_env=False).status_code == 200
-        until(lambda: "too many connections" in hasty.process.text, "it is told")
-    assert hasty.process.text.count("too many connections") == 1
-    assert f"closed one from {ELSEWHERE}" in hasty.process.text
+        assert hasty.process.count("too many connections") == 1
+    assert hasty.process.count(f"closed one from {ELSEWHERE}")
 
 
 def test_it_takes_the_files_that_it_may(servers: Callable[[Server], Server]) -> None:
@@ -320,7 +319,7 @@ def test_the_start_tells_what_it_uses_and_where_it_is(servers: Callable[[Server]
         lambda: f"the panel is at http://127.0.0.1:{mine.port}\n" in mine.process.text + "\n", "where"
     )
     said = f'panel "Robot cell 1" ({panel}), robot live by {ROOT / "zenoh.json5"}, data in {mine.data}'
-    assert said in mine.process.text
+    assert mine.process.count(said)
 
 
 @pytest.mark.parametrize(
