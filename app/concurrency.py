@@ -9,7 +9,7 @@ from typing import Any
 from app.ros_logging import RobotLog
 
 
-def told(
+def spawn_logged(
     work: Coroutine[Any, Any, None], log: logging.Logger | RobotLog, failure: str
 ) -> "asyncio.Task[None]":
     """A task whose failure is logged, not lost."""
@@ -23,7 +23,7 @@ def told(
     return task
 
 
-class Waits:
+class CancellableWaits:
     """On the event loop."""
 
     __slots__ = ("_given_up", "_limits")
@@ -32,7 +32,7 @@ class Waits:
         self._limits: set[asyncio.Timeout] = set()
         self._given_up = False
 
-    def give_up(self) -> None:
+    def cancel_all(self) -> None:
         """Ends all of them, and each later one where it first waits; once."""
         self._given_up = True
         for limit in self._limits:
@@ -50,7 +50,7 @@ class Waits:
             self._limits.discard(limit)
 
 
-class Owed:
+class InFlight:
     """On the event loop."""
 
     __slots__ = ("_many", "_none")
@@ -61,7 +61,7 @@ class Owed:
         self._none.set()
 
     @contextmanager
-    def one(self) -> Iterator[None]:
+    def track(self) -> Iterator[None]:
         """While it lasts, somebody waits for an answer."""
         self._many += 1
         self._none.clear()
@@ -72,7 +72,7 @@ class Owed:
             if not self._many:
                 self._none.set()
 
-    async def told(self, within_s: float) -> None:
+    async def drained(self, within_s: float) -> None:
         """Until nobody waits for one; `within_s` at most."""
         with suppress(TimeoutError):
             await asyncio.wait_for(self._none.wait(), within_s)

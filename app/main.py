@@ -19,14 +19,14 @@ from app.commands.press_limits import PressLimits
 from app.errors import KioskError, PanelError
 from app.panel import Panel, load_panel
 from app.process import listen_sockets
-from app.process.sd_notify import Manager
-from app.process.shutdown import in_order
+from app.process.sd_notify import ServiceManager
+from app.process.shutdown import graceful_shutdown
 from app.process.watchdog import Watchdog
 from app.runtime.assembly import check_zenoh, mode_of, open_fleet, open_log
 from app.settings import Settings, shipped
 from app.simulator import zenoh_peer
-from app.web.app_state import Site, named_robot
-from app.web.asgi import Application, InWords
+from app.web.app_state import AppState, named_robot
+from app.web.asgi import Application, StartErrorsInWords
 from app.web.assets import load_assets
 from app.web.described import errors
 from app.web.error_pages import HANDLERS, on_error_in_development
@@ -45,7 +45,7 @@ from app.web.routes import (
     presses,
     static,
 )
-from app.web.security import Doors
+from app.web.security import RequestGuard
 from app.web.serving import check_port, urls
 
 log = logging.getLogger("kiosk")
@@ -63,28 +63,28 @@ def create_app(settings: Settings | None = None) -> FastAPI:
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        async with _site(settings, panel, app.state.server) as site:
-            app.state.site = site
+        async with _app_state(settings, panel, app.state.server) as state:
+            app.state.app_state = state
             loop = asyncio.get_running_loop()
 
             async def ending() -> None:
                 watchdog.end()
                 try:
-                    site.fleet.close()
-                    site.log.close()
-                    await site.owed.told(ANSWERED_WITHIN_S)
+                    state.fleet.close()
+                    state.log.close()
+                    await state.in_flight.drained(ANSWERED_WITHIN_S)
                 finally:
-                    site.fleet.give_up()
-                    await site.owed.told(READ_WITHIN_S)
-                    loop.call_later(READ_WITHIN_S, listen_sockets.hang_up, ports)
+                    state.fleet.cancel_all()
+                    await state.in_flight.drained(READ_WITHIN_S)
+                    loop.call_later(READ_WITHIN_S, listen_sockets.abort_unsent, ports)
 
             ports: set[int] = set()
-            watchdog = _watchdog(site)
-            with in_order(loop, ending):
+            watchdog = _watchdog(state)
+            with graceful_shutdown(loop, ending):
                 works = (
                     watchdog.run(),
                     _listening(app.state.server, ports, settings.hosts),
-                    pages.compiled(site.templates),
+                    pages.compiled(state.templates),
                 )
                 tasks = [asyncio.create_task(work) for work in works]
                 try:
@@ -107,10 +107,10 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     if settings.dev:
         app.add_exception_handler(Exception, on_error_in_development)
     app.add_middleware(GZipMiddleware, minimum_size=500)
-    app.add_middleware(Doors, hosts=settings.hosts)
+    app.add_middleware(RequestGuard, hosts=settings.hosts)
     if settings.proxies:
         app.add_middleware(Proxies, named=settings.proxies)
-    app.add_middleware(InWords)
+    app.add_middleware(StartErrorsInWords)
     for routes in (pages, events, presses, press_socket, control, hold_socket, parameters):
         app.include_router(routes.router)
         app.include_router(routes.router, prefix="/robots/{robot}", dependencies=[Depends(named_robot)])
@@ -121,7 +121,9 @@ def create_app(settings: Settings | None = None) -> FastAPI:
 
 
 @asynccontextmanager
-async def _site(settings: Settings, panel: Panel, server: ServerConfig | None) -> AsyncIterator[Site]:
+async def _app_state(
+    settings: Settings, panel: Panel, server: ServerConfig | None
+) -> AsyncIterator[AppState]:
     """All that requests need, open."""
     async with open_log(settings, panel) as oplog:
         check_port(server)
@@ -132,26 +134,26 @@ async def _site(settings: Settings, panel: Panel, server: ServerConfig | None) -
         revision = f"{panel.revision}-{assets.revision}"
         if settings.dev:
             revision += f"-{secrets.token_hex(4)}"  # open pages load whatever was changed
-        limits = PressLimits(partial(oplog.leave_out, limited=True))
+        limits = PressLimits(partial(oplog.suppress, limited=True))
         metrics = Metrics(lambda: oplog.left_out, lambda: limits.refused)
         async with open_fleet(settings, panel, revision, oplog, zenoh_peer.in_process) as fleet:
             metrics.follow(fleet)
-            yield Site(fleet, assets, _templates(), metrics, oplog, limits)
+            yield AppState(fleet, assets, _templates(), metrics, oplog, limits)
 
 
 async def _listening(server: ServerConfig | None, ports: set[int], hosts: Sequence[str]) -> None:
     """Tells where browsers find the panel, as soon as they do."""
-    listening = await listen_sockets.narrow(ports)
+    listening = await listen_sockets.limit_send_buffer(ports)
     if listening:
         log.info("the panel is at %s", ", ".join(urls(server, listening, hosts)))
 
 
-def _watchdog(site: Site) -> Watchdog:
-    """What tells the service manager of the robots that the site has at the time."""
+def _watchdog(state: AppState) -> Watchdog:
+    """What tells the service manager of the robots that the state has at the time."""
     return Watchdog(
-        Manager(),
-        lambda: [(kiosk.robot.name, kiosk.link) for kiosk in site.fleet.kiosks],
-        lambda: site.fleet.state,
+        ServiceManager(),
+        lambda: [(session.robot.name, session.link) for session in state.fleet.sessions],
+        lambda: state.fleet.state,
     )
 
 

@@ -6,7 +6,7 @@ from typing import Final
 
 import pytest
 
-from app.concurrency import Owed
+from app.concurrency import InFlight
 
 SOON_S: Final = 0.05
 
@@ -16,12 +16,12 @@ def test_it_waits_until_all_are_told() -> None:
 
 
 async def _until_all_are_told() -> None:
-    owed = Owed()
-    await owed.told(0)  # nobody waits
-    with owed.one():
-        with owed.one():
+    owed = InFlight()
+    await owed.drained(0)  # nobody waits
+    with owed.track():
+        with owed.track():
             pass
-        told = asyncio.create_task(owed.told(5))
+        told = asyncio.create_task(owed.drained(5))
         await asyncio.sleep(SOON_S)
         assert not told.done()
     async with asyncio.timeout(1):
@@ -34,8 +34,8 @@ def test_it_waits_no_longer_than_it_may() -> None:
 
 
 async def _no_longer_than_it_may() -> None:
-    owed = Owed()
-    with owed.one():
+    owed = InFlight()
+    with owed.track():
         began = time.monotonic()
-        await owed.told(SOON_S)
+        await owed.drained(SOON_S)
         assert SOON_S <= time.monotonic() - began < 1

@@ -5,7 +5,7 @@ import logging
 
 import pytest
 
-from app.concurrency import told
+from app.concurrency import spawn_logged
 from app.ros_logging import RobotLog
 
 LOG = RobotLog(logging.getLogger("kiosk.tasks"), "Robot 1")
@@ -16,7 +16,7 @@ def test_a_failure_is_logged_with_its_robot_and_its_place(caplog: pytest.LogCapt
         raise ZeroDivisionError("in vain")
 
     async def begun() -> None:
-        await asyncio.gather(told(fails(), LOG, "counting failed"), return_exceptions=True)
+        await asyncio.gather(spawn_logged(fails(), LOG, "counting failed"), return_exceptions=True)
 
     asyncio.run(begun())
     (record,) = caplog.records
@@ -27,9 +27,9 @@ def test_a_failure_is_logged_with_its_robot_and_its_place(caplog: pytest.LogCapt
 
 def test_an_end_and_a_cancel_are_no_failures(caplog: pytest.LogCaptureFixture) -> None:
     async def begun() -> None:
-        task = told(asyncio.sleep(0), LOG, "counting failed")
+        task = spawn_logged(asyncio.sleep(0), LOG, "counting failed")
         await task
-        task = told(asyncio.sleep(60), LOG, "counting failed")
+        task = spawn_logged(asyncio.sleep(60), LOG, "counting failed")
         task.cancel()
         await asyncio.gather(task, return_exceptions=True)
 

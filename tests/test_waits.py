@@ -4,10 +4,10 @@ import asyncio
 
 import pytest
 
-from app.concurrency import Waits
+from app.concurrency import CancellableWaits
 
 
-async def waits(on: Waits, event: asyncio.Event) -> str:
+async def waits(on: CancellableWaits, event: asyncio.Event) -> str:
     try:
         async with on.one():
             await event.wait()
@@ -17,10 +17,10 @@ async def waits(on: Waits, event: asyncio.Event) -> str:
 
 
 async def _both_and_a_later_one() -> None:
-    mine, event = Waits(), asyncio.Event()
+    mine, event = CancellableWaits(), asyncio.Event()
     first, second = (asyncio.create_task(waits(mine, event)) for _ in range(2))
     await asyncio.sleep(0)
-    mine.give_up()
+    mine.cancel_all()
     assert list(await asyncio.gather(first, second)) == ["given up", "given up"]
     assert await waits(mine, event) == "given up"
     async with mine.one():
@@ -28,14 +28,14 @@ async def _both_and_a_later_one() -> None:
 
 
 async def _not_what_was_answered() -> None:
-    mine, event = Waits(), asyncio.Event()
+    mine, event = CancellableWaits(), asyncio.Event()
     event.set()
     assert await waits(mine, event) == "answered"
-    mine.give_up()
+    mine.cancel_all()
 
 
 async def _who_is_cancelled_is_not_given_up() -> None:
-    mine = Waits()
+    mine = CancellableWaits()
     task = asyncio.create_task(waits(mine, asyncio.Event()))
     await asyncio.sleep(0)
     task.cancel()

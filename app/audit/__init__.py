@@ -2,8 +2,8 @@
 
 from app.audit.audit_log import OperatorLog
 from app.audit.entry import Entry, Origin, entered, same_values
-from app.audit.null_log import Unlogged
-from app.audit.queries import Filter, Row, Unended
+from app.audit.null_log import NullLog
+from app.audit.queries import Filter, OpenPress, Row
 from app.audit.reader_process import ReaderProcess
 from app.audit.ticket import Limits, Repeated
 
@@ -11,13 +11,13 @@ __all__ = [
     "Entry",
     "Filter",
     "Limits",
+    "NullLog",
+    "OpenPress",
     "OperatorLog",
     "Origin",
     "ReaderProcess",
     "Repeated",
     "Row",
-    "Unended",
-    "Unlogged",
     "entered",
     "same_values",
 ]

@@ -16,15 +16,15 @@ from contextlib import AbstractAsyncContextManager, contextmanager, suppress
 from pathlib import Path
 from typing import Final
 
-from app.audit.data_dir import Folder
+from app.audit.data_dir import DataDir
 from app.audit.database import Head
 from app.audit.entry import Entry, Origin
-from app.audit.queries import Filter, Row, Unended
+from app.audit.queries import Filter, OpenPress, Row
 from app.audit.reader_process import ReaderProcess
 from app.audit.readers import Readers
-from app.audit.refusal_quota import SUMMED_UP_S, Refusals
+from app.audit.refusal_quota import SUMMED_UP_S, RefusalQuota
 from app.audit.ticket import Limits, Results, Ticket
-from app.audit.writer_thread import Keeper
+from app.audit.writer_thread import WriterThread
 from app.errors import LogError
 from app.i18n import say
 
@@ -42,29 +42,29 @@ class OperatorLog:
     def __init__(self, folder: Path, limits: Limits, mode: str = "live") -> None:
         self.folder = folder
         self._limits = limits
-        self._folder = Folder(folder)
+        self._folder = DataDir(folder)
         self._changed: set[Callable[[], None]] = set()
         self._readers = Readers(folder)
         self._stuck: set[Ticket] = set()
         self._loop = asyncio.get_running_loop()
-        self._refusals = Refusals()
+        self._refusals = RefusalQuota()
         self._telling: asyncio.TimerHandle | None = None
-        self._keeper = Keeper(self._folder, limits, secrets.token_hex(4), mode, self._tell)
+        self._writer = WriterThread(self._folder, limits, secrets.token_hex(4), mode, self._tell)
 
     async def start(self) -> None:
         """Opens the log; FolderInUse when another server has the folder. What else may be wrong is
         its `fault`, and tried again."""
         with suppress(OSError):  # the keeper meets it again, and says it
             await self._folder.hold_soon()
-        self._keeper.start()
-        await self._own(self._keeper.tried.wait)
+        self._writer.start()
+        await self._own(self._writer.tried.wait)
 
     async def stop(self) -> None:
         """Writes what is waiting, and lets go of the folder."""
         if self._telling is not None:
             self._telling.cancel()
             self._add_left_out()
-        await self._own(self._keeper.stop)
+        await self._own(self._writer.stop)
         self._readers.stop()
         self._folder.release()
 
@@ -84,7 +84,7 @@ class OperatorLog:
     @property
     def head(self) -> Head | None:
         """None until it could be opened."""
-        return self._keeper.head
+        return self._writer.head
 
     @property
     def fault(self) -> str:
@@ -95,9 +95,9 @@ class OperatorLog:
 
     @property
     def _why(self) -> str:
-        if self._stuck and not self._keeper.fault:
+        if self._stuck and not self._writer.fault:
             return say("log_slow", seconds=f"{PRESSED_WITHIN_S:g}")
-        return self._keeper.fault
+        return self._writer.fault
 
     @property
     def lock(self) -> str:
@@ -107,10 +107,10 @@ class OperatorLog:
     @property
     def _needed(self) -> bool:
         """Whether nothing is sent that is not logged."""
-        return self._limits.required or self._keeper.displaced
+        return self._limits.required or self._writer.displaced
 
     @contextmanager
-    def followed(self, changed: Callable[[], None]) -> Iterator[None]:
+    def notifying(self, changed: Callable[[], None]) -> Iterator[None]:
         """`changed` is called, on the loop, whenever `fault` has changed."""
         self._changed.add(changed)
         try:
@@ -145,14 +145,14 @@ class OperatorLog:
         """Writes what came of a press, when nobody waits for it."""
         self._add(entry)
 
-    def room(self, origin: Origin) -> bool:
+    def allowed(self, origin: Origin) -> bool:
         """Whether a refusal may be an entry; where not, it is left out."""
-        return self._refusals.room(origin)
+        return self._refusals.allowed(origin)
 
-    def leave_out(self, origin: Origin, limited: bool = False) -> None:
+    def suppress(self, origin: Origin, limited: bool = False) -> None:
         """Counts a refusal that is no entry, `limited` one that was not even judged; one entry tells of
         those of a while."""
-        if self._refusals.leave_out(origin, limited):
+        if self._refusals.suppress(origin, limited):
             self._tell_left_out_later()
 
     @property
@@ -170,8 +170,8 @@ class OperatorLog:
             self._add_left_out()
 
     def _add_left_out(self) -> None:
-        for entry in self._refusals.told():
-            self._keeper.add(Ticket(entry, self._loop.create_future()), None)
+        for entry in self._refusals.summary_due():
+            self._writer.add(Ticket(entry, self._loop.create_future()), None)
 
     async def rows(self, wanted: Filter, before: int | None, count: int) -> list[Row]:
         """The newest entries that are wanted before a number; LogError, TooMany."""
@@ -187,12 +187,12 @@ class OperatorLog:
         """The server is about to end: it waits for nobody who reads."""
         self._readers.close()
 
-    async def unended(self, robot: str, widgets: Collection[str], since: int) -> list[Unended]:
+    async def open_presses(self, robot: str, widgets: Collection[str], since: int) -> list[OpenPress]:
         """Presses of these widgets, not before `since` (ms), of which the end is not known, the newest
         first; LogError when that can't be read, or what was cut off is not closed yet."""
         if self.head is None:
             raise LogError(say("log_unreadable", why=self._why or say("log_closed")))
-        return await self._readers.unended(robot, widgets, since)
+        return await self._readers.open_presses(robot, widgets, since)
 
     async def _written(self, entry: Entry) -> Entry:
         if why := self._why:
@@ -222,13 +222,13 @@ class OperatorLog:
     def _close_abandoned(self, ticket: Ticket) -> None:
         """A press that nobody waits for any more may have been written all the same."""
         if isinstance(ticket.result, Entry):
-            self._add(ticket.result.followed("closed", "refused", say("log_abandoned")))
+            self._add(ticket.result.follow_up("closed", "refused", say("log_abandoned")))
 
     def _add(self, entry: Entry) -> Ticket:
         """Hands it to the keeper. Only what starts a press is turned away when too much waits: what
         came of it is bounded by the presses that there are."""
         ticket = Ticket(entry, self._loop.create_future())
-        if not self._keeper.add(ticket, MOST_WAITING if entry.of is None else None):
+        if not self._writer.add(ticket, MOST_WAITING if entry.of is None else None):
             raise LogError(say("log_full_queue"))
         return ticket
 

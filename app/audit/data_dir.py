@@ -22,7 +22,7 @@ HELD_BY_OTHER_S: Final = 5.0  # a server that is started anew waits so long for 
 ASKED_AGAIN_S: Final = 0.1
 
 
-class Folder:
+class DataDir:
     """A folder for databases, readable by its user alone; `hold` it before anything is written."""
 
     def __init__(self, path: Path) -> None:

@@ -73,7 +73,7 @@ class Entry(NamedTuple):
         """What its hash must be."""
         return _hash(self[:-1])
 
-    def followed(self, kind: Kind, outcome: str, reason: str, **more: str) -> Self:
+    def follow_up(self, kind: Kind, outcome: str, reason: str, **more: str) -> Self:
         """The entry that tells, now, what came of this press."""
         at, monotonic = _now()
         return self._replace(

@@ -5,17 +5,17 @@ from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from app.audit.data_dir import Folder
+from app.audit.data_dir import DataDir
 from app.audit.database import Head
 from app.audit.entry import Entry, Origin
-from app.audit.queries import Unended
+from app.audit.queries import OpenPress
 from app.errors import FolderInUse, LogError
 from app.i18n import say
 
 log = logging.getLogger("kiosk.log")
 
 
-class Unlogged:
+class NullLog:
     """Takes every entry and writes none; keeps a second server from the folder all the same."""
 
     folder = None
@@ -26,7 +26,7 @@ class Unlogged:
     left_out = 0
 
     def __init__(self, folder: Path | None = None) -> None:
-        self._folder = Folder(folder) if folder else None
+        self._folder = DataDir(folder) if folder else None
 
     async def start(self) -> None:
         """FolderInUse when another server has the folder: each would send what comes twice."""
@@ -41,17 +41,17 @@ class Unlogged:
             self._folder.release()
 
     @contextmanager
-    def followed(self, changed: Callable[[], None]) -> Iterator[None]:
+    def notifying(self, changed: Callable[[], None]) -> Iterator[None]:
         """There is never anything to be told."""
         yield
 
-    def room(self, origin: Origin) -> bool:
+    def allowed(self, origin: Origin) -> bool:
         return True
 
-    def leave_out(self, origin: Origin, limited: bool = False) -> None:
+    def suppress(self, origin: Origin, limited: bool = False) -> None:
         """It is not counted."""
 
-    async def unended(self, robot: str, widgets: Collection[str], since: int) -> list[Unended]:
+    async def open_presses(self, robot: str, widgets: Collection[str], since: int) -> list[OpenPress]:
         return []
 
     async def pressed(self, entry: Entry) -> Entry | None:

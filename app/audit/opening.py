@@ -80,7 +80,7 @@ class Opening:
 def cut_off(store: Store) -> Sequence[Entry]:
     """What is to be said of presses of servers that ended before they knew what came of them."""
     return [
-        entry.followed(
+        entry.follow_up(
             "corrected" if store.answered(entry.seq) else "closed", "unknown", say("log_ended")
         )
         for entry in store.undone()

@@ -5,11 +5,11 @@ from contextlib import AbstractContextManager
 from typing import Any, Protocol
 
 from app.audit.entry import Entry, Origin, entered
-from app.audit.queries import Unended
+from app.audit.queries import OpenPress
 from app.errors import LogError
 from app.i18n import say
-from app.permission.clients import Browser
-from app.robot.command_status import Answer
+from app.permission.clients import Client
+from app.robot.command_status import Outcome
 
 
 class Log(Protocol):
@@ -20,7 +20,7 @@ class Log(Protocol):
     def fault(self) -> str: ...
     @property
     def lock(self) -> str: ...
-    def followed(self, changed: Callable[[], None]) -> AbstractContextManager[None]: ...
+    def notifying(self, changed: Callable[[], None]) -> AbstractContextManager[None]: ...
 
     async def pressed(self, entry: Entry) -> Entry | None:
         """Returns when the entry is written; LogError when it can't be and must, Repeated where the log
@@ -32,18 +32,18 @@ class Log(Protocol):
     def add(self, entry: Entry) -> None:
         """Writes it, and nobody waits."""
 
-    def room(self, origin: Origin) -> bool:
+    def allowed(self, origin: Origin) -> bool:
         """Whether a refusal may be an entry; where not, it is left out."""
 
-    def leave_out(self, origin: Origin, limited: bool = False) -> None:
+    def suppress(self, origin: Origin, limited: bool = False) -> None:
         """Counts a refusal that is no entry, `limited` one that was not even judged."""
 
-    async def unended(self, robot: str, widgets: Collection[str], since: int) -> list[Unended]:
+    async def open_presses(self, robot: str, widgets: Collection[str], since: int) -> list[OpenPress]:
         """Presses of these widgets, not before `since` (ms), of which the end is not known, the newest
         first; LogError when that can't be read (yet)."""
 
 
-class Noted:
+class PendingEntry:
     """One press in the log; `entry` is None where it could not be written and need not be."""
 
     def __init__(
@@ -54,7 +54,7 @@ class Noted:
         self._board = board
         self._fault = fault
         self._judged = {"verdict": "", "board": ""}
-        self.corrected_to: Answer | None = None
+        self.corrected_to: Outcome | None = None
 
     @property
     def hash(self) -> str:
@@ -69,28 +69,28 @@ class Noted:
         """Writes what came of it; returns when that is on the disk, or why it is not."""
         if self._entry is None:
             return self._fault
-        return await self._log.closed(self._entry.followed("closed", outcome, reason, **self._judged))
+        return await self._log.closed(self._entry.follow_up("closed", outcome, reason, **self._judged))
 
     def broke_off(self, sentence: str) -> None:
         """Nobody will know what came of it."""
         if self._entry is not None:
-            self._log.add(self._entry.followed("closed", "unknown", say(sentence), **self._judged))
+            self._log.add(self._entry.follow_up("closed", "unknown", say(sentence), **self._judged))
 
-    def corrected(self, answer: Answer) -> None:
+    def corrected(self, answer: Outcome) -> None:
         """More is known now than when it was closed."""
         self.corrected_to = answer
         if self._entry is not None:
             text = answer.text
-            self._log.add(self._entry.followed("corrected", answer.outcome, text, **self._judged))
+            self._log.add(self._entry.follow_up("corrected", answer.outcome, text, **self._judged))
 
 
-class Logbook:
+class PressLog:
     """The operator's log as the presses of one robot write it; `board` gives what is shown now."""
 
     def __init__(self, log: Log, robot: str = "", board: Callable[[], str] = str) -> None:
         self._log = log
-        self.room = log.room
-        self.leave_out = log.leave_out
+        self.room = log.allowed
+        self.leave_out = log.suppress
         self._robot = robot
         self._board = board
 
@@ -101,30 +101,32 @@ class Logbook:
         press_id: str,
         origin: Origin,
         action: str = "press",
-    ) -> Noted:
+    ) -> PendingEntry:
         """Written before anything is sent; LogError and Repeated as `Log` has them."""
         entry = entered("pressed", origin, inputs, **self._about(widget, press_id, action))
         written = await self._log.pressed(entry)
-        return Noted(self._log, written, self._board, self._log.fault)
+        return PendingEntry(self._log, written, self._board, self._log.fault)
 
-    async def canceled(self, widget: str, origin: Origin) -> Noted:
+    async def canceled(self, widget: str, origin: Origin) -> PendingEntry:
         """A cancel is written if it can be: no log that fails keeps anybody from stopping a robot."""
         entry = entered("pressed", origin, {}, **self._about(widget, "", "cancel"))
         try:
             written = await self._log.pressed(entry)
         except LogError as error:
-            return Noted(self._log, None, self._board, str(error))
-        return Noted(self._log, written, self._board, self._log.fault)
+            return PendingEntry(self._log, None, self._board, str(error))
+        return PendingEntry(self._log, written, self._board, self._log.fault)
 
     @property
     def unneeded(self) -> bool:
         """Whether presses go on though the log can't be written."""
         return bool(self._log.fault) and not self._log.lock
 
-    async def unended(self, widgets: Collection[str], since: int) -> list[tuple[Unended, Noted]]:
+    async def open_presses(
+        self, widgets: Collection[str], since: int
+    ) -> list[tuple[OpenPress, PendingEntry]]:
         """Presses whose end the log does not know, as `Log` has it, each with what corrects it."""
-        found = await self._log.unended(self._robot, widgets, since)
-        return [(one, Noted(self._log, one.press, self._board)) for one in found]
+        found = await self._log.open_presses(self._robot, widgets, since)
+        return [(one, PendingEntry(self._log, one.press, self._board)) for one in found]
 
     async def refused(
         self,
@@ -144,6 +146,6 @@ class Logbook:
         return {"widget": widget, "press": press_id, "action": action, "robot": self._robot}
 
 
-def origin_of(browser: Browser, seen: str = "") -> Origin:
+def origin_of(client: Client, seen: str = "") -> Origin:
     """Where a press comes from: a browser, which is named until users log in."""
-    return Origin(address=browser.address, browser=browser.id, who=browser.name, seen=seen)
+    return Origin(address=client.address, browser=client.id, who=client.name, seen=seen)

@@ -57,7 +57,7 @@ class Row:
 
 
 @dataclass(frozen=True, slots=True)
-class Unended:
+class OpenPress:
     """A press of which the log has no end: its entry, what was told of it last ("" where nothing was),
     and whether what it was for was `accepted` once."""
 
@@ -80,7 +80,7 @@ def rows(
     return [Row(Entry(*row[:-1]), row[-1]) for row in _found(folder, query, values, longest_s)]
 
 
-def unended(folder: Path, robot: str, widgets: Collection[str], since: int) -> list[Unended]:
+def open_presses(folder: Path, robot: str, widgets: Collection[str], since: int) -> list[OpenPress]:
     """Presses of these widgets of a robot, not before `since` (ms), of which the end is not known; the
     newest first. LogError."""
     names = {f"widget{number}": widget for number, widget in enumerate(widgets)}
@@ -100,7 +100,7 @@ def unended(folder: Path, robot: str, widgets: Collection[str], since: int) -> l
         ORDER BY p.seq DESC
     """
     found = _found(folder, query, {"robot": robot, "since": since, **names})
-    return [Unended(Entry(*row[:-3]), row[-3], row[-2], bool(row[-1])) for row in found]
+    return [OpenPress(Entry(*row[:-3]), row[-3], row[-2], bool(row[-1])) for row in found]
 
 
 def _found(

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from app.errors import TooMany
 
 
-class Places:
+class ReaderSlots:
     """On the event loop; nobody waits."""
 
     def __init__(self, most: int, again_s: int, message: str) -> None:

@@ -9,10 +9,10 @@ from functools import partial
 from pathlib import Path
 from typing import Final, TypeVar
 
-from app.audit.queries import Filter, Row, Unended, rows, unended
+from app.audit.queries import Filter, OpenPress, Row, open_presses, rows
 from app.audit.reader_main import Wish, rows_in
 from app.audit.reader_process import ReaderProcess
-from app.audit.reader_slots import Places
+from app.audit.reader_slots import ReaderSlots
 from app.errors import LogError, SearchTooLong
 from app.i18n import say
 
@@ -31,8 +31,8 @@ class Readers:
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._threads = ThreadPoolExecutor(THREADS, "operators-log-reader")
-        self._searching = Places(SEARCHES_MOST, SEARCH_AGAIN_S, say("log_searched"))
-        self._exporting = Places(1, EXPORT_AGAIN_S, say("log_exported"))
+        self._searching = ReaderSlots(SEARCHES_MOST, SEARCH_AGAIN_S, say("log_searched"))
+        self._exporting = ReaderSlots(1, EXPORT_AGAIN_S, say("log_exported"))
         self._processes: set[ReaderProcess] = set()
         self._closed = False
 
@@ -46,9 +46,9 @@ class Readers:
                 async with self._apart(Wish(self._folder, wanted, before, count)) as process:
                     return rows_in(await process.whole())
 
-    async def unended(self, robot: str, widgets: Collection[str], since: int) -> list[Unended]:
+    async def open_presses(self, robot: str, widgets: Collection[str], since: int) -> list[OpenPress]:
         """See `unended` of app/audit/queries.py."""
-        return await self._read(partial(unended, self._folder, robot, widgets, since))
+        return await self._read(partial(open_presses, self._folder, robot, widgets, since))
 
     @asynccontextmanager
     async def export(

@@ -69,7 +69,7 @@ class _More:
     count: int = 0
 
 
-class Refusals:
+class RefusalQuota:
     """Used on the event loop only."""
 
     def __init__(
@@ -84,7 +84,7 @@ class Refusals:
         self._more: dict[tuple[str, str, bool], _More] = {}
         self.left_out = 0
 
-    def room(self, whose: Whose) -> bool:
+    def allowed(self, whose: Whose) -> bool:
         """Whether a refusal may be an entry."""
         now = self._monotonic()
         known = (self._left.get(key) for key in _keys(whose))
@@ -100,7 +100,7 @@ class Refusals:
         while len(self._left) > REMEMBERED:
             self._left.popitem(last=False)
 
-    def leave_out(self, origin: Origin, limited: bool = False) -> bool:
+    def suppress(self, origin: Origin, limited: bool = False) -> bool:
         """A refusal is only counted, `limited` where there were too many presses to judge it; whether
         it is the first since all were told."""
         first = not self._more
@@ -111,7 +111,7 @@ class Refusals:
         self.left_out += not limited
         return first
 
-    def told(self) -> list[Entry]:
+    def summary_due(self) -> list[Entry]:
         """An entry for each browser of which some were left out, and none of these any more."""
         more, self._more = self._more, {}
         return [_entry(one) for one in more.values()]

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Final
 
-from app.audit.data_dir import Folder
+from app.audit.data_dir import DataDir
 from app.audit.database import Head, in_words
 from app.audit.entry import Entry, entered
 from app.audit.opening import Opening, cut_off
@@ -48,12 +48,12 @@ class Steady:
         return now - self._since >= HOUR_S
 
 
-class Keeper:
+class WriterThread:
     """Owns the file: writes what is handed to it, keeps the file small, and opens it again."""
 
     def __init__(
         self,
-        folder: Folder,
+        folder: DataDir,
         limits: Limits,
         boot: str,
         mode: str,

@@ -15,8 +15,8 @@ from app.clock import format_time
 from app.i18n import say
 from app.panel.values import same
 from app.panel.widgets.publish import Confirm, Publishing
-from app.robot.command_status import Answer, Corrected, Progress
-from app.robot.state import Reading, Robot
+from app.robot.command_status import CommandStatus, OnCorrection, Outcome
+from app.robot.state import Reading, RobotState
 from app.ros_logging import RobotLog
 
 log = logging.getLogger("kiosk.confirmations")
@@ -41,7 +41,7 @@ class _Waiting:
 class Confirmations:
     """The commands of one robot that wait for their effect; used on the event loop only."""
 
-    def __init__(self, robot: Robot, changed: Callable[[], None]) -> None:
+    def __init__(self, robot: RobotState, changed: Callable[[], None]) -> None:
         """`changed` is called when what the widgets show has changed."""
         self._robot = robot
         self._changed = changed
@@ -56,8 +56,8 @@ class Confirmations:
         press_id: str,
         since: float,
         sent: str,
-        corrected: Corrected,
-    ) -> Answer:
+        corrected: OnCorrection,
+    ) -> Outcome:
         """What came of a command that went out at `since` (monotonic seconds), as `sent` says."""
         confirm = widget.confirm
         assert confirm is not None
@@ -67,7 +67,9 @@ class Confirmations:
             self._forget(older)  # what comes now may be of this one
         self._waiting.setdefault(self._robot.key(confirm.topic), []).append(waiting)
         self._latest[widget.id] = press_id
-        self._show(widget, Progress(busy=True, text=say("waiting_for_effect", topic=confirm.topic)))
+        self._show(
+            widget, CommandStatus(busy=True, text=say("waiting_for_effect", topic=confirm.topic))
+        )
         try:
             await asyncio.wait({future}, timeout=confirm.within_s)
         except asyncio.CancelledError:
@@ -77,13 +79,13 @@ class Confirmations:
         self._show_last(waiting, answer)
         return answer
 
-    def _missed(self, waiting: _Waiting, sent: str, corrected: Corrected) -> Answer:
+    def _missed(self, waiting: _Waiting, sent: str, corrected: OnCorrection) -> Outcome:
         confirm = waiting.confirm
         waiting.late = True
         waiting.confirmed.add_done_callback(lambda _: self._too_late(waiting, corrected))
         asyncio.get_running_loop().call_later(LATE_S, self._forget, waiting)
         limit = f"{confirm.within_s:g}"
-        return Answer("unknown", f"{sent} {say('no_effect', topic=confirm.topic, seconds=limit)}")
+        return Outcome("unknown", f"{sent} {say('no_effect', topic=confirm.topic, seconds=limit)}")
 
     def awaits(self, key: str) -> bool:
         """Whether what this topic says next may confirm something."""
@@ -100,12 +102,12 @@ class Confirmations:
                 waiting.confirmed.set_result(reading.wall)
                 done.add(waiting.widget.id)
 
-    def _confirmed(self, waiting: _Waiting) -> Answer:
+    def _confirmed(self, waiting: _Waiting) -> Outcome:
         self._forget(waiting)
         at = format_time(waiting.confirmed.result())
-        return Answer("confirmed", say("confirmed", topic=waiting.confirm.topic, time=at))
+        return Outcome("confirmed", say("confirmed", topic=waiting.confirm.topic, time=at))
 
-    def _too_late(self, waiting: _Waiting, corrected: Corrected) -> None:
+    def _too_late(self, waiting: _Waiting, corrected: OnCorrection) -> None:
         if waiting.confirmed.cancelled():
             return
         answer = self._confirmed(waiting)
@@ -119,12 +121,12 @@ class Confirmations:
         self._waiting[key] = left
         waiting.confirmed.cancel()
 
-    def _show_last(self, waiting: _Waiting, answer: Answer) -> None:
+    def _show_last(self, waiting: _Waiting, answer: Outcome) -> None:
         if self._latest.get(waiting.widget.id) == waiting.press_id:
-            self._show(waiting.widget, Progress(outcome=answer.outcome, text=answer.text))
+            self._show(waiting.widget, CommandStatus(outcome=answer.outcome, text=answer.text))
 
-    def _show(self, widget: Publishing, progress: Progress) -> None:
-        self._robot.progress[widget.id] = progress
+    def _show(self, widget: Publishing, progress: CommandStatus) -> None:
+        self._robot.command_status[widget.id] = progress
         self._changed()
 
 

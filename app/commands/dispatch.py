@@ -5,10 +5,10 @@ from collections.abc import Awaitable, Callable, Iterable, Mapping
 from typing import Any, NamedTuple, Protocol
 
 from app.clock import format_time
-from app.commands.actions.goals import Actions
+from app.commands.actions.goals import GoalTracker
 from app.commands.confirmations import Confirmations
-from app.commands.parameters.sync import Parameters
-from app.commands.service_calls import Calls
+from app.commands.parameters.sync import ParameterSync
+from app.commands.service_calls import ServiceCalls
 from app.errors import InputError, NotFound
 from app.i18n import say
 from app.interfaces import Interfaces
@@ -19,11 +19,11 @@ from app.panel.widgets.kinds import row_of
 from app.panel.widgets.parameter import SET, Parameter
 from app.panel.widgets.publish import Publishing
 from app.panel.widgets.service_action import Action, Call
-from app.robot.command_status import Answer, Corrected, LastLook, no_look
-from app.robot.state import Robot
+from app.robot.command_status import LastLook, OnCorrection, Outcome, no_look
+from app.robot.state import RobotState
 
 
-class Way(Protocol):
+class Transport(Protocol):
     """What a press needs of the link."""
 
     def put(self, key: str, payload: bytes) -> None: ...
@@ -37,29 +37,29 @@ async def taken_for_reached() -> bool:
 
 class Outgoing(NamedTuple):
     """What is sent by a press: the checked `values` of its inputs and the `fields` that they fill in,
-    and what `Sending.send` gets beside them."""
+    and what `Dispatcher.send` gets beside them."""
 
     values: dict[str, Any]
     fields: dict[str, Any]
     press_id: str
-    correct: Corrected
+    correct: OnCorrection
     entry: str
     look: LastLook
 
 
-class Sending:
+class Dispatcher:
     """What the widgets of one panel send to one robot; judges nothing."""
 
     def __init__(
         self,
         panel: Panel,
         interfaces: Interfaces,
-        robot: Robot,
-        way: Way,
-        calls: Calls,
-        actions: Actions,
+        robot: RobotState,
+        transport: Transport,
+        calls: ServiceCalls,
+        actions: GoalTracker,
         confirmations: Confirmations,
-        parameters: Parameters,
+        parameters: ParameterSync,
         monotonic: Callable[[], float] = time.monotonic,
         reached: Callable[[], Awaitable[bool]] = taken_for_reached,
     ) -> None:
@@ -69,14 +69,14 @@ class Sending:
         self._needs = {id: inputs_of(w) for id, w in self._widgets.items() if isinstance(w, Pressed)}
         self._interfaces = interfaces
         self._robot = robot
-        self._way = way
+        self._transport = transport
         self._calls = calls
         self._actions = actions
         self._confirmations = confirmations
         self._parameters = parameters
         self._monotonic = monotonic
         # How each kind, or family, is sent; why it would not be; and how what is entered is checked.
-        self.senders: Mapping[type[Pressed], Callable[[Any, Outgoing], Awaitable[Answer]]] = {
+        self.senders: Mapping[type[Pressed], Callable[[Any, Outgoing], Awaitable[Outcome]]] = {
             Publishing: self._publish,
             Call: self._call,
             Action: self._start,
@@ -124,10 +124,10 @@ class Sending:
         widget: Pressed,
         inputs: Mapping[str, Any],
         press_id: str,
-        correct: Corrected,
+        correct: OnCorrection,
         entry: str = "",
         look: LastLook = no_look,
-    ) -> Answer:
+    ) -> Outcome:
         """Sends, and waits for what comes of it; `correct` gets what is known later. `entry` is the
         hash of the press's entry in the operator's log, `look` the last one at what permits it.
 
@@ -144,7 +144,7 @@ class Sending:
         values = self.checked(self._needs[widget.id], inputs)
         return row_of(self.refusals, widget)(widget, filled(widget.template, with_now(values)))
 
-    async def _publish(self, widget: Publishing, going: Outgoing) -> Answer:
+    async def _publish(self, widget: Publishing, going: Outgoing) -> Outcome:
         if widget.confirm is None:
             return await self._arrived(widget, self._published(widget, going.fields, going.look))
         equals = filled(widget.confirm.equals, going.values)
@@ -158,7 +158,7 @@ class Sending:
         self._interfaces.encode(widget.type, fields)
         return ""
 
-    async def _call(self, widget: Call, going: Outgoing) -> Answer:
+    async def _call(self, widget: Call, going: Outgoing) -> Outcome:
         request, _ = self._interfaces.service(widget.type)
         payload = self._interfaces.encode(request, going.fields)
         return await self._calls.call(widget, payload, going.press_id, going.correct, going.look)
@@ -167,31 +167,31 @@ class Sending:
         self._interfaces.encode(self._interfaces.service(widget.type)[0], fields)
         return self._calls.full(widget.service)
 
-    async def _start(self, widget: Action, going: Outgoing) -> Answer:
+    async def _start(self, widget: Action, going: Outgoing) -> Outcome:
         return await self._actions.start(
             widget, going.fields, going.press_id, going.correct, going.entry, going.look
         )
 
-    async def _set(self, widget: Parameter, going: Outgoing) -> Answer:
+    async def _set(self, widget: Parameter, going: Outgoing) -> Outcome:
         value = going.fields["value"]
         return await self._parameters.set(widget, value, going.press_id, going.correct, going.look)
 
-    def _published(self, widget: Publishing, fields: dict[str, Any], look: LastLook) -> Answer:
+    def _published(self, widget: Publishing, fields: dict[str, Any], look: LastLook) -> Outcome:
         payload = self._interfaces.encode(widget.type, fields)
         key = self._robot.key(widget.topic)
-        heard = self._way.heard(key)
+        heard = self._transport.heard(key)
         look()
-        self._way.put(key, payload)
+        self._transport.put(key, payload)
         sentence = "published" if heard else "sent_to_nobody"
         text = say(sentence, topic=widget.topic, time=format_time(time.time()))
-        return Answer("published" if heard else "unknown", text)
+        return Outcome("published" if heard else "unknown", text)
 
-    async def _arrived(self, widget: Publishing, answer: Answer) -> Answer:
+    async def _arrived(self, widget: Publishing, answer: Outcome) -> Outcome:
         """What was `published` is on its way until the bridge has answered."""
         at = format_time(time.time())
         if answer.outcome != "published" or await self._reached():
             return answer
-        return Answer("unknown", say("sent_unanswered", topic=widget.topic, time=at))
+        return Outcome("unknown", say("sent_unanswered", topic=widget.topic, time=at))
 
     def checked(self, names: Iterable[str], inputs: Mapping[str, Any]) -> dict[str, Any]:
         """The values of the inputs with these ids."""
@@ -210,6 +210,6 @@ class Sending:
         """Why there is no goal to cancel; "" where there is one."""
         return self._actions.over(widget, press_id)
 
-    async def cancel(self, widget: Action, press_id: str) -> Answer:
+    async def cancel(self, widget: Action, press_id: str) -> Outcome:
         """Asks the robot to cancel the goal of a press or, without its id, the one under way."""
         return await self._actions.cancel(widget, press_id)

@@ -9,13 +9,13 @@ from typing import Final
 
 from app import clock
 from app.audit.press_record import Log, origin_of
-from app.commands.receipts import By
+from app.commands.receipts import PressContext
 from app.errors import InputError
 from app.i18n import say
-from app.permission.clients import Browser
-from app.permission.control_authority import Control
+from app.permission.clients import Client
+from app.permission.control_authority import ControlAuthority
 from app.permission.interlocks import Verdict, locked
-from app.view.publisher import Board
+from app.view.publisher import ViewPublisher
 
 AHEAD_S: Final = 1.0  # a press can't be from later than now, but for rounding and drift
 SEEN: Final = r"^[0-9a-f]{1,32}-[0-9]{1,18}$"  # <boot>-<version>, an event's id
@@ -24,19 +24,19 @@ PRESS_ID: Final = rf"^[A-Za-z0-9_.:-]{{1,{LONGEST_ID}}}$"
 _is_seen: Final = re.compile(SEEN).fullmatch
 
 
-class Doubts:
+class PressGuard:
     """Of one robot's controls."""
 
     def __init__(
         self,
-        board: Board,
-        control: Control,
+        publisher: ViewPublisher,
+        control: ControlAuthority,
         operators_log: Log,
         expires_s: float,
         boots: Callable[[], Collection[str]],
     ) -> None:
         """`boots` are those of all robots' boards, by which a page of another one is told."""
-        self._board = board
+        self._publisher = publisher
         self._control = control
         self._log = operators_log
         self._expires_s = expires_s
@@ -47,7 +47,7 @@ class Doubts:
         """From now on nothing is sent any more."""
         self._ended = True
 
-    def by(self, widget: str, browser: Browser, seen: str = "", at: float | None = None) -> By:
+    def by(self, widget: str, client: Client, seen: str = "", at: float | None = None) -> PressContext:
         """Who presses or holds a widget, and what has to hold for that at every moment.
 
         `seen` is the id of the last event that the operator saw, "" where that is not known; `at`
@@ -55,10 +55,10 @@ class Doubts:
         """
         if seen:
             self._check(seen)
-        self._control.touch(browser)
-        return By(
-            origin_of(browser, seen),
-            lambda: self._controls(browser),
+        self._control.touch(client)
+        return PressContext(
+            origin_of(client, seen),
+            lambda: self._controls(client),
             lambda: self._doubt(widget, seen, at),
         )
 
@@ -73,22 +73,22 @@ class Doubts:
         boot, _, version = seen.partition("-")
         if not _is_seen(seen):
             raise InputError(f'seen: "{seen:.60}" is not the id of an event')
-        if boot == self._board.boot and int(version) > self._board.version:
-            newest = self._board.id
+        if boot == self._publisher.boot and int(version) > self._publisher.version:
+            newest = self._publisher.id
             raise InputError(f"seen: version {version} is not there yet, the newest is {newest}")
 
-    def _controls(self, browser: Browser) -> Verdict:
+    def _controls(self, client: Client) -> Verdict:
         if self._ended:
             return locked("ending")
         if self._log.lock:
             return Verdict(False, "log", self._log.lock)
-        return self._control.verdict(browser)
+        return self._control.verdict(client)
 
     def _doubt(self, widget: str, seen: str, at: float | None) -> str:
         """Why a press is no longer what was meant; "" if it is."""
         boot, _, version = seen.partition("-")
-        if boot and boot != self._board.boot:
+        if boot and boot != self._publisher.boot:
             return say("seen_on_another" if boot in self._boots() else "seen_before_restart")
-        if boot and int(version) < self._board.turned(widget):
+        if boot and int(version) < self._publisher.lock_changed_at(widget):
             return say("changed_meanwhile")
         return "" if at is None else self.late(at)

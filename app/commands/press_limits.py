@@ -11,7 +11,7 @@ from typing import Final
 
 from app.audit import Origin
 from app.audit.press_record import origin_of
-from app.permission.clients import Browser
+from app.permission.clients import Client
 from app.rate_limit import Buckets, Quota
 
 # A finger taps ten times a second at most; a program that follows a control loop presses 50 times.
@@ -36,29 +36,29 @@ class PressLimits:
         self._cancels = Buckets(OF_CANCELS, monotonic)
         self.refused = 0
 
-    def admit(self, browser: Browser) -> bool:
+    def admit(self, client: Client) -> bool:
         """Whether it may press once more now; what may not is counted, here and for the log."""
         asked: list[tuple[Buckets, Hashable]] = [
-            (self._clients, (browser.address, browser.id)),
-            (self._addresses, browser.address),
+            (self._clients, (client.address, client.id)),
+            (self._addresses, client.address),
         ]
-        if not browser.local:
+        if not client.local:
             asked.append((self._all, ""))
         if not all(buckets.has(key) for buckets, key in asked):
-            return self._refuse(browser)
+            return self._refuse(client)
         for buckets, key in asked:
             buckets.take(key)
         return True
 
-    def admit_cancel(self, browser: Browser, *goal: str) -> bool:
+    def admit_cancel(self, client: Client, *goal: str) -> bool:
         """The same for a cancel: it is one too many only if this very goal's was asked for that often
         just now, so that nobody is kept from stopping a robot."""
         if not self._cancels.has(goal):
-            return self._refuse(browser)
+            return self._refuse(client)
         self._cancels.take(goal)
         return True
 
-    def _refuse(self, browser: Browser) -> bool:
+    def _refuse(self, client: Client) -> bool:
         self.refused += 1
-        self._leave_out(origin_of(browser))
+        self._leave_out(origin_of(client))
         return False

@@ -14,14 +14,14 @@ from functools import partial
 from typing import Any
 
 from app.audit import Origin, Repeated
-from app.audit.press_record import Logbook, Noted
+from app.audit.press_record import PendingEntry, PressLog
 from app.clock import format_time
-from app.commands.dispatch import Sending
+from app.commands.dispatch import Dispatcher
 from app.commands.receipts import (
     FINE,
     LONGEST_LOGGED,
     MOST_LOOKS,
-    By,
+    PressContext,
     Receipt,
     Receipts,
     Witness,
@@ -34,17 +34,17 @@ from app.commands.receipts import (
     untyped,
     with_doubt,
 )
-from app.commands.refusals import Unjudged
-from app.commands.repeated import Recall
-from app.concurrency import Waits
+from app.commands.refusals import EarlyRefusals
+from app.commands.repeated import RepeatedPresses
+from app.concurrency import CancellableWaits
 from app.errors import Cause, FieldError, InputError, LinkError, LogError, NotFound, PressRefused
 from app.i18n import say
 from app.panel.model import Panel
 from app.panel.widgets.families import Pressed
 from app.panel.widgets.service_action import Action
 from app.permission.interlocks import Verdict
-from app.robot.command_status import Answer
-from app.robot.state import Robot
+from app.robot.command_status import Outcome
+from app.robot.state import RobotState
 from app.ros_logging import RobotLog, on_rosout
 
 log = logging.getLogger("kiosk.presses")
@@ -69,9 +69,9 @@ class Presses:
     def __init__(
         self,
         panel: Panel,
-        robot: Robot,
-        sending: Sending,
-        logbook: Logbook,
+        robot: RobotState,
+        dispatcher: Dispatcher,
+        press_log: PressLog,
         monotonic: Callable[[], float] = time.monotonic,
         catch_up: Callable[[], None] = lambda: None,
         news: Callable[[], bool] = lambda: False,
@@ -82,47 +82,49 @@ class Presses:
         self._panel = panel
         self._robot = robot
         self._log = RobotLog(log, robot.name)
-        self._sending = sending
-        self._logbook = logbook
+        self._dispatcher = dispatcher
+        self._press_log = press_log
         self._catch_up = catch_up
         self._news = news
         self._under_way: dict[str, _UnderWay] = {}
         self._monotonic = monotonic
         self._receipts = Receipts(witness)
-        self._unjudged = Unjudged(sending, logbook, self._receipts, self._log)
-        self._recall = Recall(sending, self._unjudged, self._log)
-        self.widget = sending.widget
+        self._early_refusals = EarlyRefusals(dispatcher, press_log, self._receipts, self._log)
+        self._repeated = RepeatedPresses(dispatcher, self._early_refusals, self._log)
+        self.widget = dispatcher.widget
         self.receipt = self._receipts.get
-        self.too_soon = self._unjudged.too_soon
-        self.limited = self._unjudged.limited
-        self._waits = Waits()
-        self.give_up = self._waits.give_up
+        self.too_soon = self._early_refusals.too_soon
+        self.limited = self._early_refusals.limited
+        self._waits = CancellableWaits()
+        self.cancel_all = self._waits.cancel_all
         self._closed = False
 
     def close(self) -> None:
         """Nothing more is sent; a goal can be canceled until the end."""
         self._closed = True
 
-    async def press(self, widget_id: str, inputs: Mapping[str, Any], press_id: str, by: By) -> Receipt:
+    async def press(
+        self, widget_id: str, inputs: Mapping[str, Any], press_id: str, context: PressContext
+    ) -> Receipt:
         """Sends what the widget is for, or refuses. The same id again is the same press.
 
         What it is judged by, is judged in the moment of sending. An input that has a default in the
         panel file may be left out.
         """
         widget = self.widget(widget_id)
-        inputs = self._sending.with_defaults(widget, inputs)
+        inputs = self._dispatcher.with_defaults(widget, inputs)
         known = self._under_way.get(press_id) or self._receipts.made(press_id)
         if known is None and not self._receipts.is_past(press_id):
-            if left_out := self._left_out(widget, inputs, press_id, by):
+            if left_out := self._left_out(widget, inputs, press_id, context):
                 return left_out
-            work = self._logged(widget, inputs, press_id, by)
+            work = self._logged(widget, inputs, press_id, context)
             return await self._once(widget, inputs, press_id, work)
         if known is None:
             why = say("press_past", id=press_id)
-            return await self._unjudged.refuse(widget, inputs, press_id, why, by.origin)
+            return await self._early_refusals.refuse(widget, inputs, press_id, why, context.origin)
         if (known.widget, known.fingerprint) != (widget_id, fingerprint(inputs)):
             why = say("press_reused", id=press_id)
-            return await self._unjudged.refuse(widget, inputs, press_id, why, by.origin)
+            return await self._early_refusals.refuse(widget, inputs, press_id, why, context.origin)
         if isinstance(known, _UnderWay):
             return await asyncio.shield(known.receipt)
         return known
@@ -133,51 +135,53 @@ class Presses:
         widget = self.widget(widget_id)
         if not isinstance(widget, Action):
             raise NotFound(f'"{widget_id}" is not an action: there is nothing to cancel')
-        if (why := self._sending.over(widget, press_id)) and not self._logbook.room(origin):
-            answer = Answer("refused", why)
-            return self._unjudged.counted(receipt_of(widget, {}, "", answer, "interlock"), origin)
-        noting = asyncio.ensure_future(self._logbook.canceled(widget_id, origin))
+        if (why := self._dispatcher.over(widget, press_id)) and not self._press_log.room(origin):
+            answer = Outcome("refused", why)
+            return self._early_refusals.counted(receipt_of(widget, {}, "", answer, "interlock"), origin)
+        noting = asyncio.ensure_future(self._press_log.canceled(widget_id, origin))
         try:
             # No disk keeps anybody from stopping a robot.
             answer, cause = await self._canceled(widget, press_id)
         except BaseException:
             (await noting).broke_off("log_broke_off")
             raise
-        noted = await noting
+        pending = await noting
         self._log.info(
             "cancel of %s by %s: %s: %s", widget_id, named(origin), answer.outcome, answer.text
         )
         receipt = receipt_of(widget, {}, "", answer, cause)
-        return await _closed(noted, receipt)
+        return await _closed(pending, receipt)
 
-    async def _canceled(self, widget: Action, press_id: str) -> tuple[Answer, Cause]:
+    async def _canceled(self, widget: Action, press_id: str) -> tuple[Outcome, Cause]:
         try:
             async with self._waits.one():
-                answer = await self._sending.cancel(widget, press_id)
+                answer = await self._dispatcher.cancel(widget, press_id)
         except TimeoutError:
-            return Answer("unknown", say("server_ends")), ""
+            return Outcome("unknown", say("server_ends")), ""
         except LinkError as error:
             text = say("not_encoded", why=str(error), time=format_time(time.time()))
-            return Answer("refused", text), "link"
+            return Outcome("refused", text), "link"
         return answer, "interlock" if answer.outcome == "refused" else ""
 
     def _left_out(
-        self, widget: Pressed, inputs: Mapping[str, Any], press_id: str, by: By
+        self, widget: Pressed, inputs: Mapping[str, Any], press_id: str, context: PressContext
     ) -> Receipt | None:
         """The receipt of a refusal that the log only counts; None for every other press."""
-        if self._logbook.room(by.origin):
+        if self._press_log.room(context.origin):
             return None
-        _, why, cause = self._ground(widget, by)
+        _, why, cause = self._ground(widget, context)
         sentence = "refused" if why else "not_encoded"
         if not why:
             try:
-                why, cause = self._sending.refusal(widget, inputs), "interlock"
+                why, cause = self._dispatcher.refusal(widget, inputs), "interlock"
             except (FieldError, InputError) as error:
                 why, cause = str(error), "input"
         if not why:
             return None
-        answer = Answer("refused", say(sentence, why=why, time=format_time(time.time())))
-        return self._unjudged.counted(receipt_of(widget, inputs, press_id, answer, cause), by.origin)
+        answer = Outcome("refused", say(sentence, why=why, time=format_time(time.time())))
+        return self._early_refusals.counted(
+            receipt_of(widget, inputs, press_id, answer, cause), context.origin
+        )
 
     async def _once(
         self,
@@ -204,56 +208,63 @@ class Presses:
         return receipt
 
     async def _logged(
-        self, widget: Pressed, inputs: Mapping[str, Any], press_id: str, by: By
+        self, widget: Pressed, inputs: Mapping[str, Any], press_id: str, context: PressContext
     ) -> Receipt:
-        own = self._sending.needed(widget, inputs)
+        own = self._dispatcher.needed(widget, inputs)
         try:
-            noted = await self._logbook.pressed(widget.id, own, press_id, by.origin)
+            pending = await self._press_log.pressed(widget.id, own, press_id, context.origin)
         except Repeated as known:
-            return await self._recall.receipt(widget, inputs, by.origin, known)
+            return await self._repeated.receipt(widget, inputs, context.origin, known)
         except LogError as error:
-            self._receipts.begin(press_id, widget.id, by.origin, own)
+            self._receipts.begin(press_id, widget.id, context.origin, own)
             text = say("refused", why=str(error), time=format_time(time.time()))
-            receipt = receipt_of(widget, inputs, press_id, Answer("refused", text), "log")
+            receipt = receipt_of(widget, inputs, press_id, Outcome("refused", text), "log")
         else:
-            self._receipts.begin(press_id, widget.id, by.origin, own)
-            with _noted_to_the_end(noted):
-                receipt = await self._pressed(widget, inputs, press_id, noted, by)
-            receipt = await _closed(noted, receipt)
+            self._receipts.begin(press_id, widget.id, context.origin, own)
+            with _closed_in_the_end(pending):
+                receipt = await self._pressed(widget, inputs, press_id, pending, context)
+            receipt = await _closed(pending, receipt)
         level = logging.INFO if receipt.outcome in FINE else logging.WARNING
-        who = named(by.origin)
+        who = named(context.origin)
         told = on_rosout(f"press {press_id} of {widget.id} by {who}: {untyped(widget, receipt)}")
         self._log.log(level, "press %s of %s by %s with %.*s: %s: %s", press_id, widget.id, who,
                 LONGEST_LOGGED, own, receipt.outcome, receipt.reason, extra=told)  # fmt: skip
         return receipt
 
-    def _correct(self, noted: Noted, press_id: str, answer: Answer) -> None:
+    def _correct(self, pending: PendingEntry, press_id: str, answer: Outcome) -> None:
         """What is known of a press now is another thing than its receipt said."""
-        noted.corrected(answer)
+        pending.corrected(answer)
         if old := self._receipts.get(press_id):
             self._receipts.keep(corrected(old, answer))
 
     async def _pressed(
-        self, widget: Pressed, inputs: Mapping[str, Any], press_id: str, noted: Noted, by: By
+        self,
+        widget: Pressed,
+        inputs: Mapping[str, Any],
+        press_id: str,
+        pending: PendingEntry,
+        context: PressContext,
     ) -> Receipt:
-        def receipt(answer: Answer, cause: Cause = "") -> Receipt:
+        def receipt(answer: Outcome, cause: Cause = "") -> Receipt:
             return receipt_of(widget, inputs, press_id, answer, cause)
 
         def refused(sentence: str, why: str, cause: Cause) -> Receipt:
             now = format_time(time.time())
-            return receipt(Answer("refused", say(sentence, why=why, time=now)), cause)
+            return receipt(Outcome("refused", say(sentence, why=why, time=now)), cause)
 
-        verdict, why, cause = self._ground(widget, by)
-        noted.judged(verdict.code)
+        verdict, why, cause = self._ground(widget, context)
+        pending.judged(verdict.code)
         if why:
             return refused("refused", why, cause)
         try:
-            correct = partial(self._correct, noted)
-            look = partial(self._last_look, widget, noted, by)
+            correct = partial(self._correct, pending)
+            look = partial(self._last_look, widget, pending, context)
             async with self._waits.one():
-                answer = await self._sending.send(widget, inputs, press_id, correct, noted.hash, look)
+                answer = await self._dispatcher.send(
+                    widget, inputs, press_id, correct, pending.hash, look
+                )
         except TimeoutError:
-            return receipt(Answer("unknown", say("server_ends")))
+            return receipt(Outcome("unknown", say("server_ends")))
         except (FieldError, InputError) as error:
             return refused("not_encoded", str(error), "input")
         except LinkError as error:
@@ -264,42 +275,46 @@ class Presses:
             return refused("not_encoded", answer.text, "interlock")
         return receipt(answer, "time" if answer.outcome == "timed_out" else "")
 
-    def _last_look(self, widget: Pressed, noted: Noted, by: By) -> None:
+    def _last_look(self, widget: Pressed, pending: PendingEntry, context: PressContext) -> None:
         """Right before it is sent: what came while it was judged and encoded counts, too."""
         for _ in range(MOST_LOOKS):
             if not self._news():
                 return
-            verdict, why, cause = self._ground(widget, by)
-            noted.judged(verdict.code)
+            verdict, why, cause = self._ground(widget, context)
+            pending.judged(verdict.code)
             if why:
                 raise PressRefused(why, cause)
         raise PressRefused(say("catching_up"), "link")
 
-    def _ground(self, widget: Pressed, by: By) -> tuple[Verdict, str, Cause]:
+    def _ground(self, widget: Pressed, context: PressContext) -> tuple[Verdict, str, Cause]:
         """The verdict now, and why it may not be sent, "" if it may."""
         self._catch_up()
-        verdict = judged(widget, by, self._panel, self._robot, self._monotonic())
+        verdict = judged(widget, context, self._panel, self._robot, self._monotonic())
         if not verdict.permitted:
             return verdict, verdict.reason or "", cause_of(verdict)
-        return verdict, say("press_by_stopping") if self._closed else by.doubt(), "interlock"
+        return (
+            verdict,
+            say("press_by_stopping") if self._closed else context.stale_reason(),
+            "interlock",
+        )
 
 
 @contextmanager
-def _noted_to_the_end(noted: Noted) -> Iterator[None]:
+def _closed_in_the_end(pending: PendingEntry) -> Iterator[None]:
     """What breaks off in here is said to have, in the log."""
     try:
         yield
     except asyncio.CancelledError:
-        noted.broke_off("log_ended")
+        pending.broke_off("log_ended")
         raise
     except BaseException:
-        noted.broke_off("log_broke_off")
+        pending.broke_off("log_broke_off")
         raise
 
 
-async def _closed(noted: Noted, receipt: Receipt) -> Receipt:
+async def _closed(pending: PendingEntry, receipt: Receipt) -> Receipt:
     """The receipt, when what it says is on the disk; where it is not, it says so."""
-    doubt = await noted.closed(receipt.outcome, receipt.reason)
-    if noted.corrected_to is not None:  # meanwhile
-        receipt = corrected(receipt, noted.corrected_to)
+    doubt = await pending.closed(receipt.outcome, receipt.reason)
+    if pending.corrected_to is not None:  # meanwhile
+        receipt = corrected(receipt, pending.corrected_to)
     return with_doubt(receipt, doubt)

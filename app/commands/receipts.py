@@ -14,9 +14,9 @@ from app.i18n import say
 from app.panel.model import Panel
 from app.panel.template import needed
 from app.panel.widgets.families import Command, Entered, Pressed
-from app.permission.interlocks import NO_WAY, PERMITTED, Verdict, press_verdict, way
-from app.robot.command_status import Answer, Outcome
-from app.robot.state import Robot
+from app.permission.interlocks import NO_WAY, PERMITTED, Verdict, link_verdict, press_verdict
+from app.robot.command_status import Outcome, OutcomeCode
+from app.robot.state import RobotState
 
 RECEIPTS_KEPT: Final = 1000
 MOST_LOOKS: Final = 20  # at news that come faster than they are taken in: then nothing is sent
@@ -39,7 +39,7 @@ class Receipt:
 
     id: str
     widget: str
-    outcome: Outcome
+    outcome: OutcomeCode
     reason: str
     at: str
     cause: Cause
@@ -64,19 +64,21 @@ def no_doubt() -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class By:
+class PressContext:
     """Who presses, and what has to hold beside the robot's permission when it is sent: `controls`
     judges who has control, `doubt` says why what the operator saw is no longer so."""
 
     origin: Origin
     controls: Callable[[], Verdict] = lambda: PERMITTED
-    doubt: Callable[[], str] = no_doubt
+    stale_reason: Callable[[], str] = no_doubt
 
 
-def judged(widget: Command, by: By, panel: Panel, robot: Robot, now: float) -> Verdict:
+def judged(
+    widget: Command, context: PressContext, panel: Panel, robot: RobotState, now: float
+) -> Verdict:
     """Whether a widget may be pressed or held by somebody now. The first that locks is told: the way to
     the robot, who has control, the widget's interlocks."""
-    for verdict in (way(robot, now), by.controls()):
+    for verdict in (link_verdict(robot, now), context.controls()):
         if not verdict.permitted:
             return verdict
     return press_verdict(widget, panel.interlocks_of(widget), robot, now)
@@ -149,7 +151,7 @@ def receipt_of(
     widget: Command,
     inputs: Mapping[str, Any],
     press_id: str,
-    answer: Answer,
+    answer: Outcome,
     cause: Cause = "",
 ) -> Receipt:
     """What came of a press just now."""
@@ -164,9 +166,9 @@ def recalled(
 ) -> Receipt:
     """What the operator's log knows of a press: where it was told nothing, nobody will know."""
     if told is None:
-        answer, at = Answer("unknown", say("log_ended")), press.at
+        answer, at = Outcome("unknown", say("log_ended")), press.at
     else:
-        answer, at = Answer(cast(Outcome, told.outcome), told.reason), told.at
+        answer, at = Outcome(cast(OutcomeCode, told.outcome), told.reason), told.at
     receipt = receipt_of(widget, inputs, press.press, answer, cause)
     wall = datetime.fromtimestamp(at / 1000, UTC).isoformat(timespec="milliseconds")
     return replace(receipt, at=wall, recalled=True)
@@ -182,7 +184,7 @@ def _short(inputs: Mapping[str, Any]) -> bool:
     return plain and sum(len(str(v)) + len(k) for k, v in inputs.items()) <= LONGEST_KEPT
 
 
-def corrected(receipt: Receipt, answer: Answer) -> Receipt:
+def corrected(receipt: Receipt, answer: Outcome) -> Receipt:
     return replace(receipt, outcome=answer.outcome, reason=answer.text, cause="")
 
 

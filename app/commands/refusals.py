@@ -8,22 +8,24 @@ from dataclasses import replace
 from typing import Any
 
 from app.audit import Origin
-from app.audit.press_record import Logbook
+from app.audit.press_record import PressLog
 from app.clock import format_time
-from app.commands.dispatch import Sending
+from app.commands.dispatch import Dispatcher
 from app.commands.receipts import Receipt, Receipts, named, receipt_of, untyped, with_doubt
 from app.i18n import say
 from app.panel.widgets.families import Pressed
-from app.robot.command_status import Answer
+from app.robot.command_status import Outcome
 from app.ros_logging import RobotLog, on_rosout
 
 
-class Unjudged:
+class EarlyRefusals:
     """Of one panel; used on the event loop only."""
 
-    def __init__(self, sending: Sending, logbook: Logbook, receipts: Receipts, log: RobotLog) -> None:
-        self._sending = sending
-        self._logbook = logbook
+    def __init__(
+        self, dispatcher: Dispatcher, press_log: PressLog, receipts: Receipts, log: RobotLog
+    ) -> None:
+        self._dispatcher = dispatcher
+        self._press_log = press_log
         self._receipts = receipts
         self._log = log
 
@@ -34,10 +36,10 @@ class Unjudged:
         id, "" where there is none."""
         why = say("press_too_soon")
         if (last := self._receipts.get(before)) is not None:
-            label = self._sending.widget(last.widget).label
+            label = self._dispatcher.widget(last.widget).label
             said = say("press_before", label=label, said=last.reason)
             why = last.reason if last.reason.endswith(why) else f"{said} {why}"
-        return await self.refuse(self._sending.widget(widget_id), inputs, press_id, why, origin)
+        return await self.refuse(self._dispatcher.widget(widget_id), inputs, press_id, why, origin)
 
     def limited(
         self,
@@ -50,8 +52,8 @@ class Unjudged:
     ) -> Receipt:
         """Of one that its client may make later, by the same id; `shown`: on a page without scripts."""
         now = format_time(time.time())
-        answer = Answer("refused", say("refused", why=say(sentence), time=now))
-        receipt = receipt_of(self._sending.widget(widget_id), inputs, press_id, answer, "limit")
+        answer = Outcome("refused", say("refused", why=say(sentence), time=now))
+        receipt = receipt_of(self._dispatcher.widget(widget_id), inputs, press_id, answer, "limit")
         if shown:
             receipt = replace(receipt, id=_own_id(press_id))
             self._receipts.keep_left_out(receipt)
@@ -59,7 +61,7 @@ class Unjudged:
 
     def counted(self, receipt: Receipt, origin: Origin) -> Receipt:
         """A refusal that is no entry of the log's."""
-        self._logbook.leave_out(origin)
+        self._press_log.leave_out(origin)
         self._receipts.keep_left_out(receipt)
         return receipt
 
@@ -68,15 +70,17 @@ class Unjudged:
     ) -> Receipt:
         """The receipt has an id of its own: that of the press is another's, or may still be one's."""
         own_id = _own_id(press_id)
-        receipt = receipt_of(widget, inputs, own_id, Answer("refused", why), "input")
-        if not self._logbook.room(origin):
+        receipt = receipt_of(widget, inputs, own_id, Outcome("refused", why), "input")
+        if not self._press_log.room(origin):
             return self.counted(receipt, origin)
-        own = self._sending.needed(widget, inputs)
+        own = self._dispatcher.needed(widget, inputs)
         self._receipts.begin(own_id, widget.id, origin, own)
         who = named(origin)
         told = on_rosout(f"press {own_id} of {widget.id} by {who}: {untyped(widget, receipt)}")
         self._log.warning("press %s of %s by %s: %s", own_id, widget.id, who, why, extra=told)
-        receipt = with_doubt(receipt, await self._logbook.refused(widget.id, own, own_id, origin, why))
+        receipt = with_doubt(
+            receipt, await self._press_log.refused(widget.id, own, own_id, origin, why)
+        )
         self._receipts.keep(receipt)
         return receipt
 

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from app.audit import Entry, Origin, Repeated, same_values
-from app.commands.dispatch import Sending
+from app.commands.dispatch import Dispatcher
 from app.commands.receipts import Receipt, cause_of, named, recalled
-from app.commands.refusals import Unjudged
+from app.commands.refusals import EarlyRefusals
 from app.errors import Cause, FieldError, InputError
 from app.i18n import say
 from app.panel.widgets.families import Pressed
@@ -14,12 +14,12 @@ from app.permission.interlocks import PERMITTED, Verdict
 from app.ros_logging import RobotLog
 
 
-class Recall:
+class RepeatedPresses:
     """Of one panel; used on the event loop only."""
 
-    def __init__(self, sending: Sending, unjudged: Unjudged, log: RobotLog) -> None:
-        self._sending = sending
-        self._unjudged = unjudged
+    def __init__(self, dispatcher: Dispatcher, early_refusals: EarlyRefusals, log: RobotLog) -> None:
+        self._dispatcher = dispatcher
+        self._early_refusals = early_refusals
         self._log = log
 
     async def receipt(
@@ -27,10 +27,10 @@ class Recall:
     ) -> Receipt:
         """What the log knows of the press; a refusal where its id is that of another press."""
         press, told = known.press, known.told
-        own = self._sending.needed(widget, inputs)
+        own = self._dispatcher.needed(widget, inputs)
         if press.widget != widget.id or not same_values(press.values, own):
             why = say("press_reused", id=press.press)
-            return await self._unjudged.refuse(widget, inputs, press.press, why, origin)
+            return await self._early_refusals.refuse(widget, inputs, press.press, why, origin)
         receipt = recalled(widget, inputs, press, told, self._cause(widget, inputs, told))
         self._log.info("press %s of %s by %s is that of entry %d: %s: %s", press.press, widget.id,
                 named(origin), press.seq, receipt.outcome, receipt.reason)  # fmt: skip
@@ -45,7 +45,7 @@ class Recall:
         if told.verdict != PERMITTED.code:
             return cause_of(Verdict(False, told.verdict or "log"))
         try:
-            self._sending.refusal(widget, inputs)
+            self._dispatcher.refusal(widget, inputs)
         except (FieldError, InputError):
             return "input"
         return "interlock"

@@ -13,15 +13,15 @@ from functools import partial
 from typing import Any, Final, Protocol
 
 from app.clock import format_time
-from app.concurrency import told
+from app.concurrency import spawn_logged
 from app.errors import DecodeError
 from app.i18n import say
 from app.interfaces import Fields, Interfaces, text_of
 from app.panel.template import PLACE
 from app.panel.widgets.service_action import Call
 from app.printable import printable
-from app.robot.command_status import Answer, Corrected, LastLook, Progress, no_look
-from app.robot.state import Robot
+from app.robot.command_status import CommandStatus, LastLook, OnCorrection, Outcome, no_look
+from app.robot.state import RobotState
 from app.ros_logging import RobotLog, on_rosout
 
 log = logging.getLogger("kiosk.calls")
@@ -51,7 +51,7 @@ class Request:
     payload: bytes
     timeout_s: float
     paths: tuple[str, ...]
-    read: Callable[[Fields], Answer]
+    read: Callable[[Fields], Outcome]
 
 
 @dataclass(slots=True)
@@ -64,11 +64,11 @@ class _Waiting:
     cut: "asyncio.Future[None]"
 
 
-class Calls:
+class ServiceCalls:
     """The calls of one robot; used on the event loop only."""
 
     def __init__(
-        self, interfaces: Interfaces, robot: Robot, link: Asker, changed: Callable[[], None]
+        self, interfaces: Interfaces, robot: RobotState, link: Asker, changed: Callable[[], None]
     ) -> None:
         """`changed` is called when what the widgets show has changed."""
         self._interfaces = interfaces
@@ -106,9 +106,9 @@ class Calls:
         widget: Call,
         payload: bytes,
         press_id: str,
-        corrected: Corrected,
+        corrected: OnCorrection,
         look: LastLook = no_look,
-    ) -> Answer:
+    ) -> Outcome:
         """Calls the service of a widget; see `ask`."""
         _, response_type = self._interfaces.service(widget.type)
         success = field_of(self._interfaces, response_type, widget.success, "success", "bool")
@@ -120,12 +120,12 @@ class Calls:
         return await self.ask(request, press_id, corrected, look)
 
     async def ask(
-        self, request: Request, press_id: str, corrected: Corrected, look: LastLook = no_look
-    ) -> Answer:
+        self, request: Request, press_id: str, corrected: OnCorrection, look: LastLook = no_look
+    ) -> Outcome:
         """Sends a request and waits; `corrected` gets the answer that comes after the time."""
         key = self._robot.key(request.service)
         if why := self.full(request.service):
-            return Answer("refused", why)
+            return Outcome("refused", why)
         loop = asyncio.get_running_loop()
         look()
         query = self._link.query(key, request.payload, request.timeout_s + LATE_S)
@@ -134,12 +134,12 @@ class Calls:
         self._open[number] = waiting
         query.add_done_callback(lambda _: self._open.pop(number, None))
         self._latest[request.widget] = press_id
-        self._show(request, Progress(busy=True, text=say("waiting_for_answer")))
+        self._show(request, CommandStatus(busy=True, text=say("waiting_for_answer")))
         answer = await self._awaited(waiting, corrected)
-        self._show(request, Progress(outcome=answer.outcome, text=answer.text))
+        self._show(request, CommandStatus(outcome=answer.outcome, text=answer.text))
         return answer
 
-    async def _awaited(self, waiting: _Waiting, corrected: Corrected) -> Answer:
+    async def _awaited(self, waiting: _Waiting, corrected: OnCorrection) -> Outcome:
         asked = waiting.request
         ends: set[asyncio.Future[Any]] = {waiting.answered, waiting.cut}
         await asyncio.wait(ends, timeout=asked.timeout_s, return_when=asyncio.FIRST_COMPLETED)
@@ -150,31 +150,31 @@ class Calls:
         else:
             waiting.answered.add_done_callback(lambda done: self._late(waiting, done, corrected))
         if waiting.cut.done() or not self._robot.graph.bridges:
-            return Answer("unknown", say("call_cut"))
+            return Outcome("unknown", say("call_cut"))
         if waiting.answered.done():
-            return Answer("unknown", say("call_dropped", service=asked.service))
+            return Outcome("unknown", say("call_dropped", service=asked.service))
         hint = "" if asked.service in self._ever_answered else say("cyclone_hint")
-        return Answer("timed_out", say("timed_out", seconds=f"{asked.timeout_s:g}") + hint)
+        return Outcome("timed_out", say("timed_out", seconds=f"{asked.timeout_s:g}") + hint)
 
     def _late(
-        self, waiting: _Waiting, done: "asyncio.Future[bytes | None]", corrected: Corrected
+        self, waiting: _Waiting, done: "asyncio.Future[bytes | None]", corrected: OnCorrection
     ) -> None:
         if done.cancelled() or (reply := done.result()) is None:
             return
-        task = told(self._correct(waiting, reply, corrected), self._log, LATE_FAILED)
+        task = spawn_logged(self._correct(waiting, reply, corrected), self._log, LATE_FAILED)
         self._correcting.add(task)
         task.add_done_callback(self._correcting.discard)
 
-    async def _correct(self, waiting: _Waiting, reply: bytes, corrected: Corrected) -> None:
+    async def _correct(self, waiting: _Waiting, reply: bytes, corrected: OnCorrection) -> None:
         asked = waiting.request
         answer = await self._read(asked, reply)
         said = f"press {waiting.press_id}: a late answer: {answer.outcome}"
         self._log.warning("%s: %s", said, answer.text, extra=on_rosout(said))
         corrected(waiting.press_id, answer)
         if self._latest.get(asked.widget) == waiting.press_id:
-            self._show(asked, Progress(outcome=answer.outcome, text=answer.text))
+            self._show(asked, CommandStatus(outcome=answer.outcome, text=answer.text))
 
-    async def _read(self, asked: Request, reply: bytes) -> Answer:
+    async def _read(self, asked: Request, reply: bytes) -> Outcome:
         self._ever_answered.add(asked.service)
         _, response_type = self._interfaces.service(asked.type)
         reader = self._interfaces.fields(response_type, asked.paths)
@@ -182,11 +182,11 @@ class Calls:
             fields = await self._robot.slices.whole(reader, reply)
         except DecodeError as error:
             self._log.error("%s: %s", asked.service, error)
-            return Answer("unknown", say("answer_unreadable", wanted=asked.type))
+            return Outcome("unknown", say("answer_unreadable", wanted=asked.type))
         return asked.read(fields)
 
-    def _show(self, asked: Request, progress: Progress) -> None:
-        self._robot.progress[asked.widget] = progress
+    def _show(self, asked: Request, progress: CommandStatus) -> None:
+        self._robot.command_status[asked.widget] = progress
         self._changed()
 
 
@@ -200,7 +200,7 @@ def field_of(
     return usual if own.get(usual) == kind else None
 
 
-def _read_call(widget: Call, success: str | None, message: str | None, fields: Fields) -> Answer:
+def _read_call(widget: Call, success: str | None, message: str | None, fields: Fields) -> Outcome:
     """What a response says; `success` and `message` are its fields that mean this, if there are any."""
     words = [with_fields(f"{{{message}}}", fields)] if message else []
     words += [with_fields(widget.answer, fields)] if widget.answer else []
@@ -208,8 +208,8 @@ def _read_call(widget: Call, success: str | None, message: str | None, fields: F
     said = f": {said}" if said else "."
     now = format_time(time.time())
     if success is None or fields.get(success):
-        return Answer("succeeded", say("answered", time=now) + said)
-    return Answer("rejected", say("said_no", time=now) + said)
+        return Outcome("succeeded", say("answered", time=now) + said)
+    return Outcome("rejected", say("said_no", time=now) + said)
 
 
 def with_fields(template: str, fields: Fields, within: str = "") -> str:

@@ -19,7 +19,7 @@ BROWSERS_KEPT: Final = 500
 
 
 @dataclass(frozen=True, slots=True)
-class Browser:
+class Client:
     """`id` may be shown to all, the token that it comes from is the browser's own; "" is one that
     keeps no token. `local`: it runs on the kiosk's own machine. `number` tells it from others."""
 
@@ -47,20 +47,20 @@ class Browser:
         return f"{self.name} ({self.address})"
 
 
-class Browsers:
+class Clients:
     """The browsers that came lately, by their tokens; forgets those not seen for the longest time."""
 
     def __init__(self) -> None:
-        self._known: OrderedDict[str, Browser] = OrderedDict()
+        self._known: OrderedDict[str, Client] = OrderedDict()
 
-    def seen(self, token: str, address: str) -> Browser:
+    def seen(self, token: str, address: str) -> Client:
         """The browser with this token, now at this address."""
         address, local = where(address)
         browser = self._known.get(token)
         if browser is None or (browser.address, browser.local) != (address, local):
             kept = browser is not None and browser.local == local
             number = browser.number if browser is not None and kept else self._free_number(local)
-            browser = self._known[token] = Browser(public_id(token), address, local, number)
+            browser = self._known[token] = Client(public_id(token), address, local, number)
         self._known.move_to_end(token)
         while len(self._known) > BROWSERS_KEPT:
             self._known.popitem(last=False)
@@ -71,16 +71,16 @@ class Browsers:
         return next(n for n in range(1, len(taken) + 2) if n not in taken)
 
 
-def stranger(address: str) -> Browser:
+def anonymous(address: str) -> Client:
     """Who came without a token and gets none: a program, mostly."""
     address, local = where(address)
-    return Browser("", address, local, 0)
+    return Client("", address, local, 0)
 
 
-def newcomer(token: str, address: str) -> Browser:
+def new_client(token: str, address: str) -> Client:
     """Who is given this token just now: it is counted when it comes back with it."""
     address, local = where(address)
-    return Browser(public_id(token), address, local, 0)
+    return Client(public_id(token), address, local, 0)
 
 
 def new_token() -> str:

@@ -13,7 +13,7 @@ from typing import Final, Literal
 
 from app.i18n import say
 from app.panel.rules import ControlRules
-from app.permission.clients import Browser
+from app.permission.clients import Client
 from app.permission.control_authority_view import NO_CONTROL, ControlView, control_view
 from app.permission.interlocks import PERMITTED, Verdict, locked
 
@@ -34,13 +34,13 @@ Refusal = Literal[
 class _Party:
     """Who holds or asks; `since` counts the time to a takeover, `scripted` once its page answered."""
 
-    browser: Browser
+    browser: Client
     since: float
     alive_until: float
     scripted: bool
 
 
-class Control:
+class ControlAuthority:
     """Who has control of one robot; times are monotonic seconds."""
 
     def __init__(
@@ -65,12 +65,12 @@ class Control:
         self._denied: dict[str, float] = {}
 
     @property
-    def holder(self) -> Browser | None:
+    def holder(self) -> Client | None:
         self.advance()
         return self._holder.browser if self._holder else None
 
     @property
-    def asker(self) -> Browser | None:
+    def requester(self) -> Client | None:
         self.advance()
         return self._asker.browser if self._asker else None
 
@@ -82,9 +82,9 @@ class Control:
         times = [party.alive_until for party in (self._holder, self._asker) if party]
         return min([*times, self._due()])
 
-    def verdict(self, browser: Browser) -> Verdict:
+    def verdict(self, client: Client) -> Verdict:
         """Whether this browser may press."""
-        if not self.rules.required or _is(browser, self.holder):
+        if not self.rules.required or _is(client, self.holder):
             return PERMITTED
         if holder := self.holder:
             return locked("control_held", name=holder.title, robot=self._robot)
@@ -92,56 +92,56 @@ class Control:
 
     # Acts: each answers why it was refused, "" where it was done. Done twice is done once.
 
-    def take(self, browser: Browser, life_s: float = LIFE_S) -> Refusal:
+    def take(self, client: Client, life_s: float = LIFE_S) -> Refusal:
         """Takes what is free; the panel at the cell takes over."""
-        if not browser.id:
+        if not client.id:
             return "control_stranger"
-        if (holder := self.holder) and not self._over(browser) and not _is(browser, holder):
+        if (holder := self.holder) and not self._may_override(client) and not _is(client, holder):
             return "control_taken"
-        if not _is(browser, holder):
-            self._hold(browser, life_s, "taken over" if holder else "taken")
+        if not _is(client, holder):
+            self._hold(client, life_s, "taken over" if holder else "taken")
         return ""
 
-    def ask(self, browser: Browser, life_s: float = LIFE_S) -> Refusal:
+    def ask(self, client: Client, life_s: float = LIFE_S) -> Refusal:
         """Asks the holder; what is free or may be taken over is taken."""
-        if not browser.id:
+        if not client.id:
             return "control_stranger"
-        if not self.holder or self._over(browser) or _is(browser, self.holder):
-            return self.take(browser, life_s)
+        if not self.holder or self._may_override(client) or _is(client, self.holder):
+            return self.take(client, life_s)
         if self._asker:
-            return "" if _is(browser, self._asker.browser) else "control_asked_by"
+            return "" if _is(client, self._asker.browser) else "control_asked_by"
         self._denied = {who: until for who, until in self._denied.items() if until > self._now()}
-        if browser.id in self._denied:
+        if client.id in self._denied:
             return "control_denied"
-        self._asker = self._party(browser, life_s)
-        self._tell(f"{browser} asks for control")
+        self._asker = self._party(client, life_s)
+        self._tell(f"{client} asks for control")
         return ""
 
-    def give(self, browser: Browser, to: str) -> Refusal:
+    def give(self, client: Client, to: str) -> Refusal:
         """The holder grants the request of the browser with the id `to`."""
-        asker = self.asker
-        if asker is None or asker.id != to or not _is(browser, self.holder):
+        asker = self.requester
+        if asker is None or asker.id != to or not _is(client, self.holder):
             return "control_not_yours"
-        self._pass_on(f"given by {browser}")
+        self._pass_on(f"given by {client}")
         return ""
 
-    def keep(self, browser: Browser, to: str) -> Refusal:
+    def keep(self, client: Client, to: str) -> Refusal:
         """The holder denies the request of the browser with the id `to`."""
-        asker = self.asker
-        if asker is None or asker.id != to or not _is(browser, self.holder):
+        asker = self.requester
+        if asker is None or asker.id != to or not _is(client, self.holder):
             return "control_not_yours"
         self._denied[to] = self._now() + ASK_AGAIN_S
         self._asker = None
-        self.touch(browser)
-        self._tell(f"{browser} keeps control: {asker} was denied")
+        self.touch(client)
+        self._tell(f"{client} keeps control: {asker} was denied")
         return ""
 
-    def release(self, browser: Browser) -> Refusal:
+    def release(self, client: Client) -> Refusal:
         """The holder gives it up: to who asks, else to nobody; who asks, asks no more."""
-        if _is(browser, self.holder):
+        if _is(client, self.holder):
             self._given_up = True
-            self._pass_on(f"given up by {browser}")
-        elif _is(browser, self.asker):
+            self._pass_on(f"given up by {client}")
+        elif _is(client, self.requester):
             self._end_request()
         else:
             return "control_not_yours"
@@ -149,28 +149,28 @@ class Control:
 
     # Signs of life.
 
-    def here(self, browser: Browser, touched: bool) -> None:
+    def keepalive(self, client: Client, touched: bool) -> None:
         """A page with scripts is there; `touched` by its operator since it said so last."""
-        for party in self._parties(browser):
+        for party in self._parties(client):
             party.scripted = True
             party.alive_until = self._now() + LIFE_S
         if touched:
-            self.touch(browser)
+            self.touch(client)
 
-    def touch(self, browser: Browser) -> None:
+    def touch(self, client: Client) -> None:
         """The operator touched or pressed something: a request waits longer."""
         self.advance()
-        if self._holder and _is(browser, self.holder):
+        if self._holder and _is(client, self.holder):
             self._holder.since = self._now()
             self._holder.alive_until = max(self._holder.alive_until, self._now() + LIFE_S)
 
-    def loaded(self, browser: Browser, life_s: float, by_hand: bool) -> None:
+    def loaded(self, client: Client, life_s: float, by_hand: bool) -> None:
         """A page was loaded; without scripts it comes again within `life_s`. With `by_hand` False
         (a program, a browser that fetches ahead) nothing is taken."""
-        for party in self._parties(browser):
+        for party in self._parties(client):
             party.alive_until = self._now() + (LIFE_S if party.scripted else life_s)
-        if by_hand and not self.holder and not self._given_up and self._over(browser):
-            self._hold(browser, life_s, "taken at its first page")
+        if by_hand and not self.holder and not self._given_up and self._may_override(client):
+            self._hold(client, life_s, "taken at its first page")
 
     def advance(self) -> None:
         """What time alone has changed."""
@@ -186,10 +186,10 @@ class Control:
         """What the pages show."""
         if not self.rules.required:
             return NO_CONTROL
-        return control_view(self.rules, self._robot, self.holder, self.asker, self._since)
+        return control_view(self.rules, self._robot, self.holder, self.requester, self._since)
 
-    def _over(self, browser: Browser) -> bool:
-        return browser.local and self.rules.local and bool(browser.id)
+    def _may_override(self, client: Client) -> bool:
+        return client.local and self.rules.local and bool(client.id)
 
     def _due(self) -> float:
         """When the request goes through by itself: the holder has the whole time from its begin."""
@@ -197,17 +197,17 @@ class Control:
             return math.inf
         return max(self._holder.since, self._asker.since) + self.rules.takeover_after_s
 
-    def _parties(self, browser: Browser) -> list[_Party]:
+    def _parties(self, client: Client) -> list[_Party]:
         self.advance()
         both = (party for party in (self._holder, self._asker) if party)
-        return [party for party in both if _is(browser, party.browser)]
+        return [party for party in both if _is(client, party.browser)]
 
-    def _party(self, browser: Browser, life_s: float) -> _Party:
-        return _Party(browser, self._now(), self._now() + life_s, life_s == LIFE_S)
+    def _party(self, client: Client, life_s: float) -> _Party:
+        return _Party(client, self._now(), self._now() + life_s, life_s == LIFE_S)
 
-    def _hold(self, browser: Browser, life_s: float, how: str) -> None:
-        self._install(self._party(browser, life_s))
-        self._tell(f"control {how} by {browser}")
+    def _hold(self, client: Client, life_s: float, how: str) -> None:
+        self._install(self._party(client, life_s))
+        self._tell(f"control {how} by {client}")
 
     def _install(self, party: _Party | None) -> None:
         self._holder = party
@@ -233,5 +233,5 @@ class Control:
         self._asker = None
 
 
-def _is(browser: Browser, other: Browser | None) -> bool:
-    return other is not None and bool(browser.id) and browser.id == other.id
+def _is(client: Client, other: Client | None) -> bool:
+    return other is not None and bool(client.id) and client.id == other.id

@@ -4,7 +4,7 @@ from typing import Final, Literal, TypedDict
 
 from app.i18n import say
 from app.panel.rules import ControlRules
-from app.permission.clients import Browser
+from app.permission.clients import Client
 
 Role = Literal["free", "held", "over", "asking", "holding", "asked"]
 
@@ -38,7 +38,7 @@ NO_CONTROL: Final = ControlView(
 
 
 def control_view(
-    rules: ControlRules, robot: str, holder: Browser | None, asker: Browser | None, since: str
+    rules: ControlRules, robot: str, holder: Client | None, asker: Client | None, since: str
 ) -> ControlView:
     """The view for a robot's name; there is an asker only where there is a holder."""
     if not rules.required:
@@ -63,12 +63,12 @@ def control_view(
     return view
 
 
-def role(control: ControlView, browser: Browser, rules: ControlRules) -> Role:
+def role(control: ControlView, client: Client, rules: ControlRules) -> Role:
     """What a browser is to who has control; pages show their buttons by it."""
     if not control["holder"]:
         return "free"
-    if browser.id == control["holder"]:
+    if client.id == control["holder"]:
         return "asked" if control["asker"] else "holding"
-    if browser.id and browser.id == control["asker"]:
+    if client.id and client.id == control["asker"]:
         return "asking"
-    return "over" if browser.local and rules.local else "held"
+    return "over" if client.local and rules.local else "held"

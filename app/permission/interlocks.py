@@ -21,8 +21,8 @@ from app.panel.widgets.service_action import Served
 from app.permission.conditions import permits, unmet
 from app.robot.command_status import IDLE
 from app.robot.graph import Graph, remembered
-from app.robot.parameter_state import UNKNOWN, Declared, each_text, ours_text, suits
-from app.robot.state import Reading, Robot
+from app.robot.parameter_state import UNKNOWN, ParameterState, each_text, ours_text, suits
+from app.robot.state import Reading, RobotState
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +59,7 @@ HISTORY_S: Final = 1.0
 SERVER_SETTLE_S: Final = 0.2
 
 
-def way(robot: Robot, now: float) -> Verdict:
+def link_verdict(robot: RobotState, now: float) -> Verdict:
     """Whether commands can reach the robot at all."""
     if not robot.link_up:
         return _no_link(robot.endpoints)
@@ -87,13 +87,13 @@ def _no_link(endpoints: tuple[str, ...]) -> Verdict:
     return Verdict(False, "no_link", say("no_link_at", where=where))
 
 
-def interlock_verdict(interlock: Interlock, robot: Robot, now: float) -> Verdict:
+def interlock_verdict(interlock: Interlock, robot: RobotState, now: float) -> Verdict:
     """Whether an interlock permits."""
-    passable = way(robot, now)
+    passable = link_verdict(robot, now)
     if not passable.permitted:
         return passable
     topic, key = interlock.topic, robot.key(interlock.topic)
-    if doubt := misfit("MS", interlock, robot):
+    if doubt := topic_mismatch("MS", interlock, robot):
         return doubt
     if interlock.require_publisher and not robot.graph.on_robot("MP", key):
         return locked("no_publisher", topic=topic)
@@ -126,18 +126,18 @@ def _forbidden(interlock: Interlock, reading: Reading) -> Verdict:
 
 
 def press_verdict(
-    widget: Command, interlocks: Iterable[Interlock], robot: Robot, now: float
+    widget: Command, interlocks: Iterable[Interlock], robot: RobotState, now: float
 ) -> Verdict:
     """Whether a widget may be pressed: a way, nothing of its own against it, and its interlocks."""
     permissions = [interlock_verdict(one, robot, now) for one in interlocks]
-    return command_verdict(widget, way(robot, now), permissions, robot, now)
+    return command_verdict(widget, link_verdict(robot, now), permissions, robot, now)
 
 
 def command_verdict(
     widget: Command,
     passable: Verdict,
     permissions: Sequence[Verdict],
-    robot: Robot,
+    robot: RobotState,
     now: float,
 ) -> Verdict:
     """The same by verdicts that are known: of the way, and of the widget's interlocks."""
@@ -158,20 +158,20 @@ def combined(verdicts: Sequence[Verdict]) -> Verdict:
     return replace(locking[0], until=until, others=tuple(locking[1:]))
 
 
-def _against(widget: Command, robot: Robot, now: float) -> Verdict | None:
+def _against(widget: Command, robot: RobotState, now: float) -> Verdict | None:
     return row_of(AGAINST, widget)(widget, robot, now)
 
 
-def against_publishing(of: Published, robot: Robot) -> Verdict | None:
+def publish_blocked(of: Published, robot: RobotState) -> Verdict | None:
     """Why a message may not be published: another type, or the last one's effect is awaited."""
-    if doubt := misfit("MP", of, robot):
+    if doubt := topic_mismatch("MP", of, robot):
         return doubt
-    if of.one_at_a_time and robot.progress.get(of.id, IDLE).busy:
+    if of.one_at_a_time and robot.command_status.get(of.id, IDLE).busy:
         return locked("busy")
     return None
 
 
-def against_calling(call: Served, robot: Robot, now: float) -> Verdict | None:
+def call_blocked(call: Served, robot: RobotState, now: float) -> Verdict | None:
     """Why a service may not be called or a goal not be sent: its server is not there with its type,
     or an answer is awaited."""
     role, name = call.role, call.server
@@ -184,23 +184,23 @@ def against_calling(call: Served, robot: Robot, now: float) -> Verdict | None:
     ready_at = robot.graph.served_since(role, key) + SERVER_SETTLE_S
     if now < ready_at:
         return Verdict(False, "getting_ready", say("getting_ready", name=name), ready_at)
-    known = robot.progress.get(call.id, IDLE)
+    known = robot.command_status.get(call.id, IDLE)
     if not known.busy:
         return None
     return locked("perhaps_busy") if known.outcome == "unknown" else locked("busy")
 
 
-def against_setting(of: Parameter, robot: Robot) -> Verdict | None:
+def set_blocked(of: Parameter, robot: RobotState) -> Verdict | None:
     """Why a parameter may not be set: its node is not there or has not told what may be set, or an
     answer is awaited."""
     if doubt := parameters_offered(of.node, robot) or unsettable(
         of, robot.parameters.get(of.id, UNKNOWN)
     ):
         return doubt
-    return locked("busy") if robot.progress.get(of.id, IDLE).busy else None
+    return locked("busy") if robot.command_status.get(of.id, IDLE).busy else None
 
 
-def parameters_offered(node: str, robot: Robot) -> Verdict | None:
+def parameters_offered(node: str, robot: RobotState) -> Verdict | None:
     """Why the parameters of a node can't be read and set, by what the graph shows."""
     for name, wanted in (GET, DESCRIBE, SET):
         found = robot.graph.server_type("SS", robot.key(f"{node}/{name}"))
@@ -211,7 +211,7 @@ def parameters_offered(node: str, robot: Robot) -> Verdict | None:
     return None
 
 
-def unsettable(of: Parameter, known: Declared) -> Verdict | None:
+def unsettable(of: Parameter, known: ParameterState) -> Verdict | None:
     """Why a parameter can't be set, by what its node says of it."""
     code = {
         "waiting": "parameter_waiting",
@@ -234,7 +234,7 @@ def unsettable(of: Parameter, known: Declared) -> Verdict | None:
     return None
 
 
-def misfit(role: TopicRole, of: Interlock | OnTopic, robot: Robot) -> Verdict | None:
+def topic_mismatch(role: TopicRole, of: Interlock | OnTopic, robot: RobotState) -> Verdict | None:
     """Why a topic can't be trusted, by what the graph shows: another type, a QoS that DDS would
     not match, a bridge that does not pass it on. `role` is what the panel does with it: publish ("MP")
     or listen ("MS")."""
@@ -259,8 +259,8 @@ def locked(code: str, **about: str | None) -> Verdict:
 
 
 # What the robot may have against a command, beside the way to it and its interlocks: by family.
-AGAINST: Final[Mapping[type[Any], Callable[[Any, Robot, float], Verdict | None]]] = {
-    Published: lambda of, robot, _: against_publishing(of, robot),
-    Served: against_calling,
-    Parameter: lambda of, robot, _: against_setting(of, robot),
+AGAINST: Final[Mapping[type[Any], Callable[[Any, RobotState, float], Verdict | None]]] = {
+    Published: lambda of, robot, _: publish_blocked(of, robot),
+    Served: call_blocked,
+    Parameter: lambda of, robot, _: set_blocked(of, robot),
 }

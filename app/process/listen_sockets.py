@@ -51,7 +51,7 @@ def names() -> set[str]:
     return {name for name, _ in listeners()}
 
 
-async def narrow(ports: set[int]) -> list[tuple[str, int]]:
+async def limit_send_buffer(ports: set[int]) -> list[tuple[str, int]]:
     """Narrows what the next sockets to listen accept, and adds their ports: of what a browser does not
     read little waits in the kernel, where nobody can take it back; the rest is never written. One that
     is gone without a word, or reads nothing for minutes, does not keep its connection. Their addresses.
@@ -70,7 +70,7 @@ async def narrow(ports: set[int]) -> list[tuple[str, int]]:
     return found
 
 
-def hang_up(ports: Collection[int]) -> None:
+def abort_unsent(ports: Collection[int]) -> None:
     """Cuts the connections that came by one of these ports and still have something to send: uvicorn
     waits for them for ever, also where nobody reads."""
     with suppress(OSError):

@@ -14,7 +14,7 @@ log = logging.getLogger("kiosk.systemd")
 LONGEST: Final = 2000  # bytes of a state in words
 
 
-class Manager:
+class ServiceManager:
     """systemd, or another that speaks its protocol; `interval_s` is None without a watchdog."""
 
     def __init__(self, env: Mapping[str, str] = os.environ) -> None:

@@ -21,7 +21,7 @@ ENDED_WITHIN_S: Final = 20.0
 
 
 @contextmanager
-def in_order(loop: asyncio.AbstractEventLoop, end: End) -> Iterator[None]:
+def graceful_shutdown(loop: asyncio.AbstractEventLoop, end: End) -> Iterator[None]:
     """Awaits `end` as soon as the process is told to end, and then tells whoever listened for that.
 
     uvicorn waits for open streams before it runs the lifespan's end: they must end first. WebSockets it

@@ -13,7 +13,7 @@ from typing import Final, Protocol
 
 from app.i18n import say
 from app.process.listen_sockets import listening, names
-from app.process.sd_notify import Manager, status
+from app.process.sd_notify import ServiceManager, status
 
 log = logging.getLogger("kiosk.watchdog")
 
@@ -31,7 +31,7 @@ class Watchdog:
 
     def __init__(
         self,
-        manager: Manager,
+        manager: ServiceManager,
         links: Callable[[], Iterable[tuple[str, Responding]]],
         state: Callable[[], str],
     ) -> None:

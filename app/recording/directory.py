@@ -20,7 +20,7 @@ def name_of(moment: float, robot: str, widget: str) -> str:
     return "-".join(filter(None, (at, robot, widget)))
 
 
-class Folder:
+class RecordingDirectory:
     """OSError where it can't be used."""
 
     def __init__(self, path: Path, most: int) -> None:

@@ -44,7 +44,7 @@ class Channel:
     definition: str
 
 
-class File:
+class McapFile:
     """Open from its making to `finish` or `abandon`; OSError where the disk does not take it.
 
     Until it is finished it has another name, and a lock that ends with the process.
@@ -134,7 +134,7 @@ def recover(folder: Path, unfinished: Path) -> Path | None:
             fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             return None
-        file = File(folder, f"{unfinished.name.removesuffix(UNFINISHED)}.recovered", {})
+        file = McapFile(folder, f"{unfinished.name.removesuffix(UNFINISHED)}.recovered", {})
         try:
             found = _finished(file) if _copied(stream, file) else None
         finally:
@@ -143,12 +143,12 @@ def recover(folder: Path, unfinished: Path) -> Path | None:
     return found
 
 
-def _finished(file: File) -> Path:
+def _finished(file: McapFile) -> Path:
     file.note("recovered", {"why": "the server ended while it was recording"})
     return file.finish()
 
 
-def _copied(stream: IO[bytes], file: File) -> int:
+def _copied(stream: IO[bytes], file: McapFile) -> int:
     """How many messages could be read."""
     schemas: dict[int, Schema] = {}
     channels: dict[int, ChannelRecord] = {}

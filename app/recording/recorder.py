@@ -12,9 +12,9 @@ from app.panel.model import Panel
 from app.panel.rules import RecordRules
 from app.recording.directory import name_of
 from app.recording.mcap_file import Channel
-from app.recording.ring_buffer import Ring, taken
+from app.recording.ring_buffer import RingBuffer, buffered
 from app.recording.writer import Recording, Recordings
-from app.robot.state import Robot, Sample
+from app.robot.state import RobotState, Sample
 
 AGAIN_S: Final = 1.0
 LONGEST_S: Final = 600.0  # after a press, a recording waits for its receipt no longer
@@ -28,7 +28,7 @@ class Recorder:
         panel: Panel,
         rules: RecordRules,
         interfaces: Interfaces,
-        robot: Robot,
+        robot: RobotState,
         robot_id: str,
         recordings: Recordings,
     ) -> None:
@@ -45,7 +45,7 @@ class Recorder:
             )
             for topic in (types if rules.topics is None else rules.topics)
         }
-        self._ring = Ring(rules.before_s, recordings.ring_bytes)
+        self._ring = RingBuffer(rules.before_s, recordings.ring_bytes)
         self._open: Recording | None = None
         self._timer: asyncio.TimerHandle | None = None
         self._under_way: dict[str, str] = {}  # press → who
@@ -59,7 +59,7 @@ class Recorder:
     def hear(self, key: str, sample: Sample) -> None:
         """A sample that the kiosk took."""
         if key in self._channels:
-            one = taken(key, sample)
+            one = buffered(key, sample)
             self._ring.add(one)
             if self._open is not None:
                 self._open.add(one)

@@ -12,7 +12,7 @@ COPIED: Final = 64 * 1024  # a smaller payload would keep the whole buffer that 
 
 
 @dataclass(frozen=True, slots=True)
-class Taken:
+class Buffered:
     """A sample of the topic with this key; `size` is in bytes, with what it costs to keep."""
 
     key: str
@@ -20,31 +20,31 @@ class Taken:
     size: int
 
 
-def taken(key: str, sample: Sample) -> Taken:
+def buffered(key: str, sample: Sample) -> Buffered:
     """A large payload is not copied: who writes it turns it into bytes."""
     length = len(sample.payload)
     if length < COPIED:
         sample = sample._replace(payload=bytes(sample.payload))
-    return Taken(key, sample, length + OVERHEAD)
+    return Buffered(key, sample, length + OVERHEAD)
 
 
-class Ring:
+class RingBuffer:
     """The newest samples, at most `longest_s` seconds and `most` bytes of them."""
 
     def __init__(self, longest_s: float, most: int) -> None:
         self._longest_s = longest_s
         self._most = most
-        self._kept: deque[Taken] = deque()
+        self._kept: deque[Buffered] = deque()
         self.size = 0
 
-    def add(self, one: Taken) -> None:
+    def add(self, one: Buffered) -> None:
         """Takes a sample; one that is larger than the ring is not kept, and what came before is."""
         if one.size <= self._most and self._longest_s > 0:
             self._kept.append(one)
             self.size += one.size
         self._forget(one.sample.at)
 
-    def since(self, now: float) -> Iterator[Taken]:
+    def since(self, now: float) -> Iterator[Buffered]:
         """What is not older than `longest_s` at `now` (monotonic seconds), oldest first."""
         self._forget(now)
         yield from self._kept

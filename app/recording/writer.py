@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any, Final
 
 from app.i18n import say
-from app.recording.directory import Folder
-from app.recording.mcap_file import Channel, File
-from app.recording.ring_buffer import OVERHEAD, Taken
+from app.recording.directory import RecordingDirectory
+from app.recording.mcap_file import Channel, McapFile
+from app.recording.ring_buffer import OVERHEAD, Buffered
 
 log = logging.getLogger("kiosk.recording")
 
@@ -32,7 +32,7 @@ class Recordings:
     def __init__(self, path: Path, max_mb: float, robots: int) -> None:
         """Each of `robots` may have one file open at a time: together they fill half the folder."""
         most = int(max_mb * 1_000_000)
-        self._folder = Folder(path, most)
+        self._folder = RecordingDirectory(path, most)
         self.file_bytes = most // (2 * (robots + 1))
         self.ring_bytes = min(RINGS // robots, self.file_bytes // 2)  # half is for what comes after
         self._queue: queue.SimpleQueue[tuple[int, Work | None]] = queue.SimpleQueue()
@@ -77,10 +77,10 @@ class Recordings:
 
     # Below: on the thread.
 
-    def opened(self, name: str, about: Mapping[str, str]) -> File:
+    def opened(self, name: str, about: Mapping[str, str]) -> McapFile:
         self._folder.path.mkdir(mode=0o700, parents=True, exist_ok=True)
         self._folder.make_room((self._open + 1) * self.file_bytes)
-        file = File(self._folder.path, name, about)
+        file = McapFile(self._folder.path, name, about)
         self._open += 1
         return file
 
@@ -142,7 +142,7 @@ class Recording:
         self._channels = channels
         self._room = all_.file_bytes
         self._left_out = 0
-        self._file: File | None = None
+        self._file: McapFile | None = None
         self._given_up = False
         self._begun = all_.hand_over(OVERHEAD, lambda: self._do(lambda: self._open(name, about)))
 
@@ -150,7 +150,7 @@ class Recording:
     def full(self) -> bool:
         return self._room <= 0 or self._given_up or not self._begun
 
-    def add(self, one: Taken) -> None:
+    def add(self, one: Buffered) -> None:
         """A sample of a topic."""
         self._room -= one.size
         if self.full or not self._all.hand_over(one.size, lambda: self._do(lambda: self._add(one))):
@@ -180,7 +180,7 @@ class Recording:
     def _open(self, name: str, about: Mapping[str, str]) -> None:
         self._file = self._all.opened(name, about)
 
-    def _add(self, one: Taken) -> None:
+    def _add(self, one: Buffered) -> None:
         if self._file is not None:
             sample = one.sample
             received = round(sample.wall * 1e9)

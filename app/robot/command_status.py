@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
-Outcome = Literal[
+OutcomeCode = Literal[
     "published",
     "confirmed",
     "accepted",
@@ -19,7 +19,7 @@ Outcome = Literal[
 
 
 @dataclass(frozen=True, slots=True)
-class Progress:
+class CommandStatus:
     """`busy` while an answer is awaited; then `outcome` and `text` say what came of it.
 
     `fraction` (0 to 1) is how far an action is, None where it does not say; `stoppable` while a
@@ -28,7 +28,7 @@ class Progress:
     """
 
     busy: bool = False
-    outcome: Outcome | Literal[""] = ""
+    outcome: OutcomeCode | Literal[""] = ""
     text: str = ""
     fraction: float | None = None
     stoppable: bool = False
@@ -36,18 +36,18 @@ class Progress:
     press: str = ""
 
 
-IDLE = Progress()
+IDLE = CommandStatus()
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class Outcome:
     """What came of a call or a goal; `text` is a sentence for the operator."""
 
-    outcome: Outcome
+    outcome: OutcomeCode
     text: str
 
 
-Corrected = Callable[[str, Answer], None]  # (press id, what is known of it now)
+OnCorrection = Callable[[str, Outcome], None]  # (press id, what is known of it now)
 LastLook = Callable[[], None]  # right before it is sent; raises PressRefused where it no longer may be
 
 

@@ -37,7 +37,7 @@ OPEN: Final = Range()
 
 
 @dataclass(frozen=True, slots=True)
-class Declared:
+class ParameterState:
     """What is known of a parameter; `found` is the type that it has on the robot.
 
     `value` is None where there is none; of one that is `cut` or `silent` it is the last known.
@@ -53,21 +53,21 @@ class Declared:
     wall: float = 0.0
 
 
-UNKNOWN: Final = Declared("waiting")
+UNKNOWN: Final = ParameterState("waiting")
 
 
-def declared(of: Parameter, descriptor: Any, value: Any, wall: float) -> Declared:
+def parameter_states(of: Parameter, descriptor: Any, value: Any, wall: float) -> ParameterState:
     """From a ParameterDescriptor and a ParameterValue, each None where the node gave none."""
     kind = NOT_SET if value is None else value.type
     described_as = NOT_SET if descriptor is None or descriptor.dynamic_typing else descriptor.type
     if kind == described_as == NOT_SET and not (descriptor is not None and descriptor.dynamic_typing):
-        return Declared("undeclared", wall=wall)
+        return ParameterState("undeclared", wall=wall)
     for one in (kind, described_as):
         if one != NOT_SET and one != NAMES.index(of.type):
-            return Declared("mistyped", found=name_of(one), wall=wall)
+            return ParameterState("mistyped", found=name_of(one), wall=wall)
     if descriptor is None:
-        return Declared("unreadable", wall=wall)
-    return Declared(
+        return ParameterState("unreadable", wall=wall)
+    return ParameterState(
         "missing" if kind == NOT_SET else "live",
         None if kind == NOT_SET else value_in(of, value),
         range_of(of, descriptor),
@@ -119,12 +119,12 @@ def own_range(of: Parameter) -> Range:
     return Range(*limits)
 
 
-def allowed(of: Parameter, known: Declared) -> Range:
+def allowed(of: Parameter, known: ParameterState) -> Range:
     """What both the node and the panel allow."""
     return known.range.within(own_range(of))
 
 
-def suits(of: Parameter, known: Declared) -> bool:
+def suits(of: Parameter, known: ParameterState) -> bool:
     """Whether there is a value that both the node and the panel allow."""
     if not (of.options and of.counts):
         return not allowed(of, known).empty

@@ -12,7 +12,7 @@ End = tuple[Role, str]
 ORDER: Final[Mapping[Role, int]] = {"MP": 0, "MS": 1, "SS": 2, "AS": 2}
 
 
-def ends(panel: Panel) -> Iterator[End]:
+def required_endpoints(panel: Panel) -> Iterator[End]:
     """What the panel talks with, as (role, ROS name). Every node publishes its parameters' events:
     they show none of the panel's."""
     for interlock in panel.interlocks:
@@ -21,7 +21,7 @@ def ends(panel: Panel) -> Iterator[End]:
     yield from sorted(of_widgets, key=lambda end: ORDER[end[0]])
 
 
-class Seen:
+class EndpointPresence:
     """Remembers behind which bridges each end was seen last: one entry for each that is needed."""
 
     def __init__(self, needed: Mapping[End, End]) -> None:
@@ -50,12 +50,12 @@ class Seen:
 
 
 @remembered
-def _any(graph: Graph, seen: Seen) -> bool:
+def _any(graph: Graph, seen: EndpointPresence) -> bool:
     return any(graph.on_robot(role, key) for role, key in seen.needed.values())
 
 
 @remembered
-def _gone(graph: Graph, seen: Seen) -> list[str]:
+def _gone(graph: Graph, seen: EndpointPresence) -> list[str]:
     return [
         end[1]
         for end, bridges in seen.behind.items()

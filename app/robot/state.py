@@ -18,12 +18,12 @@ from app.interfaces.names import ROSOUT_TOPIC
 from app.panel.constants import holder
 from app.panel.model import Panel, RobotEntry
 from app.panel.widgets.families import Display
-from app.robot.command_status import Progress
+from app.robot.command_status import CommandStatus
 from app.robot.graph import Graph
-from app.robot.parameter_state import Declared
-from app.robot.presence import Seen, ends
+from app.robot.parameter_state import ParameterState
+from app.robot.presence import EndpointPresence, required_endpoints
 from app.robot.sample import Buffer as Buffer
-from app.robot.sample import Passed as Passed
+from app.robot.sample import PassedOver as PassedOver
 from app.robot.sample import Sample as Sample
 from app.robot.silent_publishers import SilentPublishers
 from app.robot.slices import Slices
@@ -36,7 +36,7 @@ log = logging.getLogger("kiosk.robot")
 UNREADABLE_LOG_S = 60.0  # one line per topic in this time, at most
 
 
-class Robot:
+class RobotState:
     """Latest samples, the graph, and the state of the link."""
 
     def __init__(
@@ -56,20 +56,22 @@ class Robot:
         self.settled_at = math.inf  # monotonic: when a bridge that came has set up its routes
         self._keys: dict[str, str] = {}  # of what the panel names
         self._told_apart = entry.namespace if entry else None
-        needed = list(ends(panel))
+        needed = list(required_endpoints(panel))
         named = (*panel.subscriptions(), *panel.publications(), *(n for _, n in needed), ROSOUT_TOPIC)
         self._needed = frozenset(map(self.key, named))
         self.graph = Graph(own_zid, self._told_apart, self._needed)
         self._judged = frozenset(self.key(interlock.topic) for interlock in panel.interlocks)
         self.silent = SilentPublishers(self._judged)
-        self.progress: dict[str, Progress] = {}  # of what widgets have asked, by their ids
-        self.parameters: dict[str, Declared] = {}  # what nodes said of them, by their widgets' ids
+        self.command_status: dict[str, CommandStatus] = {}  # of what widgets have asked, by their ids
+        self.parameters: dict[
+            str, ParameterState
+        ] = {}  # what nodes said of them, by their widgets' ids
         self.asking: set[str] = set()  # ids of parameter widgets whose nodes are being asked
         self.held: dict[str, str] = {}  # by the ids of hold widgets: since when, in words
         self._log = RobotLog(log, self.name)
         self.answers = True  # False: its bridges are silent, though nobody knows yet why
         self.caught_up = True  # False: the event loop stood still, and may not know what came meanwhile
-        self.seen = Seen({(role, name): (role, self.key(name)) for role, name in needed})
+        self.seen = EndpointPresence({(role, name): (role, self.key(name)) for role, name in needed})
         self.undecodable: Counter[str] = Counter()
         self.slices = slices or Slices()
         # Gets what took more than one turn to read: the topic's key, and what it said.

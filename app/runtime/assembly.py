@@ -6,7 +6,7 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import AbstractContextManager, ExitStack, asynccontextmanager
 from typing import TYPE_CHECKING
 
-from app.audit import Limits, OperatorLog, Unlogged
+from app.audit import Limits, NullLog, OperatorLog
 from app.panel import Panel
 from app.panel.model import RobotEntry
 from app.runtime.fleet import Fleet
@@ -35,11 +35,11 @@ def check_zenoh(settings: Settings, panel: Panel) -> None:
 
 
 @asynccontextmanager
-async def open_log(settings: Settings, panel: Panel) -> AsyncIterator[OperatorLog | Unlogged]:
+async def open_log(settings: Settings, panel: Panel) -> AsyncIterator[OperatorLog | NullLog]:
     """The operator's log; FolderInUse where another server has its folder."""
     mode, rules = mode_of(settings, panel), panel.log
     folder = settings.data_folder(mode)
-    oplog: OperatorLog | Unlogged = Unlogged(folder)
+    oplog: OperatorLog | NullLog = NullLog(folder)
     if rules.enabled:
         limits = Limits(days=rules.days, size_mb=rules.size_mb, required=rules.required)
         oplog = OperatorLog(folder, limits, mode)
@@ -55,7 +55,7 @@ async def open_fleet(
     settings: Settings,
     panel: Panel,
     revision: str,
-    oplog: OperatorLog | Unlogged,
+    oplog: OperatorLog | NullLog,
     simulated_robot: SimulatedRobot,
 ) -> AsyncIterator[Fleet]:
     """The robots of the panel, real or simulated. `revision` is of all that a page loads."""

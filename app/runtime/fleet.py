@@ -1,4 +1,4 @@
-"""The robots of one panel: each has a kiosk of its own, with its own link, state and presses.
+"""The robots of one panel: each has a session of its own, with its own link, state and presses.
 
 They share nothing that can fail: a lost bridge, a renewed session or a flood is one robot's. Each
 page shows how the others are.
@@ -13,8 +13,8 @@ from app.errors import NotFound
 from app.i18n import say
 from app.panel.model import Panel, RobotEntry
 from app.robot.slices import Slices
-from app.robot.state import Robot
-from app.runtime.robot_session import Kiosk
+from app.robot.state import RobotState
+from app.runtime.robot_session import RobotSession
 from app.transport.zenoh_session import Config
 from app.view.link_status import Lamp
 
@@ -39,10 +39,10 @@ class Fleet:
     ) -> None:
         """One robot without a name, or the panel's `[[robot]]` entries."""
         self.panel = panel
-        self._kiosks: dict[str | None, Kiosk] = {}
+        self._kiosks: dict[str | None, RobotSession] = {}
         slices = Slices()
         for entry in panel.robots or (None,):
-            self._kiosks[entry.id if entry else None] = Kiosk(
+            self._kiosks[entry.id if entry else None] = RobotSession(
                 panel,
                 config_of(entry),
                 revision,
@@ -56,40 +56,43 @@ class Fleet:
 
     async def start(self) -> None:
         """Opens every link; whether anybody is there shows later."""
-        for kiosk in self.kiosks:
-            await kiosk.start()
+        for session in self.sessions:
+            await session.start()
 
     async def stop(self) -> None:
         """Ends the streams and the sessions of all."""
         self.close()
-        await asyncio.gather(*(kiosk.stop() for kiosk in self.kiosks))
+        await asyncio.gather(*(session.stop() for session in self.sessions))
 
     def close(self) -> None:
         """Ends holds and streams: what would keep the process from its end, or go on after it."""
-        for kiosk in self.kiosks:
-            kiosk.close()
+        for session in self.sessions:
+            session.close()
 
-    def give_up(self) -> None:
+    def cancel_all(self) -> None:
         """Ends the waiting of what was pressed."""
-        for kiosk in self.kiosks:
-            kiosk.presses.give_up()
+        for session in self.sessions:
+            session.presses.cancel_all()
 
     @property
-    def kiosks(self) -> list[Kiosk]:
+    def sessions(self) -> list[RobotSession]:
         return list(self._kiosks.values())
 
     @property
     def state(self) -> str:
         """How the way to each robot is, in words."""
-        states = [(kiosk.robot.name, kiosk.way.reason or say("ready")) for kiosk in self.kiosks]
+        states = [
+            (session.robot.name, session.link_verdict.reason or say("ready"))
+            for session in self.sessions
+        ]
         return " ".join(say("ready_of", name=n, state=s) if n else s for n, s in states)
 
     @property
-    def first(self) -> Kiosk:
-        return self.kiosks[0]
+    def first(self) -> RobotSession:
+        return self.sessions[0]
 
-    def kiosk(self, robot: str | None) -> Kiosk:
-        """The kiosk of a robot; None is the one without a name. NotFound says which there are."""
+    def session(self, robot: str | None) -> RobotSession:
+        """The session of a robot; None is the one without a name. NotFound says which there are."""
         if robot in self._kiosks:
             return self._kiosks[robot]
         if robot is None:
@@ -97,15 +100,15 @@ class Fleet:
         known = ", ".join(str(name) for name in self._kiosks if name) or "one robot without a name"
         raise NotFound(f'there is no robot "{robot:.64}" on this panel; there is {known}')
 
-    # What each robot's kiosk needs of the others (`showing.Others`).
+    # What each robot's session needs of the others (`refresh.OtherRobots`).
 
-    def lamps(self) -> Mapping[str, Lamp]:
-        return {entry: k.showing.lamp for entry, k in self._kiosks.items() if entry is not None}
+    def link_statuses(self) -> Mapping[str, Lamp]:
+        return {entry: k.refresher.lamp for entry, k in self._kiosks.items() if entry is not None}
 
     def boots(self) -> Collection[str]:
-        return {kiosk.board.boot for kiosk in self.kiosks}
+        return {session.publisher.boot for session in self.sessions}
 
-    def show_but(self, robot: Robot) -> None:
-        for kiosk in self.kiosks:
-            if kiosk.robot is not robot:
-                kiosk.show()
+    def show_but(self, robot: RobotState) -> None:
+        for session in self.sessions:
+            if session.robot is not robot:
+                session.show()

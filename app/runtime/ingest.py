@@ -5,16 +5,16 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
-from app.commands.actions.goals import Actions
+from app.commands.actions.goals import GoalTracker
 from app.commands.confirmations import Confirmations
-from app.commands.parameters.sync import Parameters
+from app.commands.parameters.sync import ParameterSync
 from app.dialect import bridge_dialect
 from app.panel.interlock import Interlock
 from app.panel.model import Panel
 from app.panel.widgets.parameter import EVENTS
 from app.permission.conditions import permits
 from app.permission.interlocks import Verdict, interlock_verdict
-from app.robot.state import Reading, Robot, Sample
+from app.robot.state import Reading, RobotState, Sample
 from app.ros_logging import RobotLog
 from app.transport.inbox import Changes, Token
 from app.view.kinds import Enabled, enabled
@@ -27,7 +27,7 @@ Change = Literal["", "soon", "now"]
 
 
 @dataclass(slots=True)
-class News:
+class Updates:
     """What has changed: `urgent` is a permission or the graph, `came` that there is a bridge where
     there was none; `values` are the topics (their keys) that said something, and `more` is whatever
     else can wait for the next frame."""
@@ -38,16 +38,16 @@ class News:
     values: set[str] = field(default_factory=set)
 
 
-class Intake:
+class Ingest:
     """Of one robot; on the event loop only."""
 
     def __init__(
         self,
         panel: Panel,
-        robot: Robot,
-        actions: Actions,
+        robot: RobotState,
+        actions: GoalTracker,
         confirmations: Confirmations,
-        parameters: Parameters,
+        parameters: ParameterSync,
         recorder: "Recorder | None",
         log: RobotLog,
     ) -> None:
@@ -74,10 +74,10 @@ class Intake:
 
     def take(
         self, changes: Changes, shown: Callable[[], Mapping[str, Enabled]], show: Callable[[], None]
-    ) -> News:
+    ) -> Updates:
         """Takes it in. `shown` are the permissions that are; `show` is called at each value in between
         that changed one."""
-        news = News(urgent=bool(changes.tokens))
+        news = Updates(urgent=bool(changes.tokens))
         # What permits and forbids comes first, and nothing that fails keeps it from being taken in.
         ordered = sorted(changes.samples.items(), key=lambda one: one[0] not in self._interlocks)
         for key, sample in ordered:

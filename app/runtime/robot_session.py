@@ -1,4 +1,4 @@
-"""A running kiosk: one robot with its link, board and presses, and how they are wired.
+"""A session with one robot: its link, view and presses, and how they are wired.
 
 Down: the inbox wakes the loop (by values: for a frame) → `_take` → robot → showing → board → streams.
 """
@@ -9,33 +9,33 @@ import time
 from contextlib import ExitStack, suppress
 from typing import TYPE_CHECKING, Final
 
-from app.audit.press_record import Log, Logbook
-from app.commands.actions.goals import Actions
-from app.commands.actions.recovery import Resuming
+from app.audit.press_record import Log, PressLog
+from app.commands.actions.goals import GoalTracker
+from app.commands.actions.recovery import GoalRecovery
 from app.commands.confirmations import Confirmations
-from app.commands.dispatch import Sending
-from app.commands.holds.controller import Holds
-from app.commands.parameters.sync import Parameters
-from app.commands.press_context import Doubts
+from app.commands.dispatch import Dispatcher
+from app.commands.holds.controller import HoldController
+from app.commands.parameters.sync import ParameterSync
+from app.commands.press_context import PressGuard
 from app.commands.presses import Presses
-from app.commands.service_calls import Calls
+from app.commands.service_calls import ServiceCalls
 from app.errors import LinkError, NotFound
 from app.interfaces import interfaces_of
 from app.interfaces.names import ROSOUT_TOPIC
 from app.panel.model import Panel, RobotEntry
 from app.panel.widgets.parameter import Parameter
-from app.permission.control_authority import Control
-from app.permission.interlocks import Verdict, locked, way
+from app.permission.control_authority import ControlAuthority
+from app.permission.interlocks import Verdict, link_verdict, locked
 from app.robot.slices import Slices
-from app.robot.state import Reading, Robot
+from app.robot.state import Reading, RobotState
 from app.ros_logging import RobotLog
-from app.runtime.ingest import Intake
-from app.transport.bridge_liveness import Pulse
-from app.transport.graph_join import Joining
-from app.transport.readiness import WITHIN_S, Asked
+from app.runtime.ingest import Ingest
+from app.transport.bridge_liveness import BridgeLiveness
+from app.transport.graph_join import GraphMembership
+from app.transport.readiness import WITHIN_S, CoalescedQuery
 from app.transport.rosout import Rosout
-from app.transport.zenoh_session import Config, Link
-from app.view.refresh import Alone, Others, Showing
+from app.transport.zenoh_session import Config, ZenohSession
+from app.view.refresh import NoOtherRobots, OtherRobots, ViewRefresher
 
 if TYPE_CHECKING:
     from app.recording import Recorder, Recordings
@@ -43,10 +43,10 @@ if TYPE_CHECKING:
 log = logging.getLogger("kiosk")
 
 RENEW_AGAIN_S: Final = 1.0
-ALONE: Final = Alone()
+ALONE: Final = NoOtherRobots()
 
 
-class Kiosk:
+class RobotSession:
     """Opened by `start`, closed by `stop`; between them everything is on the event loop."""
 
     def __init__(
@@ -57,7 +57,7 @@ class Kiosk:
         operators_log: Log,
         *,
         entry: RobotEntry | None = None,
-        others: Others = ALONE,
+        others: OtherRobots = ALONE,
         recordings: "Recordings | None" = None,
         slices: Slices | None = None,
         simulated: bool = False,
@@ -71,13 +71,13 @@ class Kiosk:
         self._following = ExitStack()
         self.interfaces = interfaces_of(panel.distro, panel.interfaces)
         self._loop = asyncio.get_running_loop()
-        self.link = Link(config, self._wake)
-        self.robot = Robot(panel, self.interfaces, self.link.zid, entry, slices)
+        self.link = ZenohSession(config, self._wake)
+        self.robot = RobotState(panel, self.interfaces, self.link.zid, entry, slices)
         self.robot.endpoints = self.link.endpoints
         self.robot.read_later = self._read_later
         self._log = RobotLog(log, self.robot.name)
-        self.control = Control(panel.control, self.robot.name, tell=self._log.info)
-        self.showing = Showing(
+        self.control = ControlAuthority(panel.control, self.robot.name, tell=self._log.info)
+        self.refresher = ViewRefresher(
             panel,
             self.robot,
             revision,
@@ -88,23 +88,23 @@ class Kiosk:
             recordings_fault=lambda: recordings.fault if recordings else "",
             simulated=simulated,
         )
-        self.show = self.showing.now
-        self.board = self.showing.board
+        self.show = self.refresher.now
+        self.publisher = self.refresher.publisher
         self._recorder = self._recording(recordings)
-        self._calls = Calls(self.interfaces, self.robot, self.link, self.show)
-        self._actions = Actions(self.interfaces, self.robot, self.link, self.show)
+        self._calls = ServiceCalls(self.interfaces, self.robot, self.link, self.show)
+        self._actions = GoalTracker(self.interfaces, self.robot, self.link, self.show)
         self._confirmations = Confirmations(self.robot, self.show)
-        self._parameters = Parameters(
+        self._parameters = ParameterSync(
             panel, self.interfaces, self.robot, self.link, self._calls, self.show
         )
-        self.doubts = Doubts(
-            self.board, self.control, operators_log, panel.press_expires_s, others.boots
+        self.press_guard = PressGuard(
+            self.publisher, self.control, operators_log, panel.press_expires_s, others.boots
         )
-        self.logbook = Logbook(operators_log, self.robot.name, lambda: self.board.id)
-        self._resuming = Resuming(panel, self.robot, self.logbook, self._actions, self.show)
-        self._pulse = Pulse(self.robot, self.link, self.show)
-        self.reached = self._pulse.reached
-        self.sending = Sending(
+        self.press_log = PressLog(operators_log, self.robot.name, lambda: self.publisher.id)
+        self._recovery = GoalRecovery(panel, self.robot, self.press_log, self._actions, self.show)
+        self._liveness = BridgeLiveness(self.robot, self.link, self.show)
+        self.reached = self._liveness.flushed
+        self.dispatcher = Dispatcher(
             panel,
             self.interfaces,
             self.robot,
@@ -113,30 +113,30 @@ class Kiosk:
             self._actions,
             self._confirmations,
             self._parameters,
-            reached=self._pulse.reached,
+            reached=self._liveness.flushed,
         )
         self.presses = Presses(
             panel,
             self.robot,
-            self.sending,
-            self.logbook,
+            self.dispatcher,
+            self.press_log,
             catch_up=self._take,
             news=lambda: self.link.hurried,
             witness=self._recorder,
         )
-        self.holds = Holds(
+        self.holds = HoldController(
             panel,
             self.interfaces,
             self.robot,
             self.link,
             self._loop,
-            checked=self.sending.checked,
+            checked=self.dispatcher.checked,
             take=self._take,
             news=lambda: self.link.hurried,
             changed=self.show,
             witness=self._recorder,
         )
-        self._intake = Intake(
+        self._ingest = Ingest(
             panel,
             self.robot,
             self._actions,
@@ -145,8 +145,10 @@ class Kiosk:
             self._recorder,
             self._log,
         )
-        self._joining = Joining(panel, self.interfaces, self.robot, self.link, self.show, self._heal)
-        self._asked = Asked(lambda: self._joining.answered(WITHIN_S))
+        self._membership = GraphMembership(
+            panel, self.interfaces, self.robot, self.link, self.show, self._heal
+        )
+        self._readiness = CoalescedQuery(lambda: self._membership.answered(WITHIN_S))
         self._rosout = Rosout(self.robot, self.interfaces, self.link, self._loop)
         self._renewing: asyncio.Task[None] | None = None
         self._frame: asyncio.TimerHandle | None = None  # when what waits is taken
@@ -155,12 +157,12 @@ class Kiosk:
 
     async def start(self) -> None:
         """Declares everything; whether anybody is there shows later."""
-        await self._resuming.start()
+        await self._recovery.start()
         self.interfaces.prepare(
             {*self.panel.subscriptions().values(), *self.panel.publications().values()}
         )
         publish = [self.robot.key(topic) for topic in (*self.panel.publications(), ROSOUT_TOPIC)]
-        listened = self._intake
+        listened = self._ingest
         self.link.start(
             listened.keys,
             publish,
@@ -169,9 +171,9 @@ class Kiosk:
             whole=listened.whole,
         )
         self._rosout.start()
-        self._joining.start()
-        self._pulse.start()
-        self._following.enter_context(self._operators_log.followed(self.show))
+        self._membership.start()
+        self._liveness.start()
+        self._following.enter_context(self._operators_log.notifying(self.show))
 
     async def stop(self) -> None:
         """Ends the streams, takes the session down; leaves no task behind."""
@@ -181,14 +183,14 @@ class Kiosk:
             self._frame.cancel()
         self._following.close()
         self._rosout.stop()
-        self.showing.stop()
-        self.doubts.end()
+        self.refresher.stop()
+        self.press_guard.end()
         if self._renewing is not None:
             await asyncio.gather(self._renewing, return_exceptions=True)
-        await self._asked.stop()
-        await self._pulse.stop()
-        await self._joining.stop()
-        await self._resuming.stop()
+        await self._readiness.stop()
+        await self._liveness.stop()
+        await self._membership.stop()
+        await self._recovery.stop()
         await self._actions.stop()
         await self._parameters.stop()
         if self._recorder is not None:
@@ -202,7 +204,7 @@ class Kiosk:
         """Ends holds, while there is a way to say so to the robot, presses and streams."""
         self.holds.close()
         self.presses.close()
-        self.board.close()
+        self.publisher.close()
 
     def _recording(self, recordings: "Recordings | None") -> "Recorder | None":
         """What records around presses, where the panel asks for it."""
@@ -216,21 +218,21 @@ class Kiosk:
         return Recorder(self.panel, rules, self.interfaces, self.robot, name, recordings)
 
     @property
-    def way(self) -> Verdict:
+    def link_verdict(self) -> Verdict:
         """Whether commands can reach the robot now."""
         if self._operators_log.lock:
             return Verdict(False, "log", self._operators_log.lock)
-        return way(self.robot, time.monotonic())
+        return link_verdict(self.robot, time.monotonic())
 
     async def way_asked(self) -> Verdict:
         """The same, when the bridges have been asked whether they run: a second at most."""
-        if not self.way.permitted or await self._asked.answers():
-            return self.way
-        return locked("bridge_silent") if self.way.permitted else self.way
+        if not self.link_verdict.permitted or await self._readiness.answers():
+            return self.link_verdict
+        return locked("bridge_silent") if self.link_verdict.permitted else self.link_verdict
 
     def read_again(self, widget_id: str) -> str:
         """Asks the node of a parameter for it; why it can't be asked, or "". NotFound for other ids."""
-        widget = self.sending.widget(widget_id)
+        widget = self.dispatcher.widget(widget_id)
         if not isinstance(widget, Parameter):
             raise NotFound(f'"{widget_id}" is not a parameter: there is nothing to read')
         return self._parameters.read_again(widget)
@@ -270,10 +272,10 @@ class Kiosk:
             self._loop.call_soon_threadsafe(self._take if prompt else self._take_in_time)
 
     def _take_in_time(self) -> None:
-        if self.showing.due <= self._loop.time():
+        if self.refresher.due <= self._loop.time():
             self._take()
         elif self._frame is None:
-            self._frame = self._loop.call_at(self.showing.due, self._take)
+            self._frame = self._loop.call_at(self.refresher.due, self._take)
 
     def _take(self) -> None:
         if self._frame is not None:
@@ -281,7 +283,7 @@ class Kiosk:
             self._frame = None
         if self._stopped:
             return
-        self._pulse.look()
+        self._liveness.look()
         changes = self.link.drain()
         if self.robot.link_up and not changes.link_up:
             self._log.warning("Zenoh link lost")
@@ -291,27 +293,27 @@ class Kiosk:
         if came_up:
             self.robot.link_up = True
             self._log.info("Zenoh link up")
-        news = self._intake.take(changes, lambda: self.board.view["interlocks"], self.show)
+        news = self._ingest.take(changes, lambda: self.publisher.view["interlocks"], self.show)
         if changes.tokens:
             self._follow(news.came)
         if news.urgent or came_up:
             self.show()
         elif news.more:
-            self.showing.soon()
+            self.refresher.soon()
         elif news.values:
-            self.showing.values(news.values)
+            self.refresher.values(news.values)
 
     def _read_later(self, key: str, reading: Reading) -> None:
         """What was too large for one turn is read."""
         if self._stopped:
             return
-        match self._intake.read(key, reading, self.board.view["interlocks"]):
+        match self._ingest.read(key, reading, self.publisher.view["interlocks"]):
             case "now":
                 self.show()
             case "soon":
-                self.showing.soon()
+                self.refresher.soon()
             case _:
-                self.showing.values({key})
+                self.refresher.values({key})
 
     def _follow(self, came: bool) -> None:
         """After every change of the graph; `came`: there is a bridge where there was none."""
@@ -319,4 +321,4 @@ class Kiosk:
         self._calls.follow()
         self._actions.follow()
         self._parameters.follow()
-        self._joining.follow(came)
+        self._membership.follow(came)

@@ -10,7 +10,7 @@ from app.dialect import bridge_dialect
 from app.dialect.endpoint import Endpoint
 from app.interfaces.names import type_in
 from app.robot.graph import Route
-from app.robot.state import Robot
+from app.robot.state import RobotState
 
 MISSES_ALLOWED: Final = 1
 
@@ -21,10 +21,10 @@ class AdminSpace(Protocol):
     async def ask(self, selector: str, within_s: float = ...) -> list[tuple[str, bytes]]: ...
 
 
-class Bridges:
+class BridgeAdmin:
     """Asks the bridges of one robot; what they say goes into its graph."""
 
-    def __init__(self, robot: Robot, link: AdminSpace) -> None:
+    def __init__(self, robot: RobotState, link: AdminSpace) -> None:
         self._robot = robot
         self._link = link
         self.missed = 0  # askings in a row that a bridge did not answer

@@ -14,10 +14,10 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any, Final
 
-from app.concurrency import told
+from app.concurrency import spawn_logged
 from app.dialect import bridge_dialect
 from app.errors import LinkError
-from app.robot.state import Robot
+from app.robot.state import RobotState
 from app.ros_logging import RobotLog
 from app.transport.bridge_admin import AdminSpace
 
@@ -32,7 +32,7 @@ LOOKED_AT: Final = 10  # answers
 LONGEST_S: Final = 2.5  # a question is not waited for any longer
 
 
-class Silence:
+class LivenessDetector:
     """Questions and answers → whether there is silence; times in monotonic seconds. Pure."""
 
     def __init__(self) -> None:
@@ -68,12 +68,12 @@ class Silence:
             self.silent, self._heard_at, self._good = True, math.inf, 0
 
 
-class Pulse:
+class BridgeLiveness:
     """Of one robot; used on the event loop only."""
 
     def __init__(
         self,
-        robot: Robot,
+        robot: RobotState,
         link: AdminSpace,
         changed: Callable[[], None],
         monotonic: Callable[[], float] = time.monotonic,
@@ -84,7 +84,7 @@ class Pulse:
         self._changed = changed
         self._monotonic = monotonic
         self._log = RobotLog(log, robot.name)
-        self._silence = Silence()
+        self._silence = LivenessDetector()
         self._bridges: frozenset[str] = frozenset()
         self._questions: set[asyncio.Task[bool]] = set()
         self._awaited: set[asyncio.Task[bool]] = set()  # by who wants to know whether something arrived
@@ -95,7 +95,7 @@ class Pulse:
         self._behind_since = 0.0
 
     def start(self) -> None:
-        self._asking = told(self._ask_regularly(), self._log, "asking the bridges failed")
+        self._asking = spawn_logged(self._ask_regularly(), self._log, "asking the bridges failed")
 
     async def stop(self) -> None:
         """Ends its tasks; what was sent to the end gets the time for an answer."""
@@ -108,7 +108,7 @@ class Pulse:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
 
-    async def reached(self) -> bool:
+    async def flushed(self) -> bool:
         """Whether all that was sent until now has reached the bridges: they answer what they are asked
         after it, and there is no silence before. It takes as long as the way there and back."""
         question = self._ask()
@@ -160,7 +160,7 @@ class Pulse:
         bridges = self._robot.graph.bridges if self._robot.link_up else frozenset()
         if bridges != self._bridges:
             if not bridges & self._bridges:
-                self._silence = Silence()
+                self._silence = LivenessDetector()
             self._bridges = bridges
             self._tell()
 

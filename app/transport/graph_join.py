@@ -14,15 +14,15 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Final
 
-from app.concurrency import told
+from app.concurrency import spawn_logged
 from app.errors import LinkError
 from app.interfaces import Interfaces
 from app.panel.model import Panel
-from app.robot.state import Robot
+from app.robot.state import RobotState
 from app.ros_logging import RobotLog
-from app.transport.bridge_admin import Bridges
-from app.transport.liveliness_tokens import Tokens
-from app.transport.zenoh_session import Link
+from app.transport.bridge_admin import BridgeAdmin
+from app.transport.liveliness_tokens import LivelinessTokens
+from app.transport.zenoh_session import ZenohSession
 
 log = logging.getLogger("kiosk.joining")
 
@@ -36,15 +36,15 @@ ASK_AGAIN_S: Final = 0.5
 UNHEARD_ALLOWED: Final = 3  # askings that find a topic without its reader
 
 
-class Joining:
+class GraphMembership:
     """Holds the panel's tokens while a bridge is there, and asks the bridges how they are."""
 
     def __init__(
         self,
         panel: Panel,
         interfaces: Interfaces,
-        robot: Robot,
-        link: Link,
+        robot: RobotState,
+        link: ZenohSession,
         show: Callable[[], None],
         renew: Callable[[], None],
     ) -> None:
@@ -55,8 +55,8 @@ class Joining:
         self._link = link
         self._show = show
         self._renew = renew
-        self._bridges = Bridges(robot, link)
-        self._tokens = Tokens(panel, interfaces, robot)
+        self._bridges = BridgeAdmin(robot, link)
+        self._tokens = LivelinessTokens(panel, interfaces, robot)
         self._unheard = 0
         self._started_at = time.monotonic()
         self._joining: asyncio.Task[None] | None = None
@@ -64,7 +64,7 @@ class Joining:
         self._changed = asyncio.Event()
 
     def start(self) -> None:
-        self._asking = told(self._ask_regularly(), self._log, FAILED)
+        self._asking = spawn_logged(self._ask_regularly(), self._log, FAILED)
 
     async def stop(self) -> None:
         """Ends its tasks; the tokens go with the session."""
@@ -78,7 +78,7 @@ class Joining:
         if came or not self._robot.graph.bridges:
             self._leave()
         if came:
-            self._joining = told(self._join(), self._log, FAILED)
+            self._joining = spawn_logged(self._join(), self._log, FAILED)
         if self._joined:
             self._hold()
             self._changed.set()
@@ -165,12 +165,12 @@ class Joining:
                         self._leave()
                     elif self._joined:  # still
                         self._hold()
-                        self._heal()
+                        self._reopen_session()
                 except LinkError as error:
                     self._log.warning("%s", error)
                 self._show()
 
-    def _heal(self) -> None:
+    def _reopen_session(self) -> None:
         """A bridge that does not read a topic for this session does so for a new one."""
         listened = (self._robot.key(topic) for topic in self._panel.subscriptions())
         lost = [key for key in listened if self._robot.graph.unheard(key)]

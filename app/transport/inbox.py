@@ -12,7 +12,7 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Any, Final, Protocol
 
-from app.robot.state import Buffer, Passed, Sample
+from app.robot.state import Buffer, PassedOver, Sample
 
 BETWEEN_MOST: Final = 256  # changes of a watched topic that are kept from one drain to the next
 BETWEEN_BYTES: Final = 1_000_000  # and their bytes
@@ -63,12 +63,12 @@ class _Between:
     __slots__ = ("_bytes", "overrun", "values")
 
     def __init__(self) -> None:
-        self.values: deque[Passed] = deque()
+        self.values: deque[PassedOver] = deque()
         self.overrun = False
         self._bytes = 0
 
     def add(self, one: "_Arrived") -> None:
-        self.values.append(Passed(one.payload, one.at, one.wall))
+        self.values.append(PassedOver(one.payload, one.at, one.wall))
         self._bytes += len(one.payload)
         while len(self.values) > BETWEEN_MOST or (self._bytes > BETWEEN_BYTES and len(self.values) > 1):
             self._bytes -= len(self.values.popleft().payload)

@@ -15,17 +15,17 @@ from app.dialect.endpoint import TopicRole
 from app.interfaces import Interfaces
 from app.interfaces.names import ROSOUT, ROSOUT_TOPIC, Qos
 from app.panel.model import Panel
-from app.robot.state import Robot
+from app.robot.state import RobotState
 from app.ros_logging import RobotLog
 from app.transport.rosout import LOG_TYPE
 
 log = logging.getLogger("kiosk.tokens")
 
 
-class Tokens:
+class LivelinessTokens:
     """The tokens of one robot's panel, from a join to the next."""
 
-    def __init__(self, panel: Panel, interfaces: Interfaces, robot: Robot) -> None:
+    def __init__(self, panel: Panel, interfaces: Interfaces, robot: RobotState) -> None:
         self._panel = panel
         self._interfaces = interfaces
         self._robot = robot

@@ -15,7 +15,7 @@ WITHIN_S: Final = 0.8  # in which a bridge has to answer
 LIMIT_S: Final = 1.0  # of a question, also where Zenoh itself does not come back
 
 
-class Asked:
+class CoalescedQuery:
     """One question at a time, shared by all who ask while it is under way and until the next."""
 
     def __init__(self, ask: Callable[[], Awaitable[bool]]) -> None:

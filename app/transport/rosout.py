@@ -9,7 +9,7 @@ from typing import Any, Final, Protocol
 from app.errors import LinkError
 from app.interfaces import Interfaces
 from app.interfaces.names import ROSOUT_TOPIC
-from app.robot.state import Robot
+from app.robot.state import RobotState
 from app.ros_logging import RosoutHandler
 
 LOG_TYPE: Final = "rcl_interfaces/msg/Log"
@@ -28,7 +28,7 @@ class Rosout:
 
     def __init__(
         self,
-        robot: Robot,
+        robot: RobotState,
         interfaces: Interfaces,
         link: Putter,
         loop: asyncio.AbstractEventLoop,

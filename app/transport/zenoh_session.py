@@ -106,7 +106,7 @@ def _own(payload: zenoh.ZBytes) -> bytes | zenoh.ZBytes:
     return payload if len(payload) > COPIED_MOST else payload.to_bytes()
 
 
-class Link:
+class ZenohSession:
     """A session with its subscribers, publishers and tokens."""
 
     def __init__(self, config: zenoh.Config, wake: Callable[[bool], None]) -> None:

@@ -10,9 +10,9 @@ from app.i18n import say
 from app.panel.values import same
 from app.panel.widgets.displays import Indicator, Readout
 from app.panel.widgets.families import Display
-from app.permission.interlocks import misfit
+from app.permission.interlocks import topic_mismatch
 from app.printable import printable
-from app.robot.state import Robot
+from app.robot.state import RobotState
 
 LONGEST_TEXT: Final = 200  # characters of a value that a readout shows
 LONGEST_NUMBER: Final = 32  # a larger one has an exponent, whatever its format
@@ -23,7 +23,7 @@ SHAPES: Final = {"waiting": "waiting", "old": "old", "unreadable": "unreadable",
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class FieldState:
     """What is known of a field: its `value`, if there is one; `until` (monotonic seconds) is when time
     alone changes it."""
 
@@ -33,22 +33,22 @@ class Look:
     until: float = math.inf
 
 
-def look(widget: Display, robot: Robot, now: float) -> Look:
+def field_state(widget: Display, robot: RobotState, now: float) -> FieldState:
     """What is known of a widget's field at `now`."""
     topic = widget.topic
-    if doubt := misfit("MS", widget, robot):
-        return Look("unreadable", doubt.reason or "")
+    if doubt := topic_mismatch("MS", widget, robot):
+        return FieldState("unreadable", doubt.reason or "")
     reading = robot.reading(topic)
     if reading.status == "unreadable":
-        return Look("unreadable", say("readout_unreadable", topic=topic, wanted=widget.type))
+        return FieldState("unreadable", say("readout_unreadable", topic=topic, wanted=widget.type))
     if reading.fields is None:
-        return Look("waiting", say("readout_waiting", topic=topic))
+        return FieldState("waiting", say("readout_waiting", topic=topic))
     time = format_time(reading.wall)
     value = reading.value(widget.field)
     if value is None:
         code = "readout_several" if reading.several(widget.field) else "readout_missing"
-        return Look("missing", say(code, field=widget.field, time=time))
-    seen = Look("live", say("readout_time", time=time), value)
+        return FieldState("missing", say(code, field=widget.field, time=time))
+    seen = FieldState("live", say("readout_time", time=time), value)
     if reading.status == "cut":
         return replace(seen, state="old", note=say("readout_cut", time=time))
     if widget.max_age_s is None:
@@ -61,26 +61,26 @@ def look(widget: Display, robot: Robot, now: float) -> Look:
     return replace(seen, state="old", note=say("readout_old", age=format_age(old)), until=until)
 
 
-def value(widget: Display, robot: Robot, now: float) -> tuple[dict[str, Any], float]:
+def value(widget: Display, robot: RobotState, now: float) -> tuple[dict[str, Any], float]:
     """Attributes of any display: `state`, `text` (its value as it is) and `note`; and when they
     change."""
-    seen = look(widget, robot, now)
+    seen = field_state(widget, robot, now)
     return {"state": seen.state, "text": written(seen.value), "note": seen.note}, seen.until
 
 
-def readout(widget: Readout, robot: Robot, now: float) -> tuple[dict[str, Any], float]:
+def readout(widget: Readout, robot: RobotState, now: float) -> tuple[dict[str, Any], float]:
     """Attributes of a readout: `state`, `text` and `note`; and when they change."""
-    seen = look(widget, robot, now)
+    seen = field_state(widget, robot, now)
     text = NOTHING if seen.value is None else _value(widget, seen.value, robot)
     return {"state": seen.state, "text": text, "note": seen.note}, seen.until
 
 
-def indicator(widget: Indicator, robot: Robot, now: float) -> tuple[dict[str, Any], float]:
+def indicator(widget: Indicator, robot: RobotState, now: float) -> tuple[dict[str, Any], float]:
     """Attributes of a lamp: `state`, `text`, `shape`, `colour` and `note`; and when they change.
 
     What is not known now has a shape and a text of its own, and never a colour.
     """
-    seen = look(widget, robot, now)
+    seen = field_state(widget, robot, now)
     text, shape, colour = _lamp(widget, seen.value)
     note = seen.note
     if seen.state != "live":
@@ -98,7 +98,7 @@ def _lamp(widget: Indicator, value: Any) -> tuple[str, str, str]:
     return say("lamp_unknown", value=written(value)), "unknown", "none"
 
 
-def _value(widget: Readout, value: Any, robot: Robot) -> str:
+def _value(widget: Readout, value: Any, robot: RobotState) -> str:
     if widget.constants is not None:
         return _constant(widget.constants, robot.constants(widget), value)
     if isinstance(value, bool) or not isinstance(value, int | float):

@@ -13,8 +13,8 @@ from app.panel.widgets.numbers import Numeric
 from app.panel.widgets.parameter import Parameter
 from app.panel.widgets.publish import Publishing
 from app.permission.interlocks import PERMITTED, Verdict
-from app.robot.command_status import IDLE, Progress
-from app.robot.state import Robot
+from app.robot.command_status import IDLE, CommandStatus
+from app.robot.state import RobotState
 from app.view.display_values import indicator, readout, value
 from app.view.parameter_values import parameter
 
@@ -28,7 +28,7 @@ class Enabled(TypedDict):
     reason: str | None
 
 
-def show(widget: Placed, robot: Robot, now: float, verdict: Verdict = PERMITTED) -> Shown:
+def show(widget: Placed, robot: RobotState, now: float, verdict: Verdict = PERMITTED) -> Shown:
     """The attributes of a widget at `now` (monotonic seconds), and when time alone would change them;
     `verdict` is that of a command: a change of it is no change by time alone."""
     return row_of(SHOWN, widget)(widget, robot, verdict, now)
@@ -50,7 +50,7 @@ def told(reasons: Sequence[str]) -> dict[str, str]:
     return {"reasons": "\n".join(reasons), "more": more}
 
 
-def progress(of: Progress) -> Attributes:
+def progress(of: CommandStatus) -> Attributes:
     """Attributes of a call or an action: `progress` from 0 to 1, None where it is not known; `goal`
     is the state of an action's goal as ROS names it, `press` the id of the press that a cancel is for,
     both "" where there is none."""
@@ -65,29 +65,29 @@ def progress(of: Progress) -> Attributes:
     }
 
 
-def _pressed(widget: Pressed, robot: Robot, verdict: Verdict, _: float) -> Shown:
+def _pressed(widget: Pressed, robot: RobotState, verdict: Verdict, _: float) -> Shown:
     """The lock, and what came of the last press."""
-    came = progress(robot.progress.get(widget.id, IDLE))
+    came = progress(robot.command_status.get(widget.id, IDLE))
     return {**lock(widget, verdict), **came}, math.inf
 
 
-def _published(widget: Publishing, robot: Robot, verdict: Verdict, now: float) -> Shown:
+def _published(widget: Publishing, robot: RobotState, verdict: Verdict, now: float) -> Shown:
     if widget.confirm is not None:
         return _pressed(widget, robot, verdict, now)
     return lock(widget, verdict), math.inf
 
 
-def _held(widget: Hold, robot: Robot, verdict: Verdict, _: float) -> Shown:
+def _held(widget: Hold, robot: RobotState, verdict: Verdict, _: float) -> Shown:
     holding = robot.held.get(widget.id, "")
     return {**lock(widget, verdict), "held": bool(holding), "holding": holding}, math.inf
 
 
-def _parameter(widget: Parameter, robot: Robot, verdict: Verdict, now: float) -> Shown:
+def _parameter(widget: Parameter, robot: RobotState, verdict: Verdict, now: float) -> Shown:
     pressed, until = _pressed(widget, robot, verdict, now)
     return pressed | parameter(widget, robot), until
 
 
-SHOWN: Final[Mapping[type[Placed], Callable[[Any, Robot, Verdict, float], Shown]]] = {
+SHOWN: Final[Mapping[type[Placed], Callable[[Any, RobotState, Verdict, float], Shown]]] = {
     Input: lambda of, robot, verdict, now: ({}, math.inf),
     Numeric: lambda of, robot, verdict, now: ({"limits": of.limits}, math.inf),
     Pressed: _pressed,

@@ -13,8 +13,8 @@ from typing import Final, Literal, TypedDict
 from app.clock import format_datetime
 from app.i18n import say
 from app.panel.model import Panel
-from app.permission.interlocks import NO_WAY, PERMITTED, Verdict, misfit
-from app.robot.state import Robot
+from app.permission.interlocks import NO_WAY, PERMITTED, Verdict, topic_mismatch
+from app.robot.state import RobotState
 
 State = Literal["ok", "wait", "bad"]
 
@@ -60,7 +60,7 @@ class Lamp(TypedDict):
     text: str
 
 
-class LinkLamp(Lamp):
+class LinkStatus(Lamp):
     """A link: `since` is when it came to this state, "" where that is not known; `locks` says which
     controls it locks, `reason` why it is as it is and what helps, "" where there is nothing to say."""
 
@@ -69,9 +69,9 @@ class LinkLamp(Lamp):
     reason: str
 
 
-def lamps(
-    panel: Panel, robot: Robot, passable: Verdict, verdicts: Mapping[str, Verdict], now: float
-) -> tuple[dict[str, LinkLamp], float]:
+def link_statuses(
+    panel: Panel, robot: RobotState, passable: Verdict, verdicts: Mapping[str, Verdict], now: float
+) -> tuple[dict[str, LinkStatus], float]:
     """The three links, and when (monotonic seconds) time alone would change them; `verdicts` are those
     of all that can be pressed, by its id. The server's link is "ok" wherever it says so itself."""
     state, text = BRIDGE_LAMPS[passable.code]
@@ -93,15 +93,15 @@ def summary(name: str, link: Mapping[str, Lamp]) -> Lamp:
 
 
 @lru_cache(maxsize=64)
-def _link(name: str, state: State, text: str, reason: str, *locked: str) -> LinkLamp:
+def _link(name: str, state: State, text: str, reason: str, *locked: str) -> LinkStatus:
     """The same lamp, which nobody changes, until it is another one."""
-    return LinkLamp(
+    return LinkStatus(
         name=say(name), state=state, text=say(text), since="", locks=locks(locked), reason=reason
     )
 
 
 def _node(
-    robot: Robot, passable: Verdict, verdicts: Mapping[str, Verdict], silence: str
+    robot: RobotState, passable: Verdict, verdicts: Mapping[str, Verdict], silence: str
 ) -> tuple[State, str, str]:
     """State, text and reason of the link from the bridge to the robot's nodes."""
     if BRIDGE_LAMPS[passable.code][0] == "bad":
@@ -117,7 +117,7 @@ def _node(
     return "ok", "ok", _first(verdicts, NODE).reason or ""
 
 
-def silent(panel: Panel, robot: Robot, now: float) -> tuple[str, float]:
+def silent(panel: Panel, robot: RobotState, now: float) -> tuple[str, float]:
     """Why a node is taken for silent: its publisher is there by its token, but what it permits is
     older than the panel allows. "" where none is; and when that may change. What is only shown may
     be told of events, and looks old by itself."""
@@ -128,7 +128,7 @@ def silent(panel: Panel, robot: Robot, now: float) -> tuple[str, float]:
         key, reading = robot.key(of.topic), robot.reading(of.topic)
         if reading.status not in ("message", "unreadable") or not robot.graph.on_robot("MP", key):
             continue
-        if misfit("MS", of, robot):
+        if topic_mismatch("MS", of, robot):
             continue
         stale_at = reading.at + of.max_age_s
         if now >= stale_at:
@@ -182,17 +182,17 @@ class Since:
         """`wall` gives seconds since the epoch."""
         self._wall = wall
         self._began: dict[str, tuple[tuple[str, str], str]] = {}
-        self._seen: Mapping[str, LinkLamp] = {}
-        self._dated: dict[str, LinkLamp] = {}
+        self._seen: Mapping[str, LinkStatus] = {}
+        self._dated: dict[str, LinkStatus] = {}
 
-    def dated(self, links: Mapping[str, LinkLamp]) -> dict[str, LinkLamp]:
+    def dated(self, links: Mapping[str, LinkStatus]) -> dict[str, LinkStatus]:
         """The same, with `since` for those that the server knows of."""
         if links != self._seen:
             self._seen = links
             self._dated = {name: self._of(name, lamp) for name, lamp in links.items()}
         return self._dated
 
-    def _of(self, name: str, lamp: LinkLamp) -> LinkLamp:
+    def _of(self, name: str, lamp: LinkStatus) -> LinkStatus:
         if name == BROWSERS_OWN:
             return lamp
         state = (lamp["state"], lamp["text"])

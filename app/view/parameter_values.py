@@ -9,8 +9,8 @@ from app.panel.number_range import decimal
 from app.panel.widgets.parameter import EVENT_TYPE, EVENTS, LONGEST_TEXT, One, Parameter, Value
 from app.permission.interlocks import parameters_offered
 from app.printable import printable
-from app.robot.parameter_state import LONGEST_LIST, UNKNOWN, Declared, allowed, limits_text
-from app.robot.state import Robot
+from app.robot.parameter_state import LONGEST_LIST, UNKNOWN, ParameterState, allowed, limits_text
+from app.robot.state import RobotState
 from app.view.display_values import NOTHING, written
 
 # How each state looks: as those of a readout.
@@ -28,7 +28,7 @@ LONGEST_HINT: Final = 200
 ANY_STEP: Final = {False: "any", True: "1"}
 
 
-def parameter(of: Parameter, robot: Robot) -> dict[str, Any]:
+def parameter(of: Parameter, robot: RobotState) -> dict[str, Any]:
     """Attributes: `state`, `text`, `note`, `hint`, `limits`, `settable`, `askable` (whether its node
     can be asked now), and of the input `entry` (the value to start from) and `bounds` (`min`, `max` and
     `step` as HTML has them)."""
@@ -73,11 +73,11 @@ def _beginning(value: Value) -> Value:
     return tuple(found)
 
 
-def never_told(known: Declared) -> bool:
+def never_told(known: ParameterState) -> bool:
     return known.state in ("waiting", "silent") and known.value is None
 
 
-def _note(of: Parameter, known: Declared, robot: Robot) -> str:
+def _note(of: Parameter, known: ParameterState, robot: RobotState) -> str:
     time = format_time(known.wall)
     if never_told(known):
         silent = known.state == "silent" and of.id not in robot.asking
@@ -100,7 +100,7 @@ def _note(of: Parameter, known: Declared, robot: Robot) -> str:
     return say("parameter_read" if told else "parameter_told", time=time, node=of.node)
 
 
-def tells(robot: Robot) -> bool:
+def tells(robot: RobotState) -> bool:
     """Whether changes that others make are heard, by what the graph shows."""
     key, graph = robot.key(EVENTS), robot.graph
     heard = graph.on_robot("MP", key) and not graph.unheard(key)

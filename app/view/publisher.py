@@ -28,7 +28,7 @@ def encoded(data: Mapping[str, Any]) -> bytes:
     return text
 
 
-class Board:
+class ViewPublisher:
     """Where the view is posted; changed on the event loop only."""
 
     def __init__(self, view: View, revision: str) -> None:
@@ -65,7 +65,7 @@ class Board:
         self.heartbeat.along()
         self._wake()
 
-    def turned(self, widget: str) -> int:
+    def lock_changed_at(self, widget: str) -> int:
         """The version in which a widget's lock has last closed or opened; 0 if it never has."""
         return self._turned.get(widget, 0)
 
@@ -110,6 +110,6 @@ class Board:
         return b"event: %b\ndata: %b\nid: %b\n\n" % (name.encode(), encoded(data), self.id.encode())
 
 
-def told(browser: str) -> bytes:
+def client_id_event(browser: str) -> bytes:
     """Tells a page the id of its browser: it knows by it what `control` means for it."""
     return b"event: browser\ndata: %b\n\n" % encoded({"id": browser})

@@ -12,49 +12,49 @@ from typing import Protocol
 from app.audit.press_record import Log
 from app.panel.model import Panel
 from app.panel.widgets.families import Display
-from app.permission.control_authority import Control
-from app.robot.state import Robot
+from app.permission.control_authority import ControlAuthority
+from app.robot.state import RobotState
 from app.view.link_status import Lamp, Since
-from app.view.publisher import Board
-from app.view.view import Sight, refreshed, sight
+from app.view.publisher import ViewPublisher
+from app.view.view import ViewWithDeadlines, build_view, update_displays
 
 
-class Others(Protocol):
+class OtherRobots(Protocol):
     """What is needed of all robots of a panel, where there are several."""
 
-    def lamps(self) -> Mapping[str, Lamp]:
+    def link_statuses(self) -> Mapping[str, Lamp]:
         """The lamp of each, by its id."""
 
     def boots(self) -> Collection[str]:
         """The boots of their boards."""
 
-    def show_but(self, robot: Robot) -> None:
+    def show_but(self, robot: RobotState) -> None:
         """One robot's lamp has changed: the others' pages show it."""
 
 
-class Alone:
+class NoOtherRobots:
     """A robot without others."""
 
-    def lamps(self) -> Mapping[str, Lamp]:
+    def link_statuses(self) -> Mapping[str, Lamp]:
         return {}
 
     def boots(self) -> Collection[str]:
         return ()
 
-    def show_but(self, robot: Robot) -> None: ...
+    def show_but(self, robot: RobotState) -> None: ...
 
 
-class Showing:
+class ViewRefresher:
     """The board of one robot, and what is posted there; on the event loop only."""
 
     def __init__(
         self,
         panel: Panel,
-        robot: Robot,
+        robot: RobotState,
         revision: str,
-        control: Control,
+        control: ControlAuthority,
         operators_log: Log,
-        others: Others,
+        others: OtherRobots,
         *,
         before: Callable[[], None],
         recordings_fault: Callable[[], str],
@@ -74,7 +74,7 @@ class Showing:
         self._displays = [(robot.key(w.topic), w) for w in panel.displays]
         self._seen = self._sight()
         self.lamp = self._seen.robot
-        self.board = Board(self._seen.view, revision)
+        self.publisher = ViewPublisher(self._seen.view, revision)
         self._shown_at = 0.0
         self._spoke: set[str] = set()  # keys of topics that said something since
         self._whole = False  # whether more than values is to be shown
@@ -120,9 +120,9 @@ class Showing:
         if whole or self._whole or now >= self._seen.rest:
             self._look()
         else:
-            self._seen = refreshed(self._seen, self._stale(now), self._robot, now)
+            self._seen = update_displays(self._seen, self._stale(now), self._robot, now)
         self._whole, self._spoke = False, set()
-        self.board.post(self._seen.view)
+        self.publisher.post(self._seen.view)
         self._at(self._seen.until)
 
     def _stale(self, now: float) -> list[Display]:
@@ -148,14 +148,14 @@ class Showing:
         loop = asyncio.get_running_loop()
         self._timer = None if when == math.inf else loop.call_at(when, self._frame)
 
-    def _sight(self) -> Sight:
+    def _sight(self) -> ViewWithDeadlines:
         unlogged = self._operators_log.fault
         faults = (unlogged, self._recordings_fault())
-        seen = sight(
+        seen = build_view(
             self._panel,
             self._robot,
             time.monotonic(),
-            robots=self._others.lamps(),
+            robots=self._others.link_statuses(),
             simulated=self._simulated,
             fault="\n".join(filter(None, faults)),
             lock=self._operators_log.lock if unlogged else "",

@@ -11,18 +11,18 @@ from typing import Any, Final, NamedTuple, TypedDict
 from app.i18n import say
 from app.panel.model import Panel
 from app.panel.widgets.families import Display
-from app.permission.clients import Browser
+from app.permission.clients import Client
 from app.permission.control_authority_view import NO_CONTROL, ControlView
 from app.permission.interlocks import (
     PERMITTED,
     Verdict,
     command_verdict,
     interlock_verdict,
-    way,
+    link_verdict,
 )
-from app.robot.state import Robot
+from app.robot.state import RobotState
 from app.view.kinds import Enabled, enabled, show, told
-from app.view.link_status import Lamp, LinkLamp, lamps, summary
+from app.view.link_status import Lamp, LinkStatus, link_statuses, summary
 
 
 class Notice(TypedDict):
@@ -36,7 +36,7 @@ class View(TypedDict):
     """Everything that can change on a page; `widgets` has the attributes of each by its id, `robots`
     the lamp of each where there are several."""
 
-    link: dict[str, LinkLamp]
+    link: dict[str, LinkStatus]
     interlocks: dict[str, Enabled]
     widgets: dict[str, dict[str, Any]]
     notice: Notice
@@ -47,7 +47,7 @@ class View(TypedDict):
 NO_OTHERS: Final[Mapping[str, Lamp]] = {}
 
 
-class Sight(NamedTuple):
+class ViewWithDeadlines(NamedTuple):
     """A view, the robot's lamp on the pages of others, and when (monotonic seconds) time alone would
     change what the displays show, by their ids, and the `rest`."""
 
@@ -62,9 +62,9 @@ class Sight(NamedTuple):
         return min(self.rest, *self.displays.values()) if self.displays else self.rest
 
 
-def sight(
+def build_view(
     panel: Panel,
-    robot: Robot,
+    robot: RobotState,
     now: float,
     *,
     robots: Mapping[str, Lamp] = NO_OTHERS,
@@ -73,10 +73,10 @@ def sight(
     lock: str = "",
     control: ControlView = NO_CONTROL,
     control_until: float = math.inf,
-) -> Sight:
+) -> ViewWithDeadlines:
     """The view at `now` (monotonic seconds); `fault` stands above it, for `lock` nothing can be
     pressed, where they are not "". Time alone would change `control` at `control_until`."""
-    passable = way(robot, now)
+    passable = link_verdict(robot, now)
     interlocks = {i.id: interlock_verdict(i, robot, now) for i in panel.interlocks}
     verdicts = {
         w.id: command_verdict(w, passable, [interlocks[i] for i in w.interlocks], robot, now)
@@ -84,7 +84,7 @@ def sight(
     }
     locks = {w: Verdict(False, "log", lock) for w in verdicts} if lock else verdicts
     widgets = {w.id: show(w, robot, now, locks.get(w.id, PERMITTED)) for w in panel.widgets()}
-    link, until = lamps(panel, robot, passable, locks, now)
+    link, until = link_statuses(panel, robot, passable, locks, now)
     banner = say("simulated") if simulated or robot.graph.simulated else ""
     view = View(
         link=link,
@@ -98,22 +98,24 @@ def sight(
     others = (at for name, (_, at) in widgets.items() if name not in untils)
     judged = (passable, *interlocks.values(), *verdicts.values())
     rest = min(until, control_until, *others, *(verdict.until for verdict in judged))
-    return Sight(view, summary(robot.name, link), rest, untils)
+    return ViewWithDeadlines(view, summary(robot.name, link), rest, untils)
 
 
-def refreshed(seen: Sight, displays: Iterable[Display], robot: Robot, now: float) -> Sight:
+def update_displays(
+    seen: ViewWithDeadlines, displays: Iterable[Display], robot: RobotState, now: float
+) -> ViewWithDeadlines:
     """The same with these displays as of `now`, where nothing else has changed."""
     widgets, untils = dict(seen.view["widgets"]), dict(seen.displays)
     for widget in displays:
         widgets[widget.id], untils[widget.id] = show(widget, robot, now)
-    return Sight({**seen.view, "widgets": widgets}, seen.robot, seen.rest, untils)
+    return ViewWithDeadlines({**seen.view, "widgets": widgets}, seen.robot, seen.rest, untils)
 
 
-def as_seen_by(view: View, browser: Browser) -> View:
+def as_seen_by(view: View, client: Client) -> View:
     """The view as a page shows it: without control what can be pressed is locked, unless there is no
     way to the robot at all. Pages with scripts do the same to what events bring."""
     control = view["control"]
-    mine = browser.id and browser.id == control["holder"]
+    mine = client.id and client.id == control["holder"]
     if not control["required"] or mine or view["link"]["bridge"]["state"] != "ok":
         return view
     lock = {"enabled": False, "reason": control["text"], **told([control["text"]])}

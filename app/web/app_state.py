@@ -8,61 +8,61 @@ from fastapi import Depends, Path
 from jinja2 import Environment
 from starlette.requests import HTTPConnection
 
-from app.audit import OperatorLog, Unlogged
+from app.audit import NullLog, OperatorLog
 from app.commands.press_limits import PressLimits
 from app.commands.receipts import Receipt
-from app.concurrency import Owed
-from app.permission.clients import Browsers
+from app.concurrency import InFlight
+from app.permission.clients import Clients
 from app.runtime.fleet import Fleet
-from app.runtime.robot_session import Kiosk
+from app.runtime.robot_session import RobotSession
 from app.web.assets import Assets
 from app.web.metrics import Metrics
 
 
 @dataclass(slots=True)
-class Site:
+class AppState:
     """All that a request needs."""
 
     fleet: Fleet
     assets: Assets
     templates: Environment
     metrics: Metrics
-    log: OperatorLog | Unlogged
+    log: OperatorLog | NullLog
     limits: PressLimits
-    browsers: Browsers = field(default_factory=Browsers)
-    owed: Owed = field(default_factory=Owed)
+    clients: Clients = field(default_factory=Clients)
+    in_flight: InFlight = field(default_factory=InFlight)
 
     @property
     def banner(self) -> str:
         """What stands above a page of no robot: that one is simulated."""
-        banners = (kiosk.board.view["notice"]["banner"] for kiosk in self.fleet.kiosks)
+        banners = (session.publisher.view["notice"]["banner"] for session in self.fleet.sessions)
         return next(filter(None, banners), "")
 
     async def counted(self, command: Awaitable[Receipt]) -> Receipt:
         """The receipt of a command, counted in the metrics; shutdown waits for it."""
-        with self.owed.one():
+        with self.in_flight.track():
             receipt = await command
         self.metrics.pressed(receipt.outcome)
         return receipt
 
 
-def site_of(request: HTTPConnection) -> Site:
-    site: Site = request.app.state.site
-    return site
+def site_of(request: HTTPConnection) -> AppState:
+    state: AppState = request.app.state.app_state
+    return state
 
 
-async def _current(request: HTTPConnection) -> Site:
+async def _current(request: HTTPConnection) -> AppState:
     return site_of(request)  # not itself the dependency: plain functions run on a thread
 
 
-CurrentSite = Annotated[Site, Depends(_current)]
+CurrentState = Annotated[AppState, Depends(_current)]
 
 
-async def _of_robot(request: HTTPConnection) -> Kiosk:
-    return site_of(request).fleet.kiosk(request.path_params.get("robot"))
+async def _of_robot(request: HTTPConnection) -> RobotSession:
+    return site_of(request).fleet.session(request.path_params.get("robot"))
 
 
-CurrentKiosk = Annotated[Kiosk, Depends(_of_robot)]
+CurrentSession = Annotated[RobotSession, Depends(_of_robot)]
 
 
 async def named_robot(robot: Annotated[str, Path(description="The id of a [[robot]]")]) -> None:

@@ -88,7 +88,7 @@ def direct(scope: Scope, send: Send) -> Send:
     return own
 
 
-class InWords:
+class StartErrorsInWords:
     """Passes everything on, but for the tracebacks of the kiosk's own errors."""
 
     def __init__(self, app: ASGIApp) -> None:

@@ -8,8 +8,8 @@ from fastapi import Request
 from fastapi.responses import Response
 from starlette.requests import HTTPConnection
 
-from app.permission.clients import TOKEN, Browser, new_token, newcomer, stranger
-from app.web.app_state import Site
+from app.permission.clients import TOKEN, Client, anonymous, new_client, new_token
+from app.web.app_state import AppState
 
 COOKIE: Final = "panel_browser"
 KEPT_S: Final = 365 * 86_400
@@ -23,11 +23,11 @@ class Caller:
     token: str
     address: str
 
-    def seen(self, site: Site) -> Browser:
+    def seen(self, state: AppState) -> Client:
         """The browser that this is now; without a token a stranger."""
         if not self.token:
-            return stranger(self.address)
-        return site.browsers.seen(self.token, self.address)
+            return anonymous(self.address)
+        return state.clients.seen(self.token, self.address)
 
 
 def caller(request: HTTPConnection) -> Caller:
@@ -36,24 +36,24 @@ def caller(request: HTTPConnection) -> Caller:
     return Caller(token if TOKEN.fullmatch(token) else "", address)
 
 
-def visitor(request: HTTPConnection, site: Site) -> Browser:
+def visitor(request: HTTPConnection, state: AppState) -> Client:
     """The browser by its cookie; without one, or with one that is none of ours, a stranger."""
-    return caller(request).seen(site)
+    return caller(request).seen(state)
 
 
-def welcomed(request: Request, site: Site) -> tuple[Browser, str]:
+def welcomed(request: Request, state: AppState) -> tuple[Client, str]:
     """The browser, and the token that it gets with the answer, "" where it has one.
 
     With a link on another site's page a browser does not send the cookie that it may have: it
     gets no second one, and tells with its next request who it is.
     """
-    browser = visitor(request, site)
+    browser = visitor(request, state)
     if browser.id or request.headers.get("sec-fetch-site") in OTHER_SITES:
         return browser, ""
     token = new_token()
     if by_hand(request):
-        return site.browsers.seen(token, browser.address), token
-    return newcomer(token, browser.address), token
+        return state.clients.seen(token, browser.address), token
+    return new_client(token, browser.address), token
 
 
 def keep(response: Response, request: Request, token: str) -> Response:

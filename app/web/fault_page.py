@@ -14,7 +14,7 @@ from fastapi.responses import HTMLResponse, JSONResponse, Response
 
 from app.printable import printable
 from app.web.error_pages import TRY_AGAIN
-from app.web.security import Doors
+from app.web.security import RequestGuard
 
 log = logging.getLogger("kiosk.development")
 
@@ -39,7 +39,7 @@ def fault_page(fault: str, hosts: Iterable[str]) -> FastAPI:
 
     app = FastAPI(openapi_url=None)
     app.add_route("/{path:path}", answer)
-    app.add_middleware(Doors, hosts=hosts)
+    app.add_middleware(RequestGuard, hosts=hosts)
     return app
 
 

@@ -44,11 +44,11 @@ def _of_fleet(fleet: Fleet) -> Iterator[Metric]:
     unreadable = CounterMetricFamily(
         "kiosk_undecodable", "Samples looked at that were not their type", labels=["robot", "key"]
     )
-    for kiosk in fleet.kiosks:
-        robot, name = kiosk.robot, kiosk.entry.id if kiosk.entry else ""
+    for session in fleet.sessions:
+        robot, name = session.robot, session.entry.id if session.entry else ""
         up.add_metric([name], int(robot.link_up))
         bridges.add_metric([name], len(robot.graph.bridges))
-        ready.add_metric([name], int(kiosk.way.permitted))
+        ready.add_metric([name], int(session.link_verdict.permitted))
         for key, count in robot.undecodable.items():
             unreadable.add_metric([name, key], count)
     yield from (up, bridges, ready, unreadable)

@@ -40,7 +40,7 @@ SECURITY_HEADERS: Final = FOR_ALL | {
 NO_DOCUMENTS: Final = ("text/css", "text/javascript", "text/event-stream")
 
 
-class Doors:
+class RequestGuard:
     """Refuses with 403 before anything is read; adds the security headers to what goes out."""
 
     def __init__(self, app: ASGIApp, hosts: Iterable[str]) -> None:

@@ -35,7 +35,7 @@ def pressed(number: int = 1) -> Entry:
 
 def sent(entry: Entry | None) -> Entry:
     assert entry is not None
-    return entry.followed("closed", "published", "Sent.")
+    return entry.follow_up("closed", "published", "Sent.")
 
 
 def kinds(folder: Path) -> list[tuple[str, str, str]]:
@@ -165,7 +165,7 @@ def test_a_disk_that_hangs_blocks_no_loop_and_locks(
     changes: list[str] = []
 
     async def work(log: OperatorLog) -> None:
-        with log.followed(lambda: changes.append(log.lock)):
+        with log.notifying(lambda: changes.append(log.lock)):
             disk.open.clear()
             with pytest.raises(LogError, match=r"can't be written: the disk did not take .* 0\.5 s"):
                 await log.pressed(pressed(1))

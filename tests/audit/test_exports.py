@@ -287,7 +287,7 @@ def test_two_search_at_a_time_and_the_server_itself_waits_for_none(
         with pytest.raises(TooMany, match="is being searched") as refused:
             await log.rows(Filter(), None, 10)
         assert (refused.value.status, refused.value.again_s) == (429, 2)
-        assert await log.unended("", ["say"], 0) == []
+        assert await log.open_presses("", ["say"], 0) == []
         go_on.set()
         assert await asyncio.gather(*searches) == [[], []]
         assert await log.rows(Filter(), None, 10) == []

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from app.audit import Entry, Filter, Limits, OperatorLog, Origin, Unlogged, entered
-from app.audit.data_dir import LOCK, Folder
+from app.audit import Entry, Filter, Limits, NullLog, OperatorLog, Origin, entered
+from app.audit.data_dir import LOCK, DataDir
 from app.audit.database import NAME
 from app.audit.queries import rows
 from app.audit.verify import verify
@@ -27,7 +27,7 @@ def pressed(number: int = 1) -> Entry:
 
 def sent(entry: Entry | None) -> Entry:
     assert entry is not None
-    return entry.followed("closed", "published", "Sent.")
+    return entry.follow_up("closed", "published", "Sent.")
 
 
 def entries(folder: Path) -> list[Entry]:
@@ -184,7 +184,7 @@ def test_a_lock_that_is_gone_is_taken_again_and_said(tmp_path: Path) -> None:
         await until_good(log)
         await log.pressed(pressed(2))
         with pytest.raises(FolderInUse):
-            Folder(tmp_path).hold()
+            DataDir(tmp_path).hold()
 
     run(tmp_path, work)
     assert f"{LOCK} was removed or renamed" in entries(tmp_path)[-2].reason
@@ -195,7 +195,7 @@ def test_a_lock_that_is_gone_is_taken_again_and_said(tmp_path: Path) -> None:
 def test_nothing_is_sent_while_another_server_has_the_folder(tmp_path: Path, required: bool) -> None:
     async def work(log: OperatorLog) -> None:
         (tmp_path / LOCK).unlink()
-        other = Folder(tmp_path)
+        other = DataDir(tmp_path)
         other.hold()
         with pytest.raises(LogError):
             await log.pressed(pressed(1))
@@ -213,13 +213,13 @@ def test_nothing_is_sent_while_another_server_has_the_folder(tmp_path: Path, req
 
 def test_without_a_log_too_the_lock_is_looked_at(tmp_path: Path) -> None:
     async def work() -> None:
-        log = Unlogged(tmp_path)
+        log = NullLog(tmp_path)
         await log.start()
         assert await log.pressed(pressed(1)) is None
         (tmp_path / LOCK).unlink()
         assert await log.pressed(pressed(2)) is None  # taken again
         (tmp_path / LOCK).unlink()
-        other = Folder(tmp_path)
+        other = DataDir(tmp_path)
         other.hold()
         with pytest.raises(LogError, match="is in use by process"):
             await log.pressed(pressed(3))
@@ -246,7 +246,7 @@ def test_a_server_sends_nothing_that_its_log_does_not_have(
     assert logged == ["new"]
     until(lambda: "new" in kiosk.widget("last_heard")["text"], "the robot has it")
     (tmp_path / LOCK).unlink()
-    other = Folder(tmp_path)
+    other = DataDir(tmp_path)
     other.hold()
     refused = kiosk.press("operation", "twice")
     assert refused.status_code == 503

@@ -9,10 +9,10 @@ from typing import Any
 
 import pytest
 
-from app.audit import Entry, Filter, Limits, OperatorLog, Origin, Unended
-from app.audit.press_record import Log, Logbook
+from app.audit import Entry, Filter, Limits, OpenPress, OperatorLog, Origin
+from app.audit.press_record import Log, PressLog
 from app.audit.queries import rows
-from app.commands.receipts import By, Receipt
+from app.commands.receipts import PressContext, Receipt
 from app.errors import LogError
 from app.i18n import say
 from app.panel.model import Panel
@@ -32,7 +32,7 @@ from tests.support.builders import (
 )
 
 KIM = Origin(address="10.0.0.7", browser="b1", who="Kim", seen="boot-7")
-FROM = By(KIM)
+FROM = PressContext(KIM)
 SET = {
     "id": "light",
     "kind": "call",
@@ -70,7 +70,7 @@ class SlowLog:
         self.entries: list[Entry] = []
 
     @contextmanager
-    def followed(self, changed: Callable[[], None]) -> Iterator[None]:
+    def notifying(self, changed: Callable[[], None]) -> Iterator[None]:
         yield
 
     async def pressed(self, entry: Entry) -> Entry | None:
@@ -89,13 +89,13 @@ class SlowLog:
     def add(self, entry: Entry) -> None:
         self._kept(entry)
 
-    def room(self, origin: Origin) -> bool:
+    def allowed(self, origin: Origin) -> bool:
         return True
 
-    def leave_out(self, origin: Origin, limited: bool = False) -> None:
+    def suppress(self, origin: Origin, limited: bool = False) -> None:
         raise AssertionError("there is room for all")
 
-    async def unended(self, robot: str, widgets: Collection[str], since: int) -> list[Unended]:
+    async def open_presses(self, robot: str, widgets: Collection[str], since: int) -> list[OpenPress]:
         return []
 
     def _kept(self, entry: Entry) -> Entry:
@@ -113,7 +113,7 @@ class Bench:
         self.asked: list[asyncio.Future[bytes | None]] = []
         permits(self.robot)
         self.presses = presses_of(
-            panel, self.robot, self, asker=self, logbook=Logbook(log, "arm", lambda: "board-3")
+            panel, self.robot, self, asker=self, press_log=PressLog(log, "arm", lambda: "board-3")
         )
         for service in ("light",):
             self.robot.graph.apply(f"@/b1/@ros2_lv/SS/{service}/std_srvs§srv§SetBool", True)
@@ -247,7 +247,7 @@ def test_no_log_keeps_anybody_from_canceling() -> None:
     async def work(log: SlowLog, bench: Bench) -> None:
         log.written.set()
         log.fails = True
-        bench.robot.progress["count"] = IDLE
+        bench.robot.command_status["count"] = IDLE
         receipt = await bench.presses.cancel("count", KIM)
         assert "there is nothing under way to cancel" in receipt.reason
         assert "Not safely in the operator's log" in receipt.reason
@@ -358,7 +358,7 @@ def test_every_refusal_is_in_the_log(tmp_path: Path) -> None:
         permits(bench.robot, False)
         await bench.press("guarded", "p2")
         await bench.press("free", "p2")
-        by = By(KIM, doubt=lambda: say("seen_before_restart"))
+        by = PressContext(KIM, stale_reason=lambda: say("seen_before_restart"))
         await bench.presses.press("free", {"message": "hi"}, "p3", by)
 
     entries = [entry for entry in real(tmp_path, work) if entry.kind != "pressed"]

@@ -9,15 +9,15 @@ from typing import Any
 import pytest
 
 from app.audit import Entry, Filter, Limits, OperatorLog, Origin, audit_log
-from app.audit.press_record import Logbook
+from app.audit.press_record import PressLog
 from app.audit.queries import rows
-from app.audit.refusal_quota import OF_ADDRESS, OF_ALL, OF_BROWSER, REMEMBERED, TOLD_APART, Refusals
+from app.audit.refusal_quota import OF_ADDRESS, OF_ALL, OF_BROWSER, REMEMBERED, TOLD_APART, RefusalQuota
 from app.audit.store import Store
 from app.audit.verify import verify
 from app.commands.presses import Presses
-from app.commands.receipts import RECEIPTS_KEPT, By, Receipt
+from app.commands.receipts import RECEIPTS_KEPT, PressContext, Receipt
 from app.errors import LogError
-from app.robot.state import Robot
+from app.robot.state import RobotState
 from tests.browser.test_holds_in_browser import PANEL
 from tests.support.builders import COUNT, panel_of, permits, presses_of, robot_there, small_panel
 from tests.support.parts import ROOT, Server, until
@@ -51,17 +51,17 @@ class Counted:
 
     def __init__(self) -> None:
         self.now = 0.0
-        self.refusals = Refusals(lambda: self.now, lambda: 1_000_000.0)
+        self.refusals = RefusalQuota(lambda: self.now, lambda: 1_000_000.0)
 
     def come(self, origin: Origin, times: int) -> int:
         """How many became entries."""
         entries = 0
         for _ in range(times):
-            if self.refusals.room(origin):
+            if self.refusals.allowed(origin):
                 self.refusals.take(origin)
                 entries += 1
             else:
-                self.refusals.leave_out(origin)
+                self.refusals.suppress(origin)
         return entries
 
 
@@ -112,14 +112,14 @@ def test_what_is_left_out_is_told_by_browser_and_the_rest_together(counted: Coun
     counted.come(KIM, 60 + 7)
     for number in range(2 * TOLD_APART):
         counted.come(Origin(address=f"10.0.0.{number}", browser="c"), 61)
-    told = counted.refusals.told()
+    told = counted.refusals.summary_due()
     assert len(told) == TOLD_APART + 1
     assert told[0].reason.startswith("7 more refusals from Panel 1 (10.0.0.7) since ")
     assert (told[0].kind, told[0].outcome, told[0].browser) == ("refused", "refused", "b1")
     assert json.loads(told[0].values) == {"more": 7}
     assert told[-1].reason.split(" since")[0].endswith("more refusals from others")
     assert sum(json.loads(entry.values)["more"] for entry in told) == counted.refusals.left_out
-    assert counted.refusals.told() == []
+    assert counted.refusals.summary_due() == []
 
 
 class Cell:
@@ -128,10 +128,10 @@ class Cell:
     def __init__(self, log: OperatorLog) -> None:
         self.log = log
         self.sent = 0
-        self.robot: Robot = robot_there(small_panel())
+        self.robot: RobotState = robot_there(small_panel())
         permits(self.robot)
-        self.logbook = Logbook(log)
-        self.presses: Presses = presses_of(small_panel(), self.robot, self, logbook=self.logbook)
+        self.logbook = PressLog(log)
+        self.presses: Presses = presses_of(small_panel(), self.robot, self, press_log=self.logbook)
 
     def put(self, key: str, payload: bytes) -> None:
         self.sent += 1
@@ -140,7 +140,7 @@ class Cell:
         return True
 
     async def press(self, press_id: str, origin: Origin = KIM, **inputs: Any) -> Receipt:
-        by = By(origin)
+        by = PressContext(origin)
         return await self.presses.press("guarded", inputs or {"message": "hi"}, press_id, by)
 
 
@@ -248,7 +248,9 @@ def test_the_same_id_is_the_same_press_and_displaces_no_other(tmp_path: Path) ->
 
 def test_cancels_of_nothing_are_limited_too(tmp_path: Path) -> None:
     async def work(cell: Cell) -> None:
-        presses = presses_of(panel_of(COUNT), robot_there(panel_of(COUNT)), cell, logbook=cell.logbook)
+        presses = presses_of(
+            panel_of(COUNT), robot_there(panel_of(COUNT)), cell, press_log=cell.logbook
+        )
         for _ in range(ENOUGH):
             receipt = await presses.cancel("count", KIM)
             assert receipt.reason == "there is nothing under way to cancel"
@@ -276,7 +278,7 @@ def test_while_the_log_is_broken_they_are_kept_to_be_told(
             await cell.press(f"f{number}")
         broken.set()
         assert (await cell.press("p", LEE)).cause == "log"
-        cell.log.leave_out(KIM)
+        cell.log.suppress(KIM)
         await asyncio.sleep(0.1)
         broken.clear()
         async with asyncio.timeout(5):

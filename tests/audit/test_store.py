@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from app.audit.data_dir import LOCK, Folder
+from app.audit.data_dir import LOCK, DataDir
 from app.audit.database import NAME, Head, set_aside
 from app.audit.entry import LONGEST_VALUES, Entry, Origin, as_json, entered, plain
 from app.audit.opening import Opening
@@ -34,7 +34,7 @@ def pressed(number: int = 1, widget: str = "drive") -> Entry:
 def fill(store: Store, count: int) -> None:
     """`count` presses with their outcomes."""
     for entry in store.append([pressed(number) for number in range(count)]):
-        store.append([entry.followed("closed", "published", "Sent.", verdict="permitted")])
+        store.append([entry.follow_up("closed", "published", "Sent.", verdict="permitted")])
 
 
 @pytest.fixture
@@ -233,7 +233,7 @@ def began(values: dict[str, Any]) -> Entry:
         ([began({"mode": "live"})], False),
         # As it was written at first.
         ([began({})], True),
-        ([pressed().followed("closed", "published", "Sent."), began({})], True),
+        ([pressed().follow_up("closed", "published", "Sent."), began({})], True),
         ([pressed(), began({})], False),
     ],
 )
@@ -393,14 +393,14 @@ def test_removal_by_hand_is_not_taken_for_retention(store: Store, tmp_path: Path
 def test_presses_of_an_earlier_server_are_undone_until_they_are_closed(tmp_path: Path) -> None:
     store = Store(tmp_path, "boot1")
     done, goal, cut = store.append([pressed(1), pressed(2), pressed(3)])
-    store.append([done.followed("closed", "published", "Sent.")])
-    store.append([goal.followed("closed", "accepted", "Accepted.")])
+    store.append([done.follow_up("closed", "published", "Sent.")])
+    store.append([goal.follow_up("closed", "accepted", "Accepted.")])
     assert store.undone() == []
     store.close()
     store = Store(tmp_path, "boot2")
     assert [entry.seq for entry in store.undone()] == [goal.seq, cut.seq]
     assert (store.answered(goal.seq), store.answered(cut.seq)) == (True, False)
-    store.append([e.followed("closed", "unknown", "ended") for e in store.undone()])
+    store.append([e.follow_up("closed", "unknown", "ended") for e in store.undone()])
     assert store.undone() == []
     store.close()
 
@@ -409,7 +409,7 @@ def test_presses_of_an_earlier_server_are_undone_until_they_are_closed(tmp_path:
 
 
 def test_the_folder_and_the_file_are_the_users_alone(tmp_path: Path) -> None:
-    folder = Folder(tmp_path / "state/panel")
+    folder = DataDir(tmp_path / "state/panel")
     folder.hold()
     store = Store(folder.path, "boot1")
     fill(store, 1)
@@ -422,7 +422,7 @@ def test_the_folder_and_the_file_are_the_users_alone(tmp_path: Path) -> None:
 
 
 def test_a_folder_has_one_holder_at_a_time(tmp_path: Path) -> None:
-    first, second = Folder(tmp_path), Folder(tmp_path)
+    first, second = DataDir(tmp_path), DataDir(tmp_path)
     first.hold()
     with pytest.raises(FolderInUse, match=rf"{tmp_path} is in use by process \d+ since 2\d{{3}}-"):
         second.hold()
@@ -472,7 +472,7 @@ def test_a_file_of_a_later_version_is_left_alone(tmp_path: Path) -> None:
 def test_a_filter_finds_what_it_says(store: Store, tmp_path: Path) -> None:
     for number, widget in ((1, "drive"), (2, "home")):
         (entry,) = store.append([pressed(number, widget)])
-        store.append([entry.followed("closed", "published", f"Sent 100%_{number}.")])
+        store.append([entry.follow_up("closed", "published", f"Sent 100%_{number}.")])
     middle = read(tmp_path)[0].at
     assert [e.press for e in read(tmp_path, widget="home")] == ["p2"]
     assert [e.press for e in read(tmp_path, outcome="published")] == ["p2", "p1"]

@@ -7,15 +7,15 @@ from typing import Any
 
 import pytest
 
-from app.commands.actions.goals import Actions
-from app.commands.service_calls import LATE_S, LONGEST_SAID, MOST_UNANSWERED, Calls
+from app.commands.actions.goals import GoalTracker
+from app.commands.service_calls import LATE_S, LONGEST_SAID, MOST_UNANSWERED, ServiceCalls
 from app.dialect import bridge_dialect
 from app.errors import LinkError
 from app.panel.model import Panel
 from app.panel.widgets.service_action import Action, Call
-from app.permission.interlocks import against_calling
-from app.robot.command_status import Answer, Progress
-from app.robot.state import Robot, Sample
+from app.permission.interlocks import call_blocked
+from app.robot.command_status import CommandStatus, Outcome
+from app.robot.state import RobotState, Sample
 from tests.support.builders import BRIDGE, INTERFACES, panel_of, robot_there
 
 TRIGGER = "std_srvs/srv/Trigger"
@@ -67,35 +67,40 @@ class Bench:
             {**CALL, "timeout_s": 0.05},
             {**GOAL, "goal": {"order": 3}, "progress": "sequence[0]", "timeout_s": 0.05},
         )
-        self.robot: Robot = robot_there(self.panel)
+        self.robot: RobotState = robot_there(self.panel)
         self.robot.graph.apply(bridge_dialect.server_token(BRIDGE, "SS", "reset", TRIGGER), True)
         self.robot.graph.apply(bridge_dialect.server_token(BRIDGE, "AS", "count", COUNT), True)
         self.line = Line()
-        self.corrected: list[tuple[str, Answer]] = []
-        self.calls = Calls(INTERFACES, self.robot, self.line, lambda: None)
-        self.shows: list[Progress] = []  # what an action's widget had when it was to be shown at once
-        self.actions = Actions(
-            INTERFACES, self.robot, self.line, lambda: self.shows.append(self.robot.progress["count"])
+        self.corrected: list[tuple[str, Outcome]] = []
+        self.calls = ServiceCalls(INTERFACES, self.robot, self.line, lambda: None)
+        self.shows: list[
+            CommandStatus
+        ] = []  # what an action's widget had when it was to be shown at once
+        self.actions = GoalTracker(
+            INTERFACES,
+            self.robot,
+            self.line,
+            lambda: self.shows.append(self.robot.command_status["count"]),
         )
         call, goal = self.panel.widgets()
         assert isinstance(call, Call)
         assert isinstance(goal, Action)
         self.reset, self.count = call, goal
 
-    def correct(self, press_id: str, answer: Answer) -> None:
+    def correct(self, press_id: str, answer: Outcome) -> None:
         self.corrected.append((press_id, answer))
 
-    def call(self, press_id: str = "p1") -> "asyncio.Task[Answer]":
+    def call(self, press_id: str = "p1") -> "asyncio.Task[Outcome]":
         request = INTERFACES.encode(f"{TRIGGER}_Request", {})
         return asyncio.create_task(self.calls.call(self.reset, request, press_id, self.correct))
 
-    def send_goal(self, press_id: str = "g1") -> "asyncio.Task[Answer]":
+    def send_goal(self, press_id: str = "g1") -> "asyncio.Task[Outcome]":
         goal = self.actions.start(self.count, {"order": 3}, press_id, self.correct)
         return asyncio.create_task(goal)
 
     @property
-    def shown(self) -> Progress:
-        return self.robot.progress["count"]
+    def shown(self) -> CommandStatus:
+        return self.robot.command_status["count"]
 
     def answer_goal(self, accepted: bool) -> None:
         response = INTERFACES.action(COUNT).send_goal_response
@@ -195,7 +200,7 @@ def test_a_late_answer_corrects_its_own_press_and_not_what_came_after() -> None:
                 await asyncio.sleep(0)
         ((press_id, answer),) = bench.corrected
         assert (press_id, answer.outcome) == ("p1", "rejected")
-        assert "second" in bench.robot.progress["reset"].text
+        assert "second" in bench.robot.command_status["reset"].text
 
     run(test)
 
@@ -229,9 +234,9 @@ def test_a_goal_cut_off_is_unknown_until_the_robot_tells_its_result() -> None:
         await asked(bench, 3)
         assert (locked_by(bench), bench.shown.stoppable) == ("perhaps_busy", True)
         bench.line.answer(types.get_result_response, status=4, result={"sequence": [0, 1]})
-        while not bench.robot.progress["count"].text.startswith("Succeeded"):
+        while not bench.robot.command_status["count"].text.startswith("Succeeded"):
             await asyncio.sleep(0)
-        outcomes.append(bench.robot.progress["count"].outcome)
+        outcomes.append(bench.robot.command_status["count"].outcome)
         assert outcomes == ["unknown", "succeeded"]
         assert [answer.outcome for _, answer in bench.corrected] == ["unknown", "succeeded"]
         await bench.actions.stop()
@@ -264,7 +269,7 @@ async def accepted(bench: Bench, press_id: str = "g1") -> None:
 
 async def cancel_answered(
     bench: Bench, press_id: str, *, return_code: int = 0, listed: bool = True
-) -> tuple[Answer, bytes]:
+) -> tuple[Outcome, bytes]:
     """Cancels the goal of a press: what came of that, and the goal that was to be canceled."""
     request, response = INTERFACES.service("action_msgs/srv/CancelGoal")
     count = len(bench.line.asked)
@@ -388,7 +393,7 @@ def test_a_state_that_comes_before_the_answer_counts() -> None:
 def test_another_programs_goal_and_a_rejected_one_have_no_state() -> None:
     async def test(bench: Bench) -> None:
         tell_states(bench, (b"\7" * 16, 2))
-        assert "count" not in bench.robot.progress
+        assert "count" not in bench.robot.command_status
         start = bench.send_goal()
         await asked(bench, 1)
         bench.answer_goal(accepted=False)
@@ -404,7 +409,7 @@ def test_a_goal_that_could_not_be_sent_locks_nothing_and_hides_no_other() -> Non
         bench.line.refuses = "send_goal"
         with pytest.raises(LinkError):
             await bench.send_goal()
-        assert "count" not in bench.robot.progress
+        assert "count" not in bench.robot.command_status
         bench.line.refuses = ""
         assert (await bench.send_goal()).outcome == "timed_out"
         bench.line.refuses = "send_goal"
@@ -592,13 +597,13 @@ async def in_doubt(bench: Bench) -> None:
 
 def locked_by(bench: Bench) -> str:
     """Why no goal is sent, long after its server was offered."""
-    verdict = against_calling(bench.count, bench.robot, time.monotonic() + 60)
+    verdict = call_blocked(bench.count, bench.robot, time.monotonic() + 60)
     return verdict.code if verdict else ""
 
 
 async def settled(bench: Bench) -> None:
     """Nothing is followed any more."""
-    while bench.actions._following.goals:
+    while bench.actions._results.goals:
         await asyncio.sleep(0.001)
 
 
@@ -645,11 +650,11 @@ def test_feedback_of_another_programs_goal_is_passed_over() -> None:
         await asked(bench, 1)
         bench.line.answer(types.send_goal_response, accepted=True, stamp={"sec": 0, "nanosec": 0})
         await start
-        before = bench.robot.progress["count"]
+        before = bench.robot.command_status["count"]
         other = {"goal_id": {"uuid": [7] * 16}, "feedback": {"sequence": [1]}}
         for payload in (INTERFACES.encode(types.feedback_message, other), b"\xff" * 9):
             bench.actions.hear_feedback("/count", sample_of(payload))
-        assert bench.robot.progress["count"] == before
+        assert bench.robot.command_status["count"] == before
         await bench.actions.stop()
 
     run(test)

@@ -16,9 +16,9 @@ from app.commands.receipts import Receipt
 from app.errors import PanelError
 from app.panel import load_panel
 from app.panel.model import Panel
-from app.robot.state import Passed, Robot, Sample
+from app.robot.state import PassedOver, RobotState, Sample
 from app.ros_logging import RobotLog
-from app.runtime.ingest import Intake
+from app.runtime.ingest import Ingest
 from app.transport.inbox import Changes
 from tests.commands.test_presses import Way
 from tests.support.builders import (
@@ -51,7 +51,7 @@ class Desk:
     def __init__(self, panel: Panel) -> None:
         self.now = 100.0
         self.way = Way()
-        self.robot: Robot = robot_there(panel)
+        self.robot: RobotState = robot_there(panel)
         self.confirmations = Confirmations(self.robot, lambda: None)
         self.presses = presses_of(
             panel,
@@ -95,7 +95,7 @@ def test_what_came_unseen_confirms_by_when_it_came() -> None:
         panel = panel_of()
         desk = Desk(panel)
         deaf: Any = object()
-        intake = Intake(
+        intake = Ingest(
             panel,
             desk.robot,
             deaf,
@@ -107,7 +107,7 @@ def test_what_came_unseen_confirms_by_when_it_came() -> None:
         press = asyncio.create_task(desk.press())
         await asyncio.sleep(0)
         on, off = (INTERFACES.encode(TEXT, {"data": text}) for text in ("on", "off"))
-        between = (Passed(on, came_at, came_at),)
+        between = (PassedOver(on, came_at, came_at),)
         newest = Sample(off, 9, 100.2, 100.2, BRIDGE, between=between)
         changes = Changes({desk.robot.key("/heard"): newest}, {}, link_up=True)
         intake.take(changes, dict, lambda: None)
@@ -124,7 +124,7 @@ def test_without_its_effect_it_is_not_known_and_later_corrected() -> None:
         desk.says("on", 101.0)
         await asyncio.sleep(0)
         await asyncio.sleep(0)
-        return first, desk.presses.receipt("p1"), desk.robot.progress["free"].outcome
+        return first, desk.presses.receipt("p1"), desk.robot.command_status["free"].outcome
 
     first, corrected, shown = asyncio.run(pressed())
     assert first.outcome == "unknown"

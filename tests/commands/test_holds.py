@@ -11,15 +11,15 @@ from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
-from app.commands.holds.controller import Holds
+from app.commands.holds.controller import HoldController
 from app.commands.holds.lease import AHEAD_S, LEASE_S, Lease, sent_at
-from app.commands.holds.receipts import RELEASED, Holding
+from app.commands.holds.receipts import RELEASED, ActiveHold
 from app.commands.receipts import Receipt
 from app.dialect import bridge_dialect
 from app.errors import LinkError, NotFound
 from app.i18n import ENGLISH
 from app.panel.model import Panel
-from app.view.view import sight
+from app.view.view import build_view
 from app.web.routes.hold_socket import WHYS
 from tests.support.builders import (
     BRIDGE,
@@ -135,7 +135,7 @@ class Bench:
         self.receipts: list[Receipt] = []
         self.pending: list[Callable[[], None]] = []  # what has come from the robot, not taken in yet
         self.news: Callable[[], bool] = lambda: bool(self.pending)
-        self.holds = Holds(
+        self.holds = HoldController(
             self.panel, INTERFACES, self.robot, self.way, self.loop,
             checked=checked, take=self.take, news=lambda: self.news(), changed=lambda: None,
         )  # fmt: skip
@@ -147,13 +147,13 @@ class Bench:
 
     def asked(
         self, widget: str = "jog", inputs: Mapping[str, Any] = HALF, age_s: float = 0.0
-    ) -> Receipt | Holding:
+    ) -> Receipt | ActiveHold:
         sent = self.loop.now - age_s
         return self.holds.begin(widget, inputs, sent, FROM, self.receipts.append)
 
-    def begun(self, widget: str = "jog") -> Holding:
+    def begun(self, widget: str = "jog") -> ActiveHold:
         holding = self.asked(widget)
-        assert isinstance(holding, Holding)
+        assert isinstance(holding, ActiveHold)
         return holding
 
     def refused(self, *arguments: Any, **named: Any) -> tuple[str, str]:
@@ -163,7 +163,7 @@ class Bench:
         assert (receipt.outcome, self.way.sent) == ("refused", before)
         return receipt.cause, receipt.reason.partition(": ")[2]
 
-    def keep(self, holding: Holding, seconds: float, every_s: float = 0.08) -> None:
+    def keep(self, holding: ActiveHold, seconds: float, every_s: float = 0.08) -> None:
         """Heartbeats that come at once, for some time."""
         end = self.loop.now + seconds - 1e-9
         while self.loop.now < end:
@@ -373,13 +373,13 @@ def test_a_second_browser_is_refused_and_changes_nothing(bench: Bench) -> None:
     holding = bench.begun()
     assert bench.refused() == ("interlock", "held by another browser.")
     bench.holds.end(holding, RELEASED)
-    assert isinstance(bench.asked(), Holding)
+    assert isinstance(bench.asked(), ActiveHold)
 
 
 def test_no_two_holds_send_on_one_topic(bench: Bench) -> None:
     bench.begun()
     assert bench.refused("back") == ("interlock", "Jog is held, which sends on /jog too.")
-    assert isinstance(bench.asked("arm"), Holding)
+    assert isinstance(bench.asked("arm"), ActiveHold)
 
 
 def test_a_press_that_comes_late_is_refused(bench: Bench) -> None:
@@ -411,7 +411,7 @@ def test_the_end_of_the_server_ends_all_and_refuses_more(bench: Bench) -> None:
 
 def test_every_browser_sees_that_it_is_held(bench: Bench) -> None:
     def shown() -> Any:
-        return sight(bench.panel, bench.robot, bench.loop.now).view["widgets"]["jog"]
+        return build_view(bench.panel, bench.robot, bench.loop.now).view["widgets"]["jog"]
 
     assert shown() == {"enabled": True, "reason": None, "held": False, "holding": ""}
     holding = bench.begun()
@@ -494,7 +494,7 @@ class Orders(RuleBasedStateMachine):
         super().__init__()
         logging.getLogger("kiosk.holds").setLevel(logging.CRITICAL)
         self.bench = Bench(JOG)
-        self.all: list[Holding] = []
+        self.all: list[ActiveHold] = []
         self.permitted = True
         self.beats: dict[str, float] = {}  # lease → when its newest sign of life was sent
         self.checked = 0
@@ -505,7 +505,7 @@ class Orders(RuleBasedStateMachine):
         return self.bench.loop.now
 
     @property
-    def holding(self) -> Holding | None:
+    def holding(self) -> ActiveHold | None:
         return self.all[-1] if len(self.all) > len(self.bench.receipts) else None
 
     @rule(age_s=AGES)
@@ -516,8 +516,8 @@ class Orders(RuleBasedStateMachine):
         sent = self.now - age_s
         answer = self.bench.asked(age_s=age_s)
         allowed = free and self.permitted and self.now < sent + LEASE_S
-        assert isinstance(answer, Holding) == allowed
-        if isinstance(answer, Holding):
+        assert isinstance(answer, ActiveHold) == allowed
+        if isinstance(answer, ActiveHold):
             self.all.append(answer)
             self.beats[answer.lease.id] = sent
 

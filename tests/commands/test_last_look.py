@@ -9,13 +9,13 @@ from typing import Any
 
 import pytest
 
-from app.audit import Unlogged
+from app.audit import NullLog
 from app.commands.receipts import MOST_LOOKS, Receipt
 from app.dialect.bridge_dialect import server_token
-from app.robot.state import Robot
-from app.runtime.robot_session import Kiosk
+from app.robot.state import RobotState
+from app.runtime.robot_session import RobotSession
 from app.transport.inbox import Inbox
-from app.transport.zenoh_session import Link, config_to
+from app.transport.zenoh_session import ZenohSession, config_to
 from tests.support.builders import (
     BRIDGE,
     COUNT,
@@ -69,7 +69,7 @@ class Way:
 class Late:
     """News that come after the press was judged, so often; each is taken in by the next look."""
 
-    def __init__(self, robot: Robot, *said: bool, ends: bool = True) -> None:
+    def __init__(self, robot: RobotState, *said: bool, ends: bool = True) -> None:
         self._robot = robot
         self._said = list(said)
         self._ends = ends
@@ -84,7 +84,7 @@ class Late:
             permits(self._robot, self._said.pop(0))
 
 
-def robot_permits() -> Robot:
+def robot_permits() -> RobotState:
     robot = robot_there(PANEL)
     permits(robot)
     robot.graph.apply(server_token(BRIDGE, "SS", "reset", CALL["type"]), True, 0.0)
@@ -92,7 +92,7 @@ def robot_permits() -> Robot:
     return robot
 
 
-def pressed(widget: str, way: Way, late: Late, robot: Robot) -> Receipt:
+def pressed(widget: str, way: Way, late: Late, robot: RobotState) -> Receipt:
     presses = presses_of(PANEL, robot, way, asker=way, catch_up=late.catch_up, news=late.news)
     return asyncio.run(presses.press(widget, {"message": "x"}, "p1", FROM))
 
@@ -126,20 +126,20 @@ class Recorded:
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.came: list[tuple[float, bool]] = []
         self.put: list[float] = []
-        add, put = Inbox.put, Link.put
+        add, put = Inbox.put, ZenohSession.put
 
         def added(inbox: Inbox, key: str, payload: Any, stamp: Any) -> None:
             add(inbox, key, payload, stamp)
             if key == "operation_enabled":
                 self.came.append((time.monotonic(), bytes(payload)[4] == 1))
 
-        def was_put(link: Link, key: str, payload: bytes) -> None:
+        def was_put(link: ZenohSession, key: str, payload: bytes) -> None:
             if key == "guarded":
                 self.put.append(time.monotonic())
             put(link, key, payload)
 
         monkeypatch.setattr(Inbox, "put", added)
-        monkeypatch.setattr(Link, "put", was_put)
+        monkeypatch.setattr(ZenohSession, "put", was_put)
 
     def forbidden(self) -> list[float]:
         """Of each put that came after a `false`: how many seconds after."""
@@ -150,7 +150,7 @@ class Recorded:
 
 async def pressing(endpoint: str, over: Callable[[], bool]) -> None:
     """Presses as fast as it can, one after the other."""
-    kiosk = Kiosk(small_panel(), config_to(endpoint), "revision", Unlogged())
+    kiosk = RobotSession(small_panel(), config_to(endpoint), "revision", NullLog())
     await kiosk.start()
     number = 0
     while not over():

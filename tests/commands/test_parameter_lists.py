@@ -15,7 +15,7 @@ from app.errors import InputError
 from app.panel.list_text import elements, listed, quoted
 from app.panel.number_range import Range
 from app.panel.widgets.parameter import Parameter
-from app.robot.parameter_state import Declared
+from app.robot.parameter_state import ParameterState
 from app.view.parameter_values import parameter
 from tests.panel.test_widgets import faults
 from tests.support import cyclone
@@ -65,14 +65,14 @@ def test_what_is_no_list_is_refused(text: str) -> None:
     with pytest.raises(ValueError, match="of them is none"):
         elements(text)
     with pytest.raises(InputError, match="several with commas between them, not"):
-        checked(widget(type="string[]"), Declared("live"), text)
+        checked(widget(type="string[]"), ParameterState("live"), text)
 
 
 @pytest.mark.parametrize("text", ['{}"a', 'a{}"', 'a,{}"', '"a{}', '"a"{}"'])
 def test_spaces_that_end_in_a_mistake_take_no_time(text: str) -> None:
     began = time.process_time()
     with pytest.raises(InputError, match="several with commas between them, not"):
-        checked(widget(type="string[]"), Declared("live"), text.format(" " * 995))
+        checked(widget(type="string[]"), ParameterState("live"), text.format(" " * 995))
     assert time.process_time() - began < 1  # it took 6 s, of the whole server
 
 
@@ -92,7 +92,7 @@ def test_spaces_that_end_in_a_mistake_take_no_time(text: str) -> None:
 )
 def test_a_list_is_typed_value_by_value(kind: str, given: Any, value: tuple[Any, ...]) -> None:
     of = widget(type=kind)
-    found = checked(of, Declared("live"), of.typed(given) if isinstance(given, str) else given)
+    found = checked(of, ParameterState("live"), of.typed(given) if isinstance(given, str) else given)
     assert found == value
     assert isinstance(found, tuple)
     assert [type(one) for one in found] == [type(one) for one in value]
@@ -119,7 +119,7 @@ def test_a_list_is_typed_value_by_value(kind: str, given: Any, value: tuple[Any,
 def test_each_value_of_a_list_is_checked(more: dict[str, Any], given: Any, why: str) -> None:
     limits = Range(0.0, 5.0) if more.get("type") is None else Range()
     with pytest.raises(InputError, match=why):
-        checked(widget(**more), Declared("live", range=limits), given)
+        checked(widget(**more), ParameterState("live", range=limits), given)
 
 
 @pytest.mark.parametrize(
@@ -133,20 +133,20 @@ def test_each_value_of_a_list_is_checked(more: dict[str, Any], given: Any, why: 
     ],
 )
 def test_an_option_is_chosen_by_its_value_or_its_key(more: Any, given: Any, value: Any) -> None:
-    found = checked(widget(**{"options": OPTIONS, **more}), Declared("live"), given)
+    found = checked(widget(**{"options": OPTIONS, **more}), ParameterState("live"), given)
     assert (found, type(found)) == (value, type(value))
 
 
 @pytest.mark.parametrize("given", ["", "3", 3, True, "Slow", [1]])
 def test_what_is_no_option_is_refused(given: Any) -> None:
     with pytest.raises(InputError, match="Gains must be one of Slow, Fast, not"):
-        checked(widget(type="integer", options=OPTIONS), Declared("live"), given)
+        checked(widget(type="integer", options=OPTIONS), ParameterState("live"), given)
 
 
 def test_an_option_that_the_node_does_not_take_is_refused() -> None:
     of = widget(type="integer", options=OPTIONS)
     with pytest.raises(InputError, match="Gains is Fast: it must be 0 to 1"):
-        checked(of, Declared("live", range=Range(0, 1)), "2")
+        checked(of, ParameterState("live", range=Range(0, 1)), "2")
 
 
 @pytest.mark.parametrize(
@@ -167,7 +167,7 @@ def test_a_list_and_an_option_show_as_they_are_entered(
 ) -> None:
     panel = panel_of({**GAINS, **more})
     there = robot_there(panel)
-    there.parameters["gains"] = Declared("live", value)
+    there.parameters["gains"] = ParameterState("live", value)
     (of,) = panel.parameters()
     shown = parameter(of, there)
     assert shown["text"] == text if text is not None else shown["text"].endswith("…")
@@ -188,7 +188,7 @@ def test_a_list_shows_its_beginning_however_long_its_texts_are(
 ) -> None:
     panel = panel_of({**GAINS, "type": "string[]"})
     there = robot_there(panel)
-    there.parameters["gains"] = Declared("live", value)
+    there.parameters["gains"] = ParameterState("live", value)
     (of,) = panel.parameters()
     began = time.process_time()
     for _ in range(50):  # with every change of anything on the page

@@ -8,17 +8,17 @@ from typing import Any
 import pytest
 
 from app.commands.parameters import client, sync
-from app.commands.parameters.sync import Parameters
+from app.commands.parameters.sync import ParameterSync
 from app.commands.parameters.values import checked
-from app.commands.service_calls import Calls
+from app.commands.service_calls import ServiceCalls
 from app.dialect import bridge_dialect
 from app.errors import InputError
 from app.panel.model import Panel
 from app.panel.number_range import Range, described
 from app.panel.widgets.parameter import DESCRIBE, EVENT_TYPE, GET, SET, Parameter
 from app.permission.interlocks import press_verdict
-from app.robot.command_status import Answer
-from app.robot.parameter_state import UNKNOWN, Declared, allowed, limits_text, wire
+from app.robot.command_status import Outcome
+from app.robot.parameter_state import UNKNOWN, ParameterState, allowed, limits_text, wire
 from app.robot.state import Sample
 from app.view.parameter_values import parameter
 from tests.support.builders import BRIDGE, INTERFACES, NOW, Table, panel_of, robot_there
@@ -69,8 +69,10 @@ class Bench:
         self.panel: Panel = panel_of(*(widgets or (SPEED,)))
         self.robot = robot_there(self.panel)
         self.line = Line()
-        calls = Calls(INTERFACES, self.robot, self.line, lambda: None)
-        self.parameters = Parameters(self.panel, INTERFACES, self.robot, self.line, calls, lambda: None)
+        calls = ServiceCalls(INTERFACES, self.robot, self.line, lambda: None)
+        self.parameters = ParameterSync(
+            self.panel, INTERFACES, self.robot, self.line, calls, lambda: None
+        )
         self.calls = calls
 
     def offer(self, alive: bool = True) -> None:
@@ -117,7 +119,7 @@ class Bench:
         (one,) = self.panel.parameters()
         return parameter(one, self.robot)
 
-    def known(self, name: str = "speed") -> Declared:
+    def known(self, name: str = "speed") -> ParameterState:
         return self.robot.parameters.get(name, UNKNOWN)
 
     def reason(self, name: str = "speed") -> str:
@@ -443,7 +445,7 @@ def test_after_a_set_the_node_is_asked_how_it_is() -> None:
         bench.offer()
         await bench.tell(1, 0.5)
         (one,) = bench.panel.parameters()
-        corrected: list[tuple[str, Answer]] = []
+        corrected: list[tuple[str, Outcome]] = []
         setting = asyncio.create_task(
             bench.parameters.set(
                 one, 0.7, "p1", lambda press, answer: corrected.append((press, answer))
@@ -487,7 +489,7 @@ def test_an_empty_answer_to_a_set_is_unknown() -> None:
     ],
 )
 def test_a_value_is_typed(given: Any, kind: str, value: Any) -> None:
-    found = checked(widget(type=kind), Declared("live", range=Range(None, None, None)), given)
+    found = checked(widget(type=kind), ParameterState("live", range=Range(None, None, None)), given)
     assert (found, type(found)) == (value, type(value))
 
 
@@ -512,7 +514,7 @@ def test_a_value_is_typed(given: Any, kind: str, value: Any) -> None:
 )
 def test_a_value_of_another_type_is_refused(given: Any, kind: str) -> None:
     with pytest.raises(InputError, match="Speed"):
-        checked(widget(type=kind), Declared("live"), given)
+        checked(widget(type=kind), ParameterState("live"), given)
 
 
 @pytest.mark.parametrize(
@@ -532,7 +534,7 @@ def test_a_value_of_another_type_is_refused(given: Any, kind: str) -> None:
 def test_a_panel_narrows_what_the_node_describes(
     own: dict[str, Any], theirs: Range, limits: str, good: list[float], bad: list[float]
 ) -> None:
-    of, known = widget(**own), Declared("live", range=theirs)
+    of, known = widget(**own), ParameterState("live", range=theirs)
     assert limits_text(of, allowed(of, known)) == limits
     assert [checked(of, known, one) for one in good] == good
     for one in bad:
@@ -554,7 +556,7 @@ def test_no_value_that_both_allow_locks() -> None:
 
 def test_integers_are_exact_to_the_last_step() -> None:
     of = widget(type="integer")
-    known = Declared("live", range=Range(-(2**63), 2**63 - 1, 2))
+    known = ParameterState("live", range=Range(-(2**63), 2**63 - 1, 2))
     assert checked(of, known, str(2**53 + 2)) == 2**53 + 2
     assert checked(of, known, str(2**63 - 1)) == 2**63 - 1  # the highest is always right
     with pytest.raises(InputError):
@@ -600,7 +602,7 @@ def test_a_value_shows_and_its_input_starts_from_it(
     unit = "mm" if kind in ("double", "integer") else ""
     panel = panel_of({**SPEED, "type": kind, "unit": unit})
     robot = robot_there(panel)
-    robot.parameters["speed"] = Declared("live", value)
+    robot.parameters["speed"] = ParameterState("live", value)
     (of,) = panel.parameters()
     shown = parameter(of, robot)
     assert (shown["text"], shown["entry"]) == (text, entry)

@@ -12,14 +12,14 @@ from typing import Any
 import pytest
 
 from app.audit.press_record import origin_of
-from app.commands.receipts import RECEIPTS_KEPT, By, Receipt
+from app.commands.receipts import RECEIPTS_KEPT, PressContext, Receipt
 from app.errors import LinkError, NotFound
 from app.panel.model import Panel
 from app.panel.rules import ControlRules
-from app.permission.clients import Browser, Browsers, stranger
-from app.permission.control_authority import Control
+from app.permission.clients import Client, Clients, anonymous
+from app.permission.control_authority import ControlAuthority
 from app.permission.interlocks import PERMITTED, Verdict, locked
-from app.robot.state import Robot, Sample
+from app.robot.state import RobotState, Sample
 from tests.support.builders import (
     BOOL,
     BRIDGE,
@@ -65,7 +65,7 @@ class Way:
         return [INTERFACES.decode(TEXT, payload).data for _, payload in self.sent]
 
 
-PROGRAM = stranger("127.0.0.1")
+PROGRAM = anonymous("127.0.0.1")
 
 
 class Bench:
@@ -78,7 +78,7 @@ class Bench:
         self.robot = robot_there(panel)
         permits(self.robot)
         self._presses = presses_of(panel, self.robot, self.way, monotonic=lambda: self.now)
-        self.may_press: Callable[[Browser], Verdict] = lambda _: PERMITTED
+        self.may_press: Callable[[Client], Verdict] = lambda _: PERMITTED
         self.receipt = self._presses.receipt
         self.typed = sending_of(panel, self.robot, self.way).typed
 
@@ -87,10 +87,10 @@ class Bench:
         widget: str = "free",
         inputs: Mapping[str, Any] | None = None,
         press_id: str = "p1",
-        who: Browser = PROGRAM,
+        who: Client = PROGRAM,
     ) -> Receipt:
         given = {"message": "hello"} if inputs is None else inputs
-        by = By(origin_of(who), lambda: self.may_press(who))
+        by = PressContext(origin_of(who), lambda: self.may_press(who))
         return asyncio.run(self._presses.press(widget, given, press_id, by))
 
     def cancel(self, widget: str) -> Receipt:
@@ -216,26 +216,26 @@ def test_a_permission_is_judged_at_the_time_of_the_press() -> None:
     assert len(bench.way.sent) == 1
 
 
-def loses_link(robot: Robot) -> None:
+def loses_link(robot: RobotState) -> None:
     robot.link_up = False
 
 
-def loses_bridge(robot: Robot) -> None:
+def loses_bridge(robot: RobotState) -> None:
     robot.graph.apply(f"@/{BRIDGE}/@ros2_lv", False)
 
 
-def goes_silent(robot: Robot) -> None:
+def goes_silent(robot: RobotState) -> None:
     robot.graph.answered({})
 
 
-def joins(robot: Robot) -> None:
+def joins(robot: RobotState) -> None:
     robot.settled_at = math.inf
 
 
 @pytest.mark.parametrize("happens", [loses_link, loses_bridge, goes_silent, joins])
 @pytest.mark.parametrize("widget", ["free", "guarded"])
 def test_without_a_way_to_the_robot_nothing_is_sent(
-    bench: Bench, happens: Callable[[Robot], None], widget: str
+    bench: Bench, happens: Callable[[RobotState], None], widget: str
 ) -> None:
     happens(bench.robot)
     cause, reason = refused(bench, bench.press(widget))
@@ -419,8 +419,8 @@ class Locked:
 
     def __init__(self) -> None:
         self.bench = Bench()
-        self.other = Browsers().seen("0" * 32, "192.0.2.7")
-        control = Control(ControlRules(required=True), "", monotonic=lambda: NOW)
+        self.other = Clients().seen("0" * 32, "192.0.2.7")
+        control = ControlAuthority(ControlRules(required=True), "", monotonic=lambda: NOW)
         control.take(self.other)
         self.bench.may_press = control.verdict
 

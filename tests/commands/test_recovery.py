@@ -9,17 +9,17 @@ from typing import Any
 
 import pytest
 
-from app.audit import Entry, Filter, Limits, OperatorLog, Origin, Unended, entered
-from app.audit.press_record import Logbook
-from app.audit.queries import rows, unended
+from app.audit import Entry, Filter, Limits, OpenPress, OperatorLog, Origin, entered
+from app.audit.press_record import PressLog
+from app.audit.queries import open_presses, rows
 from app.audit.store import Store
 from app.commands.actions.goal import goal_id
-from app.commands.actions.recovery import LOOKED_BACK_S, Resuming
+from app.commands.actions.recovery import LOOKED_BACK_S, GoalRecovery
 from app.commands.actions.results import RESULT_S
 from app.commands.service_calls import LATE_S, MOST_UNANSWERED
 from app.dialect import bridge_dialect
 from app.errors import LogError
-from app.permission.interlocks import against_calling
+from app.permission.interlocks import call_blocked
 from app.robot.command_status import IDLE
 from tests.commands.test_calls_and_goals import COUNT, Bench, asked, sample_of, tell_states
 from tests.support.builders import BRIDGE, INTERFACES
@@ -43,12 +43,12 @@ async def pressed(
     entry = await log.pressed(entered("pressed", FROM, {}, **about))
     assert entry is not None
     for number, outcome in enumerate(outcomes):
-        await log.closed(entry.followed("corrected" if number else "closed", outcome, "So."))
+        await log.closed(entry.follow_up("corrected" if number else "closed", outcome, "So."))
     return entry
 
 
-def found(folder: Path, robot: str = "", since: int = 0) -> list[Unended]:
-    return unended(folder, robot, ["count"], since)
+def found(folder: Path, robot: str = "", since: int = 0) -> list[OpenPress]:
+    return open_presses(folder, robot, ["count"], since)
 
 
 def test_the_log_knows_of_which_presses_it_has_no_end(tmp_path: Path) -> None:
@@ -83,14 +83,14 @@ class Rig:
         self.bench = Bench()
         self.log = log
         self.folder = folder
-        logbook = Logbook(log)
-        self.resuming = Resuming(
+        logbook = PressLog(log)
+        self.resuming = GoalRecovery(
             self.bench.panel, self.bench.robot, logbook, self.bench.actions, lambda: None, 0.01
         )
 
     @property
     def lock(self) -> str:
-        verdict = against_calling(self.bench.count, self.bench.robot, time.monotonic())
+        verdict = call_blocked(self.bench.count, self.bench.robot, time.monotonic())
         return verdict.code if verdict else ""
 
     async def started(self, questions: int = 1) -> None:
@@ -239,7 +239,7 @@ def test_what_the_robot_does_not_know_opens_and_is_logged(
         assert len(found(tmp_path)) == 1
         again = Rig(await opened(tmp_path), tmp_path)
         await again.resuming.start()
-        assert "count" not in again.bench.robot.progress
+        assert "count" not in again.bench.robot.command_status
         await again.log.stop()
 
     run(tmp_path, test, *before)
@@ -336,7 +336,7 @@ def test_what_is_of_another_robot_or_older_than_a_day_is_not_followed(
         now = time.time()
         monkeypatch.setattr(time, "time", lambda: now + LOOKED_BACK_S + 10)
         await rig.resuming.start()
-        assert "count" not in rig.bench.robot.progress
+        assert "count" not in rig.bench.robot.command_status
 
     run(tmp_path, test, "accepted")
 
@@ -345,12 +345,12 @@ def test_what_is_of_another_robot_or_older_than_a_day_is_not_followed(
 def unreadable(rig: Rig, monkeypatch: pytest.MonkeyPatch, *, unneeded: bool) -> Iterator[None]:
     """A log that can't be read; `unneeded`: the panel goes on without it."""
 
-    async def gone(*about: Any) -> list[Unended]:
+    async def gone(*about: Any) -> list[OpenPress]:
         raise LogError(GONE)
 
     with monkeypatch.context() as broken:
-        broken.setattr(rig.log, "unended", gone)
-        broken.setattr(Logbook, "unneeded", unneeded)
+        broken.setattr(rig.log, "open_presses", gone)
+        broken.setattr(PressLog, "unneeded", unneeded)
         yield
 
 
@@ -408,9 +408,9 @@ def test_a_log_that_is_not_open_yet_tells_nothing(tmp_path: Path) -> None:
     async def test() -> None:
         log = OperatorLog(tmp_path, Limits())
         with pytest.raises(LogError, match="can't be read"):
-            await log.unended("", ["count"], 0)
+            await log.open_presses("", ["count"], 0)
         await log.start()
-        assert await log.unended("", ["count"], 0) == []
+        assert await log.open_presses("", ["count"], 0) == []
         await log.stop()
 
     asyncio.run(test())
@@ -419,6 +419,6 @@ def test_a_log_that_is_not_open_yet_tells_nothing(tmp_path: Path) -> None:
 def test_a_panel_without_a_goal_of_before_shows_none(tmp_path: Path) -> None:
     async def test(rig: Rig, entry: Entry) -> None:
         await rig.resuming.start()
-        assert rig.bench.robot.progress.get("count", IDLE) == IDLE
+        assert rig.bench.robot.command_status.get("count", IDLE) == IDLE
 
     run(tmp_path, test, "accepted", "succeeded")

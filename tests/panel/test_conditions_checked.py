@@ -13,11 +13,11 @@ from app.panel import load_panel
 from app.panel.interlock import Interlock
 from app.permission.conditions import permits
 from app.permission.interlocks import interlock_verdict
-from app.robot.state import Passed, Robot, Sample
+from app.robot.state import PassedOver, RobotState, Sample
 from app.ros_logging import RobotLog
-from app.runtime.ingest import Intake
+from app.runtime.ingest import Ingest
 from app.transport.inbox import Changes
-from app.view.view import sight
+from app.view.view import build_view
 from tests.support.builders import BRIDGE, ENABLED, INTERFACES, NOW, Table, robot_there
 
 FILE: Final = """
@@ -61,12 +61,12 @@ def file_of(folder: Path, type_name: str, conditions: str) -> Path:
     return path
 
 
-def robot_of(path: Path) -> tuple[Robot, Interlock]:
+def robot_of(path: Path) -> tuple[RobotState, Interlock]:
     panel = load_panel(path)
     return robot_there(panel), panel.interlocks[0]
 
 
-def said(robot: Robot, interlock: Interlock, fields: Table) -> str | None:
+def said(robot: RobotState, interlock: Interlock, fields: Table) -> str | None:
     """The reason after the robot said this; None where it permits."""
     payload = INTERFACES.encode(interlock.type, fields)
     robot.take(robot.key(ENABLED), Sample(payload, 1, NOW, NOW, BRIDGE))
@@ -205,15 +205,15 @@ def test_a_value_that_only_changes_the_reason_waits_for_the_next_frame(tmp_path:
     panel = load_panel(path)
     robot = robot_there(panel)
     deaf: Any = Deaf()
-    intake = Intake(panel, robot, deaf, deaf, deaf, None, RobotLog(logging.getLogger("x"), ""))
+    intake = Ingest(panel, robot, deaf, deaf, deaf, None, RobotLog(logging.getLogger("x"), ""))
     shows: list[float] = []
 
     def take(value: float, *between: float) -> tuple[bool, bool]:
         def encoded(one: float) -> bytes:
             return INTERFACES.encode("std_msgs/msg/Float64", {"data": one})
 
-        passed = tuple(Passed(encoded(one), NOW, NOW) for one in between)
-        shown = sight(panel, robot, time.monotonic()).view["interlocks"]
+        passed = tuple(PassedOver(encoded(one), NOW, NOW) for one in between)
+        shown = build_view(panel, robot, time.monotonic()).view["interlocks"]
         sample = Sample(encoded(value), 1, NOW, NOW, BRIDGE, between=passed)
         news = intake.take(
             Changes({robot.key(ENABLED): sample}, {}, True), lambda: shown, lambda: shows.append(value)

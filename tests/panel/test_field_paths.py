@@ -16,8 +16,8 @@ from app.panel import load_panel
 from app.panel.checks.panel import faults_in
 from app.panel.template import PLACE
 from app.permission.interlocks import interlock_verdict
-from app.robot.state import Robot, Sample
-from app.view.view import sight
+from app.robot.state import RobotState, Sample
+from app.view.view import build_view
 from tests.commands.test_presses import Way
 from tests.support.builders import (
     BRIDGE,
@@ -178,7 +178,7 @@ def shown(widget: Table, fields: Table) -> dict[str, Any]:
     robot = robot_there(panel)
     payload = INTERFACES.encode(widget["type"], fields)
     robot.take("heard", Sample(payload, 1, NOW, NOW, BRIDGE))
-    return sight(panel, robot, NOW).view["widgets"]["heard"]
+    return build_view(panel, robot, NOW).view["widgets"]["heard"]
 
 
 J2: Final[Table] = {"type": JOINTS, "field": "position[name=joint_2]", "unit": "rad"}
@@ -256,7 +256,7 @@ def test_an_interlock_by_the_state_of_one_device(
     path = tmp_path / "cell.toml"
     path.write_text(FILE)
     panel = load_panel(path)
-    robot: Robot = robot_there(panel)
+    robot: RobotState = robot_there(panel)
     payload = INTERFACES.encode(DIAGNOSTICS, diagnostics(*levels))
     robot.take(robot.key(ENABLED), Sample(payload, 1, NOW, NOW, BRIDGE))
     assert interlock_verdict(panel.interlocks[0], robot, NOW).reason == reason

@@ -3,7 +3,7 @@
 import pytest
 from jinja2 import Environment, FileSystemLoader
 
-from app.commands.dispatch import Sending
+from app.commands.dispatch import Dispatcher
 from app.panel.widgets.families import Command, Entered, Placed, Pressed
 from app.panel.widgets.kinds import KINDS, row_of
 from app.permission.interlocks import AGAINST
@@ -25,7 +25,7 @@ class Unsent:
 
 
 @pytest.fixture(scope="module")
-def sending() -> Sending:
+def dispatcher() -> Dispatcher:
     panel = panel_of()
     return sending_of(panel, robot_there(panel), Unsent())
 
@@ -52,14 +52,14 @@ def test_a_kind_has_a_macro_of_its_name(kind: str, of: type[Placed]) -> None:
 
 
 @EACH
-def test_a_command_is_judged_and_sent(kind: str, of: type[Placed], sending: Sending) -> None:
+def test_a_command_is_judged_and_sent(kind: str, of: type[Placed], dispatcher: Dispatcher) -> None:
     if issubclass(of, Command):
         assert callable(row_of(AGAINST, widget(of, kind)))
     if issubclass(of, Pressed):
-        assert callable(row_of(sending.senders, widget(of, kind)))
-        assert callable(row_of(sending.refusals, widget(of, kind)))
+        assert callable(row_of(dispatcher.senders, widget(of, kind)))
+        assert callable(row_of(dispatcher.refusals, widget(of, kind)))
     if issubclass(of, Entered):
-        assert callable(row_of(sending.checks, widget(of, kind)))
+        assert callable(row_of(dispatcher.checks, widget(of, kind)))
 
 
 def test_a_kind_without_a_row_is_named() -> None:

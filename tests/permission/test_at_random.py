@@ -13,13 +13,13 @@ from hypothesis import strategies as some
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
 from app.commands.receipts import Receipt
-from app.commands.service_calls import Calls
+from app.commands.service_calls import ServiceCalls
 from app.dialect import bridge_dialect
 from app.errors import LinkError
 from app.panel.model import Panel
 from app.permission.interlocks import HISTORY_S, interlock_verdict
 from app.robot.graph import Route
-from app.robot.state import Robot, Sample
+from app.robot.state import RobotState, Sample
 from tests.support.builders import (
     BOOL,
     BRIDGE,
@@ -141,9 +141,9 @@ class Panels(RuleBasedStateMachine):
         self.loop = SetLoop()
         self.way = Way()
         self.grounds = Grounds(strict)
-        self.robot = Robot(self.panel, INTERFACES, KIOSK)
+        self.robot = RobotState(self.panel, INTERFACES, KIOSK)
         self.key = self.robot.key(ENABLED)
-        self.calls = Calls(INTERFACES, self.robot, self.way, lambda: None)
+        self.calls = ServiceCalls(INTERFACES, self.robot, self.way, lambda: None)
         self.presses = presses_of(
             self.panel,
             self.robot,

@@ -5,11 +5,11 @@ import pytest
 from app.permission.clients import (
     BROWSERS_KEPT,
     TOKEN,
-    Browsers,
+    Clients,
+    anonymous,
+    new_client,
     new_token,
-    newcomer,
     public_id,
-    stranger,
 )
 
 
@@ -24,21 +24,21 @@ def test_a_token_is_random_and_long() -> None:
 
 
 def test_what_others_see_of_a_token_is_another_thing_and_stays_the_same() -> None:
-    first = Browsers().seen(token(1), "192.0.2.7")
-    again = Browsers().seen(token(1), "192.0.2.7")
+    first = Clients().seen(token(1), "192.0.2.7")
+    again = Clients().seen(token(1), "192.0.2.7")
     assert first.id == again.id == public_id(token(1))
     assert first.id not in token(1)
     assert public_id(token(2)) != first.id
 
 
 def test_browsers_are_numbered_as_they_come() -> None:
-    browsers = Browsers()
+    browsers = Clients()
     names = [browsers.seen(token(n), "192.0.2.7").name for n in (1, 2, 1, 3)]
     assert names == ["Panel 1", "Panel 2", "Panel 1", "Panel 3"]
 
 
 def test_the_name_in_a_sentence_has_the_address_of_another_machine() -> None:
-    browsers = Browsers()
+    browsers = Clients()
     far = browsers.seen(token(1), "192.0.2.7")
     near = browsers.seen(token(2), "127.0.0.1")
     more = browsers.seen(token(3), "::1")
@@ -66,26 +66,26 @@ def test_the_name_in_a_sentence_has_the_address_of_another_machine() -> None:
     ],
 )
 def test_only_loopback_is_at_the_cell(address: str, local: bool, shown: str) -> None:
-    for browser in (Browsers().seen(token(1), address), stranger(address)):
+    for browser in (Clients().seen(token(1), address), anonymous(address)):
         assert (browser.local, browser.address) == (local, shown)
 
 
 def test_a_token_that_is_carried_to_another_machine_is_no_longer_at_the_cell() -> None:
-    browsers = Browsers()
+    browsers = Clients()
     assert browsers.seen(token(1), "127.0.0.1").local
     moved = browsers.seen(token(1), "192.0.2.7")
     assert (moved.local, moved.name) == (False, "Panel 1")
 
 
 def test_who_moves_in_the_network_keeps_the_name() -> None:
-    browsers = Browsers()
+    browsers = Clients()
     browsers.seen(token(1), "192.0.2.1")
     browsers.seen(token(2), "192.0.2.2")
     assert str(browsers.seen(token(2), "192.0.2.9")) == "Panel 2 (192.0.2.9)"
 
 
 def test_those_not_seen_for_longest_are_forgotten_and_their_numbers_free() -> None:
-    browsers = Browsers()
+    browsers = Clients()
     for number in range(BROWSERS_KEPT):
         browsers.seen(token(number), "192.0.2.7")
     browsers.seen(token(0), "192.0.2.7")
@@ -95,11 +95,11 @@ def test_those_not_seen_for_longest_are_forgotten_and_their_numbers_free() -> No
 
 
 def test_who_does_not_come_back_takes_no_number() -> None:
-    browsers = Browsers()
-    first = newcomer(token(1), "192.0.2.7")
+    browsers = Clients()
+    first = new_client(token(1), "192.0.2.7")
     assert (first.id, first.local) == (public_id(token(1)), False)
     assert browsers.seen(token(2), "192.0.2.7").number == 1
 
 
 def test_a_stranger_has_no_id() -> None:
-    assert (stranger("192.0.2.7").id, str(stranger("192.0.2.7"))) == ("", "a program (192.0.2.7)")
+    assert (anonymous("192.0.2.7").id, str(anonymous("192.0.2.7"))) == ("", "a program (192.0.2.7)")

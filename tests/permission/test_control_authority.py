@@ -12,8 +12,8 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 from app.errors import PanelError
 from app.panel import Panel, load_panel
 from app.panel.rules import ControlRules
-from app.permission.clients import Browser, Browsers, stranger
-from app.permission.control_authority import ASK_AGAIN_S, LIFE_S, Control, Refusal
+from app.permission.clients import Client, Clients, anonymous
+from app.permission.control_authority import ASK_AGAIN_S, LIFE_S, ControlAuthority, Refusal
 from app.permission.control_authority_view import Role, role
 from tests.support.builders import told
 
@@ -21,10 +21,10 @@ RULES = ControlRules(required=True)
 TAKEOVER_S = RULES.takeover_after_s
 FORM_LIFE_S = 35.0
 
-_KNOWN = Browsers()
+_KNOWN = Clients()
 ANN, BOB, CY = (_KNOWN.seen(f"{n:032x}", f"192.0.2.{n}") for n in (1, 2, 3))
 CELL, CELL2 = (_KNOWN.seen(f"{n:032x}", "127.0.0.1") for n in (8, 9))
-NOBODY = stranger("192.0.2.99")
+NOBODY = anonymous("192.0.2.99")
 
 
 class Room:
@@ -33,22 +33,22 @@ class Room:
     def __init__(self, rules: ControlRules = RULES, robot: str = "Robot 1") -> None:
         self.now = 1000.0
         self.told: list[str] = []
-        self.control = Control(
+        self.control = ControlAuthority(
             rules, robot, monotonic=lambda: self.now, wall=lambda: self.now, tell=self.told.append
         )
 
-    def pass_s(self, seconds: float, *alive: Browser, touched: bool = False) -> None:
+    def pass_s(self, seconds: float, *alive: Client, touched: bool = False) -> None:
         end = self.now + seconds
         while self.now < end:
             self.now = min(end, self.now + 1)
             for browser in alive:
-                self.control.here(browser, touched)
+                self.control.keepalive(browser, touched)
 
-    def may(self, browser: Browser) -> bool:
-        return self.control.verdict(browser).permitted
+    def may(self, client: Client) -> bool:
+        return self.control.verdict(client).permitted
 
-    def role(self, browser: Browser) -> Role:
-        return role(self.control.view(), browser, self.control.rules)
+    def role(self, client: Client) -> Role:
+        return role(self.control.view(), client, self.control.rules)
 
 
 @pytest.fixture
@@ -121,7 +121,7 @@ def test_who_has_no_token_gets_nothing(room: Room) -> None:
     assert room.control.until == math.inf
     room.control.take(ANN)
     assert room.control.take(NOBODY) == room.control.ask(NOBODY) == "control_stranger"
-    assert (room.control.holder, room.control.asker) == (ANN, None)
+    assert (room.control.holder, room.control.requester) == (ANN, None)
     assert room.control.give(NOBODY, "") == room.control.release(NOBODY) == "control_not_yours"
 
 
@@ -129,7 +129,7 @@ def test_the_panel_at_the_cell_takes_over(asked: Room) -> None:
     assert asked.control.take(CELL) == ""
     assert asked.control.holder == CELL
     assert not asked.may(ANN)
-    assert asked.control.asker == BOB  # whose request is now shown there
+    assert asked.control.requester == BOB  # whose request is now shown there
 
 
 def test_the_panel_at_the_cell_asks_nobody(held: Room) -> None:
@@ -142,7 +142,7 @@ def test_without_local_the_panel_at_the_cell_asks_like_others() -> None:
     room.control.take(ANN)
     assert room.control.take(CELL) == "control_taken"
     assert room.control.ask(CELL) == ""
-    assert (room.control.holder, room.control.asker) == (ANN, CELL)
+    assert (room.control.holder, room.control.requester) == (ANN, CELL)
 
 
 # Asking.
@@ -155,7 +155,7 @@ def test_what_is_free_is_not_asked_for_but_taken(room: Room) -> None:
 
 def test_the_holder_asks_for_nothing(held: Room) -> None:
     assert held.control.ask(ANN) == ""
-    assert held.control.asker is None
+    assert held.control.requester is None
 
 
 def test_a_request_is_shown_to_all(asked: Room) -> None:
@@ -178,18 +178,18 @@ def test_who_asks_may_not_press(asked: Room) -> None:
 def test_one_asks_at_a_time(asked: Room) -> None:
     assert asked.control.ask(BOB) == ""
     assert asked.control.ask(CY) == "control_asked_by"
-    assert asked.control.asker == BOB
+    assert asked.control.requester == BOB
 
 
 def test_the_holder_gives(asked: Room) -> None:
     assert asked.control.give(ANN, BOB.id) == ""
-    assert (asked.control.holder, asked.control.asker) == (BOB, None)
+    assert (asked.control.holder, asked.control.requester) == (BOB, None)
     assert not asked.may(ANN)
 
 
 def test_the_holder_keeps_and_the_request_can_be_repeated_later(asked: Room) -> None:
     assert asked.control.keep(ANN, BOB.id) == ""
-    assert (asked.control.holder, asked.control.asker) == (ANN, None)
+    assert (asked.control.holder, asked.control.requester) == (ANN, None)
     assert asked.control.ask(BOB) == "control_denied"
     assert asked.control.ask(CY) == ""  # another one may
     asked.control.keep(ANN, CY.id)
@@ -197,22 +197,22 @@ def test_the_holder_keeps_and_the_request_can_be_repeated_later(asked: Room) -> 
     assert asked.control.ask(BOB) == ""
 
 
-@pytest.mark.parametrize("act", [Control.give, Control.keep])
+@pytest.mark.parametrize("act", [ControlAuthority.give, ControlAuthority.keep])
 @pytest.mark.parametrize("who", [BOB, CY, CELL, NOBODY])
 def test_only_the_holder_answers_a_request(
-    asked: Room, act: Callable[[Control, Browser, str], Refusal], who: Browser
+    asked: Room, act: Callable[[ControlAuthority, Client, str], Refusal], who: Client
 ) -> None:
     assert act(asked.control, who, BOB.id) == "control_not_yours"
-    assert (asked.control.holder, asked.control.asker) == (ANN, BOB)
+    assert (asked.control.holder, asked.control.requester) == (ANN, BOB)
 
 
-@pytest.mark.parametrize("act", [Control.give, Control.keep])
+@pytest.mark.parametrize("act", [ControlAuthority.give, ControlAuthority.keep])
 @pytest.mark.parametrize("to", [CY.id, ANN.id, ""])
 def test_an_answer_is_for_the_request_that_was_on_the_screen(
-    asked: Room, act: Callable[[Control, Browser, str], Refusal], to: str
+    asked: Room, act: Callable[[ControlAuthority, Client, str], Refusal], to: str
 ) -> None:
     assert act(asked.control, ANN, to) == "control_not_yours"
-    assert (asked.control.holder, asked.control.asker) == (ANN, BOB)
+    assert (asked.control.holder, asked.control.requester) == (ANN, BOB)
 
 
 def test_a_request_that_was_withdrawn_can_not_be_granted(asked: Room) -> None:
@@ -225,7 +225,7 @@ def test_a_request_goes_through_without_a_touch(asked: Room) -> None:
     asked.pass_s(TAKEOVER_S - 0.5, ANN, BOB)
     assert asked.control.holder == ANN
     asked.pass_s(0.5, ANN, BOB)
-    assert (asked.control.holder, asked.control.asker) == (BOB, None)
+    assert (asked.control.holder, asked.control.requester) == (BOB, None)
     assert not asked.may(ANN)
 
 
@@ -246,7 +246,7 @@ def test_every_touch_makes_a_request_wait_longer(asked: Room) -> None:
 def test_a_touch_of_another_counts_for_nothing(asked: Room) -> None:
     for _ in range(int(TAKEOVER_S)):
         asked.pass_s(1, ANN)
-        asked.control.here(BOB, True)
+        asked.control.keepalive(BOB, True)
         asked.control.touch(CY)
     assert asked.control.holder == BOB
 
@@ -286,11 +286,11 @@ def test_who_gives_it_up_frees_it(held: Room) -> None:
 
 def test_who_gives_it_up_while_asked_gives_it(asked: Room) -> None:
     asked.control.release(ANN)
-    assert (asked.control.holder, asked.control.asker) == (BOB, None)
+    assert (asked.control.holder, asked.control.requester) == (BOB, None)
 
 
 @pytest.mark.parametrize("who", [BOB, CELL, NOBODY])
-def test_nobody_gives_up_what_another_has(held: Room, who: Browser) -> None:
+def test_nobody_gives_up_what_another_has(held: Room, who: Client) -> None:
     assert held.control.release(who) == "control_not_yours"
     assert held.control.holder == ANN
 
@@ -312,23 +312,23 @@ def test_a_lost_holder_frees_it_in_time(held: Room) -> None:
 
 def test_a_lost_holder_passes_it_to_who_asks(asked: Room) -> None:
     asked.pass_s(LIFE_S, BOB)
-    assert (asked.control.holder, asked.control.asker) == (BOB, None)
+    assert (asked.control.holder, asked.control.requester) == (BOB, None)
 
 
 def test_a_request_ends_with_its_asker(asked: Room) -> None:
     asked.pass_s(LIFE_S, ANN)
-    assert (asked.control.holder, asked.control.asker) == (ANN, None)
+    assert (asked.control.holder, asked.control.requester) == (ANN, None)
 
 
 def test_a_lost_holder_and_a_lost_asker_leave_it_free(asked: Room) -> None:
     asked.now += 3600
-    assert (asked.control.holder, asked.control.asker) == (None, None)
+    assert (asked.control.holder, asked.control.requester) == (None, None)
     assert not asked.may(BOB)
 
 
 def test_who_was_lost_takes_it_like_anybody(held: Room) -> None:
     held.now += LIFE_S
-    held.control.here(ANN, True)
+    held.control.keepalive(ANN, True)
     assert not held.may(ANN)
     held.control.take(BOB)
     assert held.control.take(ANN) == "control_taken"
@@ -356,13 +356,13 @@ def test_a_page_with_scripts_is_lost_as_fast_after_a_page_load(held: Room) -> No
 def test_the_first_page_of_the_panel_at_the_cell_takes_what_is_free(room: Room) -> None:
     room.control.loaded(CELL, FORM_LIFE_S, by_hand=True)
     assert room.may(CELL)
-    room.control.here(CELL, False)
+    room.control.keepalive(CELL, False)
     room.now += LIFE_S
     assert not room.may(CELL)
 
 
-@pytest.mark.parametrize(("who", "by_hand"), [(ANN, True), (CELL, False), (stranger("::1"), True)])
-def test_no_other_page_takes_anything(room: Room, who: Browser, by_hand: bool) -> None:
+@pytest.mark.parametrize(("who", "by_hand"), [(ANN, True), (CELL, False), (anonymous("::1"), True)])
+def test_no_other_page_takes_anything(room: Room, who: Client, by_hand: bool) -> None:
     room.control.loaded(who, FORM_LIFE_S, by_hand)
     assert room.control.holder is None
 
@@ -473,7 +473,7 @@ class Everybody(RuleBasedStateMachine):
         self.alive_until = dict.fromkeys(EVERYBODY, -math.inf)
         self.wanted: set[str] = set()
 
-    def heard(self, who: Browser, life_s: float = LIFE_S) -> None:
+    def heard(self, who: Client, life_s: float = LIFE_S) -> None:
         self.alive_until[who] = max(self.alive_until[who], self.room.now + life_s)
 
     @rule(seconds=SECONDS)
@@ -481,7 +481,7 @@ class Everybody(RuleBasedStateMachine):
         self.room.now += seconds
 
     @rule(who=WHO, scripted=SCRIPTED)
-    def take(self, who: Browser, scripted: bool) -> None:
+    def take(self, who: Client, scripted: bool) -> None:
         life_s = LIFE_S if scripted else FORM_LIFE_S
         before = self.room.control.holder
         refusal = self.room.control.take(who, life_s)
@@ -492,7 +492,7 @@ class Everybody(RuleBasedStateMachine):
             assert self.room.control.holder == before
 
     @rule(who=WHO, scripted=SCRIPTED)
-    def ask(self, who: Browser, scripted: bool) -> None:
+    def ask(self, who: Client, scripted: bool) -> None:
         life_s = LIFE_S if scripted else FORM_LIFE_S
         before = self.room.control.holder
         self.room.control.ask(who, life_s)
@@ -502,37 +502,37 @@ class Everybody(RuleBasedStateMachine):
             assert self.room.control.holder == before
 
     @rule(who=WHO, to=WHO)
-    def give(self, who: Browser, to: Browser) -> None:
-        before, asker = self.room.control.holder, self.room.control.asker
+    def give(self, who: Client, to: Client) -> None:
+        before, asker = self.room.control.holder, self.room.control.requester
         refusal = self.room.control.give(who, to.id)
         granted = before == who and asker == to and bool(who.id)
         assert (refusal == "") == granted
         assert self.room.control.holder == (to if granted else before)
 
     @rule(who=WHO, to=WHO)
-    def keep(self, who: Browser, to: Browser) -> None:
+    def keep(self, who: Client, to: Client) -> None:
         before = self.room.control.holder
         if self.room.control.keep(who, to.id) == "":
             assert before == who
-            assert self.room.control.asker is None
+            assert self.room.control.requester is None
             self.heard(who)
         assert self.room.control.holder == before
 
     @rule(who=WHO)
-    def release(self, who: Browser) -> None:
-        before, asker = self.room.control.holder, self.room.control.asker
+    def release(self, who: Client) -> None:
+        before, asker = self.room.control.holder, self.room.control.requester
         if self.room.control.release(who) == "" and before == who:
             assert self.room.control.holder == asker
         else:
             assert self.room.control.holder == before
 
     @rule(who=WHO, touched=st.booleans())
-    def here(self, who: Browser, touched: bool) -> None:
-        self.room.control.here(who, touched)
+    def here(self, who: Client, touched: bool) -> None:
+        self.room.control.keepalive(who, touched)
         self.heard(who)
 
     @rule(who=WHO, by_hand=st.booleans())
-    def loads_a_page(self, who: Browser, by_hand: bool) -> None:
+    def loads_a_page(self, who: Client, by_hand: bool) -> None:
         before = self.room.control.holder
         self.room.control.loaded(who, FORM_LIFE_S, by_hand)
         self.heard(who, FORM_LIFE_S)
@@ -542,7 +542,7 @@ class Everybody(RuleBasedStateMachine):
             assert self.room.control.holder == before
 
     @rule(who=WHO)
-    def presses(self, who: Browser) -> None:
+    def presses(self, who: Client) -> None:
         before = self.room.control.holder
         self.room.control.touch(who)
         assert self.room.may(who) == (before == who)
@@ -552,7 +552,7 @@ class Everybody(RuleBasedStateMachine):
     @precondition(lambda self: self.room.control.holder and self.room.control.asker)
     @rule(touched=st.booleans())
     def both_stay_for_the_time_of_a_takeover(self, touched: bool) -> None:
-        holder, asker = self.room.control.holder, self.room.control.asker
+        holder, asker = self.room.control.holder, self.room.control.requester
         assert holder
         assert asker
         self.room.pass_s(TAKEOVER_S, holder, asker, touched=touched)
@@ -563,7 +563,7 @@ class Everybody(RuleBasedStateMachine):
     @rule()
     def all_are_lost(self) -> None:
         self.room.now += FORM_LIFE_S
-        assert (self.room.control.holder, self.room.control.asker) == (None, None)
+        assert (self.room.control.holder, self.room.control.requester) == (None, None)
 
     @invariant()
     def at_most_one_may_press(self) -> None:
@@ -573,17 +573,17 @@ class Everybody(RuleBasedStateMachine):
 
     @invariant()
     def nobody_absent_holds_or_asks(self) -> None:
-        for one in (self.room.control.holder, self.room.control.asker):
+        for one in (self.room.control.holder, self.room.control.requester):
             assert one is None or self.alive_until[one] > self.room.now
 
     @invariant()
     def nobody_gets_it_by_accident(self) -> None:
-        for one in (self.room.control.holder, self.room.control.asker):
+        for one in (self.room.control.holder, self.room.control.requester):
             assert one is None or one.id in self.wanted
 
     @invariant()
     def nobody_asks_for_what_is_free_or_own(self) -> None:
-        asker = self.room.control.asker
+        asker = self.room.control.requester
         assert asker is None or self.room.control.holder not in (None, asker)
 
     @invariant()
@@ -596,7 +596,7 @@ class Everybody(RuleBasedStateMachine):
     def the_view_says_the_same(self) -> None:
         view, control = self.room.control.view(), self.room.control
         assert view["holder"] == (control.holder.id if control.holder else "")
-        assert view["asker"] == (control.asker.id if control.asker else "")
+        assert view["asker"] == (control.requester.id if control.requester else "")
         roles = [self.room.role(one) for one in EVERYBODY]
         assert sum(one in ("holding", "asked") for one in roles) == (control.holder is not None)
 

@@ -10,8 +10,14 @@ from app.interfaces.names import Qos
 from app.panel.interlock import Interlock
 from app.panel.widgets.publish import Publish
 from app.panel.widgets.service_action import Call
-from app.permission.interlocks import SERVER_SETTLE_S, Verdict, interlock_verdict, press_verdict, way
-from app.robot.state import Robot, Sample
+from app.permission.interlocks import (
+    SERVER_SETTLE_S,
+    Verdict,
+    interlock_verdict,
+    link_verdict,
+    press_verdict,
+)
+from app.robot.state import RobotState, Sample
 from tests.support.builders import (
     BOOL,
     BRIDGE,
@@ -29,51 +35,51 @@ from tests.support.builders import (
 )
 
 
-def verdict_of(robot: Robot, interlock: Table = NOTHING, now: float = NOW) -> Verdict:
+def verdict_of(robot: RobotState, interlock: Table = NOTHING, now: float = NOW) -> Verdict:
     made = Interlock.model_validate({"id": "operation", "topic": ENABLED, **interlock})
     return interlock_verdict(made, robot, now)
 
 
 @pytest.fixture
-def robot() -> Robot:
+def robot() -> RobotState:
     """There, and it permits."""
     made = robot_there(small_panel())
     permits(made)
     return made
 
 
-def no_link(robot: Robot) -> None:
+def no_link(robot: RobotState) -> None:
     robot.link_up = False
 
 
-def no_bridge(robot: Robot) -> None:
+def no_bridge(robot: RobotState) -> None:
     robot.graph.apply(bridge_token(BRIDGE), False)
 
 
-def bridge_silent(robot: Robot) -> None:
+def bridge_silent(robot: RobotState) -> None:
     robot.graph.answered({})
 
 
-def bridge_unheard(robot: Robot) -> None:
+def bridge_unheard(robot: RobotState) -> None:
     robot.answers = False
 
 
-def no_link_at(robot: Robot) -> None:
+def no_link_at(robot: RobotState) -> None:
     robot.link_up = False
     robot.endpoints = ("tcp/robot1:7447",)
 
 
-def no_link_at_many(robot: Robot) -> None:
+def no_link_at_many(robot: RobotState) -> None:
     robot.link_up = False
     robot.endpoints = tuple(f"tcp/r{number}:1" for number in range(5))
 
 
-def joining(robot: Robot) -> None:
+def joining(robot: RobotState) -> None:
     robot.settled_at = NOW + 1
 
 
 SILENT = "No connection to the robot: its bridge does not answer. If this stays, restart the bridge."
-WAYS: list[tuple[Callable[[Robot], None], str, str]] = [
+WAYS: list[tuple[Callable[[RobotState], None], str, str]] = [
     (no_link, "no_link", "No connection to the robot: its bridge can't be reached."),
     (
         no_link_at,
@@ -105,24 +111,24 @@ def free() -> Publish:
 
 @pytest.mark.parametrize(("broken", "code", "reason"), WAYS)
 def test_without_a_way_to_the_robot_everything_is_locked(
-    robot: Robot, broken: Callable[[Robot], None], code: str, reason: str
+    robot: RobotState, broken: Callable[[RobotState], None], code: str, reason: str
 ) -> None:
     broken(robot)
-    for verdict in (way(robot, NOW), verdict_of(robot), press_verdict(free(), (), robot, NOW)):
+    for verdict in (link_verdict(robot, NOW), verdict_of(robot), press_verdict(free(), (), robot, NOW)):
         assert (verdict.permitted, verdict.code, verdict.reason) == (False, code, reason)
 
 
-def test_with_a_way_commands_can_reach_the_robot(robot: Robot) -> None:
-    assert way(robot, NOW) == Verdict(True)
+def test_with_a_way_commands_can_reach_the_robot(robot: RobotState) -> None:
+    assert link_verdict(robot, NOW) == Verdict(True)
 
 
-def test_joining_ends_by_itself_when_its_time_is_up(robot: Robot) -> None:
+def test_joining_ends_by_itself_when_its_time_is_up(robot: RobotState) -> None:
     robot.settled_at = NOW + 1
-    assert way(robot, NOW).until == NOW + 1
-    assert way(robot, NOW + 1).permitted
+    assert link_verdict(robot, NOW).until == NOW + 1
+    assert link_verdict(robot, NOW + 1).permitted
 
 
-def test_a_robot_that_says_true_permits(robot: Robot) -> None:
+def test_a_robot_that_says_true_permits(robot: RobotState) -> None:
     assert verdict_of(robot) == Verdict(True)
 
 
@@ -136,14 +142,14 @@ def test_nothing_is_permitted_before_the_robot_said_so() -> None:
 
 
 @pytest.mark.parametrize(("label", "name"), [(None, "operation"), ("Operation of the cell",) * 2])
-def test_a_robot_that_says_false_forbids(robot: Robot, label: str | None, name: str) -> None:
+def test_a_robot_that_says_false_forbids(robot: RobotState, label: str | None, name: str) -> None:
     permits(robot, False)
     verdict = verdict_of(robot, {"label": label})
     assert (verdict.permitted, verdict.code) == (False, "forbidden")
     assert verdict.reason == f"The robot does not permit {name}."
 
 
-def test_what_was_permitted_before_a_cut_is_locked(robot: Robot) -> None:
+def test_what_was_permitted_before_a_cut_is_locked(robot: RobotState) -> None:
     robot.cut(BRIDGE, 2)
     verdict = verdict_of(robot)
     assert (verdict.permitted, verdict.code, verdict.reason) == (
@@ -154,7 +160,7 @@ def test_what_was_permitted_before_a_cut_is_locked(robot: Robot) -> None:
 
 
 @pytest.mark.parametrize("payload", [b"", b"true!", b"\0\1\0\0", b"\0\1\0\0\1\0\0\0\0\0\0\0"])
-def test_what_can_not_be_read_locks(robot: Robot, payload: bytes) -> None:
+def test_what_can_not_be_read_locks(robot: RobotState, payload: bytes) -> None:
     robot.take(robot.key(ENABLED), Sample(payload, 2, NOW, NOW, BRIDGE))
     verdict = verdict_of(robot)
     assert (verdict.permitted, verdict.code, verdict.reason) == (
@@ -164,7 +170,7 @@ def test_what_can_not_be_read_locks(robot: Robot, payload: bytes) -> None:
     )
 
 
-def test_another_type_on_the_robot_locks(robot: Robot) -> None:
+def test_another_type_on_the_robot_locks(robot: RobotState) -> None:
     endpoint(robot, "MP", ENABLED, TEXT)
     verdict = verdict_of(robot)
     assert (verdict.permitted, verdict.code, verdict.reason) == (
@@ -176,7 +182,7 @@ def test_another_type_on_the_robot_locks(robot: Robot) -> None:
 
 
 @pytest.mark.parametrize("age", [2.0, 2.001, 1e6])
-def test_a_permission_that_is_too_old_is_stale(robot: Robot, age: float) -> None:
+def test_a_permission_that_is_too_old_is_stale(robot: RobotState, age: float) -> None:
     verdict = verdict_of(robot, {"max_age_s": 2}, NOW + age)
     assert (verdict.permitted, verdict.code, verdict.reason) == (
         False,
@@ -185,20 +191,20 @@ def test_a_permission_that_is_too_old_is_stale(robot: Robot, age: float) -> None
     )
 
 
-def test_a_fresh_permission_says_when_it_ends(robot: Robot) -> None:
+def test_a_fresh_permission_says_when_it_ends(robot: RobotState) -> None:
     assert verdict_of(robot, {"max_age_s": 2}, NOW + 1.999) == Verdict(True, until=NOW + 2)
 
 
-def test_a_permission_without_an_age_stays(robot: Robot) -> None:
+def test_a_permission_without_an_age_stays(robot: RobotState) -> None:
     assert verdict_of(robot, now=NOW + 1e9) == Verdict(True, until=math.inf)
 
 
-def test_a_new_sample_ends_staleness(robot: Robot) -> None:
+def test_a_new_sample_ends_staleness(robot: RobotState) -> None:
     permits(robot, at=NOW + 5)
     assert verdict_of(robot, {"max_age_s": 2}, NOW + 5).permitted
 
 
-def test_an_interlock_may_ask_for_a_publisher(robot: Robot) -> None:
+def test_an_interlock_may_ask_for_a_publisher(robot: RobotState) -> None:
     verdict = verdict_of(robot, {"require_publisher": True})
     assert (verdict.permitted, verdict.code, verdict.reason) == (
         False,
@@ -209,7 +215,7 @@ def test_an_interlock_may_ask_for_a_publisher(robot: Robot) -> None:
     assert verdict_of(robot, {"require_publisher": True}).permitted
 
 
-def test_a_publisher_that_ended_locks_where_one_is_asked_for(robot: Robot) -> None:
+def test_a_publisher_that_ended_locks_where_one_is_asked_for(robot: RobotState) -> None:
     endpoint(robot, "MP", ENABLED, BOOL)
     endpoint(robot, "MP", ENABLED, BOOL, alive=False)
     assert verdict_of(robot, {"require_publisher": True}).code == "no_publisher"
@@ -220,7 +226,7 @@ def test_a_publish_without_an_interlock_needs_a_way_only() -> None:
     assert press_verdict(free(), (), robot_there(small_panel()), NOW).permitted
 
 
-def test_a_publish_to_a_topic_of_another_type_is_locked(robot: Robot) -> None:
+def test_a_publish_to_a_topic_of_another_type_is_locked(robot: RobotState) -> None:
     endpoint(robot, "MS", "/free", BOOL)
     verdict = press_verdict(free(), (), robot, NOW)
     assert (verdict.code, verdict.reason) == (
@@ -229,7 +235,7 @@ def test_a_publish_to_a_topic_of_another_type_is_locked(robot: Robot) -> None:
     )
 
 
-def test_a_publish_has_the_verdict_of_its_interlock(robot: Robot) -> None:
+def test_a_publish_has_the_verdict_of_its_interlock(robot: RobotState) -> None:
     interlock = Interlock(id="operation", topic=ENABLED)
     assert press_verdict(free(), [interlock], robot, NOW).permitted
     permits(robot, False)

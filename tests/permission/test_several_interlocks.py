@@ -9,11 +9,11 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from app.panel.model import Panel
-from app.permission.clients import Browser as Visitor
+from app.permission.clients import Client as Visitor
 from app.permission.control_authority_view import NO_CONTROL, ControlView
 from app.permission.interlocks import PERMITTED, Verdict, combined, press_verdict
-from app.robot.state import Robot
-from app.view.view import as_seen_by, sight
+from app.robot.state import RobotState
+from app.view.view import as_seen_by, build_view
 from tests.browser.test_pages import SIZES as LARGE
 from tests.commands.test_holds import JOG, MOVES, SPEED, STOPS
 from tests.commands.test_holds import Bench as HoldBench
@@ -52,11 +52,11 @@ def cell(*widgets: Table, **more: Any) -> Panel:
     return panel_of(*(widgets or (MESSAGE, {**GUARDED, "interlock": BOTH})), further=FURTHER, **more)
 
 
-def closes(robot: Robot, closed: bool = True, at: float = NOW) -> None:
+def closes(robot: RobotState, closed: bool = True, at: float = NOW) -> None:
     says(robot, DOORS, closed, BOOL, at=at)
 
 
-def verdict_of(robot: Robot, panel: Panel, now: float = NOW) -> Verdict:
+def verdict_of(robot: RobotState, panel: Panel, now: float = NOW) -> Verdict:
     (widget,) = panel.commands
     return press_verdict(widget, panel.interlocks_of(widget), robot, now)
 
@@ -125,16 +125,16 @@ def test_a_view_lists_all_reasons_of_a_control_with_several() -> None:
     panel = cell(MESSAGE, {**GUARDED, "interlock": BOTH}, one)
     robot = robot_there(panel)
     closes(robot, False)
-    shown = sight(panel, robot, NOW).view["widgets"]
+    shown = build_view(panel, robot, NOW).view["widgets"]
     assert shown["guarded"] == {
         "enabled": False, "reason": WAITS, "reasons": f"{WAITS}\n{NO_DOORS}", "more": "+1 more",
     }  # fmt: skip
     assert shown["single"] == {"enabled": False, "reason": WAITS}
     permits(robot)
-    shown = sight(panel, robot, NOW).view["widgets"]
+    shown = build_view(panel, robot, NOW).view["widgets"]
     assert shown["guarded"]["reasons"] == shown["guarded"]["reason"] == NO_DOORS
     closes(robot)
-    shown = sight(panel, robot, NOW).view["widgets"]
+    shown = build_view(panel, robot, NOW).view["widgets"]
     assert shown["guarded"] == {"enabled": True, "reason": None, "reasons": "", "more": ""}
 
 
@@ -142,7 +142,7 @@ def test_who_has_not_control_is_told_that_alone() -> None:
     panel = cell(control={"required": True})
     robot = robot_there(panel)
     control: ControlView = {**NO_CONTROL, "required": True, "text": "Nobody has control."}
-    view = as_seen_by(sight(panel, robot, NOW, control=control).view, Visitor("b", "", True, 1))
+    view = as_seen_by(build_view(panel, robot, NOW, control=control).view, Visitor("b", "", True, 1))
     assert view["widgets"]["guarded"] == {
         "enabled": False, "reason": "Nobody has control.", "reasons": "Nobody has control.", "more": "",
     }  # fmt: skip
@@ -154,11 +154,11 @@ def test_a_link_that_locks_by_the_second_reason_says_so() -> None:
     robot = robot_there(panel)
     permits(robot, False)
     robot.follow_publishers()
-    link = sight(panel, robot, NOW).view["link"]["node"]
+    link = build_view(panel, robot, NOW).view["link"]["node"]
     assert link["locks"] == "Locks Free."
     endpoint(robot, "MP", DOORS, BOOL)
     robot.follow_publishers()
-    link = sight(panel, robot, NOW).view["link"]["node"]
+    link = build_view(panel, robot, NOW).view["link"]["node"]
     assert (link["locks"], link["reason"]) == ("Locks Free.", "Locked: waiting for /doors_closed.")
 
 

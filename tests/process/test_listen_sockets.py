@@ -41,7 +41,7 @@ def test_what_listens_from_now_on_is_narrowed_and_what_listened_before_is_not() 
         with socket.create_server(("127.0.0.1", 0)) as old:
             wide = accepted(old)
             ports: set[int] = set()
-            narrowing = asyncio.create_task(listen_sockets.narrow(ports))
+            narrowing = asyncio.create_task(listen_sockets.limit_send_buffer(ports))
             await asyncio.sleep(0)
             with socket.create_server(("127.0.0.1", 0)) as new:
                 assert await asyncio.wait_for(narrowing, 4) == [new.getsockname()]
@@ -67,9 +67,9 @@ def test_who_reads_nothing_is_cut_off_and_who_has_read_all_is_not() -> None:
             with suppress(BlockingIOError):
                 while stuck.send(bytes(65_536)):
                     pass
-            listen_sockets.hang_up({port + 1})
+            listen_sockets.abort_unsent({port + 1})
             assert listen_sockets.unsent(stuck)
-            listen_sockets.hang_up({port})
+            listen_sockets.abort_unsent({port})
             with pytest.raises(BrokenPipeError):
                 stuck.send(b"more")
             assert idle.send(b"still there") == 11

@@ -11,7 +11,7 @@ from typing import Final
 
 import pytest
 
-from app.process.shutdown import in_order
+from app.process.shutdown import graceful_shutdown
 
 SOON_S: Final = 0.05
 INT, TERM, HUP = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
@@ -46,7 +46,7 @@ class Told:
         await self.may_end.wait()
 
     async def by(self, number: signal.Signals, stack: ExitStack) -> None:
-        stack.enter_context(in_order(asyncio.get_running_loop(), self.end))
+        stack.enter_context(graceful_shutdown(asyncio.get_running_loop(), self.end))
         signal.raise_signal(number)
         async with asyncio.timeout(1):
             await self.ending.wait()
@@ -94,7 +94,7 @@ def test_what_fails_in_it_is_logged_and_keeps_nobody(
         raise ValueError("a fault")
 
     async def run() -> None:
-        with in_order(asyncio.get_running_loop(), fail):
+        with graceful_shutdown(asyncio.get_running_loop(), fail):
             signal.raise_signal(TERM)
             await asyncio.sleep(SOON_S)
 

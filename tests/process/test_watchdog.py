@@ -14,7 +14,7 @@ from pathlib import Path
 import httpx
 import pytest
 
-from app.process.sd_notify import Manager, status
+from app.process.sd_notify import ServiceManager, status
 from app.process.watchdog import Watchdog
 from tests.support.parts import ROOT, Process, Server, free_port, live, until
 
@@ -27,7 +27,7 @@ import signal, sys, threading, time, uvicorn
 from app.main import app
 
 def link_stands_still(*_):
-    app.state.site.fleet.first.link._inbox._wake_loop = lambda _: threading.Event().wait()
+    app.state.app_state.fleet.first.link._inbox._wake_loop = lambda _: threading.Event().wait()
 
 def loop_stands_still(*_):
     time.sleep(60)
@@ -180,19 +180,19 @@ def test_without_a_watchdog_nothing_is_pinged(
     ],
 )
 def test_the_interval_is_this_processs_own(env: dict[str, str], interval_s: float | None) -> None:
-    assert Manager({"NOTIFY_SOCKET": "/run/x", **env}).interval_s == interval_s
-    assert Manager(env).interval_s is None
+    assert ServiceManager({"NOTIFY_SOCKET": "/run/x", **env}).interval_s == interval_s
+    assert ServiceManager(env).interval_s is None
 
 
 def test_a_manager_that_does_not_listen_is_told_of_once(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    manager = Manager({"NOTIFY_SOCKET": str(tmp_path / "nobody")})
+    manager = ServiceManager({"NOTIFY_SOCKET": str(tmp_path / "nobody")})
     manager.tell("READY=1")
     manager.tell("WATCHDOG=1")
     assert len(caplog.records) == 1
-    assert not Manager({"NOTIFY_SOCKET": "vsock:2:1"}).listens
-    assert not Manager({}).listens
+    assert not ServiceManager({"NOTIFY_SOCKET": "vsock:2:1"}).listens
+    assert not ServiceManager({}).listens
 
 
 def test_a_state_is_one_line() -> None:
@@ -201,4 +201,4 @@ def test_a_state_is_one_line() -> None:
 
 
 def test_nothing_runs_where_nobody_asked() -> None:
-    asyncio.run(asyncio.wait_for(Watchdog(Manager({}), lambda: (), lambda: "").run(), 1))
+    asyncio.run(asyncio.wait_for(Watchdog(ServiceManager({}), lambda: (), lambda: "").run(), 1))

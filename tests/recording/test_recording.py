@@ -19,10 +19,10 @@ from app.interfaces import Structure
 from app.panel import load_panel
 from app.panel.rules import RecordRules
 from app.recording import Recorder, Recordings
-from app.recording.directory import Folder, name_of
-from app.recording.mcap_file import PRESSES, UNFINISHED, Channel, File
-from app.recording.ring_buffer import COPIED, OVERHEAD, Ring, taken
-from app.robot.state import Robot, Sample
+from app.recording.directory import RecordingDirectory, name_of
+from app.recording.mcap_file import PRESSES, UNFINISHED, Channel, McapFile
+from app.recording.ring_buffer import COPIED, OVERHEAD, RingBuffer, buffered
+from app.robot.state import RobotState, Sample
 from tests.support.builders import HEARD, INTERFACES, KIOSK, TEXT, panel_of
 from tests.support.parts import ROOT
 
@@ -49,9 +49,9 @@ def messages(folder: Path, topic: str) -> list[Message]:
 
 
 def test_a_ring_keeps_what_is_young_enough() -> None:
-    ring = Ring(10.0, MB)
+    ring = RingBuffer(10.0, MB)
     for at in (0.0, 5.0, 9.0, 12.0):
-        ring.add(taken("heard", sample(at)))
+        ring.add(buffered("heard", sample(at)))
     assert [one.sample.at for one in ring.since(12.0)] == [5.0, 9.0, 12.0]
     assert [one.sample.at for one in ring.since(20.0)] == [12.0]
     assert list(ring.since(99.0)) == []
@@ -59,9 +59,9 @@ def test_a_ring_keeps_what_is_young_enough() -> None:
 
 
 def test_a_ring_holds_no_more_bytes_than_it_may_in_a_flood() -> None:
-    ring = Ring(10.0, 64 * MB)
+    ring = RingBuffer(10.0, 64 * MB)
     for number in range(20_000):  # ten seconds of 10 MB at 2 kHz
-        ring.add(taken("heard", sample(number / 2000, FLOOD)))
+        ring.add(buffered("heard", sample(number / 2000, FLOOD)))
         assert ring.size <= 64 * MB
     assert len(list(ring.since(10.0))) == 6
 
@@ -70,16 +70,16 @@ FLOOD = bytes(10 * MB)
 
 
 def test_what_is_larger_than_the_ring_does_not_drive_out_the_rest() -> None:
-    ring = Ring(10.0, MB)
-    ring.add(taken("heard", sample(1.0)))
-    ring.add(taken("heard", sample(2.0, FLOOD)))
+    ring = RingBuffer(10.0, MB)
+    ring.add(buffered("heard", sample(1.0)))
+    ring.add(buffered("heard", sample(2.0, FLOOD)))
     assert [one.sample.at for one in ring.since(2.0)] == [1.0]
 
 
 def test_small_samples_count_with_what_they_cost() -> None:
-    ring = Ring(10.0, MB)
+    ring = RingBuffer(10.0, MB)
     for _ in range(10_000):
-        ring.add(taken("heard", sample(1.0, b"1234")))
+        ring.add(buffered("heard", sample(1.0, b"1234")))
     assert len(list(ring.since(1.0))) == MB // (4 + OVERHEAD)
 
 
@@ -98,7 +98,7 @@ class Shared:
 
 @pytest.mark.parametrize(("size", "kind"), [(COPIED - 1, bytes), (COPIED, Shared)])
 def test_a_small_payload_keeps_no_large_buffer(size: int, kind: type) -> None:
-    one = taken("heard", Sample(Shared(size), 1, 0.0, 0.0, None))
+    one = buffered("heard", Sample(Shared(size), 1, 0.0, 0.0, None))
     assert type(one.sample.payload) is kind
     assert one.size == size + OVERHEAD
 
@@ -143,7 +143,7 @@ def test_names_sort_by_time_and_say_whose_and_what() -> None:
 def test_what_a_killed_process_left_is_finished_at_the_next_start(tmp_path: Path) -> None:
     left_by_a_killed_process(tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["a" + UNFINISHED]
-    Folder(tmp_path, 100 * MB).open()
+    RecordingDirectory(tmp_path, 100 * MB).open()
     (path,) = tmp_path.iterdir()
     assert path.name == "a.recovered.mcap"
     assert texts(tmp_path) == ["said"]
@@ -153,7 +153,7 @@ def test_what_a_killed_process_left_is_finished_at_the_next_start(tmp_path: Path
 def left_by_a_killed_process(folder: Path) -> None:
     pid = os.fork()
     if pid == 0:
-        file = File(folder, "a", {"panel": "Cell"})
+        file = McapFile(folder, "a", {"panel": "Cell"})
         file.add(CHANNEL, PAYLOAD, 1, 1)
         file.add_press({"id": "p1"}, 2)
         os._exit(0)
@@ -163,14 +163,14 @@ def left_by_a_killed_process(folder: Path) -> None:
 def test_an_empty_half_is_removed(tmp_path: Path) -> None:
     (tmp_path / f"a{UNFINISHED}").write_bytes(b"")
     (tmp_path / f"b{UNFINISHED}").write_bytes(os.urandom(1000))
-    Folder(tmp_path, 100 * MB).open()
+    RecordingDirectory(tmp_path, 100 * MB).open()
     assert list(tmp_path.iterdir()) == []
 
 
 def test_what_another_process_still_writes_is_left_alone(tmp_path: Path) -> None:
-    file = File(tmp_path, "a", {})
+    file = McapFile(tmp_path, "a", {})
     file.add(CHANNEL, PAYLOAD, 1, 1)
-    Folder(tmp_path, 100 * MB).open()
+    RecordingDirectory(tmp_path, 100 * MB).open()
     assert file.finish() == tmp_path / "a.mcap"
     assert texts(tmp_path) == ["said"]
 
@@ -183,7 +183,7 @@ def test_a_clock_that_was_set_back_does_not_make_the_newest_recording_the_oldest
     files = [tmp_path / f"{name_of(moment, '', 'drive')}.mcap" for moment in moments]
     for file in files:
         file.write_bytes(bytes(300))
-    Folder(tmp_path, 700).make_room(0)
+    RecordingDirectory(tmp_path, 700).make_room(0)
     assert [file for file in files if file.exists()] == files[2:]
 
 
@@ -191,7 +191,7 @@ def test_the_oldest_recordings_go_and_nothing_else(tmp_path: Path) -> None:
     for number in range(10):
         (tmp_path / f"2026-{number}.mcap").write_bytes(bytes(MB))
     (tmp_path / "notes.txt").write_bytes(bytes(20 * MB))
-    Folder(tmp_path, 5 * MB).make_room(2 * MB)
+    RecordingDirectory(tmp_path, 5 * MB).make_room(2 * MB)
     kept = sorted(path.name for path in tmp_path.iterdir())
     assert kept == ["2026-7.mcap", "2026-8.mcap", "2026-9.mcap", "notes.txt"]
 
@@ -207,7 +207,7 @@ class Cell:
         self.rules = RecordRules(**{"before_s": 5.0, "after_s": 0.2, "max_mb": 16.0, **rules})
         self.panel = panel_of(HEARD)
         self.recordings = Recordings(folder, self.rules.max_mb, 1)
-        robot = Robot(self.panel, INTERFACES, KIOSK)
+        robot = RobotState(self.panel, INTERFACES, KIOSK)
         self.recorder = Recorder(self.panel, self.rules, INTERFACES, robot, "", self.recordings)
         self.told = 0
         self.recordings.follow(self._count)

@@ -8,18 +8,18 @@ from datetime import UTC, datetime
 
 import pytest
 
-from app.commands.actions.goals import Actions
+from app.commands.actions.goals import GoalTracker
 from app.commands.confirmations import Confirmations
-from app.commands.parameters.sync import Parameters
-from app.commands.service_calls import Calls
+from app.commands.parameters.sync import ParameterSync
+from app.commands.service_calls import ServiceCalls
 from app.dialect.bridge_dialect import token
 from app.dialect.endpoint import Endpoint
 from app.interfaces.names import Qos
 from app.permission.interlocks import Verdict, interlock_verdict
 from app.robot.silent_publishers import BEFORE_LATCHED_S, BEFORE_S, SilentPublishers
-from app.robot.state import Robot
+from app.robot.state import RobotState
 from app.ros_logging import RobotLog
-from app.runtime.ingest import Intake
+from app.runtime.ingest import Ingest
 from app.transport.inbox import Inbox
 from app.view.kinds import Enabled
 from tests.support.builders import (
@@ -140,8 +140,8 @@ class Incoming:
     """What comes by the link, and what an interlock makes of it."""
 
     inbox: Inbox
-    intake: Intake
-    robot: Robot
+    intake: Ingest
+    robot: RobotState
 
     def says(self, payload: bytes) -> None:
         self.inbox.put(KEY, payload, Stamp())
@@ -173,15 +173,15 @@ def incoming() -> Iterator[Incoming]:
 async def made() -> Incoming:
     panel, nobody = small_panel(), Nobody()
     robot = robot_there(panel)
-    calls = Calls(INTERFACES, robot, nobody, lambda: None)
+    calls = ServiceCalls(INTERFACES, robot, nobody, lambda: None)
     inbox = Inbox(lambda _: None)
     inbox.expect([], [KEY], [])
-    intake = Intake(
+    intake = Ingest(
         panel,
         robot,
-        Actions(INTERFACES, robot, nobody, lambda: None),
+        GoalTracker(INTERFACES, robot, nobody, lambda: None),
         Confirmations(robot, lambda: None),
-        Parameters(panel, INTERFACES, robot, nobody, calls, lambda: None),
+        ParameterSync(panel, INTERFACES, robot, nobody, calls, lambda: None),
         None,
         RobotLog(logging.getLogger("test"), ""),
     )

@@ -6,7 +6,7 @@ import pytest
 
 from app.dialect import bridge_dialect
 from app.panel.model import RobotEntry
-from app.robot.state import UNREADABLE_LOG_S, Robot, Sample
+from app.robot.state import UNREADABLE_LOG_S, RobotState, Sample
 from tests.support.builders import (
     BOOL,
     BRIDGE,
@@ -37,33 +37,33 @@ class Counted:
 
 
 @pytest.fixture
-def robot() -> Robot:
+def robot() -> RobotState:
     return robot_there(small_panel())
 
 
-def broken(robot: Robot, topic: str = "/heard", *, at: float = 1.0, seq: int = 1) -> None:
+def broken(robot: RobotState, topic: str = "/heard", *, at: float = 1.0, seq: int = 1) -> None:
     robot.take(robot.key(topic), Sample(b"broken", seq, at, at, BRIDGE))
 
 
-def test_a_topic_that_was_not_heard_is_waited_for(robot: Robot) -> None:
+def test_a_topic_that_was_not_heard_is_waited_for(robot: RobotState) -> None:
     assert robot.reading("/heard").status == "waiting"
 
 
-def test_a_sample_is_read_with_its_time(robot: Robot) -> None:
+def test_a_sample_is_read_with_its_time(robot: RobotState) -> None:
     says(robot, "/heard", "hello", at=7.0)
     reading = robot.reading("/heard")
     assert (reading.status, reading.value("data")) == ("message", "hello")
     assert (reading.at, reading.wall) == (7.0, 7.0)
 
 
-def test_a_newer_sample_takes_the_place_of_the_last(robot: Robot) -> None:
+def test_a_newer_sample_takes_the_place_of_the_last(robot: RobotState) -> None:
     says(robot, "/heard", "first")
     assert robot.reading("/heard").value("data") == "first"
     says(robot, "/heard", "second")
     assert robot.reading("/heard").value("data") == "second"
 
 
-def test_topics_do_not_mix(robot: Robot) -> None:
+def test_topics_do_not_mix(robot: RobotState) -> None:
     says(robot, "/heard", "hello")
     assert robot.reading(ENABLED).status == "waiting"
 
@@ -75,7 +75,7 @@ def test_a_namespace_stands_before_every_key() -> None:
     assert robot.reading("/heard").value("data") == "hello"
 
 
-def test_a_sample_is_decoded_once_and_only_when_it_is_asked_for(robot: Robot) -> None:
+def test_a_sample_is_decoded_once_and_only_when_it_is_asked_for(robot: RobotState) -> None:
     payload = Counted(INTERFACES.encode(TEXT, {"data": "hello"}))
     robot.take(robot.key("/heard"), Sample(payload, 1, 0.0, 0.0, BRIDGE))
     assert payload.asked == 0
@@ -84,19 +84,19 @@ def test_a_sample_is_decoded_once_and_only_when_it_is_asked_for(robot: Robot) ->
     assert payload.asked == 1
 
 
-def test_bytes_that_are_no_message_are_unreadable(robot: Robot) -> None:
+def test_bytes_that_are_no_message_are_unreadable(robot: RobotState) -> None:
     broken(robot)
     assert (robot.reading("/heard").status, robot.reading("/heard").fields) == ("unreadable", None)
 
 
-def test_a_message_after_an_unreadable_one_is_read(robot: Robot) -> None:
+def test_a_message_after_an_unreadable_one_is_read(robot: RobotState) -> None:
     broken(robot)
     robot.reading("/heard")
     says(robot, "/heard", "well")
     assert robot.reading("/heard").status == "message"
 
 
-def test_unreadable_samples_are_counted_by_key(robot: Robot) -> None:
+def test_unreadable_samples_are_counted_by_key(robot: RobotState) -> None:
     for _ in range(3):
         broken(robot)
         robot.reading("/heard")
@@ -104,7 +104,7 @@ def test_unreadable_samples_are_counted_by_key(robot: Robot) -> None:
     assert robot.undecodable == {"heard": 3}
 
 
-def test_unreadable_samples_fill_no_log(robot: Robot, caplog: pytest.LogCaptureFixture) -> None:
+def test_unreadable_samples_fill_no_log(robot: RobotState, caplog: pytest.LogCaptureFixture) -> None:
     with caplog.at_level(logging.ERROR, "kiosk.robot"):
         for at in (0.0, 1.0, UNREADABLE_LOG_S - 1, UNREADABLE_LOG_S):
             broken(robot, at=at)
@@ -113,46 +113,46 @@ def test_unreadable_samples_fill_no_log(robot: Robot, caplog: pytest.LogCaptureF
 
 
 @pytest.mark.parametrize("source", [BRIDGE, None])
-def test_a_sample_from_before_its_bridge_was_lost_is_cut(robot: Robot, source: str | None) -> None:
+def test_a_sample_from_before_its_bridge_was_lost_is_cut(robot: RobotState, source: str | None) -> None:
     says(robot, "/heard", "old", seq=1, at=3.0, source=source)
     robot.cut(BRIDGE, 2)
     reading = robot.reading("/heard")
     assert (reading.status, reading.value("data"), reading.at) == ("cut", "old", 3.0)
 
 
-def test_a_sample_of_another_bridge_is_not_cut(robot: Robot) -> None:
+def test_a_sample_of_another_bridge_is_not_cut(robot: RobotState) -> None:
     robot.graph.apply(bridge_dialect.bridge_token("b2"), True)
     says(robot, "/heard", "fresh", source="b2")
     robot.cut(BRIDGE, 2)
     assert robot.reading("/heard").status == "message"
 
 
-def test_a_sample_from_after_the_loss_is_not_cut(robot: Robot) -> None:
+def test_a_sample_from_after_the_loss_is_not_cut(robot: RobotState) -> None:
     says(robot, "/heard", "fresh", seq=3)
     robot.cut(BRIDGE, 2)
     assert robot.reading("/heard").status == "message"
 
 
-def test_a_sample_after_the_cut_is_a_message_again(robot: Robot) -> None:
+def test_a_sample_after_the_cut_is_a_message_again(robot: RobotState) -> None:
     says(robot, "/heard", "old")
     robot.cut(BRIDGE, 2)
     says(robot, "/heard", "new", seq=3)
     assert (robot.reading("/heard").status, robot.reading("/heard").value("data")) == ("message", "new")
 
 
-def test_every_topic_of_the_bridge_is_cut(robot: Robot) -> None:
+def test_every_topic_of_the_bridge_is_cut(robot: RobotState) -> None:
     says(robot, "/heard", "old")
     says(robot, ENABLED, True, BOOL)
     robot.cut(BRIDGE, 2)
     assert {robot.reading(topic).status for topic in ("/heard", ENABLED)} == {"cut"}
 
 
-def test_a_cut_before_anything_was_heard_leaves_waiting(robot: Robot) -> None:
+def test_a_cut_before_anything_was_heard_leaves_waiting(robot: RobotState) -> None:
     robot.cut(BRIDGE, 2)
     assert robot.reading("/heard").status == "waiting"
 
 
-def test_what_was_unreadable_before_the_cut_has_no_message(robot: Robot) -> None:
+def test_what_was_unreadable_before_the_cut_has_no_message(robot: RobotState) -> None:
     broken(robot)
     robot.cut(BRIDGE, 2)
     assert (robot.reading("/heard").status, robot.reading("/heard").fields) == ("cut", None)
@@ -163,7 +163,7 @@ def test_what_is_logged_of_one_of_several_robots_begins_with_its_name(
 ) -> None:
     panel = small_panel()
     entry = RobotEntry(id="r1", name="Robot 1", namespace="/r1")
-    robot = Robot(panel, INTERFACES, KIOSK, entry)
+    robot = RobotState(panel, INTERFACES, KIOSK, entry)
     robot.take("r1/heard", Sample(b"broken", 1, NOW, NOW, BRIDGE))
     robot.reading("/heard")
     (record,) = caplog.records

@@ -12,9 +12,9 @@ from app.errors import DecodeError
 from app.panel.model import Panel
 from app.permission.interlocks import interlock_verdict
 from app.robot.slices import Slices
-from app.robot.state import Reading, Robot, Sample
+from app.robot.state import Reading, RobotState, Sample
 from app.robot.topics import UNREAD_MOST
-from app.view.view import sight
+from app.view.view import build_view
 from tests.support.builders import (
     BRIDGE,
     ENABLED,
@@ -57,7 +57,7 @@ class Cell:
 
     def __init__(self, *widgets: Table, interlock: Table = LEVEL) -> None:
         self.panel: Panel = panel_of(*(widgets or (MESSAGE, FREE, SHOWN)), interlock=interlock)
-        self.robot = Robot(self.panel, INTERFACES, KIOSK, None, Slices(Clock()))
+        self.robot = RobotState(self.panel, INTERFACES, KIOSK, None, Slices(Clock()))
         self.robot.link_up, self.robot.settled_at = True, 0.0
         self.robot.graph.apply(f"@/{BRIDGE}/@ros2_lv", True)
         self.read: list[tuple[str, Any]] = []
@@ -82,7 +82,7 @@ class Cell:
 
     @property
     def shown(self) -> tuple[str, str]:
-        view = sight(self.panel, self.robot, NOW).view["widgets"]["heard"]
+        view = build_view(self.panel, self.robot, NOW).view["widgets"]["heard"]
         return view["state"], view["text"]
 
     async def all_read(self, topic: str = ENABLED) -> None:
@@ -234,7 +234,7 @@ def test_ten_megabytes_of_anything_hold_up_nothing(kind: str) -> None:
     large = KINDS[kind](TEN_MB)
     assert len(large.data) > 0.99 * TEN_MB
     panel = panel_of({**HEARD, "type": large.type, "field": large.path})
-    robot = Robot(panel, INTERFACES, KIOSK)
+    robot = RobotState(panel, INTERFACES, KIOSK)
     robot.take("heard", Sample(large.data, 1, NOW, NOW, None))
 
     def is_read() -> bool:
@@ -250,7 +250,7 @@ def test_ten_megabytes_of_anything_hold_up_nothing(kind: str) -> None:
 def test_ten_megabytes_of_garbage_hold_up_nothing() -> None:
     large = garbage(TEN_MB)
     panel = panel_of({**HEARD, "type": large.type, "field": large.path})
-    robot = Robot(panel, INTERFACES, KIOSK)
+    robot = RobotState(panel, INTERFACES, KIOSK)
     robot.take("heard", Sample(large.data, 1, NOW, NOW, None))
 
     async def test() -> None:

@@ -9,22 +9,22 @@ from typing import Any, ClassVar
 
 import pytest
 
-from app.audit import Unlogged
-from app.commands.holds.receipts import Holding
-from app.commands.receipts import LONGEST_KEPT, By, Receipt
+from app.audit import NullLog
+from app.commands.holds.receipts import ActiveHold
+from app.commands.receipts import LONGEST_KEPT, PressContext, Receipt
 from app.commands.service_calls import with_fields
 from app.panel.model import Panel
-from app.permission.clients import stranger
+from app.permission.clients import anonymous
 from app.permission.interlocks import interlock_verdict
-from app.robot.state import Passed, Robot, Sample
+from app.robot.state import PassedOver, RobotState, Sample
 from app.ros_logging import RobotLog
 from app.runtime import robot_session
-from app.runtime.ingest import Intake
+from app.runtime.ingest import Ingest
 from app.simulator import zenoh_peer
 from app.transport.inbox import Changes, Token
 from app.transport.zenoh_session import config_to
 from app.view.kinds import Enabled
-from app.view.view import sight
+from app.view.view import build_view
 from tests.commands.test_holds import HALF, JOG, POINT, SPEED
 from tests.commands.test_presses import Bench, Way
 from tests.support.builders import (
@@ -50,7 +50,7 @@ def flag(value: bool) -> bytes:
 
 
 def sample(payload: bytes, *between: bytes) -> Sample:
-    passed = tuple(Passed(one, NOW, NOW) for one in between)
+    passed = tuple(PassedOver(one, NOW, NOW) for one in between)
     return Sample(payload, 9, NOW, NOW, BRIDGE, between=passed)
 
 
@@ -66,22 +66,22 @@ class Deaf:
     def lose(self, *_: object) -> None: ...
 
 
-def intake_of(panel: Panel, robot: Robot, actions: Any) -> Intake:
+def intake_of(panel: Panel, robot: RobotState, actions: Any) -> Ingest:
     deaf: Any = Deaf()
-    return Intake(panel, robot, actions, deaf, deaf, None, RobotLog(logging.getLogger("x"), ""))
+    return Ingest(panel, robot, actions, deaf, deaf, None, RobotLog(logging.getLogger("x"), ""))
 
 
 class Page:
     """The permissions as they were last shown."""
 
-    def __init__(self, panel: Panel, robot: Robot) -> None:
+    def __init__(self, panel: Panel, robot: RobotState) -> None:
         self._panel = panel
         self._robot = robot
         self.said: list[bool] = []
         self.show()
 
     def show(self) -> None:
-        self._view = sight(self._panel, self._robot, time.monotonic()).view["interlocks"]
+        self._view = build_view(self._panel, self._robot, time.monotonic()).view["interlocks"]
         if (said := self._robot.reading(ENABLED).value("data")) is not None:
             self.said.append(said)
 
@@ -176,7 +176,7 @@ def test_each_sample_that_is_kept_whole_is_recorded_and_no_other() -> None:
     deaf: Any = Deaf()
     log = RobotLog(logging.getLogger("x"), "")
     robot = robot_there(panel)
-    intake = Intake(panel, robot, deaf, deaf, deaf, tape, log)
+    intake = Ingest(panel, robot, deaf, deaf, deaf, tape, log)
     assert intake.whole == tape.keys
     kept = [("heard", sample(said)) for said in (b"1", b"2", b"3")]
     page = Page(panel, robot)
@@ -215,7 +215,7 @@ def test_a_press_in_doubt_is_not_answered_with_another_press() -> None:
     robot = robot_there(panel)
     permits(robot)
     presses = presses_of(panel, robot, Way())
-    late = By(FROM.origin, doubt=lambda: "the page showed another robot.")
+    late = PressContext(FROM.origin, stale_reason=lambda: "the page showed another robot.")
 
     async def pressed() -> None:
         first = await presses.press("free", {"message": "a"}, "p1", FROM)
@@ -237,7 +237,7 @@ def test_a_link_that_is_lost_while_it_is_renewed_is_renewed_again(
     renewals: list[str] = []
 
     async def lost() -> None:
-        one = robot_session.Kiosk(small_panel(), config_to("tcp/127.0.0.1:1"), "r1", Unlogged())
+        one = robot_session.RobotSession(small_panel(), config_to("tcp/127.0.0.1:1"), "r1", NullLog())
 
         def renew() -> None:
             renewals.append("renewed")
@@ -283,7 +283,7 @@ def test_a_kiosk_that_gives_its_session_up_ends_what_is_held_before(
     async def scene() -> None:
         panel = panel_of(SPEED, JOG, {**HEARD, "topic": "/last_heard"}, mode="demo")
         with zenoh_peer.in_process("", panel.distro) as there:
-            one = robot_session.Kiosk(panel, config_to(there), "r1", Unlogged())
+            one = robot_session.RobotSession(panel, config_to(there), "r1", NullLog())
             await one.start()
             sent: list[float] = []
             put = one.link.put
@@ -296,10 +296,10 @@ def test_a_kiosk_that_gives_its_session_up_ends_what_is_held_before(
             monkeypatch.setattr(one.link, "put", noted)
             ended: list[Receipt] = []
             async with asyncio.timeout(20):
-                while not one.board.view["widgets"]["jog"]["enabled"]:
+                while not one.publisher.view["widgets"]["jog"]["enabled"]:
                     await asyncio.sleep(0.05)
                 hold = one.holds.begin("jog", HALF, time.monotonic(), FROM, ended.append)
-                assert isinstance(hold, Holding)
+                assert isinstance(hold, ActiveHold)
                 lost = one.robot.key("/last_heard")
                 monkeypatch.setattr(type(one.robot.graph), "unheard", lambda _, key: key == lost)
                 for number in itertools.count(1):
@@ -316,9 +316,9 @@ def test_a_kiosk_that_gives_its_session_up_ends_what_is_held_before(
 
 def test_who_ends_or_takes_a_new_panel_sends_nothing_more() -> None:
     async def pressed() -> None:
-        one = robot_session.Kiosk(small_panel(), config_to("tcp/127.0.0.1:1"), "r1", Unlogged())
+        one = robot_session.RobotSession(small_panel(), config_to("tcp/127.0.0.1:1"), "r1", NullLog())
         permits(one.robot)
-        by = one.doubts.by("free", stranger("192.0.2.1"))
+        by = one.press_guard.by("free", anonymous("192.0.2.1"))
         assert by.controls().permitted
         await one.stop()
         assert by.controls().code == "ending"

@@ -4,22 +4,22 @@ import asyncio
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Final, Protocol
 
-from app.audit import Origin, Unlogged
-from app.audit.press_record import Logbook
-from app.commands.actions.goals import Actions
+from app.audit import NullLog, Origin
+from app.audit.press_record import PressLog
+from app.commands.actions.goals import GoalTracker
 from app.commands.confirmations import Confirmations
-from app.commands.dispatch import Sending
-from app.commands.parameters.sync import Parameters
+from app.commands.dispatch import Dispatcher
+from app.commands.parameters.sync import ParameterSync
 from app.commands.presses import Presses
-from app.commands.receipts import By
-from app.commands.service_calls import Asker, Calls
+from app.commands.receipts import PressContext
+from app.commands.service_calls import Asker, ServiceCalls
 from app.dialect import bridge_dialect
 from app.dialect.endpoint import TopicRole
 from app.errors import PanelError
 from app.interfaces import interfaces_of
 from app.interfaces.names import Qos
 from app.panel.model import Panel
-from app.robot.state import Robot, Sample
+from app.robot.state import RobotState, Sample
 
 Table = Mapping[str, Any]
 
@@ -30,7 +30,7 @@ BRIDGE: Final = "b1"
 KIOSK: Final = "c1"
 ENABLED: Final = "/operation_enabled"
 NOW: Final = 1000.0  # monotonic seconds
-FROM: Final = By(Origin(address="127.0.0.1"))
+FROM: Final = PressContext(Origin(address="127.0.0.1"))
 NOTHING: Final[Table] = {}
 
 INTERLOCK: Final[Table] = {"id": "operation", "topic": ENABLED}
@@ -80,9 +80,9 @@ def small_panel(interlock: Table = NOTHING, **more: Any) -> Panel:
     return panel_of(MESSAGE, FREE, GUARDED, HEARD, interlock=interlock, **more)
 
 
-def robot_there(panel: Panel) -> Robot:
+def robot_there(panel: Panel) -> RobotState:
     """A robot that commands can reach: a link, a bridge, joined; it has said nothing yet."""
-    robot = Robot(panel, INTERFACES, KIOSK)
+    robot = RobotState(panel, INTERFACES, KIOSK)
     robot.link_up = True
     robot.settled_at = 0.0
     robot.graph.apply(bridge_dialect.bridge_token(BRIDGE), True)
@@ -90,7 +90,7 @@ def robot_there(panel: Panel) -> Robot:
 
 
 def endpoint(
-    robot: Robot,
+    robot: RobotState,
     role: TopicRole,
     topic: str,
     type_name: str,
@@ -106,7 +106,7 @@ def endpoint(
 
 
 def says(
-    robot: Robot,
+    robot: RobotState,
     topic: str,
     data: Any,
     type_name: str = TEXT,
@@ -120,7 +120,7 @@ def says(
     robot.take(robot.key(topic), Sample(payload, seq, at, at, source))
 
 
-def permits(robot: Robot, permitted: bool = True, *, at: float = NOW) -> None:
+def permits(robot: RobotState, permitted: bool = True, *, at: float = NOW) -> None:
     """The robot says whether operation is permitted."""
     says(robot, ENABLED, permitted, BOOL, at=at)
 
@@ -141,27 +141,27 @@ class Asked(Protocol):
 
 def sending_of(
     panel: Panel,
-    robot: Robot,
+    robot: RobotState,
     way: Asked,
     *,
     asker: Asker | None = None,
-    calls: Calls | None = None,
+    calls: ServiceCalls | None = None,
     confirmations: Confirmations | None = None,
     monotonic: Callable[[], float] = lambda: NOW,
     **more: Any,
-) -> Sending:
+) -> Dispatcher:
     """What is sent to a robot, with all that is needed for it and a test does not care for."""
     asker = asker or Nobody()
-    calls = calls or Calls(INTERFACES, robot, asker, lambda: None)
-    return Sending(
+    calls = calls or ServiceCalls(INTERFACES, robot, asker, lambda: None)
+    return Dispatcher(
         panel,
         INTERFACES,
         robot,
         way,
         calls,
-        Actions(INTERFACES, robot, asker, lambda: None),
+        GoalTracker(INTERFACES, robot, asker, lambda: None),
         confirmations or Confirmations(robot, lambda: None),
-        Parameters(panel, INTERFACES, robot, asker, calls, lambda: None),
+        ParameterSync(panel, INTERFACES, robot, asker, calls, lambda: None),
         monotonic,
         **more,
     )
@@ -169,10 +169,10 @@ def sending_of(
 
 def presses_of(
     panel: Panel,
-    robot: Robot,
+    robot: RobotState,
     way: Asked,
     *,
-    logbook: Logbook | None = None,
+    press_log: PressLog | None = None,
     monotonic: Callable[[], float] = lambda: NOW,
     catch_up: Callable[[], None] = lambda: None,
     news: Callable[[], bool] = lambda: False,
@@ -180,4 +180,4 @@ def presses_of(
 ) -> Presses:
     """The presses of a robot; `more` is for `sending_of`."""
     sending = sending_of(panel, robot, way, monotonic=monotonic, **more)
-    return Presses(panel, robot, sending, logbook or Logbook(Unlogged()), monotonic, catch_up, news)
+    return Presses(panel, robot, sending, press_log or PressLog(NullLog()), monotonic, catch_up, news)

@@ -9,16 +9,23 @@ import pytest
 
 from app.dialect import bridge_dialect
 from app.errors import LinkError
-from app.permission.interlocks import way
-from app.robot.state import Robot
+from app.permission.interlocks import link_verdict
+from app.robot.state import RobotState
 from app.transport import bridge_liveness
-from app.transport.bridge_liveness import EVERY_S, GOOD, LONGEST_S, LOOKED_AT, Pulse, Silence
+from app.transport.bridge_liveness import (
+    EVERY_S,
+    GOOD,
+    LONGEST_S,
+    LOOKED_AT,
+    BridgeLiveness,
+    LivenessDetector,
+)
 from tests.support.builders import BRIDGE, FROM, presses_of, robot_there, small_panel
 
 LAN_S = 0.001
 
 
-def network(silence: Silence, took_s: float, begin: float, count: int) -> float:
+def network(silence: LivenessDetector, took_s: float, begin: float, count: int) -> float:
     """Questions of which each is answered after so long; returns when the last one was."""
     events = [(begin + n * EVERY_S, None) for n in range(count)]
     heard = [(asked + took_s, asked) for asked, _ in events]
@@ -32,13 +39,13 @@ def network(silence: Silence, took_s: float, begin: float, count: int) -> float:
 
 
 def test_a_bridge_that_answers_is_not_silent() -> None:
-    silence = Silence()
+    silence = LivenessDetector()
     network(silence, LAN_S, 0.0, 100)
     assert not silence.silent
 
 
 def test_no_answer_is_silence_after_its_limit() -> None:
-    silence = Silence()
+    silence = LivenessDetector()
     end = network(silence, LAN_S, 0.0, 10)
     silence.ask(end)
     silence.judge(end + silence.limit - 0.01)
@@ -49,14 +56,14 @@ def test_no_answer_is_silence_after_its_limit() -> None:
 
 def test_nothing_was_asked_is_no_silence() -> None:
     """A server that stood still has not asked meanwhile."""
-    silence = Silence()
+    silence = LivenessDetector()
     end = network(silence, LAN_S, 0.0, 10)
     silence.judge(end + 60)
     assert not silence.silent
 
 
 def test_it_is_over_with_answers_to_what_was_asked_since_and_in_time() -> None:
-    silence = Silence()
+    silence = LivenessDetector()
     end = network(silence, LAN_S, 0.0, 10)
     for n in range(20):
         silence.ask(end + n * EVERY_S)
@@ -73,7 +80,7 @@ def test_it_is_over_with_answers_to_what_was_asked_since_and_in_time() -> None:
 
 
 def test_a_slow_network_is_silence_until_it_is_known_to_be_slow() -> None:
-    silence = Silence()
+    silence = LivenessDetector()
     end = network(silence, LAN_S, 0.0, 50)
     end = network(silence, 0.7, end, LOOKED_AT // 2)
     assert silence.silent
@@ -84,7 +91,7 @@ def test_a_slow_network_is_silence_until_it_is_known_to_be_slow() -> None:
 
 
 def test_a_loop_that_stood_still_is_no_slow_network() -> None:
-    silence = Silence()
+    silence = LivenessDetector()
     end = network(silence, LAN_S, 0.0, LOOKED_AT)
     silence.ask(end)
     silence.hear(end, end + 2.0)  # nobody judged meanwhile
@@ -117,11 +124,13 @@ class Line:
         return True
 
 
-def run(test: Callable[[Line, Robot, Pulse, list[bool]], Coroutine[Any, Any, None]]) -> None:
+def run(
+    test: Callable[[Line, RobotState, BridgeLiveness, list[bool]], Coroutine[Any, Any, None]],
+) -> None:
     async def benched() -> None:
         line, robot = Line(), robot_there(small_panel())
         told: list[bool] = []
-        mine = Pulse(robot, line, lambda: told.append(robot.answers))
+        mine = BridgeLiveness(robot, line, lambda: told.append(robot.answers))
         mine.start()
         try:
             await test(line, robot, mine, told)
@@ -145,7 +154,7 @@ async def until(what: Callable[[], object]) -> None:
 
 
 def test_each_bridge_is_asked_again_and_again() -> None:
-    async def test(line: Line, robot: Robot, mine: Pulse, told: list[bool]) -> None:
+    async def test(line: Line, robot: RobotState, mine: BridgeLiveness, told: list[bool]) -> None:
         await until(lambda: len(line.asked) > 5)
         assert {selector for selector, _ in line.asked} == {bridge_dialect.version(BRIDGE)}
         assert (robot.answers, told) == (True, [])
@@ -154,7 +163,7 @@ def test_each_bridge_is_asked_again_and_again() -> None:
 
 
 def test_silence_is_told_and_its_end() -> None:
-    async def test(line: Line, robot: Robot, mine: Pulse, told: list[bool]) -> None:
+    async def test(line: Line, robot: RobotState, mine: BridgeLiveness, told: list[bool]) -> None:
         line.answers = False
         await until(lambda: not robot.answers)
         line.answers = True
@@ -165,7 +174,7 @@ def test_silence_is_told_and_its_end() -> None:
 
 
 def test_another_bridge_is_not_the_silent_one() -> None:
-    async def test(line: Line, robot: Robot, mine: Pulse, told: list[bool]) -> None:
+    async def test(line: Line, robot: RobotState, mine: BridgeLiveness, told: list[bool]) -> None:
         line.answers = False
         await until(lambda: not robot.answers)
         robot.lose()
@@ -175,9 +184,9 @@ def test_another_bridge_is_not_the_silent_one() -> None:
 
 
 def test_without_a_session_nothing_is_asked_and_nothing_arrives() -> None:
-    async def test(line: Line, robot: Robot, mine: Pulse, told: list[bool]) -> None:
+    async def test(line: Line, robot: RobotState, mine: BridgeLiveness, told: list[bool]) -> None:
         line.fails = True
-        assert not await mine.reached()
+        assert not await mine.flushed()
 
     run(test)
 
@@ -189,7 +198,7 @@ def test_a_loop_that_stood_still_is_no_silence(monkeypatch: pytest.MonkeyPatch) 
     async def benched() -> None:
         nonlocal clock
         line, robot = Line(), robot_there(small_panel())
-        mine = Pulse(robot, line, lambda: None, lambda: clock)
+        mine = BridgeLiveness(robot, line, lambda: None, lambda: clock)
         line.answers = False
         mine.start()
         loop = asyncio.get_running_loop()
@@ -211,8 +220,8 @@ def test_a_loop_that_stood_still_is_no_silence(monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_a_press_is_published_when_the_bridge_has_answered_after_it() -> None:
-    async def test(line: Line, robot: Robot, mine: Pulse, told: list[bool]) -> None:
-        presses = presses_of(small_panel(), robot, line, reached=mine.reached)
+    async def test(line: Line, robot: RobotState, mine: BridgeLiveness, told: list[bool]) -> None:
+        presses = presses_of(small_panel(), robot, line, reached=mine.flushed)
 
         async def press(press_id: str) -> str:
             receipt = await presses.press("free", {"message": "hi"}, press_id, FROM)
@@ -228,7 +237,7 @@ def test_a_press_is_published_when_the_bridge_has_answered_after_it() -> None:
 
 
 def test_a_frozen_bridge_stays_silent_when_another_comes_or_goes() -> None:
-    async def test(line: Line, robot: Robot, mine: Pulse, told: list[bool]) -> None:
+    async def test(line: Line, robot: RobotState, mine: BridgeLiveness, told: list[bool]) -> None:
         robot.graph.apply(bridge_dialect.bridge_token("b2"), True)
         await until(lambda: bridge_dialect.version("b2") in {selector for selector, _ in line.asked})
         line.frozen = BRIDGE
@@ -255,9 +264,9 @@ def test_after_a_standstill_all_that_waited_is_taken_in_first(monkeypatch: pytes
         told: list[str] = []
 
         def tell() -> None:
-            told.append(way(robot, clock).code)
+            told.append(link_verdict(robot, clock).code)
 
-        mine = Pulse(robot, line, tell, lambda: clock)
+        mine = BridgeLiveness(robot, line, tell, lambda: clock)
         line.answers = False
         mine.start()
 

@@ -6,7 +6,7 @@ from collections.abc import Awaitable, Callable
 import pytest
 
 from app.errors import LinkError
-from app.transport.readiness import EVERY_S, LIMIT_S, Asked
+from app.transport.readiness import EVERY_S, LIMIT_S, CoalescedQuery
 
 
 class Bridges:
@@ -25,10 +25,10 @@ class Bridges:
         return self.answer
 
 
-def run(test: Callable[[Bridges, Asked], Awaitable[None]]) -> None:
+def run(test: Callable[[Bridges, CoalescedQuery], Awaitable[None]]) -> None:
     async def both() -> None:
         bridges = Bridges()
-        asked = Asked(bridges.ask)
+        asked = CoalescedQuery(bridges.ask)
         await test(bridges, asked)
         await asked.stop()
 
@@ -36,7 +36,7 @@ def run(test: Callable[[Bridges, Asked], Awaitable[None]]) -> None:
 
 
 def test_who_asks_at_once_shares_one_question() -> None:
-    async def test(bridges: Bridges, asked: Asked) -> None:
+    async def test(bridges: Bridges, asked: CoalescedQuery) -> None:
         assert await asyncio.gather(*(asked.answers() for _ in range(100))) == [True] * 100
         assert bridges.questions == 1
 
@@ -44,7 +44,7 @@ def test_who_asks_at_once_shares_one_question() -> None:
 
 
 def test_there_are_two_questions_a_second_at_most() -> None:
-    async def test(bridges: Bridges, asked: Asked) -> None:
+    async def test(bridges: Bridges, asked: CoalescedQuery) -> None:
         loop = asyncio.get_running_loop()
         end = loop.time() + 2.2 * EVERY_S
         while loop.time() < end:
@@ -56,7 +56,7 @@ def test_there_are_two_questions_a_second_at_most() -> None:
 
 
 def test_what_is_told_is_not_older_than_that() -> None:
-    async def test(bridges: Bridges, asked: Asked) -> None:
+    async def test(bridges: Bridges, asked: CoalescedQuery) -> None:
         assert await asked.answers()
         bridges.answer = False
         await asyncio.sleep(EVERY_S)
@@ -67,7 +67,7 @@ def test_what_is_told_is_not_older_than_that() -> None:
 
 @pytest.mark.real_time
 def test_no_answer_takes_a_second_at_most_and_one_who_leaves_stops_nobody() -> None:
-    async def test(bridges: Bridges, asked: Asked) -> None:
+    async def test(bridges: Bridges, asked: CoalescedQuery) -> None:
         bridges.asleep = True
         began = asyncio.get_running_loop().time()
         leaving, staying = (asyncio.ensure_future(asked.answers()) for _ in range(2))
@@ -81,7 +81,7 @@ def test_no_answer_takes_a_second_at_most_and_one_who_leaves_stops_nobody() -> N
 
 
 def test_a_link_that_can_not_ask_has_no_answer() -> None:
-    async def test(bridges: Bridges, asked: Asked) -> None:
+    async def test(bridges: Bridges, asked: CoalescedQuery) -> None:
         bridges.answer = LinkError("no session")
         assert not await asked.answers()
 

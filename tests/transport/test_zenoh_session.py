@@ -21,7 +21,7 @@ from app.dialect import bridge_dialect
 from app.errors import SettingsError
 from app.interfaces.names import Qos
 from app.robot.state import Sample
-from app.transport.zenoh_session import BLOCKED_MOST_US, Link, config_from, config_to
+from app.transport.zenoh_session import BLOCKED_MOST_US, ZenohSession, config_from, config_to
 from tests.support.parts import free_port, until
 
 RENEWALS = 30
@@ -73,7 +73,7 @@ def test_a_configuration_that_can_not_be_used_is_told_in_the_users_terms(
 def test_a_link_tells_where_it_connects(connect: str, endpoints: tuple[str, ...]) -> None:
     config = config_to("tcp/127.0.0.1:9")
     config.insert_json5("connect/endpoints", connect)
-    link = Link(config, lambda _: None)
+    link = ZenohSession(config, lambda _: None)
     assert link.endpoints == endpoints
     link.close()
 
@@ -91,7 +91,7 @@ def test_a_session_is_renewed_in_the_middle_of_what_comes_in(
             for token in held:
                 token.undeclare()
 
-    link = Link(config_to(endpoint), lambda _: None)
+    link = ZenohSession(config_to(endpoint), lambda _: None)
     link.start(["a"], ["b"])
 
     def renew() -> None:
@@ -120,7 +120,7 @@ def test_a_burst_is_not_dropped(peer: tuple[str, zenoh.Session]) -> None:
         heard.append(bytes(sample.payload))
 
     session.declare_subscriber("b", Callback(hear, indirect=False))
-    link = Link(config_to(endpoint), lambda _: None)
+    link = ZenohSession(config_to(endpoint), lambda _: None)
     link.start([], ["b"])
     until(lambda: link.heard("b"), "the subscriber is known")
     for number in range(BURST):
@@ -149,7 +149,7 @@ def test_a_link_that_takes_nothing_stops_the_loop_once_and_not_for_long() -> Non
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as peer:
         assert peer.stdout is not None
         assert peer.stdout.readline() == b"ready\n"
-        link = Link(config_to(endpoint), lambda urgent: None)
+        link = ZenohSession(config_to(endpoint), lambda urgent: None)
         link.start([], ["b"])
         until(lambda: link.heard("b"), "the subscriber is known")
         peer.send_signal(signal.SIGSTOP)
@@ -168,14 +168,14 @@ def test_a_link_that_takes_nothing_stops_the_loop_once_and_not_for_long() -> Non
     assert long[0] < 2 * BLOCKED_MOST_US / 1e6
 
 
-async def asked(link: Link) -> None:
+async def asked(link: ZenohSession) -> None:
     """A question is sent, and not waited for."""
     link.query("b", b"", 0.1).cancel()
 
 
 def test_nothing_is_left_of_the_sessions_that_were(peer: tuple[str, zenoh.Session]) -> None:
     """Zenoh kept a shared memory segment of each: a thousand losses of the link, and no file more."""
-    link = Link(config_to(peer[0]), lambda _: None)
+    link = ZenohSession(config_to(peer[0]), lambda _: None)
     link.start(["a"], ["b"])
 
     def files() -> int:
@@ -194,7 +194,7 @@ def test_tokens_are_held_by_the_new_session_when_they_are_wanted_again(
     peer: tuple[str, zenoh.Session],
 ) -> None:
     endpoint, session = peer
-    link = Link(config_to(endpoint), lambda _: None)
+    link = ZenohSession(config_to(endpoint), lambda _: None)
     link.start([], [])
     link.hold(tokens(link.zid, 1))
     link.renew()
@@ -213,7 +213,7 @@ def test_of_a_watched_topic_what_came_and_went_between_two_drains_is_kept(
     peer: tuple[str, zenoh.Session],
 ) -> None:
     endpoint, session = peer
-    link = Link(config_to(endpoint), lambda _: None)
+    link = ZenohSession(config_to(endpoint), lambda _: None)
     link.start(["a", "b"], [], watched=["a"])
     until(lambda: link.drain().link_up, "a link")
     said = [b"yes", b"no", b"no", b"yes", *(b"%d" % n for n in range(100)), b"yes"]
@@ -238,7 +238,7 @@ def test_a_stamp_of_a_clock_that_is_ahead_makes_the_link_deaf_to_nothing(
     peer: tuple[str, zenoh.Session],
 ) -> None:
     endpoint, session = peer
-    link = Link(config_to(endpoint), lambda _: None)
+    link = ZenohSession(config_to(endpoint), lambda _: None)
     link.start(["a"], [], watched=["a"])
     until(partial(matched, publisher := session.declare_publisher("a")), "it is subscribed")
     own = session.new_timestamp().get_id()
@@ -267,7 +267,7 @@ def test_a_late_link_gets_the_last_value_of_a_cache_and_nothing_older_than_what_
     )
     latched.put(b"old")
     latched.put(b"last")
-    link = Link(config_to(endpoint), lambda _: None)
+    link = ZenohSession(config_to(endpoint), lambda _: None)
     link.start(["a"], [])
     heard: list[bytes] = []
 
@@ -295,7 +295,7 @@ def test_a_small_message_does_not_keep_all_that_it_was_read_with(
     """The latest of each topic stays for long: each kept a buffer of 64 kB, of which some was used."""
     endpoint, session = peer
     topics = [f"topic{number}" for number in range(300)]
-    link = Link(config_to(endpoint), lambda _: None)
+    link = ZenohSession(config_to(endpoint), lambda _: None)
     link.start(topics, [])
     until(lambda: link.drain().link_up, "a link")
     before = resident_kb()

@@ -8,8 +8,8 @@ import pytest
 
 from app.clock import format_time
 from app.panel import load_panel
-from app.robot.state import Robot, Sample
-from app.view.view import sight
+from app.robot.state import RobotState, Sample
+from app.view.view import build_view
 from tests.support.builders import BRIDGE, HEARD, INTERFACES, NOW, panel_of, robot_there
 
 AT = f"received {format_time(NOW)}"
@@ -31,7 +31,7 @@ def shown(
         robot.take("heard", Sample(INTERFACES.encode(type_name, fields), 1, NOW, NOW, BRIDGE))
     if cut:
         robot.cut(BRIDGE, 2)
-    return sight(panel, robot, now).view["widgets"]["heard"]
+    return build_view(panel, robot, now).view["widgets"]["heard"]
 
 
 @pytest.mark.parametrize(
@@ -170,7 +170,7 @@ def test_a_lamp_of_a_file_shows_the_state_of_a_constant(tmp_path: Path, status: 
     robot = robot_there(panel)
     battery = INTERFACES.encode(BATTERY, BATTERY_FIELDS | {"power_supply_status": status})
     robot.take("heard", Sample(battery, 1, NOW, NOW, BRIDGE))
-    assert sight(panel, robot, NOW).view["widgets"]["supply"]["text"] == text
+    assert build_view(panel, robot, NOW).view["widgets"]["supply"]["text"] == text
 
 
 def test_a_lamp_of_a_bool_or_a_text() -> None:
@@ -221,12 +221,12 @@ def test_a_lamp_that_can_not_be_read_says_so() -> None:
     panel = panel_of({**LAMP, "type": "std_msgs/msg/UInt8"})
     robot = robot_there(panel)
     robot.take("heard", Sample(b"broken", 1, NOW, NOW, BRIDGE))
-    view = sight(panel, robot, NOW).view["widgets"]["heard"]
+    view = build_view(panel, robot, NOW).view["widgets"]["heard"]
     assert (view["state"], view["text"], view["shape"]) == ("unreadable", "Not readable", "unreadable")
 
 
 def test_time_changes_a_lamp() -> None:
     panel = panel_of({**LAMP, "type": "std_msgs/msg/UInt8", "max_age_s": 5.0})
-    robot = Robot(panel, INTERFACES)
+    robot = RobotState(panel, INTERFACES)
     robot.take("heard", Sample(INTERFACES.encode("std_msgs/msg/UInt8", {"data": 0}), 1, NOW, NOW, None))
-    assert sight(panel, robot, NOW).until == NOW + 5
+    assert build_view(panel, robot, NOW).until == NOW + 5

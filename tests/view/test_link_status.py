@@ -12,11 +12,11 @@ from app.panel.model import Panel
 from app.panel.number_range import Range
 from app.panel.widgets.parameter import DESCRIBE, GET, SET
 from app.permission.interlocks import PERMITTED, Verdict
-from app.robot.parameter_state import Declared
-from app.robot.state import Robot
+from app.robot.parameter_state import ParameterState
+from app.robot.state import RobotState
 from app.settings import PACKAGE
-from app.view.link_status import BRIDGE, LONGEST_LIST, NODE, LinkLamp, labels, lamps, locks
-from app.view.view import sight
+from app.view.link_status import BRIDGE, LONGEST_LIST, NODE, LinkStatus, labels, link_statuses, locks
+from app.view.view import build_view
 from tests.support.builders import (
     BOOL,
     ENABLED,
@@ -54,9 +54,9 @@ def cell(interlock: Table = NOTHING) -> Panel:
     return panel_of(MESSAGE, FREE, GUARDED, HEARD, interlock=interlock)
 
 
-def links_of(panel: Panel, robot: Robot, now: float = NOW, **more: Any) -> dict[str, LinkLamp]:
+def links_of(panel: Panel, robot: RobotState, now: float = NOW, **more: Any) -> dict[str, LinkStatus]:
     robot.follow_publishers()
-    return sight(panel, robot, now, **more).view["link"]
+    return build_view(panel, robot, now, **more).view["link"]
 
 
 def codes_of(module: str) -> set[str]:
@@ -138,19 +138,21 @@ def test_what_the_robot_forbids_is_no_fault_of_a_link() -> None:
 @pytest.mark.parametrize(
     ("known", "reason"),
     [
-        (Declared("live", 1.0, read_only=True), "Read only"),
-        (Declared("undeclared"), "has no parameter speed"),
-        (Declared("mistyped", found="string"), "is string"),
-        (Declared("live", 1.0, range=Range(5.0, 6.0)), "no value is both"),
+        (ParameterState("live", 1.0, read_only=True), "Read only"),
+        (ParameterState("undeclared"), "has no parameter speed"),
+        (ParameterState("mistyped", found="string"), "is string"),
+        (ParameterState("live", 1.0, range=Range(5.0, 6.0)), "no value is both"),
     ],
 )
-def test_a_parameter_that_can_not_be_set_is_no_fault_of_a_link(known: Declared, reason: str) -> None:
+def test_a_parameter_that_can_not_be_set_is_no_fault_of_a_link(
+    known: ParameterState, reason: str
+) -> None:
     panel = panel_of(SPEED)
     robot = robot_there(panel)
     for name, type_name in (GET, DESCRIBE, SET):
         robot.graph.apply(server_token(BRIDGE_ZID, "SS", f"arm/{name}", type_name), True)
     robot.parameters["speed"] = known
-    seen = sight(panel, robot, NOW).view
+    seen = build_view(panel, robot, NOW).view
     assert reason in seen["widgets"]["speed"]["reason"]
     assert {lamp["locks"] for lamp in seen["link"].values()} == {"Locks nothing."}
     assert {lamp["reason"] for lamp in seen["link"].values()} == {""}
@@ -180,7 +182,7 @@ def test_an_old_value_that_is_only_shown_is_no_silence() -> None:
     endpoint(robot, "MP", ENABLED, BOOL)
     says(robot, "/heard", "hello", at=NOW)
     permits(robot, at=NOW + 60)
-    seen = sight(panel, robot, NOW + 60)
+    seen = build_view(panel, robot, NOW + 60)
     assert seen.view["widgets"]["heard"]["state"] == "old"
     assert (seen.view["link"]["node"]["state"], seen.view["link"]["node"]["reason"]) == ("ok", "")
 
@@ -190,7 +192,7 @@ def test_a_forbidding_interlock_gets_old_too_and_time_shows_it() -> None:
     robot = robot_there(panel)
     endpoint(robot, "MP", ENABLED, BOOL)
     permits(robot, False)
-    assert sight(panel, robot, NOW + 1).until == NOW + 2
+    assert build_view(panel, robot, NOW + 1).until == NOW + 2
     assert links_of(panel, robot, NOW + 2)["node"]["text"] == "silent"
 
 
@@ -276,7 +278,7 @@ def test_a_qos_that_does_not_match_is_the_nodes() -> None:
 def test_what_the_bridge_does_not_pass_on_is_the_bridges() -> None:
     panel = cell()
     verdicts = {"free": PERMITTED, "guarded": Verdict(False, "unheard", "Not passed on.")}
-    link, until = lamps(panel, robot_there(panel), PERMITTED, verdicts, NOW)
+    link, until = link_statuses(panel, robot_there(panel), PERMITTED, verdicts, NOW)
     assert (link["bridge"]["locks"], link["bridge"]["reason"]) == ("Locks Guarded.", "Not passed on.")
     assert (link["bridge"]["state"], until) == ("ok", math.inf)
 

@@ -8,14 +8,14 @@ from typing import Any
 from hypothesis import given
 from hypothesis import strategies as some
 
-from app.audit import Unlogged
+from app.audit import NullLog
 from app.panel.model import Panel
 from app.panel.widgets.families import Display
-from app.permission.control_authority import Control
-from app.robot.state import Robot, Sample
-from app.view.publisher import Board
-from app.view.refresh import Alone, Showing
-from app.view.view import Sight, refreshed, sight
+from app.permission.control_authority import ControlAuthority
+from app.robot.state import RobotState, Sample
+from app.view.publisher import ViewPublisher
+from app.view.refresh import NoOtherRobots, ViewRefresher
+from app.view.view import ViewWithDeadlines, build_view, update_displays
 from tests.support.builders import (
     BOOL,
     BRIDGE,
@@ -46,7 +46,7 @@ TOPICS = {"/heard": TEXT, "/aged": TEXT, "/lamp": BOOL}
 SLOW = panel_of(GUARDED, HEARD, display_hz=1)
 
 
-def there(panel: Panel) -> Robot:
+def there(panel: Panel) -> RobotState:
     """A robot whose node is heard of and permits."""
     robot = robot_there(panel)
     endpoint(robot, "MP", ENABLED, BOOL)
@@ -60,7 +60,7 @@ SAID = some.tuples(
 )
 
 
-def say(robot: Robot, topic: str, word: str | None, at: float) -> None:
+def say(robot: RobotState, topic: str, word: str | None, at: float) -> None:
     if word is None:
         robot.take(robot.key(topic), Sample(b"broken", 1, at, at, BRIDGE))
     else:
@@ -71,41 +71,41 @@ def say(robot: Robot, topic: str, word: str | None, at: float) -> None:
 def test_a_frame_of_values_is_what_a_look_at_everything_would_show(story: list[Said]) -> None:
     robot = there(PANEL)
     now = NOW
-    seen = sight(PANEL, robot, now)
+    seen = build_view(PANEL, robot, now)
     displays = [w for w in PANEL.widgets() if isinstance(w, Display)]
     for topic, word, later in story:
         now += later
         say(robot, topic, word, now)
         if now >= seen.rest:
-            seen = sight(PANEL, robot, now)
+            seen = build_view(PANEL, robot, now)
         else:
             stale = [w for w in displays if w.topic == topic or seen.displays[w.id] <= now]
-            seen = refreshed(seen, stale, robot, now)
-        whole = sight(PANEL, robot, now)
+            seen = update_displays(seen, stale, robot, now)
+        whole = build_view(PANEL, robot, now)
         assert seen.view == whole.view
         assert seen.displays == whole.displays
         assert seen.rest <= whole.rest  # or it is looked at earlier than need be
 
 
-def showing_of(panel: Panel, robot: Robot) -> Showing:
-    control = Control(panel.control, "", tell=lambda *_: None)
-    return Showing(
+def showing_of(panel: Panel, robot: RobotState) -> ViewRefresher:
+    control = ControlAuthority(panel.control, "", tell=lambda *_: None)
+    return ViewRefresher(
         panel,
         robot,
         "r1",
         control,
-        Unlogged(),
-        Alone(),
+        NullLog(),
+        NoOtherRobots(),
         before=lambda: None,
         recordings_fault=lambda: "",
         simulated=False,
     )
 
 
-async def newer(board: Board, version: int) -> None:
+async def newer(publisher: ViewPublisher, version: int) -> None:
     async with asyncio.timeout(10):
-        while board.version <= version:
-            await board.news(version, board.heartbeat.count)
+        while publisher.version <= version:
+            await publisher.news(version, publisher.heartbeat.count)
 
 
 def run(work: Coroutine[Any, Any, None]) -> None:
@@ -117,15 +117,15 @@ def test_values_wait_for_the_frame_and_come_together() -> None:
         robot = there(SLOW)
         showing = showing_of(SLOW, robot)
         showing.now()
-        began, version = time.monotonic(), showing.board.version
+        began, version = time.monotonic(), showing.publisher.version
         for number in range(100):
             says(robot, "/heard", str(number))
             showing.values({robot.key("/heard")})
-        assert showing.board.version == version
-        await newer(showing.board, version)
+        assert showing.publisher.version == version
+        await newer(showing.publisher, version)
         assert time.monotonic() - began >= 1 / SLOW.display_hz - 0.01
-        assert showing.board.version == version + 1
-        assert showing.board.view["widgets"]["heard"]["text"] == "99"
+        assert showing.publisher.version == version + 1
+        assert showing.publisher.view["widgets"]["heard"]["text"] == "99"
         showing.stop()
 
     run(shown())
@@ -140,7 +140,7 @@ def test_a_permission_waits_for_no_frame_and_takes_the_values_along() -> None:
         showing.values({robot.key("/heard")})
         permits(robot, False)
         showing.now()
-        widgets = showing.board.view["widgets"]
+        widgets = showing.publisher.view["widgets"]
         assert (widgets["guarded"]["enabled"], widgets["heard"]["text"]) == (False, "hello")
         showing.stop()
 
@@ -151,6 +151,6 @@ def test_a_sight_changes_when_the_first_of_its_parts_does() -> None:
     robot = there(PANEL)
     says(robot, "/aged", "x")
     says(robot, "/lamp", True, BOOL)
-    seen: Sight = sight(PANEL, robot, NOW)
+    seen: ViewWithDeadlines = build_view(PANEL, robot, NOW)
     assert seen.until == NOW + 2.0
     assert seen.displays == {"heard": float("inf"), "aged": NOW + 2.0, "lamp": NOW + 3.0}

@@ -4,7 +4,7 @@ import pytest
 
 from app.dialect.bridge_dialect import bridge_token
 from app.view.link_status import Since
-from app.view.view import sight
+from app.view.view import build_view
 from tests.support.builders import BRIDGE, NOW, TEXT, endpoint, robot_there, small_panel
 
 DAY_S = 86_400.0
@@ -25,7 +25,7 @@ class Seen:
     def at(self, wall: float) -> tuple[str, str, str]:
         """`since` of server, bridge and node at a time of the wall clock."""
         self.wall = wall
-        link = self._since.dated(sight(self.panel, self.robot, NOW).view["link"])
+        link = self._since.dated(build_view(self.panel, self.robot, NOW).view["link"])
         server, bridge, node = (lamp["since"] for lamp in link.values())
         return server, bridge, node
 
@@ -61,7 +61,7 @@ def test_a_clock_that_is_set_back_changes_no_time_that_was_noted() -> None:
 
 def test_what_is_dated_is_else_as_it_was() -> None:
     seen = Seen()
-    plain = sight(seen.panel, seen.robot, NOW).view["link"]
+    plain = build_view(seen.panel, seen.robot, NOW).view["link"]
     dated = Since(lambda: 0.0).dated(plain)
     assert {name: {**lamp, "since": ""} for name, lamp in dated.items()} == plain
     assert plain["bridge"]["since"] == ""

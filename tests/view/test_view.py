@@ -8,9 +8,9 @@ import pytest
 
 from app.clock import format_time
 from app.dialect.bridge_dialect import DEMO_VERSION, bridge_token, server_token
-from app.robot.state import Robot, Sample
+from app.robot.state import RobotState, Sample
 from app.view.display_values import LONGEST_TEXT, readout, written
-from app.view.view import View, sight
+from app.view.view import View, build_view
 from tests.support.builders import (
     BOOL,
     BRIDGE,
@@ -30,33 +30,33 @@ PANEL = small_panel()
 
 
 @pytest.fixture
-def robot() -> Robot:
+def robot() -> RobotState:
     return robot_there(PANEL)
 
 
-def view_of(robot: Robot, now: float = NOW, **more: Any) -> View:
-    return sight(PANEL, robot, now, **more).view
+def view_of(robot: RobotState, now: float = NOW, **more: Any) -> View:
+    return build_view(PANEL, robot, now, **more).view
 
 
-def heard(robot: Robot, now: float = NOW, **widget: Any) -> tuple[dict[str, Any], float]:
+def heard(robot: RobotState, now: float = NOW, **widget: Any) -> tuple[dict[str, Any], float]:
     """The readout of /heard, and when time changes it."""
     panel = panel_of({**HEARD, **widget})
-    seen = sight(panel, robot, now)
+    seen = build_view(panel, robot, now)
     return seen.view["widgets"]["heard"], seen.until
 
 
-def test_a_view_has_every_widget_and_interlock(robot: Robot) -> None:
+def test_a_view_has_every_widget_and_interlock(robot: RobotState) -> None:
     view = view_of(robot)
     assert list(view["widgets"]) == ["message", "free", "guarded", "heard"]
     assert list(view["interlocks"]) == ["operation"]
 
 
-def test_a_widget_shows_that_it_can_be_pressed(robot: Robot) -> None:
+def test_a_widget_shows_that_it_can_be_pressed(robot: RobotState) -> None:
     permits(robot)
     assert view_of(robot)["widgets"]["guarded"] == {"enabled": True, "reason": None}
 
 
-def test_a_locked_widget_shows_the_reason_of_its_interlock(robot: Robot) -> None:
+def test_a_locked_widget_shows_the_reason_of_its_interlock(robot: RobotState) -> None:
     view = view_of(robot)
     assert view["widgets"]["guarded"] == view["interlocks"]["operation"]
     assert view["widgets"]["guarded"] == {
@@ -65,56 +65,56 @@ def test_a_locked_widget_shows_the_reason_of_its_interlock(robot: Robot) -> None
     }
 
 
-def test_an_interlock_locks_no_widget_but_its_own(robot: Robot) -> None:
+def test_an_interlock_locks_no_widget_but_its_own(robot: RobotState) -> None:
     assert view_of(robot)["widgets"]["free"] == {"enabled": True, "reason": None}
 
 
-def test_a_text_input_shows_nothing_of_the_robot(robot: Robot) -> None:
+def test_a_text_input_shows_nothing_of_the_robot(robot: RobotState) -> None:
     assert view_of(robot)["widgets"]["message"] == {}
 
 
 @pytest.mark.parametrize(("simulated", "banner"), [(True, "SIMULATED ROBOT"), (False, "")])
-def test_a_demo_shows_its_banner(robot: Robot, simulated: bool, banner: str) -> None:
+def test_a_demo_shows_its_banner(robot: RobotState, simulated: bool, banner: str) -> None:
     assert view_of(robot, simulated=simulated)["notice"]["banner"] == banner
 
 
-def test_a_demo_robot_behind_a_live_panel_shows_the_banner_too(robot: Robot) -> None:
+def test_a_demo_robot_behind_a_live_panel_shows_the_banner_too(robot: RobotState) -> None:
     robot.graph.answered({BRIDGE: DEMO_VERSION})
     assert view_of(robot)["notice"]["banner"] == "SIMULATED ROBOT"
 
 
 def test_the_banner_of_a_demo_is_there_while_nothing_is_connected() -> None:
-    view = view_of(Robot(PANEL, INTERFACES), simulated=True)
+    view = view_of(RobotState(PANEL, INTERFACES), simulated=True)
     assert view["notice"]["banner"] == "SIMULATED ROBOT"
 
 
-def test_a_fault_of_the_panel_file_is_shown(robot: Robot) -> None:
+def test_a_fault_of_the_panel_file_is_shown(robot: RobotState) -> None:
     assert (
         view_of(robot, fault="cell.toml can't be used")["notice"]["fault"] == "cell.toml can't be used"
     )
 
 
-def no_link(robot: Robot) -> None:
+def no_link(robot: RobotState) -> None:
     robot.link_up = False
 
 
-def no_bridge(robot: Robot) -> None:
+def no_bridge(robot: RobotState) -> None:
     robot.graph.apply(bridge_token(BRIDGE), False)
 
 
-def silent(robot: Robot) -> None:
+def silent(robot: RobotState) -> None:
     robot.graph.answered({})
 
 
-def joining(robot: Robot) -> None:
+def joining(robot: RobotState) -> None:
     robot.settled_at = math.inf
 
 
-def node(robot: Robot) -> None:
+def node(robot: RobotState) -> None:
     endpoint(robot, "MS", "/free", "std_msgs/msg/String")
 
 
-def nothing(robot: Robot) -> None:
+def nothing(robot: RobotState) -> None:
     pass
 
 
@@ -130,7 +130,10 @@ def nothing(robot: Robot) -> None:
     ],
 )
 def test_the_lights_show_how_far_the_way_goes(
-    robot: Robot, change: Callable[[Robot], None], bridge: tuple[str, str], on_robot: tuple[str, str]
+    robot: RobotState,
+    change: Callable[[RobotState], None],
+    bridge: tuple[str, str],
+    on_robot: tuple[str, str],
 ) -> None:
     change(robot)
     link = view_of(robot)["link"]
@@ -150,7 +153,7 @@ def test_the_lights_show_how_far_the_way_goes(
     ],
 )
 def test_a_node_is_one_that_the_panel_talks_with(
-    robot: Robot, role: Any, topic: str, seen: bool
+    robot: RobotState, role: Any, topic: str, seen: bool
 ) -> None:
     endpoint(robot, role, topic, BOOL)
     assert (view_of(robot)["link"]["node"]["state"] == "ok") is seen
@@ -163,10 +166,10 @@ def test_a_node_that_only_serves_is_seen_too(service: str, state: str) -> None:
     panel = panel_of(reset)
     robot = robot_there(panel)
     robot.graph.apply(server_token(BRIDGE, "SS", service, trigger), True)
-    assert sight(panel, robot, NOW).view["link"]["node"]["state"] == state
+    assert build_view(panel, robot, NOW).view["link"]["node"]["state"] == state
 
 
-def test_a_readout_waits_for_its_topic(robot: Robot) -> None:
+def test_a_readout_waits_for_its_topic(robot: RobotState) -> None:
     assert heard(robot) == (
         {"state": "waiting", "text": "—", "note": "waiting for /heard"},
         math.inf,
@@ -174,7 +177,7 @@ def test_a_readout_waits_for_its_topic(robot: Robot) -> None:
 
 
 @pytest.mark.usefixtures("utc")
-def test_a_readout_shows_value_and_time_of_reception(robot: Robot) -> None:
+def test_a_readout_shows_value_and_time_of_reception(robot: RobotState) -> None:
     says(robot, "/heard", "hello", at=3661.0)
     assert heard(robot, 9999.0) == (
         {"state": "live", "text": "hello", "note": "received 01:01:01"},
@@ -183,7 +186,7 @@ def test_a_readout_shows_value_and_time_of_reception(robot: Robot) -> None:
 
 
 @pytest.mark.usefixtures("utc")
-def test_a_readout_from_before_a_cut_says_so(robot: Robot) -> None:
+def test_a_readout_from_before_a_cut_says_so(robot: RobotState) -> None:
     says(robot, "/heard", "hello", at=3661.0)
     robot.cut(BRIDGE, 2)
     shown, _ = heard(robot)
@@ -194,14 +197,14 @@ def test_a_readout_from_before_a_cut_says_so(robot: Robot) -> None:
     }
 
 
-def test_a_readout_that_can_not_be_read_says_so(robot: Robot) -> None:
+def test_a_readout_that_can_not_be_read_says_so(robot: RobotState) -> None:
     robot.take("heard", Sample(b"broken", 1, NOW, NOW, BRIDGE))
     shown, _ = heard(robot)
     assert (shown["state"], shown["text"]) == ("unreadable", "—")
     assert shown["note"] == "/heard can't be read: what arrives is not std_msgs/msg/String"
 
 
-def test_a_readout_of_a_topic_of_another_type_says_so(robot: Robot) -> None:
+def test_a_readout_of_a_topic_of_another_type_says_so(robot: RobotState) -> None:
     says(robot, "/heard", "hello")
     endpoint(robot, "MP", "/heard", BOOL)
     shown, _ = heard(robot)
@@ -209,7 +212,7 @@ def test_a_readout_of_a_topic_of_another_type_says_so(robot: Robot) -> None:
     assert shown["note"].startswith("/heard is std_msgs/msg/Bool on the robot")
 
 
-def test_what_was_unreadable_before_a_cut_is_waited_for(robot: Robot) -> None:
+def test_what_was_unreadable_before_a_cut_is_waited_for(robot: RobotState) -> None:
     robot.take("heard", Sample(b"broken", 1, NOW, NOW, BRIDGE))
     robot.cut(BRIDGE, 2)
     assert heard(robot)[0]["state"] == "waiting"
@@ -227,7 +230,7 @@ def test_what_was_unreadable_before_a_cut_is_waited_for(robot: Robot) -> None:
     ],
 )
 def test_a_readout_with_a_greatest_age_tells_its_age(
-    robot: Robot, age: float, state: str, note: str | None, changes_at: float
+    robot: RobotState, age: float, state: str, note: str | None, changes_at: float
 ) -> None:
     says(robot, "/heard", "hello", at=NOW)
     shown, until = heard(robot, NOW + age, max_age_s=5)
@@ -242,7 +245,7 @@ def test_a_readout_shows_a_field_inside() -> None:
     robot = robot_there(panel)
     payload = INTERFACES.encode(header, {"stamp": {"sec": 5, "nanosec": 0}, "frame_id": ""})
     robot.take("heard", Sample(payload, 1, NOW, NOW, BRIDGE))
-    assert sight(panel, robot, NOW).view["widgets"]["heard"]["text"] == "5"
+    assert build_view(panel, robot, NOW).view["widgets"]["heard"]["text"] == "5"
 
 
 @pytest.mark.parametrize(
@@ -268,24 +271,24 @@ def test_a_value_is_written_as_text(value: Any, text: str) -> None:
     assert written(value) == text
 
 
-def test_the_view_changes_when_the_first_of_its_times_comes(robot: Robot) -> None:
+def test_the_view_changes_when_the_first_of_its_times_comes(robot: RobotState) -> None:
     panel = panel_of({**HEARD, "max_age_s": 9}, interlock={"max_age_s": 2})
     permits(robot, at=NOW)
     says(robot, "/heard", "hello", at=NOW)
-    assert sight(panel, robot, NOW + 1).until == NOW + 2
-    assert sight(panel, robot, NOW + 3).until == NOW + 9
+    assert build_view(panel, robot, NOW + 1).until == NOW + 2
+    assert build_view(panel, robot, NOW + 3).until == NOW + 9
 
 
-def test_a_view_that_time_does_not_change_needs_no_timer(robot: Robot) -> None:
+def test_a_view_that_time_does_not_change_needs_no_timer(robot: RobotState) -> None:
     permits(robot)
-    assert sight(PANEL, robot, NOW).until == math.inf
+    assert build_view(PANEL, robot, NOW).until == math.inf
 
 
-def test_joining_shows_again_when_it_is_over(robot: Robot) -> None:
+def test_joining_shows_again_when_it_is_over(robot: RobotState) -> None:
     robot.settled_at = NOW + 1
-    assert sight(PANEL, robot, NOW).until == NOW + 1
+    assert build_view(PANEL, robot, NOW).until == NOW + 1
 
 
-def test_a_readout_alone_gives_attributes_and_time(robot: Robot) -> None:
+def test_a_readout_alone_gives_attributes_and_time(robot: RobotState) -> None:
     widget: Any = next(w for w in PANEL.widgets() if w.id == "heard")
     assert readout(widget, robot, NOW)[0]["state"] == "waiting"

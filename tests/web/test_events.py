@@ -10,9 +10,9 @@ import pytest
 from starlette.responses import Response
 from starlette.types import Message, Receive, Scope, Send
 
-from app.robot.state import Robot
-from app.view.publisher import Board
-from app.view.view import View, sight
+from app.robot.state import RobotState
+from app.view.publisher import ViewPublisher
+from app.view.view import View, build_view
 from app.web.asgi import Application, Direct, direct
 from app.web.metrics import Open
 from app.web.routes.events import EventStream
@@ -23,8 +23,8 @@ PANEL = small_panel()
 SCOPE: dict[str, Any] = {"type": "http"}
 
 
-def view_of(robot: Robot) -> View:
-    return sight(PANEL, robot, NOW).view
+def view_of(robot: RobotState) -> View:
+    return build_view(PANEL, robot, NOW).view
 
 
 class Client:
@@ -65,7 +65,7 @@ class Bench:
 
     def __init__(self) -> None:
         self.robot = robot_there(PANEL)
-        self.board = Board(view_of(self.robot), "r1")
+        self.board = ViewPublisher(view_of(self.robot), "r1")
         self.streams = Open()
 
     @property

@@ -5,11 +5,11 @@ from collections.abc import Callable
 
 from prometheus_client.parser import text_string_to_metric_families
 
-from app.audit import Unlogged
+from app.audit import NullLog
 from app.dialect.bridge_dialect import bridge_token
 from app.robot.state import Sample
 from app.runtime.fleet import Fleet
-from app.runtime.robot_session import Kiosk
+from app.runtime.robot_session import RobotSession
 from app.transport.zenoh_session import config_to
 from app.web.metrics import Metrics
 from app.web.prometheus import exposition
@@ -30,10 +30,10 @@ def read(metrics: Metrics) -> Samples:
 
 
 def nowhere() -> Fleet:
-    return Fleet(small_panel(), lambda _: config_to(NOWHERE), "r1", Unlogged())
+    return Fleet(small_panel(), lambda _: config_to(NOWHERE), "r1", NullLog())
 
 
-def of_kiosk(change: Callable[[Kiosk], None]) -> Samples:
+def of_kiosk(change: Callable[[RobotSession], None]) -> Samples:
     """What is read of a kiosk after a change."""
 
     async def followed() -> Samples:
@@ -57,10 +57,10 @@ def test_a_kiosk_without_a_link_is_not_ready() -> None:
 
 
 def test_a_kiosk_that_can_send_is_ready() -> None:
-    def connect(kiosk: Kiosk) -> None:
-        kiosk.robot.link_up = True
-        kiosk.robot.settled_at = 0.0
-        kiosk.robot.graph.apply(bridge_token(BRIDGE), True)
+    def connect(session: RobotSession) -> None:
+        session.robot.link_up = True
+        session.robot.settled_at = 0.0
+        session.robot.graph.apply(bridge_token(BRIDGE), True)
 
     samples = of_kiosk(connect)
     assert samples["kiosk_link_up", ("",)] == 1
@@ -69,10 +69,10 @@ def test_a_kiosk_that_can_send_is_ready() -> None:
 
 
 def test_samples_that_were_not_their_type_are_counted_by_key() -> None:
-    def hear(kiosk: Kiosk) -> None:
+    def hear(session: RobotSession) -> None:
         for seq in (1, 2):
-            kiosk.robot.take("heard", Sample(b"broken", seq, 0.0, 0.0, BRIDGE))
-            kiosk.robot.reading("/heard")
+            session.robot.take("heard", Sample(b"broken", seq, 0.0, 0.0, BRIDGE))
+            session.robot.reading("/heard")
 
     assert of_kiosk(hear)["kiosk_undecodable_total", ("heard", "")] == 2
 

@@ -9,7 +9,7 @@ from starlette.responses import PlainTextResponse
 from starlette.types import Receive, Scope, Send
 
 from app.settings import LOOPBACK_HOSTS
-from app.web.security import SECURITY_HEADERS, Doors
+from app.web.security import SECURITY_HEADERS, RequestGuard
 
 GUARDED = [("POST", "/widgets/x"), ("GET", "/events"), ("GET", "/robots/r1/events")]
 HOSTS = (*LOOPBACK_HOSTS, "cell1.local", "10.0.0.7", "[fe80::1]")
@@ -23,7 +23,7 @@ def asked(
     """What comes back through the doors; inside, everything is answered with "in"."""
 
     async def ask() -> httpx.Response:
-        doors = Doors(answer or PlainTextResponse("in"), HOSTS)
+        doors = RequestGuard(answer or PlainTextResponse("in"), HOSTS)
         transport = httpx.ASGITransport(doors)
         async with httpx.AsyncClient(transport=transport, base_url="http://localhost:8000") as client:
             return await client.request(method, path, headers=headers)
@@ -212,7 +212,7 @@ def test_what_is_no_http_passes() -> None:
     async def nowhere(message: object) -> None:
         raise AssertionError(message)
 
-    asyncio.run(Doors(inside, HOSTS)({"type": "lifespan"}, nothing, nowhere))
+    asyncio.run(RequestGuard(inside, HOSTS)({"type": "lifespan"}, nothing, nowhere))
     assert seen == ["lifespan"]
 
 
@@ -245,7 +245,7 @@ def wanted_socket(headers: Mapping[str, str], *extensions: str) -> list[dict[str
         "headers": [(name.encode(), value.encode()) for name, value in headers.items()],
         "extensions": {key: {} for key in extensions},
     }
-    asyncio.run(Doors(inside, HOSTS)(scope, receive, send))
+    asyncio.run(RequestGuard(inside, HOSTS)(scope, receive, send))
     return sent
 
 

@@ -17,8 +17,8 @@ from app.i18n import say
 from app.interfaces import Fields, Interfaces
 from app.panel.template import PLACE
 from app.panel.widgets.service_action import Action
-from app.robot.command_status import Answer
-from app.robot.state import Robot
+from app.robot.command_status import Outcome
+from app.robot.state import RobotState
 from app.ros_logging import RobotLog
 
 log = logging.getLogger("kiosk.actions")
@@ -31,11 +31,11 @@ NO_SUCH_GOAL: Final = frozenset({2, 3})  # its ERROR_UNKNOWN_GOAL_ID, ERROR_GOAL
 Query = asyncio.Future[bytes | None]
 
 
-class ActionServices:
+class ActionClient:
     """Those of one robot. What asks gives LinkError where that could not be sent; what reads a reply
     gives None for one that can't be read."""
 
-    def __init__(self, interfaces: Interfaces, robot: Robot, link: Asker) -> None:
+    def __init__(self, interfaces: Interfaces, robot: RobotState, link: Asker) -> None:
         self._interfaces = interfaces
         self._robot = robot
         self._log = RobotLog(log, robot.name)
@@ -78,21 +78,21 @@ class ActionServices:
             await asyncio.wait({goal.cut}, timeout=CUT_NEWS_S)  # the news of a cut may follow
         return reply
 
-    def first_answer(self, goal: Goal, reply: bytes | None) -> Answer:
+    def first_answer(self, goal: Goal, reply: bytes | None) -> Outcome:
         """What `send_goal` answered, or why it did not."""
         widget, now = goal.widget, format_time(time.time())
         if reply is not None:
             response = self._interfaces.action(widget.type).send_goal_response
             message = self._decoded(widget, response, reply)
             if message is None:
-                return Answer("unknown", say("answer_unreadable", wanted=widget.type))
+                return Outcome("unknown", say("answer_unreadable", wanted=widget.type))
             if message.accepted:
-                return Answer("accepted", say("goal_accepted", time=now))
-            return Answer("rejected", say("goal_rejected", time=now))
+                return Outcome("accepted", say("goal_accepted", time=now))
+            return Outcome("rejected", say("goal_rejected", time=now))
         if goal.cut.done():
-            return Answer("unknown", goal.cut.result() or say("call_cut"))
+            return Outcome("unknown", goal.cut.result() or say("call_cut"))
         seconds = f"{widget.timeout_s:g}"
-        return Answer("timed_out", say("timed_out", seconds=seconds) + say("cyclone_hint"))
+        return Outcome("timed_out", say("timed_out", seconds=seconds) + say("cyclone_hint"))
 
     def cancel_response(self, widget: Action, reply: bytes) -> Any:
         """What `cancel_goal` answered: a message with `return_code` and `goals_canceling`."""

@@ -14,7 +14,7 @@ from app.commands.service_calls import with_fields
 from app.i18n import say
 from app.interfaces import Fields
 from app.panel.widgets.service_action import Action
-from app.robot.command_status import Answer, Outcome, Progress
+from app.robot.command_status import CommandStatus, Outcome, OutcomeCode
 
 FEEDBACK: Final = "feedback."  # where it is in the message that has it
 UNKNOWN: Final = 0
@@ -23,7 +23,7 @@ EXECUTING: Final = 2
 CANCELING: Final = 3
 NAMES: Final = ("UNKNOWN", "ACCEPTED", "EXECUTING", "CANCELING", "SUCCEEDED", "CANCELED", "ABORTED")
 # The outcome, and the sentences for an end that was seen and for one that was asked for later.
-ENDS: Final[Mapping[int, tuple[Outcome, str, str]]] = {
+ENDS: Final[Mapping[int, tuple[OutcomeCode, str, str]]] = {
     4: ("succeeded", "goal_succeeded", "goal_had_succeeded"),
     5: ("canceled", "goal_canceled", "goal_had_been_canceled"),
     6: ("aborted", "goal_aborted", "goal_had_been_aborted"),
@@ -50,7 +50,7 @@ class Goal:
     press_id: str
     id: uuid.UUID
     cut: "asyncio.Future[str]"
-    corrected: Callable[[str, Answer], None]
+    corrected: Callable[[str, Outcome], None]
     state: int | None = None
     known: bool = False
     doubt: str = ""
@@ -80,20 +80,20 @@ class Goal:
         return self.state is not None and self.state != UNKNOWN and self.state not in ENDS
 
     @property
-    def under_way(self) -> Progress:
+    def under_way(self) -> CommandStatus:
         sentence = say("goal_canceling" if self.state == CANCELING else "goal_executing")
         text = f"{sentence} {self.said}".strip()
-        return Progress(True, "accepted", text, self.fraction, True, self._name, self.press_id)
+        return CommandStatus(True, "accepted", text, self.fraction, True, self._name, self.press_id)
 
     @property
-    def in_doubt(self) -> Progress:
+    def in_doubt(self) -> CommandStatus:
         """What is shown of a goal that may be under way."""
         stoppable, press = not self.cut.done(), self.press_id
-        return Progress(True, "unknown", self.doubt, None, stoppable, NAMES[UNKNOWN], press)
+        return CommandStatus(True, "unknown", self.doubt, None, stoppable, NAMES[UNKNOWN], press)
 
-    def came_to(self, answer: Answer) -> Progress:
+    def came_to(self, answer: Outcome) -> CommandStatus:
         """What is shown when nothing is awaited any more."""
-        return Progress(outcome=answer.outcome, text=answer.text, goal=self._name)
+        return CommandStatus(outcome=answer.outcome, text=answer.text, goal=self._name)
 
     @property
     def _name(self) -> str:

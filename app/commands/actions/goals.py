@@ -11,9 +11,9 @@ from functools import partial
 from typing import Any, Final
 
 from app.clock import format_time
-from app.commands.actions.client import CANCEL, NO_SUCH_GOAL, ActionServices
+from app.commands.actions.client import CANCEL, NO_SUCH_GOAL, ActionClient
 from app.commands.actions.goal import ACCEPTED, CANCELING, EXECUTING, FEEDBACK, UNKNOWN, Goal, goal_id
-from app.commands.actions.results import Following
+from app.commands.actions.results import ResultWaiter
 from app.commands.service_calls import MOST_UNANSWERED, Asker
 from app.dialect import bridge_dialect
 from app.errors import DecodeError
@@ -21,26 +21,26 @@ from app.i18n import say
 from app.interfaces import Fields, Interfaces
 from app.panel.template import PLACE
 from app.panel.widgets.service_action import Action
-from app.robot.command_status import IDLE, Answer, Corrected, LastLook, Progress, no_look
-from app.robot.state import Reading, Robot, Sample
+from app.robot.command_status import IDLE, CommandStatus, LastLook, OnCorrection, Outcome, no_look
+from app.robot.state import Reading, RobotState, Sample
 from app.robot.topics import Topic
 
 STATUS: Final = "action_msgs/msg/GoalStatusArray"
 GOAL_ID: Final = "goal_id.uuid"
 
 
-class Actions:
+class GoalTracker:
     """The goals of one robot; used on the event loop only."""
 
     def __init__(
-        self, interfaces: Interfaces, robot: Robot, link: Asker, changed: Callable[[], None]
+        self, interfaces: Interfaces, robot: RobotState, link: Asker, changed: Callable[[], None]
     ) -> None:
         """`changed` is called when what the widgets show has changed."""
         self._interfaces = interfaces
         self._robot = robot
         self._changed = changed
-        self._services = ActionServices(interfaces, robot, link)
-        self._following = Following(
+        self._services = ActionClient(interfaces, robot, link)
+        self._results = ResultWaiter(
             self._services, robot, cut=self._doubt, back=self._advanced, tell=self._tell
         )
         self._latest: dict[str, Goal] = {}  # by widget
@@ -52,7 +52,7 @@ class Actions:
         bridge = bool(self._robot.graph.bridges)
         if not bridge:
             self._states.clear()
-        for goal in (*self._latest.values(), *self._following.goals):
+        for goal in (*self._latest.values(), *self._results.goals):
             if not goal.cut.done() and not (bridge and self._services.offered(goal.widget)):
                 gone = say("goal_gone", name=goal.widget.action)
                 goal.cut.set_result(gone if bridge else "")
@@ -61,34 +61,34 @@ class Actions:
 
     async def stop(self) -> None:
         """Ends its tasks; goals go on in the robot."""
-        await self._following.stop()
+        await self._results.stop()
 
     async def start(
         self,
         widget: Action,
         fields: dict[str, Any],
         press_id: str,
-        corrected: Corrected,
+        corrected: OnCorrection,
         entry: str = "",
         look: LastLook = no_look,
-    ) -> Answer:
+    ) -> Outcome:
         """Sends a goal; `corrected` gets what came of it in the end, `entry` is the hash of the press's
         entry in the operator's log. FieldError for bad fields, LinkError where it could not be sent:
         then nothing is under way."""
         own_id = goal_id(entry)
         request = self._services.goal_request(widget, own_id, fields)
         if why := self.full(widget.action):
-            return Answer("refused", why)
+            return Outcome("refused", why)
         look()
         query = self._services.send_goal(widget, request)
         cut = asyncio.get_running_loop().create_future()
         goal = Goal(widget, press_id, own_id, cut, corrected)
         self._latest[widget.id] = goal
-        self._show(goal, Progress(busy=True, text=say("waiting_for_answer")))
+        self._show(goal, CommandStatus(busy=True, text=say("waiting_for_answer")))
         answer = self._services.first_answer(goal, await self._services.reply(goal, query))
         if answer.outcome != "rejected":
             goal.advance(ACCEPTED if answer.outcome == "accepted" else UNKNOWN)
-            self._following.begin(goal)
+            self._results.begin(goal)
         if cut.done() and answer.outcome == "unknown" and not goal.lives:
             self._show_doubt(goal, answer.text)
         else:
@@ -99,26 +99,26 @@ class Actions:
     def resume(self, goal: Goal) -> None:
         """Follows a goal of before the server's start, whose `cut` is done. Its widget shows it, unless
         it has a later one."""
-        if any(goal.id == one.id for one in (*self._latest.values(), *self._following.goals)):
+        if any(goal.id == one.id for one in (*self._latest.values(), *self._results.goals)):
             return
         self._latest.setdefault(goal.widget.id, goal)
-        self._following.begin(goal)
+        self._results.begin(goal)
         self._show(goal, goal.in_doubt)
         if (said := self._states.get(goal.widget.action)) is not None:
             self.hear_status(goal.widget.action, said)
 
     def full(self, action: str) -> str:
         """Why no further goal of an action is sent; "" while one may be."""
-        count = sum(goal.widget.action == action for goal in self._following.goals)
+        count = sum(goal.widget.action == action for goal in self._results.goals)
         return say("too_many", service=action) if count >= MOST_UNANSWERED else ""
 
     def _stoppable(self, widget: Action, press_id: str) -> Goal | None:
-        latest, shown = self._latest.get(widget.id), self._robot.progress.get(widget.id, IDLE)
+        latest, shown = self._latest.get(widget.id), self._robot.command_status.get(widget.id, IDLE)
         if not press_id:
             return latest if shown.stoppable else None
         if latest is not None and latest.press_id == press_id and shown.busy:
             return latest
-        followed = (goal for goal in self._following.goals if goal.widget.id == widget.id)
+        followed = (goal for goal in self._results.goals if goal.widget.id == widget.id)
         return next((goal for goal in followed if goal.press_id == press_id), None)
 
     def over(self, widget: Action, press_id: str) -> str:
@@ -127,38 +127,40 @@ class Actions:
             return ""
         return say("goal_over" if press_id else "nothing_to_cancel")
 
-    async def cancel(self, widget: Action, press_id: str = "") -> Answer:
+    async def cancel(self, widget: Action, press_id: str = "") -> Outcome:
         """Asks the robot to cancel the goal of one press or, without its id, the one that is shown to
         be under way. LinkError where that could not be sent."""
         if (goal := self._stoppable(widget, press_id)) is None:
-            return Answer("refused", self.over(widget, press_id))
+            return Outcome("refused", self.over(widget, press_id))
         reply = await self._services.reply(goal, self._services.cancel_goal(goal))
         if reply is None:
-            return Answer("unknown", self._services.why_silent(widget))
+            return Outcome("unknown", self._services.why_silent(widget))
         response = self._services.cancel_response(widget, reply)
         if response is None:
-            return Answer("unknown", say("answer_unreadable", wanted=CANCEL))
+            return Outcome("unknown", say("answer_unreadable", wanted=CANCEL))
         return self._cancel_answered(goal, response)
 
-    def _cancel_answered(self, goal: Goal, response: Any) -> Answer:
+    def _cancel_answered(self, goal: Goal, response: Any) -> Outcome:
         """Only a goal that is listed is being canceled: rclpy refuses with return code 0."""
         now = format_time(time.time())
         if any(bytes(one.goal_id.uuid) == goal.id.bytes for one in response.goals_canceling):
-            if goal.advance(CANCELING) and (goal.doubt or self._robot.progress[goal.widget.id].busy):
+            if goal.advance(CANCELING) and (
+                goal.doubt or self._robot.command_status[goal.widget.id].busy
+            ):
                 self._find(goal)
                 self._show(goal, goal.under_way)
-            return Answer("accepted", say("cancel_sent", time=now))
+            return Outcome("accepted", say("cancel_sent", time=now))
         if goal.state == CANCELING:  # by an earlier cancel
-            return Answer("accepted", say("goal_canceling"))
+            return Outcome("accepted", say("goal_canceling"))
         if response.return_code in NO_SUCH_GOAL and goal.doubt and not goal.cut.done():
             goal.cut.set_result("")  # its end is asked for anew
-        return Answer("rejected", say("cancel_refused", time=now))
+        return Outcome("rejected", say("cancel_refused", time=now))
 
     def hear_feedback(self, action: str, sample: Sample) -> None:
         """The latest feedback of an action; of another program's goal it is passed over. Whoever
         calls this shows it when a frame is due."""
         for goal in self._of(action):
-            if self._robot.progress[goal.widget.id].stoppable:
+            if self._robot.command_status[goal.widget.id].stoppable:
                 topic = self._feedback_of(goal.widget)
                 topic.take(sample)
                 self._hear(goal, topic.reading())
@@ -169,7 +171,7 @@ class Actions:
             self._take_feedback(goal, fields)
 
     def _hear_later(self, widget: str, reading: Reading) -> None:
-        if (goal := self._latest.get(widget)) and self._robot.progress[widget].stoppable:
+        if (goal := self._latest.get(widget)) and self._robot.command_status[widget].stoppable:
             self._hear(goal, reading)
             self._changed()
 
@@ -217,7 +219,7 @@ class Actions:
     def _advanced(self, goal: Goal) -> None:
         """It has another state; while its first answer or its result is awaited, or its server after a
         cut, that will show."""
-        if goal.cut.done() or goal not in self._following.goals:
+        if goal.cut.done() or goal not in self._results.goals:
             return
         if goal.lives:
             self._find(goal)
@@ -227,9 +229,9 @@ class Actions:
 
     def _find(self, goal: Goal) -> None:
         """It is under way; where that was not known, it is told."""
-        if goal.doubt or not self._robot.progress[goal.widget.id].busy:
+        if goal.doubt or not self._robot.command_status[goal.widget.id].busy:
             goal.doubt = ""
-            answer = Answer("accepted", say("goal_found", time=format_time(time.time())))
+            answer = Outcome("accepted", say("goal_found", time=format_time(time.time())))
             goal.corrected(goal.press_id, answer)
 
     def _take_feedback(self, goal: Goal, message: Fields) -> None:
@@ -241,25 +243,25 @@ class Actions:
     def _doubt(self, goal: Goal, why: str) -> None:
         """It was cut off: the robot may be at it, and until that is known no other is sent."""
         self._show_doubt(goal, why)
-        goal.corrected(goal.press_id, Answer("unknown", why))
+        goal.corrected(goal.press_id, Outcome("unknown", why))
 
     def _show_doubt(self, goal: Goal, why: str) -> None:
         goal.doubt = why
         self._show(goal, goal.in_doubt)
 
-    def _tell(self, goal: Goal, answer: Answer) -> None:
+    def _tell(self, goal: Goal, answer: Outcome) -> None:
         """What came of it, or that it is not known any more: to the widget and the receipt."""
         goal.doubt = ""
         self._show(goal, goal.came_to(answer))
         goal.corrected(goal.press_id, answer)
 
-    def _show(self, goal: Goal, progress: Progress) -> None:
+    def _show(self, goal: Goal, progress: CommandStatus) -> None:
         if self._note(goal, progress):
             self._changed()
 
-    def _note(self, goal: Goal, progress: Progress) -> bool:
+    def _note(self, goal: Goal, progress: CommandStatus) -> bool:
         """What its widget will show; False where that shows another goal by now."""
         latest = self._latest.get(goal.widget.id) is goal
         if latest:
-            self._robot.progress[goal.widget.id] = progress
+            self._robot.command_status[goal.widget.id] = progress
         return latest

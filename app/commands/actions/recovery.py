@@ -11,18 +11,18 @@ import time
 from collections.abc import Callable
 from typing import Final
 
-from app.audit import Unended
-from app.audit.press_record import Logbook, Noted
+from app.audit import OpenPress
+from app.audit.press_record import PendingEntry, PressLog
 from app.clock import format_datetime, format_time
 from app.commands.actions.goal import UNKNOWN, Goal, goal_id
-from app.commands.actions.goals import Actions
-from app.concurrency import told
+from app.commands.actions.goals import GoalTracker
+from app.concurrency import spawn_logged
 from app.errors import LogError
 from app.i18n import say
 from app.panel.model import Panel
 from app.panel.widgets.service_action import Action
-from app.robot.command_status import IDLE, Answer, Progress
-from app.robot.state import Robot
+from app.robot.command_status import IDLE, CommandStatus, Outcome
+from app.robot.state import RobotState
 from app.ros_logging import RobotLog
 
 log = logging.getLogger("kiosk.actions")
@@ -32,15 +32,15 @@ TODAY_S: Final = 43_200.0  # an older time has its date
 READ_AGAIN_S: Final = 1.0
 
 
-class Resuming:
+class GoalRecovery:
     """Of one robot; on the event loop only."""
 
     def __init__(
         self,
         panel: Panel,
-        robot: Robot,
-        logbook: Logbook,
-        actions: Actions,
+        robot: RobotState,
+        press_log: PressLog,
+        actions: GoalTracker,
         changed: Callable[[], None],
         read_again_s: float = READ_AGAIN_S,
     ) -> None:
@@ -48,7 +48,7 @@ class Resuming:
         self._widgets = {w.id: w for w in panel.widgets() if isinstance(w, Action)}
         self._robot = robot
         self._log = RobotLog(log, robot.name)
-        self._logbook = logbook
+        self._press_log = press_log
         self._actions = actions
         self._changed = changed
         self._read_again_s = read_again_s
@@ -59,7 +59,7 @@ class Resuming:
         """Returns when the goals are known; where the log can't be read, that is tried again and again,
         and meanwhile no goal is sent, unless the panel goes on without its log."""
         if self._widgets and not await self._read():
-            self._reading = told(self._read_later(), self._log, "goals were not followed anew")
+            self._reading = spawn_logged(self._read_later(), self._log, "goals were not followed anew")
 
     async def stop(self) -> None:
         if self._reading is not None:
@@ -75,41 +75,41 @@ class Resuming:
     async def _read(self) -> bool:
         since = round((time.time() - LOOKED_BACK_S) * 1000)
         try:
-            found = await self._logbook.unended(self._widgets, since)
+            found = await self._press_log.open_presses(self._widgets, since)
         except LogError as error:
             self._say_unread(str(error))
             return False
         self._show(IDLE)
         final = {say("goal_lost"), say("goal_not_there")}
-        for unended, noted in found:
-            if unended.reason not in final:
-                self._resume(unended, noted)
+        for open_press, pending in found:
+            if open_press.reason not in final:
+                self._resume(open_press, pending)
         return True
 
     def _say_unread(self, why: str) -> None:
         text = say("goals_unread", why=why)
         if text != self._unread.text:
             self._log.warning("%s", text)
-        self._show(Progress(busy=not self._logbook.unneeded, outcome="unknown", text=text))
+        self._show(CommandStatus(busy=not self._press_log.unneeded, outcome="unknown", text=text))
 
-    def _show(self, progress: Progress) -> None:
+    def _show(self, progress: CommandStatus) -> None:
         """Where nothing else is shown."""
         before, self._unread = self._unread, progress
         if before == progress:
             return
         for widget in self._widgets:
-            if self._robot.progress.get(widget, IDLE) in (IDLE, before):
-                self._robot.progress[widget] = progress
+            if self._robot.command_status.get(widget, IDLE) in (IDLE, before):
+                self._robot.command_status[widget] = progress
         self._changed()
 
-    def _resume(self, unended: Unended, noted: Noted) -> None:
+    def _resume(self, unended: OpenPress, pending: PendingEntry) -> None:
         press, widget = unended.press, self._widgets[unended.press.widget]
         if why := self._actions.full(widget.action):
             self._log.warning("press %s is not followed anew: %s", press.press, why)
             return
 
-        def corrected(press_id: str, answer: Answer) -> None:
-            noted.corrected(answer)
+        def corrected(press_id: str, answer: Outcome) -> None:
+            pending.corrected(answer)
 
         cut = asyncio.get_running_loop().create_future()
         cut.set_result("")  # until its server is offered

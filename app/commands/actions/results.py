@@ -7,15 +7,15 @@ from collections.abc import Callable, Collection
 from typing import Final
 
 from app.clock import format_time
-from app.commands.actions.client import RESULT, STATUS, ActionServices
+from app.commands.actions.client import RESULT, STATUS, ActionClient
 from app.commands.actions.goal import ENDS, UNKNOWN, Goal
 from app.commands.service_calls import LATE_S, with_fields
-from app.concurrency import told
+from app.concurrency import spawn_logged
 from app.errors import LinkError
 from app.i18n import say
 from app.permission.interlocks import SERVER_SETTLE_S
-from app.robot.command_status import Answer
-from app.robot.state import Robot
+from app.robot.command_status import Outcome
+from app.robot.state import RobotState
 from app.ros_logging import RobotLog
 
 log = logging.getLogger("kiosk.actions")
@@ -24,17 +24,17 @@ RESULT_S: Final = 86_400.0  # a result is waited for as long as the goal takes
 ASK_AGAIN_S: Final = 1.0
 
 
-class Following:
+class ResultWaiter:
     """The goals of one robot whose ends are not known yet, each with a task of its own."""
 
     def __init__(
         self,
-        services: ActionServices,
-        robot: Robot,
+        services: ActionClient,
+        robot: RobotState,
         *,
         cut: Callable[[Goal, str], None],
         back: Callable[[Goal], None],
-        tell: Callable[[Goal, Answer], None],
+        tell: Callable[[Goal, Outcome], None],
     ) -> None:
         """`tell` gets what came of a goal, or that it is not known any more; `cut` is called with the
         sentence when one is cut off, and `back` when its server is offered again."""
@@ -52,7 +52,7 @@ class Following:
 
     def begin(self, goal: Goal) -> None:
         """Follows a goal from now on."""
-        task = told(self._follow(goal), self._log, "following a goal failed")
+        task = spawn_logged(self._follow(goal), self._log, "following a goal failed")
         self._goals[task] = goal
         task.add_done_callback(self._ended)
 
@@ -67,7 +67,7 @@ class Following:
         goal = self._goals.pop(task)
         if not task.cancelled() and task.exception():
             goal.state = UNKNOWN
-            self._tell(goal, Answer("unknown", say("goal_fault")))
+            self._tell(goal, Outcome("unknown", say("goal_fault")))
 
     async def _follow(self, goal: Goal) -> None:
         while True:
@@ -83,7 +83,7 @@ class Following:
             if not (goal.known or goal.cut.done()):
                 if not goal.doubt:
                     return  # it was never heard of: what was said of it stands
-                answer = Answer("unknown", say("goal_silent", seconds=f"{LATE_S:g}"))
+                answer = Outcome("unknown", say("goal_silent", seconds=f"{LATE_S:g}"))
                 break
             await asyncio.wait({goal.cut}, timeout=ASK_AGAIN_S)
         self._log.info("press %s: goal %s: %s: %s", goal.press_id, goal.id, answer.outcome, answer.text)
@@ -97,22 +97,22 @@ class Following:
         ):
             await asyncio.sleep(ASK_AGAIN_S)
 
-    async def _end(self, goal: Goal) -> Answer | None:
+    async def _end(self, goal: Goal) -> Outcome | None:
         """What came of it; None where nothing more is heard, or nobody answered."""
         reply = await self._result(goal)
         if reply is None:
             return None
         fields = await self._services.result(goal.widget, reply)
         if fields is None:
-            return Answer("unknown", say("answer_unreadable", wanted=goal.widget.type))
+            return Outcome("unknown", say("answer_unreadable", wanted=goal.widget.type))
         status = fields.get(STATUS)
         goal.state = status if status in ENDS else UNKNOWN
         if status not in ENDS:
-            return Answer("unknown", say("goal_lost") if goal.known else say("goal_not_there"))
+            return Outcome("unknown", say("goal_lost") if goal.known else say("goal_not_there"))
         outcome, seen, asked = ENDS[status]
         sentence = asked if goal.doubt else seen
         said = with_fields(goal.widget.result, fields, RESULT)
-        return Answer(
+        return Outcome(
             outcome, say(sentence, time=format_time(time.time())) + (f": {said}" if said else ".")
         )
 

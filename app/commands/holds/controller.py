@@ -13,9 +13,9 @@ from typing import Any, Protocol
 
 from app.clock import format_time
 from app.commands.holds.lease import LEASE_S, Lease
-from app.commands.holds.messages import Checked, HoldMessages, Values, Way
-from app.commands.holds.receipts import RELEASED, Holding, HoldReceipts, Refusal, refused
-from app.commands.receipts import MOST_LOOKS, By, Receipt, Witness, cause_of, judged
+from app.commands.holds.messages import Checked, HoldMessages, Transport, Values
+from app.commands.holds.receipts import RELEASED, ActiveHold, HoldReceipts, Refusal, refused
+from app.commands.receipts import MOST_LOOKS, PressContext, Receipt, Witness, cause_of, judged
 from app.errors import Cause, FieldError, InputError, LinkError, NotFound, PressRefused
 from app.i18n import say
 from app.interfaces import Interfaces
@@ -23,7 +23,7 @@ from app.panel.model import Panel
 from app.panel.template import needed
 from app.panel.widgets.hold import Hold
 from app.permission.interlocks import Verdict
-from app.robot.state import Robot
+from app.robot.state import RobotState
 
 
 class Clock(Protocol):
@@ -33,15 +33,15 @@ class Clock(Protocol):
     def call_at(self, when: float, callback: Callable[[], object]) -> asyncio.TimerHandle: ...
 
 
-class Holds:
+class HoldController:
     """The holds of one robot, one for each widget at most; used on the event loop only."""
 
     def __init__(
         self,
         panel: Panel,
         interfaces: Interfaces,
-        robot: Robot,
-        way: Way,
+        robot: RobotState,
+        transport: Transport,
         loop: Clock,
         *,
         checked: Checked,
@@ -56,14 +56,14 @@ class Holds:
         self._panel = panel
         self._robot = robot
         self._loop = loop
-        self._messages = HoldMessages(interfaces, robot, way, checked)
+        self._messages = HoldMessages(interfaces, robot, transport, checked)
         self._receipts = HoldReceipts(robot.name, witness)
         self.doubted = self._receipts.doubted
         self._take = take
         self._news = news
         self._changed = changed
         self._widgets = {w.id: w for w in panel.widgets() if isinstance(w, Hold)}
-        self._held: dict[str, Holding] = {}
+        self._held: dict[str, ActiveHold] = {}
         self._timer: asyncio.TimerHandle | None = None
         self._closed = False
 
@@ -78,21 +78,21 @@ class Holds:
         widget_id: str,
         inputs: Mapping[str, Any],
         sent: float,
-        by: By,
+        context: PressContext,
         told: Callable[[Receipt], None],
         hold_id: str = "",
-    ) -> Receipt | Holding:
+    ) -> Receipt | ActiveHold:
         """Begins to publish, or says why not. `sent` is when the browser asked, at the latest; a hold
         without an id gets one."""
         self._take()
         self.judge()
         widget, now = self.widget(widget_id), self._loop.time()
-        ready = self._ready(widget, inputs, sent, by, now)
+        ready = self._ready(widget, inputs, sent, context, now)
         if isinstance(ready, Refusal):
-            return self._receipts.refused(widget, inputs, by, ready, hold_id)
+            return self._receipts.refused(widget, inputs, context, ready, hold_id)
         lease = Lease.begun(hold_id or secrets.token_hex(8), widget.period_s, sent, now)
         since = say("hold_since", time=format_time(time.time()))
-        holding = Holding(widget, lease, by, needed(widget, inputs), ready, told, since)
+        holding = ActiveHold(widget, lease, context, needed(widget, inputs), ready, told, since)
         self._held[widget_id] = holding
         self._robot.held[widget_id] = since
         self._receipts.began(holding)
@@ -103,7 +103,7 @@ class Holds:
     def refuse(
         self,
         widget_id: str,
-        by: By,
+        context: PressContext,
         why: str,
         cause: Cause = "interlock",
         *,
@@ -114,22 +114,24 @@ class Holds:
         widget = self.widget(widget_id)
         refusal = Refusal(why, cause)
         if trace:
-            return self._receipts.refused(widget, {}, by, refusal, hold_id)
+            return self._receipts.refused(widget, {}, context, refusal, hold_id)
         return refused(widget, {}, refusal, hold_id)
 
-    def refusal(self, widget_id: str, inputs: Mapping[str, Any], sent: float, by: By) -> Receipt | None:
+    def refusal(
+        self, widget_id: str, inputs: Mapping[str, Any], sent: float, context: PressContext
+    ) -> Receipt | None:
         """The receipt of a hold that `begin` would refuse now, without a trace; None for others."""
         self._take()
         self.judge()
         widget = self.widget(widget_id)
-        ready = self._ready(widget, inputs, sent, by, self._loop.time())
+        ready = self._ready(widget, inputs, sent, context, self._loop.time())
         return refused(widget, inputs, ready) if isinstance(ready, Refusal) else None
 
     def _ready(
-        self, widget: Hold, inputs: Mapping[str, Any], sent: float, by: By, now: float
+        self, widget: Hold, inputs: Mapping[str, Any], sent: float, context: PressContext, now: float
     ) -> Values | Refusal:
         """What it would publish if it began now, or why it may not."""
-        why, cause = self._ground(widget, sent, by, now)
+        why, cause = self._ground(widget, sent, context, now)
         if why:
             return Refusal(why, cause)
         try:
@@ -137,7 +139,9 @@ class Holds:
         except (FieldError, InputError) as error:
             return Refusal(f"{error}.", "input")
 
-    def _ground(self, widget: Hold, sent: float, by: By, now: float) -> tuple[str, Cause]:
+    def _ground(
+        self, widget: Hold, sent: float, context: PressContext, now: float
+    ) -> tuple[str, Cause]:
         """Why it may not begin now, "" if it may."""
         if self._closed:
             return say("hold_by_stopping"), "interlock"
@@ -148,11 +152,11 @@ class Holds:
             return say(code, label=other.widget.label, topic=widget.topic), "interlock"
         if now >= sent + LEASE_S:
             return say("hold_late"), "interlock"
-        if not (verdict := self._verdict(widget, by, now)).permitted:
+        if not (verdict := self._verdict(widget, context, now)).permitted:
             return verdict.reason or "", cause_of(verdict)
-        return by.doubt(), "interlock"
+        return context.stale_reason(), "interlock"
 
-    def beat(self, holding: Holding, number: int, sent: float) -> bool:
+    def beat(self, holding: ActiveHold, number: int, sent: float) -> bool:
         """A heartbeat; whether the hold goes on."""
         self.judge()
         if not self._on(holding) or not holding.lease.beat(number, sent, self._loop.time()):
@@ -160,7 +164,7 @@ class Holds:
         self._plan()
         return True
 
-    def end(self, holding: Holding, code: str) -> None:
+    def end(self, holding: ActiveHold, code: str) -> None:
         """Ends a hold, if it is going on; `code` is of the sentence that says why."""
         self.judge()
         if self._on(holding):
@@ -197,11 +201,11 @@ class Holds:
                 self._send(holding)
         self._plan()
 
-    def _on(self, holding: Holding) -> bool:
+    def _on(self, holding: ActiveHold) -> bool:
         return self._held.get(holding.widget.id) is holding
 
-    def _verdict(self, widget: Hold, by: By, now: float) -> Verdict:
-        return judged(widget, by, self._panel, self._robot, now)
+    def _verdict(self, widget: Hold, context: PressContext, now: float) -> Verdict:
+        return judged(widget, context, self._panel, self._robot, now)
 
     def _plan(self) -> None:
         if self._timer is not None:
@@ -215,7 +219,7 @@ class Holds:
         if whens:
             self._timer = self._loop.call_at(min(whens), self.step)
 
-    def _send(self, holding: Holding) -> None:
+    def _send(self, holding: ActiveHold) -> None:
         try:
             self._messages.put(holding.widget, holding.values, lambda: self._last_look(holding))
         except LinkError as error:
@@ -225,7 +229,7 @@ class Holds:
         else:
             holding.sent += 1
 
-    def _last_look(self, holding: Holding) -> None:
+    def _last_look(self, holding: ActiveHold) -> None:
         """Right before a message is sent: what came while it was judged and encoded counts, too."""
         for _ in range(MOST_LOOKS):
             if not self._on(holding):
@@ -237,7 +241,7 @@ class Holds:
         self.end(holding, "catching_up")
         raise PressRefused("", "interlock")
 
-    def _end(self, holding: Holding, code: str, why: str) -> None:
+    def _end(self, holding: ActiveHold, code: str, why: str) -> None:
         widget, now = holding.widget, self._loop.time()
         del self._held[widget.id]
         del self._robot.held[widget.id]

@@ -8,15 +8,15 @@ from app.errors import LinkError
 from app.interfaces import INTEGERS, Interfaces
 from app.panel.template import filled, inputs_of, with_now
 from app.panel.widgets.hold import Hold, with_own_fields
-from app.permission.interlocks import way
+from app.permission.interlocks import link_verdict
 from app.robot.command_status import LastLook, no_look
-from app.robot.state import Robot
+from app.robot.state import RobotState
 
 Values = Mapping[str, Any]  # of inputs by their ids, as they were when the hold began
 Checked = Callable[[Iterable[str], Values], dict[str, Any]]
 
 
-class Way(Protocol):
+class Transport(Protocol):
     """What a hold needs of the link."""
 
     def put(self, key: str, payload: bytes) -> None: ...
@@ -25,11 +25,13 @@ class Way(Protocol):
 class HoldMessages:
     """Those of one robot; the counter of a widget goes on from hold to hold."""
 
-    def __init__(self, interfaces: Interfaces, robot: Robot, way: Way, checked: Checked) -> None:
+    def __init__(
+        self, interfaces: Interfaces, robot: RobotState, transport: Transport, checked: Checked
+    ) -> None:
         """`checked` are the values that a template gets of what was entered."""
         self._interfaces = interfaces
         self._robot = robot
-        self._way = way
+        self._transport = transport
         self._checked = checked
         self._counts: dict[str, int] = {}
 
@@ -50,7 +52,7 @@ class HoldMessages:
         """The message that ends it, if there is any way now, be it in doubt: one stop too many harms
         nobody. Why it was not sent, or ""."""
         if not self._robot.link_up or not self._robot.graph.bridges:
-            return way(self._robot, now).reason or ""
+            return link_verdict(self._robot, now).reason or ""
         try:
             self._put(widget, widget.release, values, 0, no_look)
         except LinkError as error:
@@ -73,5 +75,5 @@ class HoldMessages:
         whole = with_own_fields(widget, fields, deadline_ms, count)
         payload = self._interfaces.encode(widget.type, whole)
         look()
-        self._way.put(self._robot.key(widget.topic), payload)
+        self._transport.put(self._robot.key(widget.topic), payload)
         self._counts[widget.id] = count

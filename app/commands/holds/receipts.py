@@ -10,12 +10,20 @@ from typing import Any, Final, NamedTuple
 from app.clock import format_time
 from app.commands.holds.lease import Lease
 from app.commands.holds.messages import Values
-from app.commands.receipts import LONGEST_LOGGED, By, Receipt, Witness, named, receipt_of, untyped
+from app.commands.receipts import (
+    LONGEST_LOGGED,
+    PressContext,
+    Receipt,
+    Witness,
+    named,
+    receipt_of,
+    untyped,
+)
 from app.errors import Cause
 from app.i18n import say
 from app.panel.template import needed
 from app.panel.widgets.hold import Hold
-from app.robot.command_status import Answer, Outcome
+from app.robot.command_status import Outcome, OutcomeCode
 from app.ros_logging import RobotLog, on_rosout
 
 log = logging.getLogger("kiosk.holds")
@@ -24,12 +32,12 @@ RELEASED: Final = "hold_released"
 
 
 @dataclass(slots=True, eq=False)
-class Holding:
+class ActiveHold:
     """A hold that is going on; `told` gets its receipt when it ends, whatever ends it."""
 
     widget: Hold
     lease: Lease
-    by: By
+    by: PressContext
     inputs: Mapping[str, Any]
     values: Values
     told: Callable[[Receipt], None]
@@ -49,7 +57,7 @@ def refused(widget: Hold, inputs: Mapping[str, Any], refusal: Refusal, hold_id: 
     text = say("refused", why=refusal.why, time=format_time(time.time()))
     own = needed(widget, inputs)
     own_id = hold_id or secrets.token_hex(8)
-    return receipt_of(widget, own, own_id, Answer("refused", text), refusal.cause)
+    return receipt_of(widget, own, own_id, Outcome("refused", text), refusal.cause)
 
 
 class HoldReceipts:
@@ -59,7 +67,7 @@ class HoldReceipts:
         self._log = RobotLog(log, robot)
         self._witness = witness
 
-    def began(self, holding: Holding) -> None:
+    def began(self, holding: ActiveHold) -> None:
         widget, lease, by = holding.widget, holding.lease, holding.by
         if self._witness is not None:
             self._witness.pressed(lease.id, widget.id, named(by.origin), holding.inputs)
@@ -68,31 +76,36 @@ class HoldReceipts:
         self._log.info("hold %s of %s by %s with %.*s begins", lease.id, widget.id, who,
                 LONGEST_LOGGED, holding.inputs, extra=told)  # fmt: skip
 
-    def ended(self, holding: Holding, seconds: float, code: str, why: str, unsaid: str) -> Receipt:
+    def ended(self, holding: ActiveHold, seconds: float, code: str, why: str, unsaid: str) -> Receipt:
         """`code` and `why` it ended after so many seconds; `unsaid` is why its last message was not
         sent, "" where it was."""
         widget, lease = holding.widget, holding.lease
         sentence = RELEASED if code == RELEASED else "hold_ended"
         text = say(sentence, time=format_time(time.time()), seconds=f"{seconds:.1f}", why=why)
         text += say("hold_unsaid", why=unsaid) if unsaid else ""
-        outcome: Outcome = "unknown" if unsaid else "published" if code == RELEASED else "aborted"
+        outcome: OutcomeCode = "unknown" if unsaid else "published" if code == RELEASED else "aborted"
         level = logging.INFO if outcome == "published" else logging.WARNING
         self._log.log(level, "hold %s of %s by %s ended after %.3f s and %d messages (%s): %s",
                 lease.id, widget.id, named(holding.by.origin), seconds, holding.sent,
                 code, text)  # fmt: skip
-        return self._answered(receipt_of(widget, holding.inputs, lease.id, Answer(outcome, text)))
+        return self._answered(receipt_of(widget, holding.inputs, lease.id, Outcome(outcome, text)))
 
     def refused(
-        self, widget: Hold, inputs: Mapping[str, Any], by: By, refusal: Refusal, hold_id: str
+        self,
+        widget: Hold,
+        inputs: Mapping[str, Any],
+        context: PressContext,
+        refusal: Refusal,
+        hold_id: str,
     ) -> Receipt:
         """The same as the function, and told."""
         receipt = refused(widget, inputs, refusal, hold_id)
-        who = named(by.origin)
+        who = named(context.origin)
         told = on_rosout(f"hold of {widget.id} by {who}: {untyped(widget, receipt)}")
         self._log.warning("hold of %s by %s with %.*s: %s", widget.id, who,
                 LONGEST_LOGGED, receipt.inputs, receipt.reason, extra=told)  # fmt: skip
         if self._witness is not None:
-            self._witness.pressed(receipt.id, widget.id, named(by.origin), receipt.inputs)
+            self._witness.pressed(receipt.id, widget.id, named(context.origin), receipt.inputs)
         return self._answered(receipt)
 
     def doubted(self, receipt: Receipt) -> Receipt:

@@ -9,7 +9,7 @@ from app.commands.service_calls import Asker
 from app.errors import LinkError
 from app.interfaces import Interfaces
 from app.panel.widgets.parameter import DESCRIBE, GET
-from app.robot.state import Robot
+from app.robot.state import RobotState
 
 ANSWER_S: Final = 5.0  # within which a node has to tell its parameters
 LATE_S: Final = 5.0  # how long after that nothing more is asked: it may only be slow
@@ -23,10 +23,10 @@ class NoAnswer(Exception):
         self.dropped = dropped
 
 
-class ParameterServices:
+class ParameterClient:
     """The services of one robot's nodes; one question of a caller's at a time."""
 
-    def __init__(self, interfaces: Interfaces, robot: Robot, link: Asker) -> None:
+    def __init__(self, interfaces: Interfaces, robot: RobotState, link: Asker) -> None:
         self._interfaces = interfaces
         self._robot = robot
         self._link = link

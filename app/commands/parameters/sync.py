@@ -16,10 +16,10 @@ from functools import partial
 from typing import Any, Final, Literal
 
 from app.clock import format_time
-from app.commands.parameters.client import NoAnswer, ParameterServices
+from app.commands.parameters.client import NoAnswer, ParameterClient
 from app.commands.parameters.values import checked
-from app.commands.service_calls import LONGEST_SAID, Asker, Calls, Request
-from app.concurrency import told
+from app.commands.service_calls import LONGEST_SAID, Asker, Request, ServiceCalls
+from app.concurrency import spawn_logged
 from app.dialect import bridge_dialect
 from app.errors import DecodeError
 from app.i18n import say
@@ -28,9 +28,9 @@ from app.panel.model import Panel
 from app.panel.widgets.parameter import DESCRIBE, EVENT_TYPE, GET, SET, Parameter, Value
 from app.permission.interlocks import SERVER_SETTLE_S, parameters_offered
 from app.printable import printable
-from app.robot.command_status import Answer, Corrected, LastLook, no_look
-from app.robot.parameter_state import UNKNOWN, Declared, declared, name_of, value_in, wire
-from app.robot.state import Robot, Sample
+from app.robot.command_status import LastLook, OnCorrection, Outcome, no_look
+from app.robot.parameter_state import UNKNOWN, ParameterState, name_of, parameter_states, value_in, wire
+from app.robot.state import RobotState, Sample
 from app.ros_logging import RobotLog
 
 log = logging.getLogger("kiosk.parameters")
@@ -66,23 +66,23 @@ class _Node:
         self.urgent.set()
 
 
-class Parameters:
+class ParameterSync:
     """The parameters of one robot that its panel shows; used on the event loop only."""
 
     def __init__(
         self,
         panel: Panel,
         interfaces: Interfaces,
-        robot: Robot,
+        robot: RobotState,
         link: Asker,
-        calls: Calls,
+        calls: ServiceCalls,
         changed: Callable[[], None],
     ) -> None:
         """`changed` is called when what the widgets show has changed."""
         self._interfaces = interfaces
         self._robot = robot
         self._log = RobotLog(log, robot.name)
-        self._services = ParameterServices(interfaces, robot, link)
+        self._services = ParameterClient(interfaces, robot, link)
         self._calls = calls
         self._changed = changed
         self._nodes: dict[str, _Node] = {}
@@ -114,7 +114,7 @@ class Parameters:
             if not (offered and self._robot.graph.bridges):
                 self._cut(node)
             elif node.task is None:
-                node.task = told(self._follow_node(node), self._log, FAILED)
+                node.task = spawn_logged(self._follow_node(node), self._log, FAILED)
 
     async def stop(self) -> None:
         """Ends its tasks."""
@@ -174,7 +174,7 @@ class Parameters:
         if known.state not in ("live", "missing"):
             node.wanted.set()
         elif name_of(value.type) != widget.type:
-            self._learn(widget, Declared("mistyped", found=name_of(value.type), wall=wall))
+            self._learn(widget, ParameterState("mistyped", found=name_of(value.type), wall=wall))
         else:
             self._learn(widget, replace(known, state="live", value=value_in(widget, value), wall=wall))
 
@@ -218,14 +218,14 @@ class Parameters:
             return "partly" if error.dropped else "silent"
         except DecodeError as error:
             self._log.error("%s: %s", node.name, error)
-            self._learn_all(node, lambda known: Declared("unreadable", wall=time.time()))
+            self._learn_all(node, lambda known: ParameterState("unreadable", wall=time.time()))
             return "partly"
         node.told_at = time.monotonic()
         self._calls.mark_answered(f"{node.name}/{SET[0]}")
         values |= node.heard  # told after it was asked
         for widget in node.widgets:
             name = widget.parameter
-            found = declared(widget, descriptors.get(name), values.get(name), time.time())
+            found = parameter_states(widget, descriptors.get(name), values.get(name), time.time())
             self._learn(widget, found)
         self._changed()
         live = all(self._known(widget).state == "live" for widget in node.widgets)
@@ -256,9 +256,9 @@ class Parameters:
         widget: Parameter,
         value: Value,
         press_id: str,
-        corrected: Corrected,
+        corrected: OnCorrection,
         look: LastLook = no_look,
-    ) -> Answer:
+    ) -> Outcome:
         """Sets a parameter, as a call does; whatever came of it, the node is asked how it is now."""
         service, type_name = SET
         fields = {"parameters": [{"name": widget.parameter, "value": wire(widget, value)}]}
@@ -267,7 +267,7 @@ class Parameters:
         request = Request(widget.id, name, type_name, payload, widget.timeout_s, SET_PATHS, read)
         node = self._nodes[widget.node]
 
-        def late(press_id: str, answer: Answer) -> None:
+        def late(press_id: str, answer: Outcome) -> None:
             node.ask_now()
             corrected(press_id, answer)
 
@@ -277,15 +277,15 @@ class Parameters:
 
     # What is known.
 
-    def _known(self, widget: Parameter) -> Declared:
+    def _known(self, widget: Parameter) -> ParameterState:
         return self._robot.parameters.get(widget.id, UNKNOWN)
 
-    def _learn(self, widget: Parameter, known: Declared) -> None:
+    def _learn(self, widget: Parameter, known: ParameterState) -> None:
         if known.state == "undeclared" and self._known(widget).state != "undeclared":
             self._log.warning("%s has no parameter %s", widget.node, widget.parameter)
         self._robot.parameters[widget.id] = known
 
-    def _learn_all(self, node: _Node, of: Callable[[Declared], Declared]) -> None:
+    def _learn_all(self, node: _Node, of: Callable[[ParameterState], ParameterState]) -> None:
         for widget in node.widgets:
             self._learn(widget, of(self._known(widget)))
         self._changed()
@@ -296,16 +296,16 @@ class Parameters:
         self._learn_all(node, lambda known: replace(known, state="silent"))
 
 
-def _answer(widget: Parameter, value: Value, response: Fields) -> Answer:
+def _answer(widget: Parameter, value: Value, response: Fields) -> Outcome:
     """What a response of SetParameters says of the one parameter that was to be set."""
     now = format_time(time.time())
     successful, reason, second = (response.get(path) for path in SET_PATHS)
     if successful is None or second is not None:
-        return Answer("unknown", say("answer_unreadable", wanted=SET[1]))
+        return Outcome("unknown", say("answer_unreadable", wanted=SET[1]))
     if successful:
-        return Answer("succeeded", say("parameter_set", value=widget.written(value), time=now))
+        return Outcome("succeeded", say("parameter_set", value=widget.written(value), time=now))
     said = f": {printable(text_of(reason, LONGEST_SAID))}" if reason else "."
-    return Answer("rejected", say("said_no", time=now) + said)
+    return Outcome("rejected", say("said_no", time=now) + said)
 
 
 async def _within(event: asyncio.Event, longest_s: float | None) -> None:

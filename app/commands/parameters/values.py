@@ -11,12 +11,12 @@ from app.interfaces.validation import shown
 from app.panel.list_text import elements
 from app.panel.widgets.numbers import DECIMAL
 from app.panel.widgets.parameter import LONGEST_TEXT, One, Parameter, Value
-from app.robot.parameter_state import LONGEST_LIST, Declared, allowed, each_text, limits_text
+from app.robot.parameter_state import LONGEST_LIST, ParameterState, allowed, each_text, limits_text
 
 WHOLE: Final = re.compile(r"\s*[+-]?[0-9]{1,19}\s*", re.ASCII)
 
 
-def checked(of: Parameter, known: Declared, given: Any) -> Value:
+def checked(of: Parameter, known: ParameterState, given: Any) -> Value:
     """The value to set; InputError names the label and what it may be."""
     if of.options:
         given = _chosen(of, given)
@@ -38,7 +38,7 @@ def _chosen(of: Parameter, given: Any) -> Any:
     return option.value
 
 
-def _several(of: Parameter, known: Declared, given: Any) -> list[Any]:
+def _several(of: Parameter, known: ParameterState, given: Any) -> list[Any]:
     """What was entered with commas between; a program gives a list."""
     if isinstance(given, list):
         return given
@@ -61,7 +61,7 @@ def _entered(of: Parameter, text: str) -> Any:
     return text
 
 
-def _one(of: Parameter, known: Declared, label: str, given: Any) -> One:
+def _one(of: Parameter, known: ParameterState, label: str, given: Any) -> One:
     match of.element:
         case "bool":
             if isinstance(given, bool):
@@ -75,7 +75,7 @@ def _one(of: Parameter, known: Declared, label: str, given: Any) -> One:
     return _number(of, known, label, given)
 
 
-def _number(of: Parameter, known: Declared, label: str, given: Any) -> int | float:
+def _number(of: Parameter, known: ParameterState, label: str, given: Any) -> int | float:
     limits = allowed(of, known)
     text = each_text(of, limits)
     if given == "" or given is None:

@@ -8,8 +8,8 @@ from app.interfaces.cdr.encapsulation import LITTLE_ENDIAN, judge_end, opened
 from app.interfaces.cdr.fields import FieldReader
 from app.interfaces.cdr.reader import Order, Read, message_reader
 from app.interfaces.cdr.scanner import SLICE
-from app.interfaces.cdr.selection import Wanted
-from app.interfaces.cdr.steps import Programs
+from app.interfaces.cdr.selection import Selection
+from app.interfaces.cdr.steps import ReadPlans
 from app.interfaces.cdr.writer import Write, message_writer
 from app.interfaces.definitions import PLACEHOLDER, Field, Structure, Type
 
@@ -25,7 +25,7 @@ class Codec:
         self._classes: dict[str, type[Any]] = {}
         self._writers: dict[str, Write] = {}
         self._readers: dict[tuple[Order, str], Read] = {}
-        self._programs = Programs(self._fields)
+        self._programs = ReadPlans(self._fields)
         self._counters: dict[str, FieldReader] = {}
 
     def serialize(self, message: Any, name: str) -> bytes:
@@ -45,7 +45,7 @@ class Codec:
     def _count(self, data: bytes, name: str) -> None:
         """ValueError for a message of so many elements that building them would take its time."""
         if name not in self._counters:
-            ops = self._programs.program(name, Wanted(), each=True)
+            ops = self._programs.program(name, Selection(), each=True)
             self._counters[name] = FieldReader(name, ops, self._made_of)
         walk = self._counters[name].walk(data)
         for _ in range(MOST_ELEMENTS // SLICE):
@@ -53,7 +53,7 @@ class Codec:
                 return
         raise ValueError(f"it has more than {MOST_ELEMENTS} elements, which are not read at once")
 
-    def fields(self, name: str, wanted: Wanted) -> FieldReader:
+    def fields(self, name: str, wanted: Selection) -> FieldReader:
         """What reads some fields of each message of a type."""
         ops = self._programs.program(name, wanted)
         return FieldReader(name, ops, self._made_of)

@@ -8,7 +8,7 @@ from app.interfaces.cdr.beginnings import Beginning, Make
 from app.interfaces.cdr.encapsulation import judge_end, opened
 from app.interfaces.cdr.formats import is_number
 from app.interfaces.cdr.reader import Order, Read, value_reader
-from app.interfaces.cdr.scanner import Going
+from app.interfaces.cdr.scanner import Scan
 from app.interfaces.cdr.steps import Op
 from app.interfaces.definitions import Type
 
@@ -40,7 +40,7 @@ class Walk:
     def __init__(self, reader: "FieldReader", data: bytes) -> None:
         self._reader = reader
         self._data = data
-        self._going: Going | None = None
+        self._going: Scan | None = None
 
     def go_on(self) -> Fields | None:
         """Reads on for some milliseconds at the most; None where it is not through then. DecodeError
@@ -50,7 +50,7 @@ class Walk:
             if self._going is None:
                 self._body, self._order = opened(self._data)
                 read = reader.reads[self._order]
-                self._going = Going(reader.ops, self._body, self._order, read)
+                self._going = Scan(reader.ops, self._body, self._order, read)
             if not self._going.go_on():
                 return None
             judge_end(self._body, self._going.at)
@@ -83,7 +83,7 @@ class FieldReader:
             pass
         return fields
 
-    def found(self, going: Going, body: "memoryview[int]", order: Order) -> Fields:
+    def found(self, going: Scan, body: "memoryview[int]", order: Order) -> Fields:
         """The values, of a message that was gone through."""
         values = {}
         reader = self.reads[order]

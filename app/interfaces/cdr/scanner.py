@@ -13,7 +13,7 @@ from app.interfaces.cdr.formats import LENGTH
 from app.interfaces.cdr.layout import PHASES, passed
 from app.interfaces.cdr.reader import NATIVE, Order, Read
 from app.interfaces.cdr.selection import Lookup
-from app.interfaces.cdr.steps import Choice, Do, Mark, Op
+from app.interfaces.cdr.steps import Choice, Mark, Op, Step
 from app.interfaces.definitions import Type
 
 Reader = Callable[[Type], Read]  # what reads a value of a type
@@ -24,13 +24,13 @@ SLICE: Final = 100  # elements
 ENOUGH: Final = 2  # elements of one key: several
 
 # The steps that most elements have.
-TEXT: Final = Do.TEXT
-PASS: Final = Do.PASS
-NEXT: Final = Do.NEXT
-NUMBERS: Final = Do.NUMBERS
-EACH: Final = Do.EACH
-CHOSEN: Final = Do.CHOSEN
-END: Final = Do.END
+TEXT: Final = Step.TEXT
+PASS: Final = Step.PASS
+NEXT: Final = Step.NEXT
+NUMBERS: Final = Step.NUMBERS
+EACH: Final = Step.EACH
+CHOSEN: Final = Step.CHOSEN
+END: Final = Step.END
 
 
 @dataclass(slots=True)
@@ -51,7 +51,7 @@ class _Looking:
             self.chosen.append((self.start, step))
 
 
-class Going:
+class Scan:
     """One time through one message: by `at` it is now, in the end where the message ends. `marks` are
     the places where what is wanted begins, `several` the paths whose key more than one element has."""
 
@@ -247,16 +247,16 @@ class Going:
         return chosen
 
 
-STEPS: Final[Mapping[Do, Callable[[Going, int, int, Any], Next]]] = {
-    Do.WIDE_TEXT: Going._wide_text,
-    Do.BOOL: Going._bool,
-    Do.ALIKE: Going._alike,
-    Do.TIMES: Going._times,
-    Do.NOTE: Going._note,
-    Do.COMPARE: Going._compare,
-    Do.CHOOSE: Going._choose,
-    Do.BESIDE: Going._beside,
-    Do.DONE: Going._done,
+STEPS: Final[Mapping[Step, Callable[[Scan, int, int, Any], Next]]] = {
+    Step.WIDE_TEXT: Scan._wide_text,
+    Step.BOOL: Scan._bool,
+    Step.ALIKE: Scan._alike,
+    Step.TIMES: Scan._times,
+    Step.NOTE: Scan._note,
+    Step.COMPARE: Scan._compare,
+    Step.CHOOSE: Scan._choose,
+    Step.BESIDE: Scan._beside,
+    Step.DONE: Scan._done,
 }
 
 

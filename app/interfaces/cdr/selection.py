@@ -32,7 +32,7 @@ class Lookup:
 
 
 @dataclass(eq=False, slots=True)
-class Wanted:
+class Selection:
     """A field on the way to what is wanted, or wanted itself: `paths` then says for which.
 
     Of a list, elements are chosen by their index, by a field of theirs (`keys`: path of that field →
@@ -40,10 +40,10 @@ class Wanted:
     """
 
     paths: list[str] = field(default_factory=list)
-    fields: "dict[str, Wanted]" = field(default_factory=dict)
-    indexes: "dict[int, Wanted]" = field(default_factory=dict)
-    keys: "dict[str, dict[Any, Wanted]]" = field(default_factory=dict)
-    beside: "dict[str, dict[Any, Wanted]]" = field(default_factory=dict)
+    fields: "dict[str, Selection]" = field(default_factory=dict)
+    indexes: "dict[int, Selection]" = field(default_factory=dict)
+    keys: "dict[str, dict[Any, Selection]]" = field(default_factory=dict)
+    beside: "dict[str, dict[Any, Selection]]" = field(default_factory=dict)
     lookup: Lookup | None = None  # it is a key itself
 
     def all_paths(self) -> Iterable[str]:
@@ -61,18 +61,18 @@ class Resolver:
     def __init__(self, structures: Structures) -> None:
         self._structures = structures
 
-    def wanted(self, type_name: str, paths: Iterable[str]) -> Wanted:
+    def wanted(self, type_name: str, paths: Iterable[str]) -> Selection:
         """The tree of these paths; InterfaceError where the type has no such field."""
-        root = Wanted()
+        root = Selection()
         for path in paths:
             self._add(root, Type(type_name), path)
         return root
 
     def type_at(self, type_name: str, path: str) -> Type:
         """The type of the field at a path."""
-        return self._add(Wanted(), Type(type_name), path)
+        return self._add(Selection(), Type(type_name), path)
 
-    def _add(self, root: Wanted, whole: Type, path: str) -> Type:
+    def _add(self, root: Selection, whole: Type, path: str) -> Type:
         node, at, around = root, whole, whole
         for step in steps(path):
             match step:
@@ -81,25 +81,25 @@ class Resolver:
                     at = at.element
                 case str():
                     around, at = at, self._named(at, step, path)
-                    node = node.fields.setdefault(step, Wanted())
+                    node = node.fields.setdefault(step, Selection())
                 case _:
                     at = _indexed(at, step, path)
-                    node = node.indexes.setdefault(step, Wanted())
+                    node = node.indexes.setdefault(step, Selection())
         node.paths.append(path)
         return at
 
-    def _keyed(self, node: Wanted, at: Type, around: Type, key: Key, path: str) -> Wanted:
+    def _keyed(self, node: Selection, at: Type, around: Type, key: Key, path: str) -> Selection:
         if at.many == "one":
             raise InterfaceError(f'there is no [{key.path}=…] (in "{path}"): {at} is not a list')
         kind = self._own_key(at.element, key.path)
         if kind is not None:
             value = self._value(key, kind, at.name, path)
-            return node.keys.setdefault(key.path, {}).setdefault(value, Wanted())
+            return node.keys.setdefault(key.path, {}).setdefault(value, Selection())
         kind = next((o.type for o in self._fields(around) if o.name == key.path), None)
         if kind is None or kind.many == "one":
             raise InterfaceError(f'there is no "{key.path}" (in "{path}"): {self._has(at, around)}')
         value = self._value(key, kind.element, around.name, path)
-        return node.beside.setdefault(key.path, {}).setdefault(value, Wanted())
+        return node.beside.setdefault(key.path, {}).setdefault(value, Selection())
 
     def _own_key(self, element: Type, path: str) -> Type | None:
         """The type of a single field in an element; None where there is none of this name."""

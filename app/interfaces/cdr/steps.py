@@ -11,11 +11,11 @@ from typing import Any
 
 from app.interfaces.cdr.formats import LENGTH, SIZES, is_number
 from app.interfaces.cdr.layout import NONE, Fields, Room, joined, room_of
-from app.interfaces.cdr.selection import Lookup, Wanted
+from app.interfaces.cdr.selection import Lookup, Selection
 from app.interfaces.definitions import TEXTS, Type
 
 
-class Do(IntEnum):
+class Step(IntEnum):
     """The steps, each with what it is about."""
 
     PASS = auto()  # a Room
@@ -66,21 +66,21 @@ class Choice:
     key: Lookup | None = None
 
 
-Op = tuple[Do, Any, Any]
+Op = tuple[Step, Any, Any]
 
 
-class Programs:
+class ReadPlans:
     """Makes the programs of one set of definitions."""
 
     def __init__(self, fields: Fields) -> None:
         self._fields = fields
         self._rooms: dict[Type, Room | None] = {}
 
-    def program(self, type_name: str, wanted: Wanted, each: bool = False) -> tuple[Op, ...]:
+    def program(self, type_name: str, wanted: Selection, each: bool = False) -> tuple[Op, ...]:
         """Of a whole message; `each`: each element of its lists is gone to, but for numbers."""
         made = _Making(self._fields, self._room if not each else self._room_of_numbers)
         made.structure(type_name, wanted)
-        made.add(Do.END)
+        made.add(Step.END)
         return tuple(made.steps)
 
     def _room_of_numbers(self, kind: Type) -> Room | None:
@@ -101,7 +101,7 @@ class _Making:
         self._room = room
         self._run = NONE
 
-    def add(self, do: Do, one: Any = None, other: Any = None) -> None:
+    def add(self, do: Step, one: Any = None, other: Any = None) -> None:
         self._flush()
         self.steps.append((do, one, other))
 
@@ -113,10 +113,10 @@ class _Making:
 
     def _flush(self) -> None:
         if self._run != NONE:
-            self.steps.append((Do.PASS, self._run, None))
+            self.steps.append((Step.PASS, self._run, None))
             self._run = NONE
 
-    def structure(self, type_name: str, wanted: Wanted | None, in_list: bool = False) -> None:
+    def structure(self, type_name: str, wanted: Selection | None, in_list: bool = False) -> None:
         """Its fields, and what is chosen by lists beside others when all have been passed."""
         inner = {} if wanted is None else wanted.fields
         keys = _keys_beside(inner, {one.name: one.type for one in self._fields(type_name)})
@@ -125,25 +125,25 @@ class _Making:
             child = inner.get(one.name)
             if child is not None and child.beside:
                 places[one.name] = Mark(one.type)
-                self.add(Do.NOTE, places[one.name])
+                self.add(Step.NOTE, places[one.name])
             self._field(one.type, child, keys.get(one.name), in_list)
         for name, place in places.items():
             for key, values in inner[name].beside.items():
                 choice = self._choice(place.type)
                 choice.place, choice.key = place, keys[key]
-                self._chosen(Do.BESIDE, choice, place.type, {keys[key]: values}, Wanted())
+                self._chosen(Step.BESIDE, choice, place.type, {keys[key]: values}, Selection())
 
     def _field(
-        self, kind: Type, wanted: Wanted | None, key: Lookup | None = None, in_list: bool = False
+        self, kind: Type, wanted: Selection | None, key: Lookup | None = None, in_list: bool = False
     ) -> None:
         if wanted is not None and wanted.paths:
-            self.add(Do.NOTE, Mark(kind, tuple(wanted.paths)))
+            self.add(Step.NOTE, Mark(kind, tuple(wanted.paths)))
         if wanted is not None and wanted.lookup is not None:
             wanted.lookup.type = kind
             wanted.lookup.prepare()
-            self.add(Do.COMPARE, wanted.lookup)
+            self.add(Step.COMPARE, wanted.lookup)
         if key is not None or (wanted is not None and (wanted.indexes or wanted.keys)):
-            self._list(kind, wanted or Wanted(), key)
+            self._list(kind, wanted or Selection(), key)
         elif wanted is not None and wanted.fields:
             self.structure(kind.name, wanted, in_list)
         else:
@@ -152,44 +152,44 @@ class _Making:
     def _passed(self, kind: Type, in_list: bool) -> None:
         """What nothing is wanted of. A bool that is no bool is seen, but for those in lists."""
         if kind == Type("bool") and not in_list:
-            self.add(Do.BOOL)
+            self.add(Step.BOOL)
         elif kind.many == "one" and kind.nested and not in_list:
             self.structure(kind.name, None)
         elif room := self._room(kind):
             self._run = joined(self._run, room)
         elif kind.many == "sequence" and is_number(kind):
-            self.add(Do.NUMBERS, SIZES[kind.name])
+            self.add(Step.NUMBERS, SIZES[kind.name])
         elif kind.many == "sequence" and (room := self._room(kind.element)):
-            self.add(Do.ALIKE, room)
+            self.add(Step.ALIKE, room)
         elif kind.many != "one":
             self._each(kind)
         elif kind.nested:
             self.structure(kind.name, None, in_list)
         else:
-            self.add(Do.TEXT if kind.name == "string" else Do.WIDE_TEXT)
+            self.add(Step.TEXT if kind.name == "string" else Step.WIDE_TEXT)
 
     def _each(self, kind: Type) -> None:
         at = self._here
-        self.add(Do.EACH if kind.many == "sequence" else Do.TIMES, kind.size)
+        self.add(Step.EACH if kind.many == "sequence" else Step.TIMES, kind.size)
         body = self._here
         self._passed(kind.element, in_list=True)
-        self.add(Do.NEXT, body)
+        self.add(Step.NEXT, body)
         if kind.many == "sequence":
-            self.steps[at] = (Do.EACH, self._here, least_of(kind.element))
+            self.steps[at] = (Step.EACH, self._here, least_of(kind.element))
 
-    def _list(self, kind: Type, wanted: Wanted, key: Lookup | None) -> None:
+    def _list(self, kind: Type, wanted: Selection, key: Lookup | None) -> None:
         """A list of which elements are wanted, by their indexes or keys, or which is a key itself."""
-        looked = Wanted(lookup=key)
-        found: dict[Lookup, Mapping[Any, Wanted]] = {}
+        looked = Selection(lookup=key)
+        found: dict[Lookup, Mapping[Any, Selection]] = {}
         for path, values in wanted.keys.items():
             lookup = Lookup(Type(""), set(values))
             _inside(looked, path).lookup = lookup
             found[lookup] = values
         choice = self._choice(kind, looked)
         choice.looks_up = key
-        self._chosen(Do.CHOOSE, choice, kind, found, wanted, looked)
+        self._chosen(Step.CHOOSE, choice, kind, found, wanted, looked)
 
-    def _choice(self, kind: Type, looked: Wanted | None = None) -> Choice:
+    def _choice(self, kind: Type, looked: Selection | None = None) -> Choice:
         alone = looked is None or not (looked.lookup or looked.fields)
         room = self._room(kind.element) if alone else None
         count = kind.size if kind.many == "array" else None
@@ -197,19 +197,19 @@ class _Making:
 
     def _chosen(
         self,
-        do: Do,
+        do: Step,
         choice: Choice,
         kind: Type,
-        found: Mapping[Lookup, Mapping[Any, Wanted]],
-        wanted: Wanted,
-        looked: Wanted | None = None,
+        found: Mapping[Lookup, Mapping[Any, Selection]],
+        wanted: Selection,
+        looked: Selection | None = None,
     ) -> None:
         """The steps that look at each element, and those of each one that is chosen."""
         self.add(do, choice)
         choice.body = self._here
         if choice.room is None:
             self._field(kind.element, looked, in_list=True)
-            self.add(Do.CHOSEN)
+            self.add(Step.CHOSEN)
         choice.indexes = {index: self._own(kind, one) for index, one in wanted.indexes.items()}
         for lookup, values in found.items():
             choice.found[lookup] = {value: self._own(kind, one) for value, one in values.items()}
@@ -217,14 +217,14 @@ class _Making:
                 choice.several[lookup, value] = tuple(one.all_paths())
         choice.after = self._here
 
-    def _own(self, kind: Type, wanted: Wanted) -> int:
+    def _own(self, kind: Type, wanted: Selection) -> int:
         at = self._here
         self._field(kind.element, wanted)
-        self.add(Do.DONE)
+        self.add(Step.DONE)
         return at
 
 
-def _keys_beside(inner: Mapping[str, Wanted], types: Mapping[str, Type]) -> dict[str, Lookup]:
+def _keys_beside(inner: Mapping[str, Selection], types: Mapping[str, Type]) -> dict[str, Lookup]:
     """The lists by which elements of others beside them are chosen."""
     keys: dict[str, Lookup] = {}
     for one in inner.values():
@@ -233,9 +233,9 @@ def _keys_beside(inner: Mapping[str, Wanted], types: Mapping[str, Type]) -> dict
     return keys
 
 
-def _inside(node: Wanted, path: str) -> Wanted:
+def _inside(node: Selection, path: str) -> Selection:
     for name in path.split("."):
-        node = node.fields.setdefault(name, Wanted())
+        node = node.fields.setdefault(name, Selection())
     return node
 
 

@@ -20,7 +20,7 @@ from app.i18n import say
 from app.panel.model import Panel
 from app.panel.widgets.families import Command, Entered
 from app.printable import printable, printable_texts
-from app.web.app_state import CurrentSite, Site
+from app.web.app_state import AppState, CurrentState
 from app.web.described import TEXT, errors
 
 log = logging.getLogger("kiosk.log")
@@ -81,7 +81,7 @@ class Wanted(BaseModel):
 class LogContext(TypedDict):
     """What `log.html` gets."""
 
-    site: Site
+    site: AppState
     panel: Panel
     wanted: Wanted
     typed: dict[str, str]
@@ -103,15 +103,15 @@ class LogContext(TypedDict):
     summary="The operator's log, the newest first",
     responses=errors(403, 422, 429, 503),
 )
-async def page(site: CurrentSite, wanted: Annotated[Wanted, Query()]) -> Response:
+async def page(state: CurrentState, wanted: Annotated[Wanted, Query()]) -> Response:
     rows: list[Row] = []
-    if isinstance(site.log, OperatorLog):
-        rows = await site.log.rows(wanted.filter(), wanted.before, ROWS_ON_PAGE + 1)
+    if isinstance(state.log, OperatorLog):
+        rows = await state.log.rows(wanted.filter(), wanted.before, ROWS_ON_PAGE + 1)
     more = len(rows) > ROWS_ON_PAGE
     rows = [_shown(row) for row in rows[:ROWS_ON_PAGE]]
-    panel = site.fleet.panel
+    panel = state.fleet.panel
     context = LogContext(
-        site=site,
+        site=state,
         panel=panel,
         wanted=wanted,
         typed=printable_texts(wanted.model_dump()),
@@ -119,14 +119,14 @@ async def page(site: CurrentSite, wanted: Annotated[Wanted, Query()]) -> Respons
         labels={w.id: w.label for w in panel.widgets() if isinstance(w, Command)},
         inputs={w.id: w.label for w in panel.widgets() if isinstance(w, Entered)},
         outcomes=OUTCOMES,
-        off="" if site.log.enabled else say("log_off"),
-        banner=site.banner,
-        fault=site.log.fault,
+        off="" if state.log.enabled else say("log_off"),
+        banner=state.banner,
+        fault=state.log.fault,
         older=wanted.query(rows[-1].entry.seq) if more else "",
         newest=wanted.query() if wanted.before else "",
         csv=wanted.query(),
     )
-    html = site.templates.get_template("log.html").render(
+    html = state.templates.get_template("log.html").render(
         **context, clock_of=_clock_of, values_of=_values_of, word=_word
     )
     return HTMLResponse(html, headers={"cache-control": "no-store"})
@@ -138,12 +138,14 @@ async def page(site: CurrentSite, wanted: Annotated[Wanted, Query()]) -> Respons
     summary="What the filter shows, as CSV",
     responses=errors(403, 404, 422, 429, 503) | {200: {"content": {"text/csv": {"schema": TEXT}}}},
 )
-async def as_csv(request: Request, site: CurrentSite, wanted: Annotated[Wanted, Query()]) -> Response:
-    if not isinstance(site.log, OperatorLog):
+async def as_csv(request: Request, state: CurrentState, wanted: Annotated[Wanted, Query()]) -> Response:
+    if not isinstance(state.log, OperatorLog):
         raise NotFound(say("log_off"))
     gzip = "gzip" in request.headers.get("accept-encoding", "")
     async with AsyncExitStack() as opened:
-        export = await opened.enter_async_context(site.log.export(wanted.filter(), wanted.before, gzip))
+        export = await opened.enter_async_context(
+            state.log.export(wanted.filter(), wanted.before, gzip)
+        )
         first = await export.start()
         return Exported(export, first, gzip, opened.pop_all())
 

@@ -9,10 +9,10 @@ from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, JsonValue
 from app.errors import InputError, NotFound
 from app.i18n import say
 from app.panel.base import ID
-from app.permission.clients import Browser
+from app.permission.clients import Client
 from app.permission.control_authority import LIFE_S, Refusal
-from app.runtime.robot_session import Kiosk
-from app.web.app_state import CurrentKiosk, CurrentSite
+from app.runtime.robot_session import RobotSession
+from app.web.app_state import CurrentSession, CurrentState
 from app.web.client_cookie import keep, visitor, welcomed
 from app.web.described import FORM, JSON, described_body, errors, fields
 from app.web.request_body import as_model, body_of, form_of, json_of, kind_of
@@ -66,9 +66,9 @@ class ControlAnswer(BaseModel):
     responses=errors(403, 404, 408, 413, 422),
     openapi_extra=described_body(Here, None, required=False),
 )
-async def here(request: Request, site: CurrentSite, kiosk: CurrentKiosk) -> Response:
-    _required(kiosk)
-    kiosk.control.here(visitor(request, site), (await _given(Here, request)).touched)
+async def here(request: Request, state: CurrentState, session: CurrentSession) -> Response:
+    _required(session)
+    session.control.keepalive(visitor(request, state), (await _given(Here, request)).touched)
     return Response(status_code=204)
 
 
@@ -85,51 +85,51 @@ async def here(request: Request, site: CurrentSite, kiosk: CurrentKiosk) -> Resp
         Acting, fields(to={"pattern": ASKER}, page={"pattern": ID}), required=False
     ),
 )
-async def act(act: Act, request: Request, site: CurrentSite, kiosk: CurrentKiosk) -> Response:
-    _required(kiosk)
-    browser = visitor(request, site)
-    _, token = welcomed(request, site)  # without a cookie nothing is done yet, the next time it is
+async def act(act: Act, request: Request, state: CurrentState, session: CurrentSession) -> Response:
+    _required(session)
+    browser = visitor(request, state)
+    _, token = welcomed(request, state)  # without a cookie nothing is done yet, the next time it is
     form = kind_of(request) == FORM
     given = await _given(Acting, request)
-    reason = "" if form or given.at is None else _late(kiosk, act, given.at.timestamp())
-    refusal = "" if reason else _done(kiosk, act, browser, given.to, FORM_LIFE_S if form else LIFE_S)
+    reason = "" if form or given.at is None else _late(session, act, given.at.timestamp())
+    refusal = "" if reason else _done(session, act, browser, given.to, FORM_LIFE_S if form else LIFE_S)
     reason = say(refusal) if refusal else reason
-    kiosk.show()
+    session.show()
     if form:
-        page = kiosk.panel.page(given.page or "") or kiosk.panel.pages[0]
+        page = session.panel.page(given.page or "") or session.panel.pages[0]
         query = f"?control={refusal}" if refusal else ""
-        answer: Response = RedirectResponse(f"{kiosk.base}/pages/{page.id}{query}", status_code=303)
+        answer: Response = RedirectResponse(f"{session.base}/pages/{page.id}{query}", status_code=303)
     else:
         body = {"done": not reason, "reason": reason, "browser": browser.id}
-        content = body | {"control": kiosk.control.view()}
+        content = body | {"control": session.control.view()}
         answer = JSONResponse(content, status_code=409 if reason else 200)
     return keep(answer, request, token)
 
 
-def _required(kiosk: Kiosk) -> None:
-    if not kiosk.control.rules.required:
+def _required(session: RobotSession) -> None:
+    if not session.control.rules.required:
         raise NotFound("on this panel nobody needs control: its file has no [control] required = true")
 
 
-def _done(kiosk: Kiosk, act: str, browser: Browser, to: str, life_s: float) -> Refusal:
-    control = kiosk.control
+def _done(session: RobotSession, act: str, client: Client, to: str, life_s: float) -> Refusal:
+    control = session.control
     match act:
         case "take":
-            return control.take(browser, life_s)
+            return control.take(client, life_s)
         case "ask":
-            return control.ask(browser, life_s)
+            return control.ask(client, life_s)
         case "give":
-            return control.give(browser, to)
+            return control.give(client, to)
         case "keep":
-            return control.keep(browser, to)
+            return control.keep(client, to)
         case "release":
-            return control.release(browser)
+            return control.release(client)
     raise NotFound(f'there is no "/control/{act:.40}": there is take, ask, give, keep, release, here')
 
 
-def _late(kiosk: Kiosk, act: str, at: float) -> str:
+def _late(session: RobotSession, act: str, at: float) -> str:
     """Why what was touched then is not done any more; giving up is never too late."""
-    return "" if act == "release" else kiosk.doubts.late(at)
+    return "" if act == "release" else session.press_guard.late(at)
 
 
 async def _given(model: type[Fields], request: Request) -> Fields:

@@ -8,8 +8,8 @@ from fastapi.responses import Response
 from starlette.types import Message, Receive, Scope, Send
 
 from app.view.heartbeat import beat
-from app.view.publisher import Board, told
-from app.web.app_state import CurrentKiosk, CurrentSite
+from app.view.publisher import ViewPublisher, client_id_event
+from app.web.app_state import CurrentSession, CurrentState
 from app.web.asgi import direct
 from app.web.client_cookie import keep, welcomed
 from app.web.described import TEXT, errors
@@ -30,18 +30,18 @@ MEDIA_TYPE: Final = "text/event-stream"
     summary="Server-sent events: snapshot, <interlock>-enabled-updated, update, link, control, beat",
 )
 async def events(
-    request: Request, site: CurrentSite, kiosk: CurrentKiosk, once: bool = False
+    request: Request, state: CurrentState, session: CurrentSession, once: bool = False
 ) -> Response:
     """`once`: the snapshot alone, for a browser that has no stream to spare."""
-    board = kiosk.board
-    browser, token = welcomed(request, site) if board.view["control"]["required"] else (None, "")
-    first = told(browser.id) if browser else b""
+    board = session.publisher
+    browser, token = welcomed(request, state) if board.view["control"]["required"] else (None, "")
+    first = client_id_event(browser.id) if browser else b""
     answer: Response
     if once:
         all_of_it = board.snapshot() + first + beat()
         answer = Response(all_of_it, media_type=MEDIA_TYPE, headers=HEADERS)
     else:
-        answer = EventStream(board, first, site.metrics.streams)
+        answer = EventStream(board, first, state.metrics.streams)
     return keep(answer, request, token)
 
 
@@ -51,9 +51,9 @@ class EventStream(Response):
 
     media_type = MEDIA_TYPE
 
-    def __init__(self, board: Board, first: bytes, streams: Open) -> None:
+    def __init__(self, publisher: ViewPublisher, first: bytes, streams: Open) -> None:
         """`first` comes with the snapshot; `streams` counts it while it is open."""
-        self._board = board
+        self._board = publisher
         self._first = first
         self._streams = streams
         self.status_code = 200

@@ -1,4 +1,4 @@
-"""For who watches the kiosk: is it up, can commands reach the robot, how much of what."""
+"""For monitoring: is it up, can commands reach the robot, how much of what."""
 
 import asyncio
 from collections.abc import Callable
@@ -7,7 +7,7 @@ from fastapi import APIRouter
 from fastapi.responses import JSONResponse, PlainTextResponse, Response
 from pydantic import BaseModel
 
-from app.web.app_state import CurrentSite
+from app.web.app_state import CurrentState
 from app.web.described import errors
 from app.web.metrics import Metrics
 
@@ -37,14 +37,14 @@ class NotReady(BaseModel):
         503: {"model": NotReady, "description": "they can't"},
     },
 )
-async def readyz(site: CurrentSite) -> Response:
-    kiosks = site.fleet.kiosks
-    ways = await asyncio.gather(*(kiosk.way_asked() for kiosk in kiosks))
+async def readyz(state: CurrentState) -> Response:
+    sessions = state.fleet.sessions
+    ways = await asyncio.gather(*(session.way_asked() for session in sessions))
     way = next((way for way in ways if not way.permitted), None)
     if way is None:
         return JSONResponse({"status": "ready"})
     body: dict[str, object] = {"status": "not ready", "code": way.code, "reason": way.reason}
-    robots = {k.entry.id: w.code for k, w in zip(kiosks, ways, strict=True) if k.entry}
+    robots = {k.entry.id: w.code for k, w in zip(sessions, ways, strict=True) if k.entry}
     return JSONResponse(body | ({"robots": robots} if robots else {}), status_code=503)
 
 
@@ -54,14 +54,14 @@ async def readyz(site: CurrentSite) -> Response:
     response_class=PlainTextResponse,
     responses=errors(403) | {200: {"description": "the metrics"}},
 )
-async def metrics(site: CurrentSite) -> Response:
+async def metrics(state: CurrentState) -> Response:
     exposition = await asyncio.to_thread(_exposition)
-    text, media_type = exposition(site.metrics)
+    text, media_type = exposition(state.metrics)
     return Response(text, media_type=media_type)
 
 
 def _exposition() -> Callable[[Metrics], tuple[bytes, str]]:
-    """Read when it is first asked for, on a thread: it takes a while, and most kiosks never need it."""
+    """Read when it is first asked for, on a thread: it is slow to load, and rarely needed."""
     from app.web.prometheus import exposition
 
     return exposition

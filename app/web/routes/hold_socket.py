@@ -29,16 +29,16 @@ from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 from pydantic import BaseModel, ConfigDict, Field, JsonValue, TypeAdapter, ValidationError
 from starlette.types import Message
 
-from app.audit.press_record import Noted
+from app.audit.press_record import PendingEntry
 from app.commands.holds.lease import sent_at
-from app.commands.holds.receipts import RELEASED, Holding
+from app.commands.holds.receipts import RELEASED, ActiveHold
 from app.commands.press_context import SEEN
-from app.commands.receipts import By, Receipt, with_doubt
+from app.commands.receipts import PressContext, Receipt, with_doubt
 from app.errors import InputError, LogError
 from app.i18n import say
 from app.panel.template import needed
-from app.runtime.robot_session import Kiosk
-from app.web.app_state import CurrentKiosk, CurrentSite, Site
+from app.runtime.robot_session import RobotSession
+from app.web.app_state import AppState, CurrentSession, CurrentState
 from app.web.client_cookie import visitor
 from app.web.request_body import json_of, received
 
@@ -105,30 +105,30 @@ _message: TypeAdapter[Begin | Beat | End] = TypeAdapter(
 
 
 @router.websocket("/widgets/{widget}/hold")
-async def hold(socket: WebSocket, widget: str, site: CurrentSite, kiosk: CurrentKiosk) -> None:
-    kiosk.holds.widget(widget)
+async def hold(socket: WebSocket, widget: str, state: CurrentState, session: CurrentSession) -> None:
+    session.holds.widget(widget)
     await socket.accept()
-    session = _Session(socket, site, kiosk, widget)
-    with suppress(WebSocketDisconnect), site.owed.one():
-        receipt = await session.run(widget)
+    served = _HoldSocket(socket, state, session, widget)
+    with suppress(WebSocketDisconnect), state.in_flight.track():
+        receipt = await served.run(widget)
         if receipt.cause != "limit":
-            site.metrics.pressed(receipt.outcome)
+            state.metrics.pressed(receipt.outcome)
 
 
-class _Session:
+class _HoldSocket:
     """One socket and its one hold."""
 
-    def __init__(self, socket: WebSocket, site: Site, kiosk: Kiosk, widget: str) -> None:
+    def __init__(self, socket: WebSocket, state: AppState, session: RobotSession, widget: str) -> None:
         self._socket = socket
-        self._limits = site.limits
-        self._kiosk = kiosk
+        self._limits = state.limits
+        self._session = session
         self._opened_at = time.monotonic()
         self._ended: asyncio.Future[Receipt] = asyncio.get_running_loop().create_future()
-        self._browser = visitor(socket, site)
+        self._client = visitor(socket, state)
         self._id = secrets.token_hex(8)  # of the hold: in the log, its receipt and its recording
-        self._by = kiosk.doubts.by(widget, self._browser)
-        self._room = kiosk.logbook.room(self._by.origin)
-        self._noted: Noted | None = None
+        self._context = session.press_guard.by(widget, self._client)
+        self._room = session.press_log.room(self._context.origin)
+        self._pending: PendingEntry | None = None
         self._receipt: Receipt | None = None  # of its end, when all of it is known
         self._next: asyncio.Future[Message] | None = None  # what the browser says next
 
@@ -136,8 +136,8 @@ class _Session:
         """From the first message to the end; the receipt of the hold, of a refusal too."""
         await self._say()
         begun = await self._begun(widget)
-        if self._noted is not None:
-            self._noted.judged("permitted" if isinstance(begun, Holding) else begun.cause)
+        if self._pending is not None:
+            self._pending.judged("permitted" if isinstance(begun, ActiveHold) else begun.cause)
         if isinstance(begun, Receipt):
             begun = await self._refused(begun)
             await self._say(state="refused", status=CLOSE[begun.cause] - 4000, **begun.as_json())
@@ -149,28 +149,28 @@ class _Session:
                 await self._say(state="held", lease=begun.lease.id, reason=begun.since)
             await self._listen(begun)
         finally:
-            self._kiosk.holds.end(begun, "hold_by_closing")
+            self._session.holds.end(begun, "hold_by_closing")
             await asyncio.gather(telling, return_exceptions=True)
         return self._receipt or self._ended.result()
 
-    async def _begun(self, widget: str) -> Receipt | Holding:
-        holds, by = self._kiosk.holds, self._by
+    async def _begun(self, widget: str) -> Receipt | ActiveHold:
+        holds, by = self._session.holds, self._context
         refuse = partial(holds.refuse, widget, hold_id=self._id, trace=self._room)
         try:
             async with asyncio.timeout(BEGIN_WITHIN_S):
                 said = await self._read()
         except TimeoutError:
             return refuse(by, say("hold_late"))
-        if not self._limits.admit(self._browser):
+        if not self._limits.admit(self._client):
             return refuse(by, say("too_often"), "limit", trace=False)
         if isinstance(said, End):
             return refuse(by, say("hold_let_go"))
         if not isinstance(said, Begin):
             return refuse(by, say("hold_by_nonsense"))
         sent = self._sent(said)
-        inputs = self._kiosk.sending.with_defaults(holds.widget(widget), said.inputs)
+        inputs = self._session.dispatcher.with_defaults(holds.widget(widget), said.inputs)
         try:
-            by = self._by = self._kiosk.doubts.by(widget, self._browser, said.seen)
+            by = self._context = self._session.press_guard.by(widget, self._client, said.seen)
             if not self._room and (left_out := holds.refusal(widget, inputs, sent, by)):
                 return left_out
             still_held = await self._written(widget, inputs, by)
@@ -182,53 +182,53 @@ class _Session:
             return refuse(by, say("hold_let_go"))
         return holds.begin(widget, inputs, sent, by, self._ended.set_result, self._id)
 
-    async def _written(self, widget: str, inputs: Mapping[str, Any], by: By) -> bool:
+    async def _written(self, widget: str, inputs: Mapping[str, Any], context: PressContext) -> bool:
         """The entry in the log, while the browser is listened to: whether it holds still."""
-        own = needed(self._kiosk.holds.widget(widget), inputs)
+        own = needed(self._session.holds.widget(widget), inputs)
         writing = asyncio.ensure_future(
-            self._kiosk.logbook.pressed(widget, own, self._id, by.origin, "hold")
+            self._session.press_log.pressed(widget, own, self._id, context.origin, "hold")
         )
         self._next = asyncio.ensure_future(self._received())
         await asyncio.wait({writing, self._next}, return_when=asyncio.FIRST_COMPLETED)
         let_go = self._next.done()
-        self._noted = await writing
+        self._pending = await writing
         return not let_go
 
     async def _refused(self, receipt: Receipt) -> Receipt:
         """A hold that did not begin, in the operator's log."""
-        if self._noted is not None:
+        if self._pending is not None:
             return await self._closed(receipt)
         if receipt.cause == "limit":
             return receipt
         if not self._room:
-            self._kiosk.logbook.leave_out(self._by.origin)
+            self._session.press_log.leave_out(self._context.origin)
             return receipt
-        why = await self._kiosk.logbook.refused(
-            receipt.widget, receipt.inputs, receipt.id, self._by.origin, receipt.reason, "hold"
+        why = await self._session.press_log.refused(
+            receipt.widget, receipt.inputs, receipt.id, self._context.origin, receipt.reason, "hold"
         )
         return with_doubt(receipt, why)
 
     async def _closed(self, receipt: Receipt) -> Receipt:
         """Its end in the operator's log, on the disk before it is told."""
-        why = await self._noted.closed(receipt.outcome, receipt.reason) if self._noted else ""
+        why = await self._pending.closed(receipt.outcome, receipt.reason) if self._pending else ""
         return with_doubt(receipt, why)
 
-    async def _listen(self, holding: Holding) -> None:
+    async def _listen(self, holding: ActiveHold) -> None:
         """Until the browser closes or says nothing any more: what is late gets its answer too."""
         with suppress(TimeoutError, WebSocketDisconnect):
             while True:
                 async with asyncio.timeout(SILENCE_S):
                     said = await self._read()
                 if self._hear(said, holding):
-                    self._kiosk.control.touch(self._browser)
+                    self._session.control.touch(self._client)
                     await self._say(state="held")
                 elif isinstance(said, Beat) and self._receipt is not None:
                     await self._say(state="ended", **self._receipt.as_json())
         await self._close(1000)
 
-    def _hear(self, said: Begin | Beat | End | None, holding: Holding) -> bool:
+    def _hear(self, said: Begin | Beat | End | None, holding: ActiveHold) -> bool:
         """Whether the hold goes on after what was said."""
-        holds = self._kiosk.holds
+        holds = self._session.holds
         if isinstance(said, End) and said.lease in ("", holding.lease.id):
             holds.end(holding, WHYS.get(said.why, "hold_by_nonsense"))
             return False
@@ -256,8 +256,8 @@ class _Session:
     async def _tell(self) -> None:
         """The end, as soon as it is there, whatever ended it; then the browser may close."""
         receipt = await asyncio.shield(self._ended)
-        if receipt.outcome != "unknown" and not await self._kiosk.reached():
-            receipt = self._kiosk.holds.doubted(receipt)
+        if receipt.outcome != "unknown" and not await self._session.reached():
+            receipt = self._session.holds.doubted(receipt)
         self._receipt = receipt = await self._closed(receipt)
         with suppress(WebSocketDisconnect, RuntimeError):
             await self._say(state="ended", **receipt.as_json())

@@ -19,14 +19,14 @@ from app.i18n import say
 from app.panel.model import Page, Panel
 from app.panel.template import inputs_of
 from app.panel.widgets.families import Entered, Pressed
-from app.permission.clients import Browser
+from app.permission.clients import Client
 from app.permission.control_authority import Refusal
 from app.permission.control_authority_view import Role, role
 from app.printable import printable_texts
-from app.runtime.robot_session import Kiosk
+from app.runtime.robot_session import RobotSession
 from app.view.sections import SECTIONS, Section
 from app.view.view import View, as_seen_by
-from app.web.app_state import CurrentSite, Site
+from app.web.app_state import AppState, CurrentState
 from app.web.client_cookie import by_hand, keep, welcomed
 from app.web.described import PAGE, Described, errors
 
@@ -71,7 +71,7 @@ OTHER_PAGES = ("ask.html", "error.html", "log.html")
 class PageContext(TypedDict):
     """What `screen.html` gets."""
 
-    site: Site
+    site: AppState
     panel: Panel
     page: Page
     base: str
@@ -108,10 +108,10 @@ class PageContext(TypedDict):
     summary="The first page of the panel",
     responses=PAGES,
 )
-async def first_page(request: Request, site: CurrentSite) -> Response:
-    if away := _to_a_robot(request, site, "/"):
+async def first_page(request: Request, state: CurrentState) -> Response:
+    if away := _to_a_robot(request, state, "/"):
         return away
-    return _render(request, site, site.fleet.panel.pages[0])
+    return _render(request, state, state.fleet.panel.pages[0])
 
 
 @router.get(
@@ -120,13 +120,13 @@ async def first_page(request: Request, site: CurrentSite) -> Response:
     summary="A page of the panel",
     responses=PAGES,
 )
-async def named_page(page: str, request: Request, site: CurrentSite) -> Response:
-    if away := _to_a_robot(request, site, f"/pages/{page}"):
+async def named_page(page: str, request: Request, state: CurrentState) -> Response:
+    if away := _to_a_robot(request, state, f"/pages/{page}"):
         return away
-    found = site.fleet.panel.page(page)
+    found = state.fleet.panel.page(page)
     if found is None:
         raise NotFound(f'there is no page "{page}"')
-    return _render(request, site, found)
+    return _render(request, state, found)
 
 
 async def compiled(templates: Environment) -> None:
@@ -144,42 +144,42 @@ class Ask(TypedDict):
     inputs: list[Entered]
 
 
-def _to_a_robot(request: Request, site: Site, path: str) -> Response | None:
+def _to_a_robot(request: Request, state: AppState, path: str) -> Response | None:
     """Where there are several robots each page is of one: without a name, of the first."""
-    first = site.fleet.first.base
+    first = state.fleet.first.base
     if not first or "robot" in request.path_params:
         return None
     return RedirectResponse(first + path, status_code=303)
 
 
-def _render(request: Request, site: Site, page: Page) -> Response:
-    kiosk = site.fleet.kiosk(request.path_params.get("robot"))
+def _render(request: Request, state: AppState, page: Page) -> Response:
+    session = state.fleet.session(request.path_params.get("robot"))
     typed = any(isinstance(widget, Entered) for widget in page.widgets)
     refresh_s = REFRESH_WITH_INPUTS_S if typed else REFRESH_S
-    browser, token = welcomed(request, site)
-    if kiosk.control.rules.required:
-        kiosk.control.loaded(browser, refresh_s + GRACE_S, by_hand(request))
-        kiosk.show()
-    context = _context(request, site, kiosk, page, browser, refresh_s)
-    html = site.templates.get_template("screen.html").render(**context)
+    browser, token = welcomed(request, state)
+    if session.control.rules.required:
+        session.control.loaded(browser, refresh_s + GRACE_S, by_hand(request))
+        session.show()
+    context = _context(request, state, session, page, browser, refresh_s)
+    html = state.templates.get_template("screen.html").render(**context)
     return keep(HTMLResponse(html, headers={"cache-control": "no-store"}), request, token)
 
 
 def _context(
-    request: Request, site: Site, kiosk: Kiosk, page: Page, browser: Browser, refresh_s: int
+    request: Request, state: AppState, session: RobotSession, page: Page, client: Client, refresh_s: int
 ) -> PageContext:
-    board, rules = kiosk.board, kiosk.control.rules
+    board, rules = session.publisher, session.control.rules
     refusal = request.query_params.get("control", "")
-    receipt = kiosk.presses.receipt(request.query_params.get("receipt", ""))
+    receipt = session.presses.receipt(request.query_params.get("receipt", ""))
     again = {RELOADED: 1} | ({"receipt": receipt.id} if receipt else {})
     now, wall = clock.server_now(), time.time()
     return PageContext(
-        site=site,
-        panel=site.fleet.panel,
+        site=state,
+        panel=state.fleet.panel,
         page=page,
-        base=kiosk.base,
-        robot=kiosk.entry.id if kiosk.entry else "",
-        view=as_seen_by(board.view, browser),
+        base=session.base,
+        robot=session.entry.id if session.entry else "",
+        view=as_seen_by(board.view, client),
         sections=SECTIONS,
         event_id=board.id,
         revision=board.revision,
@@ -188,7 +188,7 @@ def _context(
         press_id=secrets.token_hex(8),
         receipt=receipt,
         inputs=dict(receipt.entered) | printable_texts(receipt.entered) if receipt else {},
-        words=_words(kiosk, page),
+        words=_words(session, page),
         lost=say("server_lost"),
         lost_short=say("lost"),
         locks_all=say("locks_all"),
@@ -197,31 +197,31 @@ def _context(
         refresh_s=refresh_s,
         now=round(now * 1000),
         since=None if RELOADED in request.query_params else round(now, 3),
-        again=f"{kiosk.base}/pages/{page.id}?{urlencode(again)}",
+        again=f"{session.base}/pages/{page.id}?{urlencode(again)}",
         until=round(now + refresh_s + RELOADED_S, 3),
-        browser=browser.id,
-        over=rules.local and browser.local,
-        role=role(board.view["control"], browser, rules),
+        browser=client.id,
+        over=rules.local and client.local,
+        role=role(board.view["control"], client, rules),
         refused=say(refusal) if refusal and refusal in REFUSALS else "",
     )
 
 
-def _words(kiosk: Kiosk, page: Page) -> dict[str, Any]:
+def _words(session: RobotSession, page: Page) -> dict[str, Any]:
     """The words of a page by their names in its templates, and what it asks before a press."""
-    own = {"base": kiosk.base, "log": say("log_link"), "asks": asks_of(kiosk, page)}
+    own = {"base": session.base, "log": say("log_link"), "asks": asks_of(session, page)}
     plain = {word: say(word) for word in (*WORDS, *LINK_WORDS)}
     return own | plain | {act: say(f"control_{act}") for act in CONTROL_ACTS}
 
 
-def asks_of(kiosk: Kiosk, page: Page) -> dict[str, Ask]:
+def asks_of(session: RobotSession, page: Page) -> dict[str, Ask]:
     """What is asked before the presses of a page that ask first."""
     pressed = (w for w in page.widgets if isinstance(w, Pressed) and w.confirm_press)
-    return {widget.id: ask_of(kiosk, widget) for widget in pressed}
+    return {widget.id: ask_of(session, widget) for widget in pressed}
 
 
-def ask_of(kiosk: Kiosk, widget: Pressed) -> Ask:
+def ask_of(session: RobotSession, widget: Pressed) -> Ask:
     """With the robot's name, where there are several."""
-    inputs = {w.id: w for w in kiosk.panel.widgets() if isinstance(w, Entered)}
-    robot = kiosk.entry.name if kiosk.entry else ""
+    inputs = {w.id: w for w in session.panel.widgets() if isinstance(w, Entered)}
+    robot = session.entry.name if session.entry else ""
     sentence = say("ask_on" if robot else "ask", label=widget.label, robot=robot)
     return Ask(sentence=sentence, inputs=[inputs[name] for name in inputs_of(widget)])

@@ -4,7 +4,7 @@ from fastapi import APIRouter, Request
 from fastapi.responses import JSONResponse, RedirectResponse, Response
 from pydantic import BaseModel
 
-from app.web.app_state import CurrentKiosk
+from app.web.app_state import CurrentSession
 from app.web.described import FORM, errors
 from app.web.request_body import body_of, kind_of
 from app.web.routes.press_forms import page_after
@@ -30,10 +30,10 @@ class Asked(BaseModel):
         409: {"model": Asked, "description": "its node is not there"},
     },
 )
-async def read(widget: str, request: Request, kiosk: CurrentKiosk) -> Response:
+async def read(widget: str, request: Request, session: CurrentSession) -> Response:
     await body_of(request)  # a page without scripts sends its whole form
-    why = kiosk.read_again(widget)
+    why = session.read_again(widget)
     if kind_of(request) == FORM:
-        return RedirectResponse(page_after(kiosk, widget, ""), status_code=303)
+        return RedirectResponse(page_after(session, widget, ""), status_code=303)
     answer = Asked(asked=not why, reason=why)
     return JSONResponse(answer.model_dump(), status_code=409 if why else 202)

@@ -13,10 +13,10 @@ from app.commands.press_context import PRESS_ID
 from app.errors import InputError
 from app.i18n import say
 from app.panel.model import Page
-from app.permission.clients import Browser
+from app.permission.clients import Client
 from app.printable import printable_texts
-from app.runtime.robot_session import Kiosk
-from app.web.app_state import Site
+from app.runtime.robot_session import RobotSession
+from app.web.app_state import AppState
 from app.web.routes.pages import ask_of
 
 CONFIRMED: Final = "_confirmed"  # a form's field: the server has asked, and this is the yes
@@ -25,46 +25,46 @@ ASKED_S: Final = 30.0  # the answer is a press, and no later one
 
 
 async def pressed_by_form(
-    site: Site, kiosk: Kiosk, browser: Browser, widget: str, inputs: dict[str, str]
+    state: AppState, session: RobotSession, client: Client, widget: str, inputs: dict[str, str]
 ) -> Response:
     """Back to the page, with the receipt on it; or the question that comes first."""
     too_soon, before = _is_second_tap(inputs), inputs.pop("_last", "")
-    asks = kiosk.presses.widget(widget).confirm_press
+    asks = session.presses.widget(widget).confirm_press
     if asks and (inputs.pop(CONFIRMED, "") != "yes" or too_soon):
-        return _ask(site, kiosk, widget, inputs)
+        return _ask(state, session, widget, inputs)
     # One rendered page has one id for all its buttons, and each button is a press of its own.
     page_id = inputs.pop("_id", secrets.token_hex(8))
     if not re.fullmatch(PRESS_ID, page_id):
         raise InputError(f'_id: "{page_id:.40}" is not the id of a press')
     press_id = f"{page_id}.{widget}"
     seen, until = inputs.pop("_seen", ""), _until(inputs)
-    typed = kiosk.sending.typed(inputs)
-    if not site.limits.admit(browser):
-        receipt = kiosk.presses.limited(widget, typed, press_id, shown=True)
-        return RedirectResponse(page_after(kiosk, widget, receipt.id), status_code=303)
-    by = kiosk.doubts.by(widget, browser, seen, until)
+    typed = session.dispatcher.typed(inputs)
+    if not state.limits.admit(client):
+        receipt = session.presses.limited(widget, typed, press_id, shown=True)
+        return RedirectResponse(page_after(session, widget, receipt.id), status_code=303)
+    by = session.press_guard.by(widget, client, seen, until)
     if too_soon:
-        work = kiosk.presses.too_soon(widget, typed, press_id, before, by.origin)
+        work = session.presses.too_soon(widget, typed, press_id, before, by.origin)
     else:
-        work = kiosk.presses.press(widget, typed, press_id, by)
-    receipt = await site.counted(work)
-    return RedirectResponse(page_after(kiosk, widget, receipt.id), status_code=303)
+        work = session.presses.press(widget, typed, press_id, by)
+    receipt = await state.counted(work)
+    return RedirectResponse(page_after(session, widget, receipt.id), status_code=303)
 
 
-def _ask(site: Site, kiosk: Kiosk, widget: str, inputs: dict[str, str]) -> Response:
+def _ask(state: AppState, session: RobotSession, widget: str, inputs: dict[str, str]) -> Response:
     """Asks a browser without scripts whether it is meant: the answer is the press."""
-    pressed = kiosk.presses.widget(widget)
-    html = site.templates.get_template("ask.html").render(
-        site=site,
-        panel=kiosk.panel,
-        banner=kiosk.board.view["notice"]["banner"],
-        asked=ask_of(kiosk, pressed),
-        action=f"{kiosk.base}/widgets/{widget}",
-        back=f"{kiosk.base}/pages/{_page_of(kiosk, widget).id}",
+    pressed = session.presses.widget(widget)
+    html = state.templates.get_template("ask.html").render(
+        site=state,
+        panel=session.panel,
+        banner=session.publisher.view["notice"]["banner"],
+        asked=ask_of(session, pressed),
+        action=f"{session.base}/widgets/{widget}",
+        back=f"{session.base}/pages/{_page_of(session, widget).id}",
         fields={
             **inputs,
             CONFIRMED: "yes",
-            "_seen": kiosk.board.id,
+            "_seen": session.publisher.id,
             "_until": str(round(clock.server_now() + ASKED_S, 3)),
             "_since": str(round(clock.server_now(), 3)),
         },
@@ -76,8 +76,8 @@ def _ask(site: Site, kiosk: Kiosk, widget: str, inputs: dict[str, str]) -> Respo
     return HTMLResponse(html, headers={"cache-control": "no-store"})
 
 
-def _page_of(kiosk: Kiosk, widget: str) -> Page:
-    return next(p for p in kiosk.panel.pages if any(w.id == widget for w in p.widgets))
+def _page_of(session: RobotSession, widget: str) -> Page:
+    return next(p for p in session.panel.pages if any(w.id == widget for w in p.widgets))
 
 
 def _until(inputs: dict[str, str]) -> float | None:
@@ -109,7 +109,7 @@ def _moment(inputs: dict[str, str], name: str) -> float | None:
     return moment
 
 
-def page_after(kiosk: Kiosk, widget: str, receipt_id: str) -> str:
+def page_after(session: RobotSession, widget: str, receipt_id: str) -> str:
     """The page of a widget, with a receipt if there is one."""
-    page = f"{kiosk.base}/pages/{_page_of(kiosk, widget).id}"
+    page = f"{session.base}/pages/{_page_of(session, widget).id}"
     return f"{page}?receipt={quote(receipt_id)}" if receipt_id else page

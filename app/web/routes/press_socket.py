@@ -24,7 +24,7 @@ from starlette.types import Message
 from app.commands.press_context import PRESS_ID
 from app.errors import InputError, KioskError
 from app.i18n import say
-from app.web.app_state import CurrentKiosk, CurrentSite, Site
+from app.web.app_state import AppState, CurrentSession, CurrentState
 from app.web.client_cookie import caller
 from app.web.request_body import as_model, json_of, received
 from app.web.routes.presses import STATUS, Press, pressed
@@ -49,20 +49,20 @@ class SocketPress(Press):
 
 
 @router.websocket("/presses")
-async def presses(socket: WebSocket, site: CurrentSite, kiosk: CurrentKiosk) -> None:
+async def presses(socket: WebSocket, state: CurrentState, session: CurrentSession) -> None:
     """`kiosk`: where there is no such robot, there is no socket."""
     await socket.accept()
-    await _Session(socket, site).run()
+    await _PressSocket(socket, state).run()
 
 
-class _Session:
+class _PressSocket:
     """One socket and what is pressed on it; it knows no more of the page than each press says."""
 
-    __slots__ = ("_caller", "_refused", "_site", "_socket", "_under_way")
+    __slots__ = ("_caller", "_refused", "_socket", "_state", "_under_way")
 
-    def __init__(self, socket: WebSocket, site: Site) -> None:
+    def __init__(self, socket: WebSocket, state: AppState) -> None:
         self._socket = socket
-        self._site = site
+        self._state = state
         self._caller = caller(socket)
         self._under_way: set[asyncio.Task[None]] = set()
         self._refused = 0  # one after the other
@@ -98,10 +98,10 @@ class _Session:
         task.add_done_callback(self._under_way.discard)
 
     async def _press(self, said: SocketPress) -> None:
-        site, socket = self._site, self._socket
+        state, socket = self._state, self._socket
         try:
-            kiosk = site.fleet.kiosk(socket.path_params.get("robot"))
-            receipt = await pressed(site, kiosk, self._caller.seen(site), said.widget, said)
+            session = state.fleet.session(socket.path_params.get("robot"))
+            receipt = await pressed(state, session, self._caller.seen(state), said.widget, said)
         except KioskError as error:
             await self._answer(said.id, error.status, error=str(error))
         except Exception:

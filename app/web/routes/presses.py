@@ -13,9 +13,9 @@ from app.commands.press_context import LONGEST_ID, PRESS_ID, SEEN
 from app.commands.press_limits import RETRY_AFTER_S
 from app.commands.receipts import Receipt
 from app.errors import InputError
-from app.permission.clients import Browser
-from app.runtime.robot_session import Kiosk
-from app.web.app_state import CurrentKiosk, CurrentSite, Site
+from app.permission.clients import Client
+from app.runtime.robot_session import RobotSession
+from app.web.app_state import AppState, CurrentSession, CurrentState
 from app.web.client_cookie import visitor
 from app.web.described import (
     FORM,
@@ -105,16 +105,18 @@ RECEIPTS: Final[Described] = errors(403, 404, 408, 413) | {
         Press, {"type": "object", "additionalProperties": TEXT}, required=True
     ),
 )
-async def press(widget: str, request: Request, site: CurrentSite, kiosk: CurrentKiosk) -> Response:
-    kiosk.presses.widget(widget)
-    browser = visitor(request, site)
+async def press(
+    widget: str, request: Request, state: CurrentState, session: CurrentSession
+) -> Response:
+    session.presses.widget(widget)
+    browser = visitor(request, state)
     body = await body_of(request)
     kind = kind_of(request)
     if kind == JSON:
-        receipt = await pressed(site, kiosk, browser, widget, as_model(Press, json_of(body)))
+        receipt = await pressed(state, session, browser, widget, as_model(Press, json_of(body)))
         return _answer(receipt)
     if kind == FORM:
-        return await pressed_by_form(site, kiosk, browser, widget, form_of(body))
+        return await pressed_by_form(state, session, browser, widget, form_of(body))
     raise InputError(f'a press is "{JSON}" or "{FORM}", not "{kind}"')
 
 
@@ -125,9 +127,11 @@ async def press(widget: str, request: Request, site: CurrentSite, kiosk: Current
     responses=RECEIPTS | errors(422),
     openapi_extra=described_body(Cancel, fields(_press={}), required=False),
 )
-async def cancel(widget: str, request: Request, site: CurrentSite, kiosk: CurrentKiosk) -> Response:
-    kiosk.presses.widget(widget)
-    browser = visitor(request, site)
+async def cancel(
+    widget: str, request: Request, state: CurrentState, session: CurrentSession
+) -> Response:
+    session.presses.widget(widget)
+    browser = visitor(request, state)
     body, kind = await body_of(request), kind_of(request)
     form = kind == FORM
     of = ""
@@ -135,24 +139,26 @@ async def cancel(widget: str, request: Request, site: CurrentSite, kiosk: Curren
         of = form_of(body).get("_press", "")
     elif kind == JSON and body:
         of = as_model(Cancel, json_of(body)).press
-    if site.limits.admit_cancel(browser, kiosk.base, widget, of[:LONGEST_ID]):
-        receipt = await site.counted(kiosk.presses.cancel(widget, origin_of(browser), of))
+    if state.limits.admit_cancel(browser, session.base, widget, of[:LONGEST_ID]):
+        receipt = await state.counted(session.presses.cancel(widget, origin_of(browser), of))
     else:
-        receipt = kiosk.presses.limited(widget, {}, "", "cancel_too_often", shown=form)
+        receipt = session.presses.limited(widget, {}, "", "cancel_too_often", shown=form)
     if form:
-        return RedirectResponse(page_after(kiosk, widget, receipt.id), status_code=303)
+        return RedirectResponse(page_after(session, widget, receipt.id), status_code=303)
     return _answer(receipt)
 
 
-async def pressed(site: Site, kiosk: Kiosk, browser: Browser, widget: str, given: Press) -> Receipt:
+async def pressed(
+    state: AppState, session: RobotSession, client: Client, widget: str, given: Press
+) -> Receipt:
     """What comes of a press that was given as JSON, by whatever way."""
-    kiosk.presses.widget(widget)
+    session.presses.widget(widget)
     press_id = given.id or secrets.token_hex(8)
-    if not site.limits.admit(browser):
-        return kiosk.presses.limited(widget, given.inputs, press_id)
+    if not state.limits.admit(client):
+        return session.presses.limited(widget, given.inputs, press_id)
     at = given.at.timestamp() if given.at else None
-    by = kiosk.doubts.by(widget, browser, given.seen or "", at)
-    return await site.counted(kiosk.presses.press(widget, given.inputs, press_id, by))
+    by = session.press_guard.by(widget, client, given.seen or "", at)
+    return await state.counted(session.presses.press(widget, given.inputs, press_id, by))
 
 
 def _answer(receipt: Receipt) -> Response:

@@ -4,17 +4,17 @@ from fastapi import APIRouter, Request
 from fastapi.responses import Response
 
 from app.errors import NotFound
-from app.web.app_state import CurrentSite
+from app.web.app_state import CurrentState
 
 router = APIRouter()
 
 
 @router.get("/static/{revision}/{name:path}", include_in_schema=False)
-async def static(revision: str, name: str, request: Request, site: CurrentSite) -> Response:
-    asset = site.assets.files.get(name)
+async def static(revision: str, name: str, request: Request, state: CurrentState) -> Response:
+    asset = state.assets.files.get(name)
     if asset is None:
         raise NotFound(f'there is no file "{name}"')
-    fits = revision == site.assets.revision
+    fits = revision == state.assets.revision
     caching = "public, max-age=31536000, immutable" if fits else "no-store"
     headers = {"cache-control": caching}
     if "gzip" not in request.headers.get("accept-encoding", ""):

@@ -5,14 +5,14 @@ import time
 from app import main
 from app.process import shutdown
 from app.runtime import robot_session
-from app.transport.zenoh_session import Link
+from app.transport.zenoh_session import ZenohSession
 
 
-class Standing(Link):
+class Standing(ZenohSession):
     def close(self) -> None:
         time.sleep(60)
 
 
-vars(robot_session)["Link"] = Standing
+vars(robot_session)["ZenohSession"] = Standing
 vars(shutdown)["ENDED_WITHIN_S"] = 1.0
 app = main.app
