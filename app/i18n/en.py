@@ -5,70 +5,78 @@ from typing import Final
 
 ENGLISH: Final[Mapping[str, str]] = {
     # Why a control is locked.
-    "no_link": "No connection to the robot: its bridge can't be reached.",
-    "no_link_at": "No connection to the robot: its bridge can't be reached at {where}.",
+    "no_link": "No connection to the robot: its bridge cannot be reached.",
+    "no_link_at": "No connection to the robot: its bridge cannot be reached at {where}.",
     "and_more": "{names} and {number} more",
-    "no_bridge": "No connection to the robot: Zenoh answers, but no ROS 2 bridge is there.",
-    "no_bridge_of": "No connection to {name}: Zenoh answers, but no ROS 2 bridge of its namespace.",
-    "ending": "The panel's server is ending.",
-    "joining": "Joining the robot's topics: a moment.",
-    "catching_up": "The panel's server stood still: it takes in what the robot said meanwhile.",
-    "bridge_silent": (
-        "No connection to the robot: its bridge does not answer. If this stays, restart the bridge."
+    "no_bridge": "No connection to the robot: Zenoh responds, but no ROS 2 bridge is running.",
+    "no_bridge_of": (
+        "No connection to {name}: Zenoh responds, but no ROS 2 bridge of its namespace is running."
     ),
-    "wrong_type": "{topic} is {found} on the robot, but this panel is made for {wanted}.",
-    "unheard": "Locked: the bridge does not pass on {topic}. If this stays, restart the bridge.",
+    "ending": "The panel server is shutting down.",
+    "joining": "Connecting to the robot's topics. Please wait.",
+    "catching_up": "The panel server stalled. Catching up with the robot.",
+    "bridge_silent": (
+        "No connection to the robot: its bridge does not respond. If this persists, restart the bridge."
+    ),
+    "wrong_type": "{topic} is {found} on the robot, but this panel expects {wanted}.",
+    "unheard": "Locked: the bridge does not forward {topic}. If this persists, restart the bridge.",
     "waiting": "Locked: waiting for {topic}.",
-    "cut": "Locked: the connection was cut; waiting for a new {topic}.",
+    "cut": "Locked: the connection was lost. Waiting for a new {topic}.",
     "stale": "Locked: the last {topic} is older than {limit} s.",
-    "new_publisher": "A new publisher of {topic} has not said anything yet.",
+    "new_publisher": "Locked: a new publisher of {topic} has not published yet.",
     "no_publisher": "Locked: no node of the robot publishes {topic}.",
-    "unreadable": "Locked: {topic} can't be read: what arrives is not {wanted}.",
-    "missing": "Locked: there is no {field} in the last {topic}.",
-    "several": "Locked: {field} is in the last {topic} more than once.",
-    "reading": "Locked: {topic} is large; it is being read.",
+    "unreadable": "Locked: {topic} cannot be read. The data received is not {wanted}.",
+    "missing": "Locked: the last {topic} has no {field}.",
+    "several": "Locked: the last {topic} has {field} more than once.",
+    "reading": "Locked: {topic} is large and is still being read.",
     "forbidden": "The robot does not permit {name}.",
     "unmet": "{name} is {value}: it must be {wanted}.",
     "either": "{first} or {last}",
     "both": "{one} and {other}",
     "not_value": "not {value}",
     "more_reasons": "+{number} more",
-    "no_service": "Locked: the robot does not offer {name} now.",
-    "getting_ready": "Locked: the robot has just begun to offer {name}; getting ready.",
-    "busy": "Under way: waiting for the robot.",
-    "perhaps_busy": "Locked: a goal that was sent before may still be under way.",
+    "no_service": "Locked: the robot does not offer {name} at present.",
+    "getting_ready": "Locked: the robot has just started {name}. Connecting.",
+    "busy": "In progress: waiting for the robot.",
+    "perhaps_busy": "Locked: a goal sent earlier may still be running.",
     # QoS that DDS would not match: the robot's and the panel's.
-    "publishes_best_effort": "The robot publishes {topic} best effort; this panel asks for reliable.",
-    "publishes_volatile": "The robot publishes {topic} volatile; this panel asks for transient local.",
-    "asks_for_reliable": "The robot asks for {topic} reliable; this panel publishes it best effort.",
+    "publishes_best_effort": (
+        "The robot publishes {topic} as best effort, but this panel requires reliable."
+    ),
+    "publishes_volatile": (
+        "The robot publishes {topic} as volatile, but this panel requires transient local."
+    ),
+    "asks_for_reliable": (
+        "The robot requires {topic} as reliable, but this panel publishes it as best effort."
+    ),
     "asks_for_transient_local": (
-        "The robot asks for {topic} transient local; this panel publishes it volatile."
+        "The robot requires {topic} as transient local, but this panel publishes it as volatile."
     ),
     # What a page says by itself, without its server.
-    "server_lost": "There is no connection to the panel's server.",
-    "server_unsure": "No answer from the panel's server: it is not known whether this was sent.",
+    "server_lost": "No connection to the panel server.",
+    "server_unsure": "No response from the panel server. The command may or may not have been sent.",
     # Parameters: why one is locked, what is shown of it, what came of setting it.
-    "no_parameters": "Locked: the robot does not offer the parameters of {node} now.",
-    "parameter_waiting": "Locked: waiting for {node} to tell its {name}.",
+    "no_parameters": "Locked: the robot does not offer the parameters of {node} at present.",
+    "parameter_waiting": "Locked: waiting for {node} to report {name}.",
     "parameter_silent": (
-        "Locked: {node} does not answer when it is asked for its {name}. “Read again” asks once more."
+        "Locked: {node} does not respond when {name} is read. “Read again” tries once more."
     ),
     "parameter_undeclared": "Locked: {node} has no parameter {name}.",
-    "parameter_mistyped": "{name} of {node} is {found}, but this panel is made for {wanted}.",
-    "parameter_unreadable": "Locked: what {node} tells of its {name} can't be read.",
-    "parameter_read_only": "Read only: {node} does not let its {name} be set.",
+    "parameter_mistyped": "{name} of {node} is {found}, but this panel expects {wanted}.",
+    "parameter_unreadable": "Locked: the value of {name} from {node} cannot be read.",
+    "parameter_read_only": "Read only: {node} does not allow {name} to be set.",
     "parameter_apart": (
-        "Locked: {node} takes {theirs} for its {name}, and this panel gives {ours}: no value is both."
+        "Locked: {node} accepts {theirs} for {name} and this panel offers {ours}. No value fits both."
     ),
     "parameter_read": "read {time}",
-    "parameter_told": "read {time}; {node} does not tell of changes",
-    "parameter_cut": "from before the connection was cut, read {time}",
-    "parameter_no_answer": "no answer since; read {time}",
+    "parameter_told": "read {time}; {node} does not report changes",
+    "parameter_cut": "from before the connection was lost, read {time}",
+    "parameter_no_answer": "no response since; read {time}",
     "parameter_asking": "waiting for {node}",
-    "parameter_unanswered": "no answer from {node}",
+    "parameter_unanswered": "no response from {node}",
     "read_again": "Read again",
     "read_named": "Read {label} again",
-    "parameter_no_value": "declared, but it has no value yet",
+    "parameter_no_value": "declared, but has no value yet",
     "parameter_not_there": "not declared by {node}",
     "parameter_set": "Set to {value} at {time}.",
     "set": "Set",
@@ -80,63 +88,65 @@ ENGLISH: Final[Mapping[str, str]] = {
     "any_number": "a number",
     "any_whole": "a whole number",
     "any_text": "a text",
-    "limits_list": "{each}; several with commas between them",
+    "limits_list": "{each}; separate several values with commas",
     "list_value": "{label}, value {number}",
-    "list_long": "{label} has {count} values; {most} are allowed",
+    "list_long": "{label} has {count} values. At most {most} are allowed",
     "no_list": "{label} must be {limits}, not {given}",
     "no_text": "{label} must be text of {most} characters at most, not {given}",
     # What came of a call or a goal.
-    "waiting_for_answer": "Sent; waiting for the robot's answer.",
+    "waiting_for_answer": "Sent. Waiting for the robot's response.",
     "answered": "Done at {time}",
-    "said_no": "The robot said no at {time}",
-    "timed_out": "No answer within {seconds} s: it is not known whether the robot did it.",
-    "cyclone_hint": " (Services and actions reach only robots on Cyclone DDS.)",
-    "call_cut": "The connection was cut while waiting: the robot may have done it.",
-    "call_dropped": "The bridge gave no answer for {service}: it is not known whether it was done.",
-    "answer_unreadable": "The robot answered, but not with {wanted}: the robot may have done it.",
-    "too_many": "too many calls of {service} have had no answer yet",
+    "said_no": "Rejected by the robot at {time}",
+    "timed_out": "No response within {seconds} s. The robot may or may not have done it.",
+    "cyclone_hint": " (Services and actions work only with robots on Cyclone DDS.)",
+    "call_cut": "The connection was lost while waiting. The robot may have done it.",
+    "call_dropped": "The bridge returned no response for {service}. The result is unknown.",
+    "answer_unreadable": "The robot responded, but not with {wanted}. The robot may have done it.",
+    "too_many": "too many calls of {service} are still waiting for a response",
     "goal_rejected": "The robot rejected the goal at {time}.",
     "goal_accepted": "Accepted at {time}.",
-    "goal_executing": "Under way.",
-    "goal_canceling": "Being canceled.",
+    "goal_executing": "In progress.",
+    "goal_canceling": "Canceling.",
     "goal_succeeded": "Succeeded at {time}",
     "goal_canceled": "Canceled at {time}",
-    "goal_aborted": "The robot aborted it at {time}",
-    "goal_lost": "The robot no longer knows this goal: what came of it is not known.",
-    "goal_not_there": "The robot does not know this goal: it did not get it, or knows it no longer.",
-    "goal_silent": "The robot told nothing of this goal for {seconds} s: what came of it is not known.",
-    "goal_in_doubt": "A goal of {time} may still be under way: it was sent before this server's start.",
-    "goal_found": "Found under way at {time}.",
-    "goal_had_succeeded": "Succeeded, by {time}",
-    "goal_had_been_canceled": "Canceled, by {time}",
-    "goal_had_been_aborted": "Aborted by the robot, by {time}",
-    "goals_unread": "Whether a goal of before this server's start is under way is not known: {why}",
-    "goal_cut": "The connection was cut: the robot may still be doing it.",
-    "goal_fault": "A fault of the panel's server: what came of it is not known.",
-    "goal_gone": "The robot stopped offering {name}: what came of it is not known.",
+    "goal_aborted": "Aborted by the robot at {time}",
+    "goal_lost": "The robot no longer knows this goal. The result is unknown.",
+    "goal_not_there": (
+        "The robot does not know this goal: it was not received, or is already forgotten."
+    ),
+    "goal_silent": "No news of this goal from the robot for {seconds} s. The result is unknown.",
+    "goal_in_doubt": "A goal sent at {time}, before the restart, may still be running.",
+    "goal_found": "Still in progress at {time}.",
+    "goal_had_succeeded": "Succeeded before {time}",
+    "goal_had_been_canceled": "Canceled before {time}",
+    "goal_had_been_aborted": "Aborted by the robot before {time}",
+    "goals_unread": "It is unknown whether a goal from before the restart is still running: {why}",
+    "goal_cut": "The connection was lost. The robot may still be doing it.",
+    "goal_fault": "Internal error in the panel server. The result is unknown.",
+    "goal_gone": "The robot stopped offering {name}. The result is unknown.",
     "cancel": "Cancel",
-    "cancel_sent": "The robot was asked to cancel at {time}.",
+    "cancel_sent": "Cancel requested at {time}.",
     "cancel_refused": "The robot refused to cancel at {time}.",
     "cancel_unheard": (
-        "The robot does not offer {name} now: it is not known whether it was asked to cancel."
+        "The robot does not offer {name} at present. The cancel request may not have arrived."
     ),
     "goal_over": (
-        "That goal is over, or of before this server's start and perhaps still under way: nothing was"
-        " canceled."
+        "Nothing was canceled: that goal is over, or was sent before the restart and may still be"
+        " running."
     ),
-    "nothing_to_cancel": "there is nothing under way to cancel",
+    "nothing_to_cancel": "nothing is in progress",
     # Why a press is no longer what was meant.
     "changed_meanwhile": "it changed while you pressed.",
-    "expired": "it took {seconds} s to get here: press again.",
-    "ahead": "its time is ahead of the panel's server: load the page again.",
+    "expired": "it took {seconds} s to arrive. Press again.",
+    "ahead": "its time is ahead of the panel server. Reload the page.",
     "seen_on_another": "the page showed another robot.",
-    "seen_before_restart": "the panel's server was started anew since the page showed this.",
+    "seen_before_restart": "the panel server restarted after the page showed this.",
     # The effect of a command.
-    "waiting_for_effect": "Sent; waiting for {topic} to show it.",
+    "waiting_for_effect": "Sent. Waiting for {topic} to confirm it.",
     "confirmed": "Confirmed by {topic} at {time}.",
-    "no_effect": "{topic} did not show it within {seconds} s: it is not known whether it was done.",
+    "no_effect": "No confirmation on {topic} within {seconds} s. The result is unknown.",
     # Before a command.
-    "ask": "{label}: do it?",
+    "ask": "{label}?",
     "ask_on": "{label} on {robot}?",
     "empty": "(empty)",
     "back": "Back",
@@ -148,35 +158,41 @@ ENGLISH: Final[Mapping[str, str]] = {
     "the_robot": "the robot",
     "control": "Control of the robot",
     "control_held": "{name} has control of {robot}.",
-    "control_free": "Nobody has control of {robot}: take control first.",
+    "control_free": "No panel has control of {robot}. Take control first.",
     "control_mine": "This panel has control of {robot}.",
-    "control_asks": "{name} asks for control of {robot}; untouched, it goes over in {seconds} s.",
-    "control_asked": "{name} was asked: control is yours after {seconds} s without a touch there.",
+    "control_asks": (
+        "{name} requests control of {robot}. If this panel is not touched, control passes in "
+        "{seconds} s."
+    ),
+    "control_asked": (
+        "Control requested from {name}. If that panel is not touched, control passes to you in "
+        "{seconds} s."
+    ),
     "control_take": "Take control",
-    "control_ask": "Ask for control",
+    "control_ask": "Request control",
     "control_give": "Give",
     "control_keep": "Keep",
-    "control_release": "Give up control",
-    "control_withdraw": "Ask no more",
-    "control_taken": "Another panel has control: it can be asked.",
-    "control_asked_by": "Another panel is asking already: a moment.",
-    "control_denied": "The request was denied: it can be made again in some seconds.",
-    "control_stranger": "Not done: this browser had no cookie of this panel. Try once more.",
-    "control_not_yours": "This had changed already: nothing was done.",
+    "control_release": "Release control",
+    "control_withdraw": "Cancel request",
+    "control_taken": "Another panel has control. You can request it.",
+    "control_asked_by": "Another panel has already requested control. Please wait.",
+    "control_denied": "The request was denied. Try again in a few seconds.",
+    "control_stranger": "Not done: this browser had no cookie of this panel. Try again.",
+    "control_not_yours": "Nothing was done: the control of the robot had already changed.",
     # What a readout shows beside or instead of a value.
     "readout_waiting": "waiting for {topic}",
-    "readout_cut": "from before the connection was cut, received {time}",
+    "readout_cut": "from before the connection was lost, received {time}",
     "readout_old": "{age} old",
-    "readout_unreadable": "{topic} can't be read: what arrives is not {wanted}",
+    "readout_unreadable": "{topic} cannot be read: the data received is not {wanted}",
     "readout_time": "received {time}",
-    "readout_missing": "there is no {field} in what was received {time}",
-    "readout_several": "{field} is more than once in what was received {time}",
+    "readout_missing": "no {field} in the message received {time}",
+    "readout_several": "{field} is more than once in the message received {time}",
     # What a lamp shows when no state of its own does.
     "lamp_waiting": "No value yet",
     "lamp_unknown": "Unknown: {value}",
-    "lamp_old": "Not known",
-    "lamp_unreadable": "Not readable",
-    "lamp_missing": "Not there",
+    "lamp_old": "Unknown",
+    "lamp_unreadable": "Unreadable",
+    "lamp_missing": "Missing",
     "lamp_was": "was {text}: {note}",
     # Inputs: what they take, and why a value is refused.
     "on": "On",
@@ -191,56 +207,59 @@ ENGLISH: Final[Mapping[str, str]] = {
     "no_toggle": "{label} must be true ({on}) or false ({off}), not {given}",
     # What came of a press.
     "published": "Sent on {topic} at {time}.",
-    "sent_to_nobody": "Sent on {topic} at {time}, but no node is known to listen to it.",
+    "sent_to_nobody": "Sent on {topic} at {time}, but no node is known to subscribe to it.",
     "sent_unanswered": (
-        "Sent on {topic} at {time}, but the bridge has not answered since: it is not known whether it "
-        "reaches the robot."
+        "Sent on {topic} at {time}, but the bridge has not responded since. The robot may not "
+        "have received it."
     ),
     "refused": "Not sent at {time}: {why}",
     "not_encoded": "Not sent at {time}: {why}.",
-    "too_many_presses": "Not sent: {most} presses of this page have had no answer yet.",
+    "too_many_presses": "Not sent: {most} presses on this page are still waiting for a response.",
     "too_often": "too many presses in a short time. Wait a second, then press again.",
-    "cancel_too_often": "the robot has been asked to cancel this many times just now. Wait a second.",
-    "press_past": "Not sent again: press {id} was made before; the operator's log has what came of it.",
+    "cancel_too_often": "too many cancel requests in a short time. Wait a second.",
+    "press_past": "Not sent again: press {id} was already made. See the operator's log for its result.",
     "press_too_soon": (
-        "Not sent: so soon after the page came it may be a second tap. Press again if it was meant."
+        "Not sent: this came so soon after the page that it may be a double tap. Press again if "
+        "you meant it."
     ),
     "press_before": "{label}: {said}",
     "press_reused": "Not sent: the press id {id} was already used for another press.",
     # The operator's log.
-    "log_unwritable": "The operator's log can't be written: {why}.",
-    "log_unwritable_free": "The operator's log can't be written, so nothing is logged: {why}.",
-    "log_unreadable": "The operator's log can't be read: {why}.",
-    "log_reader_ended": "what read it was ended",
-    "log_exported": "The operator's log is being exported already. Try again when that is done.",
+    "log_unwritable": "The operator's log cannot be written: {why}.",
+    "log_unwritable_free": "The operator's log cannot be written, so nothing is logged: {why}.",
+    "log_unreadable": "The operator's log cannot be read: {why}.",
+    "log_reader_ended": "the process reading it ended",
+    "log_exported": "The operator's log is already being exported. Try again when that export is done.",
     "log_searched": "The operator's log is being searched by others. Try again in a moment.",
-    "folder_taken": "Another server has taken this panel's data: {why}.",
+    "folder_taken": "Another server is using this panel's data: {why}.",
     "log_taken": "{name} was removed or renamed",
     "log_emptied": "the file was emptied",
-    "log_closed": "the file is being opened anew",
-    "log_slow": "the disk did not take the entry in {seconds} s",
-    "log_full_queue": "more is pressed than the disk takes; press again",
-    "log_more_refused": "{count} more refusals from {name} since {since}, each answered as ever.",
-    "log_more_limited": "{count} presses from {name} since {since} were over the limit: not sent.",
-    "others": "others",
-    "log_abandoned": "Not sent: the entry was written too late.",
-    "log_not_on_disk": "{said} (Not safely in the operator's log: {why}.)",
-    "log_ended": "the panel's server ended before it knew",
-    "press_by_stopping": "the panel's server stops. Press again.",
-    "server_ends": "The panel's server ends: it is not known what came of this.",
-    "log_broke_off": "A fault of the panel's server: it is not known whether this was sent.",
-    "log_began": "The panel's server started.",
-    "log_began_anew": "The log before this one was damaged and is kept as {name}.",
-    "log_began_for_gone": (
-        "The log before this one, up to entry {last}, was removed or renamed while the server ran."
+    "log_closed": "the file is being reopened",
+    "log_slow": "the disk did not store the entry within {seconds} s",
+    "log_full_queue": "presses arrive faster than the disk can store them. Press again",
+    "log_more_refused": "{count} more refusals from {name} since {since}, each answered as usual.",
+    "log_more_limited": (
+        "{count} presses from {name} since {since} exceeded the limit and were not sent."
     ),
-    "log_began_empty": "The log had no entries when the server opened it; the last was number {last}.",
-    "log_found": "What stood in its place is kept as {name}.",
-    "log_resumed": "The log could not be written from {since} to now: {why}.",
+    "others": "others",
+    "log_abandoned": "Not sent: the log entry was written too late.",
+    "log_not_on_disk": "{said} (Not safely in the operator's log: {why}.)",
+    "log_ended": "the panel server ended before the result was known",
+    "press_by_stopping": "the panel server is shutting down. Press again.",
+    "server_ends": "The panel server is shutting down. The result is unknown.",
+    "log_broke_off": "Internal error in the panel server. The command may or may not have been sent.",
+    "log_began": "The panel server started.",
+    "log_began_anew": "The previous log was damaged and is kept as {name}.",
+    "log_began_for_gone": (
+        "The previous log, up to entry {last}, was removed or renamed while the server was running."
+    ),
+    "log_began_empty": "The log was empty when the server opened it. The last entry was number {last}.",
+    "log_found": "The file found in its place is kept as {name}.",
+    "log_resumed": "The log could not be written from {since} until now: {why}.",
     "log_lost": "The disk lost entries {first} to {last}.",
     "log_removed_days": "older than {days} days",
     "log_removed_size": "the log was larger than {size} MB",
-    "log_off": "The panel file switches the operator's log off.",
+    "log_off": "The operator's log is switched off in the panel file.",
     "log_link": "Log",
     # Its page.
     "log_page_title": "Operator's log",
@@ -259,7 +278,7 @@ ENGLISH: Final[Mapping[str, str]] = {
     "log_page_values": "Values",
     "log_page_of": "of {number}",
     "log_page_pressed": "pressed {time}",
-    "log_page_none": "There is no such entry.",
+    "log_page_none": "No such entry.",
     "log_page_newest": "Newest",
     "log_page_older": "Older",
     "log_page_csv": "CSV",
@@ -269,41 +288,40 @@ ENGLISH: Final[Mapping[str, str]] = {
     # Hold-to-run: what is shown while it is held, and why it ended.
     "hold_since": "Held since {time}.",
     "hold_released": "Released at {time}, after {seconds} s.",
-    "hold_ended": "Ended at {time}, after {seconds} s: {why} Let go and press again.",
-    "hold_unsaid": " The message that ends it was not sent: {why}",
+    "hold_ended": "Ended at {time}, after {seconds} s: {why} Release and press again.",
+    "hold_unsaid": " The stop message was not sent: {why}",
     "hold_unanswered": (
-        " The bridge did not answer after that: it is not known whether the robot got the message that"
-        " ends it."
+        " The bridge did not respond afterwards. The robot may not have received the stop message."
     ),
-    "hold_by_renewal": "the bridge no longer passes on a topic: the connection to it is made anew.",
-    "hold_by_cancel": "the screen took the touch away.",
+    "hold_by_renewal": "the bridge stopped forwarding a topic and is being reconnected.",
+    "hold_by_cancel": "the screen canceled the touch.",
     "hold_by_sliding": "the finger slid off the button.",
     "hold_by_second": "a second finger touched the screen.",
-    "hold_by_menu": "a menu was asked for.",
-    "hold_by_blur": "the page lost the input.",
+    "hold_by_menu": "a menu was opened.",
+    "hold_by_blur": "the page lost the focus.",
     "hold_by_hiding": "the page was hidden.",
     "hold_by_leaving": "the page was left.",
     "hold_by_lock": "the page was locked.",
     "hold_by_escape": "Escape was pressed.",
-    "hold_by_silence": "the browser had no answer from the panel's server.",
-    "hold_by_heartbeat": "nothing was heard from the browser.",
+    "hold_by_silence": "the browser had no response from the panel server.",
+    "hold_by_heartbeat": "no signal from the browser.",
     "hold_by_closing": "the connection to the browser was closed.",
-    "hold_by_stall": "the panel's server stood still.",
-    "hold_by_nonsense": "the browser sent what can't be understood.",
-    "hold_by_stopping": "the panel's server stops.",
+    "hold_by_stall": "the panel server stalled.",
+    "hold_by_nonsense": "the browser sent an invalid message.",
+    "hold_by_stopping": "the panel server is shutting down.",
     "hold_elsewhere": "held by another browser.",
-    "hold_same_topic": "{label} is held, which sends on {topic} too.",
+    "hold_same_topic": "{label} is held, which also sends on {topic}.",
     "hold_late": "the press came too late.",
-    "hold_let_go": "it was let go before it began: hold it longer.",
-    "hold_scripts": "Locked: holding needs the page's scripts.",
-    "hold_cut": "The connection to the panel's server was lost while this was held.",
+    "hold_let_go": "released before the hold began. Hold it longer.",
+    "hold_scripts": "Locked: hold-to-run needs JavaScript.",
+    "hold_cut": "The connection to the panel server was lost while this was held.",
     # Recordings.
-    "not_recorded": "Presses are not recorded: {why}. They work as always.",
+    "not_recorded": "Presses are not recorded: {why}. They are sent as usual.",
     # What the service manager is told.
     "ready": "Ready: commands can reach the robot.",
     "ready_of": "{name}: {state}",
-    "link_stands_still": "The Zenoh link of {name} stands still: the server must be started anew.",
-    "stopping": "Stopping.",
+    "link_stands_still": "The Zenoh session of {name} does not respond. Restart the panel server.",
+    "stopping": "Shutting down.",
     # The way to the robot.
     "server": "Server",
     "bridge": "Bridge",
@@ -312,15 +330,15 @@ ENGLISH: Final[Mapping[str, str]] = {
     "simulated": "SIMULATED ROBOT",
     "ok": "ok",
     "lost": "no connection",
-    "unknown": "not known",
-    "absent": "not there",
-    "silent": "no answer",
-    "no_node": "no node seen",
-    "pending": "joining",
+    "unknown": "unknown",
+    "absent": "not found",
+    "silent": "no response",
+    "no_node": "no node found",
+    "pending": "connecting",
     "pausing": "catching up",
     "node_silent": "silent",
     # Its links: what each locks, why the robot's nodes are not heard and what helps.
-    "links": "The way to the robot",
+    "links": "Connection to the robot",
     "link_state": "State",
     "link_since": "Since",
     "link_locks": "What it locks, and why",
@@ -328,16 +346,17 @@ ENGLISH: Final[Mapping[str, str]] = {
     "locks_more": "Locks {names} and {number} more.",
     "locks_nothing": "Locks nothing.",
     "locks_all": "Locks every control.",
-    "node_unknown": "While the bridge can't be reached, nothing is known of the robot's nodes.",
+    "node_unknown": "While the bridge cannot be reached, the state of the robot's nodes is unknown.",
     "node_absent": (
-        "No node that this panel talks with is seen: start it, with the ROS domain of the bridge."
+        "No node that this panel communicates with was found. Start it, with the ROS domain of "
+        "the bridge."
     ),
     "node_gone": (
-        "{name} was there and is gone, but the bridge is not: start its node again; if it runs, the "
-        "bridge has lost it: restart the node or the bridge."
+        "{name} has disappeared, though the bridge is running. Restart the node. If it is "
+        "running, the bridge has lost it: restart the bridge."
     ),
     "node_stale": (
-        "Nothing new on {topic} for {limit} s or more, though its node is there: look whether the node "
-        "hangs or has crashed, and restart it."
+        "No new data on {topic} for {limit} s or more, though its node is running. Check whether "
+        "the node hangs, and restart it."
     ),
 }

@@ -24,7 +24,7 @@ from app.web.client_cookie import COOKIE
 from tests.browser.test_holds_in_browser import PANEL as HOLDING
 from tests.support.parts import ROOT, Process, Server, free_port, until
 
-FULL = "The operator's log can't be written: no space left on device."
+FULL = "The operator's log cannot be written: no space left on device."
 # A data folder on a disk of its own, which only the server and its children see.
 SMALL_DISK = ["unshare", "--mount", "sh", "-c"]
 MOUNT = 'mount -t tmpfs -o size=2m tmpfs "$KIOSK_DATA" && exec "$@"'
@@ -118,7 +118,7 @@ def test_one_line_lets_presses_go_on_without_a_log(
             break
     fault = kiosk.snapshot()["notice"]["fault"]
     assert fault == (
-        "The operator's log can't be written, so nothing is logged: no space left on device."
+        "The operator's log cannot be written, so nothing is logged: no space left on device."
     )
     assert kiosk.ready()
     assert kiosk.press("operation", "unlogged").json()["outcome"] == "published"

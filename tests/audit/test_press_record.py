@@ -53,7 +53,7 @@ JOG = {
     "release": {"data": 0},
     "interlock": "operation",
 }
-FULL = "The operator's log can't be written: no space left on device."
+FULL = "The operator's log cannot be written: no space left on device."
 
 
 class SlowLog:
@@ -249,7 +249,7 @@ def test_no_log_keeps_anybody_from_canceling() -> None:
         log.fails = True
         bench.robot.command_status["count"] = IDLE
         receipt = await bench.presses.cancel("count", KIM)
-        assert "there is nothing under way to cancel" in receipt.reason
+        assert "nothing is in progress" in receipt.reason
         assert "Not safely in the operator's log" in receipt.reason
 
     slow(work, panel_of(COUNT, *_message()))

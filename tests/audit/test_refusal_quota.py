@@ -253,7 +253,7 @@ def test_cancels_of_nothing_are_limited_too(tmp_path: Path) -> None:
         )
         for _ in range(ENOUGH):
             receipt = await presses.cancel("count", KIM)
-            assert receipt.reason == "there is nothing under way to cancel"
+            assert receipt.reason == "nothing is in progress"
         assert cell.log.left_out == ENOUGH - OF_BROWSER.at_once
 
     written(tmp_path, work)

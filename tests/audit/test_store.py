@@ -206,7 +206,7 @@ def test_what_was_done_to_the_file_is_named(
 ) -> None:
     store = Store(tmp_path, "boot1")
     fill(store, 10)
-    store.append([entered("began", values={"mode": "live"}, reason="The panel's server started.")])
+    store.append([entered("began", values={"mode": "live"}, reason="The panel server started.")])
     fill(store, 2)
     head = store.head.hash
     store.close()
@@ -270,7 +270,7 @@ def test_a_log_that_is_not_there_or_no_log_is_unreadable(
     assert main(["verify", "--data", str(tmp_path / "none")]) == 2
     (tmp_path / NAME).write_bytes(b"garbage" * 1000)
     assert main(["verify", "--data", str(tmp_path)]) == 2
-    assert "can't be read" in capsys.readouterr().err
+    assert "cannot be read" in capsys.readouterr().err
 
 
 def test_a_panel_with_a_fault_keeps_nobody_from_verifying(

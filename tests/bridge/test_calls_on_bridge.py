@@ -181,7 +181,7 @@ def test_a_late_answer_corrects_the_receipt(kiosk: Server, robot: CycloneRobot) 
     robot.answer_slow(seconds=2)
     receipt = press(kiosk, "slow", id="slow-1")
     assert (receipt.status_code, receipt.json()["outcome"]) == (504, "timed_out")
-    assert "not known whether the robot did it" in receipt.json()["reason"]
+    assert "may or may not have done it" in receipt.json()["reason"]
     until(lambda: kiosk.widget("slow")["outcome"] == "succeeded", "the late answer is shown")
     again = press(kiosk, "slow", id="slow-1")
     assert (again.status_code, again.json()["outcome"]) == (200, "succeeded")
@@ -314,7 +314,7 @@ def test_a_bridge_lost_while_waiting_leaves_it_unknown(
         own_cyclone_bridge.kill()
         receipt = waiting.result()
     assert (receipt.status_code, receipt.json()["outcome"]) == (200, "unknown")
-    assert "the robot may have done it" in receipt.json()["reason"]
+    assert "The robot may have done it" in receipt.json()["reason"]
 
 
 def test_a_goal_runs_to_its_result_and_shows_in_every_browser(
@@ -508,7 +508,7 @@ def test_a_goal_of_more_than_five_seconds_survives_a_reload(
     page.goto(kiosk.url)
     count = page.locator('[data-widget="count"]')
     count.get_by_role("button", name="Count", exact=True).click()
-    expect(count.locator(".result")).to_contain_text("Under way")
+    expect(count.locator(".result")).to_contain_text("In progress")
     page.reload()
     expect(count.locator(".result")).to_contain_text("so far [0, 1")
     expect(count.locator(".goal")).to_have_text("EXECUTING")
@@ -533,7 +533,7 @@ def test_a_goals_state_is_not_known_while_the_server_is_lost(
     count.get_by_role("button", name="Count", exact=True).click()
     expect(count.locator(".goal")).to_have_text("EXECUTING")
     kiosk.process.send(signal.SIGSTOP)
-    expect(count.locator(".goal")).to_have_text("not known")
+    expect(count.locator(".goal")).to_have_text("unknown")
     kiosk.process.send(signal.SIGCONT)
     expect(count.locator(".goal")).to_have_text("EXECUTING")
     expect(count.get_by_role("button", name="Cancel")).to_be_enabled()
@@ -549,7 +549,7 @@ def test_a_late_answer_corrects_what_every_browser_shows(
     page.get_by_role("button", name="Slow", exact=True).click()
     results = [one.locator('[data-widget="slow"] .result') for one in (page, other)]
     for result in results:
-        expect(result).to_contain_text("No answer within 1 s")
+        expect(result).to_contain_text("No response within 1 s")
         expect(result).to_have_attribute("data-outcome", "timed_out")
     for result in results:
         expect(result).to_contain_text("Done at")

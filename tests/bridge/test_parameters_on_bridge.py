@@ -185,10 +185,10 @@ def test_read_only_undeclared_mistyped_and_absent_are_locked(
     kiosk: Server, robot: CycloneRobot
 ) -> None:
     reasons = {
-        "serial": "Read only: /cyclone_robot does not let its serial be set.",
+        "serial": "Read only: /cyclone_robot does not allow serial to be set.",
         "nothing": "Locked: /cyclone_robot has no parameter nothing.",
-        "mistyped": "mode of /cyclone_robot is integer, but this panel is made for string.",
-        "elsewhere": "Locked: the robot does not offer the parameters of /nobody now.",
+        "mistyped": "mode of /cyclone_robot is integer, but this panel expects string.",
+        "elsewhere": "Locked: the robot does not offer the parameters of /nobody at present.",
     }
     robot.declare_parameter(name="mode", value=1)
     until(lambda: "integer" in kiosk.widget("mistyped")["reason"], "its type is known")
@@ -262,7 +262,7 @@ def test_a_bridge_lost_while_setting_leaves_it_unknown(
         own_cyclone_bridge.kill()
         receipt = waiting.result()
     assert (receipt.status_code, receipt.json()["outcome"]) == (200, "unknown")
-    assert "the robot may have done it" in receipt.json()["reason"]
+    assert "The robot may have done it" in receipt.json()["reason"]
     shown = kiosk.widget("name")
     assert (shown["state"], shown["text"], shown["enabled"]) == ("old", "cyclone", False)
     until(lambda: robot.parameters()["name"] == "later", "the robot did it")

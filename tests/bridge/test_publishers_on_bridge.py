@@ -33,8 +33,8 @@ def test_a_publisher_that_stays_and_says_nothing_locks_until_one_speaks(publishe
     publishers.open()
     silent = Kind("silent", times=0, matched=False)
     with publishers.there("fast", silent):
-        publishers.until_reason("A new publisher of /kept has not said anything yet.")
-    publishers.until_reason("A new publisher of /kept has not said anything yet.")
+        publishers.until_reason("Locked: a new publisher of /kept has not published yet.")
+    publishers.until_reason("Locked: a new publisher of /kept has not published yet.")
     publishers.open()
 
 

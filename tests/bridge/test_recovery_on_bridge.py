@@ -133,7 +133,7 @@ def test_a_goal_that_ended_meanwhile_is_told(start: Start, robot: CycloneRobot, 
     robot.abort()
     again = start()
     until(lambda: again.widget("count")["outcome"] == "aborted", "its end is told")
-    assert again.widget("count")["result"].startswith("Aborted by the robot, by ")
+    assert again.widget("count")["result"].startswith("Aborted by the robot before ")
     until(lambda: told(tmp_path) == [*BROKEN_OFF, ("corrected", "aborted")], "and logged")
 
 
@@ -198,7 +198,7 @@ def test_a_goal_is_in_doubt_until_the_robot_is_there(
     again = start()
     until(lambda: "does not offer /fibonacci" in (again.widget("count")["reason"] or ""), "joined")
     shown = again.widget("count")
-    assert "may still be under way" in shown["result"]
+    assert "may still be running" in shown["result"]
     assert (shown["goal"], shown["busy"], shown["stoppable"]) == ("UNKNOWN", True, False)
     assert "does not offer /fibonacci" in cancel(again, press="goal-1").json()["reason"]
     robots(own_cyclone_bridge.domain)
@@ -217,5 +217,5 @@ def test_without_a_log_nothing_is_known(
     until(lambda: again.widget("count")["enabled"], "open")
     assert again.widget("count")["result"] == ""
     late = cancel(again, press="goal-1")
-    assert "perhaps still under way" in late.json()["reason"]
+    assert "may still be running" in late.json()["reason"]
     robot.cancel()

@@ -17,7 +17,7 @@ from tests.web.test_control_over_http import PROXY, control_panel
 IDLE_S = 4.0
 FIRST, SECOND = "192.0.2.1", "192.0.2.2"
 
-NOBODY = "Nobody has control of the robot: take control first."
+NOBODY = "No panel has control of the robot. Take control first."
 
 Opens = Callable[..., Page]
 
@@ -137,41 +137,41 @@ def test_taking_looking_on_asking_keeping_and_giving(kiosk: Server, opens: Opens
     locked_by(second, "Panel 1 (192.0.2.1) has control of the robot.")
     expect(button(second, "Take control")).to_have_count(0)
 
-    tap(second, "Ask for control")
+    tap(second, "Request control")
     expect(bar(second)).to_contain_text("Panel 1 (192.0.2.1) was asked")
     expect(bar(first)).to_contain_text("Panel 2 (192.0.2.2) asks for control of the robot")
     tap(first, "Keep")
     locked_by(second, "Panel 1 (192.0.2.1) has control of the robot.")
     expect(bar(first)).to_have_text("This panel has control of the robot.")
-    tap(second, "Ask for control")
+    tap(second, "Request control")
     expect(second.locator("#control .refused")).to_contain_text("The request was denied")
 
     third = opens("192.0.2.3")
-    tap(third, "Ask for control")
+    tap(third, "Request control")
     tap(first, "Give")
     expect(bar(third)).to_have_text("This panel has control of the robot.")
     sends(third)
     for onlooker in (first, second):
         locked_by(onlooker, "Panel 3 (192.0.2.3) has control of the robot.")
-    tap(third, "Give up control")
+    tap(third, "Release control")
     for page in (first, second, third):
-        locked_by(page, "Nobody has control of the robot")
+        locked_by(page, "No panel has control of the robot")
 
 
 def test_a_request_is_withdrawn(opens: Opens) -> None:
     first, second = opens(FIRST), opens(SECOND)
     take(first)
-    tap(second, "Ask for control")
+    tap(second, "Request control")
     expect(button(first, "Give")).to_be_visible()
-    tap(second, "Ask no more")
-    expect(button(first, "Give up control")).to_be_visible()
+    tap(second, "Cancel request")
+    expect(button(first, "Release control")).to_be_visible()
     expect(button(first, "Give")).to_have_count(0)
 
 
 def test_an_idle_holder_gives_way_and_one_at_work_does_not(opens: Opens) -> None:
     first, second = opens(FIRST), opens(SECOND)
     take(first)
-    tap(second, "Ask for control")
+    tap(second, "Request control")
     expect(button(first, "Give")).to_be_visible()
     began = time.monotonic()
     while time.monotonic() - began < 1.5 * IDLE_S:
@@ -211,9 +211,9 @@ def test_a_holder_whose_browser_is_killed_or_hangs_is_lost(
     try:
         for pid in pids:
             os.kill(pid, fault)
-        expect(bar(second)).to_contain_text("Nobody has control", timeout=8000)
+        expect(bar(second)).to_contain_text("No panel has control", timeout=8000)
         assert 3 < time.monotonic() - began < 9
-        locked_by(second, "Nobody has control of the robot")
+        locked_by(second, "No panel has control of the robot")
         take(second)
     finally:
         for pid in pids if fault == signal.SIGSTOP else ():
@@ -228,7 +228,7 @@ def test_a_holder_whose_browser_is_killed_or_hangs_is_lost(
 def test_a_page_that_is_closed_frees_it_for_who_asks(opens: Opens) -> None:
     first, second = opens(FIRST), opens(SECOND)
     take(first)
-    tap(second, "Ask for control")
+    tap(second, "Request control")
     expect(button(first, "Give")).to_be_visible()
     first.close()
     expect(bar(second)).to_contain_text("This panel has control", timeout=8000)
@@ -237,10 +237,10 @@ def test_a_page_that_is_closed_frees_it_for_who_asks(opens: Opens) -> None:
 def test_what_was_given_up_does_not_come_back_with_a_page(opens: Opens) -> None:
     cell = opens()
     expect(bar(cell)).to_contain_text("This panel has control")
-    tap(cell, "Give up control")
-    locked_by(cell, "Nobody has control of the robot")
+    tap(cell, "Release control")
+    locked_by(cell, "No panel has control of the robot")
     cell.reload()
-    locked_by(cell, "Nobody has control of the robot")
+    locked_by(cell, "No panel has control of the robot")
     take(cell)
 
 
@@ -248,8 +248,8 @@ def test_what_was_given_up_does_not_come_back_with_a_page(opens: Opens) -> None:
 def test_two_taps_take_control_and_do_not_give_it_up(opens: Opens) -> None:
     first = opens(FIRST)
     button(first, "Take control").dblclick(delay=20)
-    expect(button(first, "Give up control")).to_be_visible()
-    place = button(first, "Give up control").bounding_box()
+    expect(button(first, "Release control")).to_be_visible()
+    place = button(first, "Release control").bounding_box()
     assert place is not None
     first.mouse.click(place["x"] + 5, place["y"] + 5)
     first.wait_for_timeout(1000)
@@ -262,11 +262,11 @@ def test_after_a_restart_of_the_server_nobody_has_it(
     first = opens(FIRST)
     take(first)
     kiosk.process.kill()
-    expect(bar(first)).to_have_text("not known")
-    expect(button(first, "Give up control")).to_be_disabled()
+    expect(bar(first)).to_have_text("unknown")
+    expect(button(first, "Release control")).to_be_disabled()
     again = Server(ROOT, kiosk.port, KIOSK_PANEL=str(tmp_path / "control.toml"), KIOSK_PROXIES=PROXY)
     try:
-        locked_by(first, "Nobody has control of the robot")
+        locked_by(first, "No panel has control of the robot")
         take(first)
         sends(first)
     finally:
@@ -275,14 +275,14 @@ def test_after_a_restart_of_the_server_nobody_has_it(
 
 def test_without_scripts_forms_do_the_same(kiosk: Server, opens: Opens) -> None:
     first, second = opens(FIRST, scripts=False), opens(SECOND, scripts=False)
-    locked_by(first, "Nobody has control of the robot")
+    locked_by(first, "No panel has control of the robot")
     tap(first, "Take control")
     expect(bar(first)).to_contain_text("This panel has control")
     first.wait_for_timeout(TAP_AGAIN_MS)
     sends(first)
     second.reload()
     locked_by(second, "Panel 1 (192.0.2.1) has control of the robot.")
-    tap(second, "Ask for control")
+    tap(second, "Request control")
     expect(bar(second)).to_contain_text("was asked")
     first.reload()
     tap(first, "Give")
@@ -290,8 +290,8 @@ def test_without_scripts_forms_do_the_same(kiosk: Server, opens: Opens) -> None:
     second.reload()
     second.wait_for_timeout(TAP_AGAIN_MS)
     sends(second)
-    tap(second, "Give up control")
-    locked_by(second, "Nobody has control of the robot")
+    tap(second, "Release control")
+    locked_by(second, "No panel has control of the robot")
 
 
 def test_a_page_that_came_by_a_link_on_another_site_learns_who_it_is(

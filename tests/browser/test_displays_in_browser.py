@@ -285,7 +285,7 @@ def test_a_lamp_has_text_and_shape_for_each_state(cell: Server, robot: RosNode, 
         shows(*look)
     page.route("**/events*", lambda route: route.abort())
     page.reload()
-    shows("not known", "old", "none")
+    shows("unknown", "old", "none")
     robot.withdraw("/test_state")
 
 
@@ -298,7 +298,7 @@ def test_a_best_effort_publisher_is_told_in_words_unless_it_is_asked_for(
         robot.every(topic, {"data": 23.96}, 0.1)
     note = widget(page, "voltage").locator(".note")
     expect(note).to_have_text(
-        "The robot publishes /test_voltage best effort; this panel asks for reliable."
+        "The robot publishes /test_voltage as best effort, but this panel requires reliable."
     )
     expect(widget(page, "voltage").locator(".value")).to_have_text("—")
     expect(widget(page, "current").locator(".value")).to_have_text("24.0 A")
@@ -314,7 +314,7 @@ def test_a_durability_that_the_robot_does_not_publish_is_told(
     panel.write_text(PANEL.replace('qos = { reliability = "best_effort", depth = 1 }', latched))
     robot.advertise("/test_current", "std_msgs/msg/Float32")
     mine = live(bridge.endpoint, tmp_path, KIOSK_PANEL=str(panel))
-    said = "The robot publishes /test_current volatile; this panel asks for transient local."
+    said = "The robot publishes /test_current as volatile, but this panel requires transient local."
     try:
         until(lambda: mine.widget("current")["note"] == said, "the mismatch is told")
         robot.withdraw("/test_current")
@@ -338,7 +338,7 @@ def test_a_subscriber_that_would_not_hear_a_best_effort_press_locks_it(
     message = 'message = { data = "{mode}" }'
     panel.write_text(PANEL.replace(message, f'{message}\nqos = {{ reliability = "best_effort" }}'))
     mine = live(bridge.endpoint, tmp_path, KIOSK_PANEL=str(panel))
-    said = "The robot asks for /test_mode reliable; this panel publishes it best effort."
+    said = "The robot requires /test_mode as reliable, but this panel publishes it as best effort."
     try:
         until(lambda: mine.widget("choose")["reason"] == said, "the mismatch is told")
         answer = mine.http.post("/widgets/choose", json={"inputs": {"mode": 1}})

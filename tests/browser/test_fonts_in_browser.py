@@ -38,7 +38,7 @@ def test_the_bar_fits_and_nothing_moves_when_somebody_asks(
     size = "() => [document.documentElement.scrollWidth, document.documentElement.scrollHeight]"
     take(first)
     before = button(first, "Publish").bounding_box()
-    tap(second, "Ask for control")
+    tap(second, "Request control")
     expect(button(first, "Keep")).to_be_visible()
     assert button(first, "Publish").bounding_box() == before
     for page in (first, second):

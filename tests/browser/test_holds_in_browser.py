@@ -286,7 +286,7 @@ def test_a_finger_that_goes_ends_it(touched: Finger, jogger: RosNode, cause: str
     name, code = TOUCHES[cause]
     soon(cause, measured(touched, jogger, getattr(touched, name), code))
     assert touched.state is None
-    sentence = "Released at" if code == "hold_released" else "Let go and press again."
+    sentence = "Released at" if code == "hold_released" else "Release and press again."
     expect(touched.page.locator("#receipt-jog")).to_contain_text(sentence)
 
 
@@ -407,7 +407,7 @@ def test_the_servers_end_stops_the_robot_first(touched: Finger, jogger: RosNode)
     time.sleep(QUIET_S)
     soon("server ended", times(jogger, before, began))
     assert [code for code, _ in ended(touched.server)[ends:]] == ["hold_by_stopping"]
-    expect(touched.page.locator("#receipt-jog")).to_contain_text("the panel's server stops")
+    expect(touched.page.locator("#receipt-jog")).to_contain_text("the panel server is shutting down")
     expect(touched.button).to_be_disabled()
     assert touched.state is None
 

@@ -230,7 +230,7 @@ def test_every_other_end_says_why_and_wants_a_new_press(bench: Bench, code: str)
     assert bench.points == [MOVES, STOPS]
     (receipt,) = bench.receipts
     assert receipt.outcome == "aborted"
-    assert f": {ENGLISH[code]} Let go and press again." in receipt.reason
+    assert f": {ENGLISH[code]} Release and press again." in receipt.reason
     assert bench.holds.beat(holding, 2, bench.loop.now) is False
     bench.loop.pass_time(10)
     assert bench.points == [MOVES, STOPS]
@@ -247,7 +247,7 @@ def test_without_a_heartbeat_it_ends_a_quarter_of_a_second_after_the_last_was_se
     assert point == STOPS
     assert stopped_at - NOW == pytest.approx(0.08 + LEASE_S)
     assert max(at for at, point in bench.way.sent if point == MOVES) < stopped_at
-    assert "nothing was heard from the browser" in bench.receipts[0].reason
+    assert "no signal from the browser" in bench.receipts[0].reason
 
 
 def test_a_late_heartbeat_prolongs_nothing(bench: Bench) -> None:
@@ -332,7 +332,7 @@ def test_without_a_way_nothing_is_said_and_nothing_is_said_later(bench: Bench) -
     bench.holds.judge()
     (receipt,) = bench.receipts
     assert receipt.outcome == "unknown"
-    assert "The message that ends it was not sent: No connection to the robot" in receipt.reason
+    assert "The stop message was not sent: No connection to the robot" in receipt.reason
     bench.robot.graph.apply(bridge_dialect.bridge_token(BRIDGE), True)
     bench.holds.judge()
     bench.loop.pass_time(10)
@@ -356,7 +356,7 @@ def test_after_a_stall_of_the_server_it_is_over_and_nothing_is_made_up_for(bench
     assert bench.holds.beat(holding, 1, bench.loop.now) is False  # heartbeats waited in the socket
     bench.loop.pass_time(10)
     assert bench.way.sent == [(NOW, MOVES), (NOW + 0.4, STOPS)]
-    assert "the panel's server stood still" in bench.receipts[0].reason
+    assert "the panel server stalled" in bench.receipts[0].reason
 
 
 def test_after_a_short_stall_missed_messages_are_passed_over(bench: Bench) -> None:
@@ -378,7 +378,7 @@ def test_a_second_browser_is_refused_and_changes_nothing(bench: Bench) -> None:
 
 def test_no_two_holds_send_on_one_topic(bench: Bench) -> None:
     bench.begun()
-    assert bench.refused("back") == ("interlock", "Jog is held, which sends on /jog too.")
+    assert bench.refused("back") == ("interlock", "Jog is held, which also sends on /jog.")
     assert isinstance(bench.asked("arm"), ActiveHold)
 
 

@@ -33,7 +33,7 @@ GAINS: Final[dict[str, Any]] = {
     "type": "double[]",
 }  # fmt: skip
 OPTIONS: Final = [{"value": 1, "label": "Slow"}, {"value": 2, "label": "Fast"}]
-SEVERAL: Final = "several with commas between them"
+SEVERAL: Final = "separate several values with commas"
 TEXTS: Final = f"a text; {SEVERAL}"
 FORM: Final = {"content-type": "application/x-www-form-urlencoded"}
 
@@ -64,14 +64,14 @@ def test_a_list_is_written_as_it_is_read(values: list[str], text: str) -> None:
 def test_what_is_no_list_is_refused(text: str) -> None:
     with pytest.raises(ValueError, match="of them is none"):
         elements(text)
-    with pytest.raises(InputError, match="several with commas between them, not"):
+    with pytest.raises(InputError, match="separate several values with commas, not"):
         checked(widget(type="string[]"), ParameterState("live"), text)
 
 
 @pytest.mark.parametrize("text", ['{}"a', 'a{}"', 'a,{}"', '"a{}', '"a"{}"'])
 def test_spaces_that_end_in_a_mistake_take_no_time(text: str) -> None:
     began = time.process_time()
-    with pytest.raises(InputError, match="several with commas between them, not"):
+    with pytest.raises(InputError, match="separate several values with commas, not"):
         checked(widget(type="string[]"), ParameterState("live"), text.format(" " * 995))
     assert time.process_time() - began < 1  # it took 6 s, of the whole server
 
@@ -105,8 +105,8 @@ def test_a_list_is_typed_value_by_value(kind: str, given: Any, value: tuple[Any,
         ({}, "1, 7", "Gains, value 2 is 7: it must be 0 to 5"),
         ({"min": 1, "unit": "N"}, [0.5], "Gains, value 1 is 0.5 N: it must be 1 to 5 N"),
         ({}, [1, None], "Gains, value 2 has no number"),
-        ({}, 5, "Gains must be 0 to 5; several with commas between them, not 5"),
-        ({}, [1.0] * 1001, "Gains has 1001 values; 1000 are allowed"),
+        ({}, 5, "Gains must be 0 to 5; separate several values with commas, not 5"),
+        ({}, [1.0] * 1001, "Gains has 1001 values. At most 1000 are allowed"),
         (
             {"type": "bool[]"},
             "On, maybe",
@@ -280,7 +280,7 @@ def test_lists_and_options_are_read_and_set(kiosk: Server, robot: CycloneRobot) 
         "slots": "1, 9007199254740993",
         "mode": "Slow",
     }
-    assert shown["gains"]["limits"] == "0 to 5 N; several with commas between them"
+    assert shown["gains"]["limits"] == "0 to 5 N; separate several values with commas"
     values = {
         "gains": ("0.5, 5", [0.5, 5.0]),
         "axes": ("free, free, used", [False, False, True]),
@@ -378,9 +378,9 @@ type = "std_msgs/msg/String"
     page.goto(mine.url)
     gains = page.locator('[data-widget="gains"]')
     again = gains.get_by_role("button", name="Read Gains again")
-    expect(gains.locator(".note")).to_have_text("no answer from /system_controller", timeout=60_000)
+    expect(gains.locator(".note")).to_have_text("no response from /system_controller", timeout=60_000)
     expect(again).to_be_enabled()
-    expect(gains.locator(".why")).to_contain_text("“Read again” asks once more.")
+    expect(gains.locator(".why")).to_contain_text("“Read again” tries once more.")
     told: set[str] = set()  # the seconds at which it spoke, longer than it was waited to ask once more
 
     def told_for_seconds() -> bool:

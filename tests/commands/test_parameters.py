@@ -158,7 +158,7 @@ def test_a_node_is_asked_when_it_is_seen_and_no_more() -> None:
         bench.offer()
         bench.parameters.follow()
         await bench.asked(1)
-        assert "waiting for /arm to tell its speed" in bench.reason()
+        assert "waiting for /arm to report speed" in bench.reason()
         await bench.tell(1, 0.5)
         assert (bench.known().state, bench.known().value, bench.reason()) == ("live", 0.5, "")
         await asyncio.sleep(0.05)
@@ -291,9 +291,9 @@ def test_a_node_that_does_not_answer_is_asked_again_when_it_is_touched_or_new(
         await bench.answer(1, DESCRIBE, descriptors=[descriptor("speed", DOUBLE)])  # late
         await bench.until(lambda: bench.shown["askable"])
         assert bench.known().state == "silent"
-        assert bench.shown["note"] == "no answer from /arm"
+        assert bench.shown["note"] == "no response from /arm"
         assert "Cyclone DDS" in bench.reason()
-        assert "“Read again” asks once more" in bench.reason()
+        assert "“Read again” tries once more" in bench.reason()
         for _ in range(3):  # whatever it says by itself
             bench.event(skipped=1, changed_parameters=change(0.7), new_parameters=change(0.7))
             bench.parameters.follow()
@@ -435,7 +435,7 @@ def test_what_can_not_be_read_is_said() -> None:
         bench.line.asked[0][2].set_result(b"\0\1\0\0\xff\xff")
         await asyncio.sleep(0.005)
         assert bench.known().state == "unreadable"
-        assert "can't be read" in bench.reason()
+        assert "cannot be read" in bench.reason()
 
     run(test)
 
@@ -452,7 +452,7 @@ def test_after_a_set_the_node_is_asked_how_it_is() -> None:
             )
         )
         await bench.asked(3)
-        assert bench.reason() == "Under way: waiting for the robot."
+        assert bench.reason() == "In progress: waiting for the robot."
         request = INTERFACES.decode(f"{SET[1]}_Request", bench.line.asked[2][1])
         (sent,) = request.parameters
         assert (sent.name, sent.value.type, sent.value.double_value) == ("speed", DOUBLE, 0.7)
@@ -548,7 +548,7 @@ def test_no_value_that_both_allow_locks() -> None:
         limits = [{"from_value": 0.0, "to_value": 2.0, "step": 0.0}]
         await bench.tell(1, 0.5, floating_point_range=limits)
         assert bench.reason() == (
-            "Locked: /arm takes 0 to 2 for its speed, and this panel gives 3 or more: no value is both."
+            "Locked: /arm accepts 0 to 2 for speed and this panel offers 3 or more. No value fits both."
         )
 
     run(test, {**SPEED, "min": 3.0})
@@ -606,4 +606,4 @@ def test_a_value_shows_and_its_input_starts_from_it(
     (of,) = panel.parameters()
     shown = parameter(of, robot)
     assert (shown["text"], shown["entry"]) == (text, entry)
-    assert "does not tell of changes" in shown["note"]  # nobody publishes /parameter_events
+    assert "does not report changes" in shown["note"]  # nobody publishes /parameter_events

@@ -152,7 +152,7 @@ def test_a_press_that_nobody_listens_to_is_sent_but_unknown(bench: Bench) -> Non
     bench.way.listened_to = False
     receipt = bench.press()
     assert (receipt.outcome, receipt.cause) == ("unknown", "")
-    assert receipt.reason.endswith("but no node is known to listen to it.")
+    assert receipt.reason.endswith("but no node is known to subscribe to it.")
     assert bench.way.texts == ["hello"]
 
 
@@ -185,8 +185,8 @@ def listens_with_another_type(bench: Bench) -> None:
     ("happens", "why"),
     [
         (forbids, "The robot does not permit operation"),
-        (cuts, "Locked: the connection was cut"),
-        (garbles, "Locked: /operation_enabled can't be read"),
+        (cuts, "Locked: the connection was lost"),
+        (garbles, "Locked: /operation_enabled cannot be read"),
         (takes_another_type, "/operation_enabled is std_msgs/msg/String on the robot"),
         (listens_with_another_type, "/guarded is std_msgs/msg/Bool on the robot"),
     ],
@@ -397,7 +397,7 @@ def test_the_oldest_receipts_are_forgotten() -> None:
     assert bench.receipt(f"p{RECEIPTS_KEPT}") is not None
     sent = len(bench.way.sent)
     again = bench.press(press_id="p0")
-    assert "was made before" in again.reason
+    assert "was already made" in again.reason
     assert (again.outcome, len(bench.way.sent)) == ("refused", sent)
 
 
@@ -463,7 +463,7 @@ def test_a_cancel_that_could_not_be_sent_has_a_receipt(monkeypatch: pytest.Monke
         raise LinkError("can't ask home/_action/cancel_goal: closed")
 
     bench = Bench(panel_of(HOME))
-    monkeypatch.setattr("app.commands.actions.goals.Actions.cancel", refuses)
+    monkeypatch.setattr("app.commands.actions.goals.GoalTracker.cancel", refuses)
     receipt = bench.cancel("home")
     assert (receipt.outcome, receipt.cause) == ("refused", "link")
     assert "can't ask home/_action/cancel_goal" in receipt.reason
@@ -472,8 +472,8 @@ def test_a_cancel_that_could_not_be_sent_has_a_receipt(monkeypatch: pytest.Monke
 def test_cancelling_needs_no_control() -> None:
     bench = Bench(panel_of(MESSAGE, HOME))
     bench.may_press = lambda _: locked("control_free", robot="the robot")
-    assert "Nobody has control" in bench.press("home").reason
-    assert bench.cancel("home").reason == "there is nothing under way to cancel"
+    assert "No panel has control" in bench.press("home").reason
+    assert bench.cancel("home").reason == "nothing is in progress"
 
 
 SPEED = {

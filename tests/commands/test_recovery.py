@@ -26,7 +26,7 @@ from tests.support.builders import BRIDGE, INTERFACES
 
 FROM = Origin(address="10.0.0.7")
 TYPES = INTERFACES.action(COUNT)
-GONE = "The operator's log can't be read: gone."
+GONE = "The operator's log cannot be read: gone."
 
 
 async def opened(folder: Path) -> OperatorLog:
@@ -146,7 +146,7 @@ def test_an_accepted_goal_is_in_doubt_and_asked_for_by_its_entry(tmp_path: Path)
     async def test(rig: Rig, entry: Entry) -> None:
         await rig.started()
         shown = rig.bench.shown
-        assert "may still be under way" in shown.text
+        assert "may still be running" in shown.text
         assert (shown.busy, shown.stoppable, shown.goal, shown.press) == (True, True, "UNKNOWN", "g1")
         assert rig.lock == "perhaps_busy"
         assert asked_for(rig) == goal_id(entry.hash).bytes
@@ -217,7 +217,7 @@ def test_its_feedback_tells_that_it_is_under_way(tmp_path: Path) -> None:
         rig.bench.actions.hear_feedback(
             "/count", sample_of(INTERFACES.encode(TYPES.feedback_message, said))
         )
-        assert (rig.bench.shown.goal, rig.bench.shown.text) == ("EXECUTING", "Under way. so far [1]")
+        assert (rig.bench.shown.goal, rig.bench.shown.text) == ("EXECUTING", "In progress. so far [1]")
 
     run(tmp_path, test, "accepted")
 
@@ -249,7 +249,7 @@ def test_an_end_that_came_meanwhile_has_no_time_of_its_own(tmp_path: Path) -> No
     async def test(rig: Rig, entry: Entry) -> None:
         await rig.started()
         await rig.answer(status=5)
-        assert rig.bench.shown.text.startswith("Canceled, by ")
+        assert rig.bench.shown.text.startswith("Canceled before ")
 
     run(tmp_path, test, "accepted")
 
@@ -260,7 +260,7 @@ def test_one_that_was_never_heard_of_locks_for_a_while_only(tmp_path: Path) -> N
         assert rig.bench.line.timeouts == [LATE_S]
         rig.bench.line.asked[0][2].set_result(None)
         await rig.open()
-        assert "told nothing of this goal for 60 s" in rig.bench.shown.text
+        assert "No news of this goal from the robot for 60 s" in rig.bench.shown.text
         assert rig.lock == ""
 
     run(tmp_path, test, "timed_out")
@@ -361,7 +361,7 @@ def test_while_the_log_can_not_be_read_it_is_said_that_nothing_is_known(
     async def test(rig: Rig, entry: Entry) -> None:
         with unreadable(rig, monkeypatch, unneeded=not needed):
             await rig.resuming.start()
-            assert rig.bench.shown.text.endswith(f"is not known: {GONE}")
+            assert rig.bench.shown.text.endswith(f"is still running: {GONE}")
             assert (rig.bench.shown.busy, rig.bench.shown.stoppable) == (needed, False)
             await asyncio.sleep(0.03)
             assert rig.bench.line.asked == []
@@ -407,7 +407,7 @@ def test_what_was_sent_while_the_log_could_not_be_read_stays_shown(
 def test_a_log_that_is_not_open_yet_tells_nothing(tmp_path: Path) -> None:
     async def test() -> None:
         log = OperatorLog(tmp_path, Limits())
-        with pytest.raises(LogError, match="can't be read"):
+        with pytest.raises(LogError, match="cannot be read"):
             await log.open_presses("", ["count"], 0)
         await log.start()
         assert await log.open_presses("", ["count"], 0) == []

@@ -122,7 +122,7 @@ def test_a_press_that_was_cut_off_is_unknown_and_not_sent_again(
     until(lambda: kiosk.widget("slow")["enabled"], "it could be sent")
     answer = kiosk.http.post("/widgets/slow", json=SLOW)
     assert (answer.status_code, answer.json()["outcome"]) == (200, "unknown")
-    assert answer.json()["reason"] == "the panel's server ended before it knew"
+    assert answer.json()["reason"] == "the panel server ended before the result was known"
     with kiosk.socket() as socket:
         assert socket.press(widget="slow", **SLOW).json()["outcome"] == "unknown"
     form = "_id=f1&words=a"

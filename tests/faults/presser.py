@@ -61,7 +61,7 @@ class Presser:
                 answer = http.post(f"{self._server.base}/widgets/{self._widget}", json=body)
                 receipt = answer.json()
             except (httpx.HTTPError, json.JSONDecodeError):
-                return  # what came of it is not known, and it is not pressed again
+                return  # The result is unknown, and it is not pressed again
             if not press.outcome:
                 press.outcome, press.reason = receipt["outcome"], receipt["reason"]
                 press.answered_at = time.monotonic()

@@ -250,10 +250,10 @@ def test_garbage_on_all_that_is_listened_to(rig: Rig, server: Server) -> None:
         lied_at = time.monotonic()
         until(lambda: (liar.put("kept", b"\0\1\0\0"), not watch.now("kept").enabled)[1], "it locks")
         locked_s, reason = watch.locked_after(lied_at, "kept", SHOWN_WITHIN_S)
-        assert "can't be read" in reason
+        assert "cannot be read" in reason
         for number in range(GARBAGE):
             liar.put(LISTENED_TO[number % len(LISTENED_TO)], lie(chance))
-        until(lambda: "can't be read" in watch.widgets["heard"]["note"], "the readout says so")
+        until(lambda: "cannot be read" in watch.widgets["heard"]["note"], "the readout says so")
         until(lambda: over(liar, watch), "all of it has come", every_s=0.1)
         assert not watch.was_open("kept", lied_at + locked_s, time.monotonic())
         rig.robot.publish("/kept", {"data": True})

@@ -242,7 +242,7 @@ states = [{ value = "OK", text = "Good", shape = "circle" }]
     [
         ([("x", 2), ("drive: motor", 1)], None),
         ([("drive: motor", 2)], "Drive is ERROR: it must be WARN or less."),
-        ([], "Locked: there is no status[name='drive: motor'].level in the last /operation_enabled."),
+        ([], "Locked: the last /operation_enabled has no status[name='drive: motor'].level."),
         (
             [("drive: motor", 0), ("drive: motor", 2)],
             "Locked: status[name='drive: motor'].level is in the last /operation_enabled"

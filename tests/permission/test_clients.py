@@ -59,10 +59,10 @@ def test_the_name_in_a_sentence_has_the_address_of_another_machine() -> None:
         ("0.0.0.0", False, "0.0.0.0"),
         ("fe80::1%eth0", False, "fe80::1"),
         ("2001:db8::7", False, "2001:db8::7"),
-        ("localhost", False, "not known"),
-        ("127.0.0.1.evil.example", False, "not known"),
-        ("<script>", False, "not known"),
-        ("", False, "not known"),
+        ("localhost", False, "unknown"),
+        ("127.0.0.1.evil.example", False, "unknown"),
+        ("<script>", False, "unknown"),
+        ("", False, "unknown"),
     ],
 )
 def test_only_loopback_is_at_the_cell(address: str, local: bool, shown: str) -> None:

@@ -81,7 +81,7 @@ def test_at_first_nobody_has_it(room: Room) -> None:
     assert room.control.holder is None
     verdict = room.control.verdict(ANN)
     assert (verdict.permitted, verdict.code) == (False, "control_free")
-    assert verdict.reason == "Nobody has control of Robot 1: take control first."
+    assert verdict.reason == "No panel has control of Robot 1. Take control first."
     assert not room.may(CELL)
 
 
@@ -163,9 +163,10 @@ def test_a_request_is_shown_to_all(asked: Room) -> None:
     assert (view["holder"], view["asker"]) == (ANN.id, BOB.id)
     assert view["asker_name"] == "Panel 2 (192.0.2.2)"
     assert view["holder_text"] == (
-        "Panel 2 (192.0.2.2) asks for control of Robot 1; untouched, it goes over in 30 s."
+        "Panel 2 (192.0.2.2) requests control of Robot 1."
+        " If this panel is not touched, control passes in 30 s."
     )
-    assert "after 30 s without a touch" in view["asker_text"]
+    assert "control passes to you in 30 s" in view["asker_text"]
     assert view["text"] == "Panel 1 (192.0.2.1) has control of Robot 1."
     assert view["since"] == "1970-01-01T00:16:40.000+00:00"
 
@@ -269,7 +270,7 @@ def test_a_shorter_time_may_be_set() -> None:
     room = Room(ControlRules(required=True, takeover_after_s=3))
     room.control.take(ANN)
     room.control.ask(BOB)
-    assert "after 3 s" in room.control.view()["asker_text"]
+    assert "to you in 3 s" in room.control.view()["asker_text"]
     room.pass_s(3, ANN, BOB)
     assert room.control.holder == BOB
 
@@ -549,7 +550,7 @@ class Everybody(RuleBasedStateMachine):
         assert self.room.control.holder == before
         self.heard(who)
 
-    @precondition(lambda self: self.room.control.holder and self.room.control.asker)
+    @precondition(lambda self: self.room.control.holder and self.room.control.requester)
     @rule(touched=st.booleans())
     def both_stay_for_the_time_of_a_takeover(self, touched: bool) -> None:
         holder, asker = self.room.control.holder, self.room.control.requester

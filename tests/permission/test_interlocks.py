@@ -78,28 +78,30 @@ def joining(robot: RobotState) -> None:
     robot.settled_at = NOW + 1
 
 
-SILENT = "No connection to the robot: its bridge does not answer. If this stays, restart the bridge."
+SILENT = (
+    "No connection to the robot: its bridge does not respond. If this persists, restart the bridge."
+)
 WAYS: list[tuple[Callable[[RobotState], None], str, str]] = [
-    (no_link, "no_link", "No connection to the robot: its bridge can't be reached."),
+    (no_link, "no_link", "No connection to the robot: its bridge cannot be reached."),
     (
         no_link_at,
         "no_link",
-        "No connection to the robot: its bridge can't be reached at tcp/robot1:7447.",
+        "No connection to the robot: its bridge cannot be reached at tcp/robot1:7447.",
     ),
     (
         no_link_at_many,
         "no_link",
-        "No connection to the robot: its bridge can't be reached at tcp/r0:1, tcp/r1:1, tcp/r2:1 "
+        "No connection to the robot: its bridge cannot be reached at tcp/r0:1, tcp/r1:1, tcp/r2:1 "
         "and 2 more.",
     ),
     (
         no_bridge,
         "no_bridge",
-        "No connection to the robot: Zenoh answers, but no ROS 2 bridge is there.",
+        "No connection to the robot: Zenoh responds, but no ROS 2 bridge is running.",
     ),
     (bridge_silent, "bridge_silent", SILENT),
     (bridge_unheard, "bridge_silent", SILENT),
-    (joining, "joining", "Joining the robot's topics: a moment."),
+    (joining, "joining", "Connecting to the robot's topics. Please wait."),
 ]
 
 
@@ -155,7 +157,7 @@ def test_what_was_permitted_before_a_cut_is_locked(robot: RobotState) -> None:
     assert (verdict.permitted, verdict.code, verdict.reason) == (
         False,
         "cut",
-        "Locked: the connection was cut; waiting for a new /operation_enabled.",
+        "Locked: the connection was lost. Waiting for a new /operation_enabled.",
     )
 
 
@@ -166,7 +168,7 @@ def test_what_can_not_be_read_locks(robot: RobotState, payload: bytes) -> None:
     assert (verdict.permitted, verdict.code, verdict.reason) == (
         False,
         "unreadable",
-        "Locked: /operation_enabled can't be read: what arrives is not std_msgs/msg/Bool.",
+        "Locked: /operation_enabled cannot be read. The data received is not std_msgs/msg/Bool.",
     )
 
 
@@ -177,7 +179,7 @@ def test_another_type_on_the_robot_locks(robot: RobotState) -> None:
         False,
         "wrong_type",
         "/operation_enabled is std_msgs/msg/String on the robot, "
-        "but this panel is made for std_msgs/msg/Bool.",
+        "but this panel expects std_msgs/msg/Bool.",
     )
 
 
@@ -231,7 +233,7 @@ def test_a_publish_to_a_topic_of_another_type_is_locked(robot: RobotState) -> No
     verdict = press_verdict(free(), (), robot, NOW)
     assert (verdict.code, verdict.reason) == (
         "wrong_type",
-        "/free is std_msgs/msg/Bool on the robot, but this panel is made for std_msgs/msg/String.",
+        "/free is std_msgs/msg/Bool on the robot, but this panel expects std_msgs/msg/String.",
     )
 
 
@@ -260,7 +262,7 @@ def test_a_permission_that_is_published_best_effort_locks_a_panel_that_asks_for_
     verdict = interlock_verdict(small_panel().interlocks[0], robot, NOW)
     assert (verdict.permitted, verdict.code) == (False, "publishes_best_effort")
     assert verdict.reason == (
-        "The robot publishes /operation_enabled best effort; this panel asks for reliable."
+        "The robot publishes /operation_enabled as best effort, but this panel requires reliable."
     )
     asks_less = small_panel({"qos": {"reliability": "best_effort"}}).interlocks[0]
     assert interlock_verdict(asks_less, robot, NOW).permitted
@@ -271,7 +273,8 @@ def test_a_subscriber_that_would_not_hear_locks_a_press() -> None:
     endpoint(robot, "MS", "/free", TEXT, qos=Qos(transient_local=True))
     verdict = press_verdict(free(), (), robot, NOW)
     assert (
-        verdict.reason == "The robot asks for /free transient local; this panel publishes it volatile."
+        verdict.reason
+        == "The robot requires /free as transient local, but this panel publishes it as volatile."
     )
     assert not verdict.permitted
 
@@ -286,7 +289,7 @@ def test_a_service_that_has_just_come_is_not_called_yet() -> None:
     assert (verdict.permitted, verdict.code, verdict.reason, verdict.until) == (
         False,
         "getting_ready",
-        "Locked: the robot has just begun to offer /reset; getting ready.",
+        "Locked: the robot has just started /reset. Connecting.",
         NOW + SERVER_SETTLE_S,
     )
     assert press_verdict(call, (), robot, NOW + SERVER_SETTLE_S).permitted

@@ -106,7 +106,7 @@ def test_without_a_way_nothing_else_is_told() -> None:
     robot = robot_there(panel)
     robot.link_up = False
     assert verdict_of(robot, panel).reasons == [
-        "No connection to the robot: its bridge can't be reached."
+        "No connection to the robot: its bridge cannot be reached."
     ]
 
 
@@ -280,7 +280,7 @@ def test_a_page_without_its_server_tells_that_alone(
     why.click()
     mine.process.send(signal.SIGSTOP)
     try:
-        lost = "There is no connection to the panel's server."
+        lost = "No connection to the panel server."
         expect(why).to_contain_text(lost)
         expect(why.locator("b")).to_have_text("")
         expect(page.locator("#reasons-several p")).to_have_text(lost)

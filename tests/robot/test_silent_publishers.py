@@ -242,7 +242,7 @@ def test_a_permission_in_each_order_of_tokens_and_messages(
 def test_the_reason_names_the_topic(incoming: Incoming) -> None:
     for event in (true, appears, goes, appears):
         event(incoming)
-    assert incoming.verdict.reason == f"A new publisher of {ENABLED} has not said anything yet."
+    assert incoming.verdict.reason == f"Locked: a new publisher of {ENABLED} has not published yet."
 
 
 def test_a_new_session_starts_without_the_doubts_of_the_last(incoming: Incoming) -> None:

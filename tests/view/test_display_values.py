@@ -189,16 +189,16 @@ def test_a_lamp_of_a_bool_or_a_text() -> None:
         (
             {"now": NOW + 6, "max_age_s": 5.0},
             "old",
-            "Not known",
+            "Unknown",
             "old",
             "was Fault: 6 s old",
         ),
         (
             {"cut": True},
             "old",
-            "Not known",
+            "Unknown",
             "old",
-            f"was Fault: from before the connection was cut, {AT}",
+            f"was Fault: from before the connection was lost, {AT}",
         ),
     ],
 )
@@ -222,7 +222,7 @@ def test_a_lamp_that_can_not_be_read_says_so() -> None:
     robot = robot_there(panel)
     robot.take("heard", Sample(b"broken", 1, NOW, NOW, BRIDGE))
     view = build_view(panel, robot, NOW).view["widgets"]["heard"]
-    assert (view["state"], view["text"], view["shape"]) == ("unreadable", "Not readable", "unreadable")
+    assert (view["state"], view["text"], view["shape"]) == ("unreadable", "Unreadable", "unreadable")
 
 
 def test_time_changes_a_lamp() -> None:

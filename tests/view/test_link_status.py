@@ -108,10 +108,10 @@ def test_without_a_bridge_it_locks_all_and_the_node_nothing() -> None:
     link = links_of(panel, robot)
     assert link["bridge"]["locks"] == "Locks Free, Guarded."
     assert link["bridge"]["reason"] == (
-        "No connection to the robot: Zenoh answers, but no ROS 2 bridge is there."
+        "No connection to the robot: Zenoh responds, but no ROS 2 bridge is running."
     )
     assert (link["node"]["locks"], link["server"]["locks"]) == ("Locks nothing.", "Locks nothing.")
-    assert link["node"]["reason"].startswith("While the bridge can't be reached")
+    assert link["node"]["reason"].startswith("While the bridge cannot be reached")
 
 
 def test_a_value_that_is_waited_for_locks_by_the_node() -> None:
@@ -141,7 +141,7 @@ def test_what_the_robot_forbids_is_no_fault_of_a_link() -> None:
         (ParameterState("live", 1.0, read_only=True), "Read only"),
         (ParameterState("undeclared"), "has no parameter speed"),
         (ParameterState("mistyped", found="string"), "is string"),
-        (ParameterState("live", 1.0, range=Range(5.0, 6.0)), "no value is both"),
+        (ParameterState("live", 1.0, range=Range(5.0, 6.0)), "No value fits both"),
     ],
 )
 def test_a_parameter_that_can_not_be_set_is_no_fault_of_a_link(
@@ -172,7 +172,7 @@ def test_a_node_that_stops_talking_is_silent_though_its_token_is_there(silent_fo
     permits(robot)
     node = links_of(panel, robot, NOW + silent_for)["node"]
     assert (node["state"], node["text"]) == (("bad", "silent") if silent_for >= 5 else ("ok", "ok"))
-    assert node["reason"].startswith("Nothing new on /operation_enabled for 5 s") is (silent_for >= 5)
+    assert node["reason"].startswith("No new data on /operation_enabled for 5 s") is (silent_for >= 5)
 
 
 def test_an_old_value_that_is_only_shown_is_no_silence() -> None:
@@ -208,14 +208,14 @@ def test_an_old_value_without_a_publisher_is_no_silence() -> None:
     panel = panel_of(HEARD, interlock={"max_age_s": 5.0})
     robot = robot_there(panel)
     permits(robot)
-    assert links_of(panel, robot, NOW + 60)["node"]["text"] == "no node seen"
+    assert links_of(panel, robot, NOW + 60)["node"]["text"] == "no node found"
 
 
 def test_a_node_that_was_never_seen_is_to_be_started() -> None:
     panel = cell()
     node = links_of(panel, robot_there(panel))["node"]
-    assert (node["state"], node["text"]) == ("wait", "no node seen")
-    assert node["reason"].endswith("start it, with the ROS domain of the bridge.")
+    assert (node["state"], node["text"]) == ("wait", "no node found")
+    assert node["reason"].endswith("Start it, with the ROS domain of the bridge.")
 
 
 def test_a_node_that_was_there_and_went_without_its_bridge_has_its_remedy() -> None:
@@ -225,9 +225,9 @@ def test_a_node_that_was_there_and_went_without_its_bridge_has_its_remedy() -> N
     links_of(panel, robot)
     endpoint(robot, "MP", "/heard", TEXT, alive=False)
     node = links_of(panel, robot)["node"]
-    assert (node["state"], node["text"]) == ("wait", "no node seen")
-    assert node["reason"].startswith("/heard was there and is gone, but the bridge is not")
-    assert "restart the node or the bridge" in node["reason"]
+    assert (node["state"], node["text"]) == ("wait", "no node found")
+    assert node["reason"].startswith("/heard has disappeared, though the bridge is running")
+    assert "restart the bridge" in node["reason"]
     endpoint(robot, "MP", "/heard", TEXT)
     assert links_of(panel, robot)["node"]["reason"] == "Locked: waiting for /operation_enabled."
 
@@ -241,7 +241,7 @@ def test_a_publisher_that_went_has_its_remedy_while_others_are_there() -> None:
     endpoint(robot, "MP", ENABLED, BOOL, alive=False)
     node = links_of(panel, robot)["node"]
     assert (node["text"], node["locks"]) == ("ok", "Locks Guarded.")
-    assert node["reason"].startswith("/operation_enabled was there and is gone")
+    assert node["reason"].startswith("/operation_enabled has disappeared")
 
 
 def test_a_node_that_went_with_its_bridge_is_not_lost_by_it() -> None:
@@ -252,7 +252,7 @@ def test_a_node_that_went_with_its_bridge_is_not_lost_by_it() -> None:
     endpoint(robot, "MP", "/heard", TEXT, alive=False)
     robot.graph.apply(bridge_token(BRIDGE_ZID), False)
     robot.graph.apply(bridge_token("b2"), True)
-    assert "start it" in links_of(panel, robot)["node"]["reason"]
+    assert "Start it" in links_of(panel, robot)["node"]["reason"]
 
 
 def test_a_lost_link_forgets_which_nodes_were_there() -> None:
@@ -263,7 +263,7 @@ def test_a_lost_link_forgets_which_nodes_were_there() -> None:
     robot.lose()
     robot.link_up, robot.settled_at = True, 0.0
     robot.graph.apply(bridge_token(BRIDGE_ZID), True)
-    assert "start it" in links_of(panel, robot)["node"]["reason"]
+    assert "Start it" in links_of(panel, robot)["node"]["reason"]
 
 
 def test_a_qos_that_does_not_match_is_the_nodes() -> None:

@@ -91,7 +91,7 @@ def test_a_changed_light_is_sent_with_all_lights(publisher: ViewPublisher, robot
     publisher.post(view_of(robot))
     sent = events(publisher.since(1, old))
     assert sent["link"] == publisher.view["link"]
-    assert sent["link"]["bridge"]["text"] == "no answer"
+    assert sent["link"]["bridge"]["text"] == "no response"
 
 
 def test_a_changed_notice_is_sent(publisher: ViewPublisher, robot: RobotState) -> None:

@@ -122,10 +122,10 @@ def nothing(robot: RobotState) -> None:
     ("change", "bridge", "on_robot"),
     [
         (no_link, ("bad", "no connection"), ("bad", "no connection")),
-        (no_bridge, ("bad", "not there"), ("bad", "no connection")),
-        (silent, ("bad", "no answer"), ("bad", "no connection")),
-        (joining, ("wait", "joining"), ("wait", "no node seen")),
-        (nothing, ("ok", "ok"), ("wait", "no node seen")),
+        (no_bridge, ("bad", "not found"), ("bad", "no connection")),
+        (silent, ("bad", "no response"), ("bad", "no connection")),
+        (joining, ("wait", "connecting"), ("wait", "no node found")),
+        (nothing, ("ok", "ok"), ("wait", "no node found")),
         (node, ("ok", "ok"), ("ok", "ok")),
     ],
 )
@@ -193,7 +193,7 @@ def test_a_readout_from_before_a_cut_says_so(robot: RobotState) -> None:
     assert shown == {
         "state": "old",
         "text": "hello",
-        "note": "from before the connection was cut, received 01:01:01",
+        "note": "from before the connection was lost, received 01:01:01",
     }
 
 
@@ -201,7 +201,7 @@ def test_a_readout_that_can_not_be_read_says_so(robot: RobotState) -> None:
     robot.take("heard", Sample(b"broken", 1, NOW, NOW, BRIDGE))
     shown, _ = heard(robot)
     assert (shown["state"], shown["text"]) == ("unreadable", "—")
-    assert shown["note"] == "/heard can't be read: what arrives is not std_msgs/msg/String"
+    assert shown["note"] == "/heard cannot be read: the data received is not std_msgs/msg/String"
 
 
 def test_a_readout_of_a_topic_of_another_type_says_so(robot: RobotState) -> None:

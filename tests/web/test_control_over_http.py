@@ -79,7 +79,7 @@ def test_a_press_needs_control(client: Callable[..., Client], kiosk: Server) -> 
     ann, bob = client("192.0.2.1"), client("192.0.2.2")
     free = ann.press()
     assert (free.status_code, free.json()["outcome"]) == (409, "refused")
-    assert "Nobody has control of the robot: take control first." in free.json()["reason"]
+    assert "No panel has control of the robot. Take control first." in free.json()["reason"]
     assert ann.take()
     assert ann.press().json()["outcome"] == "published"
     refused = bob.press()
@@ -152,7 +152,7 @@ def test_what_was_touched_long_ago_is_not_done_any_more(client: Callable[..., Cl
     long_ago = (datetime.now(UTC) - timedelta(seconds=4)).isoformat()
     answer = late.control("take", at=long_ago)
     assert (answer.status_code, answer.json()["done"]) == (409, False)
-    assert "s to get here: press again." in answer.json()["reason"]
+    assert "s to arrive. Press again." in answer.json()["reason"]
     assert answer.json()["control"]["holder"] == ""
     assert late.control("take", at=datetime.now(UTC).isoformat()).json()["done"]
     assert late.control("release", at=long_ago).json()["done"]

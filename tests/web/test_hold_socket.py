@@ -142,7 +142,7 @@ def test_who_lets_go_before_a_hold_begins_is_told_that_it_did_not(demo: Server) 
         socket.say(do="end", why="released")
         said = socket.hear()
         assert (said["state"], said["status"], said["outcome"]) == ("refused", 409, "refused")
-        assert said["reason"].endswith("it was let go before it began: hold it longer.")
+        assert said["reason"].endswith("released before the hold began. Hold it longer.")
         assert socket.closed() == 4409
 
 
@@ -316,7 +316,7 @@ def test_a_lost_bridge_ends_it_and_what_could_not_be_said_is_not_said_later(
             own_bridge.kill()
             said = socket.beat_until_it_ends()
             assert said["outcome"] == "unknown"
-            assert "The message that ends it was not sent: No connection" in said["reason"]
+            assert "The stop message was not sent: No connection" in said["reason"]
         own_bridge.start()
         until(server.ready, "ready again")
         permit(server, own_node, True)
@@ -339,7 +339,7 @@ def test_a_release_that_may_not_have_reached_the_bridge_is_not_published(
         own_bridge.thaw()
     assert (said["state"], said["outcome"]) == ("ended", "unknown")
     assert said["reason"].startswith("Released at")
-    assert "it is not known whether the robot got the message that ends it" in said["reason"]
+    assert "The robot may not have received the stop message" in said["reason"]
     assert said["reason"] in kiosk.http.get("/log.csv").text
 
 
@@ -351,7 +351,7 @@ def test_a_server_that_stood_still_has_ended_it_when_it_wakes(demo: Server) -> N
         demo.process.send(signal.SIGCONT)
         said = socket.hear()
         assert (said["state"], said["outcome"]) == ("ended", "aborted")
-        assert "the panel's server stood still" in said["reason"]
+        assert "the panel server stalled" in said["reason"]
 
 
 @pytest.fixture
@@ -372,7 +372,7 @@ def test_a_terminal_that_closes_ends_it_as_any_end_of_the_server(
         mine.process.send(signal.SIGHUP)
         said = socket.beat_until_it_ends()
     assert said["outcome"] == "aborted"
-    assert "the panel's server stops" in said["reason"]
+    assert "the panel server is shutting down" in said["reason"]
 
 
 def test_a_server_that_ends_tells_it_though_the_robot_has_to_be_asked_first(
@@ -387,7 +387,7 @@ def test_a_server_that_ends_tells_it_though_the_robot_has_to_be_asked_first(
         said = socket.beat_until_it_ends()
         own_bridge.thaw()
     assert said["outcome"] == "unknown"
-    assert "it is not known whether the robot got the message that ends it" in said["reason"]
+    assert "The robot may not have received the stop message" in said["reason"]
     kiosk.process.wait(10)
 
 

@@ -476,7 +476,7 @@ def test_bytes_that_are_no_message_lock_and_are_counted(
             for bad in (b"", b"\0", b"\0\1\0\0", b"\xff" * 100, b"\0\1\0\0" + b"\1" * 100):
                 peer.put("operation_enabled", bad)
                 peer.put("last_heard", bad)
-            return "can't be read" in (kiosk.widget("operation1")["reason"] or "")
+            return "cannot be read" in (kiosk.widget("operation1")["reason"] or "")
 
         until(locked, "locked once the peer is connected")
         until(lambda: kiosk.widget("last_heard")["state"] == "unreadable", "shown")
