@@ -238,7 +238,7 @@ def test_too_many_at_once_are_refused_in_words(
         results = await asyncio.gather(*presses, return_exceptions=True)
         refused = [result for result in results if isinstance(result, LogError)]
         assert 38 <= len(refused) <= 40
-        assert "more is pressed than the disk takes" in str(refused[0])
+        assert "presses arrive faster than the disk can store them" in str(refused[0])
         assert log.fault == ""
 
     run(tmp_path, work)
