@@ -7,7 +7,7 @@ from typing import Any, Protocol
 from app.audit.entry import Entry, Origin, entered
 from app.audit.queries import OpenPress
 from app.errors import LogError
-from app.i18n import say
+from app.i18n import TextLike, render, say
 from app.permission.clients import Client
 from app.robot.command_status import Outcome
 
@@ -17,16 +17,16 @@ class Log(Protocol):
     are "" while all is well."""
 
     @property
-    def fault(self) -> str: ...
+    def fault(self) -> TextLike: ...
     @property
-    def lock(self) -> str: ...
+    def lock(self) -> TextLike: ...
     def notifying(self, changed: Callable[[], None]) -> AbstractContextManager[None]: ...
 
     async def pressed(self, entry: Entry) -> Entry | None:
         """Returns when the entry is written; LogError when it can't be and must, Repeated where the log
         has a press of this id."""
 
-    async def closed(self, entry: Entry) -> str:
+    async def closed(self, entry: Entry) -> TextLike:
         """Returns when the entry is on the disk, or why it is not."""
 
     def add(self, entry: Entry) -> None:
@@ -47,7 +47,7 @@ class PendingEntry:
     """One press in the log; `entry` is None where it could not be written and need not be."""
 
     def __init__(
-        self, log: Log, entry: Entry | None, board: Callable[[], str], fault: str = ""
+        self, log: Log, entry: Entry | None, board: Callable[[], str], fault: TextLike = ""
     ) -> None:
         self._log = log
         self._entry = entry
@@ -65,7 +65,7 @@ class PendingEntry:
         """By which verdict, and by which version of the board: the one that there is now."""
         self._judged = {"verdict": verdict, "board": self._board()}
 
-    async def closed(self, outcome: str, reason: str) -> str:
+    async def closed(self, outcome: str, reason: TextLike) -> TextLike:
         """Writes what came of it; returns when that is on the disk, or why it is not."""
         if self._entry is None:
             return self._fault
@@ -113,7 +113,7 @@ class PressLog:
         try:
             written = await self._log.pressed(entry)
         except LogError as error:
-            return PendingEntry(self._log, None, self._board, str(error))
+            return PendingEntry(self._log, None, self._board, error.text)
         return PendingEntry(self._log, written, self._board, self._log.fault)
 
     @property
@@ -134,9 +134,9 @@ class PressLog:
         inputs: Mapping[str, Any],
         press_id: str,
         origin: Origin,
-        reason: str,
+        reason: TextLike,
         action: str = "press",
-    ) -> str:
+    ) -> TextLike:
         """A press that was not even judged; returns when it is on the disk, or why it is not."""
         about = self._about(widget, press_id, action)
         entry = entered("refused", origin, inputs, outcome="refused", reason=reason, **about)
@@ -148,4 +148,4 @@ class PressLog:
 
 def origin_of(client: Client, seen: str = "") -> Origin:
     """Where a press comes from: a browser, which is named until users log in."""
-    return Origin(address=client.address, browser=client.id, who=client.name, seen=seen)
+    return Origin(address=client.address, browser=client.id, who=render(client.name), seen=seen)

@@ -11,7 +11,7 @@ from app import clock
 from app.audit.press_record import Log, origin_of
 from app.commands.receipts import PressContext
 from app.errors import InputError
-from app.i18n import say
+from app.i18n import TextLike, say
 from app.permission.clients import Client
 from app.permission.control_authority import ControlAuthority
 from app.permission.interlocks import Verdict, locked
@@ -62,7 +62,7 @@ class PressGuard:
             lambda: self._doubt(widget, seen, at),
         )
 
-    def late(self, at: float) -> str:
+    def late(self, at: float) -> TextLike:
         """Why what was touched at this moment (the server's own time) is not done now; "" if it is."""
         age = clock.server_now() - at
         if age > self._expires_s:
@@ -84,7 +84,7 @@ class PressGuard:
             return Verdict(False, "log", self._log.lock)
         return self._control.verdict(client)
 
-    def _doubt(self, widget: str, seen: str, at: float | None) -> str:
+    def _doubt(self, widget: str, seen: str, at: float | None) -> TextLike:
         """Why a press is no longer what was meant; "" if it is."""
         boot, _, version = seen.partition("-")
         if boot and boot != self._publisher.boot:

@@ -38,7 +38,7 @@ from app.commands.refusals import EarlyRefusals
 from app.commands.repeated import RepeatedPresses
 from app.concurrency import CancellableWaits
 from app.errors import Cause, FieldError, InputError, LinkError, LogError, NotFound, PressRefused
-from app.i18n import say
+from app.i18n import TextLike, say
 from app.panel.model import Panel
 from app.panel.widgets.families import Pressed
 from app.panel.widgets.service_action import Action
@@ -159,7 +159,7 @@ class Presses:
         except TimeoutError:
             return Outcome("unknown", say("server_ends")), ""
         except LinkError as error:
-            text = say("not_encoded", why=str(error), time=format_time(time.time()))
+            text = say("not_encoded", why=error.text, time=format_time(time.time()))
             return Outcome("refused", text), "link"
         return answer, "interlock" if answer.outcome == "refused" else ""
 
@@ -175,7 +175,7 @@ class Presses:
             try:
                 why, cause = self._dispatcher.refusal(widget, inputs), "interlock"
             except (FieldError, InputError) as error:
-                why, cause = str(error), "input"
+                why, cause = error.text, "input"
         if not why:
             return None
         answer = Outcome("refused", say(sentence, why=why, time=format_time(time.time())))
@@ -217,7 +217,7 @@ class Presses:
             return await self._repeated.receipt(widget, inputs, context.origin, known)
         except LogError as error:
             self._receipts.begin(press_id, widget.id, context.origin, own)
-            text = say("refused", why=str(error), time=format_time(time.time()))
+            text = say("refused", why=error.text, time=format_time(time.time()))
             receipt = receipt_of(widget, inputs, press_id, Outcome("refused", text), "log")
         else:
             self._receipts.begin(press_id, widget.id, context.origin, own)
@@ -248,7 +248,7 @@ class Presses:
         def receipt(answer: Outcome, cause: Cause = "") -> Receipt:
             return receipt_of(widget, inputs, press_id, answer, cause)
 
-        def refused(sentence: str, why: str, cause: Cause) -> Receipt:
+        def refused(sentence: str, why: TextLike, cause: Cause) -> Receipt:
             now = format_time(time.time())
             return receipt(Outcome("refused", say(sentence, why=why, time=now)), cause)
 
@@ -266,9 +266,9 @@ class Presses:
         except TimeoutError:
             return receipt(Outcome("unknown", say("server_ends")))
         except (FieldError, InputError) as error:
-            return refused("not_encoded", str(error), "input")
+            return refused("not_encoded", error.text, "input")
         except LinkError as error:
-            return refused("not_encoded", str(error), "link")
+            return refused("not_encoded", error.text, "link")
         except PressRefused as error:
             return refused("refused", error.reason, error.cause)
         if answer.outcome == "refused":
@@ -286,7 +286,7 @@ class Presses:
                 raise PressRefused(why, cause)
         raise PressRefused(say("catching_up"), "link")
 
-    def _ground(self, widget: Pressed, context: PressContext) -> tuple[Verdict, str, Cause]:
+    def _ground(self, widget: Pressed, context: PressContext) -> tuple[Verdict, TextLike, Cause]:
         """The verdict now, and why it may not be sent, "" if it may."""
         self._catch_up()
         verdict = judged(widget, context, self._panel, self._robot, self._monotonic())

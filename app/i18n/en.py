@@ -4,6 +4,14 @@ from collections.abc import Mapping
 from typing import Final
 
 ENGLISH: Final[Mapping[str, str]] = {
+    # How sentences and names stand together.
+    "between_sentences": " ",
+    "between_lines": "\n",
+    "between_names": ", ",
+    "with_reply": "{said}: {reply}",
+    "with_stop": "{said}.",
+    "and_further": "{first}, {last}",
+    "and_count": "{name} +{number}",
     # Why a control is locked.
     "no_link": "No connection to the robot: its bridge cannot be reached.",
     "no_link_at": "No connection to the robot: its bridge cannot be reached at {where}.",
@@ -155,6 +163,10 @@ ENGLISH: Final[Mapping[str, str]] = {
     "browser_local": "the panel at the cell",
     "browser_more": "browser {number} at the cell",
     "browser_unknown": "a program",
+    "browser_title": "Panel {number} ({address})",  # at the begin of a sentence
+    "browser_local_title": "The panel at the cell",  # at the begin of a sentence
+    "browser_more_title": "Browser {number} at the cell",  # at the begin of a sentence
+    "browser_unknown_title": "A program ({address})",  # at the begin of a sentence
     "the_robot": "the robot",
     "control": "Control of the robot",
     "control_held": "{name} has control of {robot}.",

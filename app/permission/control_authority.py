@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Final, Literal
 
-from app.i18n import say
+from app.i18n import TextLike, say
 from app.panel.rules import ControlRules
 from app.permission.clients import Client
 from app.permission.control_authority_view import NO_CONTROL, ControlView, control_view
@@ -54,7 +54,7 @@ class ControlAuthority:
     ) -> None:
         """`robot` is its name, "" where there is only one; `tell` gets a line for each change."""
         self.rules = rules
-        self._robot = robot or say("the_robot")
+        self._robot: TextLike = robot or say("the_robot")
         self._now = monotonic
         self._wall = wall
         self._tell = tell

@@ -2,7 +2,7 @@
 
 from typing import Final, Literal, TypedDict
 
-from app.i18n import say
+from app.i18n import TextLike, say
 from app.panel.rules import ControlRules
 from app.permission.clients import Client
 
@@ -15,13 +15,13 @@ class ControlView(TypedDict):
 
     required: bool
     holder: str
-    holder_name: str
+    holder_name: TextLike
     asker: str
-    asker_name: str
+    asker_name: TextLike
     since: str
-    holder_text: str
-    asker_text: str
-    text: str
+    holder_text: TextLike
+    asker_text: TextLike
+    text: TextLike
 
 
 NO_CONTROL: Final = ControlView(
@@ -38,7 +38,7 @@ NO_CONTROL: Final = ControlView(
 
 
 def control_view(
-    rules: ControlRules, robot: str, holder: Client | None, asker: Client | None, since: str
+    rules: ControlRules, robot: TextLike, holder: Client | None, asker: Client | None, since: str
 ) -> ControlView:
     """The view for a robot's name; there is an asker only where there is a holder."""
     if not rules.required:

@@ -1,8 +1,8 @@
 """The latest view with a version, and the events that bring a browser from one to another.
 
 There is no queue: a stream remembers the view that it sent last and, whenever it can send, gets
-the difference to the newest. What is sent is encoded once for all streams: those that are equally
-far share the same bytes, the others those of each event that says all of something.
+the difference to the newest. What is sent is encoded once for all streams of a language: those that are
+equally far share the same bytes, the others those of each event that says all of something.
 """
 
 import asyncio
@@ -12,6 +12,7 @@ from typing import Any, Final
 
 from pydantic_core import to_json
 
+from app.i18n import ENGLISH, render
 from app.view.heartbeat import Heartbeat
 from app.view.sections import Events, difference
 from app.view.view import View
@@ -20,9 +21,9 @@ from app.view.view import View
 SEPARATORS: Final = {c.encode(): b"\\u%04x" % ord(c) for c in "\x85\u2028\u2029"}
 
 
-def encoded(data: Mapping[str, Any]) -> bytes:
-    """JSON in one line, for whoever reads lines; what is no number is null."""
-    text = to_json(data, inf_nan_mode="null")
+def encoded(data: Mapping[str, Any], language: str = ENGLISH) -> bytes:
+    """JSON in one line, for whoever reads lines; what is no number is null, a text is rendered."""
+    text = to_json(data, inf_nan_mode="null", fallback=lambda one: render(one, language))
     for separator, escaped in SEPARATORS.items():
         text = text.replace(separator, escaped)
     return text
@@ -40,8 +41,8 @@ class ViewPublisher:
         self.heartbeat = Heartbeat(self._wake)
         self._changed = asyncio.Event()
         self._news: Events = {}  # from the view before to this one
-        self._prepared: dict[int, bytes] = {}
-        self._whole: dict[str, bytes] = {}
+        self._prepared: dict[tuple[str, int], bytes] = {}  # by the language and the version before
+        self._whole: dict[tuple[str, str], bytes] = {}  # by the language and the event
         self._turned: dict[str, int] = {}
         self.closed = False
 
@@ -83,31 +84,35 @@ class ViewPublisher:
         if not self.closed and (self.version, self.heartbeat.count) == (version, beats):
             await self._changed.wait()
 
-    def snapshot(self) -> bytes:
+    def snapshot(self, language: str = ENGLISH) -> bytes:
         """The `snapshot` event: everything that the page shows."""
-        return self._all_of("snapshot", {"id": self.id, "revision": self.revision, **self.view})
+        everything = {"id": self.id, "revision": self.revision, **self.view}
+        return self._all_of("snapshot", everything, language)
 
-    def since(self, version: int, view: View) -> bytes:
+    def since(self, version: int, view: View, language: str = ENGLISH) -> bytes:
         """The events from a view that was posted as `version` to the newest one."""
-        prepared = self._prepared.get(version)
+        prepared = self._prepared.get((language, version))
         if prepared is None:
             latest = version == self.version - 1
             news = self._news if latest else difference(view, self.view)
-            prepared = self._prepared[version] = b"".join(
-                self._event(name, data) if name == "update" else self._all_of(name, data)
+            prepared = self._prepared[language, version] = b"".join(
+                self._event(name, data, language)
+                if name == "update"
+                else self._all_of(name, data, language)
                 for name, data in news.items()
             )
         return prepared
 
-    def _all_of(self, name: str, data: Mapping[str, Any]) -> bytes:
+    def _all_of(self, name: str, data: Mapping[str, Any], language: str) -> bytes:
         """An event that is the same whatever was sent before."""
-        whole = self._whole.get(name)
+        whole = self._whole.get((language, name))
         if whole is None:
-            whole = self._whole[name] = self._event(name, data)
+            whole = self._whole[language, name] = self._event(name, data, language)
         return whole
 
-    def _event(self, name: str, data: Mapping[str, Any]) -> bytes:
-        return b"event: %b\ndata: %b\nid: %b\n\n" % (name.encode(), encoded(data), self.id.encode())
+    def _event(self, name: str, data: Mapping[str, Any], language: str) -> bytes:
+        lines = (name.encode(), encoded(data, language), self.id.encode())
+        return b"event: %b\ndata: %b\nid: %b\n\n" % lines
 
 
 def client_id_event(browser: str) -> bytes:

@@ -18,11 +18,11 @@ from typing import Any, Final, Literal
 from app.clock import format_time
 from app.commands.parameters.client import NoAnswer, ParameterClient
 from app.commands.parameters.values import checked
-from app.commands.service_calls import LONGEST_SAID, Asker, Request, ServiceCalls
+from app.commands.service_calls import LONGEST_SAID, Asker, Request, ServiceCalls, with_reply
 from app.concurrency import spawn_logged
 from app.dialect import bridge_dialect
 from app.errors import DecodeError
-from app.i18n import say
+from app.i18n import TextLike, say
 from app.interfaces import Fields, Interfaces, text_of
 from app.panel.model import Panel
 from app.panel.widgets.parameter import DESCRIBE, EVENT_TYPE, GET, SET, Parameter, Value
@@ -234,7 +234,7 @@ class ParameterSync:
     def _end_asking(self, node: _Node) -> None:
         self._robot.asking -= {widget.id for widget in node.widgets}
 
-    def read_again(self, widget: Parameter) -> str:
+    def read_again(self, widget: Parameter) -> TextLike:
         """Asks the node of a parameter once more, unless it is being asked or has just answered; why it
         can't be, or "". However often anybody wants it, a node has no more than `AGAIN_S` allows."""
         node = self._nodes[widget.node]
@@ -304,8 +304,8 @@ def _answer(widget: Parameter, value: Value, response: Fields) -> Outcome:
         return Outcome("unknown", say("answer_unreadable", wanted=SET[1]))
     if successful:
         return Outcome("succeeded", say("parameter_set", value=widget.written(value), time=now))
-    said = f": {printable(text_of(reason, LONGEST_SAID))}" if reason else "."
-    return Outcome("rejected", say("said_no", time=now) + said)
+    said = printable(text_of(reason, LONGEST_SAID)) if reason else ""
+    return Outcome("rejected", with_reply(say("said_no", time=now), said))
 
 
 async def _within(event: asyncio.Event, longest_s: float | None) -> None:

@@ -7,7 +7,7 @@ from fastapi.responses import JSONResponse, RedirectResponse, Response
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, JsonValue
 
 from app.errors import InputError, NotFound
-from app.i18n import say
+from app.i18n import TextLike, localized, say
 from app.panel.base import ID
 from app.permission.clients import Client
 from app.permission.control_authority import LIFE_S, Refusal
@@ -15,6 +15,7 @@ from app.runtime.robot_session import RobotSession
 from app.web.app_state import CurrentSession, CurrentState
 from app.web.client_cookie import keep, visitor, welcomed
 from app.web.described import FORM, JSON, described_body, errors, fields
+from app.web.language import language_of
 from app.web.request_body import as_model, body_of, form_of, json_of, kind_of
 
 router = APIRouter()
@@ -91,7 +92,7 @@ async def act(act: Act, request: Request, state: CurrentState, session: CurrentS
     _, token = welcomed(request, state)  # without a cookie nothing is done yet, the next time it is
     form = kind_of(request) == FORM
     given = await _given(Acting, request)
-    reason = "" if form or given.at is None else _late(session, act, given.at.timestamp())
+    reason: TextLike = "" if form or given.at is None else _late(session, act, given.at.timestamp())
     refusal = "" if reason else _done(session, act, browser, given.to, FORM_LIFE_S if form else LIFE_S)
     reason = say(refusal) if refusal else reason
     session.show()
@@ -101,7 +102,7 @@ async def act(act: Act, request: Request, state: CurrentState, session: CurrentS
         answer: Response = RedirectResponse(f"{session.base}/pages/{page.id}{query}", status_code=303)
     else:
         body = {"done": not reason, "reason": reason, "browser": browser.id}
-        content = body | {"control": session.control.view()}
+        content = localized(body | {"control": session.control.view()}, language_of(request))
         answer = JSONResponse(content, status_code=409 if reason else 200)
     return keep(answer, request, token)
 
@@ -127,7 +128,7 @@ def _done(session: RobotSession, act: str, client: Client, to: str, life_s: floa
     raise NotFound(f'there is no "/control/{act:.40}": there is take, ask, give, keep, release, here')
 
 
-def _late(session: RobotSession, act: str, at: float) -> str:
+def _late(session: RobotSession, act: str, at: float) -> TextLike:
     """Why what was touched then is not done any more; giving up is never too late."""
     return "" if act == "release" else session.press_guard.late(at)
 

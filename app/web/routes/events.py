@@ -7,12 +7,14 @@ from fastapi import APIRouter, Request
 from fastapi.responses import Response
 from starlette.types import Message, Receive, Scope, Send
 
+from app.i18n import ENGLISH
 from app.view.heartbeat import beat
 from app.view.publisher import ViewPublisher, client_id_event
 from app.web.app_state import CurrentSession, CurrentState
 from app.web.asgi import direct
 from app.web.client_cookie import keep, welcomed
 from app.web.described import TEXT, errors
+from app.web.language import language_of
 from app.web.metrics import Open
 
 router = APIRouter()
@@ -37,11 +39,12 @@ async def events(
     browser, token = welcomed(request, state) if board.view["control"]["required"] else (None, "")
     first = client_id_event(browser.id) if browser else b""
     answer: Response
+    language = language_of(request)
     if once:
-        all_of_it = board.snapshot() + first + beat()
+        all_of_it = board.snapshot(language) + first + beat()
         answer = Response(all_of_it, media_type=MEDIA_TYPE, headers=HEADERS)
     else:
-        answer = EventStream(board, first, state.metrics.streams)
+        answer = EventStream(board, first, state.metrics.streams, language)
     return keep(answer, request, token)
 
 
@@ -51,11 +54,14 @@ class EventStream(Response):
 
     media_type = MEDIA_TYPE
 
-    def __init__(self, publisher: ViewPublisher, first: bytes, streams: Open) -> None:
+    def __init__(
+        self, publisher: ViewPublisher, first: bytes, streams: Open, language: str = ENGLISH
+    ) -> None:
         """`first` comes with the snapshot; `streams` counts it while it is open."""
         self._board = publisher
         self._first = first
         self._streams = streams
+        self._language = language
         self.status_code = 200
         self.background = None
         self.init_headers(HEADERS)
@@ -71,13 +77,13 @@ class EventStream(Response):
                 writing.cancel()
 
     async def _write(self, send: Send) -> None:
-        board, heartbeat = self._board, self._board.heartbeat
+        board, heartbeat, language = self._board, self._board.heartbeat, self._language
         version, view, beats = board.version, board.view, heartbeat.count
         retry = f"retry: {RECONNECT_MS}\n\n".encode()
-        await send(_body(retry + board.snapshot() + self._first + beat()))
+        await send(_body(retry + board.snapshot(language) + self._first + beat()))
         while not board.closed:
             await board.news(version, beats)
-            chunk = board.since(version, view) if board.version > version else b""
+            chunk = board.since(version, view, language) if board.version > version else b""
             if heartbeat.count > beats:
                 chunk += heartbeat.event
             version, view, beats = board.version, board.view, heartbeat.count

@@ -15,7 +15,7 @@ from app import clock
 from app.clock import format_datetime, format_time
 from app.commands.receipts import Receipt
 from app.errors import NotFound
-from app.i18n import say
+from app.i18n import Text, TextLike, say
 from app.panel.model import Page, Panel
 from app.panel.template import inputs_of
 from app.panel.widgets.families import Entered, Pressed
@@ -29,6 +29,7 @@ from app.view.view import View, as_seen_by
 from app.web.app_state import AppState, CurrentState
 from app.web.client_cookie import by_hand, keep, welcomed
 from app.web.described import PAGE, Described, errors
+from app.web.language import language_of
 
 router = APIRouter(include_in_schema=True)
 
@@ -86,11 +87,11 @@ class PageContext(TypedDict):
     receipt: Receipt | None
     inputs: dict[str, Any]
     words: dict[str, Any]
-    lost: str
-    lost_short: str
-    locks_all: str
-    unknown: str
-    unsure: str
+    lost: Text
+    lost_short: Text
+    locks_all: Text
+    unknown: Text
+    unsure: Text
     refresh_s: int
     now: int
     since: float | None
@@ -99,7 +100,7 @@ class PageContext(TypedDict):
     browser: str
     over: bool
     role: Role
-    refused: str
+    refused: TextLike
 
 
 @router.get(
@@ -140,7 +141,7 @@ async def compiled(templates: Environment) -> None:
 class Ask(TypedDict):
     """What will be done by a press, and the inputs that it takes."""
 
-    sentence: str
+    sentence: Text
     inputs: list[Entered]
 
 
@@ -161,7 +162,7 @@ def _render(request: Request, state: AppState, page: Page) -> Response:
         session.control.loaded(browser, refresh_s + GRACE_S, by_hand(request))
         session.show()
     context = _context(request, state, session, page, browser, refresh_s)
-    html = state.templates.get_template("screen.html").render(**context)
+    html = state.templates.render("screen.html", language_of(request), **context)
     return keep(HTMLResponse(html, headers={"cache-control": "no-store"}), request, token)
 
 
