@@ -165,7 +165,7 @@ def test_a_disk_that_hangs_blocks_no_loop_and_locks(
     changes: list[str] = []
 
     async def work(log: OperatorLog) -> None:
-        with log.notifying(lambda: changes.append(log.lock)):
+        with log.notifying(lambda: changes.append(str(log.lock))):
             disk.open.clear()
             with pytest.raises(LogError, match=r"can't be written: the disk did not take .* 0\.5 s"):
                 await log.pressed(pressed(1))
@@ -173,7 +173,7 @@ def test_a_disk_that_hangs_blocks_no_loop_and_locks(
             with pytest.raises(LogError):
                 await log.pressed(pressed(2))
             assert time.monotonic() - began < 0.4
-            assert "the disk did not take the entry" in log.lock
+            assert "the disk did not take the entry" in str(log.lock)
             disk.open.set()
             await until_good(log)
             await log.pressed(pressed(3))
@@ -314,7 +314,7 @@ def test_damage_while_it_runs_begins_a_new_log_whose_numbers_go_on(tmp_path: Pat
     async def work(log: OperatorLog) -> None:
         entry = await log.pressed(pressed(1))
         disk.fails = LogCorrupt("the file is damaged")
-        assert "damaged" in await log.closed(sent(entry))
+        assert "damaged" in str(await log.closed(sent(entry)))
         disk.fails = None
         await until_good(log)
 

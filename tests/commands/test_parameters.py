@@ -124,7 +124,7 @@ class Bench:
 
     def reason(self, name: str = "speed") -> str:
         one = next(w for w in self.panel.parameters() if w.id == name)
-        return press_verdict(one, (), self.robot, NOW).reason or ""
+        return str(press_verdict(one, (), self.robot, NOW).reason or "")
 
 
 def run(test: Callable[[Bench], Coroutine[Any, Any, None]], *widgets: Table) -> None:
@@ -282,7 +282,7 @@ def test_a_node_that_does_not_answer_is_asked_again_when_it_is_touched_or_new(
 
     async def test(bench: Bench) -> None:
         (one,) = bench.panel.parameters()
-        assert "does not offer" in bench.parameters.read_again(one)
+        assert "does not offer" in str(bench.parameters.read_again(one))
         bench.offer()
         await bench.asked(1)
         assert bench.parameters.read_again(one) == ""  # it is being asked
@@ -458,7 +458,7 @@ def test_after_a_set_the_node_is_asked_how_it_is() -> None:
         assert (sent.name, sent.value.type, sent.value.double_value) == ("speed", DOUBLE, 0.7)
         await bench.answer(3, SET, results=[{"successful": False, "reason": "too fast"}])
         answer = await setting
-        assert (answer.outcome, answer.text[-10:]) == ("rejected", ": too fast")
+        assert (answer.outcome, str(answer.text)[-10:]) == ("rejected", ": too fast")
         await bench.tell(4, 0.5)
         assert bench.known().value == 0.5
 
