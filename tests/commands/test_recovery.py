@@ -23,6 +23,7 @@ from app.permission.interlocks import call_blocked
 from app.robot.command_status import IDLE
 from tests.commands.test_calls_and_goals import COUNT, Bench, asked, sample_of, tell_states
 from tests.support.builders import BRIDGE, INTERFACES
+from tests.support.words import english
 
 FROM = Origin(address="10.0.0.7")
 TYPES = INTERFACES.action(COUNT)
@@ -217,7 +218,10 @@ def test_its_feedback_tells_that_it_is_under_way(tmp_path: Path) -> None:
         rig.bench.actions.hear_feedback(
             "/count", sample_of(INTERFACES.encode(TYPES.feedback_message, said))
         )
-        assert (rig.bench.shown.goal, rig.bench.shown.text) == ("EXECUTING", "In progress. so far [1]")
+        assert english((rig.bench.shown.goal, rig.bench.shown.text)) == (
+            "EXECUTING",
+            "In progress. so far [1]",
+        )
 
     run(tmp_path, test, "accepted")
 

@@ -165,7 +165,7 @@ def test_a_request_is_shown_to_all(asked: Room) -> None:
     view = asked.control.view()
     assert (view["holder"], view["asker"]) == (ANN.id, BOB.id)
     assert english(view["asker_name"]) == "Panel 2 (192.0.2.2)"
-    assert view["holder_text"] == (
+    assert english(view["holder_text"]) == (
         "Panel 2 (192.0.2.2) requests control of Robot 1."
         " If this panel is not touched, control passes in 30 s."
     )

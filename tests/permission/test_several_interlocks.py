@@ -73,7 +73,7 @@ def test_all_have_to_permit(permitted: bool, closed: bool) -> None:
     reasons = [FORBIDS] * (not permitted) + [NO_DOORS] * (not closed)
     assert verdict.permitted is (permitted and closed)
     assert english(verdict.reasons) == reasons
-    assert verdict.reason == (reasons[0] if reasons else None)
+    assert english(verdict.reason) == (reasons[0] if reasons else None)
 
 
 def test_the_order_of_the_file_says_which_is_told_first() -> None:
@@ -130,7 +130,7 @@ def test_a_view_lists_all_reasons_of_a_control_with_several() -> None:
     assert english(shown["guarded"]) == {
         "enabled": False, "reason": WAITS, "reasons": f"{WAITS}\n{NO_DOORS}", "more": "+1 more",
     }  # fmt: skip
-    assert shown["single"] == {"enabled": False, "reason": WAITS}
+    assert english(shown["single"]) == {"enabled": False, "reason": WAITS}
     permits(robot)
     shown = build_view(panel, robot, NOW).view["widgets"]
     assert shown["guarded"]["reasons"] == shown["guarded"]["reason"] == NO_DOORS
@@ -160,7 +160,10 @@ def test_a_link_that_locks_by_the_second_reason_says_so() -> None:
     endpoint(robot, "MP", DOORS, BOOL)
     robot.follow_publishers()
     link = build_view(panel, robot, NOW).view["link"]["node"]
-    assert (link["locks"], link["reason"]) == ("Locks Free.", "Locked: waiting for /doors_closed.")
+    assert english((link["locks"], link["reason"])) == (
+        "Locks Free.",
+        "Locked: waiting for /doors_closed.",
+    )
 
 
 def test_a_press_is_refused_by_the_second_one() -> None:

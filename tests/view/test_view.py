@@ -143,7 +143,7 @@ def test_the_lights_show_how_far_the_way_goes(
         bridge,
         on_robot,
     ]
-    assert [lamp["name"] for lamp in link.values()] == ["Server", "Bridge", "Robot"]
+    assert english([lamp["name"] for lamp in link.values()]) == ["Server", "Bridge", "Robot"]
 
 
 @pytest.mark.parametrize(
