@@ -16,7 +16,6 @@ from app.settings import PACKAGE, shipped
 
 SPEAKERS = ("say", "said", "locked", "refused")  # functions whose first argument is a code
 PREFIXES = ("control_", "lamp_", "log_page_")  # of codes that are put together
-ENDS = ("_title",)
 SENTENCES = sentences(ENGLISH)
 
 
@@ -52,14 +51,8 @@ def test_every_sentence_is_said_somewhere() -> None:
     sources = [path for path in PACKAGE.rglob("*.py")]
     sources += [path for name in ("templates", "static") for path in shipped(name).rglob("*.*")]
     words = set(re.findall(r"\w+", "\n".join(path.read_text() for path in sources)))
-    ends = {code: _end(code) for code in SENTENCES}
+    ends = {code: code.removeprefix(next(filter(code.startswith, PREFIXES), "")) for code in SENTENCES}
     assert [code for code, end in ends.items() if not words & {code, end}] == []
-
-
-def _end(code: str) -> str:
-    """What of a code stands in the program where it is put together."""
-    end = code.removeprefix(next(filter(code.startswith, PREFIXES), ""))
-    return end.removesuffix(next(filter(code.endswith, ENDS), ""))
 
 
 def test_a_sentence_is_filled_in() -> None:

@@ -16,6 +16,13 @@ from app.i18n import Text, render, say
 
 TOKEN: Final = re.compile(r"[0-9a-f]{32}")
 BROWSERS_KEPT: Final = 500
+# The code of a name → that of the same where it begins a sentence.
+TITLES: Final = {
+    "browser": "browser_title",
+    "browser_local": "browser_local_title",
+    "browser_more": "browser_more_title",
+    "browser_unknown": "browser_unknown_title",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,8 +44,8 @@ class Client:
     def title(self) -> Text:
         """The name at the begin of a sentence, with the address where it is of use."""
         if self.local:
-            return say(f"{self._code}_title", number=self.number)
-        return say(f"{self._code}_title", number=self.number, address=self.address)
+            return say(TITLES[self._code], number=self.number)
+        return say(TITLES[self._code], number=self.number, address=self.address)
 
     @property
     def _code(self) -> str:

@@ -14,7 +14,7 @@ from typing import Any, Final, get_args
 from pydantic import BaseModel
 
 from app import i18n
-from app.i18n import ENGLISH, sentences
+from app.i18n import BETWEEN, ENGLISH, sentences
 from app.panel import Panel
 from docs._generate.locks import shown
 from docs._generate.schema import ROOT
@@ -103,10 +103,10 @@ def _file_of(of: type) -> str:
 def sentences_table() -> str:
     """Each sentence, with its code and the modules that say it."""
     rows = []
-    for code, sentence in SENTENCES.items():
+    for code in (code for code in SENTENCES if code not in BETWEEN):
         told = [path for path, names in _said().items() if _says(names, code)]
         named = told or [path for path, tree in modules().items() if _has(tree, code)]
-        rows.append((shown(sentence), f"`{code}`", ", ".join(map(place, named))))
+        rows.append((shown(SENTENCES[code]), f"`{code}`", ", ".join(map(place, named))))
     return _markdown(rows, [("Sentence", "Code", "Said in"), ("---",) * 3])
 
 
