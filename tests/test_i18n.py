@@ -121,7 +121,10 @@ def test_a_value_is_rendered_with_all_that_is_in_it() -> None:
 def catalogue(folder: Path, language: str, entries: dict[str, str]) -> Path:
     """A catalogue with these sentences."""
     path = folder / f"{language}.po"
-    lines = (f"msgid {json.dumps(code)}\nmsgstr {json.dumps(text)}\n" for code, text in entries.items())
+    lines = (
+        f"msgid {json.dumps(code)}\nmsgstr {json.dumps(text, ensure_ascii=False)}\n"
+        for code, text in entries.items()
+    )
     path.write_text("\n".join(lines))
     return path
 
