@@ -170,7 +170,7 @@ def test_a_request_is_shown_to_all(asked: Room) -> None:
         " If this panel is not touched, control passes in 30 s."
     )
     assert "control passes to you in 30 s" in str(view["asker_text"])
-    assert view["text"] == "Panel 1 (192.0.2.1) has control of Robot 1."
+    assert english(view["text"]) == "Panel 1 (192.0.2.1) has control of Robot 1."
     assert view["since"] == "1970-01-01T00:16:40.000+00:00"
 
 
