@@ -11,11 +11,11 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from app.dialect.bridge_dialect import key_of
+from app.dialect.dialect import Dialect
 from app.errors import DecodeError
 from app.i18n import Text
 from app.interfaces import Interfaces
-from app.interfaces.names import ROSOUT_TOPIC
+from app.interfaces.names import ROSOUT_TOPIC, key_of
 from app.panel.constants import holder
 from app.panel.model import Panel, RobotEntry
 from app.panel.widgets.families import Display
@@ -44,12 +44,14 @@ class RobotState:
         self,
         panel: Panel,
         interfaces: Interfaces,
+        dialect: Dialect,
         own_zid: str = "",
         entry: RobotEntry | None = None,
         slices: Slices | None = None,
     ) -> None:
-        """`entry` is which of the panel's robots this is, where it has several; `slices` is of all that
-        is read on one event loop."""
+        """`own_zid` is of the panel's session. `entry` is which of the panel's robots this is, where
+        it has several; `slices` is of all that is read on one event loop."""
+        self.dialect = dialect
         self.name = entry.name if entry else ""
         self.namespace = entry.namespace if entry else panel.namespace
         self.link_up = False
@@ -60,7 +62,7 @@ class RobotState:
         needed = list(required_endpoints(panel))
         named = (*panel.subscriptions(), *panel.publications(), *(n for _, n in needed), ROSOUT_TOPIC)
         self._needed = frozenset(map(self.key, named))
-        self.graph = Graph(own_zid, self._told_apart, self._needed)
+        self.graph = Graph(dialect, own_zid, self._told_apart, self._needed)
         self._judged = frozenset(self.key(interlock.topic) for interlock in panel.interlocks)
         self.silent = SilentPublishers(self._judged)
         self.command_status: dict[str, CommandStatus] = {}  # of what widgets have asked, by their ids
@@ -102,7 +104,7 @@ class RobotState:
         self.read_later(key, reading)
 
     def key(self, topic: str) -> str:
-        """The key expression of a topic of this robot."""
+        """The key of a topic or service of this robot, see `key_of`."""
         key = self._keys.get(topic)
         if key is None:
             key = self._keys[topic] = key_of(topic, self.namespace)
@@ -143,7 +145,7 @@ class RobotState:
         """The link is lost: nobody is known to be there, and nothing that came says what is so."""
         self.link_up = False
         self.settled_at = math.inf
-        self.graph = Graph("", self._told_apart, self._needed)
+        self.graph = Graph(self.dialect, "", self._told_apart, self._needed)
         self.silent = SilentPublishers(self._judged)
         self.seen.forget()
         for topic in self._topics.values():

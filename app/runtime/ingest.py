@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Literal
 from app.commands.actions.goals import GoalTracker
 from app.commands.confirmations import Confirmations
 from app.commands.parameters.sync import ParameterSync
-from app.dialect import bridge_dialect
+from app.dialect.endpoint import Endpoint
+from app.interfaces import names
 from app.panel.interlock import Interlock
 from app.panel.model import Panel
 from app.panel.widgets.parameter import EVENTS
@@ -29,12 +30,14 @@ Change = Literal["", "soon", "now"]
 @dataclass(slots=True)
 class Updates:
     """What has changed: `urgent` is a permission or the graph, `came` that there is a bridge where
-    there was none; `values` are the topics (their keys) that said something, and `more` is whatever
-    else can wait for the next frame."""
+    there was none; `found` and `lost` are the zids of bridges; `values` are the topics (their keys)
+    that said something, and `more` is whatever else can wait for the next frame."""
 
     urgent: bool = False
     came: bool = False
     more: bool = False
+    found: list[str] = field(default_factory=list)
+    lost: list[str] = field(default_factory=list)
     values: set[str] = field(default_factory=set)
 
 
@@ -58,8 +61,8 @@ class Ingest:
         self._recorder = recorder
         self._log = log
         goals = {robot.key(one): one for one in panel.actions()}
-        self._feedback = {bridge_dialect.feedback(key): one for key, one in goals.items()}
-        self._status = {bridge_dialect.status(key): one for key, one in goals.items()}
+        self._feedback = {names.feedback(key): one for key, one in goals.items()}
+        self._status = {names.status(key): one for key, one in goals.items()}
         self._interlocks = {
             robot.key(of.topic): [i for i in panel.interlocks if i.topic == of.topic]
             for of in panel.interlocks
@@ -69,8 +72,6 @@ class Ingest:
         self.watched = self._interlocks.keys() | {robot.key(one.topic) for one in panel.confirms()}
         self.prompt = self.watched | self._status.keys() | {self._events}
         self.whole = frozenset() if recorder is None else recorder.keys
-        topics = map(robot.key, panel.subscriptions())
-        self.keys = [*topics, *self._feedback, *self._status]  # all that is listened to
 
     def take(
         self, changes: Changes, shown: Callable[[], Mapping[str, Enabled]], show: Callable[[], None]
@@ -96,7 +97,7 @@ class Ingest:
             else:
                 news.values.add(key)
         self._record(changes)
-        news.came = self._tokens(changes.tokens)
+        self._tokens(changes.tokens, news)
         return news
 
     def _changes(self, key: str, sample: Sample, shown: Mapping[str, Enabled]) -> Change:
@@ -153,35 +154,32 @@ class Ingest:
         self._confirmations.hear(key, reading)
         return self._change(key, shown)
 
-    def _tokens(self, tokens: Mapping[str, Token]) -> bool:
-        """Takes them in; whether there is a bridge where there was none."""
-        if not tokens:
-            return False
-        came, now, robot = False, time.monotonic(), self._robot
-        had_bridge = bool(robot.graph.bridges)
+    def _tokens(self, tokens: Mapping[str, Token], updates: Updates) -> None:
+        """Takes them in."""
+        now, graph = time.monotonic(), self._robot.graph
+        had_bridge = bool(tokens and graph.bridges)
         for key, token in tokens.items():
-            if not robot.graph.concerns(key):
+            if not graph.concerns(key):
                 continue
-            self._publisher(key, token)
-            if token.lost_seq:
-                self._parameters.lose(key)
-            if token.lost_seq and (zid := robot.graph.apply(key, False)):
-                robot.cut(zid, token.lost_seq)
-                self._log.warning("bridge %s lost", zid)
-                had_bridge = had_bridge and bool(robot.graph.bridges)
+            if endpoint := self._robot.dialect.endpoint(key):
+                self._publisher(key, token, endpoint)
+                if token.lost_seq:
+                    self._parameters.lose(endpoint)
+            if token.lost_seq and (zid := graph.apply(key, False)):
+                self._robot.cut(zid, token.lost_seq)
+                updates.lost.append(zid)
+                had_bridge = had_bridge and bool(graph.bridges)
             if token.lost_seq and token.alive:
-                robot.follow_publishers(token.lost_seq)  # gone, be it for a moment
-            if token.alive and (zid := robot.graph.apply(key, True, now)):
-                self._log.info("bridge %s found", zid)
-                came = True
-        return came and not had_bridge
+                self._robot.follow_publishers(token.lost_seq)  # gone, be it for a moment
+            if token.alive and (zid := graph.apply(key, True, now)):
+                updates.found.append(zid)
+        updates.came = bool(updates.found) and not had_bridge
 
-    def _publisher(self, key: str, token: Token) -> None:
+    def _publisher(self, key: str, token: Token, endpoint: Endpoint) -> None:
         """Whether a publisher has appeared, be it for a moment: until it says something, nobody knows
         what it permits."""
         graph, silent = self._robot.graph, self._robot.silent
-        endpoint = bridge_dialect.parsed(key)
-        if endpoint is None or endpoint.zid == graph.own_zid:
+        if endpoint.zid == graph.own_zid:
             return
         if token.came_seq and (token.lost_before or not graph.has(key)):  # else it is told twice
             silent.appeared(endpoint, token.came_seq, token.came_at, token.lost_before)

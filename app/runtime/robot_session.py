@@ -7,6 +7,7 @@ import asyncio
 import logging
 import time
 from contextlib import ExitStack, suppress
+from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
 from app.audit.press_record import Log, PressLog
@@ -22,7 +23,6 @@ from app.commands.service_calls import ServiceCalls
 from app.errors import LinkError, NotFound
 from app.i18n import TextLike
 from app.interfaces import interfaces_of
-from app.interfaces.names import ROSOUT_TOPIC
 from app.panel.model import Panel, RobotEntry
 from app.panel.widgets.parameter import Parameter
 from app.permission.control_authority import ControlAuthority
@@ -31,9 +31,9 @@ from app.robot.slices import Slices
 from app.robot.state import Reading, RobotState
 from app.ros_logging import RobotLog
 from app.runtime.ingest import Ingest
-from app.transport.bridge_liveness import BridgeLiveness
-from app.transport.graph_join import GraphMembership
-from app.transport.readiness import WITHIN_S, CoalescedQuery
+from app.transport.bridge_peer import BRIDGE
+from app.transport.declarations import declarations
+from app.transport.peer import PeerContext, RobotAccess
 from app.transport.rosout import Rosout
 from app.transport.zenoh_session import Config, ZenohSession
 from app.view.refresh import NoOtherRobots, OtherRobots, ViewRefresher
@@ -57,14 +57,15 @@ class RobotSession:
         revision: str,
         operators_log: Log,
         *,
+        access: RobotAccess = BRIDGE,
         entry: RobotEntry | None = None,
         others: OtherRobots = ALONE,
         recordings: "Recordings | None" = None,
         slices: Slices | None = None,
         simulated: bool = False,
     ) -> None:
-        """`entry` is which of the panel's robots this is for, where it has several, `others` are
-        then all of them. `revision` is of all that a page loads."""
+        """`access` is how the robot is reached. `entry` is which of the panel's robots this is for,
+        where it has several, `others` are then all of them. `revision` is of all that a page loads."""
         self.panel = panel
         self.entry = entry
         self.base = f"/robots/{entry.id}" if entry else ""
@@ -72,8 +73,8 @@ class RobotSession:
         self._following = ExitStack()
         self.interfaces = interfaces_of(panel.distro, panel.interfaces)
         self._loop = asyncio.get_running_loop()
-        self.link = ZenohSession(config, self._wake)
-        self.robot = RobotState(panel, self.interfaces, self.link.zid, entry, slices)
+        self.link = ZenohSession(config, self._wake, access.dialect)
+        self.robot = RobotState(panel, self.interfaces, access.dialect, self.link.zid, entry, slices)
         self.robot.endpoints = self.link.endpoints
         self.robot.read_later = self._read_later
         self._log = RobotLog(log, self.robot.name)
@@ -103,8 +104,9 @@ class RobotSession:
         )
         self.press_log = PressLog(operators_log, self.robot.name, lambda: self.publisher.id)
         self._recovery = GoalRecovery(panel, self.robot, self.press_log, self._actions, self.show)
-        self._liveness = BridgeLiveness(self.robot, self.link, self.show)
-        self.reached = self._liveness.flushed
+        self.peer = access.peer(
+            PeerContext(panel, self.interfaces, self.robot, self.link, self.show, self._heal)
+        )
         self.dispatcher = Dispatcher(
             panel,
             self.interfaces,
@@ -114,7 +116,7 @@ class RobotSession:
             self._actions,
             self._confirmations,
             self._parameters,
-            reached=self._liveness.flushed,
+            reached=self.peer.flushed,
         )
         self.presses = Presses(
             panel,
@@ -146,10 +148,6 @@ class RobotSession:
             self._recorder,
             self._log,
         )
-        self._membership = GraphMembership(
-            panel, self.interfaces, self.robot, self.link, self.show, self._heal
-        )
-        self._readiness = CoalescedQuery(lambda: self._membership.answered(WITHIN_S))
         self._rosout = Rosout(self.robot, self.interfaces, self.link, self._loop)
         self._renewing: asyncio.Task[None] | None = None
         self._frame: asyncio.TimerHandle | None = None  # when what waits is taken
@@ -162,18 +160,13 @@ class RobotSession:
         self.interfaces.prepare(
             {*self.panel.subscriptions().values(), *self.panel.publications().values()}
         )
-        publish = [self.robot.key(topic) for topic in (*self.panel.publications(), ROSOUT_TOPIC)]
-        listened = self._ingest
+        declared = declarations(self.panel, self.interfaces, self.robot)
+        inbox = self._ingest
         self.link.start(
-            listened.keys,
-            publish,
-            prompt=listened.prompt,
-            watched=listened.watched,
-            whole=listened.whole,
+            replace(declared, prompt=inbox.prompt, watched=inbox.watched, whole=inbox.whole)
         )
         self._rosout.start()
-        self._membership.start()
-        self._liveness.start()
+        self.peer.start()
         self._following.enter_context(self._operators_log.notifying(self.show))
 
     async def stop(self) -> None:
@@ -188,9 +181,7 @@ class RobotSession:
         self.press_guard.end()
         if self._renewing is not None:
             await asyncio.gather(self._renewing, return_exceptions=True)
-        await self._readiness.stop()
-        await self._liveness.stop()
-        await self._membership.stop()
+        await self.peer.stop()
         await self._recovery.stop()
         await self._actions.stop()
         await self._parameters.stop()
@@ -227,7 +218,7 @@ class RobotSession:
 
     async def way_asked(self) -> Verdict:
         """The same, when the bridges have been asked whether they run: a second at most."""
-        if not self.link_verdict.permitted or await self._readiness.answers():
+        if not self.link_verdict.permitted or await self.peer.answers():
             return self.link_verdict
         return locked("bridge_silent") if self.link_verdict.permitted else self.link_verdict
 
@@ -284,7 +275,7 @@ class RobotSession:
             self._frame = None
         if self._stopped:
             return
-        self._liveness.look()
+        self.peer.look()
         changes = self.link.drain()
         if self.robot.link_up and not changes.link_up:
             self._log.warning("Zenoh link lost")
@@ -296,6 +287,8 @@ class RobotSession:
             self._log.info("Zenoh link up")
         news = self._ingest.take(changes, lambda: self.publisher.view["interlocks"], self.show)
         if changes.tokens:
+            self.peer.lost(news.lost)
+            self.peer.found(news.found)
             self._follow(news.came)
         if news.urgent or came_up:
             self.show()
@@ -322,4 +315,4 @@ class RobotSession:
         self._calls.follow()
         self._actions.follow()
         self._parameters.follow()
-        self._membership.follow(came)
+        self.peer.follow(came)

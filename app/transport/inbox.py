@@ -47,13 +47,13 @@ class Token:
 @dataclass(slots=True)
 class Changes:
     """All that came since the last drain; `kept` has each sample of the topics that are kept whole,
-    `caches` the tokens of publishers that keep their last message for late subscribers."""
+    `caches` are (topic, token) of the publishers that keep their last message for late subscribers."""
 
     samples: dict[str, Sample]
     tokens: dict[str, Token]
     link_up: bool
     kept: Collection[tuple[str, Sample]] = ()
-    caches: Collection[str] = ()
+    caches: Collection[tuple[str, str]] = ()
 
 
 class _Between:
@@ -115,7 +115,7 @@ class Inbox:
         self._samples: dict[str, _Arrived] = {}
         self._live: dict[str, Stamp | None] = {}  # the last stamp of what did not come from a cache
         self._tokens: dict[str, Token] = {}
-        self._caches: list[str] = []
+        self._caches: list[tuple[str, str]] = []
         self._transports: set[str] = set()
         self._kept: deque[tuple[str, _Arrived]] = deque()
         self._kept_bytes = 0
@@ -215,9 +215,9 @@ class Inbox:
             token.lost_seq = seq
         self._wake(True)
 
-    def cache(self, key: str) -> None:
-        """The token of a publisher's cache came."""
-        self._caches.append(key)
+    def cache(self, key: str, token: str) -> None:
+        """The token of the cache of a topic's publisher came."""
+        self._caches.append((key, token))
         self._wake(True)
 
     def transport(self, zid: str, up: bool) -> None:

@@ -15,9 +15,11 @@ from tests.support.parts import ROOT, until
 
 LEAVING = """
 import sys
-from app.transport.zenoh_session import Link, config_to
-link = Link(config_to(sys.argv[1]), lambda _: None)
-link.start(["a"], [])
+from app.dialect.bridge_dialect import BridgeDialect
+from app.transport.declarations import Declarations
+from app.transport.zenoh_session import ZenohSession, config_to
+link = ZenohSession(config_to(sys.argv[1]), lambda _: None, BridgeDialect())
+link.start(Declarations(subscribe={"a": "a"}))
 while not link.drain().samples:
     pass
 """
