@@ -45,7 +45,11 @@ COMMON = {
     "app.settings",
 }
 WIRING = {"app.main", "app.check", "app.log", "app.simulator.__main__"}  # these may import every room
-SPEAK_ZENOH = {"app.transport.zenoh_session", "app.simulator.zenoh_peer"}
+SPEAK_ZENOH = {
+    "app.transport.zenoh_config",
+    "app.transport.zenoh_session",
+    "app.simulator.zenoh_peer",
+}
 # The bridge's dialect and peer, and who else may know them.
 OF_THE_BRIDGE = ("app.dialect.bridge_", "app.transport.bridge_")
 WIRE_THE_BRIDGE = {"app.runtime.robot_session", "app.simulator.zenoh_peer"}

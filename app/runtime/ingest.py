@@ -1,7 +1,11 @@
-"""What the link brought since the last turn, handed to who needs it: samples first, then tokens."""
+"""What arrived since the last turn becomes the robot's state: samples first, then tokens.
 
+Knows nothing of what is shown, and judges no hold: see `turn`.
+"""
+
+import logging
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
@@ -10,35 +14,44 @@ from app.commands.confirmations import Confirmations
 from app.commands.parameters.sync import ParameterSync
 from app.dialect.endpoint import Endpoint
 from app.interfaces import names
-from app.panel.interlock import Interlock
 from app.panel.model import Panel
 from app.panel.widgets.parameter import EVENTS
-from app.permission.conditions import permits
 from app.permission.interlocks import Verdict, interlock_verdict
 from app.robot.state import Reading, RobotState, Sample
 from app.ros_logging import RobotLog
 from app.transport.inbox import Changes, Token
-from app.view.kinds import Enabled, enabled
 
 if TYPE_CHECKING:
     from app.recording import Recorder
 
+log = logging.getLogger("kiosk")
 
 Change = Literal["", "soon", "now"]
 
 
 @dataclass(slots=True)
 class Updates:
-    """What has changed: `urgent` is a permission or the graph, `came` that there is a bridge where
-    there was none; `found` and `lost` are the zids of bridges; `values` are the topics (their keys)
-    that said something, and `more` is whatever else can wait for the next frame."""
+    """What has changed: `urgent` is a permission or the graph; `values` are the topics (their keys)
+    with a new message, and `more` is whatever else can wait for the next frame. `readings` are the
+    messages (topic's key, reading) by which a command may be confirmed.
+
+    `graph` says that tokens changed, `came` that there is a bridge where there was none; `found` and
+    `lost` are the zids of bridges.
+    """
 
     urgent: bool = False
-    came: bool = False
     more: bool = False
+    values: set[str] = field(default_factory=set)
+    readings: list[tuple[str, Reading]] = field(default_factory=list)
+    graph: bool = False
+    came: bool = False
     found: list[str] = field(default_factory=list)
     lost: list[str] = field(default_factory=list)
-    values: set[str] = field(default_factory=set)
+
+    def step(self) -> "Updates":
+        """What has changed a permission in between; what is told by it is not told again."""
+        readings, self.readings = self.readings, []
+        return Updates(urgent=True, readings=readings)
 
 
 class Ingest:
@@ -52,14 +65,13 @@ class Ingest:
         confirmations: Confirmations,
         parameters: ParameterSync,
         recorder: "Recorder | None",
-        log: RobotLog,
     ) -> None:
         self._robot = robot
         self._actions = actions
         self._confirmations = confirmations
         self._parameters = parameters
         self._recorder = recorder
-        self._log = log
+        self._log = RobotLog(log, robot.name)
         goals = {robot.key(one): one for one in panel.actions()}
         self._feedback = {names.feedback(key): one for key, one in goals.items()}
         self._status = {names.status(key): one for key, one in goals.items()}
@@ -73,57 +85,47 @@ class Ingest:
         self.prompt = self.watched | self._status.keys() | {self._events}
         self.whole = frozenset() if recorder is None else recorder.keys
 
-    def take(
-        self, changes: Changes, shown: Callable[[], Mapping[str, Enabled]], show: Callable[[], None]
-    ) -> Updates:
-        """Takes it in. `shown` are the permissions that are; `show` is called at each value in between
-        that changed one."""
-        news = Updates(urgent=bool(changes.tokens))
+    def steps(self, changes: Changes) -> Iterator[Updates]:
+        """Takes it in, step by step: yields after each value in between that changed a permission, and
+        at the end. At each step the robot's state is the one to judge by."""
+        updates = Updates(urgent=bool(changes.tokens), graph=bool(changes.tokens))
         # What permits and forbids comes first, and nothing that fails keeps it from being taken in.
         ordered = sorted(changes.samples.items(), key=lambda one: one[0] not in self._interlocks)
         for key, sample in ordered:
             if sample.overrun and key in self._interlocks:
                 self._robot.doubt(key)
-                show()
+                yield updates.step()
             for payload, at, wall in sample.between:
                 passed = sample._replace(payload=payload, at=at, wall=wall, between=())
-                if self._changes(key, passed, shown()) == "now":
-                    show()
-            change = self._changes(key, sample, shown())
-            news.urgent |= change == "now"
-            news.more |= change == "soon"
+                if self._take(key, passed, updates) == "now":
+                    yield updates.step()
+            change = self._take(key, sample, updates)
+            updates.urgent |= change == "now"
+            updates.more |= change == "soon"
             if key in self._feedback or key in self._status or key == self._events:
-                news.more = True
+                updates.more = True
             else:
-                news.values.add(key)
+                updates.values.add(key)
         self._record(changes)
-        self._tokens(changes.tokens, news)
-        return news
+        self._tokens(changes.tokens, updates)
+        yield updates
 
-    def _changes(self, key: str, sample: Sample, shown: Mapping[str, Enabled]) -> Change:
-        """Takes a sample in; whether a permission may be another one by it than is shown. What says
-        something else is not judged here: it will be, when all is looked at."""
-        interlocks = self._interlocks.get(key, ())
-        before = [self._said(one) for one in interlocks]
-        self._guarded(key, sample, self._sample)
-        if before != [self._said(one) for one in interlocks]:
-            return "now"
-        return self._change(key, shown)
+    def read(self, key: str, reading: Reading) -> Updates:
+        """A message that took more than one turn is read."""
+        return Updates(urgent=key in self._interlocks, values={key}, readings=[(key, reading)])
 
-    def _change(self, key: str, shown: Mapping[str, Enabled]) -> Change:
+    def _take(self, key: str, sample: Sample, updates: Updates) -> Change:
+        """Takes a sample in; whether a permission is another one by it."""
         now = time.monotonic()
-        changes = [
-            _change(interlock_verdict(one, self._robot, now), shown[one.id])
-            for one in self._interlocks.get(key, ())
-        ]
+        before = self._verdicts(key, now)
+        self._guarded(key, sample, lambda key, sample: self._sample(key, sample, updates))
+        pairs = zip(before, self._verdicts(key, now), strict=True)
+        changes = [_change(was, verdict) for was, verdict in pairs]
         return "now" if "now" in changes else "soon" if "soon" in changes else ""
 
-    def _said(self, interlock: Interlock) -> bool:
-        """Whether the last of a topic can be read, and permits."""
-        reading = self._robot.reading(interlock.topic)
-        if reading.status != "message":
-            return False
-        return permits(interlock, reading.value(interlock.field))
+    def _verdicts(self, key: str, now: float) -> list[Verdict]:
+        """Of the interlocks on a topic."""
+        return [interlock_verdict(one, self._robot, now) for one in self._interlocks.get(key, ())]
 
     def _record(self, changes: Changes) -> None:
         if self._recorder is not None:
@@ -136,7 +138,7 @@ class Ingest:
         except Exception:
             self._log.exception("a sample of %s was not taken in whole", key)
 
-    def _sample(self, key: str, sample: Sample) -> None:
+    def _sample(self, key: str, sample: Sample, updates: Updates) -> None:
         if key in self._feedback:
             self._actions.hear_feedback(self._feedback[key], sample)
         elif key in self._status:
@@ -146,13 +148,7 @@ class Ingest:
                 self._parameters.hear(sample)
             self._robot.take(key, sample)
             if self._confirmations.awaits(key):
-                self._confirmations.hear(key, self._robot.reading_of(key))
-
-    def read(self, key: str, reading: Reading, shown: Mapping[str, Enabled]) -> Change:
-        """A message that took more than one turn is read: whether a permission may be another one by it
-        than is shown."""
-        self._confirmations.hear(key, reading)
-        return self._change(key, shown)
+                updates.readings.append((key, self._robot.reading_of(key)))
 
     def _tokens(self, tokens: Mapping[str, Token], updates: Updates) -> None:
         """Takes them in."""
@@ -187,8 +183,8 @@ class Ingest:
             silent.lost(endpoint, token.lost_seq)
 
 
-def _change(verdict: Verdict, shown: Enabled) -> Change:
+def _change(before: Verdict, verdict: Verdict) -> Change:
     """A reason with the robot's value in it may change as often as a readout, and waits as one."""
-    if enabled(verdict) == shown:
+    if (before.permitted, before.reason) == (verdict.permitted, verdict.reason):
         return ""
-    return "soon" if verdict.code == "unmet" and not shown["enabled"] else "now"
+    return "soon" if verdict.code == "unmet" and not before.permitted else "now"

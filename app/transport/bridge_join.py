@@ -18,7 +18,7 @@ from app.errors import LinkError
 from app.ros_logging import RobotLog
 from app.transport.bridge_admin import BridgeAdmin
 from app.transport.liveliness_tokens import LivelinessTokens
-from app.transport.peer import PeerContext
+from app.transport.peer import RobotContext
 
 log = logging.getLogger("kiosk.joining")
 
@@ -35,7 +35,7 @@ UNHEARD_ALLOWED: Final = 3  # askings that find a topic without its reader
 class GraphMembership:
     """Holds the panel's tokens while a bridge is there, and asks the bridges how they are."""
 
-    def __init__(self, context: PeerContext) -> None:
+    def __init__(self, context: RobotContext) -> None:
         self._context = context
         self._panel = context.panel
         self._robot = context.robot
@@ -164,7 +164,7 @@ class GraphMembership:
         if self._unheard >= UNHEARD_ALLOWED:
             self._unheard = 0
             self._log.error("the bridge does not pass on %s: a new session", ", ".join(lost))
-            self._context.renew()
+            self._context.reopen()
 
     async def _pause(self, longest_s: float) -> None:
         """Until it is time to ask, or a moment after the graph has changed."""

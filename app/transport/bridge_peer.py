@@ -8,7 +8,7 @@ from app.dialect.bridge_dialect import BridgeDialect
 from app.ros_logging import RobotLog
 from app.transport.bridge_join import GraphMembership
 from app.transport.bridge_liveness import BridgeLiveness
-from app.transport.peer import PeerContext, RobotAccess
+from app.transport.peer import RobotAccess, RobotContext
 from app.transport.readiness import WITHIN_S, CoalescedQuery
 
 log = logging.getLogger("kiosk.bridge")
@@ -17,7 +17,7 @@ log = logging.getLogger("kiosk.bridge")
 class BridgePeer:
     """The bridges of one robot: joined, watched, queried."""
 
-    def __init__(self, context: PeerContext) -> None:
+    def __init__(self, context: RobotContext) -> None:
         self._log = RobotLog(log, context.robot.name)
         self._membership = GraphMembership(context)
         self._liveness = BridgeLiveness(context.robot, context.link, context.changed)

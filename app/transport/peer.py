@@ -44,9 +44,10 @@ class Peer(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class PeerContext:
-    """What a peer is watched with. `changed` is called when what is known of it has changed; `renew`
-    opens a new session."""
+class RobotContext:
+    """One robot of a panel and the link to it. `changed` is called when something has changed that
+    permits, forbids or is shown. `renew` opens a new session after the link was lost, `reopen` although
+    it is there."""
 
     panel: Panel
     interfaces: Interfaces
@@ -54,6 +55,7 @@ class PeerContext:
     link: ZenohSession
     changed: Callable[[], None]
     renew: Callable[[], None]
+    reopen: Callable[[], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,4 +63,4 @@ class RobotAccess:
     """How a kind of robot is reached."""
 
     dialect: Dialect
-    peer: Callable[[PeerContext], Peer]
+    peer: Callable[[RobotContext], Peer]

@@ -7,13 +7,11 @@ import atexit
 import ctypes
 import json
 import os
-import re
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
-from pathlib import Path
 from typing import Any, Final
 
 import zenoh
@@ -21,19 +19,14 @@ from zenoh.handlers import Callback
 
 from app.dialect.dialect import Dialect
 from app.dialect.latched import caches, newest
-from app.errors import LinkError, SettingsError
+from app.errors import LinkError
 from app.transport.declarations import NOTHING, Declarations
 from app.transport.inbox import Changes, Inbox
-
-Config = zenoh.Config
+from app.transport.zenoh_config import said
 
 ASK_TIMEOUT_S = 2.0
 CACHE_TIMEOUT_S = 10.0
-MOST_QUEUED = 16  # batches; Zenoh takes no more
 COPIED_MOST = 16_384  # bytes of a sample
-IN_ITS_SOURCE: Final = re.compile(r" at \S+\.rs:\d+\.?")  # where in Zenoh an error was made
-JOINED_WITHIN_MS: Final = 3_000  # by who took a connection
-BLOCKED_MOST_US = 200_000  # how long a put or a question may wait for room: less than a hold's lease
 
 # Zenoh's own setting of its threads, read when its first session opens. By default the thread that
 # waits for the network wakes another one for each message: where one does both, it costs half.
@@ -41,67 +34,12 @@ RUNTIME: Final = "(rx: (handover: net))"
 os.environ.setdefault("ZENOH_RUNTIME", RUNTIME)
 
 
-def config_from(path: Path, connect: Sequence[str] = ()) -> zenoh.Config:
-    """A Zenoh configuration file, with other endpoints to connect to if there are any; SettingsError
-    says what is wrong with it."""
-    try:
-        config = zenoh.Config.from_file(path)
-    except zenoh.ZError as error:
-        raise SettingsError(f"{path} is not a usable Zenoh configuration: {_said(error)}") from error
-    if connect:
-        try:
-            config.insert_json5("connect/endpoints", json.dumps(list(connect)))
-        except zenoh.ZError as error:
-            endpoints = ", ".join(connect)
-            raise SettingsError(
-                f"{endpoints}: can't connect there, a Zenoh endpoint is like tcp/robot1:7447: "
-                f"{_said(error)}"
-            ) from error
-    return _fit(config)
-
-
-def config_to(endpoint: str) -> zenoh.Config:
-    """A session that connects to one endpoint and to nothing else."""
-    config = zenoh.Config()
-    for place, value in {
-        "mode": '"peer"',
-        "connect/endpoints": f'["{endpoint}"]',
-        "listen/endpoints": "[]",
-        "scouting/multicast/enabled": "false",
-        "scouting/gossip/enabled": "false",
-        "open/return_conditions/connect_scouted": "false",
-    }.items():
-        config.insert_json5(place, value)
-    return _fit(config)
-
-
-def _fit(config: zenoh.Config) -> zenoh.Config:
-    """What a kiosk needs of any configuration.
-
-    No shared memory: Zenoh keeps a segment and its file for each session that was, and a session is
-    renewed at every loss of the link. Room for a burst, as Zenoh's own two messages are few. What finds
-    no room waits for it, which stops the event loop: where that takes too long (5 s are Zenoh's own)
-    the connection is closed, once, and all is locked. Nothing is dropped in silence. And a session's
-    end waits for who takes a connection and says nothing, as a frozen bridge's port does: not for 10 s.
-    """
-    config.insert_json5("transport/unicast/open_timeout", str(JOINED_WITHIN_MS))
-    config.insert_json5("transport/shared_memory/enabled", "false")
-    config.insert_json5("transport/link/tx/queue/size/data", str(MOST_QUEUED))
-    wait = "transport/link/tx/queue/congestion_control/block/wait_before_close"
-    config.insert_json5(wait, str(BLOCKED_MOST_US))
-    return config
-
-
-def _said(error: zenoh.ZError) -> str:
-    return IN_ITS_SOURCE.sub("", str(error))
-
-
 @contextmanager
 def _translated(doing: str) -> Iterator[None]:
     try:
         yield
     except zenoh.ZError as error:
-        raise LinkError(f"{doing}: {_said(error)}") from error
+        raise LinkError(f"{doing}: {said(error)}") from error
 
 
 def _own(payload: zenoh.ZBytes) -> bytes | zenoh.ZBytes:

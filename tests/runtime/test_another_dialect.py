@@ -12,9 +12,9 @@ from zenoh.handlers import Callback
 from app.audit import NullLog
 from app.dialect.endpoint import Endpoint, OwnEndpoint, Role
 from app.interfaces.names import Qos
-from app.runtime.robot_session import RobotSession
-from app.transport.peer import PeerContext, RobotAccess
-from app.transport.zenoh_session import config_to
+from app.runtime.robot_session import RobotSession, ServerParts
+from app.transport.peer import RobotAccess, RobotContext
+from app.transport.zenoh_config import config_to
 from tests.support.builders import BOOL, ENABLED, FROM, GUARDED, HEARD, INTERFACES, MESSAGE, panel_of
 
 TRIGGER = "std_srvs/srv/Trigger"
@@ -63,7 +63,7 @@ class TinyDialect:
 class TinyPeer:
     """Of a robot whose nodes are its peers: joined as soon as one is there."""
 
-    def __init__(self, context: PeerContext) -> None:
+    def __init__(self, context: RobotContext) -> None:
         self._context = context
         self.said: list[str] = []
 
@@ -157,7 +157,7 @@ def test_a_robot_without_a_bridge_is_reached_by_its_own_keys(peer: tuple[str, ze
 
     async def scene() -> None:
         access = RobotAccess(TinyDialect(), TinyPeer)
-        one = RobotSession(PANEL, config_to(endpoint), "r1", NullLog(), access=access)
+        one = RobotSession(ServerParts(PANEL, "r1", NullLog()), config_to(endpoint), access=access)
         await one.start()
         await when(lambda: one.robot.link_up)
         assert one.link_verdict.code == "no_bridge"

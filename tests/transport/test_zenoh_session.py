@@ -22,7 +22,8 @@ from app.errors import SettingsError
 from app.interfaces.names import Qos
 from app.robot.state import Sample
 from app.transport.declarations import Declarations
-from app.transport.zenoh_session import BLOCKED_MOST_US, ZenohSession, config_from, config_to
+from app.transport.zenoh_config import BLOCKED_MOST_US, config_from, config_to
+from app.transport.zenoh_session import ZenohSession
 from tests.support.builders import DIALECT
 from tests.support.parts import free_port, until
 
