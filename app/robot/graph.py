@@ -204,6 +204,11 @@ class Graph:
         """Whether the robot's publisher is TRANSIENT_LOCAL; None if it has none now."""
         return next((e.transient_local for e in self._on_robot("MP", key)), None)
 
+    def volatile(self, key: str) -> bool:
+        """Whether the robot's publishers are known, and none is TRANSIENT_LOCAL."""
+        known = self._on_robot("MP", key)
+        return bool(known) and not any(e.transient_local for e in known)
+
     @remembered
     def unheard(self, key: str) -> bool:
         """Whether the robot publishes a topic that its bridge does not read for the panel."""

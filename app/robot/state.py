@@ -23,6 +23,7 @@ from app.robot.command_status import CommandStatus
 from app.robot.graph import Graph
 from app.robot.parameter_state import ParameterState
 from app.robot.presence import EndpointPresence, required_endpoints
+from app.robot.replayed import ReplayedMessages
 from app.robot.sample import Buffer as Buffer
 from app.robot.sample import PassedOver as PassedOver
 from app.robot.sample import Sample as Sample
@@ -65,6 +66,7 @@ class RobotState:
         self.graph = Graph(dialect, own_zid, self._told_apart, self._needed)
         self._judged = frozenset(self.key(interlock.topic) for interlock in panel.interlocks)
         self.silent = SilentPublishers(self._judged)
+        self.replayed = ReplayedMessages()
         self.command_status: dict[str, CommandStatus] = {}  # of what widgets have asked, by their ids
         self.parameters: dict[
             str, ParameterState
@@ -112,17 +114,20 @@ class RobotState:
 
     def take(self, key: str, sample: Sample) -> None:
         """A newer sample of a topic."""
-        self.silent.message(key, sample.source, sample.seq, sample.at)
+        if key in self._judged:
+            self.silent.message(key, sample.source, sample.seq, sample.at)
+            self.replayed.message(key, sample.at, self.settled_at, sample.cached)
         if (topic := self._topics.get(key)) is not None:
             topic.take(sample)
 
     def cut(self, bridge: str, seq: int) -> None:
         """A bridge went away at `seq`: what came by it before no longer says what is so."""
         self.silent.lose_bridge(bridge)
-        for topic in self._topics.values():
+        for key, topic in self._topics.items():
             sample = topic.sample
             if sample is not None and sample.seq < seq and sample.source in (bridge, None):
                 topic.cut()
+                self.replayed.begin(key)
 
     def follow_publishers(self, before: float = math.inf) -> None:
         """After every change of the graph: where a publisher is required, what it said (`before` this
@@ -136,6 +141,7 @@ class RobotState:
                 topic = self._topics[key]
                 if topic.sample is not None and topic.sample.seq < before:
                     topic.cut()
+                    self.replayed.begin(key)
 
     def doubt(self, key: str) -> None:
         """It is not known what a topic said last."""
@@ -147,6 +153,7 @@ class RobotState:
         self.settled_at = math.inf
         self.graph = Graph(self.dialect, "", self._told_apart, self._needed)
         self.silent = SilentPublishers(self._judged)
+        self.replayed.begin_all()
         self.seen.forget()
         for topic in self._topics.values():
             topic.cut()

@@ -179,6 +179,8 @@ class Ingest:
             return
         if token.came_seq and (token.lost_before or not graph.has(key)):  # else it is told twice
             silent.appeared(endpoint, token.came_seq, token.came_at, token.lost_before)
+            if endpoint.role == "MP" and endpoint.transient_local:
+                self._robot.replayed.begin(endpoint.key, token.came_at)
         if token.lost_seq:
             silent.lost(endpoint, token.lost_seq)
 

@@ -86,12 +86,15 @@ class _Arrived:
     wall: float
     skipped: int = 0
     between: _Between | None = None
+    cached: bool = False
 
     def sample(self, kept: bool = False) -> Sample:
         """When it was sent is for what is kept only: to ask a stamp takes its time."""
         source = None if self.stamp is None else str(self.stamp.get_id())
         sent = self.stamp.get_time().timestamp() if kept and self.stamp is not None else None
         sample = Sample(self.payload, self.seq, self.at, self.wall, source, self.skipped, sent)
+        if self.cached:
+            sample = sample._replace(cached=True)
         if self.between is None:
             return sample
         return sample._replace(between=tuple(self.between.values), overrun=self.between.overrun)
@@ -183,10 +186,12 @@ class Inbox:
             last = self._live[key]
             if last is None or stamp is None or last.get_id() == stamp.get_id():
                 return
-        self._add(key, payload, stamp)
+        self._add(key, payload, stamp, cached=True)
 
-    def _add(self, key: str, payload: Buffer, stamp: Stamp | None) -> None:
-        arrived = _Arrived(payload, stamp, next(self._seq), time.monotonic(), time.time())
+    def _add(self, key: str, payload: Buffer, stamp: Stamp | None, cached: bool = False) -> None:
+        arrived = _Arrived(
+            payload, stamp, next(self._seq), time.monotonic(), time.time(), cached=cached
+        )
         unseen = self._samples.get(key)
         if unseen is not None:
             arrived.skipped = unseen.skipped + 1

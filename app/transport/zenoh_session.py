@@ -203,7 +203,7 @@ class ZenohSession:
                 answered.set_result(answer)
 
         def hand_over(answer: bytes | None) -> None:
-            with suppress(RuntimeError):  # the loop is closed: nobody waits any more
+            with suppress(RuntimeError):  # the loop is closed
                 loop.call_soon_threadsafe(finish, answer)
 
         def on_reply(reply: zenoh.Reply) -> None:
@@ -237,7 +237,7 @@ class ZenohSession:
                 done.set_result(None)
 
         def on_end() -> None:
-            with suppress(RuntimeError):  # the loop is closed: nobody waits any more
+            with suppress(RuntimeError):  # the loop is closed
                 loop.call_soon_threadsafe(finish)
 
         with _translated(f"can't ask {selector}"):
@@ -273,7 +273,7 @@ class ZenohSession:
             self._session.close()
 
     def _leave(self) -> None:
-        """Whoever ends without closing it: an interpreter that ends must not be called into."""
+        """At exit without a close: an interpreter that ends must not be called into."""
         with suppress(LinkError):
             self.close()
 

@@ -72,7 +72,7 @@ class ViewSources:
 
 
 class ViewRefresher:
-    """The board of one robot, and what is posted there; on the event loop only. What it shows decides
+    """The view of one robot, and when it is published; on the event loop only. What it shows decides
     nothing: a view that can't be built is logged, and built again."""
 
     def __init__(self, panel: Panel, robot: RobotState, revision: str, sources: ViewSources) -> None:
@@ -153,7 +153,7 @@ class ViewRefresher:
         return [w for key, w in self._displays if key in spoke or untils[w.id] <= now]
 
     def _look(self) -> None:
-        """Looks at everything anew."""
+        """Builds the whole view."""
         self._seen = self._sight()
         if self._seen.robot != self.lamp:
             self.lamp = self._seen.robot

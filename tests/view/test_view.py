@@ -282,6 +282,7 @@ def test_a_value_is_written_as_text(value: Any, text: str) -> None:
 
 def test_the_view_changes_when_the_first_of_its_times_comes(robot: RobotState) -> None:
     panel = panel_of({**HEARD, "max_age_s": 9}, interlock={"max_age_s": 2})
+    endpoint(robot, "MP", ENABLED, BOOL)
     permits(robot, at=NOW)
     says(robot, "/heard", "hello", at=NOW)
     assert build_view(panel, robot, NOW + 1).until == NOW + 2
