@@ -1,6 +1,5 @@
-"""The one owner of the Zenoh session. Zenoh calls back on threads of its own; what comes in goes into
-the link's inbox. Only this module and the simulator import zenoh; its errors leave here as LinkError.
-"""
+"""The one owner of the Zenoh session. Zenoh calls back on its own threads; what arrives goes into the
+inbox. Its errors leave here as LinkError."""
 
 import asyncio
 import atexit
@@ -27,7 +26,6 @@ from app.transport.zenoh_config import said
 ASK_TIMEOUT_S = 2.0
 CACHE_TIMEOUT_S = 10.0
 COPIED_MOST = 16_384  # bytes of a sample
-
 # Zenoh's own setting of its threads, read when its first session opens. By default the thread that
 # waits for the network wakes another one for each message: where one does both, it costs half.
 RUNTIME: Final = "(rx: (handover: net))"

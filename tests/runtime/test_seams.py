@@ -314,7 +314,7 @@ def test_a_kiosk_that_gives_its_session_up_ends_what_is_held_before(
                     one.holds.beat(hold, number, time.monotonic())
                     await asyncio.sleep(0.05)
             assert sent[-1] == 0.0
-            assert "the connection to it is made anew" in str(ended[0].reason)
+            assert "is being reconnected" in str(ended[0].reason)
             await one.stop()
 
     asyncio.run(scene())
