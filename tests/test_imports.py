@@ -45,7 +45,14 @@ COMMON = {
     "app.settings",
 }
 WIRING = {"app.main", "app.check", "app.log", "app.simulator.__main__"}  # these may import every room
-SPEAK_ZENOH = {"app.transport.zenoh_session", "app.simulator.zenoh_peer"}
+SPEAK_ZENOH = {
+    "app.transport.zenoh_config",
+    "app.transport.zenoh_session",
+    "app.simulator.zenoh_peer",
+}
+# The bridge's dialect and peer, and who else may know them.
+OF_THE_BRIDGE = ("app.dialect.bridge_", "app.transport.bridge_")
+WIRE_THE_BRIDGE = {"app.runtime.robot_session", "app.simulator.zenoh_peer"}
 KNOWN_TO_THE_SIMULATOR = ("app.simulator", "app.interfaces", "app.dialect", "app.errors")
 
 
@@ -113,6 +120,13 @@ def test_no_module_imports_itself_by_way_of_others() -> None:
 
 def test_only_the_link_and_the_simulator_speak_zenoh() -> None:
     assert {module for module in MODULES if of_zenoh(module)} == SPEAK_ZENOH
+
+
+def test_only_the_wiring_and_the_simulator_know_that_there_is_a_bridge() -> None:
+    """A robot without one is reached by another dialect and another peer."""
+    others = {module for module in MODULES if not module.startswith(OF_THE_BRIDGE)}
+    know = {m for m in others if any(name.startswith(OF_THE_BRIDGE) for name in of_project(m))}
+    assert know == WIRE_THE_BRIDGE
 
 
 def test_the_simulator_knows_nothing_of_the_server() -> None:

@@ -1,23 +1,30 @@
 """The dialect of zenoh-bridge-ros2dds: ROS 2 names ↔ Zenoh key expressions. No I/O.
 
-Everything that knows this bridge's keys, liveliness tokens and admin space is here, so that a
-second dialect (rmw_zenoh) can stand beside it. Source: zenoh-plugin-ros2dds 1.10, tried.
+Everything that knows this bridge's key expressions, liveliness tokens and admin space is here, so that
+a second dialect (rmw_zenoh) can stand beside it. Source: zenoh-plugin-ros2dds 1.10, tried.
 """
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, Final
 
-from app.dialect.endpoint import Direction, Endpoint, ServerRole, TopicRole
-from app.interfaces.names import ACTION_TYPE, LONGEST_NAME, MESSAGE_TYPE, TOPIC, Qos, is_key, type_in
+from app.dialect.endpoint import Direction, Endpoint, OwnEndpoint, ServerRole, TopicRole
+from app.interfaces.names import (
+    ACTION_TYPE,
+    LONGEST_NAME,
+    MESSAGE_TYPE,
+    TOPIC,
+    Qos,
+    is_key,
+    key_of,
+    type_in,
+)
 
 TOKENS: Final = "@/*/@ros2_lv/**"  # every liveliness token of every bridge and kiosk
 VERSION: Final = "@/*/ros2/version"  # answered by a bridge whose main loop runs
 ROUTES: Final = "@/*/ros2/route/topic/**"  # a bridge's routes: JSON with `ros2_type`
 CONFIG: Final = "@/*/ros2/config"  # a bridge's configuration: JSON with its `namespace`
 NODES: Final = "@/*/ros2/node/**"  # the nodes behind a bridge: JSON with their topics and types
-DEMO_VERSION: Final = '"demo robot"'  # how the demo robot answers for its version
-_CACHES: Final = "/@adv/pub/"
 _TOKEN = re.compile(
     r"@/(?P<zid>[^/]{1,64})/@ros2_lv"
     r"(?:/(?P<role>MP|MS)/(?P<key>[^/]+)/(?P<type>[^/]+)/"
@@ -25,14 +32,6 @@ _TOKEN = re.compile(
     r"|/(?P<server>SS|AS)/(?P<name>[^/]+)/(?P<server_type>[^/]+))?"
 )
 _ROUTE = re.compile(r"@/(?P<zid>[^/]+)/ros2/route/topic/(?P<direction>pub|sub)/(?P<key>.+)")
-
-
-def key_of(topic: str, namespace: str = "") -> str:
-    """The key expression of a topic, behind a bridge with this namespace ("" for none)."""
-    whole = namespace + topic
-    if not TOPIC.fullmatch(whole):
-        raise ValueError(f'"{whole}" is not an absolute ROS 2 topic name')
-    return whole[1:]
 
 
 def token(zid: str, role: TopicRole, key: str, type_name: str, qos: Qos, type_hash: str) -> str:
@@ -57,47 +56,9 @@ def action_client_token(zid: str, key: str, type_name: str) -> str:
     return f"@/{zid}/@ros2_lv/AC/{_escaped(key)}/{_escaped(type_name)}"
 
 
-def feedback(action_key: str) -> str:
-    """Where an action's feedback comes."""
-    return f"{action_key}/_action/feedback"
-
-
-def status(action_key: str) -> str:
-    """Where the states of an action's goals come."""
-    return f"{action_key}/_action/status"
-
-
-def caches(key: str) -> str:
-    """The tokens of the caches that publishers of a topic have for subscribers that come late: of
-    those that are TRANSIENT_LOCAL. Each answers to a query of its own name (source: zenoh-ext 1.10)."""
-    return f"{key}{_CACHES}**"
-
-
-def topic_of_cache(token_key: str) -> str:
-    """The key of the topic that a cache is of."""
-    return token_key.partition(_CACHES)[0]
-
-
-def newest(token_key: str) -> str:
-    """The query for the last message of a cache."""
-    return f"{token_key}?_max=1"
-
-
 def bridge_token(zid: str) -> str:
     """The token by which a bridge says that it is there."""
     return f"@/{zid}/@ros2_lv"
-
-
-def name_in(token_key: str) -> str:
-    """The name that a token is about, as `in_token` writes it; "" for a bridge's own token. There may
-    be ten thousand tokens: this is what it costs to pass one over."""
-    parts = token_key.split("/", 5)
-    return parts[4] if len(parts) > 4 else ""
-
-
-def in_token(key: str) -> str:
-    """How a token writes a key expression."""
-    return _escaped(key)
 
 
 def parsed(token_key: str) -> Endpoint | None:
@@ -151,6 +112,42 @@ def route_of(admin_key: str) -> tuple[str, Direction, str] | None:
     if found is None:
         return None
     return found["zid"], "pub" if found["direction"] == "pub" else "sub", found["key"]
+
+
+class BridgeDialect:
+    """The `Dialect` of a robot behind zenoh-bridge-ros2dds."""
+
+    tokens: Final = TOKENS
+
+    def topic(self, key: str, type_name: str) -> str:
+        """The bridge puts a topic on its own name."""
+        return key
+
+    def service(self, key: str, type_name: str) -> str:
+        return key
+
+    def attachment(self, zid: str, expression: str, number: int, at_ns: int) -> bytes | None:
+        """The bridge needs none."""
+        return None
+
+    def own_tokens(self, zid: str, endpoints: Iterable[OwnEndpoint]) -> list[str]:
+        return [_own_token(zid, one) for one in endpoints]
+
+    def endpoint(self, token: str) -> Endpoint | None:
+        return parsed(token)
+
+    def name_in(self, token: str) -> str:
+        parts = token.split("/", 5)
+        return parts[4] if len(parts) > 4 else ""
+
+    def in_token(self, key: str) -> str:
+        return _escaped(key)
+
+
+def _own_token(zid: str, of: OwnEndpoint) -> str:
+    if of.role == "AC":
+        return action_client_token(zid, of.key, of.type)
+    return token(zid, of.role, of.key, of.type, of.qos, of.type_hash)
 
 
 def _escaped(name: str) -> str:

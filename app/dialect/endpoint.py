@@ -1,18 +1,23 @@
 """A publisher, subscriber or server of a robot, as the graph knows it."""
 
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, field
+from typing import Final, Literal
+
+from app.interfaces.names import Qos
 
 TopicRole = Literal["MP", "MS"]  # a publisher, a subscriber
 ServerRole = Literal["SS", "AS"]  # a service's server, an action's
 Role = TopicRole | ServerRole
+OwnRole = TopicRole | Literal["AC"]  # of the panel: an action's client, too
 Direction = Literal["pub", "sub"]  # of a bridge's route: from ROS to Zenoh, from Zenoh to ROS
+
+DEMO_VERSION: Final = '"demo robot"'  # how the demo robot answers for its version
 
 
 @dataclass(frozen=True, slots=True)
 class Endpoint:
-    """A publisher, subscriber or server that a token shows; `role` is None for the bridge's own
-    token, and `reliable` where the token does not say."""
+    """A publisher, subscriber or server that a token shows, or with the role None the peer itself that
+    the robot is behind. `reliable` is None where the token does not say."""
 
     zid: str
     role: Role | None = None
@@ -20,6 +25,18 @@ class Endpoint:
     type: str = ""
     transient_local: bool = False
     reliable: bool | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class OwnEndpoint:
+    """A publisher, subscriber or action client of the panel's, as the ROS graph is to show it. An
+    action client has neither QoS nor hash."""
+
+    role: OwnRole
+    key: str
+    type: str
+    qos: Qos = field(default_factory=Qos)
+    type_hash: str = ""
 
 
 def within(namespace: str, outer: str) -> bool:

@@ -30,6 +30,30 @@ ROSOUT_TOPIC: Final = "/rosout"
 ROSOUT: Final = Qos(transient_local=True, depth=1000)  # rmw_qos_profile_rosout_default
 
 
+def key_of(topic: str, namespace: str = "") -> str:
+    """The key of a topic or service: its whole name behind `namespace` ("" for none), without the first
+    slash. By it the panel knows it, whatever key expression it has in Zenoh."""
+    whole = namespace + topic
+    if not TOPIC.fullmatch(whole):
+        raise ValueError(f'"{whole}" is not an absolute ROS 2 topic name')
+    return whole[1:]
+
+
+def of_action(action_key: str, part: str) -> str:
+    """The key of a topic or service of an action (design.ros2.org, "Actions")."""
+    return f"{action_key}/_action/{part}"
+
+
+def feedback(action_key: str) -> str:
+    """The key of an action's feedback."""
+    return of_action(action_key, "feedback")
+
+
+def status(action_key: str) -> str:
+    """The key of the states of an action's goals."""
+    return of_action(action_key, "status")
+
+
 def type_in(told: str) -> str:
     """The type that somebody names; `NO_TYPE`, which no panel is made for, where that can't be one."""
     return told if len(told) <= LONGEST_NAME and _ANY_TYPE.fullmatch(told) else NO_TYPE

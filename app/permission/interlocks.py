@@ -51,7 +51,7 @@ NO_WAY: Final = frozenset(
 
 ENDPOINTS_TOLD: Final = 3
 
-# What comes so soon after joining may be a latched value of any age, sent again.
+# What comes so soon after joining may be a value of any age, sent again.
 HISTORY_S: Final = 1.0
 
 # From a server's token to routes that carry the first call: a call sent in the same millisecond was
@@ -105,12 +105,19 @@ def interlock_verdict(interlock: Interlock, robot: RobotState, now: float) -> Ve
         return _forbidden(interlock, reading)
     if interlock.max_age_s is None:
         return PERMITTED
-    if reading.at < robot.settled_at + HISTORY_S:
+    if reading.at < _fresh_since(robot, key):
         return locked("waiting", topic=topic)
     stale_at = reading.at + interlock.max_age_s
     if now >= stale_at:
         return locked("stale", topic=topic, limit=f"{interlock.max_age_s:g}")
     return Verdict(True, until=stale_at)
+
+
+def _fresh_since(robot: RobotState, key: str) -> float:
+    """From when on a message was published when it came, and not sent again. Where a publisher is
+    latched, or may be, that is known some time after its first message only."""
+    joined = robot.settled_at + HISTORY_S
+    return joined if robot.graph.volatile(key) else max(joined, robot.replayed.known_since(key))
 
 
 def _forbidden(interlock: Interlock, reading: Reading) -> Verdict:

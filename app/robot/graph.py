@@ -10,8 +10,16 @@ from dataclasses import dataclass
 from itertools import chain
 from typing import Any, TypeVar, TypeVarTuple
 
-from app.dialect.bridge_dialect import DEMO_VERSION, in_token, name_in, parsed
-from app.dialect.endpoint import Direction, Endpoint, Role, ServerRole, TopicRole, within
+from app.dialect.dialect import Dialect
+from app.dialect.endpoint import (
+    DEMO_VERSION,
+    Direction,
+    Endpoint,
+    Role,
+    ServerRole,
+    TopicRole,
+    within,
+)
 from app.interfaces.names import Qos
 
 # Whose type must equal the panel's, for what the panel does with a topic. A route of the bridge
@@ -59,14 +67,16 @@ class Graph:
 
     def __init__(
         self,
+        dialect: Dialect,
         own_zid: str = "",
         namespace: str | None = None,
         keys: Collection[str] | None = None,
     ) -> None:
         """`namespace` tells this robot's bridges from those of others; None: all are its. Of tokens for
-        other key expressions than `keys` nothing is kept; None: all are."""
+        other keys than `keys` nothing is kept; None: all are."""
+        self._dialect = dialect
         self.own_zid = own_zid  # whose tokens are not the robot's
-        self._names = None if keys is None else frozenset(map(in_token, keys))
+        self._names = None if keys is None else frozenset(map(dialect.in_token, keys))
         self.known: dict[Any, Any] = {}  # see `remembered`
         self._namespace = namespace
         self._bridges: set[str] = set()
@@ -78,22 +88,21 @@ class Graph:
         self._answered: Mapping[str, str] | None = None
 
     def concerns(self, token_key: str) -> bool:
-        """Whether a token is a bridge's own, or about one of the key expressions that count."""
+        """Whether a token is a bridge's own, or about one of the keys that count."""
         if self._names is None:
             return True
-        name = name_in(token_key)
+        name = self._dialect.name_in(token_key)
         return not name or name in self._names
 
     def has(self, token_key: str) -> bool:
         """Whether a token is there by all that was taken."""
-        return (endpoint := parsed(token_key)) is not None and token_key in self._tokens.get(
-            endpoint.key, {}
-        )
+        endpoint = self._dialect.endpoint(token_key)
+        return endpoint is not None and token_key in self._tokens.get(endpoint.key, {})
 
     def apply(self, token_key: str, alive: bool, now: float = -math.inf) -> str | None:
         """Takes one token's appearance (`now`, monotonic seconds) or end; returns the zid of a
         bridge that came or went."""
-        endpoint = parsed(token_key) if self.concerns(token_key) else None
+        endpoint = self._dialect.endpoint(token_key) if self.concerns(token_key) else None
         if endpoint is None or endpoint.zid == self.own_zid:
             return None
         self.known.clear()
@@ -194,6 +203,11 @@ class Graph:
     def latched(self, key: str) -> bool | None:
         """Whether the robot's publisher is TRANSIENT_LOCAL; None if it has none now."""
         return next((e.transient_local for e in self._on_robot("MP", key)), None)
+
+    def volatile(self, key: str) -> bool:
+        """Whether the robot's publishers are known, and none is TRANSIENT_LOCAL."""
+        known = self._on_robot("MP", key)
+        return bool(known) and not any(e.transient_local for e in known)
 
     @remembered
     def unheard(self, key: str) -> bool:

@@ -25,7 +25,8 @@ class Sample(NamedTuple):
     `seq` orders samples and losses of bridges as this session saw them; `skipped` is how many came
     just before it that nobody looked at; `sent` is the timestamp of its sender's clock, in seconds
     since the epoch; `between` are other payloads that came and went unseen, for watched topics, and
-    `overrun` says that there were more before these, of which nobody knows what they said.
+    `overrun` says that there were more before these, of which nobody knows what they said. `cached` is
+    one of a cache: it was published before, nobody knows when.
     """
 
     payload: Buffer
@@ -37,3 +38,4 @@ class Sample(NamedTuple):
     sent: float | None = None
     between: tuple[PassedOver, ...] = ()
     overrun: bool = False
+    cached: bool = False

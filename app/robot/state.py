@@ -11,11 +11,11 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from app.dialect.bridge_dialect import key_of
+from app.dialect.dialect import Dialect
 from app.errors import DecodeError
 from app.i18n import Text
 from app.interfaces import Interfaces
-from app.interfaces.names import ROSOUT_TOPIC
+from app.interfaces.names import ROSOUT_TOPIC, key_of
 from app.panel.constants import holder
 from app.panel.model import Panel, RobotEntry
 from app.panel.widgets.families import Display
@@ -23,6 +23,7 @@ from app.robot.command_status import CommandStatus
 from app.robot.graph import Graph
 from app.robot.parameter_state import ParameterState
 from app.robot.presence import EndpointPresence, required_endpoints
+from app.robot.replayed import ReplayedMessages
 from app.robot.sample import Buffer as Buffer
 from app.robot.sample import PassedOver as PassedOver
 from app.robot.sample import Sample as Sample
@@ -44,12 +45,14 @@ class RobotState:
         self,
         panel: Panel,
         interfaces: Interfaces,
+        dialect: Dialect,
         own_zid: str = "",
         entry: RobotEntry | None = None,
         slices: Slices | None = None,
     ) -> None:
-        """`entry` is which of the panel's robots this is, where it has several; `slices` is of all that
-        is read on one event loop."""
+        """`own_zid` is of the panel's session. `entry` is which of the panel's robots this is, where
+        it has several; `slices` is of all that is read on one event loop."""
+        self.dialect = dialect
         self.name = entry.name if entry else ""
         self.namespace = entry.namespace if entry else panel.namespace
         self.link_up = False
@@ -60,9 +63,10 @@ class RobotState:
         needed = list(required_endpoints(panel))
         named = (*panel.subscriptions(), *panel.publications(), *(n for _, n in needed), ROSOUT_TOPIC)
         self._needed = frozenset(map(self.key, named))
-        self.graph = Graph(own_zid, self._told_apart, self._needed)
+        self.graph = Graph(dialect, own_zid, self._told_apart, self._needed)
         self._judged = frozenset(self.key(interlock.topic) for interlock in panel.interlocks)
         self.silent = SilentPublishers(self._judged)
+        self.replayed = ReplayedMessages()
         self.command_status: dict[str, CommandStatus] = {}  # of what widgets have asked, by their ids
         self.parameters: dict[
             str, ParameterState
@@ -102,7 +106,7 @@ class RobotState:
         self.read_later(key, reading)
 
     def key(self, topic: str) -> str:
-        """The key expression of a topic of this robot."""
+        """The key of a topic or service of this robot, see `key_of`."""
         key = self._keys.get(topic)
         if key is None:
             key = self._keys[topic] = key_of(topic, self.namespace)
@@ -110,17 +114,20 @@ class RobotState:
 
     def take(self, key: str, sample: Sample) -> None:
         """A newer sample of a topic."""
-        self.silent.message(key, sample.source, sample.seq, sample.at)
+        if key in self._judged:
+            self.silent.message(key, sample.source, sample.seq, sample.at)
+            self.replayed.message(key, sample.at, self.settled_at, sample.cached)
         if (topic := self._topics.get(key)) is not None:
             topic.take(sample)
 
     def cut(self, bridge: str, seq: int) -> None:
         """A bridge went away at `seq`: what came by it before no longer says what is so."""
         self.silent.lose_bridge(bridge)
-        for topic in self._topics.values():
+        for key, topic in self._topics.items():
             sample = topic.sample
             if sample is not None and sample.seq < seq and sample.source in (bridge, None):
                 topic.cut()
+                self.replayed.begin(key)
 
     def follow_publishers(self, before: float = math.inf) -> None:
         """After every change of the graph: where a publisher is required, what it said (`before` this
@@ -134,6 +141,7 @@ class RobotState:
                 topic = self._topics[key]
                 if topic.sample is not None and topic.sample.seq < before:
                     topic.cut()
+                    self.replayed.begin(key)
 
     def doubt(self, key: str) -> None:
         """It is not known what a topic said last."""
@@ -143,8 +151,9 @@ class RobotState:
         """The link is lost: nobody is known to be there, and nothing that came says what is so."""
         self.link_up = False
         self.settled_at = math.inf
-        self.graph = Graph("", self._told_apart, self._needed)
+        self.graph = Graph(self.dialect, "", self._told_apart, self._needed)
         self.silent = SilentPublishers(self._judged)
+        self.replayed.begin_all()
         self.seen.forget()
         for topic in self._topics.values():
             topic.cut()

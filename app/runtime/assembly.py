@@ -11,7 +11,7 @@ from app.panel import Panel
 from app.panel.model import RobotEntry
 from app.runtime.fleet import Fleet
 from app.settings import Mode, Settings
-from app.transport.zenoh_session import Config, config_from, config_to
+from app.transport.zenoh_config import Config, config_from, config_to
 
 if TYPE_CHECKING:
     from app.recording import Recordings

@@ -14,8 +14,8 @@ from app.i18n import TextLike, joined, say
 from app.panel.model import Panel, RobotEntry
 from app.robot.slices import Slices
 from app.robot.state import RobotState
-from app.runtime.robot_session import RobotSession
-from app.transport.zenoh_session import Config
+from app.runtime.robot_session import RobotSession, ServerParts
+from app.transport.zenoh_config import Config
 from app.view.link_status import Lamp
 
 if TYPE_CHECKING:
@@ -40,18 +40,10 @@ class Fleet:
         """One robot without a name, or the panel's `[[robot]]` entries."""
         self.panel = panel
         self._kiosks: dict[str | None, RobotSession] = {}
-        slices = Slices()
+        server = ServerParts(panel, revision, operators_log, recordings, Slices(), simulated)
         for entry in panel.robots or (None,):
             self._kiosks[entry.id if entry else None] = RobotSession(
-                panel,
-                config_of(entry),
-                revision,
-                operators_log,
-                entry=entry,
-                others=self,
-                recordings=recordings,
-                slices=slices,
-                simulated=simulated,
+                server, config_of(entry), entry=entry, others=self
             )
 
     async def start(self) -> None:

@@ -1,41 +1,57 @@
-"""What the link brought since the last turn, handed to who needs it: samples first, then tokens."""
+"""What arrived since the last turn becomes the robot's state: samples first, then tokens.
 
+Knows nothing of what is shown, and judges no hold: see `turn`.
+"""
+
+import logging
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
 from app.commands.actions.goals import GoalTracker
 from app.commands.confirmations import Confirmations
 from app.commands.parameters.sync import ParameterSync
-from app.dialect import bridge_dialect
-from app.panel.interlock import Interlock
+from app.dialect.endpoint import Endpoint
+from app.interfaces import names
 from app.panel.model import Panel
 from app.panel.widgets.parameter import EVENTS
-from app.permission.conditions import permits
 from app.permission.interlocks import Verdict, interlock_verdict
 from app.robot.state import Reading, RobotState, Sample
 from app.ros_logging import RobotLog
 from app.transport.inbox import Changes, Token
-from app.view.kinds import Enabled, enabled
 
 if TYPE_CHECKING:
     from app.recording import Recorder
 
+log = logging.getLogger("kiosk")
 
 Change = Literal["", "soon", "now"]
 
 
 @dataclass(slots=True)
 class Updates:
-    """What has changed: `urgent` is a permission or the graph, `came` that there is a bridge where
-    there was none; `values` are the topics (their keys) that said something, and `more` is whatever
-    else can wait for the next frame."""
+    """What has changed: `urgent` is a permission or the graph; `values` are the topics (their keys)
+    with a new message, and `more` is whatever else can wait for the next frame. `readings` are the
+    messages (topic's key, reading) by which a command may be confirmed.
+
+    `graph` says that tokens changed, `came` that there is a bridge where there was none; `found` and
+    `lost` are the zids of bridges.
+    """
 
     urgent: bool = False
-    came: bool = False
     more: bool = False
     values: set[str] = field(default_factory=set)
+    readings: list[tuple[str, Reading]] = field(default_factory=list)
+    graph: bool = False
+    came: bool = False
+    found: list[str] = field(default_factory=list)
+    lost: list[str] = field(default_factory=list)
+
+    def step(self) -> "Updates":
+        """What has changed a permission in between; what is told by it is not told again."""
+        readings, self.readings = self.readings, []
+        return Updates(urgent=True, readings=readings)
 
 
 class Ingest:
@@ -49,17 +65,16 @@ class Ingest:
         confirmations: Confirmations,
         parameters: ParameterSync,
         recorder: "Recorder | None",
-        log: RobotLog,
     ) -> None:
         self._robot = robot
         self._actions = actions
         self._confirmations = confirmations
         self._parameters = parameters
         self._recorder = recorder
-        self._log = log
+        self._log = RobotLog(log, robot.name)
         goals = {robot.key(one): one for one in panel.actions()}
-        self._feedback = {bridge_dialect.feedback(key): one for key, one in goals.items()}
-        self._status = {bridge_dialect.status(key): one for key, one in goals.items()}
+        self._feedback = {names.feedback(key): one for key, one in goals.items()}
+        self._status = {names.status(key): one for key, one in goals.items()}
         self._interlocks = {
             robot.key(of.topic): [i for i in panel.interlocks if i.topic == of.topic]
             for of in panel.interlocks
@@ -69,60 +84,48 @@ class Ingest:
         self.watched = self._interlocks.keys() | {robot.key(one.topic) for one in panel.confirms()}
         self.prompt = self.watched | self._status.keys() | {self._events}
         self.whole = frozenset() if recorder is None else recorder.keys
-        topics = map(robot.key, panel.subscriptions())
-        self.keys = [*topics, *self._feedback, *self._status]  # all that is listened to
 
-    def take(
-        self, changes: Changes, shown: Callable[[], Mapping[str, Enabled]], show: Callable[[], None]
-    ) -> Updates:
-        """Takes it in. `shown` are the permissions that are; `show` is called at each value in between
-        that changed one."""
-        news = Updates(urgent=bool(changes.tokens))
+    def steps(self, changes: Changes) -> Iterator[Updates]:
+        """Takes it in, step by step: yields after each value in between that changed a permission, and
+        at the end. At each step the robot's state is the one to judge by."""
+        updates = Updates(urgent=bool(changes.tokens), graph=bool(changes.tokens))
         # What permits and forbids comes first, and nothing that fails keeps it from being taken in.
         ordered = sorted(changes.samples.items(), key=lambda one: one[0] not in self._interlocks)
         for key, sample in ordered:
             if sample.overrun and key in self._interlocks:
                 self._robot.doubt(key)
-                show()
+                yield updates.step()
             for payload, at, wall in sample.between:
                 passed = sample._replace(payload=payload, at=at, wall=wall, between=())
-                if self._changes(key, passed, shown()) == "now":
-                    show()
-            change = self._changes(key, sample, shown())
-            news.urgent |= change == "now"
-            news.more |= change == "soon"
+                if self._take(key, passed, updates) == "now":
+                    yield updates.step()
+            change = self._take(key, sample, updates)
+            updates.urgent |= change == "now"
+            updates.more |= change == "soon"
             if key in self._feedback or key in self._status or key == self._events:
-                news.more = True
+                updates.more = True
             else:
-                news.values.add(key)
+                updates.values.add(key)
         self._record(changes)
-        news.came = self._tokens(changes.tokens)
-        return news
+        self._tokens(changes.tokens, updates)
+        yield updates
 
-    def _changes(self, key: str, sample: Sample, shown: Mapping[str, Enabled]) -> Change:
-        """Takes a sample in; whether a permission may be another one by it than is shown. What says
-        something else is not judged here: it will be, when all is looked at."""
-        interlocks = self._interlocks.get(key, ())
-        before = [self._said(one) for one in interlocks]
-        self._guarded(key, sample, self._sample)
-        if before != [self._said(one) for one in interlocks]:
-            return "now"
-        return self._change(key, shown)
+    def read(self, key: str, reading: Reading) -> Updates:
+        """A message that took more than one turn is read."""
+        return Updates(urgent=key in self._interlocks, values={key}, readings=[(key, reading)])
 
-    def _change(self, key: str, shown: Mapping[str, Enabled]) -> Change:
+    def _take(self, key: str, sample: Sample, updates: Updates) -> Change:
+        """Takes a sample in; whether a permission is another one by it."""
         now = time.monotonic()
-        changes = [
-            _change(interlock_verdict(one, self._robot, now), shown[one.id])
-            for one in self._interlocks.get(key, ())
-        ]
+        before = self._verdicts(key, now)
+        self._guarded(key, sample, lambda key, sample: self._sample(key, sample, updates))
+        pairs = zip(before, self._verdicts(key, now), strict=True)
+        changes = [_change(was, verdict) for was, verdict in pairs]
         return "now" if "now" in changes else "soon" if "soon" in changes else ""
 
-    def _said(self, interlock: Interlock) -> bool:
-        """Whether the last of a topic can be read, and permits."""
-        reading = self._robot.reading(interlock.topic)
-        if reading.status != "message":
-            return False
-        return permits(interlock, reading.value(interlock.field))
+    def _verdicts(self, key: str, now: float) -> list[Verdict]:
+        """Of the interlocks on a topic."""
+        return [interlock_verdict(one, self._robot, now) for one in self._interlocks.get(key, ())]
 
     def _record(self, changes: Changes) -> None:
         if self._recorder is not None:
@@ -135,7 +138,7 @@ class Ingest:
         except Exception:
             self._log.exception("a sample of %s was not taken in whole", key)
 
-    def _sample(self, key: str, sample: Sample) -> None:
+    def _sample(self, key: str, sample: Sample, updates: Updates) -> None:
         if key in self._feedback:
             self._actions.hear_feedback(self._feedback[key], sample)
         elif key in self._status:
@@ -145,52 +148,45 @@ class Ingest:
                 self._parameters.hear(sample)
             self._robot.take(key, sample)
             if self._confirmations.awaits(key):
-                self._confirmations.hear(key, self._robot.reading_of(key))
+                updates.readings.append((key, self._robot.reading_of(key)))
 
-    def read(self, key: str, reading: Reading, shown: Mapping[str, Enabled]) -> Change:
-        """A message that took more than one turn is read: whether a permission may be another one by it
-        than is shown."""
-        self._confirmations.hear(key, reading)
-        return self._change(key, shown)
-
-    def _tokens(self, tokens: Mapping[str, Token]) -> bool:
-        """Takes them in; whether there is a bridge where there was none."""
-        if not tokens:
-            return False
-        came, now, robot = False, time.monotonic(), self._robot
-        had_bridge = bool(robot.graph.bridges)
+    def _tokens(self, tokens: Mapping[str, Token], updates: Updates) -> None:
+        """Takes them in."""
+        now, graph = time.monotonic(), self._robot.graph
+        had_bridge = bool(tokens and graph.bridges)
         for key, token in tokens.items():
-            if not robot.graph.concerns(key):
+            if not graph.concerns(key):
                 continue
-            self._publisher(key, token)
-            if token.lost_seq:
-                self._parameters.lose(key)
-            if token.lost_seq and (zid := robot.graph.apply(key, False)):
-                robot.cut(zid, token.lost_seq)
-                self._log.warning("bridge %s lost", zid)
-                had_bridge = had_bridge and bool(robot.graph.bridges)
+            if endpoint := self._robot.dialect.endpoint(key):
+                self._publisher(key, token, endpoint)
+                if token.lost_seq:
+                    self._parameters.lose(endpoint)
+            if token.lost_seq and (zid := graph.apply(key, False)):
+                self._robot.cut(zid, token.lost_seq)
+                updates.lost.append(zid)
+                had_bridge = had_bridge and bool(graph.bridges)
             if token.lost_seq and token.alive:
-                robot.follow_publishers(token.lost_seq)  # gone, be it for a moment
-            if token.alive and (zid := robot.graph.apply(key, True, now)):
-                self._log.info("bridge %s found", zid)
-                came = True
-        return came and not had_bridge
+                self._robot.follow_publishers(token.lost_seq)  # gone, be it for a moment
+            if token.alive and (zid := graph.apply(key, True, now)):
+                updates.found.append(zid)
+        updates.came = bool(updates.found) and not had_bridge
 
-    def _publisher(self, key: str, token: Token) -> None:
+    def _publisher(self, key: str, token: Token, endpoint: Endpoint) -> None:
         """Whether a publisher has appeared, be it for a moment: until it says something, nobody knows
         what it permits."""
         graph, silent = self._robot.graph, self._robot.silent
-        endpoint = bridge_dialect.parsed(key)
-        if endpoint is None or endpoint.zid == graph.own_zid:
+        if endpoint.zid == graph.own_zid:
             return
         if token.came_seq and (token.lost_before or not graph.has(key)):  # else it is told twice
             silent.appeared(endpoint, token.came_seq, token.came_at, token.lost_before)
+            if endpoint.role == "MP" and endpoint.transient_local:
+                self._robot.replayed.begin(endpoint.key, token.came_at)
         if token.lost_seq:
             silent.lost(endpoint, token.lost_seq)
 
 
-def _change(verdict: Verdict, shown: Enabled) -> Change:
+def _change(before: Verdict, verdict: Verdict) -> Change:
     """A reason with the robot's value in it may change as often as a readout, and waits as one."""
-    if enabled(verdict) == shown:
+    if (before.permitted, before.reason) == (verdict.permitted, verdict.reason):
         return ""
-    return "soon" if verdict.code == "unmet" and not shown["enabled"] else "now"
+    return "soon" if verdict.code == "unmet" and not before.permitted else "now"

@@ -17,9 +17,9 @@ from zenoh.ext import CacheConfig, declare_advanced_publisher
 from zenoh.handlers import Callback
 
 from app.dialect import bridge_dialect
-from app.dialect.endpoint import TopicRole
+from app.dialect.endpoint import DEMO_VERSION, TopicRole
 from app.errors import DecodeError, LinkError
-from app.interfaces import Interfaces, interfaces_of
+from app.interfaces import Interfaces, interfaces_of, names
 from app.interfaces.names import Qos
 from app.simulator.parameters import EVENT_TYPE, EVENTS, SERVICES
 from app.simulator.robot import COUNT, COUNT_TYPE, LISTENS, SERVES, SPEAKS, DemoRobot
@@ -45,7 +45,7 @@ class Simulator:
         self._session = zenoh.open(_listening(endpoint))
         self._publishers = {topic: self._publisher(self._key(topic)) for topic in SPEAKS}
         self._publishers[EVENTS] = self._session.declare_publisher(self._key(EVENTS))
-        self._status = self._publisher(bridge_dialect.status(self._key(COUNT)))
+        self._status = self._publisher(names.status(self._key(COUNT)))
         self._states: list[tuple[bytes, int]] = []
         self._results: list[tuple[bytes, zenoh.Query]] = []
         self._types = self._interfaces.action(COUNT_TYPE)
@@ -75,7 +75,7 @@ class Simulator:
         raise zenoh.ZError("the session does not tell where it listens")
 
     def _key(self, topic: str) -> str:
-        return bridge_dialect.key_of(topic, self._namespace)
+        return names.key_of(topic, self._namespace)
 
     def _publisher(self, key: str) -> Any:
         return declare_advanced_publisher(
@@ -153,7 +153,7 @@ class Simulator:
         zid = str(self._session.zid())
 
         config = json.dumps({"namespace": self._namespace or "/"})
-        yield self._told(bridge_dialect.version(zid), bridge_dialect.DEMO_VERSION)
+        yield self._told(bridge_dialect.version(zid), DEMO_VERSION)
         yield self._told(bridge_dialect.config(zid), config)
         liveliness = self._session.liveliness()
         ends: list[tuple[TopicRole, Mapping[str, str], Qos]] = [
@@ -207,7 +207,7 @@ class Simulator:
     def _tell(self, goal_id: bytes, sequence: list[int]) -> None:
         fields = {"goal_id": {"uuid": goal_id}, "feedback": {"sequence": sequence}}
         payload = self._interfaces.encode(self._types.feedback_message, fields)
-        self._session.put(bridge_dialect.feedback(self._key(COUNT)), payload)
+        self._session.put(names.feedback(self._key(COUNT)), payload)
 
     def _tell_states(self) -> None:
         """As an action server does whenever a goal has another state."""

@@ -47,13 +47,13 @@ class Token:
 @dataclass(slots=True)
 class Changes:
     """All that came since the last drain; `kept` has each sample of the topics that are kept whole,
-    `caches` the tokens of publishers that keep their last message for late subscribers."""
+    `caches` are (topic, token) of the publishers that keep their last message for late subscribers."""
 
     samples: dict[str, Sample]
     tokens: dict[str, Token]
     link_up: bool
     kept: Collection[tuple[str, Sample]] = ()
-    caches: Collection[str] = ()
+    caches: Collection[tuple[str, str]] = ()
 
 
 class _Between:
@@ -86,12 +86,15 @@ class _Arrived:
     wall: float
     skipped: int = 0
     between: _Between | None = None
+    cached: bool = False
 
     def sample(self, kept: bool = False) -> Sample:
         """When it was sent is for what is kept only: to ask a stamp takes its time."""
         source = None if self.stamp is None else str(self.stamp.get_id())
         sent = self.stamp.get_time().timestamp() if kept and self.stamp is not None else None
         sample = Sample(self.payload, self.seq, self.at, self.wall, source, self.skipped, sent)
+        if self.cached:
+            sample = sample._replace(cached=True)
         if self.between is None:
             return sample
         return sample._replace(between=tuple(self.between.values), overrun=self.between.overrun)
@@ -115,7 +118,7 @@ class Inbox:
         self._samples: dict[str, _Arrived] = {}
         self._live: dict[str, Stamp | None] = {}  # the last stamp of what did not come from a cache
         self._tokens: dict[str, Token] = {}
-        self._caches: list[str] = []
+        self._caches: list[tuple[str, str]] = []
         self._transports: set[str] = set()
         self._kept: deque[tuple[str, _Arrived]] = deque()
         self._kept_bytes = 0
@@ -183,10 +186,12 @@ class Inbox:
             last = self._live[key]
             if last is None or stamp is None or last.get_id() == stamp.get_id():
                 return
-        self._add(key, payload, stamp)
+        self._add(key, payload, stamp, cached=True)
 
-    def _add(self, key: str, payload: Buffer, stamp: Stamp | None) -> None:
-        arrived = _Arrived(payload, stamp, next(self._seq), time.monotonic(), time.time())
+    def _add(self, key: str, payload: Buffer, stamp: Stamp | None, cached: bool = False) -> None:
+        arrived = _Arrived(
+            payload, stamp, next(self._seq), time.monotonic(), time.time(), cached=cached
+        )
         unseen = self._samples.get(key)
         if unseen is not None:
             arrived.skipped = unseen.skipped + 1
@@ -215,9 +220,9 @@ class Inbox:
             token.lost_seq = seq
         self._wake(True)
 
-    def cache(self, key: str) -> None:
-        """The token of a publisher's cache came."""
-        self._caches.append(key)
+    def cache(self, key: str, token: str) -> None:
+        """The token of the cache of a topic's publisher came."""
+        self._caches.append((key, token))
         self._wake(True)
 
     def transport(self, zid: str, up: bool) -> None:

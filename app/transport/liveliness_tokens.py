@@ -10,8 +10,7 @@ stays when the publisher goes: a route that ends and begins again delivers each 
 import logging
 from dataclasses import replace
 
-from app.dialect import bridge_dialect
-from app.dialect.endpoint import TopicRole
+from app.dialect.endpoint import OwnEndpoint, TopicRole
 from app.interfaces import Interfaces
 from app.interfaces.names import ROSOUT, ROSOUT_TOPIC, Qos
 from app.panel.model import Panel
@@ -51,7 +50,7 @@ class LivelinessTokens:
             ),
             ("MP", ROSOUT_TOPIC, LOG_TYPE, ROSOUT),
         ]
-        tokens = []
+        own = []
         for role, topic, type_name, qos in wanted:
             key = self._robot.key(topic)
             if found := self._robot.graph.wrong_type(role, key, type_name):
@@ -60,11 +59,10 @@ class LivelinessTokens:
                     self._log.error("%s is %s on the robot, %s in the panel", topic, found, type_name)
                 continue
             type_hash = self._interfaces.type_hash(type_name)
-            tokens.append(bridge_dialect.token(zid, role, key, type_name, qos, type_hash))
+            own.append(OwnEndpoint(role, key, type_name, qos, type_hash))
         for action, type_name in self._panel.actions().items():
-            key = self._robot.key(action)
-            tokens.append(bridge_dialect.action_client_token(zid, key, type_name))
-        return tokens
+            own.append(OwnEndpoint("AC", self._robot.key(action), type_name))
+        return self._robot.dialect.own_tokens(zid, own)
 
     def _qos(self, topic: str) -> Qos:
         return self._panel.qos(topic).on_wire

@@ -1,95 +1,35 @@
-"""The one owner of the Zenoh session. Zenoh calls back on threads of its own; what comes in goes into
-the link's inbox. Only this module and the simulator import zenoh; its errors leave here as LinkError.
-"""
+"""The one owner of the Zenoh session. Zenoh calls back on its own threads; what arrives goes into the
+inbox. Its errors leave here as LinkError."""
 
 import asyncio
 import atexit
 import ctypes
 import json
 import os
-import re
 import threading
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+import time
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
-from pathlib import Path
 from typing import Any, Final
 
 import zenoh
 from zenoh.handlers import Callback
 
-from app.dialect import bridge_dialect
-from app.errors import LinkError, SettingsError
-from app.transport.inbox import NO_KEYS, Changes, Inbox
-
-Config = zenoh.Config
+from app.dialect.dialect import Dialect
+from app.dialect.latched import caches, newest
+from app.errors import LinkError
+from app.transport.declarations import NOTHING, Declarations
+from app.transport.inbox import Changes, Inbox
+from app.transport.zenoh_config import said
 
 ASK_TIMEOUT_S = 2.0
 CACHE_TIMEOUT_S = 10.0
-MOST_QUEUED = 16  # batches; Zenoh takes no more
 COPIED_MOST = 16_384  # bytes of a sample
-IN_ITS_SOURCE: Final = re.compile(r" at \S+\.rs:\d+\.?")  # where in Zenoh an error was made
-JOINED_WITHIN_MS: Final = 3_000  # by who took a connection
-BLOCKED_MOST_US = 200_000  # how long a put or a question may wait for room: less than a hold's lease
-
 # Zenoh's own setting of its threads, read when its first session opens. By default the thread that
 # waits for the network wakes another one for each message: where one does both, it costs half.
 RUNTIME: Final = "(rx: (handover: net))"
 os.environ.setdefault("ZENOH_RUNTIME", RUNTIME)
-
-
-def config_from(path: Path, connect: Sequence[str] = ()) -> zenoh.Config:
-    """A Zenoh configuration file, with other endpoints to connect to if there are any; SettingsError
-    says what is wrong with it."""
-    try:
-        config = zenoh.Config.from_file(path)
-    except zenoh.ZError as error:
-        raise SettingsError(f"{path} is not a usable Zenoh configuration: {_said(error)}") from error
-    if connect:
-        try:
-            config.insert_json5("connect/endpoints", json.dumps(list(connect)))
-        except zenoh.ZError as error:
-            endpoints = ", ".join(connect)
-            raise SettingsError(
-                f"{endpoints}: can't connect there, a Zenoh endpoint is like tcp/robot1:7447: "
-                f"{_said(error)}"
-            ) from error
-    return _fit(config)
-
-
-def config_to(endpoint: str) -> zenoh.Config:
-    """A session that connects to one endpoint and to nothing else."""
-    config = zenoh.Config()
-    for place, value in {
-        "mode": '"peer"',
-        "connect/endpoints": f'["{endpoint}"]',
-        "listen/endpoints": "[]",
-        "scouting/multicast/enabled": "false",
-        "scouting/gossip/enabled": "false",
-        "open/return_conditions/connect_scouted": "false",
-    }.items():
-        config.insert_json5(place, value)
-    return _fit(config)
-
-
-def _fit(config: zenoh.Config) -> zenoh.Config:
-    """What a kiosk needs of any configuration.
-
-    No shared memory: Zenoh keeps a segment and its file for each session that was, and a session is
-    renewed at every loss of the link. Room for a burst, as Zenoh's own two messages are few. What finds
-    no room waits for it, which stops the event loop: where that takes too long (5 s are Zenoh's own)
-    the connection is closed, once, and all is locked. Nothing is dropped in silence. And a session's
-    end waits for who takes a connection and says nothing, as a frozen bridge's port does: not for 10 s.
-    """
-    config.insert_json5("transport/unicast/open_timeout", str(JOINED_WITHIN_MS))
-    config.insert_json5("transport/shared_memory/enabled", "false")
-    config.insert_json5("transport/link/tx/queue/size/data", str(MOST_QUEUED))
-    wait = "transport/link/tx/queue/congestion_control/block/wait_before_close"
-    config.insert_json5(wait, str(BLOCKED_MOST_US))
-    return config
-
-
-def _said(error: zenoh.ZError) -> str:
-    return IN_ITS_SOURCE.sub("", str(error))
 
 
 @contextmanager
@@ -97,7 +37,7 @@ def _translated(doing: str) -> Iterator[None]:
     try:
         yield
     except zenoh.ZError as error:
-        raise LinkError(f"{doing}: {_said(error)}") from error
+        raise LinkError(f"{doing}: {said(error)}") from error
 
 
 def _own(payload: zenoh.ZBytes) -> bytes | zenoh.ZBytes:
@@ -109,12 +49,13 @@ def _own(payload: zenoh.ZBytes) -> bytes | zenoh.ZBytes:
 class ZenohSession:
     """A session with its subscribers, publishers and tokens."""
 
-    def __init__(self, config: zenoh.Config, wake: Callable[[bool], None]) -> None:
+    def __init__(self, config: zenoh.Config, wake: Callable[[bool], None], dialect: Dialect) -> None:
         """Opens at once, whether or not anybody is there; `wake` is the inbox's."""
         self._config = config
+        self._dialect = dialect
         self._inbox = Inbox(wake)
-        self._subscribe: tuple[str, ...] = ()
-        self._publish: tuple[str, ...] = ()
+        self._declared: Declarations = NOTHING
+        self._sent: Counter[str] = Counter()  # messages and queries, by key expression
         self._held: dict[str, zenoh.LivelinessToken] | None = {}  # None: between two sessions
         self._open()
 
@@ -132,19 +73,10 @@ class ZenohSession:
         self.zid = str(self._session.zid())
         atexit.register(self._leave)
 
-    def start(
-        self,
-        subscribe: Iterable[str],
-        publish: Iterable[str],
-        *,
-        prompt: Collection[str] = NO_KEYS,
-        watched: Collection[str] = NO_KEYS,
-        whole: Collection[str] = NO_KEYS,
-    ) -> None:
-        """Declares everything, once in a session; what is `prompt`, `watched` and `whole` of it, the
-        inbox says."""
-        self._inbox.expect(prompt, watched, whole)
-        self._subscribe, self._publish = tuple(subscribe), tuple(publish)
+    def start(self, declared: Declarations) -> None:
+        """Declares everything, once in a session."""
+        self._inbox.expect(declared.prompt, declared.watched, declared.whole)
+        self._declared = declared
         self._declare()
 
     def renew(self) -> None:
@@ -171,38 +103,42 @@ class ZenohSession:
                     self._direct(self._on_transport), history=True
                 ),
                 self._session.liveliness().declare_subscriber(
-                    bridge_dialect.TOKENS, self._direct(self._on_token), history=True
+                    self._dialect.tokens, self._direct(self._on_token), history=True
                 ),
             )
-            self._publishers = {key: self._publisher(key) for key in self._publish}
+            self._publishers = {
+                key: self._publisher(expression) for key, expression in self._declared.publish.items()
+            }
             self._subscribers = [
-                declared for key in self._subscribe for declared in self._subscriptions(key)
+                declared
+                for key, expression in self._declared.subscribe.items()
+                for declared in self._subscriptions(key, expression)
             ]
 
-    def _publisher(self, key: str) -> zenoh.Publisher:
+    def _publisher(self, expression: str) -> zenoh.Publisher:
         return self._session.declare_publisher(
-            key,
+            expression,
             congestion_control=zenoh.CongestionControl.BLOCK,
             express=True,
             reliability=zenoh.Reliability.RELIABLE,
             allowed_destination=zenoh.Locality.REMOTE,
         )
 
-    def _subscriptions(self, key: str) -> Iterator[zenoh.Subscriber[None]]:
+    def _subscriptions(self, key: str, expression: str) -> Iterator[zenoh.Subscriber[None]]:
         """What is published from now on, and the caches of what was published before. Zenoh's own
         subscriber with history drops what has an older stamp than what it had last: after a stamp of a
         clock that is ahead it would be deaf."""
         put = self._inbox.put
         yield self._session.declare_subscriber(
-            key, self._direct(lambda sample: put(key, _own(sample.payload), sample.timestamp))
+            expression, self._direct(lambda sample: put(key, _own(sample.payload), sample.timestamp))
         )
         yield self._session.liveliness().declare_subscriber(
-            bridge_dialect.caches(key), self._direct(self._on_cache), history=True
+            caches(expression), self._direct(lambda sample: self._on_cache(key, sample)), history=True
         )
 
-    def _ask_cache(self, token_key: str) -> None:
-        """Puts the last message of a cache into the inbox."""
-        key, put = bridge_dialect.topic_of_cache(token_key), self._inbox.put_cached
+    def _ask_cache(self, key: str, token: str) -> None:
+        """Puts the last message of a topic's cache into the inbox."""
+        put = self._inbox.put_cached
 
         def take(reply: zenoh.Reply) -> None:
             if reply.ok is not None:
@@ -210,7 +146,7 @@ class ZenohSession:
 
         with suppress(zenoh.ZError):  # a session that is closed: the next one finds the cache again
             self._session.get(
-                bridge_dialect.newest(token_key),
+                newest(token),
                 self._direct(take),
                 target=zenoh.QueryTarget.ALL,
                 consolidation=zenoh.ConsolidationMode.NONE,
@@ -242,7 +178,12 @@ class ZenohSession:
     def put(self, key: str, payload: bytes) -> None:
         """Sends at once or not at all: nothing is kept for later. LinkError if Zenoh refuses."""
         with _translated(f"can't send on {key}"):
-            self._publishers[key].put(payload)
+            self._publishers[key].put(payload, attachment=self._attachment(self._declared.publish[key]))
+
+    def _attachment(self, expression: str) -> bytes | None:
+        """What goes with the next message or query on a key expression."""
+        self._sent[expression] += 1
+        return self._dialect.attachment(self.zid, expression, self._sent[expression], time.time_ns())
 
     def heard(self, key: str) -> bool:
         """Whether somebody is known to listen; not whether they act on it."""
@@ -251,7 +192,7 @@ class ZenohSession:
             return bool(status.matching)
 
     def query(self, key: str, payload: bytes, timeout_s: float) -> "asyncio.Future[bytes | None]":
-        """Asks once; the future gets the first answer, or None when there is none (any more)."""
+        """Queries a service once; the future gets the first answer, or None when there is none."""
         loop = asyncio.get_running_loop()
         answered: asyncio.Future[bytes | None] = loop.create_future()
 
@@ -260,18 +201,20 @@ class ZenohSession:
                 answered.set_result(answer)
 
         def hand_over(answer: bytes | None) -> None:
-            with suppress(RuntimeError):  # the loop is closed: nobody waits any more
+            with suppress(RuntimeError):  # the loop is closed
                 loop.call_soon_threadsafe(finish, answer)
 
         def on_reply(reply: zenoh.Reply) -> None:
             if reply.ok is not None:
                 hand_over(reply.ok.payload.to_bytes())
 
+        expression = self._declared.query[key]
         with _translated(f"can't ask {key}"):
             self._session.get(
-                key,
+                expression,
                 Callback(on_reply, lambda: hand_over(None), indirect=False),
                 payload=payload,
+                attachment=self._attachment(expression),
                 timeout=timeout_s,
                 consolidation=zenoh.ConsolidationMode.NONE,
             )
@@ -292,7 +235,7 @@ class ZenohSession:
                 done.set_result(None)
 
         def on_end() -> None:
-            with suppress(RuntimeError):  # the loop is closed: nobody waits any more
+            with suppress(RuntimeError):  # the loop is closed
                 loop.call_soon_threadsafe(finish)
 
         with _translated(f"can't ask {selector}"):
@@ -312,8 +255,8 @@ class ZenohSession:
     def drain(self) -> Changes:
         """Takes all that came since the last call."""
         changes = self._inbox.drain()
-        for cache in changes.caches:  # not where it was heard of: a callback may not ask
-            self._ask_cache(cache)
+        for key, token in changes.caches:  # not where it was heard of: a callback may not query
+            self._ask_cache(key, token)
         return changes
 
     @property
@@ -328,7 +271,7 @@ class ZenohSession:
             self._session.close()
 
     def _leave(self) -> None:
-        """Whoever ends without closing it: an interpreter that ends must not be called into."""
+        """At exit without a close: an interpreter that ends must not be called into."""
         with suppress(LinkError):
             self.close()
 
@@ -337,9 +280,9 @@ class ZenohSession:
     def _on_token(self, sample: zenoh.Sample) -> None:
         self._inbox.token(str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT)
 
-    def _on_cache(self, sample: zenoh.Sample) -> None:
+    def _on_cache(self, key: str, sample: zenoh.Sample) -> None:
         if sample.kind == zenoh.SampleKind.PUT:
-            self._inbox.cache(str(sample.key_expr))
+            self._inbox.cache(key, str(sample.key_expr))
 
     def _on_transport(self, event: zenoh.TransportEvent) -> None:
         self._inbox.transport(str(event.transport.zid), event.kind == zenoh.SampleKind.PUT)

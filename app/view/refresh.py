@@ -4,10 +4,12 @@ Whatever time alone changes (an age, a request for control) is shown when it is 
 """
 
 import asyncio
+import logging
 import math
 import time
-from collections.abc import Callable, Collection, Mapping
-from typing import Protocol
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from typing import Final, Protocol
 
 from app.audit.press_record import Log
 from app.i18n import TextLike, joined
@@ -15,9 +17,14 @@ from app.panel.model import Panel
 from app.panel.widgets.families import Display
 from app.permission.control_authority import ControlAuthority
 from app.robot.state import RobotState
+from app.ros_logging import RobotLog
 from app.view.link_status import Lamp, Since
 from app.view.publisher import ViewPublisher
 from app.view.view import ViewWithDeadlines, build_view, update_displays
+
+log = logging.getLogger("kiosk.view")
+
+AGAIN_S: Final = 1.0  # after which a view that could not be built is built again
 
 
 class OtherRobots(Protocol):
@@ -45,31 +52,34 @@ class NoOtherRobots:
     def show_but(self, robot: RobotState) -> None: ...
 
 
-class ViewRefresher:
-    """The board of one robot, and what is posted there; on the event loop only."""
+class Recorded(Protocol):
+    """What is needed of the recordings."""
 
-    def __init__(
-        self,
-        panel: Panel,
-        robot: RobotState,
-        revision: str,
-        control: ControlAuthority,
-        operators_log: Log,
-        others: OtherRobots,
-        *,
-        before: Callable[[], None],
-        recordings_fault: Callable[[], TextLike],
-        simulated: bool,
-    ) -> None:
-        """`before` is called first, whenever it is shown."""
+    @property
+    def fault(self) -> TextLike:
+        """Why they are not kept; "" where they are."""
+
+
+@dataclass(frozen=True, slots=True)
+class ViewSources:
+    """What is shown beside the robot's state."""
+
+    control: ControlAuthority
+    operators_log: Log
+    others: OtherRobots
+    recordings: Recorded | None = None
+    simulated: bool = False
+
+
+class ViewRefresher:
+    """The view of one robot, and when it is published; on the event loop only. What it shows decides
+    nothing: a view that can't be built is logged, and built again."""
+
+    def __init__(self, panel: Panel, robot: RobotState, revision: str, sources: ViewSources) -> None:
         self._panel = panel
         self._robot = robot
-        self._control = control
-        self._operators_log = operators_log
-        self._others = others
-        self._before = before
-        self._recordings_fault = recordings_fault
-        self._simulated = simulated
+        self._sources = sources
+        self._log = RobotLog(log, robot.name)
         self._since = Since()
         self._frame_s = 1 / panel.display_hz
         self._displays = [(robot.key(w.topic), w) for w in panel.displays]
@@ -81,6 +91,7 @@ class ViewRefresher:
         self._whole = False  # whether more than values is to be shown
         self._timer: asyncio.TimerHandle | None = None
         self._due = math.inf  # monotonic seconds; not every event loop's timers know theirs
+        self._failed = False
         self._stopped = False
 
     def stop(self) -> None:
@@ -115,16 +126,26 @@ class ViewRefresher:
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
-        now = self._shown_at = time.monotonic()
-        whole = self._whole
-        self._before()
-        if whole or self._whole or now >= self._seen.rest:
+        self._shown_at = time.monotonic()
+        try:
+            self._refresh()
+            self.publisher.post(self._seen.view)
+        except Exception:
+            if not self._failed:
+                self._log.exception("the view could not be refreshed; it is tried again")
+            self._failed = self._whole = True
+            self._at(self._shown_at + AGAIN_S)
+        else:
+            self._failed = self._whole = False
+            self._spoke = set()
+            self._at(self._seen.until)
+
+    def _refresh(self) -> None:
+        now = self._shown_at
+        if self._whole or now >= self._seen.rest:
             self._look()
         else:
             self._seen = update_displays(self._seen, self._stale(now), self._robot, now)
-        self._whole, self._spoke = False, set()
-        self.publisher.post(self._seen.view)
-        self._at(self._seen.until)
 
     def _stale(self, now: float) -> list[Display]:
         """The displays that a topic or time has changed."""
@@ -132,11 +153,11 @@ class ViewRefresher:
         return [w for key, w in self._displays if key in spoke or untils[w.id] <= now]
 
     def _look(self) -> None:
-        """Looks at everything anew."""
+        """Builds the whole view."""
         self._seen = self._sight()
         if self._seen.robot != self.lamp:
             self.lamp = self._seen.robot
-            self._others.show_but(self._robot)
+            self._sources.others.show_but(self._robot)
             self._seen = self._sight()
 
     def _at(self, when: float) -> None:
@@ -150,18 +171,19 @@ class ViewRefresher:
         self._timer = None if when == math.inf else loop.call_at(when, self._frame)
 
     def _sight(self) -> ViewWithDeadlines:
-        unlogged = self._operators_log.fault
-        fault = joined((unlogged, self._recordings_fault()), "between_lines")
+        sources = self._sources
+        unlogged = sources.operators_log.fault
+        faults = (unlogged, sources.recordings.fault if sources.recordings else "")
         seen = build_view(
             self._panel,
             self._robot,
             time.monotonic(),
-            robots=self._others.link_statuses(),
-            simulated=self._simulated,
-            fault=fault,
-            lock=self._operators_log.lock if unlogged else "",
-            control=self._control.view(),
-            control_until=self._control.until,
+            robots=sources.others.link_statuses(),
+            simulated=sources.simulated,
+            fault=joined(faults, "between_lines"),
+            lock=sources.operators_log.lock if unlogged else "",
+            control=sources.control.view(),
+            control_until=sources.control.until,
         )
         seen.view["link"] = self._since.dated(seen.view["link"])
         return seen

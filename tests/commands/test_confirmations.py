@@ -2,7 +2,6 @@
 
 import asyncio
 import itertools
-import logging
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,6 @@ from app.errors import PanelError
 from app.panel import load_panel
 from app.panel.model import Panel
 from app.robot.state import PassedOver, RobotState, Sample
-from app.ros_logging import RobotLog
 from app.runtime.ingest import Ingest
 from app.transport.inbox import Changes
 from tests.commands.test_presses import Way
@@ -102,7 +100,6 @@ def test_what_came_unseen_confirms_by_when_it_came() -> None:
             desk.confirmations,
             deaf,
             None,
-            RobotLog(logging.getLogger("x"), ""),
         )
         press = asyncio.create_task(desk.press())
         await asyncio.sleep(0)
@@ -110,7 +107,9 @@ def test_what_came_unseen_confirms_by_when_it_came() -> None:
         between = (PassedOver(on, came_at, came_at),)
         newest = Sample(off, 9, 100.2, 100.2, BRIDGE, between=between)
         changes = Changes({desk.robot.key("/heard"): newest}, {}, link_up=True)
-        intake.take(changes, dict, lambda: None)
+        for updates in intake.steps(changes):
+            for key, reading in updates.readings:
+                desk.confirmations.hear(key, reading)
         return await press
 
     outcomes = [asyncio.run(pressed(came_at)).outcome for came_at in (99.9, 100.1)]

@@ -13,9 +13,10 @@ from app.audit import NullLog
 from app.commands.receipts import MOST_LOOKS, Receipt
 from app.dialect.bridge_dialect import server_token
 from app.robot.state import RobotState
-from app.runtime.robot_session import RobotSession
+from app.runtime.robot_session import RobotSession, ServerParts
 from app.transport.inbox import Inbox
-from app.transport.zenoh_session import ZenohSession, config_to
+from app.transport.zenoh_config import config_to
+from app.transport.zenoh_session import ZenohSession
 from tests.support.builders import (
     BRIDGE,
     COUNT,
@@ -150,7 +151,7 @@ class Recorded:
 
 async def pressing(endpoint: str, over: Callable[[], bool]) -> None:
     """Presses as fast as it can, one after the other."""
-    kiosk = RobotSession(small_panel(), config_to(endpoint), "revision", NullLog())
+    kiosk = RobotSession(ServerParts(small_panel(), "revision", NullLog()), config_to(endpoint))
     await kiosk.start()
     number = 0
     while not over():

@@ -80,9 +80,14 @@ class Bench:
         for name, kind in (GET, DESCRIBE, SET):
             token = bridge_dialect.server_token(BRIDGE, "SS", f"arm/{name}", kind)
             if not alive:
-                self.parameters.lose(token)
+                self.lose(token)
             self.robot.graph.apply(token, alive)
         self.parameters.follow()
+
+    def lose(self, token: str) -> None:
+        endpoint = bridge_dialect.parsed(token)
+        assert endpoint is not None
+        self.parameters.lose(endpoint)
 
     async def asked(self, count: int) -> None:
         async with asyncio.timeout(5):
@@ -265,7 +270,7 @@ def test_a_node_that_was_another_one_for_a_moment_is_asked_anew() -> None:
     async def test(bench: Bench) -> None:
         bench.offer()
         await bench.tell(1, 0.5)
-        bench.parameters.lose(bridge_dialect.bridge_token(BRIDGE))
+        bench.lose(bridge_dialect.bridge_token(BRIDGE))
         assert (bench.known().state, bench.known().value) == ("cut", 0.5)
         assert "waiting for /arm" in bench.reason()
         bench.parameters.follow()

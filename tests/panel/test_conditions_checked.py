@@ -1,8 +1,6 @@
 """What an interlock permits: conditions beside a bool, checked as the panel file is loaded."""
 
-import logging
 import math
-import time
 from pathlib import Path
 from typing import Any, Final
 
@@ -14,10 +12,8 @@ from app.panel.interlock import Interlock
 from app.permission.conditions import permits
 from app.permission.interlocks import interlock_verdict
 from app.robot.state import PassedOver, RobotState, Sample
-from app.ros_logging import RobotLog
 from app.runtime.ingest import Ingest
 from app.transport.inbox import Changes
-from app.view.view import build_view
 from tests.support.builders import BRIDGE, ENABLED, INTERFACES, NOW, Table, robot_there
 
 FILE: Final = """
@@ -205,7 +201,7 @@ def test_a_value_that_only_changes_the_reason_waits_for_the_next_frame(tmp_path:
     panel = load_panel(path)
     robot = robot_there(panel)
     deaf: Any = Deaf()
-    intake = Ingest(panel, robot, deaf, deaf, deaf, None, RobotLog(logging.getLogger("x"), ""))
+    intake = Ingest(panel, robot, deaf, deaf, deaf, None)
     shows: list[float] = []
 
     def take(value: float, *between: float) -> tuple[bool, bool]:
@@ -213,12 +209,10 @@ def test_a_value_that_only_changes_the_reason_waits_for_the_next_frame(tmp_path:
             return INTERFACES.encode("std_msgs/msg/Float64", {"data": one})
 
         passed = tuple(PassedOver(encoded(one), NOW, NOW) for one in between)
-        shown = build_view(panel, robot, time.monotonic()).view["interlocks"]
         sample = Sample(encoded(value), 1, NOW, NOW, BRIDGE, between=passed)
-        news = intake.take(
-            Changes({robot.key(ENABLED): sample}, {}, True), lambda: shown, lambda: shows.append(value)
-        )
-        return news.urgent, news.more
+        *between_two, last = intake.steps(Changes({robot.key(ENABLED): sample}, {}, True))
+        shows.extend(value for _ in between_two)
+        return last.urgent, last.more
 
     assert take(3.0) == (False, True)  # it was waited for: locked then as now
     assert take(3.1) == (False, True)

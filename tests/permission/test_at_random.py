@@ -23,6 +23,7 @@ from app.robot.state import RobotState, Sample
 from tests.support.builders import (
     BOOL,
     BRIDGE,
+    DIALECT,
     ENABLED,
     FROM,
     GUARDED,
@@ -141,7 +142,7 @@ class Panels(RuleBasedStateMachine):
         self.loop = SetLoop()
         self.way = Way()
         self.grounds = Grounds(strict)
-        self.robot = RobotState(self.panel, INTERFACES, KIOSK)
+        self.robot = RobotState(self.panel, INTERFACES, DIALECT, KIOSK)
         self.key = self.robot.key(ENABLED)
         self.calls = ServiceCalls(INTERFACES, self.robot, self.way, lambda: None)
         self.presses = presses_of(

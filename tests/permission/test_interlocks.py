@@ -186,6 +186,7 @@ def test_another_type_on_the_robot_locks(robot: RobotState) -> None:
 
 @pytest.mark.parametrize("age", [2.0, 2.001, 1e6])
 def test_a_permission_that_is_too_old_is_stale(robot: RobotState, age: float) -> None:
+    endpoint(robot, "MP", ENABLED, BOOL)
     verdict = verdict_of(robot, {"max_age_s": 2}, NOW + age)
     assert english((verdict.permitted, verdict.code, verdict.reason)) == (
         False,
@@ -195,6 +196,7 @@ def test_a_permission_that_is_too_old_is_stale(robot: RobotState, age: float) ->
 
 
 def test_a_fresh_permission_says_when_it_ends(robot: RobotState) -> None:
+    endpoint(robot, "MP", ENABLED, BOOL)
     assert verdict_of(robot, {"max_age_s": 2}, NOW + 1.999) == Verdict(True, until=NOW + 2)
 
 
@@ -203,6 +205,7 @@ def test_a_permission_without_an_age_stays(robot: RobotState) -> None:
 
 
 def test_a_new_sample_ends_staleness(robot: RobotState) -> None:
+    endpoint(robot, "MP", ENABLED, BOOL)
     permits(robot, at=NOW + 5)
     assert verdict_of(robot, {"max_age_s": 2}, NOW + 5).permitted
 

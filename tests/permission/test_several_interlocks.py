@@ -54,6 +54,7 @@ def cell(*widgets: Table, **more: Any) -> Panel:
 
 
 def closes(robot: RobotState, closed: bool = True, at: float = NOW) -> None:
+    endpoint(robot, "MP", DOORS, BOOL)
     says(robot, DOORS, closed, BOOL, at=at)
 
 

@@ -23,7 +23,7 @@ from app.recording.directory import RecordingDirectory, name_of
 from app.recording.mcap_file import PRESSES, UNFINISHED, Channel, McapFile
 from app.recording.ring_buffer import COPIED, OVERHEAD, RingBuffer, buffered
 from app.robot.state import RobotState, Sample
-from tests.support.builders import HEARD, INTERFACES, KIOSK, TEXT, panel_of
+from tests.support.builders import DIALECT, HEARD, INTERFACES, KIOSK, TEXT, panel_of
 from tests.support.parts import ROOT
 
 CHANNEL = Channel("/heard", TEXT, "string data\n")
@@ -207,7 +207,7 @@ class Cell:
         self.rules = RecordRules(**{"before_s": 5.0, "after_s": 0.2, "max_mb": 16.0, **rules})
         self.panel = panel_of(HEARD)
         self.recordings = Recordings(folder, self.rules.max_mb, 1)
-        robot = RobotState(self.panel, INTERFACES, KIOSK)
+        robot = RobotState(self.panel, INTERFACES, DIALECT, KIOSK)
         self.recorder = Recorder(self.panel, self.rules, INTERFACES, robot, "", self.recordings)
         self.told = 0
         self.recordings.follow(self._count)

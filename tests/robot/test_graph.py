@@ -5,11 +5,11 @@ from collections.abc import Sized
 
 import pytest
 
-from app.dialect.bridge_dialect import DEMO_VERSION, bridge_token, server_token, token
-from app.dialect.endpoint import TopicRole
+from app.dialect.bridge_dialect import bridge_token, server_token, token
+from app.dialect.endpoint import DEMO_VERSION, TopicRole
 from app.interfaces.names import Qos
 from app.robot.graph import Graph, Route
-from tests.support.builders import BOOL, BRIDGE, KIOSK, TEXT
+from tests.support.builders import BOOL, BRIDGE, DIALECT, KIOSK, TEXT
 
 OTHER_KIOSK = "c2"
 TRIGGER = "std_srvs/srv/Trigger"
@@ -22,13 +22,13 @@ def topic_token(zid: str, role: TopicRole, key: str, type_name: str, qos: Qos | 
 @pytest.fixture
 def graph() -> Graph:
     """A graph with one bridge."""
-    made = Graph(KIOSK)
+    made = Graph(DIALECT, KIOSK)
     made.apply(bridge_token(BRIDGE), True)
     return made
 
 
 def test_a_bridge_comes_and_goes() -> None:
-    graph = Graph(KIOSK)
+    graph = Graph(DIALECT, KIOSK)
     assert graph.apply(bridge_token(BRIDGE), True) == BRIDGE
     assert graph.bridges == {BRIDGE}
     assert graph.apply(bridge_token(BRIDGE), False) == BRIDGE
@@ -41,7 +41,7 @@ def test_a_topics_token_is_no_bridge(graph: Graph) -> None:
 
 
 def test_the_kiosks_own_tokens_do_not_count() -> None:
-    graph = Graph(KIOSK)
+    graph = Graph(DIALECT, KIOSK)
     assert graph.apply(bridge_token(KIOSK), True) is None
     graph.apply(topic_token(KIOSK, "MP", "a", BOOL), True)
     assert graph.bridges == frozenset()
@@ -173,7 +173,7 @@ def test_an_answer_of_who_is_no_bridge_does_not_help(graph: Graph) -> None:
 
 
 def test_without_a_bridge_nothing_is_silent() -> None:
-    graph = Graph()
+    graph = Graph(DIALECT)
     graph.answered({})
     assert not graph.silent
 
@@ -269,7 +269,7 @@ def test_a_token_that_does_not_say_is_no_mismatch(graph: Graph) -> None:
 
 
 def test_a_robots_bridges_are_those_of_its_namespace() -> None:
-    graph = Graph(KIOSK, "/robot1")
+    graph = Graph(DIALECT, KIOSK, "/robot1")
     for zid in ("b1", "b2", "b3"):
         graph.apply(bridge_token(zid), True)
     assert graph.bridges == {"b1", "b2", "b3"}  # nobody has told yet
@@ -284,7 +284,7 @@ def test_a_robots_bridges_are_those_of_its_namespace() -> None:
 
 
 def test_another_robots_silent_bridge_is_not_this_ones_doubt() -> None:
-    graph = Graph(KIOSK, "/robot1")
+    graph = Graph(DIALECT, KIOSK, "/robot1")
     graph.apply(bridge_token("b1"), True)
     graph.configured({"b1": "/robot1"})
     graph.apply(bridge_token("b2"), True)
@@ -313,7 +313,7 @@ def test_of_nodes_that_came_and_went_nothing_is_kept(graph: Graph) -> None:
 
 def test_ten_thousand_nodes_that_the_panel_does_not_name_cost_next_to_nothing() -> None:
     """They come at once, when a bridge is joined that has them behind it."""
-    graph = Graph(KIOSK, keys=["a"])
+    graph = Graph(DIALECT, KIOSK, keys=["a"])
     others = [topic_token(BRIDGE, "MP", f"some/topic{number}", TEXT) for number in range(10_000)]
     began = time.thread_time()
     for one in others:

@@ -1,7 +1,6 @@
 """A publisher of a permission that appears and says nothing: what was said before is a doubt."""
 
 import asyncio
-import logging
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -18,10 +17,8 @@ from app.interfaces.names import Qos
 from app.permission.interlocks import Verdict, interlock_verdict
 from app.robot.silent_publishers import BEFORE_LATCHED_S, BEFORE_S, SilentPublishers
 from app.robot.state import RobotState
-from app.ros_logging import RobotLog
 from app.runtime.ingest import Ingest
 from app.transport.inbox import Inbox
-from app.view.kinds import Enabled
 from tests.support.builders import (
     BOOL,
     BRIDGE,
@@ -38,7 +35,6 @@ KEY = ENABLED[1:]
 OTHER = "b2"
 TRUE, FALSE = b"\0\1\0\0\1", b"\0\1\0\0\0"
 PUBLISHER = Endpoint(BRIDGE, "MP", KEY, BOOL)
-SHOWN: dict[str, Enabled] = {"operation": {"enabled": False, "reason": None}}
 
 
 @pytest.fixture
@@ -152,7 +148,8 @@ class Incoming:
 
     @property
     def verdict(self) -> Verdict:
-        self.intake.take(self.inbox.drain(), lambda: SHOWN, lambda: None)
+        for _ in self.intake.steps(self.inbox.drain()):
+            pass
         (interlock,) = small_panel().interlocks
         return interlock_verdict(interlock, self.robot, 1e9)
 
@@ -184,7 +181,6 @@ async def made() -> Incoming:
         Confirmations(robot, lambda: None),
         ParameterSync(panel, INTERFACES, robot, nobody, calls, lambda: None),
         None,
-        RobotLog(logging.getLogger("test"), ""),
     )
     return Incoming(inbox, intake, robot)
 

@@ -10,6 +10,7 @@ from app.robot.state import UNREADABLE_LOG_S, RobotState, Sample
 from tests.support.builders import (
     BOOL,
     BRIDGE,
+    DIALECT,
     ENABLED,
     INTERFACES,
     KIOSK,
@@ -163,7 +164,7 @@ def test_what_is_logged_of_one_of_several_robots_begins_with_its_name(
 ) -> None:
     panel = small_panel()
     entry = RobotEntry(id="r1", name="Robot 1", namespace="/r1")
-    robot = RobotState(panel, INTERFACES, KIOSK, entry)
+    robot = RobotState(panel, INTERFACES, DIALECT, KIOSK, entry)
     robot.take("r1/heard", Sample(b"broken", 1, NOW, NOW, BRIDGE))
     robot.reading("/heard")
     (record,) = caplog.records

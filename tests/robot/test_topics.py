@@ -17,6 +17,7 @@ from app.robot.topics import UNREAD_MOST
 from app.view.view import build_view
 from tests.support.builders import (
     BRIDGE,
+    DIALECT,
     ENABLED,
     FREE,
     HEARD,
@@ -57,7 +58,7 @@ class Cell:
 
     def __init__(self, *widgets: Table, interlock: Table = LEVEL) -> None:
         self.panel: Panel = panel_of(*(widgets or (MESSAGE, FREE, SHOWN)), interlock=interlock)
-        self.robot = RobotState(self.panel, INTERFACES, KIOSK, None, Slices(Clock()))
+        self.robot = RobotState(self.panel, INTERFACES, DIALECT, KIOSK, None, Slices(Clock()))
         self.robot.link_up, self.robot.settled_at = True, 0.0
         self.robot.graph.apply(f"@/{BRIDGE}/@ros2_lv", True)
         self.read: list[tuple[str, Any]] = []
@@ -234,7 +235,7 @@ def test_ten_megabytes_of_anything_hold_up_nothing(kind: str) -> None:
     large = KINDS[kind](TEN_MB)
     assert len(large.data) > 0.99 * TEN_MB
     panel = panel_of({**HEARD, "type": large.type, "field": large.path})
-    robot = RobotState(panel, INTERFACES, KIOSK)
+    robot = RobotState(panel, INTERFACES, DIALECT, KIOSK)
     robot.take("heard", Sample(large.data, 1, NOW, NOW, None))
 
     def is_read() -> bool:
@@ -250,7 +251,7 @@ def test_ten_megabytes_of_anything_hold_up_nothing(kind: str) -> None:
 def test_ten_megabytes_of_garbage_hold_up_nothing() -> None:
     large = garbage(TEN_MB)
     panel = panel_of({**HEARD, "type": large.type, "field": large.path})
-    robot = RobotState(panel, INTERFACES, KIOSK)
+    robot = RobotState(panel, INTERFACES, DIALECT, KIOSK)
     robot.take("heard", Sample(large.data, 1, NOW, NOW, None))
 
     async def test() -> None:

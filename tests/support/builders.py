@@ -14,6 +14,7 @@ from app.commands.presses import Presses
 from app.commands.receipts import PressContext
 from app.commands.service_calls import Asker, ServiceCalls
 from app.dialect import bridge_dialect
+from app.dialect.bridge_dialect import BridgeDialect
 from app.dialect.endpoint import TopicRole
 from app.errors import PanelError
 from app.interfaces import interfaces_of
@@ -24,6 +25,7 @@ from app.robot.state import RobotState, Sample
 Table = Mapping[str, Any]
 
 INTERFACES: Final = interfaces_of("jazzy")
+DIALECT: Final = BridgeDialect()
 BOOL: Final = "std_msgs/msg/Bool"
 TEXT: Final = "std_msgs/msg/String"
 BRIDGE: Final = "b1"
@@ -82,7 +84,7 @@ def small_panel(interlock: Table = NOTHING, **more: Any) -> Panel:
 
 def robot_there(panel: Panel) -> RobotState:
     """A robot that commands can reach: a link, a bridge, joined; it has said nothing yet."""
-    robot = RobotState(panel, INTERFACES, KIOSK)
+    robot = RobotState(panel, INTERFACES, DIALECT, KIOSK)
     robot.link_up = True
     robot.settled_at = 0.0
     robot.graph.apply(bridge_dialect.bridge_token(BRIDGE), True)

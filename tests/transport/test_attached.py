@@ -10,14 +10,18 @@ import zenoh
 from zenoh.handlers import Callback
 
 from app.transport import zenoh_session
-from app.transport.zenoh_session import attach, config_to
+from app.transport.zenoh_config import config_to
+from app.transport.zenoh_session import attach
 from tests.support.parts import ROOT, until
 
 LEAVING = """
 import sys
-from app.transport.zenoh_session import Link, config_to
-link = Link(config_to(sys.argv[1]), lambda _: None)
-link.start(["a"], [])
+from app.dialect.bridge_dialect import BridgeDialect
+from app.transport.declarations import Declarations
+from app.transport.zenoh_config import config_to
+from app.transport.zenoh_session import ZenohSession
+link = ZenohSession(config_to(sys.argv[1]), lambda _: None, BridgeDialect())
+link.start(Declarations(subscribe={"a": "a"}))
 while not link.drain().samples:
     pass
 """

@@ -3,9 +3,9 @@
 import pytest
 
 from app.dialect import bridge_dialect
-from app.dialect.bridge_dialect import key_of, parsed, token
+from app.dialect.bridge_dialect import parsed, token
 from app.dialect.endpoint import Endpoint, ServerRole, TopicRole
-from app.interfaces.names import MESSAGE_TYPE, NAMESPACE, NO_TYPE, ROSOUT, TOPIC, Qos, type_in
+from app.interfaces.names import MESSAGE_TYPE, NAMESPACE, NO_TYPE, ROSOUT, TOPIC, Qos, key_of, type_in
 from tests.support.builders import BOOL, TEXT
 
 HASH = "RIHS01_0"

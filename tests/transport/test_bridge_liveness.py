@@ -231,7 +231,7 @@ def test_a_press_is_published_when_the_bridge_has_answered_after_it() -> None:
         line.answers = False
         told_so = await press("p2")
         assert told_so.startswith("unknown: Sent on /free")
-        assert "has not answered since" in told_so
+        assert "has not responded since" in told_so
 
     run(test)
 

@@ -21,7 +21,10 @@ from app.dialect import bridge_dialect
 from app.errors import SettingsError
 from app.interfaces.names import Qos
 from app.robot.state import Sample
-from app.transport.zenoh_session import BLOCKED_MOST_US, ZenohSession, config_from, config_to
+from app.transport.declarations import Declarations
+from app.transport.zenoh_config import BLOCKED_MOST_US, config_from, config_to
+from app.transport.zenoh_session import ZenohSession
+from tests.support.builders import DIALECT
 from tests.support.parts import free_port, until
 
 RENEWALS = 30
@@ -37,6 +40,12 @@ def matched(publisher: zenoh.Publisher) -> bool:
 def resident_kb() -> int:
     status = Path("/proc/self/status").read_text()
     return next(int(line.split()[1]) for line in status.splitlines() if line.startswith("VmRSS"))
+
+
+def declared(subscribe: list[str], publish: list[str], **more: Any) -> Declarations:
+    """By keys that are their own key expressions."""
+    topics, own = dict(zip(subscribe, subscribe, strict=True)), dict(zip(publish, publish, strict=True))
+    return Declarations(subscribe=topics, publish=own, query=own, **more)
 
 
 def tokens(zid: str, count: int) -> list[str]:
@@ -73,7 +82,7 @@ def test_a_configuration_that_can_not_be_used_is_told_in_the_users_terms(
 def test_a_link_tells_where_it_connects(connect: str, endpoints: tuple[str, ...]) -> None:
     config = config_to("tcp/127.0.0.1:9")
     config.insert_json5("connect/endpoints", connect)
-    link = ZenohSession(config, lambda _: None)
+    link = ZenohSession(config, lambda _: None, DIALECT)
     assert link.endpoints == endpoints
     link.close()
 
@@ -91,8 +100,8 @@ def test_a_session_is_renewed_in_the_middle_of_what_comes_in(
             for token in held:
                 token.undeclare()
 
-    link = ZenohSession(config_to(endpoint), lambda _: None)
-    link.start(["a"], ["b"])
+    link = ZenohSession(config_to(endpoint), lambda _: None, DIALECT)
+    link.start(declared(["a"], ["b"]))
 
     def renew() -> None:
         for _ in range(RENEWALS):
@@ -120,8 +129,8 @@ def test_a_burst_is_not_dropped(peer: tuple[str, zenoh.Session]) -> None:
         heard.append(bytes(sample.payload))
 
     session.declare_subscriber("b", Callback(hear, indirect=False))
-    link = ZenohSession(config_to(endpoint), lambda _: None)
-    link.start([], ["b"])
+    link = ZenohSession(config_to(endpoint), lambda _: None, DIALECT)
+    link.start(declared([], ["b"]))
     until(lambda: link.heard("b"), "the subscriber is known")
     for number in range(BURST):
         link.put("b", str(number).encode())
@@ -149,8 +158,8 @@ def test_a_link_that_takes_nothing_stops_the_loop_once_and_not_for_long() -> Non
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as peer:
         assert peer.stdout is not None
         assert peer.stdout.readline() == b"ready\n"
-        link = ZenohSession(config_to(endpoint), lambda urgent: None)
-        link.start([], ["b"])
+        link = ZenohSession(config_to(endpoint), lambda urgent: None, DIALECT)
+        link.start(declared([], ["b"]))
         until(lambda: link.heard("b"), "the subscriber is known")
         peer.send_signal(signal.SIGSTOP)
         took = []
@@ -175,8 +184,8 @@ async def asked(link: ZenohSession) -> None:
 
 def test_nothing_is_left_of_the_sessions_that_were(peer: tuple[str, zenoh.Session]) -> None:
     """Zenoh kept a shared memory segment of each: a thousand losses of the link, and no file more."""
-    link = ZenohSession(config_to(peer[0]), lambda _: None)
-    link.start(["a"], ["b"])
+    link = ZenohSession(config_to(peer[0]), lambda _: None, DIALECT)
+    link.start(declared(["a"], ["b"]))
 
     def files() -> int:
         return len(list(Path("/proc/self/fd").iterdir()))
@@ -194,8 +203,8 @@ def test_tokens_are_held_by_the_new_session_when_they_are_wanted_again(
     peer: tuple[str, zenoh.Session],
 ) -> None:
     endpoint, session = peer
-    link = ZenohSession(config_to(endpoint), lambda _: None)
-    link.start([], [])
+    link = ZenohSession(config_to(endpoint), lambda _: None, DIALECT)
+    link.start(declared([], []))
     link.hold(tokens(link.zid, 1))
     link.renew()
     wanted = tokens(link.zid, 2)
@@ -213,8 +222,8 @@ def test_of_a_watched_topic_what_came_and_went_between_two_drains_is_kept(
     peer: tuple[str, zenoh.Session],
 ) -> None:
     endpoint, session = peer
-    link = ZenohSession(config_to(endpoint), lambda _: None)
-    link.start(["a", "b"], [], watched=["a"])
+    link = ZenohSession(config_to(endpoint), lambda _: None, DIALECT)
+    link.start(declared(["a", "b"], [], watched=["a"]))
     until(lambda: link.drain().link_up, "a link")
     said = [b"yes", b"no", b"no", b"yes", *(b"%d" % n for n in range(100)), b"yes"]
     for key in ("a", "b"):
@@ -238,8 +247,8 @@ def test_a_stamp_of_a_clock_that_is_ahead_makes_the_link_deaf_to_nothing(
     peer: tuple[str, zenoh.Session],
 ) -> None:
     endpoint, session = peer
-    link = ZenohSession(config_to(endpoint), lambda _: None)
-    link.start(["a"], [], watched=["a"])
+    link = ZenohSession(config_to(endpoint), lambda _: None, DIALECT)
+    link.start(declared(["a"], [], watched=["a"]))
     until(partial(matched, publisher := session.declare_publisher("a")), "it is subscribed")
     own = session.new_timestamp().get_id()
     now = datetime.now(UTC)
@@ -267,8 +276,8 @@ def test_a_late_link_gets_the_last_value_of_a_cache_and_nothing_older_than_what_
     )
     latched.put(b"old")
     latched.put(b"last")
-    link = ZenohSession(config_to(endpoint), lambda _: None)
-    link.start(["a"], [])
+    link = ZenohSession(config_to(endpoint), lambda _: None, DIALECT)
+    link.start(declared(["a"], []))
     heard: list[bytes] = []
 
     def came(payload: bytes) -> bool:
@@ -295,8 +304,8 @@ def test_a_small_message_does_not_keep_all_that_it_was_read_with(
     """The latest of each topic stays for long: each kept a buffer of 64 kB, of which some was used."""
     endpoint, session = peer
     topics = [f"topic{number}" for number in range(300)]
-    link = ZenohSession(config_to(endpoint), lambda _: None)
-    link.start(topics, [])
+    link = ZenohSession(config_to(endpoint), lambda _: None, DIALECT)
+    link.start(declared(topics, []))
     until(lambda: link.drain().link_up, "a link")
     before = resident_kb()
     kept: dict[str, Sample] = {}

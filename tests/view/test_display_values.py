@@ -10,7 +10,7 @@ from app.clock import format_time
 from app.panel import load_panel
 from app.robot.state import RobotState, Sample
 from app.view.view import build_view
-from tests.support.builders import BRIDGE, HEARD, INTERFACES, NOW, panel_of, robot_there
+from tests.support.builders import BRIDGE, DIALECT, HEARD, INTERFACES, NOW, panel_of, robot_there
 from tests.support.words import english
 
 AT = f"received {format_time(NOW)}"
@@ -232,6 +232,6 @@ def test_a_lamp_that_can_not_be_read_says_so() -> None:
 
 def test_time_changes_a_lamp() -> None:
     panel = panel_of({**LAMP, "type": "std_msgs/msg/UInt8", "max_age_s": 5.0})
-    robot = RobotState(panel, INTERFACES)
+    robot = RobotState(panel, INTERFACES, DIALECT)
     robot.take("heard", Sample(INTERFACES.encode("std_msgs/msg/UInt8", {"data": 0}), 1, NOW, NOW, None))
     assert build_view(panel, robot, NOW).until == NOW + 5

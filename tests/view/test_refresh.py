@@ -14,7 +14,7 @@ from app.panel.widgets.families import Display
 from app.permission.control_authority import ControlAuthority
 from app.robot.state import RobotState, Sample
 from app.view.publisher import ViewPublisher
-from app.view.refresh import NoOtherRobots, ViewRefresher
+from app.view.refresh import NoOtherRobots, ViewRefresher, ViewSources
 from app.view.view import ViewWithDeadlines, build_view, update_displays
 from tests.support.builders import (
     BOOL,
@@ -89,17 +89,7 @@ def test_a_frame_of_values_is_what_a_look_at_everything_would_show(story: list[S
 
 def showing_of(panel: Panel, robot: RobotState) -> ViewRefresher:
     control = ControlAuthority(panel.control, "", tell=lambda *_: None)
-    return ViewRefresher(
-        panel,
-        robot,
-        "r1",
-        control,
-        NullLog(),
-        NoOtherRobots(),
-        before=lambda: None,
-        recordings_fault=lambda: "",
-        simulated=False,
-    )
+    return ViewRefresher(panel, robot, "r1", ViewSources(control, NullLog(), NoOtherRobots()))
 
 
 async def newer(publisher: ViewPublisher, version: int) -> None:

@@ -7,13 +7,15 @@ from typing import Any
 import pytest
 
 from app.clock import format_time
-from app.dialect.bridge_dialect import DEMO_VERSION, bridge_token, server_token
+from app.dialect.bridge_dialect import bridge_token, server_token
+from app.dialect.endpoint import DEMO_VERSION
 from app.robot.state import RobotState, Sample
 from app.view.display_values import LONGEST_TEXT, readout, written
 from app.view.view import View, build_view
 from tests.support.builders import (
     BOOL,
     BRIDGE,
+    DIALECT,
     ENABLED,
     HEARD,
     INTERFACES,
@@ -85,7 +87,7 @@ def test_a_demo_robot_behind_a_live_panel_shows_the_banner_too(robot: RobotState
 
 
 def test_the_banner_of_a_demo_is_there_while_nothing_is_connected() -> None:
-    view = view_of(RobotState(PANEL, INTERFACES), simulated=True)
+    view = view_of(RobotState(PANEL, INTERFACES, DIALECT), simulated=True)
     assert english(view["notice"]["banner"]) == "SIMULATED ROBOT"
 
 
@@ -280,6 +282,7 @@ def test_a_value_is_written_as_text(value: Any, text: str) -> None:
 
 def test_the_view_changes_when_the_first_of_its_times_comes(robot: RobotState) -> None:
     panel = panel_of({**HEARD, "max_age_s": 9}, interlock={"max_age_s": 2})
+    endpoint(robot, "MP", ENABLED, BOOL)
     permits(robot, at=NOW)
     says(robot, "/heard", "hello", at=NOW)
     assert build_view(panel, robot, NOW + 1).until == NOW + 2

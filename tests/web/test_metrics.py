@@ -10,7 +10,7 @@ from app.dialect.bridge_dialect import bridge_token
 from app.robot.state import Sample
 from app.runtime.fleet import Fleet
 from app.runtime.robot_session import RobotSession
-from app.transport.zenoh_session import config_to
+from app.transport.zenoh_config import config_to
 from app.web.metrics import Metrics
 from app.web.prometheus import exposition
 from tests.support.builders import BRIDGE, small_panel

@@ -15,6 +15,7 @@ from app.commands.service_calls import CUT_NEWS_S, Asker
 from app.errors import DecodeError
 from app.i18n import Text, joined, say
 from app.interfaces import Fields, Interfaces
+from app.interfaces.names import of_action
 from app.panel.template import PLACE
 from app.panel.widgets.service_action import Action
 from app.robot.command_status import Outcome
@@ -66,7 +67,7 @@ class ActionClient:
         return self._ask(goal.widget, "get_result", payload, timeout_s)
 
     def _ask(self, widget: Action, service: str, payload: bytes, timeout_s: float) -> Query:
-        key = f"{self._robot.key(widget.action)}/_action/{service}"
+        key = of_action(self._robot.key(widget.action), service)
         return self._link.query(key, payload, timeout_s)
 
     async def reply(self, goal: Goal, query: Query) -> bytes | None:

@@ -15,10 +15,9 @@ from app.commands.actions.client import CANCEL, NO_SUCH_GOAL, ActionClient
 from app.commands.actions.goal import ACCEPTED, CANCELING, EXECUTING, FEEDBACK, UNKNOWN, Goal, goal_id
 from app.commands.actions.results import ResultWaiter
 from app.commands.service_calls import MOST_UNANSWERED, Asker
-from app.dialect import bridge_dialect
 from app.errors import DecodeError
 from app.i18n import TextLike, say
-from app.interfaces import Fields, Interfaces
+from app.interfaces import Fields, Interfaces, names
 from app.panel.template import PLACE
 from app.panel.widgets.service_action import Action
 from app.robot.command_status import IDLE, CommandStatus, LastLook, OnCorrection, Outcome, no_look
@@ -186,7 +185,7 @@ class GoalTracker:
                 watched=False,
                 unreadable=partial(
                     self._robot.count_unreadable,
-                    bridge_dialect.feedback(self._robot.key(widget.action)),
+                    names.feedback(self._robot.key(widget.action)),
                 ),
                 read_later=partial(self._hear_later, widget.id),
             )
@@ -199,7 +198,7 @@ class GoalTracker:
         goals = {goal.id.bytes: goal for goal in self._of(action)}
         if not goals:
             return
-        message = self._heard(bridge_dialect.status(self._robot.key(action)), STATUS, sample)
+        message = self._heard(names.status(self._robot.key(action)), STATUS, sample)
         for one in () if message is None else message.status_list:
             goal = goals.get(bytes(one.goal_info.goal_id.uuid))
             if goal is not None and goal.advance(one.status):

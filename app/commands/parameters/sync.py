@@ -20,7 +20,7 @@ from app.commands.parameters.client import NoAnswer, ParameterClient
 from app.commands.parameters.values import checked
 from app.commands.service_calls import LONGEST_SAID, Asker, Request, ServiceCalls, with_reply
 from app.concurrency import spawn_logged
-from app.dialect import bridge_dialect
+from app.dialect.endpoint import Endpoint
 from app.errors import DecodeError
 from app.i18n import TextLike, say
 from app.interfaces import Fields, Interfaces, text_of
@@ -97,10 +97,8 @@ class ParameterSync:
 
     # What the graph shows.
 
-    def lose(self, token_key: str) -> None:
-        """A token ended, be it for a moment: its node may be another one now."""
-        if (endpoint := bridge_dialect.parsed(token_key)) is None:
-            return
+    def lose(self, endpoint: Endpoint) -> None:
+        """An endpoint's token ended, be it for a moment: its node may be another one now."""
         if endpoint.role is None:
             for node in self._nodes.values():
                 self._cut(node)

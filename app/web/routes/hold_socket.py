@@ -258,7 +258,7 @@ class _HoldSocket:
     async def _tell(self) -> None:
         """The end, as soon as it is there, whatever ended it; then the browser may close."""
         receipt = await asyncio.shield(self._ended)
-        if receipt.outcome != "unknown" and not await self._session.reached():
+        if receipt.outcome != "unknown" and not await self._session.peer.flushed():
             receipt = self._session.holds.doubted(receipt)
         self._receipt = receipt = await self._closed(receipt)
         with suppress(WebSocketDisconnect, RuntimeError):

@@ -28,7 +28,9 @@ async def sizes(request: Request) -> dict[str, int]:
     kiosk = site_of(request).fleet.first
     gc.collect()
     held = {"objects": len(gc.get_objects()), "tasks": len(asyncio.all_tasks())}
-    parts = [one for one in vars(kiosk).values() if type(one).__module__.startswith("app.")]
+    wholes = (kiosk, kiosk._commands, kiosk.peer)
+    held_by = [part for whole in wholes for part in vars(whole).values()]
+    parts = [one for one in held_by if type(one).__module__.startswith("app.")]
     for part in (kiosk, *parts, kiosk.link._inbox, kiosk.robot.graph, kiosk.presses._receipts):
         held |= {f"{type(part).__name__}.{name}": len(one) for name, one in sized(part)}
     return held

@@ -10,19 +10,15 @@ import asyncio
 import logging
 import math
 import time
-from collections.abc import Callable
 from contextlib import suppress
 from typing import Final
 
 from app.concurrency import spawn_logged
 from app.errors import LinkError
-from app.interfaces import Interfaces
-from app.panel.model import Panel
-from app.robot.state import RobotState
 from app.ros_logging import RobotLog
 from app.transport.bridge_admin import BridgeAdmin
 from app.transport.liveliness_tokens import LivelinessTokens
-from app.transport.zenoh_session import ZenohSession
+from app.transport.peer import RobotContext
 
 log = logging.getLogger("kiosk.joining")
 
@@ -39,24 +35,14 @@ UNHEARD_ALLOWED: Final = 3  # askings that find a topic without its reader
 class GraphMembership:
     """Holds the panel's tokens while a bridge is there, and asks the bridges how they are."""
 
-    def __init__(
-        self,
-        panel: Panel,
-        interfaces: Interfaces,
-        robot: RobotState,
-        link: ZenohSession,
-        show: Callable[[], None],
-        renew: Callable[[], None],
-    ) -> None:
-        """`show` is called when what is known has changed; `renew` opens a new session."""
-        self._panel = panel
-        self._robot = robot
-        self._log = RobotLog(log, robot.name)
-        self._link = link
-        self._show = show
-        self._renew = renew
-        self._bridges = BridgeAdmin(robot, link)
-        self._tokens = LivelinessTokens(panel, interfaces, robot)
+    def __init__(self, context: RobotContext) -> None:
+        self._context = context
+        self._panel = context.panel
+        self._robot = context.robot
+        self._log = RobotLog(log, self._robot.name)
+        self._link = context.link
+        self._bridges = BridgeAdmin(self._robot, self._link)
+        self._tokens = LivelinessTokens(self._panel, context.interfaces, self._robot)
         self._unheard = 0
         self._started_at = time.monotonic()
         self._joining: asyncio.Task[None] | None = None
@@ -123,7 +109,7 @@ class GraphMembership:
         await self._ask_until_answered()
         self._robot.settled_at = time.monotonic()
         self._log.info("joined the robot's topics")
-        self._show()
+        self._context.changed()
 
     async def _settle(self) -> None:
         """Until the routes carry the first message: whom the graph shows as a listener is heard of."""
@@ -151,7 +137,7 @@ class GraphMembership:
                     return
             except LinkError as error:
                 self._log.warning("%s", error)
-            self._show()
+            self._context.changed()
             await asyncio.sleep(ASK_AGAIN_S)
 
     async def _ask_regularly(self) -> None:
@@ -168,7 +154,7 @@ class GraphMembership:
                         self._reopen_session()
                 except LinkError as error:
                     self._log.warning("%s", error)
-                self._show()
+                self._context.changed()
 
     def _reopen_session(self) -> None:
         """A bridge that does not read a topic for this session does so for a new one."""
@@ -178,7 +164,7 @@ class GraphMembership:
         if self._unheard >= UNHEARD_ALLOWED:
             self._unheard = 0
             self._log.error("the bridge does not pass on %s: a new session", ", ".join(lost))
-            self._renew()
+            self._context.reopen()
 
     async def _pause(self, longest_s: float) -> None:
         """Until it is time to ask, or a moment after the graph has changed."""

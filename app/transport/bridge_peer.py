@@ -1,0 +1,56 @@
+"""The `Peer` of a robot behind zenoh-bridge-ros2dds: of several bridges, if it has several."""
+
+import logging
+from collections.abc import Iterable
+from typing import Final
+
+from app.dialect.bridge_dialect import BridgeDialect
+from app.ros_logging import RobotLog
+from app.transport.bridge_join import GraphMembership
+from app.transport.bridge_liveness import BridgeLiveness
+from app.transport.peer import RobotAccess, RobotContext
+from app.transport.readiness import WITHIN_S, CoalescedQuery
+
+log = logging.getLogger("kiosk.bridge")
+
+
+class BridgePeer:
+    """The bridges of one robot: joined, watched, queried."""
+
+    def __init__(self, context: RobotContext) -> None:
+        self._log = RobotLog(log, context.robot.name)
+        self._membership = GraphMembership(context)
+        self._liveness = BridgeLiveness(context.robot, context.link, context.changed)
+        self._readiness = CoalescedQuery(lambda: self._membership.answered(WITHIN_S))
+
+    def start(self) -> None:
+        self._membership.start()
+        self._liveness.start()
+
+    async def stop(self) -> None:
+        await self._readiness.stop()
+        await self._liveness.stop()
+        await self._membership.stop()
+
+    def found(self, zids: Iterable[str]) -> None:
+        for zid in zids:
+            self._log.info("bridge %s found", zid)
+
+    def lost(self, zids: Iterable[str]) -> None:
+        for zid in zids:
+            self._log.warning("bridge %s lost", zid)
+
+    def follow(self, came: bool) -> None:
+        self._membership.follow(came)
+
+    def look(self) -> None:
+        self._liveness.look()
+
+    async def flushed(self) -> bool:
+        return await self._liveness.flushed()
+
+    async def answers(self) -> bool:
+        return await self._readiness.answers()
+
+
+BRIDGE: Final = RobotAccess(BridgeDialect(), BridgePeer)

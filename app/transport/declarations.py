@@ -1,0 +1,70 @@
+"""What a session subscribes to, publishes and queries: the panel's keys → Zenoh key expressions."""
+
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Final
+
+from app.interfaces import Interfaces
+from app.interfaces.names import ROSOUT_TOPIC, feedback, of_action, status
+from app.panel.model import Panel
+from app.panel.widgets.parameter import DESCRIBE, GET, SET
+from app.panel.widgets.service_action import Call
+from app.robot.state import RobotState
+from app.transport.inbox import NO_KEYS
+from app.transport.rosout import LOG_TYPE
+
+Named = Iterator[tuple[str, str]]  # (key, type)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Declarations:
+    """Key → key expression of each topic that is subscribed to or published, and of each service that
+    is queried. What is `prompt`, `watched` and `whole` of the topics, the inbox says."""
+
+    subscribe: Mapping[str, str] = field(default_factory=dict)
+    publish: Mapping[str, str] = field(default_factory=dict)
+    query: Mapping[str, str] = field(default_factory=dict)
+    prompt: Collection[str] = NO_KEYS
+    watched: Collection[str] = NO_KEYS
+    whole: Collection[str] = NO_KEYS
+
+
+NOTHING: Final = Declarations()
+
+
+def declarations(panel: Panel, interfaces: Interfaces, robot: RobotState) -> Declarations:
+    """All that a panel has to do with on one robot."""
+    topic, service = robot.dialect.topic, robot.dialect.service
+    return Declarations(
+        subscribe={key: topic(key, name) for key, name in _subscribed(panel, interfaces, robot)},
+        publish={key: topic(key, name) for key, name in _published(panel, robot)},
+        query={key: service(key, name) for key, name in _queried(panel, interfaces, robot)},
+    )
+
+
+def _subscribed(panel: Panel, interfaces: Interfaces, robot: RobotState) -> Named:
+    for topic, name in panel.subscriptions().items():
+        yield robot.key(topic), name
+    for action, name in panel.actions().items():
+        types = interfaces.action(name)
+        yield feedback(robot.key(action)), types.feedback_message
+        yield status(robot.key(action)), types.status
+
+
+def _published(panel: Panel, robot: RobotState) -> Named:
+    for topic, name in {**panel.publications(), ROSOUT_TOPIC: LOG_TYPE}.items():
+        yield robot.key(topic), name
+
+
+def _queried(panel: Panel, interfaces: Interfaces, robot: RobotState) -> Named:
+    for widget in panel.widgets():
+        if isinstance(widget, Call):
+            yield robot.key(widget.service), widget.type
+    for action, name in panel.actions().items():
+        types, key = interfaces.action(name), robot.key(action)
+        yield of_action(key, "send_goal"), types.send_goal
+        yield of_action(key, "cancel_goal"), types.cancel_goal
+        yield of_action(key, "get_result"), types.get_result
+    for node in {widget.node for widget in panel.parameters()}:
+        for service, name in (GET, DESCRIBE, SET):
+            yield robot.key(f"{node}/{service}"), name

@@ -1,0 +1,192 @@
+"""A robot without a bridge: another dialect and another peer, on real Zenoh, and the same panel."""
+
+import asyncio
+import time
+from collections.abc import Callable, Iterable
+from functools import partial
+from typing import Any
+
+import zenoh
+from zenoh.handlers import Callback
+
+from app.audit import NullLog
+from app.dialect.endpoint import Endpoint, OwnEndpoint, Role
+from app.interfaces.names import Qos
+from app.runtime.robot_session import RobotSession, ServerParts
+from app.transport.peer import RobotAccess, RobotContext
+from app.transport.zenoh_config import config_to
+from tests.support.builders import BOOL, ENABLED, FROM, GUARDED, HEARD, INTERFACES, MESSAGE, panel_of
+
+TRIGGER = "std_srvs/srv/Trigger"
+CALL = {"id": "reset", "kind": "call", "label": "Reset", "service": "/reset", "type": TRIGGER}
+PANEL = panel_of(MESSAGE, {**GUARDED, "id": "go", "topic": "/go"}, HEARD, CALL)
+ROLES: dict[str, Role] = {"MP": "MP", "MS": "MS", "SS": "SS"}
+
+
+class TinyDialect:
+    """Key expressions with their types, and messages with their numbers: as a robot's own nodes have
+    them, but shorter."""
+
+    tokens = "tiny/*/**"
+
+    def topic(self, key: str, type_name: str) -> str:
+        return f"7/{key}/{type_name.replace('/', '::')}/*"
+
+    def service(self, key: str, type_name: str) -> str:
+        return self.topic(key, type_name)
+
+    def attachment(self, zid: str, expression: str, number: int, at_ns: int) -> bytes | None:
+        return b"%d of %s" % (number, zid.encode())
+
+    def own_tokens(self, zid: str, endpoints: Iterable[OwnEndpoint]) -> list[str]:
+        topics = (self.token(zid, one.role, one.key, one.type) for one in endpoints)
+        return [f"tiny/{zid}/node", *topics]
+
+    def token(self, zid: str, role: str, key: str, type_name: str) -> str:
+        return f"tiny/{zid}/{role}/{key.replace('/', '%')}/{type_name.replace('/', '%')}"
+
+    def endpoint(self, token: str) -> Endpoint | None:
+        _, zid, role, *what = token.split("/")
+        if role == "node":
+            return Endpoint(zid)
+        key, type_name = (one.replace("%", "/") for one in what)
+        return Endpoint(zid, ROLES[role], key, type_name) if role in ROLES else None
+
+    def name_in(self, token: str) -> str:
+        parts = token.split("/")
+        return parts[3] if len(parts) > 3 else ""
+
+    def in_token(self, key: str) -> str:
+        return key.replace("/", "%")
+
+
+class TinyPeer:
+    """Of a robot whose nodes are its peers: joined as soon as one is there."""
+
+    def __init__(self, context: RobotContext) -> None:
+        self._context = context
+        self.said: list[str] = []
+
+    def start(self) -> None: ...
+
+    async def stop(self) -> None: ...
+
+    def found(self, zids: Iterable[str]) -> None:
+        self.said += [f"found {zid}" for zid in zids]
+
+    def lost(self, zids: Iterable[str]) -> None:
+        self.said += [f"lost {zid}" for zid in zids]
+
+    def follow(self, came: bool) -> None:
+        robot, link = self._context.robot, self._context.link
+        if came:
+            own = OwnEndpoint("MP", robot.key("/go"), "std_msgs/msg/String", Qos())
+            link.hold(robot.dialect.own_tokens(link.zid, [own]))
+            robot.settled_at = time.monotonic()
+
+    def look(self) -> None: ...
+
+    async def flushed(self) -> bool:
+        return True
+
+    async def answers(self) -> bool:
+        return True
+
+
+class TinyRobot:
+    """A node on Zenoh that permits, listens to `/go` and serves `/reset`."""
+
+    def __init__(self, session: zenoh.Session) -> None:
+        self._session = session
+        self.zid = str(session.zid())
+        self.heard: list[tuple[str, bytes]] = []
+        self.asked: list[bytes] = []
+        self._declared: list[Any] = [
+            session.declare_subscriber(
+                "7/go/std_msgs::msg::String/h1", Callback(self._hear, indirect=False)
+            ),
+            session.declare_queryable(
+                "7/reset/std_srvs::srv::Trigger/h2",
+                Callback(self._serve, indirect=False),
+                complete=True,
+            ),
+        ]
+
+    def appear(self) -> None:
+        tiny, declare = TinyDialect(), self._session.liveliness().declare_token
+        own = [("MP", "operation_enabled", BOOL), ("SS", "reset", TRIGGER)]
+        self._declared += [declare(tiny.token(self.zid, *one)) for one in own]
+        self._declared.append(declare(f"tiny/{self.zid}/node"))
+
+    def say(self, permitted: bool) -> bool:
+        payload = INTERFACES.encode(BOOL, {"data": permitted})
+        self._session.put("7/operation_enabled/std_msgs::msg::Bool/h3", payload)
+        return permitted
+
+    def has_heard(self, number: int) -> bool:
+        return len(self.heard) == number
+
+    def nodes(self) -> set[str]:
+        """All tokens that are there."""
+        replies = self._session.liveliness().get("tiny/**", timeout=2)
+        return {str(one.ok.key_expr) for one in replies if one.ok is not None}
+
+    def _hear(self, sample: zenoh.Sample) -> None:
+        text = INTERFACES.decode("std_msgs/msg/String", sample.payload.to_bytes()).data
+        assert sample.attachment is not None
+        self.heard.append((text, sample.attachment.to_bytes()))
+
+    def _serve(self, query: zenoh.Query) -> None:
+        with query:
+            assert query.attachment is not None
+            self.asked.append(query.attachment.to_bytes())
+            answer = INTERFACES.encode(f"{TRIGGER}_Response", {"success": True, "message": "done"})
+            query.reply("7/reset/std_srvs::srv::Trigger/h2", answer)
+
+
+async def when(condition: Callable[[], object]) -> None:
+    async with asyncio.timeout(20):
+        while not condition():
+            await asyncio.sleep(0.01)
+
+
+def test_a_robot_without_a_bridge_is_reached_by_its_own_keys(peer: tuple[str, zenoh.Session]) -> None:
+    """Seen, joined, heard, commanded and called, with not one of the bridge's key expressions."""
+    endpoint, there = peer
+    robot = TinyRobot(there)
+
+    async def scene() -> None:
+        access = RobotAccess(TinyDialect(), TinyPeer)
+        one = RobotSession(ServerParts(PANEL, "r1", NullLog()), config_to(endpoint), access=access)
+        await one.start()
+        await when(lambda: one.robot.link_up)
+        assert one.link_verdict.code == "no_bridge"
+        robot.appear()
+        await when(lambda: one.link_verdict.permitted)
+        assert isinstance(one.peer, TinyPeer)
+        assert one.peer.said == [f"found {robot.zid}"]
+        assert (await one.way_asked()).permitted
+
+        shown = one.publisher
+        await when(lambda: robot.say(True) and shown.view["interlocks"]["operation"]["enabled"])
+        await when(lambda: one.link.heard("go"))
+        for number, text in enumerate(("one", "two"), 1):
+            receipt = await one.presses.press("go", {"message": text}, text, FROM)
+            assert receipt.outcome == "published", receipt.reason
+            await when(partial(robot.has_heard, number))
+        zid = one.link.zid.encode()
+        assert robot.heard == [("one", b"1 of " + zid), ("two", b"2 of " + zid)]
+
+        await when(lambda: one.publisher.view["widgets"]["reset"]["enabled"])
+        receipt = await one.presses.press("reset", {}, "p3", FROM)
+        assert receipt.outcome == "succeeded", receipt.reason
+        assert robot.asked == [b"1 of " + zid]
+        own = {f"tiny/{one.link.zid}/node", f"tiny/{one.link.zid}/MP/go/std_msgs%msg%String"}
+        assert own <= await asyncio.to_thread(robot.nodes)
+
+        robot.say(False)
+        await when(lambda: not shown.view["interlocks"]["operation"]["enabled"])
+        assert one.robot.reading(ENABLED).value("data") is False
+        await one.stop()
+
+    asyncio.run(scene())

@@ -1,0 +1,189 @@
+"""One turn of a session: robot's state, holds, confirmations, view, in this order."""
+
+import asyncio
+import time
+from collections.abc import Coroutine
+from typing import Any
+
+import pytest
+
+from app.audit import NullLog
+from app.commands.confirmations import Confirmations
+from app.commands.holds.controller import HoldController
+from app.commands.holds.receipts import ActiveHold
+from app.commands.receipts import Receipt
+from app.dialect import bridge_dialect
+from app.runtime.robot_session import RobotSession, ServerParts
+from app.transport.bridge_peer import BRIDGE as BRIDGES
+from app.transport.inbox import Inbox
+from app.transport.peer import RobotAccess
+from app.transport.zenoh_config import config_to
+from app.view import refresh
+from tests.commands.test_holds import ARM, HALF, JOG, SPEED
+from tests.runtime.test_another_dialect import TinyPeer
+from tests.support.builders import (
+    BOOL,
+    BRIDGE,
+    FREE,
+    FROM,
+    HEARD,
+    INTERFACES,
+    MESSAGE,
+    TEXT,
+    panel_of,
+)
+
+SAMPLES = 5_000
+CONFIRM = {"topic": "/heard", "field": "data", "equals": "{message}", "within_s": 20.0}
+PANEL = panel_of(SPEED, JOG, ARM, MESSAGE, {**FREE, "confirm": CONFIRM}, HEARD)
+ACCESS = RobotAccess(BRIDGES.dialect, TinyPeer)
+
+
+class Cell:
+    """A session without Zenoh: what arrives is put into its inbox, what it sends is kept."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.ended: list[Receipt] = []
+        self.order: list[str] = []
+        self._monkeypatch = monkeypatch
+        server = ServerParts(PANEL, "r1", NullLog())
+        self.session = RobotSession(server, config_to("tcp/127.0.0.1:1"), access=ACCESS)
+        self.inbox: Inbox = self.session.link._inbox
+        ingest = self.session._ingest
+        self.inbox.expect(ingest.prompt, ingest.watched, ingest.whole)
+        monkeypatch.setattr(self.session.link, "put", lambda *_: None)
+        monkeypatch.setattr(self.session.link, "heard", lambda _: True)
+        monkeypatch.setattr(self.session.link, "hold", lambda _: None)
+        self.inbox.transport(BRIDGE, True)
+        self.inbox.token(bridge_dialect.bridge_token(BRIDGE), True)
+        self.permit(True)
+        self.take()
+        assert self.session.publisher.view["widgets"]["jog"]["enabled"]
+
+    def permit(self, permitted: bool) -> None:
+        self.inbox.put("operation_enabled", INTERFACES.encode(BOOL, {"data": permitted}), None)
+
+    def take(self) -> None:
+        self.session._turn.take()
+
+    def hold(self, widget: str) -> None:
+        inputs = HALF if widget == "jog" else {}
+        hold = self.session.holds.begin(widget, inputs, time.monotonic(), FROM, self.ended.append)
+        assert isinstance(hold, ActiveHold)
+
+    def note_the_order(self) -> None:
+        """Notes in which order things are judged and shown from now on."""
+
+        def noted(owner: Any, name: str, what: str) -> None:
+            real = getattr(owner, name)
+
+            def note(*args: Any, **named: Any) -> Any:
+                self.order.append(what)
+                return real(*args, **named)
+
+            self._monkeypatch.setattr(owner, name, note)
+
+        noted(HoldController, "judge", "holds")
+        noted(Confirmations, "hear", "confirmations")
+        noted(refresh, "build_view", "view")
+
+
+def run(work: Coroutine[Any, Any, None]) -> None:
+    asyncio.run(work)
+
+
+def test_a_view_that_can_not_be_built_keeps_no_hold_from_its_end(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(refresh, "AGAIN_S", 0.01)
+
+    async def scene() -> None:
+        cell = Cell(monkeypatch)
+        cell.hold("jog")
+        cell.hold("arm")
+        with monkeypatch.context() as broken:
+            broken.setattr(refresh, "build_view", Broken())
+            cell.permit(False)
+            cell.take()
+            assert [receipt.widget for receipt in cell.ended] == ["jog", "arm"]
+            assert (await cell.session.presses.press("free", {"message": "x"}, "p", FROM)).outcome
+        async with asyncio.timeout(20):  # and it is built again
+            while cell.session.publisher.view["widgets"]["jog"]["enabled"]:
+                await asyncio.sleep(0.01)
+        await cell.session.stop()
+
+    run(scene())
+    assert caplog.text.count("the view could not be refreshed") == 1
+
+
+class Broken:
+    def __call__(self, *_: Any, **__: Any) -> Any:
+        raise RuntimeError("no view")
+
+
+def test_in_a_turn_with_thousands_of_samples_holds_are_judged_before_anything_is_shown(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    async def scene() -> None:
+        cell = Cell(monkeypatch)
+        cell.hold("jog")
+        cell.note_the_order()
+        for number in range(SAMPLES):
+            cell.inbox.put(f"other{number}", b"", None)
+        cell.permit(False)
+        cell.take()
+        assert [receipt.widget for receipt in cell.ended] == ["jog"]
+        assert (cell.order[0], cell.order[-1]) == ("holds", "view")
+        assert cell.order.count("view") == 1
+        await cell.session.stop()
+
+    run(scene())
+
+
+def test_a_false_that_came_and_went_in_a_flood_ends_a_hold(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def scene() -> None:
+        cell = Cell(monkeypatch)
+        cell.hold("jog")
+        for number in range(SAMPLES):
+            cell.permit(number != SAMPLES - 100)
+        cell.take()
+        assert [receipt.widget for receipt in cell.ended] == ["jog"]
+        assert cell.session.publisher.view["widgets"]["jog"]["enabled"]
+        await cell.session.stop()
+
+    run(scene())
+
+
+def test_a_turn_judges_holds_then_confirmations_and_shows_last(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def scene() -> None:
+        cell = Cell(monkeypatch)
+        press = asyncio.ensure_future(cell.session.presses.press("free", {"message": "on"}, "p", FROM))
+        async with asyncio.timeout(20):
+            while not cell.session._commands.confirmations.awaits("heard"):
+                await asyncio.sleep(0.001)
+        cell.note_the_order()
+        cell.inbox.put("heard", INTERFACES.encode(TEXT, {"data": "on"}), None)
+        cell.permit(False)
+        cell.take()
+        assert cell.order == ["holds", "confirmations", "view"]
+        assert (await press).outcome == "confirmed"
+        await cell.session.stop()
+
+    run(scene())
+
+
+def test_what_changes_while_a_turn_runs_is_shown_by_it_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As when a hold ends: it tells so, and the turn that ended it shows it."""
+
+    async def scene() -> None:
+        cell = Cell(monkeypatch)
+        cell.hold("jog")
+        cell.hold("arm")
+        version = cell.session.publisher.version
+        cell.permit(False)
+        cell.take()
+        assert cell.session.publisher.version == version + 1
+        assert not cell.session.publisher.view["widgets"]["jog"]["held"]
+        await cell.session.stop()
+
+    run(scene())
