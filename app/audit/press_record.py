@@ -8,7 +8,7 @@ from app.audit.entry import Entry, Origin, entered
 from app.audit.queries import OpenPress
 from app.errors import LogError
 from app.i18n import say
-from app.permission.clients import Client
+from app.permission.principal import Principal
 from app.robot.command_status import Outcome
 
 
@@ -146,6 +146,7 @@ class PressLog:
         return {"widget": widget, "press": press_id, "action": action, "robot": self._robot}
 
 
-def origin_of(client: Client, seen: str = "") -> Origin:
-    """Where a press comes from: a browser, which is named until users log in."""
-    return Origin(address=client.address, browser=client.id, who=client.name, seen=seen)
+def origin_of(who: Principal, seen: str = "") -> Origin:
+    """Where a press comes from: the client, and who is logged in there or, without users, its name."""
+    client = who.client
+    return Origin(address=client.address, browser=client.id, who=who.name, seen=seen)

@@ -12,9 +12,9 @@ from app.audit.press_record import Log, origin_of
 from app.commands.receipts import PressContext
 from app.errors import InputError
 from app.i18n import say
-from app.permission.clients import Client
 from app.permission.control_authority import ControlAuthority
 from app.permission.interlocks import Verdict, locked
+from app.permission.principal import Principal
 from app.view.publisher import ViewPublisher
 
 AHEAD_S: Final = 1.0  # a press can't be from later than now, but for rounding and drift
@@ -47,7 +47,7 @@ class PressGuard:
         """From now on nothing is sent any more."""
         self._ended = True
 
-    def by(self, widget: str, client: Client, seen: str = "", at: float | None = None) -> PressContext:
+    def by(self, widget: str, who: Principal, seen: str = "", at: float | None = None) -> PressContext:
         """Who presses or holds a widget, and what has to hold for that at every moment.
 
         `seen` is the id of the last event that the operator saw, "" where that is not known; `at`
@@ -55,10 +55,10 @@ class PressGuard:
         """
         if seen:
             self._check(seen)
-        self._control.touch(client)
+        self._control.touch(who)
         return PressContext(
-            origin_of(client, seen),
-            lambda: self._controls(client),
+            origin_of(who, seen),
+            lambda: self._controls(who),
             lambda: self._doubt(widget, seen, at),
         )
 
@@ -77,12 +77,12 @@ class PressGuard:
             newest = self._publisher.id
             raise InputError(f"seen: version {version} is not there yet, the newest is {newest}")
 
-    def _controls(self, client: Client) -> Verdict:
+    def _controls(self, who: Principal) -> Verdict:
         if self._ended:
             return locked("ending")
         if self._log.lock:
             return Verdict(False, "log", self._log.lock)
-        return self._control.verdict(client)
+        return self._control.verdict(who)
 
     def _doubt(self, widget: str, seen: str, at: float | None) -> str:
         """Why a press is no longer what was meant; "" if it is."""

@@ -4,7 +4,7 @@ from typing import Final, Literal, TypedDict
 
 from app.i18n import say
 from app.panel.rules import ControlRules
-from app.permission.clients import Client
+from app.permission.principal import Principal
 
 Role = Literal["free", "held", "over", "asking", "holding", "asked"]
 
@@ -38,16 +38,16 @@ NO_CONTROL: Final = ControlView(
 
 
 def control_view(
-    rules: ControlRules, robot: str, holder: Client | None, asker: Client | None, since: str
+    rules: ControlRules, robot: str, holder: Principal | None, asker: Principal | None, since: str
 ) -> ControlView:
     """The view for a robot's name; there is an asker only where there is a holder."""
     if not rules.required:
         return NO_CONTROL
     view = ControlView(
         required=True,
-        holder=holder.id if holder else "",
+        holder=holder.client.id if holder else "",
         holder_name=holder.title if holder else "",
-        asker=asker.id if asker else "",
+        asker=asker.client.id if asker else "",
         asker_name=asker.title if asker else "",
         since=since,
         holder_text=say("control_mine", robot=robot),
@@ -63,12 +63,12 @@ def control_view(
     return view
 
 
-def role(control: ControlView, client: Client, rules: ControlRules) -> Role:
+def role(control: ControlView, who: Principal, rules: ControlRules) -> Role:
     """What a browser is to who has control; pages show their buttons by it."""
     if not control["holder"]:
         return "free"
-    if client.id == control["holder"]:
+    if who.client.id == control["holder"]:
         return "asked" if control["asker"] else "holding"
-    if client.id and client.id == control["asker"]:
+    if who.client.id and who.client.id == control["asker"]:
         return "asking"
-    return "over" if client.local and rules.local else "held"
+    return "over" if who.client.local and rules.local else "held"

@@ -11,7 +11,6 @@ from typing import Any, Final, NamedTuple, TypedDict
 from app.i18n import say
 from app.panel.model import Panel
 from app.panel.widgets.families import Display
-from app.permission.clients import Client
 from app.permission.control_authority_view import NO_CONTROL, ControlView
 from app.permission.interlocks import (
     PERMITTED,
@@ -20,6 +19,7 @@ from app.permission.interlocks import (
     interlock_verdict,
     link_verdict,
 )
+from app.permission.principal import Principal
 from app.robot.state import RobotState
 from app.view.kinds import Enabled, enabled, show, told
 from app.view.link_status import Lamp, LinkStatus, link_statuses, summary
@@ -111,11 +111,11 @@ def update_displays(
     return ViewWithDeadlines({**seen.view, "widgets": widgets}, seen.robot, seen.rest, untils)
 
 
-def as_seen_by(view: View, client: Client) -> View:
+def as_seen_by(view: View, who: Principal) -> View:
     """The view as a page shows it: without control what can be pressed is locked, unless there is no
     way to the robot at all. Pages with scripts do the same to what events bring."""
     control = view["control"]
-    mine = client.id and client.id == control["holder"]
+    mine = who.client.id and who.client.id == control["holder"]
     if not control["required"] or mine or view["link"]["bridge"]["state"] != "ok":
         return view
     lock = {"enabled": False, "reason": control["text"], **told([control["text"]])}

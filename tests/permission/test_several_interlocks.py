@@ -12,6 +12,7 @@ from app.panel.model import Panel
 from app.permission.clients import Client as Visitor
 from app.permission.control_authority_view import NO_CONTROL, ControlView
 from app.permission.interlocks import PERMITTED, Verdict, combined, press_verdict
+from app.permission.principal import Principal
 from app.robot.state import RobotState
 from app.view.view import as_seen_by, build_view
 from tests.browser.test_pages import SIZES as LARGE
@@ -142,7 +143,9 @@ def test_who_has_not_control_is_told_that_alone() -> None:
     panel = cell(control={"required": True})
     robot = robot_there(panel)
     control: ControlView = {**NO_CONTROL, "required": True, "text": "Nobody has control."}
-    view = as_seen_by(build_view(panel, robot, NOW, control=control).view, Visitor("b", "", True, 1))
+    view = as_seen_by(
+        build_view(panel, robot, NOW, control=control).view, Principal(Visitor("b", "", True, 1))
+    )
     assert view["widgets"]["guarded"] == {
         "enabled": False, "reason": "Nobody has control.", "reasons": "Nobody has control.", "more": "",
     }  # fmt: skip

@@ -16,6 +16,7 @@ from app.commands.service_calls import with_fields
 from app.panel.model import Panel
 from app.permission.clients import anonymous
 from app.permission.interlocks import interlock_verdict
+from app.permission.principal import Principal
 from app.robot.state import PassedOver, RobotState, Sample
 from app.ros_logging import RobotLog
 from app.runtime import robot_session
@@ -318,7 +319,7 @@ def test_who_ends_or_takes_a_new_panel_sends_nothing_more() -> None:
     async def pressed() -> None:
         one = robot_session.RobotSession(small_panel(), config_to("tcp/127.0.0.1:1"), "r1", NullLog())
         permits(one.robot)
-        by = one.press_guard.by("free", anonymous("192.0.2.1"))
+        by = one.press_guard.by("free", Principal(anonymous("192.0.2.1")))
         assert by.controls().permitted
         await one.stop()
         assert by.controls().code == "ending"

@@ -9,8 +9,8 @@ from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, JsonValue
 from app.errors import InputError, NotFound
 from app.i18n import say
 from app.panel.base import ID
-from app.permission.clients import Client
 from app.permission.control_authority import LIFE_S, Refusal
+from app.permission.principal import Principal
 from app.runtime.robot_session import RobotSession
 from app.web.app_state import CurrentSession, CurrentState
 from app.web.client_cookie import keep, visitor, welcomed
@@ -87,12 +87,12 @@ async def here(request: Request, state: CurrentState, session: CurrentSession) -
 )
 async def act(act: Act, request: Request, state: CurrentState, session: CurrentSession) -> Response:
     _required(session)
-    browser = visitor(request, state)
+    who = visitor(request, state)
     _, token = welcomed(request, state)  # without a cookie nothing is done yet, the next time it is
     form = kind_of(request) == FORM
     given = await _given(Acting, request)
     reason = "" if form or given.at is None else _late(session, act, given.at.timestamp())
-    refusal = "" if reason else _done(session, act, browser, given.to, FORM_LIFE_S if form else LIFE_S)
+    refusal = "" if reason else _done(session, act, who, given.to, FORM_LIFE_S if form else LIFE_S)
     reason = say(refusal) if refusal else reason
     session.show()
     if form:
@@ -100,7 +100,7 @@ async def act(act: Act, request: Request, state: CurrentState, session: CurrentS
         query = f"?control={refusal}" if refusal else ""
         answer: Response = RedirectResponse(f"{session.base}/pages/{page.id}{query}", status_code=303)
     else:
-        body = {"done": not reason, "reason": reason, "browser": browser.id}
+        body = {"done": not reason, "reason": reason, "browser": who.client.id}
         content = body | {"control": session.control.view()}
         answer = JSONResponse(content, status_code=409 if reason else 200)
     return keep(answer, request, token)
@@ -111,19 +111,19 @@ def _required(session: RobotSession) -> None:
         raise NotFound("on this panel nobody needs control: its file has no [control] required = true")
 
 
-def _done(session: RobotSession, act: str, client: Client, to: str, life_s: float) -> Refusal:
+def _done(session: RobotSession, act: str, who: Principal, to: str, life_s: float) -> Refusal:
     control = session.control
     match act:
         case "take":
-            return control.take(client, life_s)
+            return control.take(who, life_s)
         case "ask":
-            return control.ask(client, life_s)
+            return control.ask(who, life_s)
         case "give":
-            return control.give(client, to)
+            return control.give(who, to)
         case "keep":
-            return control.keep(client, to)
+            return control.keep(who, to)
         case "release":
-            return control.release(client)
+            return control.release(who)
     raise NotFound(f'there is no "/control/{act:.40}": there is take, ask, give, keep, release, here')
 
 

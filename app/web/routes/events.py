@@ -34,8 +34,8 @@ async def events(
 ) -> Response:
     """`once`: the snapshot alone, for a browser that has no stream to spare."""
     board = session.publisher
-    browser, token = welcomed(request, state) if board.view["control"]["required"] else (None, "")
-    first = client_id_event(browser.id) if browser else b""
+    who, token = welcomed(request, state) if board.view["control"]["required"] else (None, "")
+    first = client_id_event(who.client.id) if who else b""
     answer: Response
     if once:
         all_of_it = board.snapshot() + first + beat()

@@ -124,9 +124,9 @@ class _HoldSocket:
         self._session = session
         self._opened_at = time.monotonic()
         self._ended: asyncio.Future[Receipt] = asyncio.get_running_loop().create_future()
-        self._client = visitor(socket, state)
+        self._who = visitor(socket, state)
         self._id = secrets.token_hex(8)  # of the hold: in the log, its receipt and its recording
-        self._context = session.press_guard.by(widget, self._client)
+        self._context = session.press_guard.by(widget, self._who)
         self._room = session.press_log.room(self._context.origin)
         self._pending: PendingEntry | None = None
         self._receipt: Receipt | None = None  # of its end, when all of it is known
@@ -161,7 +161,7 @@ class _HoldSocket:
                 said = await self._read()
         except TimeoutError:
             return refuse(by, say("hold_late"))
-        if not self._limits.admit(self._client):
+        if not self._limits.admit(self._who):
             return refuse(by, say("too_often"), "limit", trace=False)
         if isinstance(said, End):
             return refuse(by, say("hold_let_go"))
@@ -170,7 +170,7 @@ class _HoldSocket:
         sent = self._sent(said)
         inputs = self._session.dispatcher.with_defaults(holds.widget(widget), said.inputs)
         try:
-            by = self._context = self._session.press_guard.by(widget, self._client, said.seen)
+            by = self._context = self._session.press_guard.by(widget, self._who, said.seen)
             if not self._room and (left_out := holds.refusal(widget, inputs, sent, by)):
                 return left_out
             still_held = await self._written(widget, inputs, by)
@@ -220,7 +220,7 @@ class _HoldSocket:
                 async with asyncio.timeout(SILENCE_S):
                     said = await self._read()
                 if self._hear(said, holding):
-                    self._session.control.touch(self._client)
+                    self._session.control.touch(self._who)
                     await self._say(state="held")
                 elif isinstance(said, Beat) and self._receipt is not None:
                     await self._say(state="ended", **self._receipt.as_json())

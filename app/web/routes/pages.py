@@ -19,9 +19,9 @@ from app.i18n import say
 from app.panel.model import Page, Panel
 from app.panel.template import inputs_of
 from app.panel.widgets.families import Entered, Pressed
-from app.permission.clients import Client
 from app.permission.control_authority import Refusal
 from app.permission.control_authority_view import Role, role
+from app.permission.principal import Principal
 from app.printable import printable_texts
 from app.runtime.robot_session import RobotSession
 from app.view.sections import SECTIONS, Section
@@ -156,17 +156,17 @@ def _render(request: Request, state: AppState, page: Page) -> Response:
     session = state.fleet.session(request.path_params.get("robot"))
     typed = any(isinstance(widget, Entered) for widget in page.widgets)
     refresh_s = REFRESH_WITH_INPUTS_S if typed else REFRESH_S
-    browser, token = welcomed(request, state)
+    who, token = welcomed(request, state)
     if session.control.rules.required:
-        session.control.loaded(browser, refresh_s + GRACE_S, by_hand(request))
+        session.control.loaded(who, refresh_s + GRACE_S, by_hand(request))
         session.show()
-    context = _context(request, state, session, page, browser, refresh_s)
+    context = _context(request, state, session, page, who, refresh_s)
     html = state.templates.get_template("screen.html").render(**context)
     return keep(HTMLResponse(html, headers={"cache-control": "no-store"}), request, token)
 
 
 def _context(
-    request: Request, state: AppState, session: RobotSession, page: Page, client: Client, refresh_s: int
+    request: Request, state: AppState, session: RobotSession, page: Page, who: Principal, refresh_s: int
 ) -> PageContext:
     board, rules = session.publisher, session.control.rules
     refusal = request.query_params.get("control", "")
@@ -179,7 +179,7 @@ def _context(
         page=page,
         base=session.base,
         robot=session.entry.id if session.entry else "",
-        view=as_seen_by(board.view, client),
+        view=as_seen_by(board.view, who),
         sections=SECTIONS,
         event_id=board.id,
         revision=board.revision,
@@ -199,9 +199,9 @@ def _context(
         since=None if RELOADED in request.query_params else round(now, 3),
         again=f"{session.base}/pages/{page.id}?{urlencode(again)}",
         until=round(now + refresh_s + RELOADED_S, 3),
-        browser=client.id,
-        over=rules.local and client.local,
-        role=role(board.view["control"], client, rules),
+        browser=who.client.id,
+        over=rules.local and who.client.local,
+        role=role(board.view["control"], who, rules),
         refused=say(refusal) if refusal and refusal in REFUSALS else "",
     )
 
