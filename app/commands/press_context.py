@@ -5,15 +5,16 @@ The one place for this, whether a press comes as JSON, as a form or as a hold.
 
 import re
 from collections.abc import Callable, Collection
+from dataclasses import dataclass
 from typing import Final
 
 from app import clock
+from app.audit import Origin
 from app.audit.press_record import Log, origin_of
-from app.commands.receipts import PressContext
 from app.errors import InputError
 from app.i18n import say
 from app.permission.control_authority import ControlAuthority
-from app.permission.interlocks import Verdict, locked
+from app.permission.press_permission import NO_GROUNDS, Grounds
 from app.permission.principal import Principal
 from app.view.publisher import ViewPublisher
 
@@ -22,6 +23,23 @@ SEEN: Final = r"^[0-9a-f]{1,32}-[0-9]{1,18}$"  # <boot>-<version>, an event's id
 LONGEST_ID: Final = 64
 PRESS_ID: Final = rf"^[A-Za-z0-9_.:-]{{1,{LONGEST_ID}}}$"
 _is_seen: Final = re.compile(SEEN).fullmatch
+
+
+def not_stale() -> str:
+    """Of a client that does not say what was seen, and when it was pressed."""
+    return ""
+
+
+@dataclass(frozen=True, slots=True)
+class PressContext:
+    """Who presses, and what has to hold beside the robot's permission when it is sent.
+
+    `grounds` is what the server has against it, `stale_reason` why what the operator saw is no longer
+    so, "" if it still is."""
+
+    origin: Origin
+    grounds: Callable[[], Grounds] = lambda: NO_GROUNDS
+    stale_reason: Callable[[], str] = not_stale
 
 
 class PressGuard:
@@ -58,7 +76,7 @@ class PressGuard:
         self._control.touch(who)
         return PressContext(
             origin_of(who, seen),
-            lambda: self._controls(who),
+            lambda: self._grounds(who),
             lambda: self._doubt(widget, seen, at),
         )
 
@@ -77,12 +95,8 @@ class PressGuard:
             newest = self._publisher.id
             raise InputError(f"seen: version {version} is not there yet, the newest is {newest}")
 
-    def _controls(self, who: Principal) -> Verdict:
-        if self._ended:
-            return locked("ending")
-        if self._log.lock:
-            return Verdict(False, "log", self._log.lock)
-        return self._control.verdict(who)
+    def _grounds(self, who: Principal) -> Grounds:
+        return Grounds(self._control.verdict(who), self._log.lock, self._ended)
 
     def _doubt(self, widget: str, seen: str, at: float | None) -> str:
         """Why a press is no longer what was meant; "" if it is."""

@@ -17,18 +17,16 @@ from app.audit import Origin, Repeated
 from app.audit.press_record import PendingEntry, PressLog
 from app.clock import format_time
 from app.commands.dispatch import Dispatcher
+from app.commands.press_context import PressContext
 from app.commands.receipts import (
     FINE,
     LONGEST_LOGGED,
     MOST_LOOKS,
-    PressContext,
     Receipt,
     Receipts,
     Witness,
-    cause_of,
     corrected,
     fingerprint,
-    judged,
     named,
     receipt_of,
     untyped,
@@ -43,6 +41,7 @@ from app.panel.model import Panel
 from app.panel.widgets.families import Pressed
 from app.panel.widgets.service_action import Action
 from app.permission.interlocks import Verdict
+from app.permission.press_permission import cause_of, judged
 from app.robot.command_status import Outcome
 from app.robot.state import RobotState
 from app.ros_logging import RobotLog, on_rosout
@@ -289,9 +288,10 @@ class Presses:
     def _ground(self, widget: Pressed, context: PressContext) -> tuple[Verdict, str, Cause]:
         """The verdict now, and why it may not be sent, "" if it may."""
         self._catch_up()
-        verdict = judged(widget, context, self._panel, self._robot, self._monotonic())
+        interlocks = self._panel.interlocks_of(widget)
+        verdict = judged(widget, interlocks, self._robot, self._monotonic(), context.grounds())
         if not verdict.permitted:
-            return verdict, verdict.reason or "", cause_of(verdict)
+            return verdict, verdict.reason or "", cause_of(verdict.code)
         return (
             verdict,
             say("press_by_stopping") if self._closed else context.stale_reason(),

@@ -12,13 +12,8 @@ from app.i18n import say
 from app.panel.model import Panel
 from app.panel.widgets.families import Display
 from app.permission.control_authority_view import NO_CONTROL, ControlView
-from app.permission.interlocks import (
-    PERMITTED,
-    Verdict,
-    command_verdict,
-    interlock_verdict,
-    link_verdict,
-)
+from app.permission.interlocks import PERMITTED, interlock_verdict, link_verdict
+from app.permission.press_permission import Grounds, Question, permission
 from app.permission.principal import Principal
 from app.robot.state import RobotState
 from app.view.kinds import Enabled, enabled, show, told
@@ -78,13 +73,14 @@ def build_view(
     pressed, where they are not "". Time alone would change `control` at `control_until`."""
     passable = link_verdict(robot, now)
     interlocks = {i.id: interlock_verdict(i, robot, now) for i in panel.interlocks}
-    verdicts = {
-        w.id: command_verdict(w, passable, [interlocks[i] for i in w.interlocks], robot, now)
+    grounds = Grounds(log_lock=lock)
+    questions = [
+        Question(w, robot, now, passable, [interlocks[i] for i in w.interlocks], grounds)
         for w in panel.commands
-    }
-    locks = {w: Verdict(False, "log", lock) for w in verdicts} if lock else verdicts
-    widgets = {w.id: show(w, robot, now, locks.get(w.id, PERMITTED)) for w in panel.widgets()}
-    link, until = link_statuses(panel, robot, passable, locks, now)
+    ]
+    verdicts = {question.widget.id: permission(question) for question in questions}
+    widgets = {w.id: show(w, robot, now, verdicts.get(w.id, PERMITTED)) for w in panel.widgets()}
+    link, until = link_statuses(panel, robot, passable, verdicts, now)
     banner = say("simulated") if simulated or robot.graph.simulated else ""
     view = View(
         link=link,

@@ -12,13 +12,15 @@ from typing import Any
 import pytest
 
 from app.audit.press_record import origin_of
-from app.commands.receipts import RECEIPTS_KEPT, PressContext, Receipt
+from app.commands.press_context import PressContext
+from app.commands.receipts import RECEIPTS_KEPT, Receipt
 from app.errors import LinkError, NotFound
 from app.panel.model import Panel
 from app.panel.rules import ControlRules
 from app.permission.clients import Clients, anonymous
 from app.permission.control_authority import ControlAuthority
 from app.permission.interlocks import PERMITTED, Verdict, locked
+from app.permission.press_permission import Grounds
 from app.permission.principal import Principal
 from app.robot.state import RobotState, Sample
 from tests.support.builders import (
@@ -91,7 +93,7 @@ class Bench:
         who: Principal = PROGRAM,
     ) -> Receipt:
         given = {"message": "hello"} if inputs is None else inputs
-        by = PressContext(origin_of(who), lambda: self.may_press(who))
+        by = PressContext(origin_of(who), lambda: Grounds(self.may_press(who)))
         return asyncio.run(self._presses.press(widget, given, press_id, by))
 
     def cancel(self, widget: str) -> Receipt:

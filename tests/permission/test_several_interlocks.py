@@ -11,7 +11,8 @@ from playwright.sync_api import Browser, Page, expect
 from app.panel.model import Panel
 from app.permission.clients import Client as Visitor
 from app.permission.control_authority_view import NO_CONTROL, ControlView
-from app.permission.interlocks import PERMITTED, Verdict, combined, press_verdict
+from app.permission.interlocks import PERMITTED, Verdict
+from app.permission.press_permission import combined, judged
 from app.permission.principal import Principal
 from app.robot.state import RobotState
 from app.view.view import as_seen_by, build_view
@@ -59,7 +60,7 @@ def closes(robot: RobotState, closed: bool = True, at: float = NOW) -> None:
 
 def verdict_of(robot: RobotState, panel: Panel, now: float = NOW) -> Verdict:
     (widget,) = panel.commands
-    return press_verdict(widget, panel.interlocks_of(widget), robot, now)
+    return judged(widget, panel.interlocks_of(widget), robot, now)
 
 
 @pytest.mark.parametrize("permitted", [True, False])

@@ -10,8 +10,8 @@ from app.commands.actions.goals import GoalTracker
 from app.commands.confirmations import Confirmations
 from app.commands.dispatch import Dispatcher
 from app.commands.parameters.sync import ParameterSync
+from app.commands.press_context import PressContext
 from app.commands.presses import Presses
-from app.commands.receipts import PressContext
 from app.commands.service_calls import Asker, ServiceCalls
 from app.dialect import bridge_dialect
 from app.dialect.endpoint import TopicRole

@@ -15,7 +15,8 @@ from app.clock import format_time
 from app.commands.holds.lease import LEASE_S, Lease
 from app.commands.holds.messages import Checked, HoldMessages, Transport, Values
 from app.commands.holds.receipts import RELEASED, ActiveHold, HoldReceipts, Refusal, refused
-from app.commands.receipts import MOST_LOOKS, PressContext, Receipt, Witness, cause_of, judged
+from app.commands.press_context import PressContext
+from app.commands.receipts import MOST_LOOKS, Receipt, Witness
 from app.errors import Cause, FieldError, InputError, LinkError, NotFound, PressRefused
 from app.i18n import say
 from app.interfaces import Interfaces
@@ -23,6 +24,7 @@ from app.panel.model import Panel
 from app.panel.template import needed
 from app.panel.widgets.hold import Hold
 from app.permission.interlocks import Verdict
+from app.permission.press_permission import cause_of, judged
 from app.robot.state import RobotState
 
 
@@ -153,7 +155,7 @@ class HoldController:
         if now >= sent + LEASE_S:
             return say("hold_late"), "interlock"
         if not (verdict := self._verdict(widget, context, now)).permitted:
-            return verdict.reason or "", cause_of(verdict)
+            return verdict.reason or "", cause_of(verdict.code)
         return context.stale_reason(), "interlock"
 
     def beat(self, holding: ActiveHold, number: int, sent: float) -> bool:
@@ -205,7 +207,8 @@ class HoldController:
         return self._held.get(holding.widget.id) is holding
 
     def _verdict(self, widget: Hold, context: PressContext, now: float) -> Verdict:
-        return judged(widget, context, self._panel, self._robot, now)
+        interlocks = self._panel.interlocks_of(widget)
+        return judged(widget, interlocks, self._robot, now, context.grounds())
 
     def _plan(self) -> None:
         if self._timer is not None:

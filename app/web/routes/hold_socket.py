@@ -32,8 +32,8 @@ from starlette.types import Message
 from app.audit.press_record import PendingEntry
 from app.commands.holds.lease import sent_at
 from app.commands.holds.receipts import RELEASED, ActiveHold
-from app.commands.press_context import SEEN
-from app.commands.receipts import PressContext, Receipt, with_doubt
+from app.commands.press_context import SEEN, PressContext
+from app.commands.receipts import Receipt, with_doubt
 from app.errors import InputError, LogError
 from app.i18n import say
 from app.panel.template import needed
