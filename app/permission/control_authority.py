@@ -83,8 +83,13 @@ class ControlAuthority:
         return min([*times, self._due()])
 
     def verdict(self, who: Principal) -> Verdict:
-        """Whether this browser may press."""
-        if not self.rules.required or _is(who, self.holder):
+        """Whether this client may press."""
+        return PERMITTED if _is(who, self.holder) else self.lock
+
+    @property
+    def lock(self) -> Verdict:
+        """What locks for every client without control."""
+        if not self.rules.required:
             return PERMITTED
         if holder := self.holder:
             return locked("control_held", name=holder.title, robot=self._robot)

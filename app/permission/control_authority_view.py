@@ -1,4 +1,4 @@
-"""Who has control, as the pages show it: one view for all, and what each browser is by it."""
+"""Who has control, as the pages show it: one view for all, and one for each role."""
 
 from typing import Final, Literal, TypedDict
 
@@ -6,12 +6,14 @@ from app.i18n import say
 from app.panel.rules import ControlRules
 from app.permission.principal import Principal
 
-Role = Literal["free", "held", "over", "asking", "holding", "asked"]
+# What a client is to who has control; "" where control is not required.
+Role = Literal["", "free", "held", "over", "asking", "holding", "asked"]
+IN_CONTROL: Final = frozenset[Role]({"", "holding", "asked"})
 
 
 class ControlView(TypedDict):
-    """What every page shows; each picks its text by comparing the ids with its own. "" is nobody;
-    `since` is RFC 3339."""
+    """What is known of control; a client's own part is its `role` and the text that is `shown` to it,
+    "" in the view for all. An id or a name is "" where there is none; `since` is RFC 3339."""
 
     required: bool
     holder: str
@@ -22,6 +24,8 @@ class ControlView(TypedDict):
     holder_text: str
     asker_text: str
     text: str
+    role: Role
+    shown: str
 
 
 NO_CONTROL: Final = ControlView(
@@ -34,6 +38,8 @@ NO_CONTROL: Final = ControlView(
     holder_text="",
     asker_text="",
     text="",
+    role="",
+    shown="",
 )
 
 
@@ -53,6 +59,8 @@ def control_view(
         holder_text=say("control_mine", robot=robot),
         asker_text="",
         text=say("control_free", robot=robot),
+        role="",
+        shown="",
     )
     if holder:
         view["text"] = say("control_held", name=holder.title, robot=robot)
@@ -64,7 +72,9 @@ def control_view(
 
 
 def role(control: ControlView, who: Principal, rules: ControlRules) -> Role:
-    """What a browser is to who has control; pages show their buttons by it."""
+    """What a client is to who has control; pages show their buttons by it."""
+    if not control["required"]:
+        return ""
     if not control["holder"]:
         return "free"
     if who.client.id == control["holder"]:
@@ -72,3 +82,14 @@ def role(control: ControlView, who: Principal, rules: ControlRules) -> Role:
     if who.client.id and who.client.id == control["asker"]:
         return "asking"
     return "over" if who.client.local and rules.local else "held"
+
+
+def seen_as(control: ControlView, role: Role) -> ControlView:
+    """The view as a client of this role gets it."""
+    if role == "asking":
+        shown = control["asker_text"]
+    elif role in ("holding", "asked"):
+        shown = control["holder_text"]
+    else:
+        shown = control["text"]
+    return {**control, "role": role, "shown": shown}

@@ -74,7 +74,7 @@ class ViewRefresher:
         self._displays = [(robot.key(w.topic), w) for w in panel.displays]
         self._seen = self._sight()
         self.lamp = self._seen.robot
-        self.publisher = ViewPublisher(self._seen.view, revision)
+        self.publisher = ViewPublisher(self._seen.view, revision, self._seen.without_control)
         self._shown_at = 0.0
         self._spoke: set[str] = set()  # keys of topics that said something since
         self._whole = False  # whether more than values is to be shown
@@ -122,7 +122,7 @@ class ViewRefresher:
         else:
             self._seen = update_displays(self._seen, self._stale(now), self._robot, now)
         self._whole, self._spoke = False, set()
-        self.publisher.post(self._seen.view)
+        self.publisher.post(self._seen.view, self._seen.without_control)
         self._at(self._seen.until)
 
     def _stale(self, now: float) -> list[Display]:
@@ -160,6 +160,7 @@ class ViewRefresher:
             fault="\n".join(filter(None, faults)),
             lock=self._operators_log.lock if unlogged else "",
             control=self._control.view(),
+            control_lock=self._control.lock,
             control_until=self._control.until,
         )
         seen.view["link"] = self._since.dated(seen.view["link"])

@@ -20,12 +20,12 @@ from app.panel.model import Page, Panel
 from app.panel.template import inputs_of
 from app.panel.widgets.families import Entered, Pressed
 from app.permission.control_authority import Refusal
-from app.permission.control_authority_view import Role, role
+from app.permission.control_authority_view import role
 from app.permission.principal import Principal
 from app.printable import printable_texts
 from app.runtime.robot_session import RobotSession
 from app.view.sections import SECTIONS, Section
-from app.view.view import View, as_seen_by
+from app.view.view import View
 from app.web.app_state import AppState, CurrentState
 from app.web.client_cookie import by_hand, keep, welcomed
 from app.web.described import PAGE, Described, errors
@@ -97,8 +97,6 @@ class PageContext(TypedDict):
     again: str
     until: float
     browser: str
-    over: bool
-    role: Role
     refused: str
 
 
@@ -179,7 +177,7 @@ def _context(
         page=page,
         base=session.base,
         robot=session.entry.id if session.entry else "",
-        view=as_seen_by(board.view, who),
+        view=board.seen_as(role(board.view["control"], who, rules)),
         sections=SECTIONS,
         event_id=board.id,
         revision=board.revision,
@@ -200,8 +198,6 @@ def _context(
         again=f"{session.base}/pages/{page.id}?{urlencode(again)}",
         until=round(now + refresh_s + RELOADED_S, 3),
         browser=who.client.id,
-        over=rules.local and who.client.local,
-        role=role(board.view["control"], who, rules),
         refused=say(refusal) if refusal and refusal in REFUSALS else "",
     )
 
