@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any, Final, Literal, NamedTuple, Self
 
-Kind = Literal["began", "pressed", "closed", "corrected", "refused", "removed", "resumed"]
+Kind = Literal["began", "pressed", "closed", "corrected", "refused", "control", "removed", "resumed"]
 
 LONGEST_VALUES: Final = 2000
 LONGEST_TEXT: Final = 500

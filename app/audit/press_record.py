@@ -142,6 +142,17 @@ class PressLog:
         entry = entered("refused", origin, inputs, outcome="refused", reason=reason, **about)
         return await self._log.closed(entry)
 
+    async def acted(self, action: str, act_id: str, origin: Origin, outcome: str, reason: str) -> str:
+        """An act that is no press; returns when it is on the disk, or why it is not."""
+        about = self._about("", act_id, action)
+        return await self._log.closed(
+            entered("control", origin, {}, outcome=outcome, reason=reason, **about)
+        )
+
+    def note(self, action: str, origin: Origin, reason: str) -> None:
+        """Control changed by no act."""
+        self._log.add(entered("control", origin, {}, reason=reason, **self._about("", "", action)))
+
     def _about(self, widget: str, press_id: str, action: str) -> dict[str, str]:
         return {"widget": widget, "press": press_id, "action": action, "robot": self._robot}
 

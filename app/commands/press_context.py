@@ -14,6 +14,7 @@ from app.audit.press_record import Log, origin_of
 from app.errors import InputError
 from app.i18n import say
 from app.permission.control_authority import ControlAuthority
+from app.permission.interlocks import PERMITTED, Verdict, locked
 from app.permission.press_permission import NO_GROUNDS, Grounds
 from app.permission.principal import Principal
 from app.view.publisher import ViewPublisher
@@ -79,6 +80,16 @@ class PressGuard:
             lambda: self._grounds(who),
             lambda: self._doubt(widget, seen, at),
         )
+
+    def act_verdict(self, at: float | None) -> Verdict:
+        """What the server has against an act that is no press, touched at this moment (the server's own
+        time, None where it is not known)."""
+        if self._ended:
+            return locked("ending")
+        if self._log.lock:
+            return Verdict(False, "log", self._log.lock)
+        why = "" if at is None else self.late(at)
+        return Verdict(False, "late", why) if why else PERMITTED
 
     def late(self, at: float) -> str:
         """Why what was touched at this moment (the server's own time) is not done now; "" if it is."""

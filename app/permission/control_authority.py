@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import Final, Literal
+from typing import Final, Literal, NamedTuple
 
 from app.i18n import say
 from app.panel.rules import ControlRules
@@ -28,6 +28,15 @@ Refusal = Literal[
     "control_not_yours",
     "control_stranger",
 ]
+
+
+class Passing(NamedTuple):
+    """Control changed by no act: `code` says how, `who` had it, took it or asked for it, and `other` is
+    in control now."""
+
+    code: str
+    who: Principal
+    other: Principal | None = None
 
 
 @dataclass(slots=True)
@@ -51,13 +60,16 @@ class ControlAuthority:
         monotonic: Callable[[], float] = time.monotonic,
         wall: Callable[[], float] = time.time,
         tell: Callable[[str], None] = lambda _: None,
+        passed: Callable[[Passing], None] = lambda _: None,
     ) -> None:
-        """`robot` is its name, "" where there is only one; `tell` gets a line for each change."""
+        """`robot` is its name, "" where there is only one; `tell` gets a line for each change, `passed`
+        each that no act made."""
         self.rules = rules
         self._robot = robot or say("the_robot")
         self._now = monotonic
         self._wall = wall
         self._tell = tell
+        self._passed = passed
         self._holder: _Party | None = None
         self._asker: _Party | None = None
         self._since = ""
@@ -176,16 +188,19 @@ class ControlAuthority:
             party.alive_until = self._now() + (LIFE_S if party.scripted else life_s)
         if by_hand and not self.holder and not self._given_up and self._may_override(who):
             self._hold(who, life_s, "taken at its first page")
+            self._passed(Passing("control_first_page", who))
 
     def advance(self) -> None:
         """What time alone has changed."""
         now = self._now()
         if self._asker and now >= self._asker.alive_until:
+            asker = self._asker.who
             self._end_request()
+            self._passed(Passing("control_request_lost", asker))
         if self._holder and now >= self._holder.alive_until:
-            self._pass_on(f"lost by {self._holder.who}")
+            self._pass_by_time("control_lost", f"lost by {self._holder.who}")
         elif now >= self._due():
-            self._pass_on("taken over for want of a touch")
+            self._pass_by_time("control_idle", "taken over for want of a touch")
 
     def view(self) -> ControlView:
         """What the pages show."""
@@ -231,6 +246,12 @@ class ControlAuthority:
             heir.since = self._now()
         self._install(heir)
         self._tell(f"control {how}, now of {heir.who if heir else 'nobody'}")
+
+    def _pass_by_time(self, code: str, how: str) -> None:
+        before = self._holder
+        self._pass_on(how)
+        if before:
+            self._passed(Passing(code, before.who, self._holder.who if self._holder else None))
 
     def _end_request(self) -> None:
         if self._asker:

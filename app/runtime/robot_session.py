@@ -13,6 +13,7 @@ from app.audit.press_record import Log, PressLog
 from app.commands.actions.goals import GoalTracker
 from app.commands.actions.recovery import GoalRecovery
 from app.commands.confirmations import Confirmations
+from app.commands.control_acts import ControlActs
 from app.commands.dispatch import Dispatcher
 from app.commands.holds.controller import HoldController
 from app.commands.parameters.sync import ParameterSync
@@ -76,7 +77,12 @@ class RobotSession:
         self.robot.endpoints = self.link.endpoints
         self.robot.read_later = self._read_later
         self._log = RobotLog(log, self.robot.name)
-        self.control = ControlAuthority(panel.control, self.robot.name, tell=self._log.info)
+        self.control = ControlAuthority(
+            panel.control,
+            self.robot.name,
+            tell=self._log.info,
+            passed=lambda passing: self.control_acts.passed(passing),
+        )
         self.refresher = ViewRefresher(
             panel,
             self.robot,
@@ -101,6 +107,9 @@ class RobotSession:
             self.publisher, self.control, operators_log, panel.press_expires_s, others.boots
         )
         self.press_log = PressLog(operators_log, self.robot.name, lambda: self.publisher.id)
+        self.control_acts = ControlActs(
+            self.control, self.press_guard, self.press_log, self.robot.name, self.show
+        )
         self._recovery = GoalRecovery(panel, self.robot, self.press_log, self._actions, self.show)
         self._liveness = BridgeLiveness(self.robot, self.link, self.show)
         self.reached = self._liveness.flushed

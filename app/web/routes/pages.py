@@ -4,7 +4,7 @@ import asyncio
 import secrets
 import time
 from collections.abc import Sequence
-from typing import Any, TypedDict, get_args
+from typing import Any, TypedDict
 from urllib.parse import urlencode
 
 from fastapi import APIRouter, Request
@@ -19,7 +19,6 @@ from app.i18n import say
 from app.panel.model import Page, Panel
 from app.panel.template import inputs_of
 from app.panel.widgets.families import Entered, Pressed
-from app.permission.control_authority import Refusal
 from app.permission.control_authority_view import role
 from app.permission.principal import Principal
 from app.printable import printable_texts
@@ -45,7 +44,7 @@ RELOADED = "reloaded"  # by itself: nobody tapped for it
 RELOADED_S = 2.0  # a press on a page that should have reloaded before is one on an old page
 # How long after a page without scripts was due it is still thought to be there.
 GRACE_S = 5
-REFUSALS = get_args(Refusal)
+TOO_OFTEN = "control_too_often"
 WORDS = (
     "cancel",
     "robots",
@@ -167,7 +166,6 @@ def _context(
     request: Request, state: AppState, session: RobotSession, page: Page, who: Principal, refresh_s: int
 ) -> PageContext:
     board, rules = session.publisher, session.control.rules
-    refusal = request.query_params.get("control", "")
     receipt = session.presses.receipt(request.query_params.get("receipt", ""))
     again = {RELOADED: 1} | ({"receipt": receipt.id} if receipt else {})
     now, wall = clock.server_now(), time.time()
@@ -198,8 +196,16 @@ def _context(
         again=f"{session.base}/pages/{page.id}?{urlencode(again)}",
         until=round(now + refresh_s + RELOADED_S, 3),
         browser=who.client.id,
-        refused=say(refusal) if refusal and refusal in REFUSALS else "",
+        refused=_refused(session, request.query_params.get("control", "")),
     )
+
+
+def _refused(session: RobotSession, query: str) -> str:
+    """Why an act on control was refused: `query` is its id, or the code where it is not kept."""
+    if query == TOO_OFTEN:
+        return say(TOO_OFTEN)
+    receipt = session.control_acts.receipt(query)
+    return receipt.reason if receipt else ""
 
 
 def _words(session: RobotSession, page: Page) -> dict[str, Any]:
