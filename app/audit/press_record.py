@@ -89,10 +89,16 @@ class PressLog:
 
     def __init__(self, log: Log, robot: str = "", board: Callable[[], str] = str) -> None:
         self._log = log
-        self.room = log.allowed
-        self.leave_out = log.suppress
         self._robot = robot
         self._board = board
+
+    def room(self, origin: Origin) -> bool:
+        """Whether a refusal may be an entry."""
+        return self._log.allowed(origin)
+
+    def leave_out(self, origin: Origin) -> None:
+        """Counts a refusal that is no entry."""
+        self._log.suppress(origin)
 
     async def pressed(
         self,

@@ -9,6 +9,7 @@ from datetime import UTC, datetime
 from typing import Any, Final, Protocol, cast
 
 from app.audit import Entry, Origin
+from app.audit.press_record import PendingEntry
 from app.errors import Cause
 from app.i18n import say
 from app.panel.template import needed
@@ -162,6 +163,14 @@ def with_doubt(receipt: Receipt, doubt: str) -> Receipt:
     if not doubt:
         return receipt
     return replace(receipt, reason=say("log_not_on_disk", said=receipt.reason, why=doubt))
+
+
+async def closed(pending: PendingEntry, receipt: Receipt) -> Receipt:
+    """The receipt, when what it says is on the disk; where it is not, it says so."""
+    doubt = await pending.closed(receipt.outcome, receipt.reason)
+    if pending.corrected_to is not None:  # in the meantime
+        receipt = corrected(receipt, pending.corrected_to)
+    return with_doubt(receipt, doubt)
 
 
 def named(origin: Origin) -> str:

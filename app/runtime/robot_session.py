@@ -16,8 +16,10 @@ from app.commands.confirmations import Confirmations
 from app.commands.control_acts import ControlActs
 from app.commands.dispatch import Dispatcher
 from app.commands.holds.controller import HoldController
+from app.commands.holds.messages import HoldMessages
 from app.commands.parameters.sync import ParameterSync
 from app.commands.press_context import PressGuard
+from app.commands.press_judge import Latest, PressJudge
 from app.commands.presses import Presses
 from app.commands.service_calls import ServiceCalls
 from app.errors import LinkError, NotFound
@@ -124,24 +126,20 @@ class RobotSession:
             self._parameters,
             reached=self._liveness.flushed,
         )
+        latest = Latest(self._take, lambda: self.link.hurried)
         self.presses = Presses(
-            panel,
-            self.robot,
+            PressJudge(panel, self.robot, latest),
             self.dispatcher,
             self.press_log,
-            catch_up=self._take,
-            news=lambda: self.link.hurried,
-            witness=self._recorder,
+            self.robot.name,
+            self._recorder,
         )
         self.holds = HoldController(
             panel,
-            self.interfaces,
             self.robot,
-            self.link,
+            HoldMessages(self.interfaces, self.robot, self.link, self.dispatcher.checked),
             self._loop,
-            checked=self.dispatcher.checked,
-            take=self._take,
-            news=lambda: self.link.hurried,
+            latest,
             changed=self.show,
             witness=self._recorder,
         )

@@ -11,6 +11,7 @@ from app.commands.confirmations import Confirmations
 from app.commands.dispatch import Dispatcher
 from app.commands.parameters.sync import ParameterSync
 from app.commands.press_context import PressContext
+from app.commands.press_judge import Latest, PressJudge
 from app.commands.presses import Presses
 from app.commands.service_calls import Asker, ServiceCalls
 from app.dialect import bridge_dialect
@@ -180,4 +181,5 @@ def presses_of(
 ) -> Presses:
     """The presses of a robot; `more` is for `sending_of`."""
     sending = sending_of(panel, robot, way, monotonic=monotonic, **more)
-    return Presses(panel, robot, sending, press_log or PressLog(NullLog()), monotonic, catch_up, news)
+    judge = PressJudge(panel, robot, Latest(catch_up, news), monotonic)
+    return Presses(judge, sending, press_log or PressLog(NullLog()), robot.name)

@@ -40,11 +40,11 @@ async def pressed_by_form(
     seen, until = inputs.pop("_seen", ""), _until(inputs)
     typed = session.dispatcher.typed(inputs)
     if not state.limits.admit(who):
-        receipt = session.presses.limited(widget, typed, press_id, shown=True)
+        receipt = session.presses.early_refusals.limited(widget, typed, press_id, shown=True)
         return RedirectResponse(page_after(session, widget, receipt.id), status_code=303)
     by = session.press_guard.by(widget, who, seen, until)
     if too_soon:
-        work = session.presses.too_soon(widget, typed, press_id, before, by.origin)
+        work = session.presses.early_refusals.too_soon(widget, typed, press_id, before, by.origin)
     else:
         work = session.presses.press(widget, typed, press_id, by)
     receipt = await state.counted(work)

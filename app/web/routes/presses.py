@@ -142,7 +142,7 @@ async def cancel(
     if state.limits.admit_cancel(who, session.base, widget, of[:LONGEST_ID]):
         receipt = await state.counted(session.presses.cancel(widget, origin_of(who), of))
     else:
-        receipt = session.presses.limited(widget, {}, "", "cancel_too_often", shown=form)
+        receipt = session.presses.early_refusals.limited(widget, {}, "", "cancel_too_often", shown=form)
     if form:
         return RedirectResponse(page_after(session, widget, receipt.id), status_code=303)
     return _answer(receipt)
@@ -155,7 +155,7 @@ async def pressed(
     session.presses.widget(widget)
     press_id = given.id or secrets.token_hex(8)
     if not state.limits.admit(who):
-        return session.presses.limited(widget, given.inputs, press_id)
+        return session.presses.early_refusals.limited(widget, given.inputs, press_id)
     at = given.at.timestamp() if given.at else None
     by = session.press_guard.by(widget, who, given.seen or "", at)
     return await state.counted(session.presses.press(widget, given.inputs, press_id, by))
