@@ -14,7 +14,7 @@ from app.commands.actions.goals import GoalTracker
 from app.commands.actions.recovery import GoalRecovery
 from app.commands.confirmations import Confirmations
 from app.commands.control_acts import ControlActs
-from app.commands.dispatch import Dispatcher
+from app.commands.dispatch import Dispatcher, Trackers
 from app.commands.holds.controller import HoldController
 from app.commands.holds.messages import HoldMessages
 from app.commands.parameters.sync import ParameterSync
@@ -120,10 +120,7 @@ class RobotSession:
             self.interfaces,
             self.robot,
             self.link,
-            self._calls,
-            self._actions,
-            self._confirmations,
-            self._parameters,
+            Trackers(self._calls, self._actions, self._confirmations, self._parameters),
             reached=self._liveness.flushed,
         )
         latest = Latest(self._take, lambda: self.link.hurried)

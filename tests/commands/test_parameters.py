@@ -374,7 +374,7 @@ def test_a_node_that_answers_without_it_is_asked_ever_more_rarely(
         paused.append(longest_s)
         await asyncio.sleep(0)
 
-    monkeypatch.setattr(sync, "_within", within)
+    monkeypatch.setattr(sync, "within", within)
 
     async def test(bench: Bench) -> None:
         bench.offer()

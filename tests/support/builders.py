@@ -8,7 +8,7 @@ from app.audit import NullLog, Origin
 from app.audit.press_record import PressLog
 from app.commands.actions.goals import GoalTracker
 from app.commands.confirmations import Confirmations
-from app.commands.dispatch import Dispatcher
+from app.commands.dispatch import Dispatcher, Trackers
 from app.commands.parameters.sync import ParameterSync
 from app.commands.press_context import PressContext
 from app.commands.press_judge import Latest, PressJudge
@@ -159,10 +159,12 @@ def sending_of(
         INTERFACES,
         robot,
         way,
-        calls,
-        GoalTracker(INTERFACES, robot, asker, lambda: None),
-        confirmations or Confirmations(robot, lambda: None),
-        ParameterSync(panel, INTERFACES, robot, asker, calls, lambda: None),
+        Trackers(
+            calls,
+            GoalTracker(INTERFACES, robot, asker, lambda: None),
+            confirmations or Confirmations(robot, lambda: None),
+            ParameterSync(panel, INTERFACES, robot, asker, calls, lambda: None),
+        ),
         monotonic,
         **more,
     )
