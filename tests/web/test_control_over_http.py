@@ -350,7 +350,7 @@ def test_a_form_that_is_sent_twice_is_one_act(client: Callable[..., Client]) -> 
     assert ann.http.post("/control/take", data=fields).status_code == 303
     assert ann.control("release").json()["done"]
     assert ann.http.post("/control/take", data=fields).status_code == 303
-    assert "Nobody has control" in ann.http.get("/pages/operation").text
+    assert "No panel has control" in ann.http.get("/pages/operation").text
 
 
 def test_acts_are_in_the_operators_log_its_page_and_its_csv(
@@ -370,8 +370,8 @@ def test_acts_are_in_the_operators_log_its_page_and_its_csv(
     assert acts[1]["press"] == "bobs-act"
     html = ann.http.get("/log", params={"text": "control_take"}).text
     assert html.count("<td>Take control") == 2
-    assert "Give up control" not in html
-    assert "Another panel has control: it can be asked." in html
+    assert "Release control" not in html
+    assert "Another panel has control. You can request it." in html
 
 
 def test_more_acts_than_a_client_may_are_refused(client: Callable[..., Client]) -> None:
