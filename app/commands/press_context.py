@@ -107,7 +107,7 @@ class PressGuard:
             raise InputError(f"seen: version {version} is not there yet, the newest is {newest}")
 
     def _grounds(self, who: Principal) -> Grounds:
-        return Grounds(self._control.verdict(who), self._log.lock, self._ended)
+        return Grounds(self._control.verdict(who), self._log.lock, self._ended, who)
 
     def _doubt(self, widget: str, seen: str, at: float | None) -> str:
         """Why a press is no longer what was meant; "" if it is."""

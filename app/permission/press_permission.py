@@ -22,25 +22,28 @@ from app.permission.interlocks import (
     link_verdict,
     locked,
 )
+from app.permission.principal import Principal
 from app.robot.state import RobotState
 
 
 @dataclass(frozen=True, slots=True)
 class Grounds:
-    """What the server itself has against a press, beside the robot: `ending` while it shuts down,
-    `log_lock` why the operator's log locks ("" where it does not), `control` whether who presses has
-    control. Without any, everything depends on the robot."""
+    """What the server itself has against a press, beside the robot.
+
+    `ending` while it shuts down, `log_lock` why the operator's log locks ("" where it does not),
+    `control` whether who presses has control; `who` is None in a question for all clients.
+    """
 
     control: Verdict = PERMITTED
     log_lock: str = ""
     ending: bool = False
+    who: Principal | None = None
 
 
 NO_GROUNDS: Final = Grounds()
 
 
-@dataclass(frozen=True, slots=True)
-class Question:
+class Question(NamedTuple):
     """May `widget` be pressed at `now` (monotonic seconds)? `link` and `interlocks` (the widget's
     own, in their order) are verdicts that are known already: they are the same for many widgets."""
 
@@ -89,12 +92,12 @@ CAUSES: Final[Mapping[str, Cause]] = {
 def permission(question: Question) -> Verdict:
     """The verdict of all checks, in their order."""
     verdicts = []
-    for check in CHECKS:
-        verdict = check.judge(question)
+    for _, judge, alone in CHECKS:
+        verdict = judge(question)
         if verdict is None or verdict is PERMITTED:
             continue
         verdicts.append(verdict)
-        if check.alone and not verdict.permitted:
+        if alone and not verdict.permitted:
             break
     return combined(verdicts)
 
@@ -113,6 +116,8 @@ def judged(
 
 def combined(verdicts: Sequence[Verdict]) -> Verdict:
     """The verdict of what all have to permit: the first that does not is told first."""
+    if not verdicts:
+        return PERMITTED
     if len(verdicts) == 1:
         return verdicts[0]
     locking = [one for verdict in verdicts for one in _each(verdict) if not one.permitted]

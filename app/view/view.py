@@ -105,7 +105,7 @@ def build_view(
 
 def _without_control(questions: Iterable[Question], lock: Verdict) -> dict[str, Attributes]:
     """The same commands, asked for a client that has no control."""
-    asked = (replace(one, grounds=replace(one.grounds, control=lock)) for one in questions)
+    asked = (one._replace(grounds=replace(one.grounds, control=lock)) for one in questions)
     return {one.widget.id: show(one.widget, one.robot, one.now, permission(one))[0] for one in asked}
 
 
