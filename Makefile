@@ -25,7 +25,7 @@ run: .venv/run
 
 # A panel in another folder: `KIOSK_PANEL=… make dev`.
 WATCHED := $(addprefix --reload-dir=,app templates static $(if $(KIOSK_PANEL),$(realpath $(dir $(KIOSK_PANEL)))))
-WATCHED += $(patsubst %,'--reload-include=*.%',toml json5 html css js msg srv action)
+WATCHED += $(patsubst %,'--reload-include=*.%',toml json5 html css js po msg srv action)
 dev: .venv/test
 	KIOSK_DEV=1 KIOSK_LOG_LEVEL=debug .venv/bin/uvicorn app.main:app --reload $(WATCHED)
 
@@ -49,6 +49,7 @@ check: .venv/test
 	.venv/bin/ruff check app tests bench docs
 	.venv/bin/ruff format --check app tests bench docs
 	.venv/bin/mypy
+	.venv/bin/python -m app.i18n
 
 # Warnings are errors. What the pages take from the code is written first.
 docs: .venv-docs/ready

@@ -25,6 +25,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
+from app.i18n import Text, TextLike
 from app.printable import printable
 
 # Why a receipt says that a press was refused.
@@ -33,12 +34,18 @@ Cause = Literal["", "interlock", "input", "link", "log", "time", "limit"]
 
 class KioskError(Exception):
     """The root; `status` is the HTTP status of an answer that carries it. Its message may name what a
-    robot or a browser sent, and goes to pages and terminals."""
+    robot or a browser sent, and goes to pages and terminals; `text` is it for a reader's language."""
 
     status = 500
 
     def __str__(self) -> str:
         return printable(super().__str__())
+
+    @property
+    def text(self) -> TextLike:
+        """The sentence that it was raised with, or its message, which is in no language."""
+        given = self.args[0] if self.args else ""
+        return given if isinstance(given, Text) else str(self)
 
 
 class SettingsError(KioskError):
@@ -124,7 +131,7 @@ class PressRefused(KioskError):
 
     status = 409
 
-    def __init__(self, reason: str, cause: Cause) -> None:
+    def __init__(self, reason: TextLike, cause: Cause) -> None:
         super().__init__(reason)
         self.reason = reason
         self.cause = cause
@@ -137,7 +144,7 @@ class TooSlow(KioskError):
 class TooMany(KioskError):
     status = 429
 
-    def __init__(self, message: str, again_s: int) -> None:
+    def __init__(self, message: TextLike, again_s: int) -> None:
         super().__init__(message)
         self.again_s = again_s
 
@@ -167,7 +174,7 @@ class LogCorrupt(LogError):
 class LogGone(LogError):
     """`itself`: the log's own file is gone, and a new one has to be begun."""
 
-    def __init__(self, message: str, *, itself: bool) -> None:
+    def __init__(self, message: TextLike, *, itself: bool) -> None:
         super().__init__(message)
         self.itself = itself
 

@@ -10,7 +10,6 @@ from contextlib import asynccontextmanager
 from functools import partial
 
 from fastapi import Depends, FastAPI
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from starlette.middleware.gzip import GZipMiddleware
 from uvicorn import Config as ServerConfig
 
@@ -31,6 +30,7 @@ from app.web.assets import load_assets
 from app.web.described import errors
 from app.web.error_pages import HANDLERS, on_error_in_development
 from app.web.metrics import Metrics
+from app.web.page_templates import PageTemplates
 from app.web.proxies import Proxies
 from app.web.request_body import LONGEST
 from app.web.routes import audit_log as log_routes
@@ -84,7 +84,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
                 works = (
                     watchdog.run(),
                     _listening(app.state.server, ports, settings.hosts),
-                    pages.compiled(state.templates),
+                    pages.compiled(state.templates.environment(panel.language)),
                 )
                 tasks = [asyncio.create_task(work) for work in works]
                 try:
@@ -138,7 +138,8 @@ async def _app_state(
         metrics = Metrics(lambda: oplog.left_out, lambda: limits.refused)
         async with open_fleet(settings, panel, revision, oplog, zenoh_peer.in_process) as fleet:
             metrics.follow(fleet)
-            yield AppState(fleet, assets, _templates(), metrics, oplog, limits)
+            templates = PageTemplates(shipped("templates"))
+            yield AppState(fleet, assets, templates, metrics, oplog, limits)
 
 
 async def _listening(server: ServerConfig | None, ports: set[int], hosts: Sequence[str]) -> None:
@@ -154,17 +155,6 @@ def _watchdog(state: AppState) -> Watchdog:
         ServiceManager(),
         lambda: [(session.robot.name, session.link) for session in state.fleet.sessions],
         lambda: state.fleet.state,
-    )
-
-
-def _templates() -> Environment:
-    return Environment(
-        loader=FileSystemLoader(shipped("templates")),
-        autoescape=True,
-        undefined=StrictUndefined,
-        auto_reload=False,
-        trim_blocks=True,
-        lstrip_blocks=True,
     )
 
 

@@ -12,6 +12,7 @@ import pytest
 import zenoh
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 
+from app.i18n import ENGLISH, sentences
 from tests.needs import needs_part, needs_parts
 from tests.support import domains
 from tests.support.fonts import fonts_file
@@ -32,6 +33,7 @@ from tests.support.parts import (
 )
 
 expect.set_options(timeout=1000 * ENOUGH_S)
+sentences(ENGLISH)  # read before any test measures time
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

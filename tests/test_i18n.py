@@ -1,20 +1,29 @@
-"""The sentences: every code that the program uses is there, and ages read as operators say them."""
+"""Sentences as values, and their catalogues: every code is there, in every language."""
 
 import ast
+import json
 import re
-import subprocess
-import sys
 from collections.abc import Iterator
-from string import Formatter
+from pathlib import Path
 
 import pytest
 
 from app.clock import format_age
-from app.i18n import ENGLISH, say
+from app.i18n import ENGLISH, Text, joined, localized, render, say, sentences, text_in
+from app.i18n.__main__ import faults, placeholders
+from app.i18n.catalogue import catalogues_in, files
 from app.settings import PACKAGE, shipped
 
 SPEAKERS = ("say", "said", "locked", "refused")  # functions whose first argument is a code
-PREFIXES = ("control_", "lamp_", "log_page_")  # of codes that are put together
+PREFIXES = (
+    "control_",
+    "lamp_",
+    "log_",
+    "log_done_",
+    "log_page_",
+    "log_page_control_",
+)  # of codes that are put together
+SENTENCES = sentences(ENGLISH)
 
 
 def spoken() -> Iterator[tuple[str, str, frozenset[str]]]:
@@ -29,63 +38,137 @@ def spoken() -> Iterator[tuple[str, str, frozenset[str]]]:
                 yield f"{path.name}:{call.lineno}", str(code.value), names
 
 
-def needed(code: str) -> set[str]:
-    return {name for _, name, _, _ in Formatter().parse(ENGLISH[code]) if name}
-
-
 def test_every_code_that_the_program_says_has_a_sentence() -> None:
     said = list(spoken())
     assert len(said) > 20
-    assert [(where, code) for where, code, _ in said if code not in ENGLISH] == []
+    assert [(where, code) for where, code, _ in said if code not in SENTENCES] == []
 
 
 def test_every_sentence_gets_all_that_it_is_about() -> None:
     # `refused(code, why)` fills in `why` and `time` itself.
     lacking = [
-        (where, code) for where, code, names in spoken() if not needed(code) <= names | {"why", "time"}
+        (where, code)
+        for where, code, names in spoken()
+        if not placeholders(SENTENCES[code]) <= names | {"why", "time"}
     ]
     assert lacking == []
 
 
 def test_every_sentence_is_said_somewhere() -> None:
-    sources = [path for path in PACKAGE.rglob("*.py") if path.name != "sentences.py"]
+    sources = [path for path in PACKAGE.rglob("*.py")]
     sources += [path for name in ("templates", "static") for path in shipped(name).rglob("*.*")]
     words = set(re.findall(r"\w+", "\n".join(path.read_text() for path in sources)))
-    ends = {code: code.removeprefix(next(filter(code.startswith, PREFIXES), "")) for code in ENGLISH}
-    assert [code for code, end in ends.items() if not words & {code, end}] == []
-
-
-def test_no_sentence_is_said_while_modules_are_imported() -> None:
-    """One that is could never be in a reader's language."""
-    code = """
-import importlib, pkgutil
-import app, app.i18n
-
-def say(code, **about):
-    raise AssertionError(f"{code} is said at import")
-
-app.i18n.say = say
-for module in pkgutil.walk_packages(app.__path__, "app."):
-    if not module.name.endswith("__main__") and module.name != "app.main":
-        importlib.import_module(module.name)
-"""
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=PACKAGE.parent, capture_output=True, text=True, check=False
-    )
-    assert (done.returncode, done.stderr) == (0, "")
+    ends = {code: {code.removeprefix(prefix) for prefix in ("", *PREFIXES)} for code in SENTENCES}
+    assert [code for code, said in ends.items() if not words & said] == []
 
 
 def test_a_sentence_is_filled_in() -> None:
-    assert say("waiting", topic="/estop") == "Locked: waiting for /estop."
+    assert render(say("waiting", topic="/estop")) == "Locked: waiting for /estop."
 
 
 def test_braces_in_what_is_filled_in_are_only_text() -> None:
-    assert say("refused", why="{topic}", time="now") == "Not sent at now: {topic}"
+    assert render(say("refused", why="{topic}", time="now")) == "Not sent at now: {topic}"
 
 
 def test_an_unknown_code_is_a_mistake_of_the_programmers() -> None:
     with pytest.raises(KeyError):
-        say("no such code")
+        render(say("no such code"))
+
+
+def test_a_text_is_its_code_and_its_parameters() -> None:
+    text = say("stale", topic="/estop", limit="2")
+    assert text == say("stale", limit="2", topic="/estop")
+    assert {text: 1}[say("stale", topic="/estop", limit="2")] == 1
+    assert text != say("stale", topic="/estop", limit="3")
+    assert text != render(text)
+    with pytest.raises(AttributeError, match="code: a Text does not change"):
+        text.code = "waiting"
+
+
+def test_a_text_in_a_text_is_rendered_with_it() -> None:
+    why = say("waiting", topic="/estop")
+    assert render(say("with_stop", said=say("and_more", names=("/a", why), number=2))) == (
+        f"/a, {render(why)} and 2 more."
+    )
+
+
+def test_texts_that_follow_one_another_are_one() -> None:
+    first, last = say("ready"), say("stopping")
+    both = joined([first, "", last])
+    assert isinstance(both, Text)
+    assert render(both) == f"{render(first)} {render(last)}"
+    assert render(joined([first, last], "between_lines")).splitlines() == [render(first), render(last)]
+    assert (joined([first, ""]), joined([])) == (first, "")
+
+
+def test_what_hides_in_a_parameter_is_shown() -> None:
+    assert "\\u202e" in render(say("waiting", topic="/\u202estop"))
+
+
+def test_a_text_comes_back_from_json() -> None:
+    text = say("refused", why=joined([say("waiting", topic="/a"), "as is"]), time="10:00:00")
+    assert text_in(json.dumps(text.as_json())) == text
+    with pytest.raises(ValueError, match="no sentence"):
+        text_in('{"code": "ready"}')
+
+
+def test_a_value_is_rendered_with_all_that_is_in_it() -> None:
+    given = {"reason": say("ready"), "several": [say("ready"), 1, None], "text": "as it is"}
+    ready = render(say("ready"))
+    assert localized(given, ENGLISH) == {
+        "reason": ready,
+        "several": [ready, 1, None],
+        "text": "as it is",
+    }
+
+
+# Catalogues.
+
+
+def catalogue(folder: Path, language: str, entries: dict[str, str]) -> Path:
+    """A catalogue with these sentences."""
+    path = folder / f"{language}.po"
+    lines = (f"msgid {json.dumps(code)}\nmsgstr {json.dumps(text)}\n" for code, text in entries.items())
+    path.write_text("\n".join(lines))
+    return path
+
+
+def test_every_catalogue_is_whole() -> None:
+    assert list(faults(files())) == []
+
+
+@pytest.mark.parametrize(
+    ("changed", "fault"),
+    [
+        ({"waiting": ""}, "waiting is not translated"),
+        ({"waiting": "Gesperrt."}, "waiting has nothing, and English has {topic}"),
+        ({"waiting": "{topic} {node}"}, "waiting has {node}, {topic}, and English has {topic}"),
+        ({"waiting": "{topic.__class__}"}, "waiting has {topic.__class__}, and English has {topic}"),
+        ({"waiting": "{topic!r}"}, "waiting has {topic!r}, and English has {topic}"),
+        ({"waiting": "{topic"}, "waiting can't be filled in: expected '}' before end of string"),
+        ({"vaiting": "{topic}"}, "vaiting is no code of the English catalogue"),
+    ],
+)
+def test_a_fault_of_a_translation_is_named(tmp_path: Path, changed: dict[str, str], fault: str) -> None:
+    path = catalogue(tmp_path, "de", {**SENTENCES, **changed})
+    assert list(faults({ENGLISH: files()[ENGLISH], "de": path})) == [f"de.po: {fault}"]
+
+
+def test_a_catalogue_that_cannot_be_read_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "de.po"
+    path.write_bytes(b'msgid "ready"\nmsgstr "Gr\xfcn"\n')
+    (found,) = faults({ENGLISH: files()[ENGLISH], "de": path})
+    assert found.startswith("de.po: ")
+
+
+def test_each_language_has_its_sentences_and_what_it_lacks_in_english(tmp_path: Path) -> None:
+    catalogue(tmp_path, "de", {"waiting": "Gesperrt: warte auf {topic}.", "between_names": " / "})
+    with catalogues_in(tmp_path):
+        assert render(say("waiting", topic="/a"), "de") == "Gesperrt: warte auf /a."
+        assert render(say("waiting", topic=("/a", "/b")), "de") == "Gesperrt: warte auf /a / /b."
+        assert render(say("stopping"), "de") == SENTENCES["stopping"]
+        assert render(say("waiting", topic="/a")) == "Locked: waiting for /a."
+    assert list(files()) == [ENGLISH]
 
 
 @pytest.mark.parametrize(

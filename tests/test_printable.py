@@ -58,7 +58,7 @@ def test_in_json_an_escape_says_the_same() -> None:
 
 
 def test_sentences_and_errors_are_printable() -> None:
-    assert say("no_option", label="Speed", options="1, 2", given=BAD).endswith(f"not {SHOWN}")
+    assert str(say("no_option", label="Speed", options="1, 2", given=BAD)).endswith(f"not {SHOWN}")
     assert str(InputError(f'no input "{BAD}"')) == f'no input "{SHOWN}"'
 
 

@@ -76,7 +76,7 @@ def test_every_kind_of_change_reaches_an_open_browser(checkout: Checkout, page: 
     expect(page.get_by_role("heading", name="A new heading")).to_be_visible(timeout=STARTED_MS)
     checkout.edit("static/css/tokens.css", "--ground: #d8dbde", "--ground: #123456")
     expect(page.locator("body")).to_have_css("background-color", "rgb(18, 52, 86)", timeout=STARTED_MS)
-    checkout.edit("app/i18n/en.py", '"server": "Server"', '"server": "Changed server"')
+    checkout.edit("app/i18n/en.po", 'msgstr "Server"', 'msgstr "Changed server"')
     expect(page.locator('[data-lamp="server"]')).to_contain_text("Changed server", timeout=STARTED_MS)
 
 

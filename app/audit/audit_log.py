@@ -26,7 +26,7 @@ from app.audit.refusal_quota import SUMMED_UP_S, RefusalQuota
 from app.audit.ticket import Limits, Results, Ticket
 from app.audit.writer_thread import WriterThread
 from app.errors import LogError
-from app.i18n import say
+from app.i18n import ENGLISH, TextLike, say
 
 log = logging.getLogger("kiosk.log")
 
@@ -87,20 +87,20 @@ class OperatorLog:
         return self._writer.head
 
     @property
-    def fault(self) -> str:
+    def fault(self) -> TextLike:
         """The sentence that says that the log can't be written; "" while it can."""
         why = self._why
         sentence = "log_unwritable" if self._needed else "log_unwritable_free"
         return say(sentence, why=why) if why else ""
 
     @property
-    def _why(self) -> str:
+    def _why(self) -> TextLike:
         if self._stuck and not self._writer.fault:
             return say("log_slow", seconds=f"{PRESSED_WITHIN_S:g}")
         return self._writer.fault
 
     @property
-    def lock(self) -> str:
+    def lock(self) -> TextLike:
         """Why nothing may be pressed; "" while it may."""
         return self.fault if self._needed else ""
 
@@ -128,17 +128,17 @@ class OperatorLog:
             return await self._written(entry)
         except LogError as error:
             if self._needed:
-                raise LogError(self.fault or say("log_unwritable", why=error)) from error
+                raise LogError(self.fault or say("log_unwritable", why=error.text)) from error
             return None
 
-    async def closed(self, entry: Entry) -> str:
+    async def closed(self, entry: Entry) -> TextLike:
         """Writes what came of a press; returns when that is on the disk, or why it is not."""
         if entry.outcome == "refused":
             self._refusals.take(entry)
         try:
             await self._within(self._add(entry), CLOSED_WITHIN_S)
         except LogError as error:
-            return str(error)
+            return error.text
         return ""
 
     def add(self, entry: Entry) -> None:
@@ -178,10 +178,11 @@ class OperatorLog:
         return await self._readers.rows(wanted, before, count)
 
     def export(
-        self, wanted: Filter, before: int | None, gzip: bool
+        self, wanted: Filter, before: int | None, gzip: bool, language: str = ENGLISH
     ) -> AbstractAsyncContextManager[ReaderProcess]:
-        """All that is wanted before a number, as CSV, while this lasts; LogError, TooMany."""
-        return self._readers.export(wanted, before, gzip)
+        """All that is wanted before a number, as CSV in a language, while this lasts; LogError,
+        TooMany."""
+        return self._readers.export(wanted, before, gzip, language)
 
     def close(self) -> None:
         """The server is about to end: it waits for nobody who reads."""

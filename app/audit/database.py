@@ -16,7 +16,7 @@ from app.i18n import say
 NAME: Final = "operators-log.sqlite3"
 SUFFIXES: Final = ("", "-wal", "-shm")
 APPLICATION: Final = 0x4F504C47  # "OPLG"
-VERSION: Final = 1
+VERSION: Final = 2
 PATIENCE_S: Final = 1.0  # with a program of somebody's that has the file locked
 
 # `undone` has the presses of which the end is not known; it can be made from `entry` anew.
@@ -26,7 +26,8 @@ CREATE TABLE entry (
   kind TEXT NOT NULL, of INTEGER, address TEXT NOT NULL, browser TEXT NOT NULL, who TEXT NOT NULL,
   robot TEXT NOT NULL, press TEXT NOT NULL, widget TEXT NOT NULL, action TEXT NOT NULL,
   "values" TEXT NOT NULL, seen TEXT NOT NULL, verdict TEXT NOT NULL, board TEXT NOT NULL,
-  outcome TEXT NOT NULL, reason TEXT NOT NULL, prev TEXT NOT NULL, hash TEXT NOT NULL
+  outcome TEXT NOT NULL, reason TEXT NOT NULL, prev TEXT NOT NULL, hash TEXT NOT NULL,
+  text TEXT NOT NULL DEFAULT ''
 ) STRICT;
 CREATE TABLE undone (seq INTEGER PRIMARY KEY, outcome TEXT NOT NULL) STRICT;
 CREATE TABLE about (key TEXT PRIMARY KEY, value ANY NOT NULL) STRICT, WITHOUT ROWID;
@@ -108,6 +109,8 @@ def _prepare(db: sqlite3.Connection, after: Head | None) -> None:
         _begin(db, after)
     elif application != APPLICATION or tables != 3:
         raise LogCorrupt("the file is not an operator's log")
+    elif version == 1:
+        _add_text(db)
     elif version != VERSION:
         raise LogError(f"the file is of another version of this program ({version}, not {VERSION})")
     db.execute(INDEX)
@@ -122,6 +125,13 @@ def _begin(db: sqlite3.Connection, after: Head | None) -> None:
     db.execute("COMMIT")
 
 
+def _add_text(db: sqlite3.Connection) -> None:
+    """A file of version 1 has no codes of reasons; its entries stay as they are."""
+    column = "text TEXT NOT NULL DEFAULT ''"
+    db.executescript(f"BEGIN IMMEDIATE; ALTER TABLE entry ADD COLUMN {column}; "
+                     f"PRAGMA user_version = {VERSION}; COMMIT")  # fmt: skip
+
+
 def read_only(folder: Path) -> sqlite3.Connection:
     """A connection of a reader's, which holds up no writer."""
     with in_words():
@@ -133,6 +143,8 @@ def read_only(folder: Path) -> sqlite3.Connection:
             timeout=PATIENCE_S,
             isolation_level=None,
         )
+        if db.execute("PRAGMA user_version").fetchone()[0] == 1:  # no server has opened it since
+            db.execute("CREATE TEMP VIEW entry AS SELECT *, '' AS text FROM main.entry")
     db.text_factory = lambda data: data.decode("utf-8", "replace")
     return db
 

@@ -2,7 +2,8 @@
 
 An entry's hash is SHA-256 over a JSON array of all its fields but the hash itself, in their order,
 in UTF-8, without spaces, with nothing escaped that need not be. `prev`, the last of these fields,
-is the hash of the entry before; the first entry's is the log's genesis, 32 random bytes.
+is the hash of the entry before; the first entry's is the log's genesis, 32 random bytes. `text` is left
+out where it is "": so were all entries written before there was this field.
 """
 
 import hashlib
@@ -11,6 +12,8 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any, Final, Literal, NamedTuple, Self
+
+from app.i18n import ENGLISH, TextLike, render, text_in
 
 Kind = Literal["began", "pressed", "closed", "corrected", "refused", "control", "removed", "resumed"]
 
@@ -34,7 +37,9 @@ class Entry(NamedTuple):
     which counts within one `boot` of the server; `of` the number of the press that it tells of.
 
     `values` is JSON, `verdict` the code of what permitted or locked, `board` the version of the
-    view at that moment. `seq`, `boot`, `prev` and `hash` are there once it is written.
+    view at that moment. `reason` is English, `text` the same as JSON, with its code and parameters; ""
+    for what is no sentence of the catalogue. `seq`, `boot`, `prev` and `hash` are there once it is
+    written.
     """
 
     seq: int
@@ -56,6 +61,7 @@ class Entry(NamedTuple):
     board: str = ""
     outcome: str = ""
     reason: str = ""
+    text: str = ""
     prev: str = ""
     hash: str = ""
 
@@ -73,7 +79,24 @@ class Entry(NamedTuple):
         """What its hash must be."""
         return _hash(self[:-1])
 
-    def follow_up(self, kind: Kind, outcome: str, reason: str, **more: str) -> Self:
+    @property
+    def said(self) -> TextLike:
+        """Its reason, for a reader's language where that is known."""
+        try:
+            return text_in(self.text) if self.text else self.reason
+        except ValueError:
+            return self.reason
+
+    def reason_in(self, language: str) -> str:
+        """Its reason as a reader of this language reads it; English as it was written."""
+        if language == ENGLISH or isinstance(said := self.said, str):
+            return self.reason
+        try:
+            return plain(render(said, language))
+        except (KeyError, IndexError, ValueError):  # of another version's catalogue
+            return self.reason
+
+    def follow_up(self, kind: Kind, outcome: str, reason: TextLike, **more: str) -> Self:
         """The entry that tells, now, what came of this press."""
         at, monotonic = _now()
         return self._replace(
@@ -83,7 +106,8 @@ class Entry(NamedTuple):
             kind=kind,
             of=self.seq,
             outcome=outcome,
-            reason=plain(reason),
+            reason=plain(render(reason)),
+            text=code_of(reason),
             **{name: plain(text) for name, text in more.items()},
         )
 
@@ -91,6 +115,7 @@ class Entry(NamedTuple):
 FIELDS: Final = Entry._fields
 MONOTONIC: Final = FIELDS.index("monotonic")
 PREV: Final = FIELDS.index("prev")
+TEXT: Final = FIELDS.index("text")
 ORIGIN: Final = tuple(field.name for field in fields(Origin))
 _as_text: Final = json.JSONEncoder(ensure_ascii=False, separators=(",", ":")).encode
 _in_order: Final = json.JSONEncoder(sort_keys=True).encode
@@ -98,14 +123,28 @@ _as_json: Final = json.JSONEncoder(ensure_ascii=False, allow_nan=False).encode
 
 
 def entered(
-    kind: Kind, origin: Origin | None = None, values: Mapping[str, Any] | None = None, **texts: str
+    kind: Kind,
+    origin: Origin | None = None,
+    values: Mapping[str, Any] | None = None,
+    reason: TextLike = "",
+    **texts: str,
 ) -> Entry:
     """An entry as of now, with texts that any file and any page can take."""
     at, monotonic = _now()
     if origin is not None:
         texts |= {name: getattr(origin, name) for name in ORIGIN}
+    texts |= {"reason": render(reason)}
     cleaned: dict[str, Any] = {name: plain(text) for name, text in texts.items()}
+    cleaned["text"] = code_of(reason)
     return Entry(0, at, "", monotonic, kind, values=as_json(values or {}), **cleaned)
+
+
+def code_of(reason: TextLike) -> str:
+    """A reason as JSON; "" for one that is no sentence, or has parameters that are too long."""
+    if isinstance(reason, str):
+        return ""
+    text = _as_text(reason.as_json())
+    return plain(text, len(text)) if len(text) <= LONGEST_VALUES else ""
 
 
 def plain(text: str, longest: int = LONGEST_TEXT) -> str:
@@ -134,7 +173,9 @@ def same_values(text: str, values: Mapping[str, Any]) -> bool:
 
 
 def _hash(row: tuple[Any, ...]) -> str:
-    return hashlib.sha256(_as_text(row).encode()).hexdigest()
+    """Of a row without its hash: `text` counts where it is there."""
+    counted = row if row[TEXT] else (*row[:TEXT], *row[TEXT + 1 :])
+    return hashlib.sha256(_as_text(counted).encode()).hexdigest()
 
 
 def _now() -> tuple[int, int]:

@@ -8,28 +8,33 @@ import io
 import zlib
 from collections.abc import Iterable, Iterator
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Final
 
 from app.audit import entry
 from app.audit.queries import Filter, Row, rows
+from app.i18n import ENGLISH
 from app.printable import printable
 
 ROWS_AT_ONCE: Final = 500
 GZIP: Final = zlib.MAX_WBITS | 16  # the format, as zlib has it
 TEXTS: Final = entry.FIELDS.index("address")  # an entry's fields from here on
-FIELDS: Final = (*entry.FIELDS[:TEXTS], "pressed_at", *entry.FIELDS[TEXTS:])
+# `text`, which is for programs, comes last.
+LATER: Final = tuple(name for name in entry.FIELDS[TEXTS:] if name != "text")
+FIELDS: Final = (*entry.FIELDS[:TEXTS], "pressed_at", *LATER, "text")
 # What a spreadsheet would take as a formula.
 FORMULA: Final = ("=", "+", "-", "@", "\t", "\r")
 
 
-def lines(folder: Path, wanted: Filter, before: int | None) -> Iterator[bytes]:
-    """All that is wanted before a number; LogError."""
+def lines(folder: Path, wanted: Filter, before: int | None, language: str = ENGLISH) -> Iterator[bytes]:
+    """All that is wanted before a number, with reasons in a language; LogError."""
+    cells = partial(_cells, language)
     found = rows(folder, wanted, before, ROWS_AT_ONCE)
-    yield "\ufeff".encode() + _csv([FIELDS, *map(_cells, found)])
+    yield "\ufeff".encode() + _csv([FIELDS, *map(cells, found)])
     while len(found) == ROWS_AT_ONCE:
         found = rows(folder, wanted, found[-1].entry.seq, ROWS_AT_ONCE)
-        yield _csv(map(_cells, found))
+        yield _csv(map(cells, found))
 
 
 def packed(pieces: Iterable[bytes]) -> Iterator[bytes]:
@@ -40,9 +45,11 @@ def packed(pieces: Iterable[bytes]) -> Iterator[bytes]:
     yield packer.flush()
 
 
-def _cells(row: Row) -> tuple[str | int | None, ...]:
-    seq, at, boot, monotonic, kind, of, *texts = row.entry
-    return (seq, _time(at), boot, monotonic, kind, of, _time(row.pressed_at), *map(_text, texts))
+def _cells(language: str, row: Row) -> tuple[str | int | None, ...]:
+    of = row.entry
+    times = (of.seq, _time(of.at), of.boot, of.monotonic, of.kind, of.of, _time(row.pressed_at))
+    shown = of._replace(reason=of.reason_in(language))
+    return (*times, *(_text(getattr(shown, name)) for name in LATER), _text(of.text))
 
 
 def _time(ms: int | None) -> str | None:

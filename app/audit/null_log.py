@@ -10,7 +10,7 @@ from app.audit.database import Head
 from app.audit.entry import Entry, Origin
 from app.audit.queries import OpenPress
 from app.errors import FolderInUse, LogError
-from app.i18n import say
+from app.i18n import TextLike, say
 
 log = logging.getLogger("kiosk.log")
 
@@ -20,8 +20,8 @@ class NullLog:
 
     folder = None
     enabled = False
-    fault = ""
-    lock = ""
+    fault: TextLike = ""
+    lock: TextLike = ""
     head: Head | None = None
     left_out = 0
 
@@ -60,12 +60,12 @@ class NullLog:
             try:
                 self._folder.hold()
             except FolderInUse as error:
-                raise LogError(say("folder_taken", why=error)) from error
+                raise LogError(say("folder_taken", why=error.text)) from error
             except OSError as error:
                 log.warning("a second server would not be noticed: %s", error)
         return None
 
-    async def closed(self, entry: Entry) -> str:
+    async def closed(self, entry: Entry) -> TextLike:
         return ""
 
     def close(self) -> None:

@@ -8,7 +8,7 @@ from app.audit.database import NAME, Head, clear, in_words, set_aside
 from app.audit.entry import Entry, entered
 from app.audit.store import Store
 from app.errors import LogCorrupt, LogError, LogGone
-from app.i18n import say
+from app.i18n import TextLike, joined, say
 
 log = logging.getLogger("kiosk.log")
 
@@ -20,7 +20,7 @@ class Opening:
         self._folder = folder
         self._boot = boot
         self._lost: LogError | None = None
-        self._begun = ""
+        self._begun: TextLike = ""
 
     def lost(self, error: LogError) -> None:
         """The file was closed for this; what needs a new one stays known until there is one."""
@@ -49,11 +49,11 @@ class Opening:
         self._lost = None
         return store
 
-    def _why_gone(self, head: Head | None) -> str:
+    def _why_gone(self, head: Head | None) -> TextLike:
         with in_words():
             found = clear(self._folder)
-        why = say("log_began_for_gone", last=head.seq if head else 0)
-        why += " " + say("log_found", name=found) if found else ""
+        gone = say("log_began_for_gone", last=head.seq if head else 0)
+        why = joined([gone, say("log_found", name=found) if found else ""])
         log.error("%s", why)
         return why
 

@@ -7,7 +7,7 @@ from typing import Any, Protocol
 from app.audit.entry import Entry, Origin, entered
 from app.audit.queries import OpenPress
 from app.errors import LogError
-from app.i18n import say
+from app.i18n import TextLike, render, say
 from app.permission.principal import Principal
 from app.robot.command_status import Outcome
 
@@ -17,16 +17,16 @@ class Log(Protocol):
     are "" while all is well."""
 
     @property
-    def fault(self) -> str: ...
+    def fault(self) -> TextLike: ...
     @property
-    def lock(self) -> str: ...
+    def lock(self) -> TextLike: ...
     def notifying(self, changed: Callable[[], None]) -> AbstractContextManager[None]: ...
 
     async def pressed(self, entry: Entry) -> Entry | None:
         """Returns when the entry is written; LogError when it can't be and must, Repeated where the log
         has a press of this id."""
 
-    async def closed(self, entry: Entry) -> str:
+    async def closed(self, entry: Entry) -> TextLike:
         """Returns when the entry is on the disk, or why it is not."""
 
     def add(self, entry: Entry) -> None:
@@ -47,7 +47,7 @@ class PendingEntry:
     """One press in the log; `entry` is None where it could not be written and need not be."""
 
     def __init__(
-        self, log: Log, entry: Entry | None, board: Callable[[], str], fault: str = ""
+        self, log: Log, entry: Entry | None, board: Callable[[], str], fault: TextLike = ""
     ) -> None:
         self._log = log
         self._entry = entry
@@ -65,7 +65,7 @@ class PendingEntry:
         """By which verdict, and by which version of the board: the one that there is now."""
         self._judged = {"verdict": verdict, "board": self._board()}
 
-    async def closed(self, outcome: str, reason: str) -> str:
+    async def closed(self, outcome: str, reason: TextLike) -> TextLike:
         """Writes what came of it; returns when that is on the disk, or why it is not."""
         if self._entry is None:
             return self._fault
@@ -119,7 +119,7 @@ class PressLog:
         try:
             written = await self._log.pressed(entry)
         except LogError as error:
-            return PendingEntry(self._log, None, self._board, str(error))
+            return PendingEntry(self._log, None, self._board, error.text)
         return PendingEntry(self._log, written, self._board, self._log.fault)
 
     @property
@@ -140,22 +140,24 @@ class PressLog:
         inputs: Mapping[str, Any],
         press_id: str,
         origin: Origin,
-        reason: str,
+        reason: TextLike,
         action: str = "press",
-    ) -> str:
+    ) -> TextLike:
         """A press that was not even judged; returns when it is on the disk, or why it is not."""
         about = self._about(widget, press_id, action)
         entry = entered("refused", origin, inputs, outcome="refused", reason=reason, **about)
         return await self._log.closed(entry)
 
-    async def acted(self, action: str, act_id: str, origin: Origin, outcome: str, reason: str) -> str:
+    async def acted(
+        self, action: str, act_id: str, origin: Origin, outcome: str, reason: TextLike
+    ) -> TextLike:
         """An act that is no press; returns when it is on the disk, or why it is not."""
         about = self._about("", act_id, action)
         return await self._log.closed(
             entered("control", origin, {}, outcome=outcome, reason=reason, **about)
         )
 
-    def note(self, action: str, origin: Origin, reason: str) -> None:
+    def note(self, action: str, origin: Origin, reason: TextLike) -> None:
         """Control changed by no act."""
         self._log.add(entered("control", origin, {}, reason=reason, **self._about("", "", action)))
 
@@ -166,4 +168,4 @@ class PressLog:
 def origin_of(who: Principal, seen: str = "") -> Origin:
     """Where a press comes from: the client, and who is logged in there or, without users, its name."""
     client = who.client
-    return Origin(address=client.address, browser=client.id, who=who.name, seen=seen)
+    return Origin(address=client.address, browser=client.id, who=render(who.name), seen=seen)

@@ -3,6 +3,7 @@
 Each call is one short read on a connection of its own: a slow reader keeps nothing open.
 """
 
+import json
 import time
 from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass
@@ -59,13 +60,19 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class OpenPress:
-    """A press of which the log has no end: its entry, what was told of it last ("" where nothing was),
-    and whether what it was for was `accepted` once."""
+    """A press of which the log has no end: its entry, what was told of it last ("" where nothing was;
+    `text` is the reason with its code), and whether what it was for was `accepted` once."""
 
     press: Entry
     outcome: str
     reason: str
+    text: str
     accepted: bool
+
+    @property
+    def code(self) -> str:
+        """That of the reason; "" where the log has none."""
+        return str(json.loads(self.text)["code"]) if self.text else ""
 
 
 def rows(
@@ -94,14 +101,19 @@ def open_presses(folder: Path, robot: str, widgets: Collection[str], since: int)
         ), told AS (
           SELECT of, max(seq) AS last, max(outcome = 'accepted') AS accepted FROM recent GROUP BY of
         )
-        SELECT {columns}, ifnull(l.outcome, '') AS said, ifnull(l.reason, ''), ifnull(t.accepted, 0)
+        SELECT {columns}, ifnull(l.outcome, '') AS said, ifnull(l.reason, ''), ifnull(l.text, ''),
+          ifnull(t.accepted, 0)
         FROM recent p LEFT JOIN told t ON t.of = p.seq LEFT JOIN entry l ON l.seq = t.last
         WHERE p.kind = 'pressed' AND p.at >= :since
           AND said IN ('', 'accepted', 'unknown', 'timed_out')
         ORDER BY p.seq DESC
     """
     found = _found(folder, query, {"robot": robot, "since": since, **names})
-    return [OpenPress(Entry(*row[:-3]), row[-3], row[-2], bool(row[-1])) for row in found]
+    return [
+        OpenPress(Entry(*row[:-4]), outcome, reason, text, bool(accepted))
+        for row in found
+        for outcome, reason, text, accepted in (row[-4:],)
+    ]
 
 
 def _found(

@@ -18,6 +18,7 @@ from app.audit.entry import Entry
 from app.audit.export import lines, packed
 from app.audit.queries import Filter, Row, rows
 from app.errors import LogError
+from app.i18n import ENGLISH
 
 NICER: Final = 10  # than the server, which has no time to lose
 
@@ -31,6 +32,7 @@ class Wish:
     before: int | None
     count: int | None = None
     gzip: bool = False
+    language: str = ENGLISH  # of the reasons of CSV
 
     def as_json(self) -> bytes:
         return json.dumps(asdict(self) | {"folder": str(self.folder)}).encode()
@@ -53,7 +55,7 @@ def read(wish: Wish) -> Iterator[bytes]:
         found = rows(wish.folder, wish.wanted, wish.before, wish.count)
         yield json.dumps([(row.entry, row.pressed_at) for row in found]).encode()
         return
-    pieces = lines(wish.folder, wish.wanted, wish.before)
+    pieces = lines(wish.folder, wish.wanted, wish.before, wish.language)
     yield from packed(pieces) if wish.gzip else pieces
 
 

@@ -63,7 +63,7 @@ class ReaderProcess:
         try:
             self._process = process = _begun()
         except OSError as error:  # such as memory or open files that are used up
-            raise LogError(say("log_unreadable", why=error.strerror or error)) from error
+            raise LogError(say("log_unreadable", why=error.strerror or str(error))) from error
         if self._cut:
             process.kill()
         assert process.stdin is not None

@@ -4,12 +4,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from app.errors import TooMany
+from app.i18n import TextLike
 
 
 class ReaderSlots:
     """On the event loop; nobody waits."""
 
-    def __init__(self, most: int, again_s: int, message: str) -> None:
+    def __init__(self, most: int, again_s: int, message: TextLike) -> None:
         """`again_s`: when it makes sense to come again; `message` says that all places are taken."""
         self._free = most
         self._again_s = again_s

@@ -14,7 +14,7 @@ from app.audit.reader_main import Wish, rows_in
 from app.audit.reader_process import ReaderProcess
 from app.audit.reader_slots import ReaderSlots
 from app.errors import LogError, SearchTooLong
-from app.i18n import say
+from app.i18n import ENGLISH, say
 
 SEARCHES_MOST: Final = 2  # at a time
 THREADS: Final = SEARCHES_MOST + 1  # one for what the server itself has to know
@@ -52,12 +52,13 @@ class Readers:
 
     @asynccontextmanager
     async def export(
-        self, wanted: Filter, before: int | None, gzip: bool
+        self, wanted: Filter, before: int | None, gzip: bool, language: str = ENGLISH
     ) -> AsyncIterator[ReaderProcess]:
-        """All that is wanted before a number, as CSV, while this lasts; TooMany beside another one,
-        LogError when the server ends."""
+        """All that is wanted before a number, as CSV in a language, while this lasts; TooMany beside
+        another one, LogError when the server ends."""
+        wish = Wish(self._folder, wanted, before, gzip=gzip, language=language)
         with self._exporting.one():
-            async with self._apart(Wish(self._folder, wanted, before, gzip=gzip)) as process:
+            async with self._apart(wish) as process:
                 yield process
 
     def close(self) -> None:
@@ -76,7 +77,7 @@ class Readers:
         except SearchTooLong:
             raise
         except LogError as error:
-            raise LogError(say("log_unreadable", why=error)) from error
+            raise LogError(say("log_unreadable", why=error.text)) from error
 
     @asynccontextmanager
     async def _apart(self, wish: Wish) -> AsyncIterator[ReaderProcess]:

@@ -13,7 +13,7 @@ from typing import Final, Protocol
 
 from app.audit.entry import Entry, Origin, entered
 from app.clock import format_time
-from app.i18n import say
+from app.i18n import render, say
 
 SUMMED_UP_S: Final = 60.0  # from the first that is left out to the entry that tells of it
 TOLD_APART: Final = 5  # browsers in that time; the rest is told together
@@ -106,7 +106,7 @@ class RefusalQuota:
         first = not self._more
         key = (origin.address, origin.browser, limited)
         if key not in self._more and len(self._more) >= TOLD_APART:
-            key, origin = ("", "", limited), Origin(address="", who=say("others"))
+            key, origin = ("", "", limited), Origin(address="", who=render(say("others")))
         self._more.setdefault(key, _More(origin, limited, self._wall())).count += 1
         self.left_out += not limited
         return first

@@ -14,7 +14,7 @@ from typing import Final, Literal
 from app.audit.database import NAME, PATIENCE_S, Files, Head, in_words, opened
 from app.audit.entry import FIELDS, Entry, entered
 from app.errors import LogError
-from app.i18n import say
+from app.i18n import TextLike, say
 
 COLUMNS: Final = ", ".join(f'"{name}"' for name in FIELDS)
 INSERT: Final = f"INSERT INTO entry ({COLUMNS}) VALUES ({', '.join('?' * len(FIELDS))})"
@@ -139,7 +139,7 @@ class Store:
         )
         return int(pages - free) * int(size)
 
-    def _remove(self, last: int, why: Literal["days", "size"], reason: str) -> bool:
+    def _remove(self, last: int, why: Literal["days", "size"], reason: TextLike) -> bool:
         first, (anchor,) = (
             self._oldest,
             self._db.execute("SELECT hash FROM entry WHERE seq = ?", (last,)).fetchone(),

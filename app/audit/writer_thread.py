@@ -18,7 +18,7 @@ from app.audit.store import Store
 from app.audit.syncer import Syncer
 from app.audit.ticket import Limits, Repeated, Results, Ticket
 from app.errors import FolderInUse, LogError, LogGone
-from app.i18n import say
+from app.i18n import TextLike, say
 
 log = logging.getLogger("kiosk.log")
 
@@ -64,7 +64,7 @@ class WriterThread:
         self._limits = limits
         self._mode = mode
         self._tell = tell
-        self.fault = ""
+        self.fault: TextLike = ""
         self.displaced = False  # another server has the folder, or may
         self.head: Head | None = None
         self.tried = threading.Event()
@@ -197,10 +197,10 @@ class WriterThread:
         wait = TRIED_AGAIN_S[min(self._failures, len(TRIED_AGAIN_S) - 1)]
         self._failures += 1
         self._try_at = time.monotonic() + wait
-        if self.fault != str(error):
+        if self.fault != error.text:
             log.error("the operator's log can't be written: %s", error)
             self._fault_since = self._fault_since or time.strftime("%H:%M:%S")
-            self.fault = str(error)
+            self.fault = error.text
             self._tell([], True)
 
     def _open(self) -> None:

@@ -63,6 +63,6 @@ class Cancels:
         except TimeoutError:
             return Outcome("unknown", say("server_ends")), ""
         except LinkError as error:
-            text = say("not_encoded", why=str(error), time=format_time(time.time()))
+            text = say("not_encoded", why=error.text, time=format_time(time.time()))
             return Outcome("refused", text), "link"
         return answer, "interlock" if answer.outcome == "refused" else ""

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from app.clock import format_time
-from app.i18n import say
+from app.i18n import TextLike, joined, say
 from app.panel.values import same
 from app.panel.widgets.publish import Confirm, Publishing
 from app.robot.command_status import CommandStatus, OnCorrection, Outcome
@@ -55,7 +55,7 @@ class Confirmations:
         equals: Any,
         press_id: str,
         since: float,
-        sent: str,
+        sent: TextLike,
         corrected: OnCorrection,
     ) -> Outcome:
         """What came of a command that went out at `since` (monotonic seconds), as `sent` says."""
@@ -79,13 +79,14 @@ class Confirmations:
         self._show_last(waiting, answer)
         return answer
 
-    def _missed(self, waiting: _Waiting, sent: str, corrected: OnCorrection) -> Outcome:
+    def _missed(self, waiting: _Waiting, sent: TextLike, corrected: OnCorrection) -> Outcome:
         confirm = waiting.confirm
         waiting.late = True
         waiting.confirmed.add_done_callback(lambda _: self._too_late(waiting, corrected))
         asyncio.get_running_loop().call_later(LATE_S, self._forget, waiting)
         limit = f"{confirm.within_s:g}"
-        return Outcome("unknown", f"{sent} {say('no_effect', topic=confirm.topic, seconds=limit)}")
+        missed = say("no_effect", topic=confirm.topic, seconds=limit)
+        return Outcome("unknown", joined([sent, missed]))
 
     def awaits(self, key: str) -> bool:
         """Whether what this topic says next may confirm something."""

@@ -16,7 +16,7 @@ from app.audit.press_record import PressLog, origin_of
 from app.commands.press_context import PressGuard
 from app.commands.receipts import RECEIPTS_KEPT
 from app.errors import Cause, NotFound
-from app.i18n import say
+from app.i18n import TextLike, say
 from app.permission.control_authority import LIFE_S, ControlAuthority, Passing
 from app.permission.press_permission import cause_of
 from app.permission.principal import Principal
@@ -47,13 +47,23 @@ class ActReceipt:
     act: str
     outcome: OutcomeCode
     code: str
-    reason: str
+    reason: TextLike
     at: str
     cause: Cause
 
     @property
     def done(self) -> bool:
         return self.outcome != "refused"
+
+    def as_json(self) -> dict[str, TextLike]:
+        return {
+            "id": self.id,
+            "act": self.act,
+            "outcome": self.outcome,
+            "code": self.code,
+            "reason": self.reason,
+            "at": self.at,
+        }
 
 
 class ControlActs:
@@ -112,7 +122,8 @@ class ControlActs:
         self, asked: Asked, act_id: str, at: float | None, life_s: float
     ) -> "asyncio.Task[ActReceipt]":
         """The act itself, at once; its entry takes time."""
-        refusal, told = self._refusal(asked, at), ""
+        told: TextLike = ""
+        refusal = self._refusal(asked, at)
         if refusal is None:
             before = self._control.holder, self._control.requester
             code = self._do(asked, life_s)
@@ -131,7 +142,7 @@ class ControlActs:
             self._made.popitem(last=False)
         return task
 
-    def _refusal(self, asked: Asked, at: float | None) -> tuple[str, str] | None:
+    def _refusal(self, asked: Asked, at: float | None) -> tuple[str, TextLike] | None:
         """Code and sentence of what the server has against it; giving up is never too late."""
         if asked.act == "release":
             return None
@@ -152,7 +163,7 @@ class ControlActs:
                 return control.keep(who, asked.to)
         return control.release(who)
 
-    def _told(self, asked: Asked, holder: Principal | None, requester: Principal | None) -> str:
+    def _told(self, asked: Asked, holder: Principal | None, requester: Principal | None) -> TextLike:
         """What was done, in the log's words: `holder` and `requester` are those before it."""
         names = {"holder": holder, "requester": requester}
         code = f"log_done_{asked.act}"
@@ -163,7 +174,7 @@ class ControlActs:
             code = "log_done_withdraw"
         return say(code, **{name: who.title if who else "" for name, who in names.items()})
 
-    async def _logged(self, asked: Asked, receipt: ActReceipt, told: str) -> ActReceipt:
+    async def _logged(self, asked: Asked, receipt: ActReceipt, told: TextLike) -> ActReceipt:
         origin = origin_of(asked.who)
         if not receipt.done and not self._press_log.room(origin):
             self._press_log.leave_out(origin)
@@ -186,7 +197,7 @@ def _receipt(
     asked: Asked,
     act_id: str,
     code: str = "",
-    reason: str = "",
+    reason: TextLike = "",
     cause: Cause | None = None,
     *,
     outcome: OutcomeCode = "refused",

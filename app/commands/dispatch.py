@@ -10,7 +10,7 @@ from app.commands.confirmations import Confirmations
 from app.commands.parameters.sync import ParameterSync
 from app.commands.service_calls import ServiceCalls
 from app.errors import InputError, NotFound
-from app.i18n import say
+from app.i18n import TextLike, say
 from app.interfaces import Interfaces
 from app.panel.model import Panel
 from app.panel.template import filled, inputs_of, with_now
@@ -88,7 +88,7 @@ class Dispatcher:
             Action: self._start,
             Parameter: self._set,
         }
-        self.refusals: Mapping[type[Pressed], Callable[[Any, dict[str, Any]], str]] = {
+        self.refusals: Mapping[type[Pressed], Callable[[Any, dict[str, Any]], TextLike]] = {
             Publishing: self._unpublished,
             Call: self._uncalled,
             Action: lambda widget, _: self._actions.full(widget.action),
@@ -145,7 +145,7 @@ class Dispatcher:
         send = row_of(self.senders, widget)
         return await send(widget, Outgoing(values, fields, press_id, correct, entry, look))
 
-    def refusal(self, widget: Pressed, inputs: Mapping[str, Any]) -> str:
+    def refusal(self, widget: Pressed, inputs: Mapping[str, Any]) -> TextLike:
         """Why `send` would refuse it now, "" if it would not; FieldError or InputError as there."""
         values = self.checked(self._needs[widget.id], inputs)
         return row_of(self.refusals, widget)(widget, filled(widget.template, with_now(values)))
@@ -169,7 +169,7 @@ class Dispatcher:
         payload = self._interfaces.encode(request, going.fields)
         return await self._calls.call(widget, payload, going.press_id, going.correct, going.look)
 
-    def _uncalled(self, widget: Call, fields: dict[str, Any]) -> str:
+    def _uncalled(self, widget: Call, fields: dict[str, Any]) -> TextLike:
         self._interfaces.encode(self._interfaces.service(widget.type)[0], fields)
         return self._calls.full(widget.service)
 
@@ -212,7 +212,7 @@ class Dispatcher:
             values[name] = row_of(self.checks, field)(field, inputs[name])
         return values
 
-    def over(self, widget: Action, press_id: str) -> str:
+    def over(self, widget: Action, press_id: str) -> TextLike:
         """Why there is no goal to cancel; "" where there is one."""
         return self._actions.over(widget, press_id)
 

@@ -12,7 +12,7 @@ from app import clock
 from app.audit import Origin
 from app.audit.press_record import Log, origin_of
 from app.errors import InputError
-from app.i18n import say
+from app.i18n import TextLike, say
 from app.permission.control_authority import ControlAuthority
 from app.permission.interlocks import PERMITTED, Verdict, locked
 from app.permission.press_permission import NO_GROUNDS, Grounds
@@ -26,7 +26,7 @@ PRESS_ID: Final = rf"^[A-Za-z0-9_.:-]{{1,{LONGEST_ID}}}$"
 _is_seen: Final = re.compile(SEEN).fullmatch
 
 
-def not_stale() -> str:
+def not_stale() -> TextLike:
     """Of a client that does not say what was seen, and when it was pressed."""
     return ""
 
@@ -40,7 +40,7 @@ class PressContext:
 
     origin: Origin
     grounds: Callable[[], Grounds] = lambda: NO_GROUNDS
-    stale_reason: Callable[[], str] = not_stale
+    stale_reason: Callable[[], TextLike] = not_stale
 
 
 class PressGuard:
@@ -91,7 +91,7 @@ class PressGuard:
         why = "" if at is None else self.late(at)
         return Verdict(False, "late", why) if why else PERMITTED
 
-    def late(self, at: float) -> str:
+    def late(self, at: float) -> TextLike:
         """Why what was touched at this moment (the server's own time) is not done now; "" if it is."""
         age = clock.server_now() - at
         if age > self._expires_s:
@@ -109,7 +109,7 @@ class PressGuard:
     def _grounds(self, who: Principal) -> Grounds:
         return Grounds(self._control.verdict(who), self._log.lock, self._ended, who)
 
-    def _doubt(self, widget: str, seen: str, at: float | None) -> str:
+    def _doubt(self, widget: str, seen: str, at: float | None) -> TextLike:
         """Why a press is no longer what was meant; "" if it is."""
         boot, _, version = seen.partition("-")
         if boot and boot != self._publisher.boot:

@@ -8,7 +8,7 @@ from app.audit.press_record import PendingEntry
 from app.commands.press_context import PressContext
 from app.commands.receipts import MOST_LOOKS
 from app.errors import Cause, PressRefused
-from app.i18n import say
+from app.i18n import TextLike, say
 from app.panel.model import Panel
 from app.panel.widgets.families import Command
 from app.permission.interlocks import Verdict
@@ -51,13 +51,13 @@ class PressJudge:
         interlocks = self._panel.interlocks_of(widget)
         return judged(widget, interlocks, self._robot, self._monotonic(), context.grounds())
 
-    def ground(self, widget: Command, context: PressContext) -> tuple[Verdict, str, Cause]:
+    def ground(self, widget: Command, context: PressContext) -> tuple[Verdict, TextLike, Cause]:
         """The verdict now, and why it may not be sent, "" if it may."""
         verdict = self.verdict(widget, context)
         if not verdict.permitted:
             return verdict, verdict.reason or "", cause_of(verdict.code)
-        stopping = say("press_by_stopping") if self._closed else ""
-        return verdict, stopping or context.stale_reason(), "interlock"
+        stale = say("press_by_stopping") if self._closed else context.stale_reason()
+        return verdict, stale, "interlock"
 
     def last_look(self, widget: Command, pending: PendingEntry, context: PressContext) -> None:
         """Right before it is sent: what came while it was judged and encoded counts, too. PressRefused

@@ -37,7 +37,7 @@ from app.commands.refusals import EarlyRefusals
 from app.commands.repeated import RepeatedPresses
 from app.concurrency import CancellableWaits
 from app.errors import Cause, FieldError, InputError, LinkError, LogError, PressRefused
-from app.i18n import say
+from app.i18n import TextLike, say
 from app.panel.widgets.families import Pressed
 from app.robot.command_status import Outcome
 from app.ros_logging import RobotLog, on_rosout
@@ -162,7 +162,7 @@ class Presses:
             return await self._repeated.receipt(widget, inputs, context.origin, known)
         except LogError as error:
             self._receipts.begin(press_id, widget.id, context.origin, own)
-            text = say("refused", why=str(error), time=format_time(time.time()))
+            text = say("refused", why=error.text, time=format_time(time.time()))
             receipt = receipt_of(widget, inputs, press_id, Outcome("refused", text), "log")
         else:
             self._receipts.begin(press_id, widget.id, context.origin, own)
@@ -193,7 +193,7 @@ class Presses:
         def receipt(answer: Outcome, cause: Cause = "") -> Receipt:
             return receipt_of(widget, inputs, press_id, answer, cause)
 
-        def refused(sentence: str, why: str, cause: Cause) -> Receipt:
+        def refused(sentence: str, why: TextLike, cause: Cause) -> Receipt:
             now = format_time(time.time())
             return receipt(Outcome("refused", say(sentence, why=why, time=now)), cause)
 
@@ -211,9 +211,9 @@ class Presses:
         except TimeoutError:
             return receipt(Outcome("unknown", say("server_ends")))
         except (FieldError, InputError) as error:
-            return refused("not_encoded", str(error), "input")
+            return refused("not_encoded", error.text, "input")
         except LinkError as error:
-            return refused("not_encoded", str(error), "link")
+            return refused("not_encoded", error.text, "link")
         except PressRefused as error:
             return refused("refused", error.reason, error.cause)
         if answer.outcome == "refused":

@@ -11,7 +11,7 @@ from typing import Any, Final, Protocol, cast
 from app.audit import Entry, Origin
 from app.audit.press_record import PendingEntry
 from app.errors import Cause
-from app.i18n import say
+from app.i18n import TextLike, render, say
 from app.panel.template import needed
 from app.panel.widgets.families import Command, Entered, Pressed
 from app.robot.command_status import Outcome, OutcomeCode
@@ -37,7 +37,7 @@ class Receipt:
     id: str
     widget: str
     outcome: OutcomeCode
-    reason: str
+    reason: TextLike
     at: str
     cause: Cause
     inputs: Mapping[str, Any]
@@ -45,7 +45,7 @@ class Receipt:
     entered: Mapping[str, Any] = field(default_factory=dict)
     recalled: bool = False
 
-    def as_json(self) -> dict[str, str]:
+    def as_json(self) -> dict[str, TextLike]:
         return {
             "id": self.id,
             "widget": self.widget,
@@ -132,7 +132,7 @@ def recalled(
     if told is None:
         answer, at = Outcome("unknown", say("log_ended")), press.at
     else:
-        answer, at = Outcome(cast(OutcomeCode, told.outcome), told.reason), told.at
+        answer, at = Outcome(cast(OutcomeCode, told.outcome), told.said), told.at
     receipt = receipt_of(widget, inputs, press.press, answer, cause)
     wall = datetime.fromtimestamp(at / 1000, UTC).isoformat(timespec="milliseconds")
     return replace(receipt, at=wall, recalled=True)
@@ -156,10 +156,10 @@ def untyped(widget: Command, receipt: Receipt) -> str:
     """The outcome, with its reason where that repeats nothing of what was typed in."""
     if receipt.cause == "input" or isinstance(widget, Entered):
         return receipt.outcome
-    return f"{receipt.outcome}: {receipt.reason}"
+    return f"{receipt.outcome}: {render(receipt.reason)}"
 
 
-def with_doubt(receipt: Receipt, doubt: str) -> Receipt:
+def with_doubt(receipt: Receipt, doubt: TextLike) -> Receipt:
     if not doubt:
         return receipt
     return replace(receipt, reason=say("log_not_on_disk", said=receipt.reason, why=doubt))

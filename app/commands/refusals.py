@@ -15,7 +15,7 @@ from app.commands.press_context import PressContext
 from app.commands.press_judge import PressJudge
 from app.commands.receipts import Receipt, Receipts, named, receipt_of, untyped, with_doubt
 from app.errors import FieldError, InputError
-from app.i18n import say
+from app.i18n import BETWEEN, Text, TextLike, joined, say
 from app.panel.widgets.families import Pressed
 from app.robot.command_status import Outcome
 from app.ros_logging import RobotLog, on_rosout
@@ -43,11 +43,11 @@ class EarlyRefusals:
     ) -> Receipt:
         """What may be the second tap of another press, of which it says what came too: `before` is its
         id, "" where there is none."""
-        why = say("press_too_soon")
+        why: TextLike = say("press_too_soon")
         if (last := self._receipts.get(before)) is not None:
             label = self._dispatcher.widget(last.widget).label
             said = say("press_before", label=label, said=last.reason)
-            why = last.reason if last.reason.endswith(why) else f"{said} {why}"
+            why = last.reason if ends_with(last.reason, why) else joined([said, why])
         return await self.refuse(self._dispatcher.widget(widget_id), inputs, press_id, why, origin)
 
     def limited(
@@ -90,14 +90,14 @@ class EarlyRefusals:
             try:
                 why, cause = self._dispatcher.refusal(widget, inputs), "interlock"
             except (FieldError, InputError) as error:
-                why, cause = str(error), "input"
+                why, cause = error.text, "input"
         if not why:
             return None
         answer = Outcome("refused", say(sentence, why=why, time=format_time(time.time())))
         return self.counted(receipt_of(widget, inputs, press_id, answer, cause), context.origin)
 
     async def refuse(
-        self, widget: Pressed, inputs: Mapping[str, Any], press_id: str, why: str, origin: Origin
+        self, widget: Pressed, inputs: Mapping[str, Any], press_id: str, why: TextLike, origin: Origin
     ) -> Receipt:
         """The receipt has an id of its own: that of the press is another's, or may still be one's."""
         own_id = _own_id(press_id)
@@ -114,6 +114,14 @@ class EarlyRefusals:
         )
         self._receipts.keep(receipt)
         return receipt
+
+
+def ends_with(text: TextLike, last: TextLike) -> bool:
+    """Whether a text is another, or ends in it."""
+    if text == last or not isinstance(text, Text) or text.code not in BETWEEN:
+        return text == last
+    (_, parts) = text.params[0]
+    return isinstance(parts, tuple) and ends_with(parts[-1], last)
 
 
 def _own_id(press_id: str) -> str:

@@ -15,7 +15,7 @@ from typing import Any, Final, Protocol
 from app.clock import format_time
 from app.concurrency import spawn_logged
 from app.errors import DecodeError
-from app.i18n import say
+from app.i18n import Text, TextLike, joined, say
 from app.interfaces import Fields, Interfaces, text_of
 from app.panel.template import PLACE
 from app.panel.widgets.service_action import Call
@@ -85,7 +85,7 @@ class ServiceCalls:
         """How many requests of a service the bridge may still hold."""
         return sum(self._robot.key(w.request.service) == key for w in self._open.values())
 
-    def full(self, service: str) -> str:
+    def full(self, service: str) -> TextLike:
         """Why no further request of a service is sent; "" while one may be."""
         full = self.unanswered(self._robot.key(service)) >= MOST_UNANSWERED
         return say("too_many", service=service) if full else ""
@@ -154,7 +154,8 @@ class ServiceCalls:
         if waiting.answered.done():
             return Outcome("unknown", say("call_dropped", service=asked.service))
         hint = "" if asked.service in self._ever_answered else say("cyclone_hint")
-        return Outcome("timed_out", say("timed_out", seconds=f"{asked.timeout_s:g}") + hint)
+        sentence = say("timed_out", seconds=f"{asked.timeout_s:g}")
+        return Outcome("timed_out", joined([sentence, hint]))
 
     def _late(
         self, waiting: _Waiting, done: "asyncio.Future[bytes | None]", corrected: OnCorrection
@@ -205,11 +206,15 @@ def _read_call(widget: Call, success: str | None, message: str | None, fields: F
     words = [with_fields(f"{{{message}}}", fields)] if message else []
     words += [with_fields(widget.answer, fields)] if widget.answer else []
     said = " – ".join(word for word in words if word)
-    said = f": {said}" if said else "."
     now = format_time(time.time())
     if success is None or fields.get(success):
-        return Outcome("succeeded", say("answered", time=now) + said)
-    return Outcome("rejected", say("said_no", time=now) + said)
+        return Outcome("succeeded", with_reply(say("answered", time=now), said))
+    return Outcome("rejected", with_reply(say("said_no", time=now), said))
+
+
+def with_reply(said: Text, reply: str) -> Text:
+    """A sentence and what the robot said, which may be ""."""
+    return say("with_reply", said=said, reply=reply) if reply else say("with_stop", said=said)
 
 
 def with_fields(template: str, fields: Fields, within: str = "") -> str:

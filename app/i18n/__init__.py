@@ -1,14 +1,21 @@
-"""What a person reads: sentences by their codes, the one place to translate.
+"""What a person reads: a sentence is its code and what it is about, until it is rendered for a reader.
 
-Codes are stable names for tests and logs; `say` fills in what the sentence is about.
+Codes are stable names for tests and logs; `catalogue` has the sentences of each language by them.
 """
 
-from app.i18n.en import ENGLISH
-from app.printable import printable
+from app.i18n.catalogue import ENGLISH, sentences
+from app.i18n.text import BETWEEN, Param, Text, TextLike, joined, localized, render, say, text_in
 
-__all__ = ["ENGLISH", "say"]
-
-
-def say(code: str, **about: object) -> str:
-    """The sentence for `code`, filled in; a KeyError is a mistake of the programmer's."""
-    return printable(ENGLISH[code].format(**about))
+__all__ = [
+    "BETWEEN",
+    "ENGLISH",
+    "Param",
+    "Text",
+    "TextLike",
+    "joined",
+    "localized",
+    "render",
+    "say",
+    "sentences",
+    "text_in",
+]

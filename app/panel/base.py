@@ -4,12 +4,12 @@ import re
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Self
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo
 
 from app.errors import InterfaceError
-from app.i18n import say
+from app.i18n import TextLike, render, say
 from app.interfaces.field_path import Key, steps
 from app.interfaces.names import ACTION_TYPE, MESSAGE_TYPE, NAMESPACE, SERVICE_TYPE, TOPIC, Qos
 from app.interfaces.validation import shown
@@ -49,10 +49,10 @@ def _action(given: str) -> str:
 
 
 def said(code: str) -> Any:
-    """A field whose default is a sentence of the catalogue: it is said when a panel is loaded."""
+    """A field whose default is a sentence of the catalogue: each reader sees it in their language."""
 
     def described(schema: dict[str, Any]) -> None:
-        schema["default"] = say(code)
+        schema["default"] = render(say(code))
 
     return Field(default_factory=lambda: say(code), json_schema_extra=described)
 
@@ -128,6 +128,11 @@ ID: Final = r"^[a-z][a-z0-9_]{0,63}$"
 Id = Annotated[str, Field(pattern=ID)]
 Interlocks = Annotated[tuple[str, ...], BeforeValidator(_interlocks)]
 Label = Annotated[str, Field(min_length=1, max_length=120)]
+# A label that the panel file may leave to the catalogue: Pydantic knows only of what a file gives.
+if TYPE_CHECKING:
+    SaidLabel = TextLike
+else:
+    SaidLabel = Label
 Span = Annotated[int, Field(ge=1, le=12)]
 Topic = Annotated[str, AfterValidator(_topic), Field(max_length=255)]
 Type = Annotated[str, AfterValidator(_type)]

@@ -12,7 +12,7 @@ from fractions import Fraction
 from struct import pack, unpack
 from typing import Final
 
-from app.i18n import say
+from app.i18n import TextLike, say
 from app.interfaces import to_plain
 from app.panel.values import digits
 
@@ -72,10 +72,11 @@ class Range:
         return int(found) if isinstance(self.low, int) else float(found)
 
 
-def described(of: Range, unit: str) -> str:
+def described(of: Range, unit: str) -> TextLike:
     """A range as an operator reads it: "0 to 1.5 m/s, in steps of 0.1"; "" where all is open."""
     unit = f" {unit}" if unit else ""
     low, high = _written(of.low), _written(of.high)
+    text: TextLike
     if of.low is not None and of.high is not None:
         text = say("limits_both", low=low, high=high, unit=unit)
     elif of.low is not None:
@@ -87,7 +88,7 @@ def described(of: Range, unit: str) -> str:
     if of.step is None or (of.step == 1 and isinstance(of.step, int)):
         return text
     steps = say("limits_step", step=_written(of.step))
-    return f"{text}, {steps}" if text else steps
+    return say("and_further", first=text, last=steps) if text else steps
 
 
 def decimal(number: float) -> str:

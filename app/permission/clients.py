@@ -12,10 +12,17 @@ from functools import lru_cache
 from ipaddress import IPv6Address, ip_address
 from typing import Final
 
-from app.i18n import say
+from app.i18n import Text, render, say
 
 TOKEN: Final = re.compile(r"[0-9a-f]{32}")
 BROWSERS_KEPT: Final = 500
+# The code of a name → that of the same where it begins a sentence.
+TITLES: Final = {
+    "browser": "browser_title",
+    "browser_local": "browser_local_title",
+    "browser_more": "browser_more_title",
+    "browser_unknown": "browser_unknown_title",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,22 +36,27 @@ class Client:
     number: int
 
     @property
-    def name(self) -> str:
+    def name(self) -> Text:
         """ "Panel 2"; "the panel at the cell"."""
-        if not self.id:
-            return say("browser_unknown")
-        if self.local:
-            return say("browser_local" if self.number == 1 else "browser_more", number=self.number)
-        return say("browser", number=self.number)
+        return say(self._code, number=self.number) if self.id else say(self._code)
 
     @property
-    def title(self) -> str:
+    def title(self) -> Text:
         """The name at the begin of a sentence, with the address where it is of use."""
-        name = self.name if self.local else str(self)
-        return name[:1].upper() + name[1:]
+        if self.local:
+            return say(TITLES[self._code], number=self.number)
+        return say(TITLES[self._code], number=self.number, address=self.address)
+
+    @property
+    def _code(self) -> str:
+        if not self.id:
+            return "browser_unknown"
+        if self.local:
+            return "browser_local" if self.number == 1 else "browser_more"
+        return "browser"
 
     def __str__(self) -> str:
-        return f"{self.name} ({self.address})"
+        return f"{render(self.name)} ({self.address})"
 
 
 class Clients:
@@ -98,7 +110,7 @@ def where(address: str) -> tuple[str, bool]:
     try:
         found = ip_address(address.partition("%")[0])
     except ValueError:
-        return say("unknown"), False
+        return render(say("unknown")), False  # as the log has it
     if isinstance(found, IPv6Address) and found.ipv4_mapped:
         found = found.ipv4_mapped
     return str(found), found.is_loopback

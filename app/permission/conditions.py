@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Final
 
-from app.i18n import say
+from app.i18n import Text, TextLike, render, say
 from app.panel.interlock import Interlock
 from app.panel.number_range import decimal, shortest
 from app.panel.values import same
@@ -28,37 +28,38 @@ def permits(of: Interlock, value: Any) -> bool:
     return value is not None and all(HOLDS[key](value, wanted) for key, wanted in conditions.items())
 
 
-def unmet(of: Interlock, value: Any) -> str:
+def unmet(of: Interlock, value: Any) -> Text:
     """The sentence for a value that does not meet the conditions."""
     wanted = list(_wanted(of))
     must = wanted[0] if len(wanted) == 1 else say("both", one=wanted[0], other=wanted[1])
     return say("unmet", name=of.name, value=_now(of, value, must), wanted=must)
 
 
-def _wanted(of: Interlock) -> Iterator[str]:
+def _wanted(of: Interlock) -> Iterator[TextLike]:
     if of.equals is not None:
         yield _told(of, of.equals)
     if of.one_of is not None:
         *all_but_last, last = (_told(of, one) for one in of.one_of)
-        yield say("either", first=", ".join(all_but_last), last=last) if all_but_last else last
+        yield say("either", first=tuple(all_but_last), last=last) if all_but_last else last
     if of.min is not None or of.max is not None:
         yield _limits(of)
     if of.not_equals is not None:
         yield say("not_value", value=_told(of, of.not_equals))
 
 
-def _limits(of: Interlock) -> str:
+def _limits(of: Interlock) -> Text:
     low, high = ("" if one is None else _written(of, one) for one in (of.min, of.max))
     code = "limits_both" if low and high else "limits_low" if low else "limits_high"
     return say(code, low=low, high=high, unit=_unit(of))
 
 
-def _now(of: Interlock, value: Any, must: str) -> str:
+def _now(of: Interlock, value: Any, must: TextLike) -> str:
     """What the robot said: in as few digits as tell it from what it must be."""
     if not isinstance(value, float):
         return _told(of, value)
     told = (_told(of, float(f"{value:.{digits}g}")) for digits in DIGITS)
-    return next((text for text in told if text not in must), _told(of, value))
+    written = render(must)  # its numbers are the same in every language
+    return next((text for text in told if text not in written), _told(of, value))
 
 
 def _told(of: Interlock, value: Any) -> str:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Final, Literal, NamedTuple
 
-from app.i18n import say
+from app.i18n import TextLike, say
 from app.panel.rules import ControlRules
 from app.permission.control_authority_view import NO_CONTROL, ControlView, control_view
 from app.permission.interlocks import PERMITTED, Verdict, locked
@@ -65,7 +65,7 @@ class ControlAuthority:
         """`robot` is its name, "" where there is only one; `tell` gets a line for each change, `passed`
         each that no act made."""
         self.rules = rules
-        self._robot = robot or say("the_robot")
+        self._robot: TextLike = robot or say("the_robot")
         self._now = monotonic
         self._wall = wall
         self._tell = tell

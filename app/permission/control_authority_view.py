@@ -2,7 +2,7 @@
 
 from typing import Final, Literal, TypedDict
 
-from app.i18n import say
+from app.i18n import TextLike, say
 from app.panel.rules import ControlRules
 from app.permission.principal import Principal
 
@@ -17,15 +17,15 @@ class ControlView(TypedDict):
 
     required: bool
     holder: str
-    holder_name: str
+    holder_name: TextLike
     asker: str
-    asker_name: str
+    asker_name: TextLike
     since: str
-    holder_text: str
-    asker_text: str
-    text: str
+    holder_text: TextLike
+    asker_text: TextLike
+    text: TextLike
     role: Role
-    shown: str
+    shown: TextLike
 
 
 NO_CONTROL: Final = ControlView(
@@ -44,7 +44,7 @@ NO_CONTROL: Final = ControlView(
 
 
 def control_view(
-    rules: ControlRules, robot: str, holder: Principal | None, asker: Principal | None, since: str
+    rules: ControlRules, robot: TextLike, holder: Principal | None, asker: Principal | None, since: str
 ) -> ControlView:
     """The view for a robot's name; there is an asker only where there is a holder."""
     if not rules.required:

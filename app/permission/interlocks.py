@@ -12,7 +12,7 @@ from functools import lru_cache
 from typing import Any, Final
 
 from app.dialect.endpoint import TopicRole
-from app.i18n import say
+from app.i18n import TextLike, joined, say
 from app.interfaces.names import Qos
 from app.panel.interlock import Interlock
 from app.panel.widgets.families import Command, OnTopic, Published
@@ -33,12 +33,12 @@ class Verdict:
 
     permitted: bool
     code: str = "permitted"
-    reason: str | None = None
+    reason: TextLike | None = None
     until: float = math.inf
     others: tuple["Verdict", ...] = ()
 
     @property
-    def reasons(self) -> list[str]:
+    def reasons(self) -> list[TextLike]:
         """All that is told of a lock, each sentence once."""
         told = (one.reason for one in (self, *self.others))
         return list(dict.fromkeys(reason for reason in told if reason))
@@ -82,9 +82,8 @@ def _no_link(endpoints: tuple[str, ...]) -> Verdict:
     """With where the bridge was looked for, if that is known."""
     if not endpoints:
         return locked("no_link")
-    where, more = ", ".join(endpoints[:ENDPOINTS_TOLD]), len(endpoints) - ENDPOINTS_TOLD
-    if more > 0:
-        where = say("and_more", names=where, number=more)
+    told, more = endpoints[:ENDPOINTS_TOLD], len(endpoints) - ENDPOINTS_TOLD
+    where = say("and_more", names=told, number=more) if more > 0 else told
     return Verdict(False, "no_link", say("no_link_at", where=where))
 
 
@@ -193,7 +192,7 @@ def unsettable(of: Parameter, known: ParameterState) -> Verdict | None:
     }.get(known.state)
     node, name = of.node, of.parameter
     if code == "parameter_silent" and known.wall == 0.0:
-        return Verdict(False, code, say(code, node=node, name=name) + say("cyclone_hint"))
+        return Verdict(False, code, _silent_parameter(node, name))
     if code is not None:
         return locked(code, node=node, name=name, found=known.found, wanted=of.type)
     if known.read_only:
@@ -202,6 +201,10 @@ def unsettable(of: Parameter, known: ParameterState) -> Verdict | None:
         theirs = each_text(of, known.range)
         return locked("parameter_apart", node=node, name=name, theirs=theirs, ours=ours_text(of))
     return None
+
+
+def _silent_parameter(node: str, name: str) -> TextLike:
+    return joined([say("parameter_silent", node=node, name=name), say("cyclone_hint")])
 
 
 def topic_mismatch(role: TopicRole, of: Interlock | OnTopic, robot: RobotState) -> Verdict | None:
@@ -223,7 +226,7 @@ def _misfit(
 
 
 @lru_cache(maxsize=256)
-def locked(code: str, **about: str | None) -> Verdict:
+def locked(code: str, **about: TextLike) -> Verdict:
     """The verdict for a sentence; the same one again for the same."""
     return Verdict(False, code, say(code, **about))
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Final, NamedTuple
 
 from app.errors import Cause
+from app.i18n import TextLike
 from app.panel.interlock import Interlock
 from app.panel.widgets.families import Command
 from app.permission.interlocks import (
@@ -35,7 +36,7 @@ class Grounds:
     """
 
     control: Verdict = PERMITTED
-    log_lock: str = ""
+    log_lock: TextLike = ""
     ending: bool = False
     who: Principal | None = None
 

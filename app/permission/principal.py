@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
+from app.i18n import TextLike, render
 from app.permission.clients import Client
 
 UserRole = Literal["operator"]
@@ -21,14 +22,14 @@ class Principal:
     role: UserRole = "operator"
 
     @property
-    def name(self) -> str:
+    def name(self) -> TextLike:
         """As the operator's log names them: the user, else the client."""
         return self.user or self.client.name
 
     @property
-    def title(self) -> str:
+    def title(self) -> TextLike:
         """The name at the start of a sentence."""
         return self.user or self.client.title
 
     def __str__(self) -> str:
-        return f"{self.name} ({self.client.address})"
+        return f"{render(self.name)} ({self.client.address})"

@@ -11,7 +11,7 @@ import threading
 from collections.abc import Callable, Iterable
 from typing import Final, Protocol
 
-from app.i18n import say
+from app.i18n import TextLike, render, say
 from app.process.listen_sockets import listening, names
 from app.process.sd_notify import ServiceManager, status
 
@@ -33,7 +33,7 @@ class Watchdog:
         self,
         manager: ServiceManager,
         links: Callable[[], Iterable[tuple[str, Responding]]],
-        state: Callable[[], str],
+        state: Callable[[], TextLike],
     ) -> None:
         """`links` are those of now, with their robots' names; `state` is the server's, in words."""
         self._manager = manager
@@ -58,19 +58,19 @@ class Watchdog:
             if not self._ended:
                 text = say("link_stands_still", name=stuck) if stuck else self._state()
                 ping = ["WATCHDOG=1"] if self._manager.interval_s and not stuck else []
-                self._manager.tell(*ping, status(text))
+                self._manager.tell(*ping, status(render(text)))
             await asyncio.sleep(self._every_s)
 
     def end(self) -> None:
         """The server was told to end."""
         if not self._ended:
             self._ended = True
-            self._manager.tell("STOPPING=1", status(say("stopping")))
+            self._manager.tell("STOPPING=1", status(render(say("stopping"))))
 
     async def _standing_still(self) -> str:
         """The robots whose links did not respond in a quarter of the interval; "" for none."""
         loop = asyncio.get_running_loop()
-        links = [(name or say("robot"), link) for name, link in self._links()]
+        links = [(name or render(say("robot")), link) for name, link in self._links()]
         for _, link in links:
             if id(link) not in self._asking:
                 # A thread of its own: the executor's may all be busy, and this one may never end.

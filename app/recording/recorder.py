@@ -7,6 +7,7 @@ from datetime import UTC, datetime
 from typing import Any, Final
 
 from app.commands.receipts import Receipt
+from app.i18n import render
 from app.interfaces import Interfaces
 from app.panel.model import Panel
 from app.panel.rules import RecordRules
@@ -77,7 +78,7 @@ class Recorder:
         """What came of a press, or what is known of it by now."""
         who = self._under_way.pop(receipt.id, "")
         self._tell(id=receipt.id, widget=receipt.widget, who=who, values=dict(receipt.inputs),
-                   outcome=receipt.outcome, reason=receipt.reason, at=receipt.at)  # fmt: skip
+                   outcome=receipt.outcome, reason=render(receipt.reason), at=receipt.at)  # fmt: skip
 
     def stop(self) -> None:
         """Ends the recording that is open."""

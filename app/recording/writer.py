@@ -9,7 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final
 
-from app.i18n import say
+from app.i18n import TextLike, say
 from app.recording.directory import RecordingDirectory
 from app.recording.mcap_file import Channel, McapFile
 from app.recording.ring_buffer import OVERHEAD, Buffered
@@ -39,7 +39,7 @@ class Recordings:
         self._counting = threading.Lock()
         self._waiting = 0
         self._open = 0
-        self.fault = ""
+        self.fault: TextLike = ""
         self._told: list[Callable[[], None]] = []
         self._loop = asyncio.get_running_loop()
         self._thread = threading.Thread(target=self._run, name="recordings", daemon=True)
@@ -119,7 +119,7 @@ class Recordings:
             with self._counting:
                 self._waiting -= size
 
-    def _tell(self, fault: str) -> None:
+    def _tell(self, fault: TextLike) -> None:
         if fault != self.fault:
             self.fault = fault
             with suppress(RuntimeError):  # the loop is closed: nobody looks any more

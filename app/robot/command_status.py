@@ -4,6 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
+from app.i18n import TextLike
+
 OutcomeCode = Literal[
     "published",
     "confirmed",
@@ -29,7 +31,7 @@ class CommandStatus:
 
     busy: bool = False
     outcome: OutcomeCode | Literal[""] = ""
-    text: str = ""
+    text: TextLike = ""
     fraction: float | None = None
     stoppable: bool = False
     goal: str = ""
@@ -44,7 +46,7 @@ class Outcome:
     """What came of a call or a goal; `text` is a sentence for the operator."""
 
     outcome: OutcomeCode
-    text: str
+    text: TextLike
 
 
 OnCorrection = Callable[[str, Outcome], None]  # (press id, what is known of it now)

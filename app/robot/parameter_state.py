@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
-from app.i18n import say
+from app.i18n import TextLike, joined, say
 from app.panel.number_range import Range, described
 from app.panel.widgets.parameter import Parameter, Value
 
@@ -132,13 +132,13 @@ def suits(of: Parameter, known: ParameterState) -> bool:
     return any(all(known.range.holds(one) for one in several) for several in values)
 
 
-def ours_text(of: Parameter) -> str:
+def ours_text(of: Parameter) -> TextLike:
     """What the panel lets be set, as an operator reads it."""
-    labels = ", ".join(option.label for option in of.options)
+    labels = joined((option.label for option in of.options), "between_names")
     return labels or limits_text(of, own_range(of))
 
 
-def limits_text(of: Parameter, limits: Range) -> str:
+def limits_text(of: Parameter, limits: Range) -> TextLike:
     """What may be set, as an operator reads it; "" where nothing has to be said."""
     if of.options:
         return ""
@@ -147,7 +147,7 @@ def limits_text(of: Parameter, limits: Range) -> str:
     return each_text(of, limits) if of.counts else ""
 
 
-def each_text(of: Parameter, limits: Range) -> str:
+def each_text(of: Parameter, limits: Range) -> TextLike:
     """What one value may be."""
     match of.element:
         case "bool":

@@ -13,6 +13,7 @@ from typing import Any
 
 from app.dialect.bridge_dialect import key_of
 from app.errors import DecodeError
+from app.i18n import Text
 from app.interfaces import Interfaces
 from app.interfaces.names import ROSOUT_TOPIC
 from app.panel.constants import holder
@@ -67,7 +68,7 @@ class RobotState:
             str, ParameterState
         ] = {}  # what nodes said of them, by their widgets' ids
         self.asking: set[str] = set()  # ids of parameter widgets whose nodes are being asked
-        self.held: dict[str, str] = {}  # by the ids of hold widgets: since when, in words
+        self.held: dict[str, Text] = {}  # by the ids of hold widgets: since when, in words
         self._log = RobotLog(log, self.name)
         self.answers = True  # False: its bridges are silent, though nobody knows yet why
         self.caught_up = True  # False: the event loop stood still, and may not know what came meanwhile

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from app.audit.press_record import Log
 from app.errors import NotFound
-from app.i18n import say
+from app.i18n import TextLike, joined, say
 from app.panel.model import Panel, RobotEntry
 from app.robot.slices import Slices
 from app.robot.state import RobotState
@@ -79,13 +79,13 @@ class Fleet:
         return list(self._kiosks.values())
 
     @property
-    def state(self) -> str:
+    def state(self) -> TextLike:
         """How the way to each robot is, in words."""
         states = [
             (session.robot.name, session.link_verdict.reason or say("ready"))
             for session in self.sessions
         ]
-        return " ".join(say("ready_of", name=n, state=s) if n else s for n, s in states)
+        return joined(say("ready_of", name=n, state=s) if n else s for n, s in states)
 
     @property
     def first(self) -> RobotSession:

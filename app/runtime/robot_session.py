@@ -23,6 +23,7 @@ from app.commands.press_judge import Latest, PressJudge
 from app.commands.presses import Presses
 from app.commands.service_calls import ServiceCalls
 from app.errors import LinkError, NotFound
+from app.i18n import TextLike
 from app.interfaces import interfaces_of
 from app.interfaces.names import ROSOUT_TOPIC
 from app.panel.model import Panel, RobotEntry
@@ -234,7 +235,7 @@ class RobotSession:
             return self.link_verdict
         return locked("bridge_silent") if self.link_verdict.permitted else self.link_verdict
 
-    def read_again(self, widget_id: str) -> str:
+    def read_again(self, widget_id: str) -> TextLike:
         """Asks the node of a parameter for it; why it can't be asked, or "". NotFound for other ids."""
         widget = self.dispatcher.widget(widget_id)
         if not isinstance(widget, Parameter):

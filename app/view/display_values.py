@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Final, Literal
 
 from app.clock import format_age, format_time
-from app.i18n import say
+from app.i18n import TextLike, say
 from app.panel.values import same
 from app.panel.widgets.displays import Indicator, Readout
 from app.panel.widgets.families import Display
@@ -28,7 +28,7 @@ class FieldState:
     alone changes it."""
 
     state: State
-    note: str
+    note: TextLike
     value: Any = None
     until: float = math.inf
 
@@ -91,7 +91,7 @@ def indicator(widget: Indicator, robot: RobotState, now: float) -> tuple[dict[st
     return shown, seen.until
 
 
-def _lamp(widget: Indicator, value: Any) -> tuple[str, str, str]:
+def _lamp(widget: Indicator, value: Any) -> tuple[TextLike, str, str]:
     for state in widget.states:
         if same(state.value, value):
             return state.text, state.shape, state.colour

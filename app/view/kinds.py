@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final, TypedDict
 
-from app.i18n import say
+from app.i18n import TextLike, joined, say
 from app.panel.widgets.displays import Indicator, Readout
 from app.panel.widgets.families import Command, Display, Input, Placed, Pressed
 from app.panel.widgets.hold import Hold
@@ -25,7 +25,7 @@ Shown = tuple[Attributes, float]
 
 class Enabled(TypedDict):
     enabled: bool
-    reason: str | None
+    reason: TextLike | None
 
 
 def show(widget: Placed, robot: RobotState, now: float, verdict: Verdict = PERMITTED) -> Shown:
@@ -44,10 +44,10 @@ def lock(widget: Command, verdict: Verdict) -> Attributes:
     return {**enabled(verdict), **several}
 
 
-def told(reasons: Sequence[str]) -> dict[str, str]:
+def told(reasons: Sequence[TextLike]) -> dict[str, TextLike]:
     """`reasons` are all, a line each, and `more` says how many there are beside the first."""
-    more = say("more_reasons", number=len(reasons) - 1) if len(reasons) > 1 else ""
-    return {"reasons": "\n".join(reasons), "more": more}
+    more: TextLike = say("more_reasons", number=len(reasons) - 1) if len(reasons) > 1 else ""
+    return {"reasons": joined(reasons, "between_lines"), "more": more}
 
 
 def progress(of: CommandStatus) -> Attributes:

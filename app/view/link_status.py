@@ -11,7 +11,7 @@ from functools import lru_cache
 from typing import Final, Literal, TypedDict
 
 from app.clock import format_datetime
-from app.i18n import say
+from app.i18n import Text, TextLike, say
 from app.panel.model import Panel
 from app.permission.interlocks import NO_WAY, PERMITTED, Verdict, topic_mismatch
 from app.robot.state import RobotState
@@ -55,9 +55,9 @@ LONGEST_LIST: Final = 120  # characters of labels that are told; the rest is cou
 class Lamp(TypedDict):
     """One light: `state` is "ok", "wait" or "bad"."""
 
-    name: str
+    name: TextLike
     state: State
-    text: str
+    text: TextLike
 
 
 class LinkStatus(Lamp):
@@ -65,8 +65,8 @@ class LinkStatus(Lamp):
     controls it locks, `reason` why it is as it is and what helps, "" where there is nothing to say."""
 
     since: str
-    locks: str
-    reason: str
+    locks: TextLike
+    reason: TextLike
 
 
 def link_statuses(
@@ -93,7 +93,7 @@ def summary(name: str, link: Mapping[str, Lamp]) -> Lamp:
 
 
 @lru_cache(maxsize=64)
-def _link(name: str, state: State, text: str, reason: str, *locked: str) -> LinkStatus:
+def _link(name: str, state: State, text: str, reason: TextLike, *locked: str) -> LinkStatus:
     """The same lamp, which nobody changes, until it is another one."""
     return LinkStatus(
         name=say(name), state=state, text=say(text), since="", locks=locks(locked), reason=reason
@@ -101,8 +101,8 @@ def _link(name: str, state: State, text: str, reason: str, *locked: str) -> Link
 
 
 def _node(
-    robot: RobotState, passable: Verdict, verdicts: Mapping[str, Verdict], silence: str
-) -> tuple[State, str, str]:
+    robot: RobotState, passable: Verdict, verdicts: Mapping[str, Verdict], silence: TextLike
+) -> tuple[State, str, TextLike]:
     """State, text and reason of the link from the bridge to the robot's nodes."""
     if BRIDGE_LAMPS[passable.code][0] == "bad":
         return "bad", "lost", say("node_unknown")
@@ -110,14 +110,14 @@ def _node(
         return "bad", "node_silent", silence
     gone = robot.seen.gone(robot.graph)
     if not robot.seen.any(robot.graph):
-        reason = _gone(gone) if gone else say("node_absent") if passable.permitted else ""
-        return "wait", "no_node", reason
+        absent = say("node_absent") if passable.permitted else ""
+        return "wait", "no_node", _gone(gone) if gone else absent
     if gone and _first(verdicts, GONE).reason:
         return "ok", "ok", _gone(gone)
     return "ok", "ok", _first(verdicts, NODE).reason or ""
 
 
-def silent(panel: Panel, robot: RobotState, now: float) -> tuple[str, float]:
+def silent(panel: Panel, robot: RobotState, now: float) -> tuple[TextLike, float]:
     """Why a node is taken for silent: its publisher is there by its token, but what it permits is
     older than the panel allows. "" where none is; and when that may change. What is only shown may
     be told of events, and looks old by itself."""
@@ -145,14 +145,14 @@ def labels(panel: Panel, verdicts: Mapping[str, Verdict], codes: frozenset[str])
     return [w.label for w in panel.commands if w.id in locked]
 
 
-def locks(names: Sequence[str]) -> str:
+def locks(names: Sequence[str]) -> Text:
     """Which controls a link locks, in words; of a long list the rest is counted."""
     if not names:
         return say("locks_nothing")
     told = 1
     while told < len(names) and len(", ".join(names[: told + 1])) <= LONGEST_LIST:
         told += 1
-    shown = ", ".join(names[:told])
+    shown = tuple(names[:told])
     if told == len(names):
         return say("locks", names=shown)
     return say("locks_more", names=shown, number=len(names) - told)
@@ -167,9 +167,10 @@ def _all(verdict: Verdict) -> tuple[Verdict, ...]:
     return (verdict, *verdict.others)
 
 
-def _gone(names: Sequence[str]) -> str:
-    more = f" +{len(names) - 1}" if len(names) > 1 else ""
-    return say("node_gone", name=names[0] + more)
+def _gone(names: Sequence[str]) -> Text:
+    more = len(names) - 1
+    name = say("and_count", name=names[0], number=more) if more else names[0]
+    return say("node_gone", name=name)
 
 
 BROWSERS_OWN = "server"  # each browser knows for itself since when it is connected
@@ -181,7 +182,7 @@ class Since:
     def __init__(self, wall: Callable[[], float] = time.time) -> None:
         """`wall` gives seconds since the epoch."""
         self._wall = wall
-        self._began: dict[str, tuple[tuple[str, str], str]] = {}
+        self._began: dict[str, tuple[tuple[str, TextLike], str]] = {}
         self._seen: Mapping[str, LinkStatus] = {}
         self._dated: dict[str, LinkStatus] = {}
 

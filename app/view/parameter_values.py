@@ -4,7 +4,7 @@ import math
 from typing import Any, Final
 
 from app.clock import format_time
-from app.i18n import say
+from app.i18n import Text, TextLike, say
 from app.panel.number_range import decimal
 from app.panel.widgets.parameter import EVENT_TYPE, EVENTS, LONGEST_TEXT, One, Parameter, Value
 from app.permission.interlocks import parameters_offered
@@ -51,9 +51,10 @@ def parameter(of: Parameter, robot: RobotState) -> dict[str, Any]:
     }
 
 
-def _text(of: Parameter, value: Value) -> str:
+def _text(of: Parameter, value: Value) -> TextLike:
     option = of.option(value)
-    return written(of.unchosen(_beginning(value)) if option is None else option.label)
+    text = of.unchosen(_beginning(value)) if option is None else option.label
+    return text if isinstance(text, Text) else written(text)
 
 
 def _beginning(value: Value) -> Value:
@@ -77,7 +78,7 @@ def never_told(known: ParameterState) -> bool:
     return known.state in ("waiting", "silent") and known.value is None
 
 
-def _note(of: Parameter, known: ParameterState, robot: RobotState) -> str:
+def _note(of: Parameter, known: ParameterState, robot: RobotState) -> Text:
     time = format_time(known.wall)
     if never_told(known):
         silent = known.state == "silent" and of.id not in robot.asking

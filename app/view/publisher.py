@@ -2,8 +2,8 @@
 
 There is no queue: a stream remembers the view that it sent last and, whenever it can send, gets
 the difference to the newest. A client's role in control decides which view that is: there is one for
-each role. What is sent is encoded once for all streams: those of one role that are equally far share
-the same bytes, the others those of each event that says all of something.
+each role. What is sent is encoded once for all streams of a language and a role: those that are equally
+far share the same bytes, the others those of each event that says all of something.
 """
 
 import asyncio
@@ -13,6 +13,7 @@ from typing import Any, Final
 
 from pydantic_core import to_json
 
+from app.i18n import ENGLISH, render
 from app.permission.control_authority_view import Role
 from app.view.heartbeat import Heartbeat
 from app.view.kinds import Attributes
@@ -24,9 +25,9 @@ NOTHING: Final[Mapping[str, Attributes]] = {}
 SEPARATORS: Final = {c.encode(): b"\\u%04x" % ord(c) for c in "\x85\u2028\u2029"}
 
 
-def encoded(data: Mapping[str, Any]) -> bytes:
-    """JSON in one line, for whoever reads lines; what is no number is null."""
-    text = to_json(data, inf_nan_mode="null")
+def encoded(data: Mapping[str, Any], language: str = ENGLISH) -> bytes:
+    """JSON in one line, for whoever reads lines; what is no number is null, a text is rendered."""
+    text = to_json(data, inf_nan_mode="null", fallback=lambda one: render(one, language))
     for separator, escaped in SEPARATORS.items():
         text = text.replace(separator, escaped)
     return text
@@ -49,8 +50,9 @@ class ViewPublisher:
         self._news: Events = {}  # from the view before to this one
         self._without_control = without_control
         self._seen: dict[Role, View] = {}
-        self._prepared: dict[tuple[int, Role, Role], bytes] = {}
-        self._whole: dict[tuple[str, int], bytes] = {}
+        # By the language, the version before, and the roles then and now.
+        self._prepared: dict[tuple[str, int, Role, Role], bytes] = {}
+        self._whole: dict[tuple[str, str, int], bytes] = {}  # by the language, the event and its data
         self._turned: dict[str, int] = {}
         self.closed = False
 
@@ -97,38 +99,47 @@ class ViewPublisher:
             self._seen[role] = seen_as(self.view, self._without_control, role)
         return self._seen[role]
 
-    def snapshot(self, role: Role = "") -> bytes:
+    def snapshot(self, language: str = ENGLISH, role: Role = "") -> bytes:
         """The `snapshot` event: everything that the page shows."""
         view = self.seen_as(role)
         about = {"id": self.id, "revision": self.revision}
-        return self._all_of("snapshot", view, lambda: {**about, **view})
+        return self._all_of("snapshot", view, language, lambda: {**about, **view})
 
-    def since(self, version: int, view: View, was: Role = "", role: Role = "") -> bytes:
+    def since(
+        self, version: int, view: View, language: str = ENGLISH, was: Role = "", role: Role = ""
+    ) -> bytes:
         """The events from a view that was posted as `version`, and sent to those whose role it `was`,
         to the newest one."""
-        prepared = self._prepared.get((version, was, role))
+        prepared = self._prepared.get((language, version, was, role))
         if prepared is None:
             latest = version == self.version - 1 and not (was or role)
             news = self._news if latest else difference(view, self.seen_as(role))
-            prepared = self._prepared[version, was, role] = b"".join(
-                self._event(name, data) if name == "update" else self._all_of(name, data)
+            prepared = self._prepared[language, version, was, role] = b"".join(
+                self._event(name, data, language)
+                if name == "update"
+                else self._all_of(name, data, language)
                 for name, data in news.items()
             )
         return prepared
 
     def _all_of(
-        self, name: str, of: Mapping[str, Any], data: Callable[[], Mapping[str, Any]] | None = None
+        self,
+        name: str,
+        of: Mapping[str, Any],
+        language: str,
+        data: Callable[[], Mapping[str, Any]] | None = None,
     ) -> bytes:
         """An event that is the same whatever was sent before: with `of`, a part of one of the newest
         views, or `data` made of it."""
-        key = name, id(of)
+        key = language, name, id(of)
         whole = self._whole.get(key)
         if whole is None:
-            whole = self._whole[key] = self._event(name, data() if data else of)
+            whole = self._whole[key] = self._event(name, data() if data else of, language)
         return whole
 
-    def _event(self, name: str, data: Mapping[str, Any]) -> bytes:
-        return b"event: %b\ndata: %b\nid: %b\n\n" % (name.encode(), encoded(data), self.id.encode())
+    def _event(self, name: str, data: Mapping[str, Any], language: str) -> bytes:
+        lines = (name.encode(), encoded(data, language), self.id.encode())
+        return b"event: %b\ndata: %b\nid: %b\n\n" % lines
 
 
 def client_id_event(browser: str) -> bytes:

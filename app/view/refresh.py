@@ -10,6 +10,7 @@ from collections.abc import Callable, Collection, Mapping
 from typing import Protocol
 
 from app.audit.press_record import Log
+from app.i18n import TextLike, joined
 from app.panel.model import Panel
 from app.panel.widgets.families import Display
 from app.permission.control_authority import ControlAuthority
@@ -57,7 +58,7 @@ class ViewRefresher:
         others: OtherRobots,
         *,
         before: Callable[[], None],
-        recordings_fault: Callable[[], str],
+        recordings_fault: Callable[[], TextLike],
         simulated: bool,
     ) -> None:
         """`before` is called first, whenever it is shown."""
@@ -150,14 +151,14 @@ class ViewRefresher:
 
     def _sight(self) -> ViewWithDeadlines:
         unlogged = self._operators_log.fault
-        faults = (unlogged, self._recordings_fault())
+        fault = joined((unlogged, self._recordings_fault()), "between_lines")
         seen = build_view(
             self._panel,
             self._robot,
             time.monotonic(),
             robots=self._others.link_statuses(),
             simulated=self._simulated,
-            fault="\n".join(filter(None, faults)),
+            fault=fault,
             lock=self._operators_log.lock if unlogged else "",
             control=self._control.view(),
             control_lock=self._control.lock,

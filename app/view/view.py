@@ -1,6 +1,7 @@
 """What the page shows: pure, from (panel, robot, time); the same for HTML and for events.
 
-A view is plain JSON values; the browser puts texts and attributes where they belong and composes
+A view is JSON values and, where a person reads, texts (`i18n`): they are rendered for each language in
+use, as an event or as a page. The browser puts texts and attributes where they belong and composes
 nothing.
 """
 
@@ -9,7 +10,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any, Final, NamedTuple, TypedDict
 
-from app.i18n import say
+from app.i18n import TextLike, say
 from app.panel.model import Panel
 from app.panel.widgets.families import Display
 from app.permission.control_authority_view import IN_CONTROL, NO_CONTROL, ControlView, Role
@@ -24,8 +25,8 @@ from app.view.link_status import Lamp, LinkStatus, link_statuses, summary
 class Notice(TypedDict):
     """What stands above everything; "" where there is nothing to say."""
 
-    banner: str
-    fault: str
+    banner: TextLike
+    fault: TextLike
 
 
 class View(TypedDict):
@@ -67,8 +68,8 @@ def build_view(
     *,
     robots: Mapping[str, Lamp] = NO_OTHERS,
     simulated: bool = False,
-    fault: str = "",
-    lock: str = "",
+    fault: TextLike = "",
+    lock: TextLike = "",
     control: ControlView = NO_CONTROL,
     control_lock: Verdict = PERMITTED,
     control_until: float = math.inf,

@@ -5,18 +5,19 @@ from dataclasses import dataclass, field
 from typing import Annotated
 
 from fastapi import Depends, Path
-from jinja2 import Environment
 from starlette.requests import HTTPConnection
 
 from app.audit import NullLog, OperatorLog
 from app.commands.press_limits import PressLimits
 from app.commands.receipts import Receipt
 from app.concurrency import InFlight
+from app.i18n import TextLike
 from app.permission.clients import Clients
 from app.runtime.fleet import Fleet
 from app.runtime.robot_session import RobotSession
 from app.web.assets import Assets
 from app.web.metrics import Metrics
+from app.web.page_templates import PageTemplates
 
 
 @dataclass(slots=True)
@@ -25,7 +26,7 @@ class AppState:
 
     fleet: Fleet
     assets: Assets
-    templates: Environment
+    templates: PageTemplates
     metrics: Metrics
     log: OperatorLog | NullLog
     limits: PressLimits
@@ -33,10 +34,10 @@ class AppState:
     in_flight: InFlight = field(default_factory=InFlight)
 
     @property
-    def banner(self) -> str:
+    def banner(self) -> TextLike:
         """What stands above a page of no robot: that one is simulated."""
         banners = (session.publisher.view["notice"]["banner"] for session in self.fleet.sessions)
-        return next(filter(None, banners), "")
+        return next((banner for banner in banners if banner), "")
 
     async def counted(self, command: Awaitable[Receipt]) -> Receipt:
         """The receipt of a command, counted in the metrics; shutdown waits for it."""

@@ -11,25 +11,28 @@ from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 
 from app.errors import KioskError, TooMany, TooSlow
+from app.i18n import TextLike, render
 from app.printable import printable
 from app.web.app_state import site_of
+from app.web.language import language_of
 
 TRY_AGAIN: Final = {"refresh": "1"}  # seconds
 
 
-def error_answer(request: Request, status: int, message: str) -> Response:
+def error_answer(request: Request, status: int, message: TextLike) -> Response:
     """An error for whom it is: a page for who reads pages, JSON for programs."""
-    site = site_of(request)
+    site, language = site_of(request), language_of(request)
     if "text/html" not in request.headers.get("accept", ""):
-        return JSONResponse({"error": message}, status_code=status)
+        return JSONResponse({"error": render(message, language)}, status_code=status)
     context = {"site": site, "panel": site.fleet.panel, "status": status, "message": message}
-    html = site.templates.get_template("error.html").render(**context)
+    html = site.templates.render("error.html", language, **context)
     return HTMLResponse(html, status_code=status, headers={"cache-control": "no-store"})
 
 
 async def on_kiosk_error(request: Request, error: Exception) -> Response:
     status = error.status if isinstance(error, KioskError) else 500
-    answer = error_answer(request, status, str(error))
+    message = error.text if isinstance(error, KioskError) else str(error)
+    answer = error_answer(request, status, message)
     if isinstance(error, TooSlow):
         answer.headers["connection"] = "close"  # nobody waits for the rest
     if isinstance(error, TooMany):

@@ -7,8 +7,9 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any, Final
 
-from app.i18n import ENGLISH
+from app.i18n import ENGLISH, sentences
 
+SENTENCES: Final = sentences(ENGLISH)
 FILE: Final = Path(__file__).with_name("locks.toml")
 ADVICE: Final[Mapping[str, Any]] = tomllib.loads(FILE.read_text(encoding="utf-8"))
 OTHERS: Final = "others"  # patterns of codes that lock nothing
@@ -25,13 +26,13 @@ def unexplained() -> list[str]:
     patterns = ADVICE[OTHERS]["codes"]
     return [
         code
-        for code in ENGLISH
+        for code in SENTENCES
         if code not in explained and not any(fnmatchcase(code, pattern) for pattern in patterns)
     ]
 
 
 def _table(codes: Mapping[str, str]) -> str:
-    rows = [(shown(ENGLISH[code]), f"`{code}`", advice) for code, advice in codes.items()]
+    rows = [(shown(SENTENCES[code]), f"`{code}`", advice) for code, advice in codes.items()]
     lines = [("What the panel says", "Code", "What to do"), ("---",) * 3, *rows]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 

@@ -14,11 +14,12 @@ from typing import Any, Final, get_args
 from pydantic import BaseModel
 
 from app import i18n
-from app.i18n import ENGLISH
+from app.i18n import BETWEEN, ENGLISH, sentences
 from app.panel import Panel
 from docs._generate.locks import shown
 from docs._generate.schema import ROOT
 
+SENTENCES: Final = sentences(ENGLISH)
 PROJECT: Final = Path(__file__).parents[2]
 METHODS: Final = ("get", "post", "head", "put", "delete", "websocket")
 CATALOGUE: Final = Path(inspect.getfile(i18n)).parent
@@ -102,10 +103,10 @@ def _file_of(of: type) -> str:
 def sentences_table() -> str:
     """Each sentence, with its code and the modules that say it."""
     rows = []
-    for code, sentence in ENGLISH.items():
+    for code in (code for code in SENTENCES if code not in BETWEEN):
         told = [path for path, names in _said().items() if _says(names, code)]
         named = told or [path for path, tree in modules().items() if _has(tree, code)]
-        rows.append((shown(sentence), f"`{code}`", ", ".join(map(place, named))))
+        rows.append((shown(SENTENCES[code]), f"`{code}`", ", ".join(map(place, named))))
     return _markdown(rows, [("Sentence", "Code", "Said in"), ("---",) * 3])
 
 
@@ -127,16 +128,16 @@ def _says(names: frozenset[str], code: str) -> bool:
 def _codes(tree: ast.Module) -> Iterator[str]:
     for node in ast.walk(tree):
         match node:
-            case ast.Constant(value=str(code)) if "_" in code and code in ENGLISH:
+            case ast.Constant(value=str(code)) if "_" in code and code in SENTENCES:
                 yield code
             case ast.JoinedStr(values=[ast.Constant(value=str(begin)), ast.FormattedValue(), *_]) if (
-                begin.endswith("_") and any(code.startswith(begin) for code in ENGLISH)
+                begin.endswith("_") and any(code.startswith(begin) for code in SENTENCES)
             ):
                 yield f"{begin}*"
             case ast.Call(args=arguments, keywords=keywords) if _may_say(node.func):
                 for one in (*arguments, *(word.value for word in keywords)):
                     for inner in ast.walk(one):
-                        if isinstance(inner, ast.Constant) and inner.value in ENGLISH:
+                        if isinstance(inner, ast.Constant) and inner.value in SENTENCES:
                             yield str(inner.value)
 
 

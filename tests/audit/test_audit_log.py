@@ -25,6 +25,7 @@ from app.audit.ticket import Results
 from app.audit.verify import verify
 from app.errors import FolderInUse, LogCorrupt, LogError
 from tests.support.parts import until
+from tests.support.words import english
 
 FREE = Limits(required=False)
 
@@ -165,7 +166,7 @@ def test_a_disk_that_hangs_blocks_no_loop_and_locks(
     changes: list[str] = []
 
     async def work(log: OperatorLog) -> None:
-        with log.notifying(lambda: changes.append(log.lock)):
+        with log.notifying(lambda: changes.append(str(log.lock))):
             disk.open.clear()
             with pytest.raises(LogError, match=r"can't be written: the disk did not take .* 0\.5 s"):
                 await log.pressed(pressed(1))
@@ -173,7 +174,7 @@ def test_a_disk_that_hangs_blocks_no_loop_and_locks(
             with pytest.raises(LogError):
                 await log.pressed(pressed(2))
             assert time.monotonic() - began < 0.4
-            assert "the disk did not take the entry" in log.lock
+            assert "the disk did not take the entry" in str(log.lock)
             disk.open.set()
             await until_good(log)
             await log.pressed(pressed(3))
@@ -249,7 +250,7 @@ def test_what_could_not_be_written_of_a_sent_press_is_written_later(tmp_path: Pa
         entry = await log.pressed(pressed(1))
         disk.fails = LogError("no space left on device")
         assert await log.closed(sent(entry)) == "no space left on device"
-        assert log.lock == "The operator's log cannot be written: no space left on device."
+        assert english(log.lock) == "The operator's log cannot be written: no space left on device."
         with pytest.raises(LogError, match="no space left"):
             await log.pressed(pressed(2))
         disk.fails = None
@@ -299,7 +300,7 @@ def test_where_the_log_is_not_required_presses_go_on(tmp_path: Path, disk: Disk)
         disk.fails = LogError("no space left on device")
         assert await log.pressed(pressed(1)) is None
         assert log.lock == ""
-        assert log.fault == (
+        assert english(log.fault) == (
             "The operator's log cannot be written, so nothing is logged: no space left on device."
         )
         disk.fails = None
@@ -314,7 +315,7 @@ def test_damage_while_it_runs_begins_a_new_log_whose_numbers_go_on(tmp_path: Pat
     async def work(log: OperatorLog) -> None:
         entry = await log.pressed(pressed(1))
         disk.fails = LogCorrupt("the file is damaged")
-        assert "damaged" in await log.closed(sent(entry))
+        assert "damaged" in str(await log.closed(sent(entry)))
         disk.fails = None
         await until_good(log)
 
@@ -348,7 +349,7 @@ def test_a_folder_that_can_not_be_made_locks_until_it_can(tmp_path: Path) -> Non
 
     async def work(log: OperatorLog) -> None:
         where = tmp_path / "file"
-        assert log.lock == f"The operator's log cannot be written: not a folder ({where})."
+        assert english(log.lock) == f"The operator's log cannot be written: not a folder ({where})."
         assert log.head is None
         (tmp_path / "file").unlink()
         await until_good(log)

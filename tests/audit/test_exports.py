@@ -56,7 +56,7 @@ INSERT INTO entry SELECT n, 1763700000000 + n, 'boot0000', n * 1000, iif(n % 2, 
   iif(n % 2, n - 1, NULL), '10.0.0.7', 'ab12ab12ab12', 'Panel 2', '', 'p' || (n / 2), 'say', 'press',
   '{"message": "hello number ' || (n / 2) || '"}', '0123456789abcdef-12345',
   iif(n % 2, 'permitted', ''), iif(n % 2, '0123456789abcdef-12345', ''), iif(n % 2, 'published', ''),
-  iif(n % 2, 'Sent on /said at 10:04:32.', ''), hex(randomblob(32)), hex(randomblob(32)) FROM number
+  iif(n % 2, 'Sent on /said at 10:04:32.', ''), hex(randomblob(32)), hex(randomblob(32)), '' FROM number
 """
 # As a browser that saves it, again and again; how many bytes it got of each, and the status.
 EXPORTER = """

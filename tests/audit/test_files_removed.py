@@ -90,7 +90,7 @@ def test_no_press_is_sent_when_the_log_is_gone_and_a_new_one_says_so(
         take(folder)
         with pytest.raises(LogError, match=r"can't be written: .* was removed or renamed"):
             await log.pressed(pressed(2))
-        assert "was removed or renamed" in log.lock
+        assert "was removed or renamed" in str(log.lock)
         log.add(sent(first))
         await until_good(log)
         await log.closed(sent(await log.pressed(pressed(3))))
@@ -160,7 +160,7 @@ def test_a_log_that_was_emptied_in_its_place_is_put_aside(tmp_path: Path) -> Non
         await log.pressed(pressed(1))
         (tmp_path / NAME).open("wb").close()
         await until_locked(log)
-        assert "the file was emptied" in log.lock
+        assert "the file was emptied" in str(log.lock)
         await until_good(log)
 
     run(tmp_path, work)
@@ -200,7 +200,7 @@ def test_nothing_is_sent_while_another_server_has_the_folder(tmp_path: Path, req
         with pytest.raises(LogError):
             await log.pressed(pressed(1))
         async with asyncio.timeout(10):
-            while "is in use by process" not in log.lock:
+            while "is in use by process" not in str(log.lock):
                 await asyncio.sleep(0.01)
         with pytest.raises(LogError, match="is in use by process"):
             await log.pressed(pressed(2))

@@ -22,6 +22,7 @@ from app.robot.state import RobotState
 from tests.browser.test_holds_in_browser import PANEL
 from tests.support.builders import COUNT, panel_of, permits, presses_of, robot_there, small_panel
 from tests.support.parts import ROOT, Server, until
+from tests.support.words import english
 from tests.web.test_hold_socket import opened
 
 KIM = Origin(address="10.0.0.7", browser="b1", who="Panel 1")
@@ -168,7 +169,7 @@ def test_a_flood_of_refused_presses_leaves_the_log_as_it_was(tmp_path: Path) -> 
         for number in range(2000):
             receipt = await cell.press(f"f{number}")
             assert (receipt.outcome, receipt.cause) == ("refused", "interlock")
-            assert "does not permit operation" in receipt.reason
+            assert "does not permit operation" in str(receipt.reason)
         assert cell.log.left_out == 2000 - OF_BROWSER.at_once
         assert (await cell.press("other", LEE)).outcome == "refused"
 
@@ -216,7 +217,7 @@ def test_bad_input_is_limited_too_and_says_what_is_wrong(tmp_path: Path, inputs:
         for number in range(ENOUGH):
             last = await cell.press(f"f{number}", **inputs)
         assert (last.outcome, last.cause) == ("refused", "input")
-        assert last.reason[22:] == first.reason[22:]
+        assert str(last.reason)[22:] == str(first.reason)[22:]
         assert cell.log.left_out == ENOUGH + 1 - OF_BROWSER.at_once
 
     written(tmp_path, work)
@@ -227,7 +228,7 @@ def test_a_used_id_is_limited_too(tmp_path: Path) -> None:
         await cell.press("p")
         for _ in range(ENOUGH):
             receipt = await cell.press("p", message="other")
-            assert "already used" in receipt.reason
+            assert "already used" in str(receipt.reason)
         assert cell.log.left_out == ENOUGH - OF_BROWSER.at_once
 
     written(tmp_path, work)
@@ -254,7 +255,7 @@ def test_cancels_of_nothing_are_limited_too(tmp_path: Path) -> None:
         )
         for _ in range(ENOUGH):
             receipt = await presses.cancel("count", KIM)
-            assert receipt.reason == "nothing is in progress"
+            assert english(receipt.reason) == "nothing is in progress"
         assert cell.log.left_out == ENOUGH - OF_BROWSER.at_once
 
     written(tmp_path, work)

@@ -22,6 +22,7 @@ from app.audit.verify import verify
 from app.audit.writer_thread import HOUR_S, Steady
 from app.cli.log import main
 from app.errors import FolderInUse, LogCorrupt, LogError
+from app.i18n import TextLike, say
 
 FROM = Origin(address="10.0.0.7", browser="b1", who="Kim", seen="boot-7")
 
@@ -59,10 +60,14 @@ def test_an_entry_is_read_as_it_was_written(store: Store, tmp_path: Path) -> Non
     assert found.hash == found.computed_hash()
 
 
-def test_a_hash_can_be_computed_by_whoever_reads_the_file(store: Store, tmp_path: Path) -> None:
-    (written,) = store.append([entered("refused", FROM, {"text": 'ä"\n'}, reason='Nein: "ö"\\')])
+@pytest.mark.parametrize("reason", ['Nein: "ö"\\', say("waiting", topic="/ö")])
+def test_a_hash_can_be_computed_by_whoever_reads_the_file(
+    store: Store, tmp_path: Path, reason: TextLike
+) -> None:
+    (written,) = store.append([entered("refused", FROM, {"text": 'ä"\n'}, reason=reason)])
     with closing(sqlite3.connect(tmp_path / NAME)) as db:
-        *row, digest = db.execute("SELECT * FROM entry").fetchone()
+        *row, prev, digest, code = db.execute("SELECT * FROM entry").fetchone()
+    row += [code, prev] if code else [prev]
     text = json.dumps(row, ensure_ascii=False, separators=(",", ":"))
     assert digest == written.hash == hashlib.sha256(text.encode()).hexdigest()
 
@@ -460,7 +465,7 @@ def test_another_programs_database_is_not_written_into(tmp_path: Path) -> None:
 def test_a_file_of_a_later_version_is_left_alone(tmp_path: Path) -> None:
     Store(tmp_path, "boot1").close()
     with sqlite3.connect(tmp_path / NAME) as db:
-        db.execute("PRAGMA user_version = 2")
+        db.execute("PRAGMA user_version = 3")
     db.close()
     with pytest.raises(LogError, match="another version"):
         Store(tmp_path, "boot1")

@@ -17,6 +17,7 @@ from app.permission.interlocks import call_blocked
 from app.robot.command_status import CommandStatus, Outcome
 from app.robot.state import RobotState, Sample
 from tests.support.builders import BRIDGE, INTERFACES, panel_of, robot_there
+from tests.support.words import english
 
 TRIGGER = "std_srvs/srv/Trigger"
 COUNT = "example_interfaces/action/Fibonacci"
@@ -131,7 +132,7 @@ def test_an_answer_that_can_not_be_read_is_unknown() -> None:
         bench.line.asked[0][2].set_result(b"\0\1\0\0")
         answer = await call
         assert answer.outcome == "unknown"
-        assert "The robot may have done it" in answer.text
+        assert "The robot may have done it" in str(answer.text)
 
     run(test)
 
@@ -141,7 +142,7 @@ def test_what_the_robot_answers_is_shown_by_its_escapes() -> None:
         call = bench.call()
         await asked(bench, 1)
         bench.line.answer(f"{TRIGGER}_Response", success=False, message="no \u202e\x1b[2Jon")
-        assert (await call).text.endswith(": no \\u202e\\u001b[2Jon")
+        assert str((await call).text).endswith(": no \\u202e\\u001b[2Jon")
 
     run(test)
 
@@ -150,12 +151,12 @@ def test_a_first_timeout_hints_at_cyclone_and_a_later_one_does_not() -> None:
     async def test(bench: Bench) -> None:
         first = await bench.call()
         assert first.outcome == "timed_out"
-        assert "Cyclone DDS" in first.text
+        assert "Cyclone DDS" in str(first.text)
         call = bench.call("p2")
         await asked(bench, 2)
         bench.line.answer(f"{TRIGGER}_Response", success=True, message="")
         assert (await call).outcome == "succeeded"
-        assert "Cyclone DDS" not in (await bench.call("p3")).text
+        assert "Cyclone DDS" not in str((await bench.call("p3")).text)
 
     run(test)
 
@@ -167,7 +168,7 @@ def test_a_query_that_ends_without_an_answer_is_unknown() -> None:
         bench.line.asked[0][2].set_result(None)
         answer = await call
         assert answer.outcome == "unknown"
-        assert "/reset" in answer.text
+        assert "/reset" in str(answer.text)
 
     run(test)
 
@@ -200,7 +201,7 @@ def test_a_late_answer_corrects_its_own_press_and_not_what_came_after() -> None:
                 await asyncio.sleep(0)
         ((press_id, answer),) = bench.corrected
         assert (press_id, answer.outcome) == ("p1", "rejected")
-        assert "second" in bench.robot.command_status["reset"].text
+        assert "second" in str(bench.robot.command_status["reset"].text)
 
     run(test)
 
@@ -213,7 +214,7 @@ def test_a_bridge_that_goes_away_ends_the_waiting_at_once(what: str) -> None:
         bench.lose_the_bridge()
         answer = await waiting
         assert answer.outcome == "unknown"
-        assert "The robot may have done it" in answer.text
+        assert "The robot may have done it" in english(answer.text)
 
     run(test)
 
@@ -234,7 +235,7 @@ def test_a_goal_cut_off_is_unknown_until_the_robot_tells_its_result() -> None:
         await asked(bench, 3)
         assert (locked_by(bench), bench.shown.stoppable) == ("perhaps_busy", True)
         bench.line.answer(types.get_result_response, status=4, result={"sequence": [0, 1]})
-        while not bench.robot.command_status["count"].text.startswith("Succeeded"):
+        while not str(bench.robot.command_status["count"].text).startswith("Succeeded"):
             await asyncio.sleep(0)
         outcomes.append(bench.robot.command_status["count"].outcome)
         assert outcomes == ["unknown", "succeeded"]
@@ -296,12 +297,12 @@ def test_a_goal_that_the_robot_does_not_list_is_not_being_canceled() -> None:
         tell_states(bench, (goal_id(bench), 2))
         answer, _ = await cancel_answered(bench, "g1", listed=False)
         assert answer.outcome == "rejected"
-        assert answer.text.startswith("The robot refused to cancel at ")
+        assert str(answer.text).startswith("The robot refused to cancel at ")
         assert (bench.shown.goal, bench.shown.stoppable) == ("EXECUTING", True)
         await canceled(bench, "g1")
         assert bench.shown.goal == "CANCELING"
         again, _ = await cancel_answered(bench, "g1", return_code=3, listed=False)
-        assert (again.outcome, again.text) == ("accepted", "Canceling.")
+        assert english((again.outcome, again.text)) == ("accepted", "Canceling.")
         await bench.actions.stop()
 
     run(test)
@@ -316,7 +317,7 @@ def test_an_answer_to_a_cancel_that_can_not_be_read_is_no_refusal() -> None:
         bench.line.asked[-1][2].set_result(b"broken")
         answer = await cancel
         assert answer.outcome == "unknown"
-        assert "not with action_msgs/srv/CancelGoal" in answer.text
+        assert "not with action_msgs/srv/CancelGoal" in str(answer.text)
         assert bench.shown.goal == "ACCEPTED"
         await bench.actions.stop()
 
@@ -334,7 +335,7 @@ def test_a_late_cancel_does_not_hit_the_next_goal() -> None:
         await accepted(bench, "g2")
         late = await bench.actions.cancel(bench.count, "g1")
         assert late.outcome == "refused"
-        assert late.text.startswith("Nothing was canceled: that goal is over")
+        assert str(late.text).startswith("Nothing was canceled: that goal is over")
         assert bench.shown.goal == "ACCEPTED"
         assert await canceled(bench, "g2") == goal_id(bench, 2)
         assert (bench.shown.goal, bench.shown.press) == ("CANCELING", "g2")
@@ -362,7 +363,7 @@ def test_a_goals_state_has_its_ros_name_and_only_goes_on() -> None:
             tell_states(bench, (bytes(16), 6), (goal_id(bench), state))
             names.append(bench.shown.goal)
         assert names == ["ACCEPTED", *["EXECUTING"] * 2, *["CANCELING"] * 4]
-        assert bench.shown.text.startswith("Canceling")
+        assert str(bench.shown.text).startswith("Canceling")
         assert bench.shown.stoppable
         tell_states(bench, (goal_id(bench), 5))
         bench.line.answer(
@@ -450,7 +451,7 @@ def test_a_goal_cut_off_before_its_answer_is_asked_for_when_the_bridge_is_back()
             INTERFACES.action(COUNT).get_result_response, status=4, result={"sequence": [0, 1]}
         )
         await settled(bench)
-        assert bench.shown.text.startswith("Succeeded")
+        assert str(bench.shown.text).startswith("Succeeded")
         assert [answer.outcome for _, answer in bench.corrected] == ["accepted", "succeeded"]
 
     run(test)
@@ -493,7 +494,7 @@ def test_a_goal_that_nobody_answers_at_once_waits_for_the_news_of_the_cut() -> N
         bench.line.asked[0][2].set_result(None)
         await asyncio.sleep(0.01)
         bench.lose_the_bridge()
-        assert "connection was lost" in (await start).text
+        assert "connection was lost" in str((await start).text)
         await bench.actions.stop()
 
     run(test)
@@ -537,7 +538,7 @@ def test_what_breaks_while_a_goal_is_followed_leaves_it_unknown(
         )
         await settled(bench)
         assert (bench.shown.goal, bench.shown.busy) == ("UNKNOWN", False)
-        assert "Internal error in the panel server" in bench.shown.text
+        assert "Internal error in the panel server" in str(bench.shown.text)
         assert [answer.outcome for _, answer in bench.corrected] == ["unknown"]
 
     run(test)
@@ -574,7 +575,7 @@ def test_a_goal_whose_server_ends_is_unknown_and_asked_for_when_it_is_back() -> 
         bench.actions.follow()
         await in_doubt(bench)
         assert (bench.shown.goal, bench.shown.stoppable) == ("UNKNOWN", False)
-        assert "stopped offering /count" in bench.shown.text
+        assert "stopped offering /count" in str(bench.shown.text)
         bench.robot.graph.apply(token, True)
         await asked(bench, 3)
         assert locked_by(bench) == "perhaps_busy"
@@ -582,7 +583,7 @@ def test_a_goal_whose_server_ends_is_unknown_and_asked_for_when_it_is_back() -> 
             INTERFACES.action(COUNT).get_result_response, status=0, result={"sequence": []}
         )
         await settled(bench)
-        assert "no longer knows this goal" in bench.shown.text
+        assert "no longer knows this goal" in str(bench.shown.text)
         assert [answer.outcome for _, answer in bench.corrected] == ["unknown", "unknown"]
 
     run(test)
@@ -615,11 +616,11 @@ def test_feedback_and_results_of_any_length_are_cut() -> None:
         one = {"goal_id": {"uuid": goal_id(bench)}, "feedback": long}
         bench.actions.hear_feedback("/count", sample_of(INTERFACES.encode(types.feedback_message, one)))
         bench.line.answer(types.get_result_response, status=4, result=long)
-        assert bench.shown.text.startswith("In progress. so far [0, 1, 2, ")
-        assert len(bench.shown.text) < 2 * LONGEST_SAID
+        assert str(bench.shown.text).startswith("In progress. so far [0, 1, 2, ")
+        assert len(str(bench.shown.text)) < 2 * LONGEST_SAID
         await settled(bench)
-        assert bench.shown.text.endswith("…")
-        assert len(bench.corrected[0][1].text) < 2 * LONGEST_SAID
+        assert str(bench.shown.text).endswith("…")
+        assert len(str(bench.corrected[0][1].text)) < 2 * LONGEST_SAID
 
     run(test)
 

@@ -85,7 +85,7 @@ def test_a_command_is_confirmed_by_what_comes_after_it() -> None:
 
     receipt = asyncio.run(pressed())
     assert receipt.outcome == "confirmed"
-    assert receipt.reason.startswith("Confirmed by /heard at ")
+    assert str(receipt.reason).startswith("Confirmed by /heard at ")
 
 
 def test_what_came_unseen_confirms_by_when_it_came() -> None:
@@ -128,8 +128,8 @@ def test_without_its_effect_it_is_not_known_and_later_corrected() -> None:
 
     first, corrected, shown = asyncio.run(pressed())
     assert first.outcome == "unknown"
-    assert first.reason.startswith("Sent on /free at ")
-    assert "No confirmation on /heard within 0.2 s" in first.reason
+    assert str(first.reason).startswith("Sent on /free at ")
+    assert "No confirmation on /heard within 0.2 s" in str(first.reason)
     assert corrected is not None
     assert (corrected.outcome, shown) == ("confirmed", "confirmed")
 
@@ -148,7 +148,7 @@ def test_of_two_commands_and_one_effect_only_what_shows_after_it_confirms() -> N
 
     first, second = asyncio.run(pressed())
     assert (first.outcome, second.outcome) == ("confirmed", "unknown")
-    assert "No confirmation" in second.reason
+    assert "No confirmation" in str(second.reason)
 
 
 @pytest.mark.parametrize(
@@ -197,7 +197,7 @@ def test_a_one_shot_button_is_locked_until_its_command_is_answered() -> None:
 
     first, second, third = asyncio.run(pressed())
     assert [r.outcome for r in (first, second, third)] == ["confirmed", "refused", "unknown"]
-    assert "waiting for the robot" in second.reason
+    assert "waiting for the robot" in str(second.reason)
 
 
 @pytest.mark.parametrize(

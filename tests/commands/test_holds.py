@@ -19,7 +19,7 @@ from app.commands.press_judge import Latest
 from app.commands.receipts import Receipt
 from app.dialect import bridge_dialect
 from app.errors import LinkError, NotFound
-from app.i18n import ENGLISH
+from app.i18n import ENGLISH, sentences
 from app.panel.model import Panel
 from app.view.view import build_view
 from app.web.routes.hold_socket import WHYS
@@ -163,7 +163,7 @@ class Bench:
         receipt = self.asked(*arguments, **named)
         assert isinstance(receipt, Receipt)
         assert (receipt.outcome, self.way.sent) == ("refused", before)
-        return receipt.cause, receipt.reason.partition(": ")[2]
+        return receipt.cause, str(receipt.reason).partition(": ")[2]
 
     def keep(self, holding: ActiveHold, seconds: float, every_s: float = 0.08) -> None:
         """Heartbeats that come at once, for some time."""
@@ -192,8 +192,8 @@ def test_while_it_is_held_messages_go_out_at_the_rate_and_one_at_the_end(bench: 
     assert times == pytest.approx([n * 0.05 for n in range(20)])
     (receipt,) = bench.receipts
     assert (receipt.outcome, receipt.widget, receipt.cause) == ("published", "jog", "")
-    assert receipt.reason.startswith("Released at ")
-    assert receipt.reason.endswith(", after 1.0 s.")
+    assert str(receipt.reason).startswith("Released at ")
+    assert str(receipt.reason).endswith(", after 1.0 s.")
 
 
 def test_each_message_has_the_time_of_its_own_sending() -> None:
@@ -222,7 +222,7 @@ def test_a_doubt_ends_it_and_the_stop_still_goes_out(bench: Bench) -> None:
     assert bench.points == [MOVES, STOPS]
     (receipt,) = bench.receipts
     assert receipt.outcome == "aborted"
-    assert "is std_msgs/msg/String on the robot" in receipt.reason
+    assert "is std_msgs/msg/String on the robot" in str(receipt.reason)
 
 
 @pytest.mark.parametrize("code", sorted(set(WHYS.values()) - {RELEASED} | {"hold_by_closing"}))
@@ -232,7 +232,7 @@ def test_every_other_end_says_why_and_wants_a_new_press(bench: Bench, code: str)
     assert bench.points == [MOVES, STOPS]
     (receipt,) = bench.receipts
     assert receipt.outcome == "aborted"
-    assert f": {ENGLISH[code]} Release and press again." in receipt.reason
+    assert f": {sentences(ENGLISH)[code]} Release and press again." in str(receipt.reason)
     assert bench.holds.beat(holding, 2, bench.loop.now) is False
     bench.loop.pass_time(10)
     assert bench.points == [MOVES, STOPS]
@@ -249,7 +249,7 @@ def test_without_a_heartbeat_it_ends_a_quarter_of_a_second_after_the_last_was_se
     assert point == STOPS
     assert stopped_at - NOW == pytest.approx(0.08 + LEASE_S)
     assert max(at for at, point in bench.way.sent if point == MOVES) < stopped_at
-    assert "no signal from the browser" in bench.receipts[0].reason
+    assert "no signal from the browser" in str(bench.receipts[0].reason)
 
 
 def test_a_late_heartbeat_prolongs_nothing(bench: Bench) -> None:
@@ -279,7 +279,7 @@ def test_lost_permission_ends_it_at_once_and_not_at_the_next_message(bench: Benc
     permits(bench.robot, False)
     bench.holds.judge()
     assert bench.way.sent == [(NOW, MOVES), (NOW + 0.01, STOPS)]
-    assert "The robot does not permit operation." in bench.receipts[0].reason
+    assert "The robot does not permit operation." in str(bench.receipts[0].reason)
     permits(bench.robot, True)
     bench.loop.pass_time(10)
     assert bench.points == [MOVES, STOPS]
@@ -307,7 +307,7 @@ def test_what_comes_while_a_message_is_encoded_counts_before_it_is_sent(bench: B
     bench.loop.pass_time(0.05)
     assert looks
     assert bench.points == [MOVES, STOPS]
-    assert "The robot does not permit operation." in bench.receipts[0].reason
+    assert "The robot does not permit operation." in str(bench.receipts[0].reason)
 
 
 def test_news_without_an_end_end_a_hold(bench: Bench) -> None:
@@ -325,7 +325,7 @@ def test_a_permission_that_gets_too_old_ends_it_when_it_does() -> None:
     stopped_at, point = bench.way.sent[-1]
     assert point == STOPS
     assert stopped_at - NOW == pytest.approx(0.5)
-    assert "is older than 0.5 s" in bench.receipts[0].reason
+    assert "is older than 0.5 s" in str(bench.receipts[0].reason)
 
 
 def test_without_a_way_nothing_is_said_and_nothing_is_said_later(bench: Bench) -> None:
@@ -334,7 +334,7 @@ def test_without_a_way_nothing_is_said_and_nothing_is_said_later(bench: Bench) -
     bench.holds.judge()
     (receipt,) = bench.receipts
     assert receipt.outcome == "unknown"
-    assert "The stop message was not sent: No connection to the robot" in receipt.reason
+    assert "The stop message was not sent: No connection to the robot" in str(receipt.reason)
     bench.robot.graph.apply(bridge_dialect.bridge_token(BRIDGE), True)
     bench.holds.judge()
     bench.loop.pass_time(10)
@@ -346,7 +346,7 @@ def test_what_zenoh_refuses_ends_it(bench: Bench) -> None:
     bench.way.fails = "can't send on jog: gone"
     bench.loop.pass_time(0.05)
     assert bench.receipts[0].outcome == "unknown"
-    assert bench.receipts[0].reason.count("can't send on jog: gone.") == 2
+    assert str(bench.receipts[0].reason).count("can't send on jog: gone.") == 2
     bench.way.fails = ""
     bench.loop.pass_time(10)
     assert bench.points == [MOVES]
@@ -358,7 +358,7 @@ def test_after_a_stall_of_the_server_it_is_over_and_nothing_is_made_up_for(bench
     assert bench.holds.beat(holding, 1, bench.loop.now) is False  # heartbeats waited in the socket
     bench.loop.pass_time(10)
     assert bench.way.sent == [(NOW, MOVES), (NOW + 0.4, STOPS)]
-    assert "the panel server stalled" in bench.receipts[0].reason
+    assert "the panel server stalled" in str(bench.receipts[0].reason)
 
 
 def test_after_a_short_stall_missed_messages_are_passed_over(bench: Bench) -> None:
@@ -406,7 +406,7 @@ def test_the_end_of_the_server_ends_all_and_refuses_more(bench: Bench) -> None:
     bench.begun("arm")
     bench.holds.close()
     assert sorted(bench.points) == sorted([MOVES, (-1, 0, 0), STOPS, STOPS])
-    assert bench.refused() == ("interlock", ENGLISH["hold_by_stopping"])
+    assert bench.refused() == ("interlock", sentences(ENGLISH)["hold_by_stopping"])
     bench.holds.close()
     assert all(timer.cancelled for timer in bench.loop.timers)
 

@@ -102,7 +102,7 @@ def test_a_permission_that_is_taken_back_while_it_is_encoded_stops_it(widget: st
     robot, way = robot_permits(), Way()
     receipt = pressed(widget, way, Late(robot, False), robot)
     assert (receipt.outcome, receipt.cause) == ("refused", "interlock")
-    assert "The robot does not permit operation." in receipt.reason
+    assert "The robot does not permit operation." in str(receipt.reason)
     assert way.sent == []
 
 

@@ -22,6 +22,7 @@ from tests.support import cyclone
 from tests.support.builders import panel_of, robot_there
 from tests.support.cyclone import CycloneRobot
 from tests.support.parts import Bridge, RosNode, Server, live, until
+from tests.support.words import english
 
 cyclone_bridge = cyclone.cyclone_bridge
 client = cyclone.client
@@ -169,7 +170,7 @@ def test_a_list_and_an_option_show_as_they_are_entered(
     there = robot_there(panel)
     there.parameters["gains"] = ParameterState("live", value)
     (of,) = panel.parameters()
-    shown = parameter(of, there)
+    shown = english(parameter(of, there))
     assert shown["text"] == text if text is not None else shown["text"].endswith("…")
     assert (shown["entry"], shown["limits"]) == (entry, limits)
 

@@ -22,6 +22,7 @@ from app.robot.parameter_state import UNKNOWN, ParameterState, allowed, limits_t
 from app.robot.state import Sample
 from app.view.parameter_values import parameter
 from tests.support.builders import BRIDGE, INTERFACES, NOW, Table, panel_of, robot_there
+from tests.support.words import english
 
 SPEED: Table = {
     "id": "speed", "kind": "parameter", "label": "Speed", "node": "/arm", "parameter": "speed",
@@ -124,7 +125,7 @@ class Bench:
 
     def reason(self, name: str = "speed") -> str:
         one = next(w for w in self.panel.parameters() if w.id == name)
-        return judged(one, (), self.robot, NOW).reason or ""
+        return str(judged(one, (), self.robot, NOW).reason or "")
 
 
 def run(test: Callable[[Bench], Coroutine[Any, Any, None]], *widgets: Table) -> None:
@@ -282,12 +283,12 @@ def test_a_node_that_does_not_answer_is_asked_again_when_it_is_touched_or_new(
 
     async def test(bench: Bench) -> None:
         (one,) = bench.panel.parameters()
-        assert "does not offer" in bench.parameters.read_again(one)
+        assert "does not offer" in str(bench.parameters.read_again(one))
         bench.offer()
         await bench.asked(1)
         assert bench.parameters.read_again(one) == ""  # it is being asked
         await bench.until(lambda: bench.known().state == "silent")
-        assert (bench.shown["askable"], bench.shown["note"]) == (False, "waiting for /arm")
+        assert english((bench.shown["askable"], bench.shown["note"])) == (False, "waiting for /arm")
         await bench.answer(1, DESCRIBE, descriptors=[descriptor("speed", DOUBLE)])  # late
         await bench.until(lambda: bench.shown["askable"])
         assert bench.known().state == "silent"
@@ -458,7 +459,7 @@ def test_after_a_set_the_node_is_asked_how_it_is() -> None:
         assert (sent.name, sent.value.type, sent.value.double_value) == ("speed", DOUBLE, 0.7)
         await bench.answer(3, SET, results=[{"successful": False, "reason": "too fast"}])
         answer = await setting
-        assert (answer.outcome, answer.text[-10:]) == ("rejected", ": too fast")
+        assert (answer.outcome, str(answer.text)[-10:]) == ("rejected", ": too fast")
         await bench.tell(4, 0.5)
         assert bench.known().value == 0.5
 
@@ -535,7 +536,7 @@ def test_a_panel_narrows_what_the_node_describes(
     own: dict[str, Any], theirs: Range, limits: str, good: list[float], bad: list[float]
 ) -> None:
     of, known = widget(**own), ParameterState("live", range=theirs)
-    assert limits_text(of, allowed(of, known)) == limits
+    assert english(limits_text(of, allowed(of, known))) == limits
     assert [checked(of, known, one) for one in good] == good
     for one in bad:
         with pytest.raises(InputError, match="it must be"):
@@ -581,7 +582,7 @@ def test_a_forms_text_is_typed(kind: str, text: str, value: Any) -> None:
 
 def test_a_range_that_is_open_has_no_words() -> None:
     assert described(Range(), "m") == ""
-    assert described(Range(step=0.5), "m") == "in steps of 0.5"
+    assert english(described(Range(step=0.5), "m")) == "in steps of 0.5"
 
 
 @pytest.mark.parametrize(
@@ -605,5 +606,5 @@ def test_a_value_shows_and_its_input_starts_from_it(
     robot.parameters["speed"] = ParameterState("live", value)
     (of,) = panel.parameters()
     shown = parameter(of, robot)
-    assert (shown["text"], shown["entry"]) == (text, entry)
-    assert "does not report changes" in shown["note"]  # nobody publishes /parameter_events
+    assert english((shown["text"], shown["entry"])) == (text, entry)
+    assert "does not report changes" in english(shown["note"])  # nobody publishes /parameter_events

@@ -72,7 +72,7 @@ def said(robot: RobotState, interlock: Interlock, fields: Table) -> str | None:
     robot.take(robot.key(ENABLED), Sample(payload, 1, NOW, NOW, BRIDGE))
     verdict = interlock_verdict(interlock, robot, NOW)
     assert verdict.permitted is (verdict.reason is None)
-    return verdict.reason
+    return None if verdict.reason is None else str(verdict.reason)
 
 
 @pytest.mark.parametrize(

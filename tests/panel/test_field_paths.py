@@ -33,6 +33,7 @@ from tests.support.builders import (
     presses_of,
     robot_there,
 )
+from tests.support.words import english
 
 JAZZY: Final = interfaces_of("jazzy")
 JOINTS: Final = "sensor_msgs/msg/JointState"
@@ -202,7 +203,7 @@ MISSING: Final = f"there is no position[name=joint_2] in what was {AT}"
 def test_a_readout_of_a_joint_by_its_name(
     names: list[str], positions: list[float], state: str, text: str, note: str
 ) -> None:
-    assert shown(J2, joints(names, positions)) == {"state": state, "text": text, "note": note}
+    assert english(shown(J2, joints(names, positions))) == {"state": state, "text": text, "note": note}
 
 
 def test_a_lamp_and_a_readout_by_constants_of_an_element_by_its_name() -> None:
@@ -259,7 +260,7 @@ def test_an_interlock_by_the_state_of_one_device(
     robot: RobotState = robot_there(panel)
     payload = INTERFACES.encode(DIAGNOSTICS, diagnostics(*levels))
     robot.take(robot.key(ENABLED), Sample(payload, 1, NOW, NOW, BRIDGE))
-    assert interlock_verdict(panel.interlocks[0], robot, NOW).reason == reason
+    assert english(interlock_verdict(panel.interlocks[0], robot, NOW).reason) == reason
 
 
 def test_a_key_that_is_not_there_is_a_fault_of_the_panel(tmp_path: Path) -> None:

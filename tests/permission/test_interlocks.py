@@ -33,6 +33,7 @@ from tests.support.builders import (
     robot_there,
     small_panel,
 )
+from tests.support.words import english
 
 
 def verdict_of(robot: RobotState, interlock: Table = NOTHING, now: float = NOW) -> Verdict:
@@ -117,7 +118,7 @@ def test_without_a_way_to_the_robot_everything_is_locked(
 ) -> None:
     broken(robot)
     for verdict in (link_verdict(robot, NOW), verdict_of(robot), judged(free(), (), robot, NOW)):
-        assert (verdict.permitted, verdict.code, verdict.reason) == (False, code, reason)
+        assert english((verdict.permitted, verdict.code, verdict.reason)) == (False, code, reason)
 
 
 def test_with_a_way_commands_can_reach_the_robot(robot: RobotState) -> None:
@@ -136,7 +137,7 @@ def test_a_robot_that_says_true_permits(robot: RobotState) -> None:
 
 def test_nothing_is_permitted_before_the_robot_said_so() -> None:
     verdict = verdict_of(robot_there(small_panel()))
-    assert (verdict.permitted, verdict.code, verdict.reason) == (
+    assert english((verdict.permitted, verdict.code, verdict.reason)) == (
         False,
         "waiting",
         "Locked: waiting for /operation_enabled.",
@@ -148,13 +149,13 @@ def test_a_robot_that_says_false_forbids(robot: RobotState, label: str | None, n
     permits(robot, False)
     verdict = verdict_of(robot, {"label": label})
     assert (verdict.permitted, verdict.code) == (False, "forbidden")
-    assert verdict.reason == f"The robot does not permit {name}."
+    assert english(verdict.reason) == f"The robot does not permit {name}."
 
 
 def test_what_was_permitted_before_a_cut_is_locked(robot: RobotState) -> None:
     robot.cut(BRIDGE, 2)
     verdict = verdict_of(robot)
-    assert (verdict.permitted, verdict.code, verdict.reason) == (
+    assert english((verdict.permitted, verdict.code, verdict.reason)) == (
         False,
         "cut",
         "Locked: the connection was lost. Waiting for a new /operation_enabled.",
@@ -165,7 +166,7 @@ def test_what_was_permitted_before_a_cut_is_locked(robot: RobotState) -> None:
 def test_what_can_not_be_read_locks(robot: RobotState, payload: bytes) -> None:
     robot.take(robot.key(ENABLED), Sample(payload, 2, NOW, NOW, BRIDGE))
     verdict = verdict_of(robot)
-    assert (verdict.permitted, verdict.code, verdict.reason) == (
+    assert english((verdict.permitted, verdict.code, verdict.reason)) == (
         False,
         "unreadable",
         "Locked: /operation_enabled cannot be read. The data received is not std_msgs/msg/Bool.",
@@ -175,7 +176,7 @@ def test_what_can_not_be_read_locks(robot: RobotState, payload: bytes) -> None:
 def test_another_type_on_the_robot_locks(robot: RobotState) -> None:
     endpoint(robot, "MP", ENABLED, TEXT)
     verdict = verdict_of(robot)
-    assert (verdict.permitted, verdict.code, verdict.reason) == (
+    assert english((verdict.permitted, verdict.code, verdict.reason)) == (
         False,
         "wrong_type",
         "/operation_enabled is std_msgs/msg/String on the robot, "
@@ -186,7 +187,7 @@ def test_another_type_on_the_robot_locks(robot: RobotState) -> None:
 @pytest.mark.parametrize("age", [2.0, 2.001, 1e6])
 def test_a_permission_that_is_too_old_is_stale(robot: RobotState, age: float) -> None:
     verdict = verdict_of(robot, {"max_age_s": 2}, NOW + age)
-    assert (verdict.permitted, verdict.code, verdict.reason) == (
+    assert english((verdict.permitted, verdict.code, verdict.reason)) == (
         False,
         "stale",
         "Locked: the last /operation_enabled is older than 2 s.",
@@ -208,7 +209,7 @@ def test_a_new_sample_ends_staleness(robot: RobotState) -> None:
 
 def test_an_interlock_may_ask_for_a_publisher(robot: RobotState) -> None:
     verdict = verdict_of(robot, {"require_publisher": True})
-    assert (verdict.permitted, verdict.code, verdict.reason) == (
+    assert english((verdict.permitted, verdict.code, verdict.reason)) == (
         False,
         "no_publisher",
         "Locked: no node of the robot publishes /operation_enabled.",
@@ -231,7 +232,7 @@ def test_a_publish_without_an_interlock_needs_a_way_only() -> None:
 def test_a_publish_to_a_topic_of_another_type_is_locked(robot: RobotState) -> None:
     endpoint(robot, "MS", "/free", BOOL)
     verdict = judged(free(), (), robot, NOW)
-    assert (verdict.code, verdict.reason) == (
+    assert english((verdict.code, verdict.reason)) == (
         "wrong_type",
         "/free is std_msgs/msg/Bool on the robot, but this panel expects std_msgs/msg/String.",
     )
@@ -261,7 +262,7 @@ def test_a_permission_that_is_published_best_effort_locks_a_panel_that_asks_for_
     endpoint(robot, "MP", ENABLED, BOOL, qos=best_effort)
     verdict = interlock_verdict(small_panel().interlocks[0], robot, NOW)
     assert (verdict.permitted, verdict.code) == (False, "publishes_best_effort")
-    assert verdict.reason == (
+    assert english(verdict.reason) == (
         "The robot publishes /operation_enabled as best effort, but this panel requires reliable."
     )
     asks_less = small_panel({"qos": {"reliability": "best_effort"}}).interlocks[0]
@@ -273,7 +274,7 @@ def test_a_subscriber_that_would_not_hear_locks_a_press() -> None:
     endpoint(robot, "MS", "/free", TEXT, qos=Qos(transient_local=True))
     verdict = judged(free(), (), robot, NOW)
     assert (
-        verdict.reason
+        english(verdict.reason)
         == "The robot requires /free as transient local, but this panel publishes it as volatile."
     )
     assert not verdict.permitted
@@ -286,7 +287,7 @@ def test_a_service_that_has_just_come_is_not_called_yet() -> None:
     assert judged(call, (), robot, NOW).code == "no_service"
     robot.graph.apply(token, True, NOW)
     verdict = judged(call, (), robot, NOW)
-    assert (verdict.permitted, verdict.code, verdict.reason, verdict.until) == (
+    assert english((verdict.permitted, verdict.code, verdict.reason, verdict.until)) == (
         False,
         "getting_ready",
         "Locked: the robot has just started /reset. Connecting.",

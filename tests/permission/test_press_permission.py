@@ -114,7 +114,7 @@ def test_a_check_more_ends_a_hold(monkeypatch: pytest.MonkeyPatch) -> None:
     bench.holds.step()
     (receipt,) = bench.receipts
     assert receipt.outcome == "aborted"
-    assert WHY in receipt.reason
+    assert WHY in str(receipt.reason)
 
 
 @pytest.mark.usefixtures("alarm")

@@ -358,8 +358,8 @@ def test_a_disk_that_takes_nothing_is_told_and_a_press_tries_again(
         cell.press()
         while not cell.told:
             await asyncio.sleep(0.01)
-        assert "Presses are not recorded: " in cell.recordings.fault
-        assert "They are sent as usual." in cell.recordings.fault
+        assert "Presses are not recorded: " in str(cell.recordings.fault)
+        assert "They are sent as usual." in str(cell.recordings.fault)
         cell.folder.unlink()
         cell.press("p3")
         cell.recorder.stop()

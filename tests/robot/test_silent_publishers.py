@@ -32,6 +32,7 @@ from tests.support.builders import (
     robot_there,
     small_panel,
 )
+from tests.support.words import english
 
 KEY = ENABLED[1:]
 OTHER = "b2"
@@ -242,7 +243,10 @@ def test_a_permission_in_each_order_of_tokens_and_messages(
 def test_the_reason_names_the_topic(incoming: Incoming) -> None:
     for event in (true, appears, goes, appears):
         event(incoming)
-    assert incoming.verdict.reason == f"Locked: a new publisher of {ENABLED} has not published yet."
+    assert (
+        english(incoming.verdict.reason)
+        == f"Locked: a new publisher of {ENABLED} has not published yet."
+    )
 
 
 def test_a_new_session_starts_without_the_doubts_of_the_last(incoming: Incoming) -> None:

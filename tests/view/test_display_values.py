@@ -11,6 +11,7 @@ from app.panel import load_panel
 from app.robot.state import RobotState, Sample
 from app.view.view import build_view
 from tests.support.builders import BRIDGE, HEARD, INTERFACES, NOW, panel_of, robot_there
+from tests.support.words import english
 
 AT = f"received {format_time(NOW)}"
 STATES = [
@@ -106,7 +107,7 @@ def test_an_element_that_is_not_there_is_not_guessed(
         "effort": [],
     }
     more: Any = {"field": "position[2]", "format": ".2f", "unit": "rad"}
-    assert shown(HEARD, JOINTS, fields, **more) == {"state": state, "text": text, "note": note}
+    assert english(shown(HEARD, JOINTS, fields, **more)) == {"state": state, "text": text, "note": note}
 
 
 @pytest.mark.parametrize(
@@ -119,7 +120,7 @@ def test_an_element_that_is_not_there_is_not_guessed(
     ],
 )
 def test_a_lamp_shows_the_state_of_its_value(value: int, text: str, shape: str, colour: str) -> None:
-    assert shown(LAMP, "std_msgs/msg/UInt8", {"data": value}) == {
+    assert english(shown(LAMP, "std_msgs/msg/UInt8", {"data": value})) == {
         "state": "live",
         "text": text,
         "shape": shape,
@@ -170,14 +171,14 @@ def test_a_lamp_of_a_file_shows_the_state_of_a_constant(tmp_path: Path, status: 
     robot = robot_there(panel)
     battery = INTERFACES.encode(BATTERY, BATTERY_FIELDS | {"power_supply_status": status})
     robot.take("heard", Sample(battery, 1, NOW, NOW, BRIDGE))
-    assert build_view(panel, robot, NOW).view["widgets"]["supply"]["text"] == text
+    assert english(build_view(panel, robot, NOW).view["widgets"]["supply"]["text"]) == text
 
 
 def test_a_lamp_of_a_bool_or_a_text() -> None:
     flag = [{"value": True, "text": "Open", "shape": "circle"}]
     assert shown({**LAMP, "states": flag}, "std_msgs/msg/Bool", {"data": True})["text"] == "Open"
     view = shown({**LAMP, "states": flag}, "std_msgs/msg/Bool", {"data": False})
-    assert (view["text"], view["shape"]) == ("Unknown: false", "unknown")
+    assert english((view["text"], view["shape"])) == ("Unknown: false", "unknown")
     text = [{"value": "auto", "text": "Automatic", "shape": "bar"}]
     assert shown({**LAMP, "states": text}, "std_msgs/msg/String", {"data": "auto"})["shape"] == "bar"
 
@@ -208,13 +209,13 @@ def test_a_lamp_that_is_not_known_now_has_no_colour_and_a_shape_of_its_own(
     fields = more.pop("fields", {"data": 2})
     view = shown(LAMP, "std_msgs/msg/UInt8", fields, **more)
     look = {"state": state, "text": text, "shape": shape, "colour": "none", "note": note}
-    assert view == look
+    assert english(view) == look
 
 
 def test_a_lamp_shows_an_unknown_text_by_its_escapes() -> None:
     states = [{"value": "auto", "text": "Automatic", "shape": "bar"}]
     view = shown({**LAMP, "states": states}, "std_msgs/msg/String", {"data": "m\u202ean"})
-    assert view["text"] == "Unknown: m\\u202ean"
+    assert english(view["text"]) == "Unknown: m\\u202ean"
 
 
 def test_a_lamp_that_can_not_be_read_says_so() -> None:
@@ -222,7 +223,11 @@ def test_a_lamp_that_can_not_be_read_says_so() -> None:
     robot = robot_there(panel)
     robot.take("heard", Sample(b"broken", 1, NOW, NOW, BRIDGE))
     view = build_view(panel, robot, NOW).view["widgets"]["heard"]
-    assert (view["state"], view["text"], view["shape"]) == ("unreadable", "Unreadable", "unreadable")
+    assert english((view["state"], view["text"], view["shape"])) == (
+        "unreadable",
+        "Unreadable",
+        "unreadable",
+    )
 
 
 def test_time_changes_a_lamp() -> None:

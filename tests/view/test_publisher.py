@@ -3,16 +3,20 @@
 import asyncio
 import json
 from collections.abc import Coroutine
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+from app.i18n import localized
+from app.i18n.catalogue import catalogues_in
 from app.printable import printable
 from app.robot.state import RobotState
 from app.view.publisher import ViewPublisher
 from app.view.view import View, build_view
 from tests.support.builders import NOW, permits, robot_there, says, small_panel
 from tests.support.parts import events_in
+from tests.support.words import english
 
 PANEL = small_panel()
 
@@ -45,7 +49,7 @@ def run(work: Coroutine[Any, Any, None]) -> None:
 
 def test_a_snapshot_is_everything_that_the_page_shows(publisher: ViewPublisher) -> None:
     assert events(publisher.snapshot()) == {
-        "snapshot": {"id": publisher.id, "revision": "r1", **publisher.view}
+        "snapshot": {"id": publisher.id, "revision": "r1", **english(publisher.view)}
     }
 
 
@@ -72,7 +76,7 @@ def test_a_changed_permission_is_sent_by_its_name_and_at_its_widgets(
     assert events(publisher.since(1, old)) == {
         "operation-enabled-updated": {"enabled": True, "reason": None},
         "update": {"guarded": {"enabled": True, "reason": None}},
-        "link": publisher.view["link"],  # the node locks nothing any more
+        "link": english(publisher.view["link"]),  # the node locks nothing any more
     }
 
 
@@ -90,7 +94,7 @@ def test_a_changed_light_is_sent_with_all_lights(publisher: ViewPublisher, robot
     robot.graph.answered({})
     publisher.post(view_of(robot))
     sent = events(publisher.since(1, old))
-    assert sent["link"] == publisher.view["link"]
+    assert sent["link"] == english(publisher.view["link"])
     assert sent["link"]["bridge"]["text"] == "no response"
 
 
@@ -167,16 +171,32 @@ def test_what_says_all_of_something_is_encoded_once_for_streams_however_far(
     publisher.post(view_of(robot))
     encoded: list[Any] = []
 
-    def encode(data: Any) -> bytes:
-        encoded.append(data)
-        return json.dumps(data).encode()
+    def encode(data: Any, language: str) -> bytes:
+        encoded.append(localized(data, language))
+        return json.dumps(encoded[-1]).encode()
 
     monkeypatch.setattr("app.view.publisher.encoded", encode)
     sent = [events(publisher.since(version, view)) for version, view in enumerate(views, 1)]
     assert all(one["operation-enabled-updated"] == {"enabled": True, "reason": None} for one in sent)
-    assert all(one["link"] == publisher.view["link"] for one in sent)
+    assert all(one["link"] == english(publisher.view["link"]) for one in sent)
     assert [one["update"] for one in sent] == encoded[1:2] + encoded[3:]
     assert len(encoded) == 5  # the permission and the links once, the widgets for each
+
+
+def test_each_language_has_events_of_its_own_encoded_once(
+    publisher: ViewPublisher, robot: RobotState, tmp_path: Path
+) -> None:
+    (tmp_path / "de.po").write_text('msgid "locks_nothing"\nmsgstr "Sperrt nichts."\n')
+    old = publisher.view
+    permits(robot)
+    publisher.post(view_of(robot))
+    with catalogues_in(tmp_path):
+        german, sent = publisher.since(1, old, "de"), publisher.since(1, old)
+        assert events(german)["link"]["node"]["locks"] == "Sperrt nichts."
+        assert events(publisher.snapshot("de"))["snapshot"]["link"] == events(german)["link"]
+        assert events(sent)["link"]["node"]["locks"] == "Locks nothing."
+        assert events(sent) == events(publisher.since(1, old))
+        assert publisher.since(1, old, "de") is german
 
 
 def test_who_is_behind_does_not_wait(publisher: ViewPublisher, robot: RobotState) -> None:

@@ -28,6 +28,7 @@ from tests.support.builders import (
     robot_there,
     says,
 )
+from tests.support.words import english
 from tests.web.test_events import SCOPE, Client, run, turns
 
 STREAMS = 500
@@ -60,7 +61,7 @@ class Room:
     async def stream(self, number: int, until: AsyncExitStack) -> Client:
         client, who = Client(), self.who(number)
         stream = EventStream(
-            self.board, b"", Open(), lambda: role(self.board.view["control"], who, RULES)
+            self.board, b"", Open(), role=lambda: role(self.board.view["control"], who, RULES)
         )
         task = asyncio.create_task(stream(SCOPE, client.receive, client.send))
 
@@ -80,7 +81,7 @@ def test_the_server_locks_for_who_has_no_control_and_unlocks_with_it() -> None:
             await turns()
             for client in (ann, bob):
                 (snapshot,) = client.events("snapshot")
-                free = {"enabled": False, "reason": room.control.lock.reason}
+                free = {"enabled": False, "reason": english(room.control.lock.reason)}
                 assert snapshot["widgets"]["free"] == free
                 assert snapshot["control"]["role"] == "free"
             room.control.take(room.who(1))
@@ -91,9 +92,9 @@ def test_the_server_locks_for_who_has_no_control_and_unlocks_with_it() -> None:
             assert update["free"] == changed["free"]
             assert ann.events("control")[0]["role"] == "holding"
             (locked,) = bob.events("update")
-            assert locked["free"] == {"reason": room.control.lock.reason}
+            assert locked["free"] == {"reason": english(room.control.lock.reason)}
             held = bob.events("control")[0]
-            assert (held["role"], held["shown"]) == ("held", room.control.lock.reason)
+            assert (held["role"], held["shown"]) == ("held", english(room.control.lock.reason))
 
     run(work)
 
@@ -102,9 +103,9 @@ def test_500_streams_share_what_is_encoded(monkeypatch: pytest.MonkeyPatch) -> N
     encoded: list[Mapping[str, Any]] = []
     encode = module.encoded
 
-    def counted(data: Mapping[str, Any]) -> bytes:
+    def counted(data: Mapping[str, Any], language: str) -> bytes:
         encoded.append(data)
-        return encode(data)
+        return encode(data, language)
 
     async def work() -> None:
         room = Room()

@@ -13,7 +13,7 @@ from app.clock import format_time
 from app.commands.actions.goal import Goal
 from app.commands.service_calls import CUT_NEWS_S, Asker
 from app.errors import DecodeError
-from app.i18n import say
+from app.i18n import Text, joined, say
 from app.interfaces import Fields, Interfaces
 from app.panel.template import PLACE
 from app.panel.widgets.service_action import Action
@@ -91,14 +91,14 @@ class ActionClient:
             return Outcome("rejected", say("goal_rejected", time=now))
         if goal.cut.done():
             return Outcome("unknown", goal.cut.result() or say("call_cut"))
-        seconds = f"{widget.timeout_s:g}"
-        return Outcome("timed_out", say("timed_out", seconds=seconds) + say("cyclone_hint"))
+        sentence = say("timed_out", seconds=f"{widget.timeout_s:g}")
+        return Outcome("timed_out", joined([sentence, say("cyclone_hint")]))
 
     def cancel_response(self, widget: Action, reply: bytes) -> Any:
         """What `cancel_goal` answered: a message with `return_code` and `goals_canceling`."""
         return self._decoded(widget, self._interfaces.service(CANCEL)[1], reply)
 
-    def why_silent(self, widget: Action) -> str:
+    def why_silent(self, widget: Action) -> Text:
         """Why `cancel_goal` did not answer."""
         if self.offered(widget):
             return say("timed_out", seconds=f"{widget.timeout_s:g}")

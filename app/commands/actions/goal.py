@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from app.commands.service_calls import with_fields
-from app.i18n import say
+from app.i18n import TextLike, joined, say
 from app.interfaces import Fields
 from app.panel.widgets.service_action import Action
 from app.robot.command_status import CommandStatus, Outcome, OutcomeCode
@@ -49,11 +49,11 @@ class Goal:
     widget: Action
     press_id: str
     id: uuid.UUID
-    cut: "asyncio.Future[str]"
+    cut: "asyncio.Future[TextLike]"
     corrected: Callable[[str, Outcome], None]
     state: int | None = None
     known: bool = False
-    doubt: str = ""
+    doubt: TextLike = ""
     said: str = ""
     fraction: float | None = None
 
@@ -82,7 +82,7 @@ class Goal:
     @property
     def under_way(self) -> CommandStatus:
         sentence = say("goal_canceling" if self.state == CANCELING else "goal_executing")
-        text = f"{sentence} {self.said}".strip()
+        text = joined([sentence, self.said.rstrip()])
         return CommandStatus(True, "accepted", text, self.fraction, True, self._name, self.press_id)
 
     @property

@@ -17,7 +17,7 @@ from app.commands.actions.results import ResultWaiter
 from app.commands.service_calls import MOST_UNANSWERED, Asker
 from app.dialect import bridge_dialect
 from app.errors import DecodeError
-from app.i18n import say
+from app.i18n import TextLike, say
 from app.interfaces import Fields, Interfaces
 from app.panel.template import PLACE
 from app.panel.widgets.service_action import Action
@@ -107,7 +107,7 @@ class GoalTracker:
         if (said := self._states.get(goal.widget.action)) is not None:
             self.hear_status(goal.widget.action, said)
 
-    def full(self, action: str) -> str:
+    def full(self, action: str) -> TextLike:
         """Why no further goal of an action is sent; "" while one may be."""
         count = sum(goal.widget.action == action for goal in self._results.goals)
         return say("too_many", service=action) if count >= MOST_UNANSWERED else ""
@@ -121,7 +121,7 @@ class GoalTracker:
         followed = (goal for goal in self._results.goals if goal.widget.id == widget.id)
         return next((goal for goal in followed if goal.press_id == press_id), None)
 
-    def over(self, widget: Action, press_id: str) -> str:
+    def over(self, widget: Action, press_id: str) -> TextLike:
         """Why there is nothing to cancel; "" where there is."""
         if self._stoppable(widget, press_id) is not None:
             return ""
@@ -240,12 +240,12 @@ class GoalTracker:
             self._advanced(goal)
         self._note(goal, goal.under_way)  # shown with the next frame: a goal may say a lot
 
-    def _doubt(self, goal: Goal, why: str) -> None:
+    def _doubt(self, goal: Goal, why: TextLike) -> None:
         """It was cut off: the robot may be at it, and until that is known no other is sent."""
         self._show_doubt(goal, why)
         goal.corrected(goal.press_id, Outcome("unknown", why))
 
-    def _show_doubt(self, goal: Goal, why: str) -> None:
+    def _show_doubt(self, goal: Goal, why: TextLike) -> None:
         goal.doubt = why
         self._show(goal, goal.in_doubt)
 

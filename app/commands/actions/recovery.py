@@ -18,7 +18,7 @@ from app.commands.actions.goal import UNKNOWN, Goal, goal_id
 from app.commands.actions.goals import GoalTracker
 from app.concurrency import spawn_logged
 from app.errors import LogError
-from app.i18n import say
+from app.i18n import TextLike, say
 from app.panel.model import Panel
 from app.panel.widgets.service_action import Action
 from app.robot.command_status import IDLE, CommandStatus, Outcome
@@ -28,6 +28,15 @@ from app.ros_logging import RobotLog
 log = logging.getLogger("kiosk.actions")
 
 LOOKED_BACK_S: Final = 86_400.0
+# Of a goal that the robot does not know: it is not asked for again. Logs of versions that wrote no
+# codes have only the sentences of then.
+FINAL: Final = frozenset({"goal_lost", "goal_not_there"})
+FINAL_ONCE: Final = frozenset(
+    {
+        "The robot no longer knows this goal: what came of it is not known.",
+        "The robot does not know this goal: it did not get it, or knows it no longer.",
+    }
+)
 TODAY_S: Final = 43_200.0  # an older time has its date
 READ_AGAIN_S: Final = 1.0
 
@@ -77,16 +86,15 @@ class GoalRecovery:
         try:
             found = await self._press_log.open_presses(self._widgets, since)
         except LogError as error:
-            self._say_unread(str(error))
+            self._say_unread(error.text)
             return False
         self._show(IDLE)
-        final = {say("goal_lost"), say("goal_not_there")}
         for open_press, pending in found:
-            if open_press.reason not in final:
+            if open_press.code not in FINAL and open_press.reason not in FINAL_ONCE:
                 self._resume(open_press, pending)
         return True
 
-    def _say_unread(self, why: str) -> None:
+    def _say_unread(self, why: TextLike) -> None:
         text = say("goals_unread", why=why)
         if text != self._unread.text:
             self._log.warning("%s", text)

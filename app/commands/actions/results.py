@@ -9,10 +9,10 @@ from typing import Final
 from app.clock import format_time
 from app.commands.actions.client import RESULT, STATUS, ActionClient
 from app.commands.actions.goal import ENDS, UNKNOWN, Goal
-from app.commands.service_calls import LATE_S, with_fields
+from app.commands.service_calls import LATE_S, with_fields, with_reply
 from app.concurrency import spawn_logged
 from app.errors import LinkError
-from app.i18n import say
+from app.i18n import TextLike, say
 from app.permission.interlocks import SERVER_SETTLE_S
 from app.robot.command_status import Outcome
 from app.robot.state import RobotState
@@ -32,7 +32,7 @@ class ResultWaiter:
         services: ActionClient,
         robot: RobotState,
         *,
-        cut: Callable[[Goal, str], None],
+        cut: Callable[[Goal, TextLike], None],
         back: Callable[[Goal], None],
         tell: Callable[[Goal, Outcome], None],
     ) -> None:
@@ -112,9 +112,7 @@ class ResultWaiter:
         outcome, seen, asked = ENDS[status]
         sentence = asked if goal.doubt else seen
         said = with_fields(goal.widget.result, fields, RESULT)
-        return Outcome(
-            outcome, say(sentence, time=format_time(time.time())) + (f": {said}" if said else ".")
-        )
+        return Outcome(outcome, with_reply(say(sentence, time=format_time(time.time())), said))
 
     async def _result(self, goal: Goal) -> bytes | None:
         """The reply of `get_result`, which is asked for again where Zenoh refuses.

@@ -19,7 +19,7 @@ from app.commands.press_context import PressContext
 from app.commands.press_judge import Latest
 from app.commands.receipts import MOST_LOOKS, Receipt, Witness
 from app.errors import Cause, FieldError, InputError, LinkError, NotFound, PressRefused
-from app.i18n import say
+from app.i18n import TextLike, say
 from app.panel.model import Panel
 from app.panel.template import needed
 from app.panel.widgets.hold import Hold
@@ -103,7 +103,7 @@ class HoldController:
         self,
         widget_id: str,
         context: PressContext,
-        why: str,
+        why: TextLike,
         cause: Cause = "interlock",
         *,
         hold_id: str = "",
@@ -136,11 +136,11 @@ class HoldController:
         try:
             return self._messages.values(widget, inputs)
         except (FieldError, InputError) as error:
-            return Refusal(f"{error}.", "input")
+            return Refusal(say("with_stop", said=error.text), "input")
 
     def _ground(
         self, widget: Hold, sent: float, context: PressContext, now: float
-    ) -> tuple[str, Cause]:
+    ) -> tuple[TextLike, Cause]:
         """Why it may not begin now, "" if it may."""
         if self._closed:
             return say("hold_by_stopping"), "interlock"
@@ -223,7 +223,7 @@ class HoldController:
         try:
             self._messages.put(holding.widget, holding.values, lambda: self._last_look(holding))
         except LinkError as error:
-            self._end(holding, "link", f"{error}.")
+            self._end(holding, "link", say("with_stop", said=error.text))
         except PressRefused:
             return  # it has ended
         else:
@@ -241,7 +241,7 @@ class HoldController:
         self.end(holding, "catching_up")
         raise PressRefused("", "interlock")
 
-    def _end(self, holding: ActiveHold, code: str, why: str) -> None:
+    def _end(self, holding: ActiveHold, code: str, why: TextLike) -> None:
         widget, now = holding.widget, self._loop.time()
         del self._held[widget.id]
         del self._robot.held[widget.id]

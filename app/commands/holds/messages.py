@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Protocol
 
 from app.errors import LinkError
+from app.i18n import TextLike, say
 from app.interfaces import INTEGERS, Interfaces
 from app.panel.template import filled, inputs_of, with_now
 from app.panel.widgets.hold import Hold, with_own_fields
@@ -48,7 +49,7 @@ class HoldMessages:
         finds that it may not be."""
         self._put(widget, widget.message, values, widget.deadline_ms, look)
 
-    def put_last(self, widget: Hold, values: Values, now: float) -> str:
+    def put_last(self, widget: Hold, values: Values, now: float) -> TextLike:
         """The message that ends it, if there is any way now, be it in doubt: one stop too many harms
         nobody. Why it was not sent, or ""."""
         if not self._robot.link_up or not self._robot.graph.bridges:
@@ -56,7 +57,7 @@ class HoldMessages:
         try:
             self._put(widget, widget.release, values, 0, no_look)
         except LinkError as error:
-            return f"{error}."
+            return say("with_stop", said=error.text)
         return ""
 
     def _put(

@@ -20,7 +20,7 @@ from app.commands.receipts import (
     untyped,
 )
 from app.errors import Cause
-from app.i18n import say
+from app.i18n import Text, TextLike, joined, say
 from app.panel.template import needed
 from app.panel.widgets.hold import Hold
 from app.robot.command_status import Outcome, OutcomeCode
@@ -41,14 +41,14 @@ class ActiveHold:
     inputs: Mapping[str, Any]
     values: Values
     told: Callable[[Receipt], None]
-    since: str
+    since: Text
     sent: int = 0
 
 
 class Refusal(NamedTuple):
     """Why a hold may not begin: a sentence, and its receipt's cause."""
 
-    why: str
+    why: TextLike
     cause: Cause
 
 
@@ -76,13 +76,15 @@ class HoldReceipts:
         self._log.info("hold %s of %s by %s with %.*s begins", lease.id, widget.id, who,
                 LONGEST_LOGGED, holding.inputs, extra=told)  # fmt: skip
 
-    def ended(self, holding: ActiveHold, seconds: float, code: str, why: str, unsaid: str) -> Receipt:
+    def ended(
+        self, holding: ActiveHold, seconds: float, code: str, why: TextLike, unsaid: TextLike
+    ) -> Receipt:
         """`code` and `why` it ended after so many seconds; `unsaid` is why its last message was not
         sent, "" where it was."""
         widget, lease = holding.widget, holding.lease
         sentence = RELEASED if code == RELEASED else "hold_ended"
-        text = say(sentence, time=format_time(time.time()), seconds=f"{seconds:.1f}", why=why)
-        text += say("hold_unsaid", why=unsaid) if unsaid else ""
+        end = say(sentence, time=format_time(time.time()), seconds=f"{seconds:.1f}", why=why)
+        text = joined([end, say("hold_unsaid", why=unsaid) if unsaid else ""])
         outcome: OutcomeCode = "unknown" if unsaid else "published" if code == RELEASED else "aborted"
         level = logging.INFO if outcome == "published" else logging.WARNING
         self._log.log(level, "hold %s of %s by %s ended after %.3f s and %d messages (%s): %s",
@@ -111,8 +113,9 @@ class HoldReceipts:
     def doubted(self, receipt: Receipt) -> Receipt:
         """The receipt of a hold whose last message is not known to have reached the bridge."""
         doubt = say("hold_unanswered")
-        self._log.warning("hold %s of %s:%s", receipt.id, receipt.widget, doubt)
-        return self._answered(replace(receipt, outcome="unknown", reason=receipt.reason + doubt))
+        self._log.warning("hold %s of %s: %s", receipt.id, receipt.widget, doubt)
+        reason = joined([receipt.reason, doubt])
+        return self._answered(replace(receipt, outcome="unknown", reason=reason))
 
     def _answered(self, receipt: Receipt) -> Receipt:
         if self._witness is not None:

@@ -5,7 +5,7 @@ from functools import partial
 from typing import Final
 
 from app.clock import format_time
-from app.commands.service_calls import LONGEST_SAID, Request
+from app.commands.service_calls import LONGEST_SAID, Request, with_reply
 from app.i18n import say
 from app.interfaces import Fields, Interfaces, text_of
 from app.panel.widgets.parameter import SET, Parameter, Value
@@ -33,5 +33,5 @@ def _answer(widget: Parameter, value: Value, response: Fields) -> Outcome:
         return Outcome("unknown", say("answer_unreadable", wanted=SET[1]))
     if successful:
         return Outcome("succeeded", say("parameter_set", value=widget.written(value), time=now))
-    said = f": {printable(text_of(reason, LONGEST_SAID))}" if reason else "."
-    return Outcome("rejected", say("said_no", time=now) + said)
+    said = printable(text_of(reason, LONGEST_SAID)) if reason else ""
+    return Outcome("rejected", with_reply(say("said_no", time=now), said))

@@ -22,7 +22,7 @@ from app.commands.service_calls import Asker, ServiceCalls
 from app.concurrency import spawn_logged
 from app.dialect import bridge_dialect
 from app.errors import DecodeError
-from app.i18n import say
+from app.i18n import TextLike, say
 from app.interfaces import Interfaces
 from app.panel.model import Panel
 from app.panel.widgets.parameter import DESCRIBE, EVENT_TYPE, GET, SET, Parameter, Value
@@ -200,7 +200,7 @@ class ParameterSync:
     def _end_asking(self, node: Node) -> None:
         self._robot.asking -= {widget.id for widget in node.widgets}
 
-    def read_again(self, widget: Parameter) -> str:
+    def read_again(self, widget: Parameter) -> TextLike:
         """Asks the node of a parameter once more, unless it is being asked or has just answered; why it
         can't be, or "". However often anybody wants it, a node has no more than `AGAIN_S` allows."""
         node = self._nodes[widget.node]

@@ -5,7 +5,7 @@ import re
 from typing import Any, Final
 
 from app.errors import InputError
-from app.i18n import say
+from app.i18n import TextLike, render, say
 from app.interfaces import INTEGERS
 from app.interfaces.validation import shown
 from app.panel.list_text import elements
@@ -33,7 +33,7 @@ def _chosen(of: Parameter, given: Any) -> Any:
     """The value of the option that was given by its value or its key."""
     option = of.option(given) or next((one for one in of.options if one.key == given), None)
     if option is None:
-        options = ", ".join(one.label for one in of.options)
+        options = tuple(one.label for one in of.options)
         raise InputError(say("no_option", label=of.label, options=options, given=shown(given)))
     return option.value
 
@@ -54,14 +54,18 @@ def _several(of: Parameter, known: ParameterState, given: Any) -> list[Any]:
 def _entered(of: Parameter, text: str) -> Any:
     match of.element:
         case "bool":
-            words = {"true": True, "false": False, of.on.lower(): True, of.off.lower(): False}
+            words = {"true": True, "false": False, _lower(of.on): True, _lower(of.off): False}
             return words.get(text.lower(), text)
         case "double":
             return float(text) if DECIMAL.fullmatch(text) else text
     return text
 
 
-def _one(of: Parameter, known: ParameterState, label: str, given: Any) -> One:
+def _lower(text: TextLike) -> str:
+    return render(text).lower()
+
+
+def _one(of: Parameter, known: ParameterState, label: TextLike, given: Any) -> One:
     match of.element:
         case "bool":
             if isinstance(given, bool):
@@ -75,7 +79,7 @@ def _one(of: Parameter, known: ParameterState, label: str, given: Any) -> One:
     return _number(of, known, label, given)
 
 
-def _number(of: Parameter, known: ParameterState, label: str, given: Any) -> int | float:
+def _number(of: Parameter, known: ParameterState, label: TextLike, given: Any) -> int | float:
     limits = allowed(of, known)
     text = each_text(of, limits)
     if given == "" or given is None:

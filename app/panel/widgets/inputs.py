@@ -9,7 +9,7 @@ from pydantic import AfterValidator, Field
 from app.errors import Fault, InputError
 from app.i18n import say
 from app.interfaces.validation import shown
-from app.panel.base import Description, Label, Span, said, some
+from app.panel.base import Description, Label, SaidLabel, Span, said, some
 from app.panel.values import same
 from app.panel.widgets.families import Checking, Input
 
@@ -108,7 +108,7 @@ class SelectInput(Input):
         for option in self.options:
             if same(option.value, given) or option.key == given:
                 return option.value
-        options = ", ".join(option.label for option in self.options)
+        options = tuple(option.label for option in self.options)
         raise InputError(say("no_option", label=self.label, options=options, given=shown(given)))
 
     def faults(self, place: str, checking: Checking) -> Iterator[Fault]:
@@ -121,8 +121,8 @@ class SelectInput(Input):
 class ToggleInput(Input):
     kind: Literal["toggle"]
     span: Span = 6
-    on: Label = said("on")
-    off: Label = said("off")
+    on: SaidLabel = said("on")
+    off: SaidLabel = said("off")
     default: bool = False
 
     @property

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import Field, model_validator
 
 from app.errors import Fault, InputError
-from app.i18n import say
+from app.i18n import Text, say
 from app.interfaces.validation import shown
 from app.panel.base import Span
 from app.panel.values import digits
@@ -26,11 +26,11 @@ class Stepped(Placed):
     """What has − and + beside it."""
 
     @property
-    def less(self) -> str:
+    def less(self) -> Text:
         return say("less", label=self.label)
 
     @property
-    def more(self) -> str:
+    def more(self) -> Text:
         return say("more", label=self.label)
 
 
@@ -82,7 +82,7 @@ class Numeric(Stepped, Input):
         return {"min": digits(self.min), "max": digits(self.max), "step": step}
 
     @property
-    def limits(self) -> str:
+    def limits(self) -> Text:
         """What a number may be, as an operator reads it: "0 to 1.5 m/s, in steps of 0.1"."""
         low, high = digits(self.min), digits(self.max)
         unit = f" {self.unit}" if self.unit else ""

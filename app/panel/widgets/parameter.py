@@ -8,11 +8,11 @@ from pydantic import AfterValidator, Field
 
 from app.dialect.endpoint import Role
 from app.errors import Fault
-from app.i18n import say
+from app.i18n import Text, TextLike, render, say
 from app.interfaces import INTEGERS, Interfaces
 from app.interfaces.names import TOPIC
 from app.interfaces.validation import shown
-from app.panel.base import Label, Seconds, Span, said
+from app.panel.base import SaidLabel, Seconds, Span, said
 from app.panel.list_text import listed, quoted
 from app.panel.number_range import Range, decimal
 from app.panel.values import digits, same
@@ -63,8 +63,8 @@ class Parameter(Stepped, Entered, Pressed):
     min: Number | None = None
     max: Number | None = None
     step: Annotated[Number, Field(gt=0)] | None = None
-    on: Label = said("on")
-    off: Label = said("off")
+    on: SaidLabel = said("on")
+    off: SaidLabel = said("off")
     timeout_s: Seconds = 5.0
     span: Span = 6
 
@@ -131,12 +131,12 @@ class Parameter(Stepped, Entered, Pressed):
             yield from _limits(place, self, given)
 
     @property
-    def press(self) -> str:
+    def press(self) -> Text:
         """What the button is called where its place does not tell what it sets."""
         return say("set_named", label=self.label)
 
     @property
-    def again(self) -> str:
+    def again(self) -> Text:
         """What the button is called that asks its node once more."""
         return say("read_named", label=self.label)
 
@@ -145,27 +145,30 @@ class Parameter(Stepped, Entered, Pressed):
         value = list(value) if isinstance(value, tuple) else value
         return next((one for one in self.options if same(one.value, value)), None)
 
-    def written(self, value: Value) -> str:
+    def written(self, value: Value) -> TextLike:
         """A value as an operator reads it, exactly."""
         option = self.option(value)
         return self.unchosen(value) if option is None else option.label
 
-    def unchosen(self, value: Value) -> str:
+    def unchosen(self, value: Value) -> TextLike:
         """The same of a value that is no option's."""
-        text = self.entered(value)
         if value == ():
             return say("empty")
+        if isinstance(value, bool):
+            return self.on if value else self.off
+        text = self.entered(value)
         return f"{text} {self.unit}" if self.unit else text
 
     def entered(self, value: Value) -> str:
-        """A value as it is entered where no option is chosen."""
+        """A value as it is entered where no option is chosen. True and false are entered in lists only:
+        as the panel file calls them, or in English."""
         if isinstance(value, tuple):
             return listed(quoted(one) if isinstance(one, str) else self._one(one) for one in value)
         return self._one(value)
 
     def _one(self, value: bool | float | str) -> str:
         if isinstance(value, bool):
-            return self.on if value else self.off
+            return render(self.on if value else self.off)
         return decimal(value) if isinstance(value, float) else f"{value}"
 
 

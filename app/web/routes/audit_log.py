@@ -17,12 +17,13 @@ from starlette.types import Message, Receive, Scope, Send
 from app.audit import Entry, Filter, OperatorLog, ReaderProcess, Row
 from app.commands.control_acts import ACTS
 from app.errors import InputError, LogError, NotFound
-from app.i18n import say
+from app.i18n import Param, Text, TextLike, say
 from app.panel.model import Panel
 from app.panel.widgets.families import Command, Entered
 from app.printable import printable, printable_texts
 from app.web.app_state import AppState, CurrentState
 from app.web.described import TEXT, errors
+from app.web.language import language_of
 
 log = logging.getLogger("kiosk.log")
 
@@ -94,11 +95,11 @@ class LogContext(TypedDict):
     rows: list[Row]
     labels: dict[str, str]
     inputs: dict[str, str]
-    acts: dict[str, str]
+    acts: dict[str, Text]
     outcomes: tuple[str, ...]
-    off: str
-    banner: str
-    fault: str
+    off: TextLike
+    banner: TextLike
+    fault: TextLike
     older: str
     newest: str
     csv: str
@@ -110,12 +111,13 @@ class LogContext(TypedDict):
     summary="The operator's log, the newest first",
     responses=errors(403, 422, 429, 503),
 )
-async def page(state: CurrentState, wanted: Annotated[Wanted, Query()]) -> Response:
+async def page(request: Request, state: CurrentState, wanted: Annotated[Wanted, Query()]) -> Response:
     rows: list[Row] = []
+    language = language_of(request)
     if isinstance(state.log, OperatorLog):
         rows = await state.log.rows(wanted.filter(), wanted.before, ROWS_ON_PAGE + 1)
     more = len(rows) > ROWS_ON_PAGE
-    rows = [_shown(row) for row in rows[:ROWS_ON_PAGE]]
+    rows = [_shown(row, language) for row in rows[:ROWS_ON_PAGE]]
     panel = state.fleet.panel
     context = LogContext(
         site=state,
@@ -134,8 +136,8 @@ async def page(state: CurrentState, wanted: Annotated[Wanted, Query()]) -> Respo
         newest=wanted.query() if wanted.before else "",
         csv=wanted.query(),
     )
-    html = state.templates.get_template("log.html").render(
-        **context, clock_of=_clock_of, values_of=_values_of, word=_word
+    html = state.templates.render(
+        "log.html", language, **context, clock_of=_clock_of, values_of=_values_of, word=_word
     )
     return HTMLResponse(html, headers={"cache-control": "no-store"})
 
@@ -152,7 +154,7 @@ async def as_csv(request: Request, state: CurrentState, wanted: Annotated[Wanted
     gzip = "gzip" in request.headers.get("accept-encoding", "")
     async with AsyncExitStack() as opened:
         export = await opened.enter_async_context(
-            state.log.export(wanted.filter(), wanted.before, gzip)
+            state.log.export(wanted.filter(), wanted.before, gzip, language_of(request))
         )
         first = await export.start()
         return Exported(export, first, gzip, opened.pop_all())
@@ -219,15 +221,16 @@ def _clock_of(ms: int) -> str:
     return _time(ms).strftime("%Y-%m-%d %H:%M:%S.%f")[:-3]
 
 
-def _word(name: str, **about: object) -> str:
+def _word(name: str, **about: Param) -> Text:
     return say(f"log_page_{name}", **about)
 
 
-def _shown(row: Row) -> Row:
+def _shown(row: Row, language: str) -> Row:
     """With its texts as a page shows them, but its values: those are JSON still."""
+    entry = row.entry._replace(reason=row.entry.reason_in(language))
     cells = (
         printable(cell) if isinstance(cell, str) and name != "values" else cell
-        for name, cell in row.entry._asdict().items()
+        for name, cell in entry._asdict().items()
     )
     return replace(row, entry=Entry._make(cells))
 

@@ -1,7 +1,6 @@
 """Taking control of a robot, asking for it, giving it: JSON for scripts, forms without them."""
 
 import secrets
-from dataclasses import asdict
 from typing import Annotated, Final, TypeVar
 
 from fastapi import APIRouter, Path, Request
@@ -12,6 +11,7 @@ from app.commands.control_acts import ACTS, ActReceipt, Asked
 from app.commands.press_context import PRESS_ID
 from app.commands.press_limits import RETRY_AFTER_S
 from app.errors import InputError, NotFound
+from app.i18n import localized
 from app.panel.base import ID
 from app.permission.control_authority import LIFE_S
 from app.permission.control_authority_view import role, seen_as
@@ -20,6 +20,7 @@ from app.runtime.robot_session import RobotSession
 from app.web.app_state import CurrentSession, CurrentState
 from app.web.client_cookie import keep, visitor, welcomed
 from app.web.described import FORM, JSON, described_body, errors, fields
+from app.web.language import language_of
 from app.web.request_body import as_model, body_of, form_of, json_of, kind_of
 from app.web.routes.presses import STATUS
 
@@ -120,7 +121,7 @@ async def act(act: Act, request: Request, state: CurrentState, session: CurrentS
         at = None if form or given.at is None else given.at.timestamp()
         with state.in_flight.track():
             receipt = await session.control_acts.act(asked, act_id, at, FORM_LIFE_S if form else LIFE_S)
-    answer = _page(session, given.page, receipt) if form else _json(session, who, receipt)
+    answer = _page(session, given.page, receipt) if form else _json(request, session, who, receipt)
     return keep(answer, request, token)
 
 
@@ -134,16 +135,16 @@ def _page(session: RobotSession, page_id: str | None, receipt: ActReceipt) -> Re
     return RedirectResponse(f"{session.base}/pages/{page.id}{query}", status_code=303)
 
 
-def _json(session: RobotSession, who: Principal, receipt: ActReceipt) -> Response:
+def _json(request: Request, session: RobotSession, who: Principal, receipt: ActReceipt) -> Response:
     control = session.control.view()
-    told = {key: value for key, value in asdict(receipt).items() if key != "cause"}
     content = {
-        **told,
+        **receipt.as_json(),
         "done": receipt.done,
         "browser": who.client.id,
         "control": seen_as(control, role(control, who, session.control.rules)),
     }
     headers = {"retry-after": str(RETRY_AFTER_S)} if receipt.cause == "limit" else None
+    content = localized(content, language_of(request))
     return JSONResponse(content, status_code=STATUS[receipt.cause], headers=headers)
 
 

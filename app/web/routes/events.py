@@ -8,6 +8,7 @@ from fastapi import APIRouter, Request
 from fastapi.responses import Response
 from starlette.types import Message, Receive, Scope, Send
 
+from app.i18n import ENGLISH
 from app.permission.control_authority_view import Role, role
 from app.view.heartbeat import beat
 from app.view.publisher import ViewPublisher, client_id_event
@@ -15,6 +16,7 @@ from app.web.app_state import CurrentSession, CurrentState
 from app.web.asgi import direct
 from app.web.client_cookie import keep, welcomed
 from app.web.described import TEXT, errors
+from app.web.language import language_of
 from app.web.metrics import Open
 
 router = APIRouter()
@@ -43,11 +45,12 @@ async def events(
         return role(board.view["control"], who, rules) if who else ""
 
     answer: Response
+    language = language_of(request)
     if once:
-        all_of_it = board.snapshot(role_now()) + first + beat()
+        all_of_it = board.snapshot(language, role_now()) + first + beat()
         answer = Response(all_of_it, media_type=MEDIA_TYPE, headers=HEADERS)
     else:
-        answer = EventStream(board, first, state.metrics.streams, role_now)
+        answer = EventStream(board, first, state.metrics.streams, language, role_now)
     return keep(answer, request, token)
 
 
@@ -67,6 +70,7 @@ class EventStream(Response):
         publisher: ViewPublisher,
         first: bytes,
         streams: Open,
+        language: str = ENGLISH,
         role: Callable[[], Role] = no_role,
     ) -> None:
         """`first` comes with the snapshot; `streams` counts it while it is open; `role` is what its
@@ -74,6 +78,7 @@ class EventStream(Response):
         self._board = publisher
         self._first = first
         self._streams = streams
+        self._language = language
         self._role = role
         self.status_code = 200
         self.background = None
@@ -90,15 +95,16 @@ class EventStream(Response):
                 writing.cancel()
 
     async def _write(self, send: Send) -> None:
-        board, heartbeat = self._board, self._board.heartbeat
+        board, heartbeat, language = self._board, self._board.heartbeat, self._language
         now = self._role()
         version, view, beats = board.version, board.seen_as(now), heartbeat.count
         retry = f"retry: {RECONNECT_MS}\n\n".encode()
-        await send(_body(retry + board.snapshot(now) + self._first + beat()))
+        await send(_body(retry + board.snapshot(language, now) + self._first + beat()))
         while not board.closed:
             await board.news(version, beats)
             was, now = now, self._role()
-            chunk = board.since(version, view, was, now) if board.version > version else b""
+            newer = board.version > version
+            chunk = board.since(version, view, language, was, now) if newer else b""
             if heartbeat.count > beats:
                 chunk += heartbeat.event
             version, view, beats = board.version, board.seen_as(now), heartbeat.count

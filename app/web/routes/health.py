@@ -3,12 +3,14 @@
 import asyncio
 from collections.abc import Callable
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Request
 from fastapi.responses import JSONResponse, PlainTextResponse, Response
 from pydantic import BaseModel
 
+from app.i18n import render
 from app.web.app_state import CurrentState
 from app.web.described import errors
+from app.web.language import language_of
 from app.web.metrics import Metrics
 
 router = APIRouter()
@@ -37,13 +39,14 @@ class NotReady(BaseModel):
         503: {"model": NotReady, "description": "they can't"},
     },
 )
-async def readyz(state: CurrentState) -> Response:
+async def readyz(request: Request, state: CurrentState) -> Response:
     sessions = state.fleet.sessions
     ways = await asyncio.gather(*(session.way_asked() for session in sessions))
     way = next((way for way in ways if not way.permitted), None)
     if way is None:
         return JSONResponse({"status": "ready"})
-    body: dict[str, object] = {"status": "not ready", "code": way.code, "reason": way.reason}
+    reason = render(way.reason or "", language_of(request))
+    body: dict[str, object] = {"status": "not ready", "code": way.code, "reason": reason}
     robots = {k.entry.id: w.code for k, w in zip(sessions, ways, strict=True) if k.entry}
     return JSONResponse(body | ({"robots": robots} if robots else {}), status_code=503)
 

@@ -35,11 +35,12 @@ from app.commands.holds.receipts import RELEASED, ActiveHold
 from app.commands.press_context import SEEN, PressContext
 from app.commands.receipts import Receipt, with_doubt
 from app.errors import InputError, LogError
-from app.i18n import say
+from app.i18n import localized, say
 from app.panel.template import needed
 from app.runtime.robot_session import RobotSession
 from app.web.app_state import AppState, CurrentSession, CurrentState
 from app.web.client_cookie import visitor
+from app.web.language import language_of
 from app.web.request_body import json_of, received
 
 router = APIRouter()
@@ -125,6 +126,7 @@ class _HoldSocket:
         self._opened_at = time.monotonic()
         self._ended: asyncio.Future[Receipt] = asyncio.get_running_loop().create_future()
         self._who = visitor(socket, state)
+        self._language = language_of(socket)
         self._id = secrets.token_hex(8)  # of the hold: in the log, its receipt and its recording
         self._context = session.press_guard.by(widget, self._who)
         self._room = session.press_log.room(self._context.origin)
@@ -175,9 +177,9 @@ class _HoldSocket:
                 return left_out
             still_held = await self._written(widget, inputs, by)
         except InputError as error:
-            return refuse(by, f"{error}.", "input")
+            return refuse(by, say("with_stop", said=error.text), "input")
         except LogError as error:
-            return refuse(by, str(error), "log")
+            return refuse(by, error.text, "log")
         if not still_held:
             return refuse(by, say("hold_let_go"))
         return holds.begin(widget, inputs, sent, by, self._ended.set_result, self._id)
@@ -264,7 +266,8 @@ class _HoldSocket:
 
     async def _say(self, **what: Any) -> None:
         stamp = round(1000 * (time.monotonic() - self._opened_at), 1)
-        await self._socket.send_text(json.dumps({"stamp": stamp, **what}, ensure_ascii=False))
+        said = localized({"stamp": stamp, **what}, self._language)
+        await self._socket.send_text(json.dumps(said, ensure_ascii=False))
 
     async def _close(self, code: int) -> None:
         with suppress(WebSocketDisconnect, RuntimeError):  # the browser was faster

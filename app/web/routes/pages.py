@@ -15,7 +15,7 @@ from app import clock
 from app.clock import format_datetime, format_time
 from app.commands.receipts import Receipt
 from app.errors import NotFound
-from app.i18n import say
+from app.i18n import Text, TextLike, say
 from app.panel.model import Page, Panel
 from app.panel.template import inputs_of
 from app.panel.widgets.families import Entered, Pressed
@@ -28,6 +28,7 @@ from app.view.view import View
 from app.web.app_state import AppState, CurrentState
 from app.web.client_cookie import by_hand, keep, welcomed
 from app.web.described import PAGE, Described, errors
+from app.web.language import language_of
 
 router = APIRouter(include_in_schema=True)
 
@@ -85,18 +86,18 @@ class PageContext(TypedDict):
     receipt: Receipt | None
     inputs: dict[str, Any]
     words: dict[str, Any]
-    lost: str
-    lost_short: str
-    locks_all: str
-    unknown: str
-    unsure: str
+    lost: Text
+    lost_short: Text
+    locks_all: Text
+    unknown: Text
+    unsure: Text
     refresh_s: int
     now: int
     since: float | None
     again: str
     until: float
     browser: str
-    refused: str
+    refused: TextLike
 
 
 @router.get(
@@ -137,7 +138,7 @@ async def compiled(templates: Environment) -> None:
 class Ask(TypedDict):
     """What will be done by a press, and the inputs that it takes."""
 
-    sentence: str
+    sentence: Text
     inputs: list[Entered]
 
 
@@ -158,7 +159,7 @@ def _render(request: Request, state: AppState, page: Page) -> Response:
         session.control.loaded(who, refresh_s + GRACE_S, by_hand(request))
         session.show()
     context = _context(request, state, session, page, who, refresh_s)
-    html = state.templates.get_template("screen.html").render(**context)
+    html = state.templates.render("screen.html", language_of(request), **context)
     return keep(HTMLResponse(html, headers={"cache-control": "no-store"}), request, token)
 
 
@@ -200,7 +201,7 @@ def _context(
     )
 
 
-def _refused(session: RobotSession, query: str) -> str:
+def _refused(session: RobotSession, query: str) -> TextLike:
     """Why an act on control was refused: `query` is its id, or the code where it is not kept."""
     if query == TOO_OFTEN:
         return say(TOO_OFTEN)

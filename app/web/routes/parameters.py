@@ -4,8 +4,10 @@ from fastapi import APIRouter, Request
 from fastapi.responses import JSONResponse, RedirectResponse, Response
 from pydantic import BaseModel
 
+from app.i18n import render
 from app.web.app_state import CurrentSession
 from app.web.described import FORM, errors
+from app.web.language import language_of
 from app.web.request_body import body_of, kind_of
 from app.web.routes.press_forms import page_after
 
@@ -35,5 +37,5 @@ async def read(widget: str, request: Request, session: CurrentSession) -> Respon
     why = session.read_again(widget)
     if kind_of(request) == FORM:
         return RedirectResponse(page_after(session, widget, ""), status_code=303)
-    answer = Asked(asked=not why, reason=why)
+    answer = Asked(asked=not why, reason=render(why, language_of(request)))
     return JSONResponse(answer.model_dump(), status_code=409 if why else 202)

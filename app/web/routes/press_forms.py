@@ -25,13 +25,18 @@ ASKED_S: Final = 30.0  # the answer is a press, and no later one
 
 
 async def pressed_by_form(
-    state: AppState, session: RobotSession, who: Principal, widget: str, inputs: dict[str, str]
+    state: AppState,
+    session: RobotSession,
+    who: Principal,
+    widget: str,
+    inputs: dict[str, str],
+    language: str,
 ) -> Response:
     """Back to the page, with the receipt on it; or the question that comes first."""
     too_soon, before = _is_second_tap(inputs), inputs.pop("_last", "")
     asks = session.presses.widget(widget).confirm_press
     if asks and (inputs.pop(CONFIRMED, "") != "yes" or too_soon):
-        return _ask(state, session, widget, inputs)
+        return _ask(state, session, widget, inputs, language)
     # One rendered page has one id for all its buttons, and each button is a press of its own.
     page_id = inputs.pop("_id", secrets.token_hex(8))
     if not re.fullmatch(PRESS_ID, page_id):
@@ -51,10 +56,14 @@ async def pressed_by_form(
     return RedirectResponse(page_after(session, widget, receipt.id), status_code=303)
 
 
-def _ask(state: AppState, session: RobotSession, widget: str, inputs: dict[str, str]) -> Response:
+def _ask(
+    state: AppState, session: RobotSession, widget: str, inputs: dict[str, str], language: str
+) -> Response:
     """Asks a browser without scripts whether it is meant: the answer is the press."""
     pressed = session.presses.widget(widget)
-    html = state.templates.get_template("ask.html").render(
+    html = state.templates.render(
+        "ask.html",
+        language,
         site=state,
         panel=session.panel,
         banner=session.publisher.view["notice"]["banner"],

@@ -23,9 +23,10 @@ from starlette.types import Message
 
 from app.commands.press_context import PRESS_ID
 from app.errors import InputError, KioskError
-from app.i18n import say
+from app.i18n import TextLike, localized, say
 from app.web.app_state import AppState, CurrentSession, CurrentState
 from app.web.client_cookie import caller
+from app.web.language import language_of
 from app.web.request_body import as_model, json_of, received
 from app.web.routes.presses import STATUS, Press, pressed
 
@@ -58,12 +59,13 @@ async def presses(socket: WebSocket, state: CurrentState, session: CurrentSessio
 class _PressSocket:
     """One socket and what is pressed on it; it knows no more of the page than each press says."""
 
-    __slots__ = ("_caller", "_refused", "_socket", "_state", "_under_way")
+    __slots__ = ("_caller", "_language", "_refused", "_socket", "_state", "_under_way")
 
     def __init__(self, socket: WebSocket, state: AppState) -> None:
         self._socket = socket
         self._state = state
         self._caller = caller(socket)
+        self._language = language_of(socket)
         self._under_way: set[asyncio.Task[None]] = set()
         self._refused = 0  # one after the other
 
@@ -88,7 +90,7 @@ class _PressSocket:
             given = json_of(text, PLACE)
             said = as_model(SocketPress, given, PLACE)
         except InputError as error:
-            await self._refuse(_id_in(given), error.status, str(error))
+            await self._refuse(_id_in(given), error.status, error.text)
             return
         if len(self._under_way) >= MOST_AT_ONCE:
             await self._refuse(said.id, 429, say("too_many_presses", most=MOST_AT_ONCE))
@@ -103,7 +105,7 @@ class _PressSocket:
             session = state.fleet.session(socket.path_params.get("robot"))
             receipt = await pressed(state, session, self._caller.seen(state), said.widget, said)
         except KioskError as error:
-            await self._answer(said.id, error.status, error=str(error))
+            await self._answer(said.id, error.status, error=error.text)
         except Exception:
             log.exception("press %s broke off", said.id)
             await self._answer(said.id, 500, error=say("log_broke_off"))
@@ -111,13 +113,14 @@ class _PressSocket:
             self._refused = self._refused + 1 if receipt.cause == "limit" else 0
             await self._answer(said.id, STATUS[receipt.cause], **receipt.as_json())
 
-    async def _refuse(self, press_id: str | None, status: int, error: str) -> None:
+    async def _refuse(self, press_id: str | None, status: int, error: TextLike) -> None:
         self._refused += 1
         await self._answer(press_id, status, error=error)
         await asyncio.sleep(0)  # much may come in one piece: others have their turn
 
-    async def _answer(self, press_id: str | None, status: int, **what: str) -> None:
-        text = json.dumps({"press": press_id, "status": status, **what}, ensure_ascii=False)
+    async def _answer(self, press_id: str | None, status: int, **what: TextLike) -> None:
+        said = localized({"press": press_id, "status": status, **what}, self._language)
+        text = json.dumps(said, ensure_ascii=False)
         with suppress(WebSocketDisconnect, RuntimeError):  # nobody is there any more
             await self._socket.send_text(text)
 

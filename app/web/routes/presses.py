@@ -13,6 +13,7 @@ from app.commands.press_context import LONGEST_ID, PRESS_ID, SEEN
 from app.commands.press_limits import RETRY_AFTER_S
 from app.commands.receipts import Receipt
 from app.errors import InputError
+from app.i18n import localized
 from app.permission.principal import Principal
 from app.runtime.robot_session import RobotSession
 from app.web.app_state import AppState, CurrentSession, CurrentState
@@ -28,6 +29,7 @@ from app.web.described import (
     errors,
     fields,
 )
+from app.web.language import language_of
 from app.web.request_body import as_model, body_of, form_of, json_of, kind_of
 from app.web.routes.press_forms import page_after, pressed_by_form
 
@@ -114,9 +116,9 @@ async def press(
     kind = kind_of(request)
     if kind == JSON:
         receipt = await pressed(state, session, who, widget, as_model(Press, json_of(body)))
-        return _answer(receipt)
+        return _answer(request, receipt)
     if kind == FORM:
-        return await pressed_by_form(state, session, who, widget, form_of(body))
+        return await pressed_by_form(state, session, who, widget, form_of(body), language_of(request))
     raise InputError(f'a press is "{JSON}" or "{FORM}", not "{kind}"')
 
 
@@ -145,7 +147,7 @@ async def cancel(
         receipt = session.presses.early_refusals.limited(widget, {}, "", "cancel_too_often", shown=form)
     if form:
         return RedirectResponse(page_after(session, widget, receipt.id), status_code=303)
-    return _answer(receipt)
+    return _answer(request, receipt)
 
 
 async def pressed(
@@ -161,6 +163,7 @@ async def pressed(
     return await state.counted(session.presses.press(widget, given.inputs, press_id, by))
 
 
-def _answer(receipt: Receipt) -> Response:
+def _answer(request: Request, receipt: Receipt) -> Response:
+    content = localized(receipt.as_json(), language_of(request))
     headers = {"retry-after": str(RETRY_AFTER_S)} if receipt.cause == "limit" else None
-    return JSONResponse(receipt.as_json(), status_code=STATUS[receipt.cause], headers=headers)
+    return JSONResponse(content, status_code=STATUS[receipt.cause], headers=headers)

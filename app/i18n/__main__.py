@@ -1,0 +1,63 @@
+"""`python -m app.i18n`: is each catalogue whole, and does each translation fill in what English does?
+
+Exit status: 0 they are, 1 they are not, with a line for each fault.
+"""
+
+import sys
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from string import Formatter
+
+from babel.messages.pofile import PoFileError
+
+from app.i18n.catalogue import ENGLISH, files, translations
+
+
+def faults(catalogues: Mapping[str, Path]) -> Iterator[str]:
+    """What is wrong with catalogues, each by its language; English is the measure."""
+    english = translations(catalogues[ENGLISH])
+    for path in catalogues.values():
+        try:
+            found = translations(path)
+        except (PoFileError, UnicodeDecodeError) as error:
+            yield f"{path.name}: {error}"
+            continue
+        yield from (f"{path.name}: {code} is not translated" for code in english if code not in found)
+        for code, sentence in found.items():
+            if fault := _fault(english.get(code), sentence):
+                yield f"{path.name}: {code} {fault}"
+
+
+def _fault(english: str | None, sentence: str) -> str:
+    if english is None:
+        return "is no code of the English catalogue"
+    try:
+        names, wanted = placeholders(sentence), placeholders(english)
+    except ValueError as error:
+        return f"can't be filled in: {error}"
+    return "" if names == wanted else f"has {_listed(names)}, and English has {_listed(wanted)}"
+
+
+def placeholders(sentence: str) -> frozenset[str]:
+    """What a sentence is about, as it is written between braces; ValueError for a brace alone."""
+    parsed = Formatter().parse(sentence)
+    return frozenset(
+        name + (f"!{conversion}" if conversion else "") + (f":{form}" if form else "")
+        for _, name, form, conversion in parsed
+        if name is not None
+    )
+
+
+def _listed(names: frozenset[str]) -> str:
+    return ", ".join(f"{{{name}}}" for name in sorted(names)) or "nothing"
+
+
+def main() -> int:
+    found = list(faults(files()))
+    for fault in found:
+        print(fault, file=sys.stderr)
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

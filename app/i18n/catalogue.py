@@ -1,0 +1,59 @@
+"""The sentences of each language, by their codes: gettext catalogues, `<language>.po`.
+
+A language is a tag of BCP 47, such as "en" or "pt-BR". `msgid` is the code, `msgstr` the sentence, with
+`{name}` where a parameter stands. What a catalogue lacks is said in English.
+"""
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+from typing import Final
+
+ENGLISH: Final = "en"
+SUFFIX: Final = ".po"
+
+_folders: list[Path] = [Path(__file__).parent]
+
+
+@contextmanager
+def catalogues_in(folder: Path) -> Iterator[None]:
+    """The catalogues of one more folder count too, while this lasts."""
+    _folders.append(folder)
+    _forget()
+    try:
+        yield
+    finally:
+        _folders.remove(folder)
+        _forget()
+
+
+def _forget() -> None:
+    files.cache_clear()
+    sentences.cache_clear()
+
+
+@cache
+def files() -> Mapping[str, Path]:
+    """The catalogue of each language."""
+    found = [path for folder in _folders for path in folder.glob(f"*{SUFFIX}")]
+    return {path.stem: path for path in sorted(found)}
+
+
+@cache
+def sentences(language: str) -> Mapping[str, str]:
+    """The sentences of a language by their codes; KeyError for one without a catalogue.
+
+    Read when it is first needed: Babel takes 15 ms to load, and a catalogue as long to read.
+    """
+    own = translations(files()[language])
+    return own if language == ENGLISH else {**sentences(ENGLISH), **own}
+
+
+def translations(path: Path) -> dict[str, str]:
+    """What stands in one catalogue, without what is marked as fuzzy or not translated yet."""
+    from babel.messages.pofile import read_po
+
+    with path.open("rb") as file:
+        found = read_po(file, abort_invalid=True)
+    return {str(one.id): str(one.string) for one in found if one.id and one.string and not one.fuzzy}

@@ -1,0 +1,164 @@
+"""A log of a version before reasons had codes: it is read, verified, opened and continued."""
+
+import asyncio
+import hashlib
+import json
+import sqlite3
+from pathlib import Path
+from typing import Any, Final
+
+import pytest
+
+from app.audit import Entry, Filter, Limits, OperatorLog, Origin, entered
+from app.audit.database import NAME
+from app.audit.export import lines
+from app.audit.queries import open_presses, rows
+from app.audit.verify import verify
+from app.i18n import Text, say
+from app.i18n.catalogue import catalogues_in
+
+# As that version made its file.
+SCHEMA: Final = """
+CREATE TABLE entry (
+  seq INTEGER PRIMARY KEY, at INTEGER NOT NULL, boot TEXT NOT NULL, monotonic INTEGER NOT NULL,
+  kind TEXT NOT NULL, of INTEGER, address TEXT NOT NULL, browser TEXT NOT NULL, who TEXT NOT NULL,
+  robot TEXT NOT NULL, press TEXT NOT NULL, widget TEXT NOT NULL, action TEXT NOT NULL,
+  "values" TEXT NOT NULL, seen TEXT NOT NULL, verdict TEXT NOT NULL, board TEXT NOT NULL,
+  outcome TEXT NOT NULL, reason TEXT NOT NULL, prev TEXT NOT NULL, hash TEXT NOT NULL
+) STRICT;
+CREATE TABLE undone (seq INTEGER PRIMARY KEY, outcome TEXT NOT NULL) STRICT;
+CREATE TABLE about (key TEXT PRIMARY KEY, value ANY NOT NULL) STRICT, WITHOUT ROWID;
+CREATE INDEX IF NOT EXISTS entry_press ON entry (press) WHERE press <> '';
+PRAGMA application_id = 1330662471;
+PRAGMA user_version = 1;
+"""
+GENESIS: Final = "ab" * 32
+WHO: Final = ("10.0.0.7", "b1", "Panel 1", "")
+PRESS: Final = ("p1", "say", "press", '{"message": "hé"}', "77-1", "permitted", "77-2")
+SENT: Final = "Sent on /say at 10:00:00."
+OLD: Final[list[tuple[Any, ...]]] = [
+    (1, 1_700_000_000_000, "boot", 5, "began", None, "", "", "", "", "", "", "",
+     '{"mode": "live"}', "", "", "", "", "The panel's server started."),
+    (2, 1_700_000_001_000, "boot", 6, "pressed", None, *WHO, *PRESS, "", ""),
+    (3, 1_700_000_002_000, "boot", 7, "closed", 2, *WHO, *PRESS, "published", SENT),
+    (4, 1_700_000_003_000, "boot", 8, "pressed", None, *WHO, "p2", *PRESS[1:], "", ""),
+]  # fmt: skip
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """With a log of that version, of which one press has no end."""
+    data = tmp_path / "data"
+    data.mkdir(mode=0o700)
+    db = sqlite3.connect(data / NAME)
+    db.execute("PRAGMA journal_mode = WAL")
+    db.executescript(SCHEMA)
+    db.executemany("INSERT INTO about VALUES (?, ?)", [("genesis", GENESIS), ("first", 1)])
+    last = GENESIS
+    for row in OLD:
+        text = json.dumps([*row, last], ensure_ascii=False, separators=(",", ":"))
+        sealed = (*row, last, last := hashlib.sha256(text.encode()).hexdigest())
+        db.execute(f"INSERT INTO entry VALUES ({', '.join('?' * len(sealed))})", sealed)
+    db.execute("INSERT INTO undone VALUES (4, '')")
+    db.commit()
+    db.close()
+    return data
+
+
+def continued(folder: Path, press_id: str = "p3") -> None:
+    """By this version: a press and its end, with a reason of the catalogue."""
+
+    async def work() -> None:
+        log = OperatorLog(folder, Limits())
+        await log.start()
+        try:
+            assert log.fault == ""
+            press = await log.pressed(
+                entered(
+                    "pressed", Origin(address="10.0.0.7"), press=press_id, action="press", widget="say"
+                )
+            )
+            assert press is not None
+            reason = say("published", topic="/say", time="11:00:00")
+            assert await log.closed(press.follow_up("closed", "published", reason)) == ""
+        finally:
+            await log.stop()
+
+    asyncio.run(work())
+
+
+def entries(folder: Path, **wanted: Any) -> list[Entry]:
+    found = rows(folder, Filter(every=True, **wanted), None, 100)
+    return [row.entry for row in reversed(found)]
+
+
+def test_an_old_file_is_read_and_verified_as_it_is(folder: Path) -> None:
+    found = entries(folder)
+    assert [(one.seq, one.reason, one.text) for one in found][2] == (3, SENT, "")
+    assert found[2].said == SENT
+    assert (verify(folder).count, verify(folder).fault) == (4, "")
+    (unended,) = open_presses(folder, "", ["say"], 0)
+    assert (unended.press.press, unended.reason, unended.code) == ("p2", "", "")
+
+
+def test_an_old_file_is_opened_continued_and_verified(folder: Path) -> None:
+    before = [tuple(one) for one in entries(folder)]
+    continued(folder)
+    found = entries(folder)
+    assert [tuple(one) for one in found[:4]] == before
+    assert (verify(folder).count, verify(folder).fault) == (len(found), "")
+    assert {one.text for one in found[:4]} == {""}
+    assert [json.loads(one.text)["code"] for one in found[4:] if one.reason] == [
+        "log_ended",
+        "log_began",
+        "published",
+    ]
+    said = found[-1].said
+    assert isinstance(said, Text)
+    assert said == say("published", topic="/say", time="11:00:00")
+    assert found[-1].reason == str(said)
+    assert [one.seq for one in entries(folder, text="Sent on /say")] == [3, found[-1].seq]
+    continued(folder, "p4")
+    assert (verify(folder).count, verify(folder).fault) == (len(found) + 3, "")
+
+
+def test_a_reader_has_new_entries_in_their_language_and_old_ones_as_they_are(
+    folder: Path, tmp_path: Path
+) -> None:
+    continued(folder)
+    (tmp_path / "de.po").write_text('msgid "published"\nmsgstr "Gesendet auf {topic}, {time}."\n')
+    with catalogues_in(tmp_path):
+        old, new = (one for one in entries(folder) if one.outcome == "published")
+        assert (old.reason_in("de"), old.reason_in("en")) == (SENT, SENT)
+        assert (new.reason_in("de"), new.reason_in("en")) == (
+            "Gesendet auf /say, 11:00:00.",
+            str(say("published", topic="/say", time="11:00:00")),
+        )
+        german = b"".join(lines(folder, Filter(), None, "de")).decode("utf-8-sig").splitlines()
+        english = b"".join(lines(folder, Filter(), None)).decode("utf-8-sig").splitlines()
+    assert german[0] == english[0]
+    assert german[0].endswith(",reason,prev,hash,text")
+    assert "Gesendet auf /say, 11:00:00." in german[1]
+    assert [line for line in german if SENT in line] == [line for line in english if SENT in line]
+
+
+@pytest.mark.parametrize(
+    ("change", "seq"),
+    [
+        ("UPDATE entry SET text = '{}' WHERE seq = 3", 3),
+        ("UPDATE entry SET text = '' WHERE seq = 8", 8),
+        ("UPDATE entry SET text = replace(text, '/say', '/other') WHERE seq = 8", 8),
+    ],
+)
+def test_a_code_that_was_changed_is_found(folder: Path, change: str, seq: int) -> None:
+    continued(folder)
+    with sqlite3.connect(folder / NAME) as db:
+        assert db.execute(change).rowcount == 1
+    db.close()
+    assert verify(folder).fault == f"entry {seq} was changed, or is not in its place"
+
+
+def test_an_entry_whose_code_this_version_does_not_know_is_shown_as_it_was_written() -> None:
+    strange = entered("refused", reason="As it was.")._replace(text='{"code": "gone", "params": {}}')
+    broken = strange._replace(text='{"code": 1')
+    assert [one.reason_in("xx") for one in (strange, broken)] == ["As it was."] * 2
