@@ -5,6 +5,7 @@ import pytest
 from app.audit import Origin
 from app.commands.press_limits import OF_ADDRESS, OF_ALL, OF_CANCELS, OF_CLIENT, PressLimits
 from app.permission.clients import Client, anonymous
+from app.permission.principal import Principal
 from app.rate_limit import REMEMBERED, Buckets, Quota
 
 AT_THE_CELL = "127.0.0.1"
@@ -18,11 +19,11 @@ class Pressing:
         self.left_out: list[Origin] = []
         self.limits = PressLimits(self.left_out.append, lambda: self.now)
 
-    def admitted(self, client: Client, times: int) -> int:
-        return sum(self.limits.admit(client) for _ in range(times))
+    def admitted(self, who: Principal, times: int) -> int:
+        return sum(self.limits.admit(who) for _ in range(times))
 
-    def canceled(self, client: Client, times: int, *goal: str) -> int:
-        return sum(self.limits.admit_cancel(client, *goal) for _ in range(times))
+    def canceled(self, who: Principal, times: int, *goal: str) -> int:
+        return sum(self.limits.admit_cancel(who, *goal) for _ in range(times))
 
 
 @pytest.fixture
@@ -30,8 +31,12 @@ def pressing() -> Pressing:
     return Pressing()
 
 
-def browser(number: int, address: str = "10.0.0.7") -> Client:
-    return Client(f"b{number}", address, address == AT_THE_CELL, number)
+def program(address: str) -> Principal:
+    return Principal(anonymous(address))
+
+
+def browser(number: int, address: str = "10.0.0.7") -> Principal:
+    return Principal(Client(f"b{number}", address, address == AT_THE_CELL, number))
 
 
 def test_so_many_at_once_and_then_so_many_a_second() -> None:
@@ -86,12 +91,12 @@ def test_who_makes_up_cookies_has_the_limit_of_an_address(pressing: Pressing) ->
 
 
 def test_programs_without_a_cookie_are_one_client(pressing: Pressing) -> None:
-    assert pressing.admitted(anonymous("10.0.0.7"), 1000) == OF_CLIENT.at_once
+    assert pressing.admitted(program("10.0.0.7"), 1000) == OF_CLIENT.at_once
     assert pressing.admitted(browser(1), 10) == 10
 
 
 def test_a_whole_network_has_a_limit_and_leaves_the_cell_its_own(pressing: Pressing) -> None:
-    assert sum(pressing.admitted(anonymous(f"10.0.1.{n}"), 50) for n in range(250)) == OF_ALL.at_once
+    assert sum(pressing.admitted(program(f"10.0.1.{n}"), 50) for n in range(250)) == OF_ALL.at_once
     assert pressing.admitted(browser(1, AT_THE_CELL), 10) == 10
 
 
@@ -104,7 +109,7 @@ def test_each_that_is_too_many_is_counted_and_told_to_the_log(pressing: Pressing
 def test_a_cancel_is_one_too_many_only_if_this_goals_was_asked_for_just_now(pressing: Pressing) -> None:
     """No press, no other goal and nobody else's cancels keep anybody from stopping a robot."""
     pressing.admitted(browser(1), 1000)
-    sum(pressing.admitted(anonymous(f"10.0.1.{n}"), 50) for n in range(250))
+    sum(pressing.admitted(program(f"10.0.1.{n}"), 50) for n in range(250))
     assert pressing.canceled(browser(1), 1000, "/robots/r1", "count", "p1") == OF_CANCELS.at_once
     assert pressing.canceled(browser(1), 3, "/robots/r1", "count", "p2") == 3
     assert pressing.canceled(browser(1), 3, "/robots/r2", "count", "p1") == 3

@@ -8,7 +8,7 @@ from app.audit.entry import Entry, Origin, entered
 from app.audit.queries import OpenPress
 from app.errors import LogError
 from app.i18n import TextLike, render, say
-from app.permission.clients import Client
+from app.permission.principal import Principal
 from app.robot.command_status import Outcome
 
 
@@ -89,10 +89,16 @@ class PressLog:
 
     def __init__(self, log: Log, robot: str = "", board: Callable[[], str] = str) -> None:
         self._log = log
-        self.room = log.allowed
-        self.leave_out = log.suppress
         self._robot = robot
         self._board = board
+
+    def room(self, origin: Origin) -> bool:
+        """Whether a refusal may be an entry."""
+        return self._log.allowed(origin)
+
+    def leave_out(self, origin: Origin) -> None:
+        """Counts a refusal that is no entry."""
+        self._log.suppress(origin)
 
     async def pressed(
         self,
@@ -142,10 +148,24 @@ class PressLog:
         entry = entered("refused", origin, inputs, outcome="refused", reason=reason, **about)
         return await self._log.closed(entry)
 
+    async def acted(
+        self, action: str, act_id: str, origin: Origin, outcome: str, reason: TextLike
+    ) -> TextLike:
+        """An act that is no press; returns when it is on the disk, or why it is not."""
+        about = self._about("", act_id, action)
+        return await self._log.closed(
+            entered("control", origin, {}, outcome=outcome, reason=reason, **about)
+        )
+
+    def note(self, action: str, origin: Origin, reason: TextLike) -> None:
+        """Control changed by no act."""
+        self._log.add(entered("control", origin, {}, reason=reason, **self._about("", "", action)))
+
     def _about(self, widget: str, press_id: str, action: str) -> dict[str, str]:
         return {"widget": widget, "press": press_id, "action": action, "robot": self._robot}
 
 
-def origin_of(client: Client, seen: str = "") -> Origin:
-    """Where a press comes from: a browser, which is named until users log in."""
-    return Origin(address=client.address, browser=client.id, who=render(client.name), seen=seen)
+def origin_of(who: Principal, seen: str = "") -> Origin:
+    """Where a press comes from: the client, and who is logged in there or, without users, its name."""
+    client = who.client
+    return Origin(address=client.address, browser=client.id, who=render(who.name), seen=seen)

@@ -28,7 +28,8 @@ CONDITIONS: Final = {
     "who": "(e.who = :who OR e.address = :who)",
     "text": (
         "(e.reason || ' ' || e.\"values\" || ' ' || e.widget || ' ' || e.press || ' ' || e.robot"
-        " || ' ' || e.who || ' ' || e.address || ' ' || e.outcome) LIKE :pattern ESCAPE '\\'"
+        " || ' ' || e.action || ' ' || e.who || ' ' || e.address || ' ' || e.outcome)"
+        " LIKE :pattern ESCAPE '\\'"
     ),
 }
 

@@ -47,6 +47,15 @@ class Outgoing(NamedTuple):
     look: LastLook
 
 
+class Trackers(NamedTuple):
+    """What sends commands that the robot answers later, and knows each that has no answer yet."""
+
+    calls: ServiceCalls
+    actions: GoalTracker
+    confirmations: Confirmations
+    parameters: ParameterSync
+
+
 class Dispatcher:
     """What the widgets of one panel send to one robot; judges nothing."""
 
@@ -56,10 +65,7 @@ class Dispatcher:
         interfaces: Interfaces,
         robot: RobotState,
         transport: Transport,
-        calls: ServiceCalls,
-        actions: GoalTracker,
-        confirmations: Confirmations,
-        parameters: ParameterSync,
+        trackers: Trackers,
         monotonic: Callable[[], float] = time.monotonic,
         reached: Callable[[], Awaitable[bool]] = taken_for_reached,
     ) -> None:
@@ -70,10 +76,10 @@ class Dispatcher:
         self._interfaces = interfaces
         self._robot = robot
         self._transport = transport
-        self._calls = calls
-        self._actions = actions
-        self._confirmations = confirmations
-        self._parameters = parameters
+        self._calls = trackers.calls
+        self._actions = trackers.actions
+        self._confirmations = trackers.confirmations
+        self._parameters = trackers.parameters
         self._monotonic = monotonic
         # How each kind, or family, is sent; why it would not be; and how what is entered is checked.
         self.senders: Mapping[type[Pressed], Callable[[Any, Outgoing], Awaitable[Outcome]]] = {

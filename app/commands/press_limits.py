@@ -11,7 +11,7 @@ from typing import Final
 
 from app.audit import Origin
 from app.audit.press_record import origin_of
-from app.permission.clients import Client
+from app.permission.principal import Principal
 from app.rate_limit import Buckets, Quota
 
 # A finger taps ten times a second at most; a program that follows a control loop presses 50 times.
@@ -36,29 +36,29 @@ class PressLimits:
         self._cancels = Buckets(OF_CANCELS, monotonic)
         self.refused = 0
 
-    def admit(self, client: Client) -> bool:
+    def admit(self, who: Principal) -> bool:
         """Whether it may press once more now; what may not is counted, here and for the log."""
         asked: list[tuple[Buckets, Hashable]] = [
-            (self._clients, (client.address, client.id)),
-            (self._addresses, client.address),
+            (self._clients, (who.client.address, who.client.id)),
+            (self._addresses, who.client.address),
         ]
-        if not client.local:
+        if not who.client.local:
             asked.append((self._all, ""))
         if not all(buckets.has(key) for buckets, key in asked):
-            return self._refuse(client)
+            return self._refuse(who)
         for buckets, key in asked:
             buckets.take(key)
         return True
 
-    def admit_cancel(self, client: Client, *goal: str) -> bool:
+    def admit_cancel(self, who: Principal, *goal: str) -> bool:
         """The same for a cancel: it is one too many only if this very goal's was asked for that often
         just now, so that nobody is kept from stopping a robot."""
         if not self._cancels.has(goal):
-            return self._refuse(client)
+            return self._refuse(who)
         self._cancels.take(goal)
         return True
 
-    def _refuse(self, client: Client) -> bool:
+    def _refuse(self, who: Principal) -> bool:
         self.refused += 1
-        self._leave_out(origin_of(client))
+        self._leave_out(origin_of(who))
         return False

@@ -7,7 +7,7 @@ what the browser showed does not count. Between judging and sending nothing wait
 import asyncio
 import logging
 import time
-from collections.abc import Callable, Coroutine, Iterator, Mapping
+from collections.abc import Coroutine, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
@@ -16,35 +16,30 @@ from typing import Any
 from app.audit import Origin, Repeated
 from app.audit.press_record import PendingEntry, PressLog
 from app.clock import format_time
+from app.commands.cancels import Cancels
 from app.commands.dispatch import Dispatcher
+from app.commands.press_context import PressContext
+from app.commands.press_judge import PressJudge
 from app.commands.receipts import (
     FINE,
     LONGEST_LOGGED,
-    MOST_LOOKS,
-    PressContext,
     Receipt,
     Receipts,
     Witness,
-    cause_of,
+    closed,
     corrected,
     fingerprint,
-    judged,
     named,
     receipt_of,
     untyped,
-    with_doubt,
 )
 from app.commands.refusals import EarlyRefusals
 from app.commands.repeated import RepeatedPresses
 from app.concurrency import CancellableWaits
-from app.errors import Cause, FieldError, InputError, LinkError, LogError, NotFound, PressRefused
+from app.errors import Cause, FieldError, InputError, LinkError, LogError, PressRefused
 from app.i18n import TextLike, say
-from app.panel.model import Panel
 from app.panel.widgets.families import Pressed
-from app.panel.widgets.service_action import Action
-from app.permission.interlocks import Verdict
 from app.robot.command_status import Outcome
-from app.robot.state import RobotState
 from app.ros_logging import RobotLog, on_rosout
 
 log = logging.getLogger("kiosk.presses")
@@ -68,40 +63,35 @@ class Presses:
 
     def __init__(
         self,
-        panel: Panel,
-        robot: RobotState,
+        judge: PressJudge,
         dispatcher: Dispatcher,
         press_log: PressLog,
-        monotonic: Callable[[], float] = time.monotonic,
-        catch_up: Callable[[], None] = lambda: None,
-        news: Callable[[], bool] = lambda: False,
+        robot: str = "",
         witness: Witness | None = None,
     ) -> None:
-        """`catch_up` takes in all that has come from the robot, right before a press is judged;
-        `news` tells whether more has come that may change what is permitted."""
-        self._panel = panel
-        self._robot = robot
-        self._log = RobotLog(log, robot.name)
+        """`robot` is its name in the server's log, "" where there is only one."""
+        self._log = RobotLog(log, robot)
+        self._judge = judge
         self._dispatcher = dispatcher
         self._press_log = press_log
-        self._catch_up = catch_up
-        self._news = news
         self._under_way: dict[str, _UnderWay] = {}
-        self._monotonic = monotonic
         self._receipts = Receipts(witness)
-        self._early_refusals = EarlyRefusals(dispatcher, press_log, self._receipts, self._log)
-        self._repeated = RepeatedPresses(dispatcher, self._early_refusals, self._log)
-        self.widget = dispatcher.widget
-        self.receipt = self._receipts.get
-        self.too_soon = self._early_refusals.too_soon
-        self.limited = self._early_refusals.limited
         self._waits = CancellableWaits()
-        self.cancel_all = self._waits.cancel_all
-        self._closed = False
+        self.early_refusals = EarlyRefusals(judge, dispatcher, press_log, self._receipts, self._log)
+        self._repeated = RepeatedPresses(dispatcher, self.early_refusals, self._log)
+        self._cancels = Cancels(dispatcher, press_log, self.early_refusals, self._waits, self._log)
 
     def close(self) -> None:
         """Nothing more is sent; a goal can be canceled until the end."""
-        self._closed = True
+        self._judge.close()
+
+    def widget(self, widget_id: str) -> Pressed:
+        """What can be pressed; NotFound for everything else."""
+        return self._dispatcher.widget(widget_id)
+
+    def receipt(self, press_id: str) -> Receipt | None:
+        """The receipt of a press, as it is known now."""
+        return self._receipts.get(press_id)
 
     async def press(
         self, widget_id: str, inputs: Mapping[str, Any], press_id: str, context: PressContext
@@ -111,77 +101,32 @@ class Presses:
         What it is judged by, is judged in the moment of sending. An input that has a default in the
         panel file may be left out.
         """
-        widget = self.widget(widget_id)
+        widget = self._dispatcher.widget(widget_id)
         inputs = self._dispatcher.with_defaults(widget, inputs)
         known = self._under_way.get(press_id) or self._receipts.made(press_id)
         if known is None and not self._receipts.is_past(press_id):
-            if left_out := self._left_out(widget, inputs, press_id, context):
+            if left_out := self.early_refusals.left_out(widget, inputs, press_id, context):
                 return left_out
             work = self._logged(widget, inputs, press_id, context)
             return await self._once(widget, inputs, press_id, work)
         if known is None:
             why = say("press_past", id=press_id)
-            return await self._early_refusals.refuse(widget, inputs, press_id, why, context.origin)
+            return await self.early_refusals.refuse(widget, inputs, press_id, why, context.origin)
         if (known.widget, known.fingerprint) != (widget_id, fingerprint(inputs)):
             why = say("press_reused", id=press_id)
-            return await self._early_refusals.refuse(widget, inputs, press_id, why, context.origin)
+            return await self.early_refusals.refuse(widget, inputs, press_id, why, context.origin)
         if isinstance(known, _UnderWay):
             return await asyncio.shield(known.receipt)
         return known
 
     async def cancel(self, widget_id: str, origin: Origin, press_id: str = "") -> Receipt:
-        """Asks the robot to cancel the goal of one press or, without its id, the one under way: anybody
+        """Asks the robot to cancel the goal of one press or, without its id, the one under way: anyone
         may, whoever has control, and however late."""
-        widget = self.widget(widget_id)
-        if not isinstance(widget, Action):
-            raise NotFound(f'"{widget_id}" is not an action: there is nothing to cancel')
-        if (why := self._dispatcher.over(widget, press_id)) and not self._press_log.room(origin):
-            answer = Outcome("refused", why)
-            return self._early_refusals.counted(receipt_of(widget, {}, "", answer, "interlock"), origin)
-        noting = asyncio.ensure_future(self._press_log.canceled(widget_id, origin))
-        try:
-            # No disk keeps anybody from stopping a robot.
-            answer, cause = await self._canceled(widget, press_id)
-        except BaseException:
-            (await noting).broke_off("log_broke_off")
-            raise
-        pending = await noting
-        self._log.info(
-            "cancel of %s by %s: %s: %s", widget_id, named(origin), answer.outcome, answer.text
-        )
-        receipt = receipt_of(widget, {}, "", answer, cause)
-        return await _closed(pending, receipt)
+        return await self._cancels.cancel(widget_id, origin, press_id)
 
-    async def _canceled(self, widget: Action, press_id: str) -> tuple[Outcome, Cause]:
-        try:
-            async with self._waits.one():
-                answer = await self._dispatcher.cancel(widget, press_id)
-        except TimeoutError:
-            return Outcome("unknown", say("server_ends")), ""
-        except LinkError as error:
-            text = say("not_encoded", why=error.text, time=format_time(time.time()))
-            return Outcome("refused", text), "link"
-        return answer, "interlock" if answer.outcome == "refused" else ""
-
-    def _left_out(
-        self, widget: Pressed, inputs: Mapping[str, Any], press_id: str, context: PressContext
-    ) -> Receipt | None:
-        """The receipt of a refusal that the log only counts; None for every other press."""
-        if self._press_log.room(context.origin):
-            return None
-        _, why, cause = self._ground(widget, context)
-        sentence = "refused" if why else "not_encoded"
-        if not why:
-            try:
-                why, cause = self._dispatcher.refusal(widget, inputs), "interlock"
-            except (FieldError, InputError) as error:
-                why, cause = error.text, "input"
-        if not why:
-            return None
-        answer = Outcome("refused", say(sentence, why=why, time=format_time(time.time())))
-        return self._early_refusals.counted(
-            receipt_of(widget, inputs, press_id, answer, cause), context.origin
-        )
+    def cancel_all(self) -> None:
+        """Ends what waits for the robot: its outcome is unknown."""
+        self._waits.cancel_all()
 
     async def _once(
         self,
@@ -223,7 +168,7 @@ class Presses:
             self._receipts.begin(press_id, widget.id, context.origin, own)
             with _closed_in_the_end(pending):
                 receipt = await self._pressed(widget, inputs, press_id, pending, context)
-            receipt = await _closed(pending, receipt)
+            receipt = await closed(pending, receipt)
         level = logging.INFO if receipt.outcome in FINE else logging.WARNING
         who = named(context.origin)
         told = on_rosout(f"press {press_id} of {widget.id} by {who}: {untyped(widget, receipt)}")
@@ -252,13 +197,13 @@ class Presses:
             now = format_time(time.time())
             return receipt(Outcome("refused", say(sentence, why=why, time=now)), cause)
 
-        verdict, why, cause = self._ground(widget, context)
+        verdict, why, cause = self._judge.ground(widget, context)
         pending.judged(verdict.code)
         if why:
             return refused("refused", why, cause)
         try:
             correct = partial(self._correct, pending)
-            look = partial(self._last_look, widget, pending, context)
+            look = partial(self._judge.last_look, widget, pending, context)
             async with self._waits.one():
                 answer = await self._dispatcher.send(
                     widget, inputs, press_id, correct, pending.hash, look
@@ -275,29 +220,6 @@ class Presses:
             return refused("not_encoded", answer.text, "interlock")
         return receipt(answer, "time" if answer.outcome == "timed_out" else "")
 
-    def _last_look(self, widget: Pressed, pending: PendingEntry, context: PressContext) -> None:
-        """Right before it is sent: what came while it was judged and encoded counts, too."""
-        for _ in range(MOST_LOOKS):
-            if not self._news():
-                return
-            verdict, why, cause = self._ground(widget, context)
-            pending.judged(verdict.code)
-            if why:
-                raise PressRefused(why, cause)
-        raise PressRefused(say("catching_up"), "link")
-
-    def _ground(self, widget: Pressed, context: PressContext) -> tuple[Verdict, TextLike, Cause]:
-        """The verdict now, and why it may not be sent, "" if it may."""
-        self._catch_up()
-        verdict = judged(widget, context, self._panel, self._robot, self._monotonic())
-        if not verdict.permitted:
-            return verdict, verdict.reason or "", cause_of(verdict)
-        return (
-            verdict,
-            say("press_by_stopping") if self._closed else context.stale_reason(),
-            "interlock",
-        )
-
 
 @contextmanager
 def _closed_in_the_end(pending: PendingEntry) -> Iterator[None]:
@@ -310,11 +232,3 @@ def _closed_in_the_end(pending: PendingEntry) -> Iterator[None]:
     except BaseException:
         pending.broke_off("log_broke_off")
         raise
-
-
-async def _closed(pending: PendingEntry, receipt: Receipt) -> Receipt:
-    """The receipt, when what it says is on the disk; where it is not, it says so."""
-    doubt = await pending.closed(receipt.outcome, receipt.reason)
-    if pending.corrected_to is not None:  # meanwhile
-        receipt = corrected(receipt, pending.corrected_to)
-    return with_doubt(receipt, doubt)

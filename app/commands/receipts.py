@@ -3,27 +3,24 @@
 import hashlib
 import json
 from collections import OrderedDict
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from typing import Any, Final, Protocol, cast
 
 from app.audit import Entry, Origin
+from app.audit.press_record import PendingEntry
 from app.errors import Cause
 from app.i18n import TextLike, render, say
-from app.panel.model import Panel
 from app.panel.template import needed
 from app.panel.widgets.families import Command, Entered, Pressed
-from app.permission.interlocks import NO_WAY, PERMITTED, Verdict, link_verdict, press_verdict
 from app.robot.command_status import Outcome, OutcomeCode
-from app.robot.state import RobotState
 
 RECEIPTS_KEPT: Final = 1000
 MOST_LOOKS: Final = 20  # at news that come faster than they are taken in: then nothing is sent
 PAST_KEPT: Final = 20_000  # ids of presses whose receipts are not kept any more
 LONGEST_LOGGED: Final = 300
 LONGEST_KEPT: Final = 4000  # characters of all inputs of a press
-OUT_OF_REACH: Final = NO_WAY | {"no_service", "no_parameters", "getting_ready", "ending"}
 FINE: Final = frozenset({"published", "confirmed", "accepted", "succeeded"})
 _sorted: Final = json.JSONEncoder(sort_keys=True).encode
 
@@ -56,39 +53,6 @@ class Receipt:
             "reason": self.reason,
             "at": self.at,
         }
-
-
-def no_doubt() -> TextLike:
-    """Of who does not say what was seen, and when it was pressed."""
-    return ""
-
-
-@dataclass(frozen=True, slots=True)
-class PressContext:
-    """Who presses, and what has to hold beside the robot's permission when it is sent: `controls`
-    judges who has control, `doubt` says why what the operator saw is no longer so."""
-
-    origin: Origin
-    controls: Callable[[], Verdict] = lambda: PERMITTED
-    stale_reason: Callable[[], TextLike] = no_doubt
-
-
-def judged(
-    widget: Command, context: PressContext, panel: Panel, robot: RobotState, now: float
-) -> Verdict:
-    """Whether a widget may be pressed or held by somebody now. The first that locks is told: the way to
-    the robot, who has control, the widget's interlocks."""
-    for verdict in (link_verdict(robot, now), context.controls()):
-        if not verdict.permitted:
-            return verdict
-    return press_verdict(widget, panel.interlocks_of(widget), robot, now)
-
-
-def cause_of(verdict: Verdict) -> Cause:
-    """Why a receipt says that a verdict refused it."""
-    if verdict.code == "log":
-        return "log"
-    return "link" if verdict.code in OUT_OF_REACH else "interlock"
 
 
 class Witness(Protocol):
@@ -199,6 +163,14 @@ def with_doubt(receipt: Receipt, doubt: TextLike) -> Receipt:
     if not doubt:
         return receipt
     return replace(receipt, reason=say("log_not_on_disk", said=receipt.reason, why=doubt))
+
+
+async def closed(pending: PendingEntry, receipt: Receipt) -> Receipt:
+    """The receipt, when what it says is on the disk; where it is not, it says so."""
+    doubt = await pending.closed(receipt.outcome, receipt.reason)
+    if pending.corrected_to is not None:  # in the meantime
+        receipt = corrected(receipt, pending.corrected_to)
+    return with_doubt(receipt, doubt)
 
 
 def named(origin: Origin) -> str:

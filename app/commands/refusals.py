@@ -1,5 +1,5 @@
-"""Presses that are refused and not even judged: their id was used before, they came too soon, or they
-are more than their client may."""
+"""Presses that are refused before they are an entry of the log: their id was used before, they came too
+soon, they are more than their client may, or their refusal is only counted."""
 
 import secrets
 import time
@@ -11,7 +11,10 @@ from app.audit import Origin
 from app.audit.press_record import PressLog
 from app.clock import format_time
 from app.commands.dispatch import Dispatcher
+from app.commands.press_context import PressContext
+from app.commands.press_judge import PressJudge
 from app.commands.receipts import Receipt, Receipts, named, receipt_of, untyped, with_doubt
+from app.errors import FieldError, InputError
 from app.i18n import BETWEEN, Text, TextLike, joined, say
 from app.panel.widgets.families import Pressed
 from app.robot.command_status import Outcome
@@ -22,8 +25,14 @@ class EarlyRefusals:
     """Of one panel; used on the event loop only."""
 
     def __init__(
-        self, dispatcher: Dispatcher, press_log: PressLog, receipts: Receipts, log: RobotLog
+        self,
+        judge: PressJudge,
+        dispatcher: Dispatcher,
+        press_log: PressLog,
+        receipts: Receipts,
+        log: RobotLog,
     ) -> None:
+        self._judge = judge
         self._dispatcher = dispatcher
         self._press_log = press_log
         self._receipts = receipts
@@ -64,6 +73,28 @@ class EarlyRefusals:
         self._press_log.leave_out(origin)
         self._receipts.keep_left_out(receipt)
         return receipt
+
+    def left_out(
+        self, widget: Pressed, inputs: Mapping[str, Any], press_id: str, context: PressContext
+    ) -> Receipt | None:
+        """The receipt of a refusal that the log only counts; None for every other press.
+
+        Only a client that has used up the log's quota of refusals is judged here, before its entry is
+        written: what it may do still goes out, and its refusals push no other entry out of the log.
+        """
+        if self._press_log.room(context.origin):
+            return None
+        _, why, cause = self._judge.ground(widget, context)
+        sentence = "refused" if why else "not_encoded"
+        if not why:
+            try:
+                why, cause = self._dispatcher.refusal(widget, inputs), "interlock"
+            except (FieldError, InputError) as error:
+                why, cause = error.text, "input"
+        if not why:
+            return None
+        answer = Outcome("refused", say(sentence, why=why, time=format_time(time.time())))
+        return self.counted(receipt_of(widget, inputs, press_id, answer, cause), context.origin)
 
     async def refuse(
         self, widget: Pressed, inputs: Mapping[str, Any], press_id: str, why: TextLike, origin: Origin

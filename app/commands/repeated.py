@@ -5,12 +5,13 @@ from typing import Any
 
 from app.audit import Entry, Origin, Repeated, same_values
 from app.commands.dispatch import Dispatcher
-from app.commands.receipts import Receipt, cause_of, named, recalled
+from app.commands.receipts import Receipt, named, recalled
 from app.commands.refusals import EarlyRefusals
 from app.errors import Cause, FieldError, InputError
 from app.i18n import say
 from app.panel.widgets.families import Pressed
-from app.permission.interlocks import PERMITTED, Verdict
+from app.permission.interlocks import PERMITTED
+from app.permission.press_permission import cause_of
 from app.ros_logging import RobotLog
 
 
@@ -43,7 +44,7 @@ class RepeatedPresses:
         if told.outcome == "timed_out":
             return "time"
         if told.verdict != PERMITTED.code:
-            return cause_of(Verdict(False, told.verdict or "log"))
+            return cause_of(told.verdict or "log")
         try:
             self._dispatcher.refusal(widget, inputs)
         except (FieldError, InputError):

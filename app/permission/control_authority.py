@@ -9,13 +9,13 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import Final, Literal
+from typing import Final, Literal, NamedTuple
 
 from app.i18n import TextLike, say
 from app.panel.rules import ControlRules
-from app.permission.clients import Client
 from app.permission.control_authority_view import NO_CONTROL, ControlView, control_view
 from app.permission.interlocks import PERMITTED, Verdict, locked
+from app.permission.principal import Principal
 
 LIFE_S: Final = 5.0  # without a sign of life; a page with scripts gives one every 1.5 s
 ASK_AGAIN_S: Final = 10.0  # after a request was denied
@@ -30,11 +30,20 @@ Refusal = Literal[
 ]
 
 
+class Passing(NamedTuple):
+    """Control changed by no act: `code` says how, `who` had it, took it or asked for it, and `other` is
+    in control now."""
+
+    code: str
+    who: Principal
+    other: Principal | None = None
+
+
 @dataclass(slots=True)
 class _Party:
     """Who holds or asks; `since` counts the time to a takeover, `scripted` once its page answered."""
 
-    browser: Client
+    who: Principal
     since: float
     alive_until: float
     scripted: bool
@@ -51,13 +60,16 @@ class ControlAuthority:
         monotonic: Callable[[], float] = time.monotonic,
         wall: Callable[[], float] = time.time,
         tell: Callable[[str], None] = lambda _: None,
+        passed: Callable[[Passing], None] = lambda _: None,
     ) -> None:
-        """`robot` is its name, "" where there is only one; `tell` gets a line for each change."""
+        """`robot` is its name, "" where there is only one; `tell` gets a line for each change, `passed`
+        each that no act made."""
         self.rules = rules
         self._robot: TextLike = robot or say("the_robot")
         self._now = monotonic
         self._wall = wall
         self._tell = tell
+        self._passed = passed
         self._holder: _Party | None = None
         self._asker: _Party | None = None
         self._since = ""
@@ -65,14 +77,14 @@ class ControlAuthority:
         self._denied: dict[str, float] = {}
 
     @property
-    def holder(self) -> Client | None:
+    def holder(self) -> Principal | None:
         self.advance()
-        return self._holder.browser if self._holder else None
+        return self._holder.who if self._holder else None
 
     @property
-    def requester(self) -> Client | None:
+    def requester(self) -> Principal | None:
         self.advance()
-        return self._asker.browser if self._asker else None
+        return self._asker.who if self._asker else None
 
     @property
     def until(self) -> float:
@@ -82,9 +94,14 @@ class ControlAuthority:
         times = [party.alive_until for party in (self._holder, self._asker) if party]
         return min([*times, self._due()])
 
-    def verdict(self, client: Client) -> Verdict:
-        """Whether this browser may press."""
-        if not self.rules.required or _is(client, self.holder):
+    def verdict(self, who: Principal) -> Verdict:
+        """Whether this client may press."""
+        return PERMITTED if _is(who, self.holder) else self.lock
+
+    @property
+    def lock(self) -> Verdict:
+        """What locks for every client without control."""
+        if not self.rules.required:
             return PERMITTED
         if holder := self.holder:
             return locked("control_held", name=holder.title, robot=self._robot)
@@ -92,56 +109,56 @@ class ControlAuthority:
 
     # Acts: each answers why it was refused, "" where it was done. Done twice is done once.
 
-    def take(self, client: Client, life_s: float = LIFE_S) -> Refusal:
+    def take(self, who: Principal, life_s: float = LIFE_S) -> Refusal:
         """Takes what is free; the panel at the cell takes over."""
-        if not client.id:
+        if not who.client.id:
             return "control_stranger"
-        if (holder := self.holder) and not self._may_override(client) and not _is(client, holder):
+        if (holder := self.holder) and not self._may_override(who) and not _is(who, holder):
             return "control_taken"
-        if not _is(client, holder):
-            self._hold(client, life_s, "taken over" if holder else "taken")
+        if not _is(who, holder):
+            self._hold(who, life_s, "taken over" if holder else "taken")
         return ""
 
-    def ask(self, client: Client, life_s: float = LIFE_S) -> Refusal:
+    def ask(self, who: Principal, life_s: float = LIFE_S) -> Refusal:
         """Asks the holder; what is free or may be taken over is taken."""
-        if not client.id:
+        if not who.client.id:
             return "control_stranger"
-        if not self.holder or self._may_override(client) or _is(client, self.holder):
-            return self.take(client, life_s)
+        if not self.holder or self._may_override(who) or _is(who, self.holder):
+            return self.take(who, life_s)
         if self._asker:
-            return "" if _is(client, self._asker.browser) else "control_asked_by"
-        self._denied = {who: until for who, until in self._denied.items() if until > self._now()}
-        if client.id in self._denied:
+            return "" if _is(who, self._asker.who) else "control_asked_by"
+        self._denied = {client: until for client, until in self._denied.items() if until > self._now()}
+        if who.client.id in self._denied:
             return "control_denied"
-        self._asker = self._party(client, life_s)
-        self._tell(f"{client} asks for control")
+        self._asker = self._party(who, life_s)
+        self._tell(f"{who} asks for control")
         return ""
 
-    def give(self, client: Client, to: str) -> Refusal:
+    def give(self, who: Principal, to: str) -> Refusal:
         """The holder grants the request of the browser with the id `to`."""
         asker = self.requester
-        if asker is None or asker.id != to or not _is(client, self.holder):
+        if asker is None or asker.client.id != to or not _is(who, self.holder):
             return "control_not_yours"
-        self._pass_on(f"given by {client}")
+        self._pass_on(f"given by {who}")
         return ""
 
-    def keep(self, client: Client, to: str) -> Refusal:
+    def keep(self, who: Principal, to: str) -> Refusal:
         """The holder denies the request of the browser with the id `to`."""
         asker = self.requester
-        if asker is None or asker.id != to or not _is(client, self.holder):
+        if asker is None or asker.client.id != to or not _is(who, self.holder):
             return "control_not_yours"
         self._denied[to] = self._now() + ASK_AGAIN_S
         self._asker = None
-        self.touch(client)
-        self._tell(f"{client} keeps control: {asker} was denied")
+        self.touch(who)
+        self._tell(f"{who} keeps control: {asker} was denied")
         return ""
 
-    def release(self, client: Client) -> Refusal:
+    def release(self, who: Principal) -> Refusal:
         """The holder gives it up: to who asks, else to nobody; who asks, asks no more."""
-        if _is(client, self.holder):
+        if _is(who, self.holder):
             self._given_up = True
-            self._pass_on(f"given up by {client}")
-        elif _is(client, self.requester):
+            self._pass_on(f"given up by {who}")
+        elif _is(who, self.requester):
             self._end_request()
         else:
             return "control_not_yours"
@@ -149,38 +166,41 @@ class ControlAuthority:
 
     # Signs of life.
 
-    def keepalive(self, client: Client, touched: bool) -> None:
+    def keepalive(self, who: Principal, touched: bool) -> None:
         """A page with scripts is there; `touched` by its operator since it said so last."""
-        for party in self._parties(client):
+        for party in self._parties(who):
             party.scripted = True
             party.alive_until = self._now() + LIFE_S
         if touched:
-            self.touch(client)
+            self.touch(who)
 
-    def touch(self, client: Client) -> None:
+    def touch(self, who: Principal) -> None:
         """The operator touched or pressed something: a request waits longer."""
         self.advance()
-        if self._holder and _is(client, self.holder):
+        if self._holder and _is(who, self.holder):
             self._holder.since = self._now()
             self._holder.alive_until = max(self._holder.alive_until, self._now() + LIFE_S)
 
-    def loaded(self, client: Client, life_s: float, by_hand: bool) -> None:
+    def loaded(self, who: Principal, life_s: float, by_hand: bool) -> None:
         """A page was loaded; without scripts it comes again within `life_s`. With `by_hand` False
         (a program, a browser that fetches ahead) nothing is taken."""
-        for party in self._parties(client):
+        for party in self._parties(who):
             party.alive_until = self._now() + (LIFE_S if party.scripted else life_s)
-        if by_hand and not self.holder and not self._given_up and self._may_override(client):
-            self._hold(client, life_s, "taken at its first page")
+        if by_hand and not self.holder and not self._given_up and self._may_override(who):
+            self._hold(who, life_s, "taken at its first page")
+            self._passed(Passing("control_first_page", who))
 
     def advance(self) -> None:
         """What time alone has changed."""
         now = self._now()
         if self._asker and now >= self._asker.alive_until:
+            asker = self._asker.who
             self._end_request()
+            self._passed(Passing("control_request_lost", asker))
         if self._holder and now >= self._holder.alive_until:
-            self._pass_on(f"lost by {self._holder.browser}")
+            self._pass_by_time("control_lost", f"lost by {self._holder.who}")
         elif now >= self._due():
-            self._pass_on("taken over for want of a touch")
+            self._pass_by_time("control_idle", "taken over for want of a touch")
 
     def view(self) -> ControlView:
         """What the pages show."""
@@ -188,8 +208,8 @@ class ControlAuthority:
             return NO_CONTROL
         return control_view(self.rules, self._robot, self.holder, self.requester, self._since)
 
-    def _may_override(self, client: Client) -> bool:
-        return client.local and self.rules.local and bool(client.id)
+    def _may_override(self, who: Principal) -> bool:
+        return who.client.local and self.rules.local and bool(who.client.id)
 
     def _due(self) -> float:
         """When the request goes through by itself: the holder has the whole time from its begin."""
@@ -197,17 +217,17 @@ class ControlAuthority:
             return math.inf
         return max(self._holder.since, self._asker.since) + self.rules.takeover_after_s
 
-    def _parties(self, client: Client) -> list[_Party]:
+    def _parties(self, who: Principal) -> list[_Party]:
         self.advance()
         both = (party for party in (self._holder, self._asker) if party)
-        return [party for party in both if _is(client, party.browser)]
+        return [party for party in both if _is(who, party.who)]
 
-    def _party(self, client: Client, life_s: float) -> _Party:
-        return _Party(client, self._now(), self._now() + life_s, life_s == LIFE_S)
+    def _party(self, who: Principal, life_s: float) -> _Party:
+        return _Party(who, self._now(), self._now() + life_s, life_s == LIFE_S)
 
-    def _hold(self, client: Client, life_s: float, how: str) -> None:
-        self._install(self._party(client, life_s))
-        self._tell(f"control {how} by {client}")
+    def _hold(self, who: Principal, life_s: float, how: str) -> None:
+        self._install(self._party(who, life_s))
+        self._tell(f"control {how} by {who}")
 
     def _install(self, party: _Party | None) -> None:
         self._holder = party
@@ -216,7 +236,7 @@ class ControlAuthority:
             self._given_up = False
             now = datetime.fromtimestamp(self._wall(), UTC)
             self._since = now.isoformat(timespec="milliseconds")
-            if self._asker and _is(party.browser, self._asker.browser):
+            if self._asker and _is(party.who, self._asker.who):
                 self._asker = None
 
     def _pass_on(self, how: str) -> None:
@@ -225,13 +245,19 @@ class ControlAuthority:
         if heir:
             heir.since = self._now()
         self._install(heir)
-        self._tell(f"control {how}, now of {heir.browser if heir else 'nobody'}")
+        self._tell(f"control {how}, now of {heir.who if heir else 'nobody'}")
+
+    def _pass_by_time(self, code: str, how: str) -> None:
+        before = self._holder
+        self._pass_on(how)
+        if before:
+            self._passed(Passing(code, before.who, self._holder.who if self._holder else None))
 
     def _end_request(self) -> None:
         if self._asker:
-            self._tell(f"{self._asker.browser} asks for control no more")
+            self._tell(f"{self._asker.who} asks for control no more")
         self._asker = None
 
 
-def _is(client: Client, other: Client | None) -> bool:
-    return other is not None and bool(client.id) and client.id == other.id
+def _is(who: Principal, other: Principal | None) -> bool:
+    return other is not None and bool(who.client.id) and who.client.id == other.client.id

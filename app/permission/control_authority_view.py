@@ -1,17 +1,19 @@
-"""Who has control, as the pages show it: one view for all, and what each browser is by it."""
+"""Who has control, as the pages show it: one view for all, and one for each role."""
 
 from typing import Final, Literal, TypedDict
 
 from app.i18n import TextLike, say
 from app.panel.rules import ControlRules
-from app.permission.clients import Client
+from app.permission.principal import Principal
 
-Role = Literal["free", "held", "over", "asking", "holding", "asked"]
+# What a client is to who has control; "" where control is not required.
+Role = Literal["", "free", "held", "over", "asking", "holding", "asked"]
+IN_CONTROL: Final = frozenset[Role]({"", "holding", "asked"})
 
 
 class ControlView(TypedDict):
-    """What every page shows; each picks its text by comparing the ids with its own. "" is nobody;
-    `since` is RFC 3339."""
+    """What is known of control; a client's own part is its `role` and the text that is `shown` to it,
+    "" in the view for all. An id or a name is "" where there is none; `since` is RFC 3339."""
 
     required: bool
     holder: str
@@ -22,6 +24,8 @@ class ControlView(TypedDict):
     holder_text: TextLike
     asker_text: TextLike
     text: TextLike
+    role: Role
+    shown: TextLike
 
 
 NO_CONTROL: Final = ControlView(
@@ -34,25 +38,29 @@ NO_CONTROL: Final = ControlView(
     holder_text="",
     asker_text="",
     text="",
+    role="",
+    shown="",
 )
 
 
 def control_view(
-    rules: ControlRules, robot: TextLike, holder: Client | None, asker: Client | None, since: str
+    rules: ControlRules, robot: TextLike, holder: Principal | None, asker: Principal | None, since: str
 ) -> ControlView:
     """The view for a robot's name; there is an asker only where there is a holder."""
     if not rules.required:
         return NO_CONTROL
     view = ControlView(
         required=True,
-        holder=holder.id if holder else "",
+        holder=holder.client.id if holder else "",
         holder_name=holder.title if holder else "",
-        asker=asker.id if asker else "",
+        asker=asker.client.id if asker else "",
         asker_name=asker.title if asker else "",
         since=since,
         holder_text=say("control_mine", robot=robot),
         asker_text="",
         text=say("control_free", robot=robot),
+        role="",
+        shown="",
     )
     if holder:
         view["text"] = say("control_held", name=holder.title, robot=robot)
@@ -63,12 +71,25 @@ def control_view(
     return view
 
 
-def role(control: ControlView, client: Client, rules: ControlRules) -> Role:
-    """What a browser is to who has control; pages show their buttons by it."""
+def role(control: ControlView, who: Principal, rules: ControlRules) -> Role:
+    """What a client is to who has control; pages show their buttons by it."""
+    if not control["required"]:
+        return ""
     if not control["holder"]:
         return "free"
-    if client.id == control["holder"]:
+    if who.client.id == control["holder"]:
         return "asked" if control["asker"] else "holding"
-    if client.id and client.id == control["asker"]:
+    if who.client.id and who.client.id == control["asker"]:
         return "asking"
-    return "over" if client.local and rules.local else "held"
+    return "over" if who.client.local and rules.local else "held"
+
+
+def seen_as(control: ControlView, role: Role) -> ControlView:
+    """The view as a client of this role gets it."""
+    if role == "asking":
+        shown = control["asker_text"]
+    elif role in ("holding", "asked"):
+        shown = control["holder_text"]
+    else:
+        shown = control["text"]
+    return {**control, "role": role, "shown": shown}

@@ -1,12 +1,13 @@
-"""May this be pressed now? Pure: (panel, robot, time) → a verdict with its reason.
+"""What the robot has against a command: link, interlocks, its endpoints. Pure, from (robot, time) to a
+verdict with its reason; `press_permission` asks them in their order.
 
 Nothing is permitted on a doubt: each ground must be there, and the first that is missing is the
 reason an operator reads.
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Final
 
@@ -131,40 +132,9 @@ def _forbidden(interlock: Interlock, reading: Reading) -> Verdict:
     return Verdict(False, "unmet", unmet(interlock, value))
 
 
-def press_verdict(
-    widget: Command, interlocks: Iterable[Interlock], robot: RobotState, now: float
-) -> Verdict:
-    """Whether a widget may be pressed: a way, nothing of its own against it, and its interlocks."""
-    permissions = [interlock_verdict(one, robot, now) for one in interlocks]
-    return command_verdict(widget, link_verdict(robot, now), permissions, robot, now)
-
-
-def command_verdict(
-    widget: Command,
-    passable: Verdict,
-    permissions: Sequence[Verdict],
-    robot: RobotState,
-    now: float,
-) -> Verdict:
-    """The same by verdicts that are known: of the way, and of the widget's interlocks."""
-    if not passable.permitted:
-        return passable
-    own = _against(widget, robot, now)
-    return combined(permissions if own is None else (own, *permissions))
-
-
-def combined(verdicts: Sequence[Verdict]) -> Verdict:
-    """The verdict of what all have to permit: the first that does not is told first."""
-    if len(verdicts) == 1:
-        return verdicts[0]
-    locking = [one for one in verdicts if not one.permitted]
-    until = min((one.until for one in verdicts), default=math.inf)
-    if not locking:
-        return PERMITTED if until == math.inf else Verdict(True, until=until)
-    return replace(locking[0], until=until, others=tuple(locking[1:]))
-
-
-def _against(widget: Command, robot: RobotState, now: float) -> Verdict | None:
+def command_blocked(widget: Command, robot: RobotState, now: float) -> Verdict | None:
+    """Why a command may not be sent, beside the link and its interlocks; None where nothing is known
+    against it."""
     return row_of(AGAINST, widget)(widget, robot, now)
 
 

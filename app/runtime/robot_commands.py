@@ -8,9 +8,11 @@ from app.audit.press_record import PressLog
 from app.commands.actions.goals import GoalTracker
 from app.commands.actions.recovery import GoalRecovery
 from app.commands.confirmations import Confirmations
-from app.commands.dispatch import Dispatcher
+from app.commands.dispatch import Dispatcher, Trackers
 from app.commands.holds.controller import HoldController
+from app.commands.holds.messages import HoldMessages
 from app.commands.parameters.sync import ParameterSync
+from app.commands.press_judge import Latest, PressJudge
 from app.commands.presses import Presses
 from app.commands.service_calls import ServiceCalls
 from app.transport.peer import Peer, RobotContext
@@ -43,30 +45,18 @@ class RobotCommands:
             interfaces,
             robot,
             link,
-            self.calls,
-            self.actions,
-            self.confirmations,
-            self.parameters,
+            Trackers(self.calls, self.actions, self.confirmations, self.parameters),
             reached=peer.flushed,
         )
-        self.presses = Presses(
-            panel,
-            robot,
-            self.dispatcher,
-            press_log,
-            catch_up=take,
-            news=lambda: link.hurried,
-            witness=recorder,
-        )
+        latest = Latest(take, lambda: link.hurried)
+        judge = PressJudge(panel, robot, latest)
+        self.presses = Presses(judge, self.dispatcher, press_log, robot.name, recorder)
         self.holds = HoldController(
             panel,
-            interfaces,
             robot,
-            link,
+            HoldMessages(interfaces, robot, link, self.dispatcher.checked),
             asyncio.get_running_loop(),
-            checked=self.dispatcher.checked,
-            take=take,
-            news=lambda: link.hurried,
+            latest,
             changed=changed,
             witness=recorder,
         )

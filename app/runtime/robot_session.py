@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
 
 from app.audit.press_record import Log, PressLog
+from app.commands.control_acts import ControlActs
 from app.commands.press_context import PressGuard
 from app.errors import LinkError, NotFound
 from app.i18n import TextLike
@@ -84,7 +85,12 @@ class RobotSession:
         context = RobotContext(
             panel, self.interfaces, self.robot, self.link, self.show, self.renew, self.reopen
         )
-        self.control = ControlAuthority(panel.control, self.robot.name, tell=self._log.info)
+        self.control = ControlAuthority(
+            panel.control,
+            self.robot.name,
+            tell=self._log.info,
+            passed=lambda passing: self.control_acts.passed(passing),
+        )
         sources = ViewSources(self.control, operators_log, others, server.recordings, server.simulated)
         self.refresher = ViewRefresher(panel, self.robot, server.revision, sources)
         self.publisher = self.refresher.publisher
@@ -93,6 +99,9 @@ class RobotSession:
             self.publisher, self.control, operators_log, panel.press_expires_s, others.boots
         )
         self.press_log = PressLog(operators_log, self.robot.name, lambda: self.publisher.id)
+        self.control_acts = ControlActs(
+            self.control, self.press_guard, self.press_log, self.robot.name, self.show
+        )
         self.peer = access.peer(context)
         self._commands = RobotCommands(
             context, self.peer, self.press_log, self._recorder, lambda: self._turn.take()

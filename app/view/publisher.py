@@ -1,23 +1,27 @@
 """The latest view with a version, and the events that bring a browser from one to another.
 
 There is no queue: a stream remembers the view that it sent last and, whenever it can send, gets
-the difference to the newest. What is sent is encoded once for all streams of a language: those that are
-equally far share the same bytes, the others those of each event that says all of something.
+the difference to the newest. A client's role in control decides which view that is: there is one for
+each role. What is sent is encoded once for all streams of a language and a role: those that are equally
+far share the same bytes, the others those of each event that says all of something.
 """
 
 import asyncio
 import secrets
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 from pydantic_core import to_json
 
 from app.i18n import ENGLISH, render
+from app.permission.control_authority_view import Role
 from app.view.heartbeat import Heartbeat
+from app.view.kinds import Attributes
 from app.view.sections import Events, difference
-from app.view.view import View
+from app.view.view import View, seen_as
 
 # What some readers take for the end of a line, and JSON leaves as it is.
+NOTHING: Final[Mapping[str, Attributes]] = {}
 SEPARATORS: Final = {c.encode(): b"\\u%04x" % ord(c) for c in "\x85\u2028\u2029"}
 
 
@@ -32,8 +36,11 @@ def encoded(data: Mapping[str, Any], language: str = ENGLISH) -> bytes:
 class ViewPublisher:
     """Where the view is posted; changed on the event loop only."""
 
-    def __init__(self, view: View, revision: str) -> None:
-        """`revision` is of all that a page has loaded: one that differs makes it load anew."""
+    def __init__(
+        self, view: View, revision: str, without_control: Mapping[str, Attributes] = NOTHING
+    ) -> None:
+        """`revision` is of all that a page has loaded: one that differs makes it load again.
+        `without_control` has what is different for clients without control."""
         self.boot = secrets.token_hex(4)
         self.version = 1
         self.view = view
@@ -41,8 +48,11 @@ class ViewPublisher:
         self.heartbeat = Heartbeat(self._wake)
         self._changed = asyncio.Event()
         self._news: Events = {}  # from the view before to this one
-        self._prepared: dict[tuple[str, int], bytes] = {}  # by the language and the version before
-        self._whole: dict[tuple[str, str], bytes] = {}  # by the language and the event
+        self._without_control = without_control
+        self._seen: dict[Role, View] = {}
+        # By the language, the version before, and the roles then and now.
+        self._prepared: dict[tuple[str, int, Role, Role], bytes] = {}
+        self._whole: dict[tuple[str, str, int], bytes] = {}  # by the language, the event and its data
         self._turned: dict[str, int] = {}
         self.closed = False
 
@@ -51,18 +61,17 @@ class ViewPublisher:
         """`<boot>-<version>`, the id of the events that lead here."""
         return f"{self.boot}-{self.version}"
 
-    def post(self, view: View) -> None:
+    def post(self, view: View, without_control: Mapping[str, Attributes] = NOTHING) -> None:
         """A view as of now; nothing happens if it is the same as before."""
         news = difference(self.view, view)
-        if not news:
+        if not news and without_control == self._without_control:
             return
         self.version += 1
         for widget, changed in news.get("update", {}).items():
             if "enabled" in changed:
                 self._turned[widget] = self.version
-        self.view, self._news = view, news
-        self._prepared = {}
-        self._whole = {}
+        self.view, self._news, self._without_control = view, news, without_control
+        self._seen, self._prepared, self._whole = {}, {}, {}
         self.heartbeat.along()
         self._wake()
 
@@ -84,18 +93,28 @@ class ViewPublisher:
         if not self.closed and (self.version, self.heartbeat.count) == (version, beats):
             await self._changed.wait()
 
-    def snapshot(self, language: str = ENGLISH) -> bytes:
-        """The `snapshot` event: everything that the page shows."""
-        everything = {"id": self.id, "revision": self.revision, **self.view}
-        return self._all_of("snapshot", everything, language)
+    def seen_as(self, role: Role = "") -> View:
+        """The newest view, as clients of this role get it."""
+        if role not in self._seen:
+            self._seen[role] = seen_as(self.view, self._without_control, role)
+        return self._seen[role]
 
-    def since(self, version: int, view: View, language: str = ENGLISH) -> bytes:
-        """The events from a view that was posted as `version` to the newest one."""
-        prepared = self._prepared.get((language, version))
+    def snapshot(self, language: str = ENGLISH, role: Role = "") -> bytes:
+        """The `snapshot` event: everything that the page shows."""
+        view = self.seen_as(role)
+        about = {"id": self.id, "revision": self.revision}
+        return self._all_of("snapshot", view, language, lambda: {**about, **view})
+
+    def since(
+        self, version: int, view: View, language: str = ENGLISH, was: Role = "", role: Role = ""
+    ) -> bytes:
+        """The events from a view that was posted as `version`, and sent to those whose role it `was`,
+        to the newest one."""
+        prepared = self._prepared.get((language, version, was, role))
         if prepared is None:
-            latest = version == self.version - 1
-            news = self._news if latest else difference(view, self.view)
-            prepared = self._prepared[language, version] = b"".join(
+            latest = version == self.version - 1 and not (was or role)
+            news = self._news if latest else difference(view, self.seen_as(role))
+            prepared = self._prepared[language, version, was, role] = b"".join(
                 self._event(name, data, language)
                 if name == "update"
                 else self._all_of(name, data, language)
@@ -103,11 +122,19 @@ class ViewPublisher:
             )
         return prepared
 
-    def _all_of(self, name: str, data: Mapping[str, Any], language: str) -> bytes:
-        """An event that is the same whatever was sent before."""
-        whole = self._whole.get((language, name))
+    def _all_of(
+        self,
+        name: str,
+        of: Mapping[str, Any],
+        language: str,
+        data: Callable[[], Mapping[str, Any]] | None = None,
+    ) -> bytes:
+        """An event that is the same whatever was sent before: with `of`, a part of one of the newest
+        views, or `data` made of it."""
+        key = language, name, id(of)
+        whole = self._whole.get(key)
         if whole is None:
-            whole = self._whole[language, name] = self._event(name, data, language)
+            whole = self._whole[key] = self._event(name, data() if data else of, language)
         return whole
 
     def _event(self, name: str, data: Mapping[str, Any], language: str) -> bytes:

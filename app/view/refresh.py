@@ -85,7 +85,7 @@ class ViewRefresher:
         self._displays = [(robot.key(w.topic), w) for w in panel.displays]
         self._seen = self._sight()
         self.lamp = self._seen.robot
-        self.publisher = ViewPublisher(self._seen.view, revision)
+        self.publisher = ViewPublisher(self._seen.view, revision, self._seen.without_control)
         self._shown_at = 0.0
         self._spoke: set[str] = set()  # keys of topics that said something since
         self._whole = False  # whether more than values is to be shown
@@ -129,7 +129,7 @@ class ViewRefresher:
         self._shown_at = time.monotonic()
         try:
             self._refresh()
-            self.publisher.post(self._seen.view)
+            self.publisher.post(self._seen.view, self._seen.without_control)
         except Exception:
             if not self._failed:
                 self._log.exception("the view could not be refreshed; it is tried again")
@@ -183,6 +183,7 @@ class ViewRefresher:
             fault=joined(faults, "between_lines"),
             lock=sources.operators_log.lock if unlogged else "",
             control=sources.control.view(),
+            control_lock=sources.control.lock,
             control_until=sources.control.until,
         )
         seen.view["link"] = self._since.dated(seen.view["link"])

@@ -7,22 +7,18 @@ nothing.
 
 import math
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import Any, Final, NamedTuple, TypedDict
 
 from app.i18n import TextLike, say
 from app.panel.model import Panel
 from app.panel.widgets.families import Display
-from app.permission.clients import Client
-from app.permission.control_authority_view import NO_CONTROL, ControlView
-from app.permission.interlocks import (
-    PERMITTED,
-    Verdict,
-    command_verdict,
-    interlock_verdict,
-    link_verdict,
-)
+from app.permission.control_authority_view import IN_CONTROL, NO_CONTROL, ControlView, Role
+from app.permission.control_authority_view import seen_as as control_seen_as
+from app.permission.interlocks import PERMITTED, Verdict, interlock_verdict, link_verdict
+from app.permission.press_permission import Grounds, Question, permission
 from app.robot.state import RobotState
-from app.view.kinds import Enabled, enabled, show, told
+from app.view.kinds import Attributes, Enabled, enabled, show
 from app.view.link_status import Lamp, LinkStatus, link_statuses, summary
 
 
@@ -50,12 +46,14 @@ NO_OTHERS: Final[Mapping[str, Lamp]] = {}
 
 class ViewWithDeadlines(NamedTuple):
     """A view, the robot's lamp on the pages of others, and when (monotonic seconds) time alone would
-    change what the displays show, by their ids, and the `rest`."""
+    change what the displays show, by their ids, and the `rest`. `without_control` are the attributes of
+    what can be pressed, by their ids, for clients without control; none where all have it."""
 
     view: View
     robot: Lamp
     rest: float
     displays: Mapping[str, float]
+    without_control: Mapping[str, Attributes] = {}
 
     @property
     def until(self) -> float:
@@ -73,19 +71,22 @@ def build_view(
     fault: TextLike = "",
     lock: TextLike = "",
     control: ControlView = NO_CONTROL,
+    control_lock: Verdict = PERMITTED,
     control_until: float = math.inf,
 ) -> ViewWithDeadlines:
     """The view at `now` (monotonic seconds); `fault` stands above it, for `lock` nothing can be
-    pressed, where they are not "". Time alone would change `control` at `control_until`."""
+    pressed, where they are not "". `control_lock` locks for clients without control; time alone would
+    change `control` at `control_until`."""
     passable = link_verdict(robot, now)
     interlocks = {i.id: interlock_verdict(i, robot, now) for i in panel.interlocks}
-    verdicts = {
-        w.id: command_verdict(w, passable, [interlocks[i] for i in w.interlocks], robot, now)
+    grounds = Grounds(log_lock=lock)
+    questions = [
+        Question(w, robot, now, passable, [interlocks[i] for i in w.interlocks], grounds)
         for w in panel.commands
-    }
-    locks = {w: Verdict(False, "log", lock) for w in verdicts} if lock else verdicts
-    widgets = {w.id: show(w, robot, now, locks.get(w.id, PERMITTED)) for w in panel.widgets()}
-    link, until = link_statuses(panel, robot, passable, locks, now)
+    ]
+    verdicts = {question.widget.id: permission(question) for question in questions}
+    widgets = {w.id: show(w, robot, now, verdicts.get(w.id, PERMITTED)) for w in panel.widgets()}
+    link, until = link_statuses(panel, robot, passable, verdicts, now)
     banner = say("simulated") if simulated or robot.graph.simulated else ""
     view = View(
         link=link,
@@ -99,7 +100,14 @@ def build_view(
     others = (at for name, (_, at) in widgets.items() if name not in untils)
     judged = (passable, *interlocks.values(), *verdicts.values())
     rest = min(until, control_until, *others, *(verdict.until for verdict in judged))
-    return ViewWithDeadlines(view, summary(robot.name, link), rest, untils)
+    without = {} if control_lock.permitted else _without_control(questions, control_lock)
+    return ViewWithDeadlines(view, summary(robot.name, link), rest, untils, without)
+
+
+def _without_control(questions: Iterable[Question], lock: Verdict) -> dict[str, Attributes]:
+    """The same commands, asked for a client that has no control."""
+    asked = (one._replace(grounds=replace(one.grounds, control=lock)) for one in questions)
+    return {one.widget.id: show(one.widget, one.robot, one.now, permission(one))[0] for one in asked}
 
 
 def update_displays(
@@ -109,16 +117,14 @@ def update_displays(
     widgets, untils = dict(seen.view["widgets"]), dict(seen.displays)
     for widget in displays:
         widgets[widget.id], untils[widget.id] = show(widget, robot, now)
-    return ViewWithDeadlines({**seen.view, "widgets": widgets}, seen.robot, seen.rest, untils)
+    return seen._replace(view={**seen.view, "widgets": widgets}, displays=untils)
 
 
-def as_seen_by(view: View, client: Client) -> View:
-    """The view as a page shows it: without control what can be pressed is locked, unless there is no
-    way to the robot at all. Pages with scripts do the same to what events bring."""
-    control = view["control"]
-    mine = client.id and client.id == control["holder"]
-    if not control["required"] or mine or view["link"]["bridge"]["state"] != "ok":
+def seen_as(view: View, without_control: Mapping[str, Attributes], role: Role) -> View:
+    """The view as clients of this role get it: without control, what can be pressed is locked."""
+    if not role:
         return view
-    lock = {"enabled": False, "reason": control["text"], **told([control["text"]])}
-    widgets = {w: {**a, **{k: lock[k] for k in a.keys() & lock}} for w, a in view["widgets"].items()}
-    return {**view, "widgets": widgets}
+    control = control_seen_as(view["control"], role)
+    if role in IN_CONTROL:
+        return {**view, "control": control}
+    return {**view, "control": control, "widgets": {**view["widgets"], **without_control}}

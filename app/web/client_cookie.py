@@ -8,7 +8,8 @@ from fastapi import Request
 from fastapi.responses import Response
 from starlette.requests import HTTPConnection
 
-from app.permission.clients import TOKEN, Client, anonymous, new_client, new_token
+from app.permission.clients import TOKEN, anonymous, new_client, new_token
+from app.permission.principal import Principal
 from app.web.app_state import AppState
 
 COOKIE: Final = "panel_browser"
@@ -23,11 +24,11 @@ class Caller:
     token: str
     address: str
 
-    def seen(self, state: AppState) -> Client:
-        """The browser that this is now; without a token a stranger."""
+    def seen(self, state: AppState) -> Principal:
+        """Who this is now; without a token an anonymous client."""
         if not self.token:
-            return anonymous(self.address)
-        return state.clients.seen(self.token, self.address)
+            return Principal(anonymous(self.address))
+        return Principal(state.clients.seen(self.token, self.address))
 
 
 def caller(request: HTTPConnection) -> Caller:
@@ -36,24 +37,24 @@ def caller(request: HTTPConnection) -> Caller:
     return Caller(token if TOKEN.fullmatch(token) else "", address)
 
 
-def visitor(request: HTTPConnection, state: AppState) -> Client:
-    """The browser by its cookie; without one, or with one that is none of ours, a stranger."""
+def visitor(request: HTTPConnection, state: AppState) -> Principal:
+    """Who asks, by the cookie; without one, or with one that is not ours, an anonymous client."""
     return caller(request).seen(state)
 
 
-def welcomed(request: Request, state: AppState) -> tuple[Client, str]:
-    """The browser, and the token that it gets with the answer, "" where it has one.
+def welcomed(request: Request, state: AppState) -> tuple[Principal, str]:
+    """Who asks, and the token that their browser gets with the answer, "" where it has one.
 
     With a link on another site's page a browser does not send the cookie that it may have: it
     gets no second one, and tells with its next request who it is.
     """
-    browser = visitor(request, state)
-    if browser.id or request.headers.get("sec-fetch-site") in OTHER_SITES:
-        return browser, ""
+    who = visitor(request, state)
+    if who.client.id or request.headers.get("sec-fetch-site") in OTHER_SITES:
+        return who, ""
     token = new_token()
     if by_hand(request):
-        return state.clients.seen(token, browser.address), token
-    return new_client(token, browser.address), token
+        return Principal(state.clients.seen(token, who.client.address)), token
+    return Principal(new_client(token, who.client.address)), token
 
 
 def keep(response: Response, request: Request, token: str) -> Response:

@@ -60,7 +60,7 @@ const SHOW = {
 function showWidget(id, attributes) {
   const root = widgets.get(id);
   if (!root) return;
-  for (const [name, value] of Object.entries(control.over(id, attributes))) {
+  for (const [name, value] of Object.entries(attributes)) {
     if (name in SHOW) SHOW[name](root, value);
     else showInPlace(root, name, value);
   }
@@ -70,15 +70,14 @@ function showWidget(id, attributes) {
 const bar = document.getElementById("control");
 const nothing = () => {};
 const control = bar
-  ? new (await import("./control.js")).Control(bar, showWidget, (event) => source.timeOf(event))
-  : { over: (_, attributes) => attributes, link: nothing, show: nothing, lost: nothing, beat: nothing };
+  ? new (await import("./control.js")).Control(bar, (event) => source.timeOf(event))
+  : { show: nothing, lost: nothing, beat: nothing };
 
 function showWidgets(changes) {
   for (const [id, attributes] of Object.entries(changes)) showWidget(id, attributes);
 }
 
 function showLink(lamps) {
-  control.link(lamps);
   for (const [name, { since, ...lamp }] of Object.entries(lamps)) {
     showLamp(name, name === "server" ? lamp : { since, ...lamp }); // this page's own link to it
   }
@@ -164,7 +163,7 @@ const source = new Source({
   },
   update: showWidgets,
   ...SECTIONS,
-  browser: (mine) => control.browser(mine), // comes only where control is required
+  browser: nothing, // this client's id: for programs
   beat(now) {
     setText(clock, now.clock);
     if (back) setText(document.querySelector('[data-link="server"] [data-text="since"]'), now.clock);

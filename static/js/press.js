@@ -5,7 +5,7 @@ export const TAP_AGAIN_MS = 700;
 // A page that nobody touches for so long gives its socket back.
 const UNTOUCHED_MS = 60_000;
 
-function newId() {
+export function newId() {
   const bytes = crypto.getRandomValues(new Uint8Array(16));
   return [...bytes].map((byte) => byte.toString(16).padStart(2, "0")).join("");
 }

@@ -12,7 +12,8 @@ import pytest
 from app.audit import Entry, Filter, Limits, OpenPress, OperatorLog, Origin
 from app.audit.press_record import Log, PressLog
 from app.audit.queries import rows
-from app.commands.receipts import PressContext, Receipt
+from app.commands.press_context import PressContext
+from app.commands.receipts import Receipt
 from app.errors import LogError
 from app.i18n import say
 from app.panel.model import Panel

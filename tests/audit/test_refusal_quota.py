@@ -14,8 +14,9 @@ from app.audit.queries import rows
 from app.audit.refusal_quota import OF_ADDRESS, OF_ALL, OF_BROWSER, REMEMBERED, TOLD_APART, RefusalQuota
 from app.audit.store import Store
 from app.audit.verify import verify
+from app.commands.press_context import PressContext
 from app.commands.presses import Presses
-from app.commands.receipts import RECEIPTS_KEPT, PressContext, Receipt
+from app.commands.receipts import RECEIPTS_KEPT, Receipt
 from app.errors import LogError
 from app.robot.state import RobotState
 from tests.browser.test_holds_in_browser import PANEL

@@ -13,7 +13,9 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 
 from app.commands.holds.controller import HoldController
 from app.commands.holds.lease import AHEAD_S, LEASE_S, Lease, sent_at
+from app.commands.holds.messages import HoldMessages
 from app.commands.holds.receipts import RELEASED, ActiveHold
+from app.commands.press_judge import Latest
 from app.commands.receipts import Receipt
 from app.dialect import bridge_dialect
 from app.errors import LinkError, NotFound
@@ -136,8 +138,8 @@ class Bench:
         self.pending: list[Callable[[], None]] = []  # what has come from the robot, not taken in yet
         self.news: Callable[[], bool] = lambda: bool(self.pending)
         self.holds = HoldController(
-            self.panel, INTERFACES, self.robot, self.way, self.loop,
-            checked=checked, take=self.take, news=lambda: self.news(), changed=lambda: None,
+            self.panel, self.robot, HoldMessages(INTERFACES, self.robot, self.way, checked),
+            self.loop, Latest(self.take, lambda: self.news()), changed=lambda: None,
         )  # fmt: skip
 
     def take(self) -> None:

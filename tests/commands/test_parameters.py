@@ -16,7 +16,7 @@ from app.errors import InputError
 from app.panel.model import Panel
 from app.panel.number_range import Range, described
 from app.panel.widgets.parameter import DESCRIBE, EVENT_TYPE, GET, SET, Parameter
-from app.permission.interlocks import press_verdict
+from app.permission.press_permission import judged
 from app.robot.command_status import Outcome
 from app.robot.parameter_state import UNKNOWN, ParameterState, allowed, limits_text, wire
 from app.robot.state import Sample
@@ -130,7 +130,7 @@ class Bench:
 
     def reason(self, name: str = "speed") -> str:
         one = next(w for w in self.panel.parameters() if w.id == name)
-        return str(press_verdict(one, (), self.robot, NOW).reason or "")
+        return str(judged(one, (), self.robot, NOW).reason or "")
 
 
 def run(test: Callable[[Bench], Coroutine[Any, Any, None]], *widgets: Table) -> None:
@@ -380,7 +380,7 @@ def test_a_node_that_answers_without_it_is_asked_ever_more_rarely(
         paused.append(longest_s)
         await asyncio.sleep(0)
 
-    monkeypatch.setattr(sync, "_within", within)
+    monkeypatch.setattr(sync, "within", within)
 
     async def test(bench: Bench) -> None:
         bench.offer()

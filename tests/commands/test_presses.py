@@ -12,13 +12,16 @@ from typing import Any
 import pytest
 
 from app.audit.press_record import origin_of
-from app.commands.receipts import RECEIPTS_KEPT, PressContext, Receipt
+from app.commands.press_context import PressContext
+from app.commands.receipts import RECEIPTS_KEPT, Receipt
 from app.errors import LinkError, NotFound
 from app.panel.model import Panel
 from app.panel.rules import ControlRules
-from app.permission.clients import Client, Clients, anonymous
+from app.permission.clients import Clients, anonymous
 from app.permission.control_authority import ControlAuthority
 from app.permission.interlocks import PERMITTED, Verdict, locked
+from app.permission.press_permission import Grounds
+from app.permission.principal import Principal
 from app.robot.state import RobotState, Sample
 from tests.support.builders import (
     BOOL,
@@ -66,7 +69,7 @@ class Way:
         return [INTERFACES.decode(TEXT, payload).data for _, payload in self.sent]
 
 
-PROGRAM = anonymous("127.0.0.1")
+PROGRAM = Principal(anonymous("127.0.0.1"))
 
 
 class Bench:
@@ -79,7 +82,7 @@ class Bench:
         self.robot = robot_there(panel)
         permits(self.robot)
         self._presses = presses_of(panel, self.robot, self.way, monotonic=lambda: self.now)
-        self.may_press: Callable[[Client], Verdict] = lambda _: PERMITTED
+        self.may_press: Callable[[Principal], Verdict] = lambda _: PERMITTED
         self.receipt = self._presses.receipt
         self.typed = sending_of(panel, self.robot, self.way).typed
 
@@ -88,10 +91,10 @@ class Bench:
         widget: str = "free",
         inputs: Mapping[str, Any] | None = None,
         press_id: str = "p1",
-        who: Client = PROGRAM,
+        who: Principal = PROGRAM,
     ) -> Receipt:
         given = {"message": "hello"} if inputs is None else inputs
-        by = PressContext(origin_of(who), lambda: self.may_press(who))
+        by = PressContext(origin_of(who), lambda: Grounds(self.may_press(who)))
         return asyncio.run(self._presses.press(widget, given, press_id, by))
 
     def cancel(self, widget: str) -> Receipt:
@@ -420,7 +423,7 @@ class Locked:
 
     def __init__(self) -> None:
         self.bench = Bench()
-        self.other = Clients().seen("0" * 32, "192.0.2.7")
+        self.other = Principal(Clients().seen("0" * 32, "192.0.2.7"))
         control = ControlAuthority(ControlRules(required=True), "", monotonic=lambda: NOW)
         control.take(self.other)
         self.bench.may_press = control.verdict

@@ -12,9 +12,10 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 from app.errors import PanelError
 from app.panel import Panel, load_panel
 from app.panel.rules import ControlRules
-from app.permission.clients import Client, Clients, anonymous
+from app.permission.clients import Clients, anonymous
 from app.permission.control_authority import ASK_AGAIN_S, LIFE_S, ControlAuthority, Refusal
 from app.permission.control_authority_view import Role, role
+from app.permission.principal import Principal
 from tests.support.builders import told
 from tests.support.words import english
 
@@ -23,9 +24,9 @@ TAKEOVER_S = RULES.takeover_after_s
 FORM_LIFE_S = 35.0
 
 _KNOWN = Clients()
-ANN, BOB, CY = (_KNOWN.seen(f"{n:032x}", f"192.0.2.{n}") for n in (1, 2, 3))
-CELL, CELL2 = (_KNOWN.seen(f"{n:032x}", "127.0.0.1") for n in (8, 9))
-NOBODY = anonymous("192.0.2.99")
+ANN, BOB, CY = (Principal(_KNOWN.seen(f"{n:032x}", f"192.0.2.{n}")) for n in (1, 2, 3))
+CELL, CELL2 = (Principal(_KNOWN.seen(f"{n:032x}", "127.0.0.1")) for n in (8, 9))
+NOBODY = Principal(anonymous("192.0.2.99"))
 
 
 class Room:
@@ -38,17 +39,17 @@ class Room:
             rules, robot, monotonic=lambda: self.now, wall=lambda: self.now, tell=self.told.append
         )
 
-    def pass_s(self, seconds: float, *alive: Client, touched: bool = False) -> None:
+    def pass_s(self, seconds: float, *alive: Principal, touched: bool = False) -> None:
         end = self.now + seconds
         while self.now < end:
             self.now = min(end, self.now + 1)
             for browser in alive:
                 self.control.keepalive(browser, touched)
 
-    def may(self, client: Client) -> bool:
+    def may(self, client: Principal) -> bool:
         return self.control.verdict(client).permitted
 
-    def role(self, client: Client) -> Role:
+    def role(self, client: Principal) -> Role:
         return role(self.control.view(), client, self.control.rules)
 
 
@@ -163,7 +164,7 @@ def test_the_holder_asks_for_nothing(held: Room) -> None:
 
 def test_a_request_is_shown_to_all(asked: Room) -> None:
     view = asked.control.view()
-    assert (view["holder"], view["asker"]) == (ANN.id, BOB.id)
+    assert (view["holder"], view["asker"]) == (ANN.client.id, BOB.client.id)
     assert english(view["asker_name"]) == "Panel 2 (192.0.2.2)"
     assert english(view["holder_text"]) == (
         "Panel 2 (192.0.2.2) requests control of Robot 1."
@@ -186,17 +187,17 @@ def test_one_asks_at_a_time(asked: Room) -> None:
 
 
 def test_the_holder_gives(asked: Room) -> None:
-    assert asked.control.give(ANN, BOB.id) == ""
+    assert asked.control.give(ANN, BOB.client.id) == ""
     assert (asked.control.holder, asked.control.requester) == (BOB, None)
     assert not asked.may(ANN)
 
 
 def test_the_holder_keeps_and_the_request_can_be_repeated_later(asked: Room) -> None:
-    assert asked.control.keep(ANN, BOB.id) == ""
+    assert asked.control.keep(ANN, BOB.client.id) == ""
     assert (asked.control.holder, asked.control.requester) == (ANN, None)
     assert asked.control.ask(BOB) == "control_denied"
     assert asked.control.ask(CY) == ""  # another one may
-    asked.control.keep(ANN, CY.id)
+    asked.control.keep(ANN, CY.client.id)
     asked.pass_s(ASK_AGAIN_S, ANN)
     assert asked.control.ask(BOB) == ""
 
@@ -204,16 +205,16 @@ def test_the_holder_keeps_and_the_request_can_be_repeated_later(asked: Room) -> 
 @pytest.mark.parametrize("act", [ControlAuthority.give, ControlAuthority.keep])
 @pytest.mark.parametrize("who", [BOB, CY, CELL, NOBODY])
 def test_only_the_holder_answers_a_request(
-    asked: Room, act: Callable[[ControlAuthority, Client, str], Refusal], who: Client
+    asked: Room, act: Callable[[ControlAuthority, Principal, str], Refusal], who: Principal
 ) -> None:
-    assert act(asked.control, who, BOB.id) == "control_not_yours"
+    assert act(asked.control, who, BOB.client.id) == "control_not_yours"
     assert (asked.control.holder, asked.control.requester) == (ANN, BOB)
 
 
 @pytest.mark.parametrize("act", [ControlAuthority.give, ControlAuthority.keep])
-@pytest.mark.parametrize("to", [CY.id, ANN.id, ""])
+@pytest.mark.parametrize("to", [CY.client.id, ANN.client.id, ""])
 def test_an_answer_is_for_the_request_that_was_on_the_screen(
-    asked: Room, act: Callable[[ControlAuthority, Client, str], Refusal], to: str
+    asked: Room, act: Callable[[ControlAuthority, Principal, str], Refusal], to: str
 ) -> None:
     assert act(asked.control, ANN, to) == "control_not_yours"
     assert (asked.control.holder, asked.control.requester) == (ANN, BOB)
@@ -221,7 +222,7 @@ def test_an_answer_is_for_the_request_that_was_on_the_screen(
 
 def test_a_request_that_was_withdrawn_can_not_be_granted(asked: Room) -> None:
     assert asked.control.release(BOB) == ""
-    assert asked.control.give(ANN, BOB.id) == "control_not_yours"
+    assert asked.control.give(ANN, BOB.client.id) == "control_not_yours"
     assert asked.control.holder == ANN
 
 
@@ -294,7 +295,7 @@ def test_who_gives_it_up_while_asked_gives_it(asked: Room) -> None:
 
 
 @pytest.mark.parametrize("who", [BOB, CELL, NOBODY])
-def test_nobody_gives_up_what_another_has(held: Room, who: Client) -> None:
+def test_nobody_gives_up_what_another_has(held: Room, who: Principal) -> None:
     assert held.control.release(who) == "control_not_yours"
     assert held.control.holder == ANN
 
@@ -365,8 +366,10 @@ def test_the_first_page_of_the_panel_at_the_cell_takes_what_is_free(room: Room) 
     assert not room.may(CELL)
 
 
-@pytest.mark.parametrize(("who", "by_hand"), [(ANN, True), (CELL, False), (anonymous("::1"), True)])
-def test_no_other_page_takes_anything(room: Room, who: Client, by_hand: bool) -> None:
+@pytest.mark.parametrize(
+    ("who", "by_hand"), [(ANN, True), (CELL, False), (Principal(anonymous("::1")), True)]
+)
+def test_no_other_page_takes_anything(room: Room, who: Principal, by_hand: bool) -> None:
     room.control.loaded(who, FORM_LIFE_S, by_hand)
     assert room.control.holder is None
 
@@ -403,7 +406,7 @@ def test_every_role_is_told_by_the_view(room: Room) -> None:
 
 
 def test_the_log_tells_every_change_with_who_it_was(asked: Room) -> None:
-    asked.control.give(ANN, BOB.id)
+    asked.control.give(ANN, BOB.client.id)
     asked.control.take(CELL)
     asked.now += LIFE_S
     asked.control.advance()
@@ -477,7 +480,7 @@ class Everybody(RuleBasedStateMachine):
         self.alive_until = dict.fromkeys(EVERYBODY, -math.inf)
         self.wanted: set[str] = set()
 
-    def heard(self, who: Client, life_s: float = LIFE_S) -> None:
+    def heard(self, who: Principal, life_s: float = LIFE_S) -> None:
         self.alive_until[who] = max(self.alive_until[who], self.room.now + life_s)
 
     @rule(seconds=SECONDS)
@@ -485,45 +488,45 @@ class Everybody(RuleBasedStateMachine):
         self.room.now += seconds
 
     @rule(who=WHO, scripted=SCRIPTED)
-    def take(self, who: Client, scripted: bool) -> None:
+    def take(self, who: Principal, scripted: bool) -> None:
         life_s = LIFE_S if scripted else FORM_LIFE_S
         before = self.room.control.holder
         refusal = self.room.control.take(who, life_s)
         self.heard(who, life_s)
-        self.wanted.add(who.id)
-        if before not in (None, who) and not who.local and who.id:
+        self.wanted.add(who.client.id)
+        if before not in (None, who) and not who.client.local and who.client.id:
             assert refusal == "control_taken"
             assert self.room.control.holder == before
 
     @rule(who=WHO, scripted=SCRIPTED)
-    def ask(self, who: Client, scripted: bool) -> None:
+    def ask(self, who: Principal, scripted: bool) -> None:
         life_s = LIFE_S if scripted else FORM_LIFE_S
         before = self.room.control.holder
         self.room.control.ask(who, life_s)
         self.heard(who, life_s)
-        self.wanted.add(who.id)
-        if before not in (None, who) and not who.local:
+        self.wanted.add(who.client.id)
+        if before not in (None, who) and not who.client.local:
             assert self.room.control.holder == before
 
     @rule(who=WHO, to=WHO)
-    def give(self, who: Client, to: Client) -> None:
+    def give(self, who: Principal, to: Principal) -> None:
         before, asker = self.room.control.holder, self.room.control.requester
-        refusal = self.room.control.give(who, to.id)
-        granted = before == who and asker == to and bool(who.id)
+        refusal = self.room.control.give(who, to.client.id)
+        granted = before == who and asker == to and bool(who.client.id)
         assert (refusal == "") == granted
         assert self.room.control.holder == (to if granted else before)
 
     @rule(who=WHO, to=WHO)
-    def keep(self, who: Client, to: Client) -> None:
+    def keep(self, who: Principal, to: Principal) -> None:
         before = self.room.control.holder
-        if self.room.control.keep(who, to.id) == "":
+        if self.room.control.keep(who, to.client.id) == "":
             assert before == who
             assert self.room.control.requester is None
             self.heard(who)
         assert self.room.control.holder == before
 
     @rule(who=WHO)
-    def release(self, who: Client) -> None:
+    def release(self, who: Principal) -> None:
         before, asker = self.room.control.holder, self.room.control.requester
         if self.room.control.release(who) == "" and before == who:
             assert self.room.control.holder == asker
@@ -531,22 +534,22 @@ class Everybody(RuleBasedStateMachine):
             assert self.room.control.holder == before
 
     @rule(who=WHO, touched=st.booleans())
-    def here(self, who: Client, touched: bool) -> None:
+    def here(self, who: Principal, touched: bool) -> None:
         self.room.control.keepalive(who, touched)
         self.heard(who)
 
     @rule(who=WHO, by_hand=st.booleans())
-    def loads_a_page(self, who: Client, by_hand: bool) -> None:
+    def loads_a_page(self, who: Principal, by_hand: bool) -> None:
         before = self.room.control.holder
         self.room.control.loaded(who, FORM_LIFE_S, by_hand)
         self.heard(who, FORM_LIFE_S)
-        if who.local:
-            self.wanted.add(who.id)
+        if who.client.local:
+            self.wanted.add(who.client.id)
         if before or not by_hand:
             assert self.room.control.holder == before
 
     @rule(who=WHO)
-    def presses(self, who: Client) -> None:
+    def presses(self, who: Principal) -> None:
         before = self.room.control.holder
         self.room.control.touch(who)
         assert self.room.may(who) == (before == who)
@@ -573,7 +576,7 @@ class Everybody(RuleBasedStateMachine):
     def at_most_one_may_press(self) -> None:
         holder = self.room.control.holder
         assert [one for one in EVERYBODY if self.room.may(one)] == ([holder] if holder else [])
-        assert holder is None or holder.id
+        assert holder is None or holder.client.id
 
     @invariant()
     def nobody_absent_holds_or_asks(self) -> None:
@@ -583,7 +586,7 @@ class Everybody(RuleBasedStateMachine):
     @invariant()
     def nobody_gets_it_by_accident(self) -> None:
         for one in (self.room.control.holder, self.room.control.requester):
-            assert one is None or one.id in self.wanted
+            assert one is None or one.client.id in self.wanted
 
     @invariant()
     def nobody_asks_for_what_is_free_or_own(self) -> None:
@@ -599,8 +602,8 @@ class Everybody(RuleBasedStateMachine):
     @invariant()
     def the_view_says_the_same(self) -> None:
         view, control = self.room.control.view(), self.room.control
-        assert view["holder"] == (control.holder.id if control.holder else "")
-        assert view["asker"] == (control.requester.id if control.requester else "")
+        assert view["holder"] == (control.holder.client.id if control.holder else "")
+        assert view["asker"] == (control.requester.client.id if control.requester else "")
         roles = [self.room.role(one) for one in EVERYBODY]
         assert sum(one in ("holding", "asked") for one in roles) == (control.holder is not None)
 

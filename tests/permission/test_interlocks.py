@@ -15,8 +15,8 @@ from app.permission.interlocks import (
     Verdict,
     interlock_verdict,
     link_verdict,
-    press_verdict,
 )
+from app.permission.press_permission import judged
 from app.robot.state import RobotState, Sample
 from tests.support.builders import (
     BOOL,
@@ -117,7 +117,7 @@ def test_without_a_way_to_the_robot_everything_is_locked(
     robot: RobotState, broken: Callable[[RobotState], None], code: str, reason: str
 ) -> None:
     broken(robot)
-    for verdict in (link_verdict(robot, NOW), verdict_of(robot), press_verdict(free(), (), robot, NOW)):
+    for verdict in (link_verdict(robot, NOW), verdict_of(robot), judged(free(), (), robot, NOW)):
         assert english((verdict.permitted, verdict.code, verdict.reason)) == (False, code, reason)
 
 
@@ -229,12 +229,12 @@ def test_a_publisher_that_ended_locks_where_one_is_asked_for(robot: RobotState) 
 
 
 def test_a_publish_without_an_interlock_needs_a_way_only() -> None:
-    assert press_verdict(free(), (), robot_there(small_panel()), NOW).permitted
+    assert judged(free(), (), robot_there(small_panel()), NOW).permitted
 
 
 def test_a_publish_to_a_topic_of_another_type_is_locked(robot: RobotState) -> None:
     endpoint(robot, "MS", "/free", BOOL)
-    verdict = press_verdict(free(), (), robot, NOW)
+    verdict = judged(free(), (), robot, NOW)
     assert english((verdict.code, verdict.reason)) == (
         "wrong_type",
         "/free is std_msgs/msg/Bool on the robot, but this panel expects std_msgs/msg/String.",
@@ -243,9 +243,9 @@ def test_a_publish_to_a_topic_of_another_type_is_locked(robot: RobotState) -> No
 
 def test_a_publish_has_the_verdict_of_its_interlock(robot: RobotState) -> None:
     interlock = Interlock(id="operation", topic=ENABLED)
-    assert press_verdict(free(), [interlock], robot, NOW).permitted
+    assert judged(free(), [interlock], robot, NOW).permitted
     permits(robot, False)
-    assert press_verdict(free(), [interlock], robot, NOW).code == "forbidden"
+    assert judged(free(), [interlock], robot, NOW).code == "forbidden"
 
 
 @pytest.mark.parametrize("permitted", [True, False])
@@ -275,7 +275,7 @@ def test_a_permission_that_is_published_best_effort_locks_a_panel_that_asks_for_
 def test_a_subscriber_that_would_not_hear_locks_a_press() -> None:
     robot = robot_there(small_panel())
     endpoint(robot, "MS", "/free", TEXT, qos=Qos(transient_local=True))
-    verdict = press_verdict(free(), (), robot, NOW)
+    verdict = judged(free(), (), robot, NOW)
     assert (
         english(verdict.reason)
         == "The robot requires /free as transient local, but this panel publishes it as volatile."
@@ -287,16 +287,16 @@ def test_a_service_that_has_just_come_is_not_called_yet() -> None:
     call = Call(id="reset", kind="call", label="Reset", service="/reset", type="std_srvs/srv/Trigger")
     robot = robot_there(panel_of(call.model_dump(exclude_none=True, exclude_defaults=True)))
     token = server_token(BRIDGE, "SS", "reset", call.type)
-    assert press_verdict(call, (), robot, NOW).code == "no_service"
+    assert judged(call, (), robot, NOW).code == "no_service"
     robot.graph.apply(token, True, NOW)
-    verdict = press_verdict(call, (), robot, NOW)
+    verdict = judged(call, (), robot, NOW)
     assert english((verdict.permitted, verdict.code, verdict.reason, verdict.until)) == (
         False,
         "getting_ready",
         "Locked: the robot has just started /reset. Connecting.",
         NOW + SERVER_SETTLE_S,
     )
-    assert press_verdict(call, (), robot, NOW + SERVER_SETTLE_S).permitted
+    assert judged(call, (), robot, NOW + SERVER_SETTLE_S).permitted
     robot.graph.apply(token, False)
     robot.graph.apply(token, True, NOW + 9)  # another node of this name
-    assert press_verdict(call, (), robot, NOW + 9).code == "getting_ready"
+    assert judged(call, (), robot, NOW + 9).code == "getting_ready"

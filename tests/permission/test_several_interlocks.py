@@ -9,11 +9,11 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from app.panel.model import Panel
-from app.permission.clients import Client as Visitor
 from app.permission.control_authority_view import NO_CONTROL, ControlView
-from app.permission.interlocks import PERMITTED, Verdict, combined, press_verdict
+from app.permission.interlocks import PERMITTED, Verdict
+from app.permission.press_permission import combined, judged
 from app.robot.state import RobotState
-from app.view.view import as_seen_by, build_view
+from app.view.view import build_view, seen_as
 from tests.browser.test_pages import SIZES as LARGE
 from tests.commands.test_holds import JOG, MOVES, SPEED, STOPS
 from tests.commands.test_holds import Bench as HoldBench
@@ -60,7 +60,7 @@ def closes(robot: RobotState, closed: bool = True, at: float = NOW) -> None:
 
 def verdict_of(robot: RobotState, panel: Panel, now: float = NOW) -> Verdict:
     (widget,) = panel.commands
-    return press_verdict(widget, panel.interlocks_of(widget), robot, now)
+    return judged(widget, panel.interlocks_of(widget), robot, now)
 
 
 @pytest.mark.parametrize("permitted", [True, False])
@@ -134,7 +134,7 @@ def test_a_view_lists_all_reasons_of_a_control_with_several() -> None:
     assert english(shown["single"]) == {"enabled": False, "reason": WAITS}
     permits(robot)
     shown = build_view(panel, robot, NOW).view["widgets"]
-    assert english(shown["guarded"]["reasons"]) == english(shown["guarded"]["reason"]) == NO_DOORS
+    assert english([shown["guarded"]["reasons"], shown["guarded"]["reason"]]) == [NO_DOORS] * 2
     closes(robot)
     shown = build_view(panel, robot, NOW).view["widgets"]
     assert shown["guarded"] == {"enabled": True, "reason": None, "reasons": "", "more": ""}
@@ -144,7 +144,9 @@ def test_who_has_not_control_is_told_that_alone() -> None:
     panel = cell(control={"required": True})
     robot = robot_there(panel)
     control: ControlView = {**NO_CONTROL, "required": True, "text": "Nobody has control."}
-    view = as_seen_by(build_view(panel, robot, NOW, control=control).view, Visitor("b", "", True, 1))
+    lock = Verdict(False, "control_free", "Nobody has control.")
+    seen = build_view(panel, robot, NOW, control=control, control_lock=lock)
+    view = seen_as(seen.view, seen.without_control, "free")
     assert view["widgets"]["guarded"] == {
         "enabled": False, "reason": "Nobody has control.", "reasons": "Nobody has control.", "more": "",
     }  # fmt: skip

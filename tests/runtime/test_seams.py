@@ -10,11 +10,13 @@ import pytest
 
 from app.audit import NullLog
 from app.commands.holds.receipts import ActiveHold
-from app.commands.receipts import LONGEST_KEPT, PressContext, Receipt
+from app.commands.press_context import PressContext
+from app.commands.receipts import LONGEST_KEPT, Receipt
 from app.commands.service_calls import with_fields
 from app.panel.model import Panel
 from app.permission.clients import anonymous
 from app.permission.interlocks import interlock_verdict
+from app.permission.principal import Principal
 from app.robot.state import PassedOver, RobotState, Sample
 from app.runtime import renewal
 from app.runtime.ingest import Ingest, Updates
@@ -324,9 +326,9 @@ def test_who_ends_or_takes_a_new_panel_sends_nothing_more() -> None:
     async def pressed() -> None:
         one = session_of(small_panel(), "tcp/127.0.0.1:1")
         permits(one.robot)
-        by = one.press_guard.by("free", anonymous("192.0.2.1"))
-        assert by.controls().permitted
+        by = one.press_guard.by("free", Principal(anonymous("192.0.2.1")))
+        assert not by.grounds().ending
         await one.stop()
-        assert by.controls().code == "ending"
+        assert by.grounds().ending
 
     asyncio.run(pressed())

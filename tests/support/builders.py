@@ -8,10 +8,11 @@ from app.audit import NullLog, Origin
 from app.audit.press_record import PressLog
 from app.commands.actions.goals import GoalTracker
 from app.commands.confirmations import Confirmations
-from app.commands.dispatch import Dispatcher
+from app.commands.dispatch import Dispatcher, Trackers
 from app.commands.parameters.sync import ParameterSync
+from app.commands.press_context import PressContext
+from app.commands.press_judge import Latest, PressJudge
 from app.commands.presses import Presses
-from app.commands.receipts import PressContext
 from app.commands.service_calls import Asker, ServiceCalls
 from app.dialect import bridge_dialect
 from app.dialect.bridge_dialect import BridgeDialect
@@ -160,10 +161,12 @@ def sending_of(
         INTERFACES,
         robot,
         way,
-        calls,
-        GoalTracker(INTERFACES, robot, asker, lambda: None),
-        confirmations or Confirmations(robot, lambda: None),
-        ParameterSync(panel, INTERFACES, robot, asker, calls, lambda: None),
+        Trackers(
+            calls,
+            GoalTracker(INTERFACES, robot, asker, lambda: None),
+            confirmations or Confirmations(robot, lambda: None),
+            ParameterSync(panel, INTERFACES, robot, asker, calls, lambda: None),
+        ),
         monotonic,
         **more,
     )
@@ -182,4 +185,5 @@ def presses_of(
 ) -> Presses:
     """The presses of a robot; `more` is for `sending_of`."""
     sending = sending_of(panel, robot, way, monotonic=monotonic, **more)
-    return Presses(panel, robot, sending, press_log or PressLog(NullLog()), monotonic, catch_up, news)
+    judge = PressJudge(panel, robot, Latest(catch_up, news), monotonic)
+    return Presses(judge, sending, press_log or PressLog(NullLog()), robot.name)

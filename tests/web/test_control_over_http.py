@@ -1,6 +1,8 @@
 """Control over HTTP: several real clients on one server with the demo robot. Those that are not at
 the cell come as through a proxy, which says where from."""
 
+import csv
+import io
 import re
 import time
 from collections.abc import Callable, Iterator
@@ -10,6 +12,7 @@ from pathlib import Path
 import httpx
 import pytest
 
+from app.commands.press_limits import OF_CLIENT
 from app.web.client_cookie import COOKIE
 from tests.runtime.test_several_robots import entry, panel_file
 from tests.support.parts import ROOT, Server, until
@@ -316,6 +319,69 @@ def test_forms_lead_back_to_their_page_with_what_was_refused(client: Callable[..
     assert "Another panel has control" in bob.http.get(refused.headers["location"]).text
     odd = bob.http.get("/pages/operation?control=<script>").text
     assert "<script>" not in odd.split('<form class="control"')[1]
+
+
+def test_an_act_is_answered_with_a_receipt_and_the_same_id_is_the_same_act(
+    client: Callable[..., Client],
+) -> None:
+    ann, bob = client("192.0.2.1"), client("192.0.2.2")
+    first = ann.control("take", id="act-1")
+    assert first.status_code == 200
+    receipt = first.json()
+    assert {name: receipt[name] for name in ("id", "act", "outcome", "code", "reason")} == {
+        "id": "act-1", "act": "take", "outcome": "succeeded", "code": "", "reason": "",
+    }  # fmt: skip
+    assert datetime.fromisoformat(receipt["at"]).tzinfo
+    assert receipt["control"]["role"] == "holding"
+    assert ann.control("release", id="act-2").json()["done"]
+    again = ann.control("take", id="act-1")
+    assert (again.status_code, again.json()["at"]) == (200, receipt["at"])
+    assert again.json()["control"]["holder"] == ""  # it was not done again
+    stolen = bob.control("take", id="act-1")
+    assert (stolen.status_code, stolen.json()["code"]) == (409, "press_reused")
+    assert ann.control("take", id="<script>").status_code == 422
+
+
+def test_a_form_that_is_sent_twice_is_one_act(client: Callable[..., Client]) -> None:
+    ann = client("192.0.2.1")
+    found = re.search(r'name="id" value="([0-9a-f]+)"', ann.http.get("/pages/operation").text)
+    assert found
+    fields = {"to": "", "page": "operation", "id": found[1]}
+    assert ann.http.post("/control/take", data=fields).status_code == 303
+    assert ann.control("release").json()["done"]
+    assert ann.http.post("/control/take", data=fields).status_code == 303
+    assert "No panel has control" in ann.http.get("/pages/operation").text
+
+
+def test_acts_are_in_the_operators_log_its_page_and_its_csv(
+    client: Callable[..., Client], kiosk: Server
+) -> None:
+    ann, bob = client("192.0.2.1"), client("192.0.2.2")
+    ann.take()
+    bob.control("take", id="bobs-act")
+    ann.control("release")
+    rows = list(csv.DictReader(io.StringIO(ann.http.get("/log.csv").text.removeprefix("\ufeff"))))
+    acts = [row for row in rows if row["kind"] == "control"]
+    assert [(row["action"], row["browser"], row["outcome"]) for row in reversed(acts)] == [
+        ("control_take", ann.id, "succeeded"),
+        ("control_take", bob.id, "refused"),
+        ("control_release", ann.id, "succeeded"),
+    ]
+    assert acts[1]["press"] == "bobs-act"
+    html = ann.http.get("/log", params={"text": "control_take"}).text
+    assert html.count("<td>Take control") == 2
+    assert "Release control" not in html
+    assert "Another panel has control. You can request it." in html
+
+
+def test_more_acts_than_a_client_may_are_refused(client: Callable[..., Client]) -> None:
+    ann, bob = client("192.0.2.1"), client("192.0.2.2")
+    ann.take()
+    answers = [bob.control("give", to="0" * 12) for _ in range(int(OF_CLIENT.at_once) * 3)]
+    limited = next(one for one in answers if one.status_code == 429)
+    assert limited.headers["retry-after"] == "1"
+    assert (limited.json()["outcome"], limited.json()["code"]) == ("refused", "control_too_often")
+    assert ann.press().status_code == 200
 
 
 def test_each_robot_has_its_own_control(tmp_path: Path) -> None:

@@ -13,16 +13,18 @@ from typing import Any, Protocol
 
 from app.clock import format_time
 from app.commands.holds.lease import LEASE_S, Lease
-from app.commands.holds.messages import Checked, HoldMessages, Transport, Values
+from app.commands.holds.messages import HoldMessages, Values
 from app.commands.holds.receipts import RELEASED, ActiveHold, HoldReceipts, Refusal, refused
-from app.commands.receipts import MOST_LOOKS, PressContext, Receipt, Witness, cause_of, judged
+from app.commands.press_context import PressContext
+from app.commands.press_judge import Latest
+from app.commands.receipts import MOST_LOOKS, Receipt, Witness
 from app.errors import Cause, FieldError, InputError, LinkError, NotFound, PressRefused
 from app.i18n import TextLike, say
-from app.interfaces import Interfaces
 from app.panel.model import Panel
 from app.panel.template import needed
 from app.panel.widgets.hold import Hold
 from app.permission.interlocks import Verdict
+from app.permission.press_permission import cause_of, judged
 from app.robot.state import RobotState
 
 
@@ -39,33 +41,30 @@ class HoldController:
     def __init__(
         self,
         panel: Panel,
-        interfaces: Interfaces,
         robot: RobotState,
-        transport: Transport,
+        messages: HoldMessages,
         loop: Clock,
+        latest: Latest,
         *,
-        checked: Checked,
-        take: Callable[[], None],
-        news: Callable[[], bool],
         changed: Callable[[], None],
         witness: Witness | None = None,
     ) -> None:
-        """`checked` are the values that a template gets of what was entered; `take` takes in what
-        has come from the robot, `news` tells whether more has come that may change what is permitted;
-        `changed` is called when what the widgets show has changed."""
+        """`changed` is called when what the widgets show has changed."""
         self._panel = panel
         self._robot = robot
         self._loop = loop
-        self._messages = HoldMessages(interfaces, robot, transport, checked)
+        self._messages = messages
         self._receipts = HoldReceipts(robot.name, witness)
-        self.doubted = self._receipts.doubted
-        self._take = take
-        self._news = news
+        self._latest = latest
         self._changed = changed
         self._widgets = {w.id: w for w in panel.widgets() if isinstance(w, Hold)}
         self._held: dict[str, ActiveHold] = {}
         self._timer: asyncio.TimerHandle | None = None
         self._closed = False
+
+    def doubted(self, receipt: Receipt) -> Receipt:
+        """The receipt of a hold whose last message is not known to have reached the bridge."""
+        return self._receipts.doubted(receipt)
 
     def widget(self, widget_id: str) -> Hold:
         """What can be held; NotFound for everything else."""
@@ -84,7 +83,7 @@ class HoldController:
     ) -> Receipt | ActiveHold:
         """Begins to publish, or says why not. `sent` is when the browser asked, at the latest; a hold
         without an id gets one."""
-        self._take()
+        self._latest.take()
         self.judge()
         widget, now = self.widget(widget_id), self._loop.time()
         ready = self._ready(widget, inputs, sent, context, now)
@@ -121,7 +120,7 @@ class HoldController:
         self, widget_id: str, inputs: Mapping[str, Any], sent: float, context: PressContext
     ) -> Receipt | None:
         """The receipt of a hold that `begin` would refuse now, without a trace; None for others."""
-        self._take()
+        self._latest.take()
         self.judge()
         widget = self.widget(widget_id)
         ready = self._ready(widget, inputs, sent, context, self._loop.time())
@@ -153,7 +152,7 @@ class HoldController:
         if now >= sent + LEASE_S:
             return say("hold_late"), "interlock"
         if not (verdict := self._verdict(widget, context, now)).permitted:
-            return verdict.reason or "", cause_of(verdict)
+            return verdict.reason or "", cause_of(verdict.code)
         return context.stale_reason(), "interlock"
 
     def beat(self, holding: ActiveHold, number: int, sent: float) -> bool:
@@ -194,7 +193,7 @@ class HoldController:
 
     def step(self) -> None:
         """Sends what is due, by all that has come until now, and plans the next step."""
-        self._take()
+        self._latest.take()
         self.judge()
         for holding in list(self._held.values()):
             if self._on(holding) and holding.lease.due(self._loop.time()):
@@ -205,7 +204,8 @@ class HoldController:
         return self._held.get(holding.widget.id) is holding
 
     def _verdict(self, widget: Hold, context: PressContext, now: float) -> Verdict:
-        return judged(widget, context, self._panel, self._robot, now)
+        interlocks = self._panel.interlocks_of(widget)
+        return judged(widget, interlocks, self._robot, now, context.grounds())
 
     def _plan(self) -> None:
         if self._timer is not None:
@@ -234,9 +234,9 @@ class HoldController:
         for _ in range(MOST_LOOKS):
             if not self._on(holding):
                 raise PressRefused("", "interlock")
-            if not self._news():
+            if not self._latest.news():
                 return
-            self._take()
+            self._latest.take()
             self.judge()
         self.end(holding, "catching_up")
         raise PressRefused("", "interlock")

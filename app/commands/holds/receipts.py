@@ -10,9 +10,9 @@ from typing import Any, Final, NamedTuple
 from app.clock import format_time
 from app.commands.holds.lease import Lease
 from app.commands.holds.messages import Values
+from app.commands.press_context import PressContext
 from app.commands.receipts import (
     LONGEST_LOGGED,
-    PressContext,
     Receipt,
     Witness,
     named,

@@ -8,28 +8,27 @@ error. What was asked of a bridge or a node that went away meanwhile no longer c
 
 import asyncio
 import logging
-import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, Final, Literal
 
-from app.clock import format_time
 from app.commands.parameters.client import NoAnswer, ParameterClient
+from app.commands.parameters.known import KnownParameters
+from app.commands.parameters.node import Node, within
+from app.commands.parameters.setting import set_request
 from app.commands.parameters.values import checked
-from app.commands.service_calls import LONGEST_SAID, Asker, Request, ServiceCalls, with_reply
+from app.commands.service_calls import Asker, ServiceCalls
 from app.concurrency import spawn_logged
 from app.dialect.endpoint import Endpoint
 from app.errors import DecodeError
 from app.i18n import TextLike, say
-from app.interfaces import Fields, Interfaces, text_of
+from app.interfaces import Interfaces
 from app.panel.model import Panel
 from app.panel.widgets.parameter import DESCRIBE, EVENT_TYPE, GET, SET, Parameter, Value
 from app.permission.interlocks import SERVER_SETTLE_S, parameters_offered
-from app.printable import printable
 from app.robot.command_status import LastLook, OnCorrection, Outcome, no_look
-from app.robot.parameter_state import UNKNOWN, ParameterState, name_of, parameter_states, value_in, wire
+from app.robot.parameter_state import parameter_states
 from app.robot.state import RobotState, Sample
 from app.ros_logging import RobotLog
 
@@ -41,29 +40,7 @@ FAILED: Final = "following a node's parameters failed"
 SETTLE_S: Final = SERVER_SETTLE_S  # before which a question to a node that appeared may be lost
 CONFIRM_S: Final = 3.0  # after which the bridge surely brings the events of a node that appeared
 AGAIN_S: Final = 1.0  # between two readings at least, and before the first try again
-SET_PATHS: Final = ("results[0].successful", "results[0].reason", "results[1].successful")
 AGAIN_MOST_S: Final = 600.0  # the pause between tries doubles up to this
-
-
-@dataclass(slots=True)
-class _Node:
-    """A node with the panel's parameters; `heard` are values of events while it is being asked.
-
-    `wanted` is set when it is to be asked again, `urgent` when that is not to wait for `AGAIN_S`;
-    `told_at` (monotonic seconds) is when it answered last.
-    """
-
-    name: str
-    widgets: list[Parameter] = field(default_factory=list)
-    wanted: asyncio.Event = field(default_factory=asyncio.Event)
-    urgent: asyncio.Event = field(default_factory=asyncio.Event)
-    heard: dict[str, Any] = field(default_factory=dict)
-    told_at: float = -math.inf
-    task: "asyncio.Task[None] | None" = None
-
-    def ask_now(self) -> None:
-        self.wanted.set()
-        self.urgent.set()
 
 
 class ParameterSync:
@@ -85,9 +62,10 @@ class ParameterSync:
         self._services = ParameterClient(interfaces, robot, link)
         self._calls = calls
         self._changed = changed
-        self._nodes: dict[str, _Node] = {}
+        self._known = KnownParameters(robot, self._log)
+        self._nodes: dict[str, Node] = {}
         for widget in panel.parameters():
-            self._nodes.setdefault(widget.node, _Node(widget.node)).widgets.append(widget)
+            self._nodes.setdefault(widget.node, Node(widget.node)).widgets.append(widget)
         services = (name for name, _ in (GET, DESCRIBE, SET))
         self._served_by = {
             robot.key(f"{node.name}/{service}"): node
@@ -121,16 +99,13 @@ class ParameterSync:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
 
-    def _cut(self, node: _Node) -> None:
+    def _cut(self, node: Node) -> None:
         if node.task is None:
             return
         node.task.cancel()
         node.task = None
         self._end_asking(node)
-        for widget in node.widgets:
-            known = self._known(widget)
-            cut = replace(known, state="cut") if known.value is not None else UNKNOWN
-            self._robot.parameters[widget.id] = cut
+        self._known.cut(node.widgets)
 
     # What the node tells.
 
@@ -155,48 +130,38 @@ class ParameterSync:
         for node in self._nodes.values():
             node.wanted.set()
 
-    def _take_event(self, node: _Node, event: Any, wall: float) -> None:
+    def _take_event(self, node: Node, event: Any, wall: float) -> None:
         redeclared = {one.name for one in (*event.new_parameters, *event.deleted_parameters)}
         changed = {one.name: one.value for one in event.changed_parameters}
         node.heard |= {
             w.parameter: changed[w.parameter] for w in node.widgets if w.parameter in changed
         }
         for widget in node.widgets:
-            if widget.parameter in redeclared:
+            name = widget.parameter
+            if name in redeclared or (
+                name in changed and not self._known.told(widget, changed[name], wall)
+            ):
                 node.wanted.set()
-            elif widget.parameter in changed:
-                self._take_value(node, widget, changed[widget.parameter], wall)
 
-    def _take_value(self, node: _Node, widget: Parameter, value: Any, wall: float) -> None:
-        known = self._known(widget)
-        if known.state not in ("live", "missing"):
-            node.wanted.set()
-        elif name_of(value.type) != widget.type:
-            self._learn(widget, ParameterState("mistyped", found=name_of(value.type), wall=wall))
-        else:
-            self._learn(widget, replace(known, state="live", value=value_in(widget, value), wall=wall))
-
-    async def _follow_node(self, node: _Node) -> None:
+    async def _follow_node(self, node: Node) -> None:
         """Asks a node, as often as there is need, until it is cut off."""
         confirmed, pause = False, AGAIN_S
         await asyncio.sleep(SETTLE_S)
         while True:
-            node.wanted.clear()
-            node.urgent.clear()
-            node.heard.clear()
+            node.asked()
             read = await self._read(node)
-            await _within(node.urgent, AGAIN_S)
+            await within(node.urgent, AGAIN_S)
             match read:
                 case "silent":
                     await node.urgent.wait()
                 case "partly":
-                    await _within(node.wanted, pause)
+                    await within(node.wanted, pause)
                     pause = min(2 * pause, AGAIN_MOST_S)
                 case "whole":
-                    await _within(node.wanted, None if confirmed else CONFIRM_S)
+                    await within(node.wanted, None if confirmed else CONFIRM_S)
                     confirmed, pause = True, AGAIN_S
 
-    async def _read(self, node: _Node) -> Read:
+    async def _read(self, node: Node) -> Read:
         """Asks for all of a node's parameters: whether it told all, not all, or nothing."""
         self._robot.asking |= {widget.id for widget in node.widgets}
         self._changed()
@@ -207,7 +172,7 @@ class ParameterSync:
                 self._end_asking(node)
                 self._changed()
 
-    async def _answered(self, node: _Node) -> Read:
+    async def _answered(self, node: Node) -> Read:
         names = list(dict.fromkeys(widget.parameter for widget in node.widgets))
         try:
             asked = self._services.read(node.name, names, partial(self._silent, node))
@@ -216,7 +181,8 @@ class ParameterSync:
             return "partly" if error.dropped else "silent"
         except DecodeError as error:
             self._log.error("%s: %s", node.name, error)
-            self._learn_all(node, lambda known: ParameterState("unreadable", wall=time.time()))
+            self._known.unreadable(node.widgets, time.time())
+            self._changed()
             return "partly"
         node.told_at = time.monotonic()
         self._calls.mark_answered(f"{node.name}/{SET[0]}")
@@ -224,12 +190,12 @@ class ParameterSync:
         for widget in node.widgets:
             name = widget.parameter
             found = parameter_states(widget, descriptors.get(name), values.get(name), time.time())
-            self._learn(widget, found)
+            self._known.learn(widget, found)
         self._changed()
-        live = all(self._known(widget).state == "live" for widget in node.widgets)
+        live = all(self._known.of(widget).state == "live" for widget in node.widgets)
         return "whole" if live else "partly"
 
-    def _end_asking(self, node: _Node) -> None:
+    def _end_asking(self, node: Node) -> None:
         self._robot.asking -= {widget.id for widget in node.widgets}
 
     def read_again(self, widget: Parameter) -> TextLike:
@@ -247,7 +213,7 @@ class ParameterSync:
 
     def checked(self, widget: Parameter, given: Any) -> Value:
         """The value to set; InputError with a sentence that names label and limits."""
-        return checked(widget, self._known(widget), given)
+        return checked(widget, self._known.of(widget), given)
 
     async def set(
         self,
@@ -258,11 +224,7 @@ class ParameterSync:
         look: LastLook = no_look,
     ) -> Outcome:
         """Sets a parameter, as a call does; whatever came of it, the node is asked how it is now."""
-        service, type_name = SET
-        fields = {"parameters": [{"name": widget.parameter, "value": wire(widget, value)}]}
-        payload = self._interfaces.encode(self._interfaces.service(type_name)[0], fields)
-        name, read = f"{widget.node}/{service}", partial(_answer, widget, value)
-        request = Request(widget.id, name, type_name, payload, widget.timeout_s, SET_PATHS, read)
+        request = set_request(self._interfaces, widget, value)
         node = self._nodes[widget.node]
 
         def late(press_id: str, answer: Outcome) -> None:
@@ -273,43 +235,6 @@ class ParameterSync:
         node.ask_now()
         return answer
 
-    # What is known.
-
-    def _known(self, widget: Parameter) -> ParameterState:
-        return self._robot.parameters.get(widget.id, UNKNOWN)
-
-    def _learn(self, widget: Parameter, known: ParameterState) -> None:
-        if known.state == "undeclared" and self._known(widget).state != "undeclared":
-            self._log.warning("%s has no parameter %s", widget.node, widget.parameter)
-        self._robot.parameters[widget.id] = known
-
-    def _learn_all(self, node: _Node, of: Callable[[ParameterState], ParameterState]) -> None:
-        for widget in node.widgets:
-            self._learn(widget, of(self._known(widget)))
+    def _silent(self, node: Node) -> None:
+        self._known.silent(node.name, node.widgets)
         self._changed()
-
-    def _silent(self, node: _Node) -> None:
-        if any(self._known(widget).state != "silent" for widget in node.widgets):
-            self._log.warning("%s does not answer when it is asked for its parameters", node.name)
-        self._learn_all(node, lambda known: replace(known, state="silent"))
-
-
-def _answer(widget: Parameter, value: Value, response: Fields) -> Outcome:
-    """What a response of SetParameters says of the one parameter that was to be set."""
-    now = format_time(time.time())
-    successful, reason, second = (response.get(path) for path in SET_PATHS)
-    if successful is None or second is not None:
-        return Outcome("unknown", say("answer_unreadable", wanted=SET[1]))
-    if successful:
-        return Outcome("succeeded", say("parameter_set", value=widget.written(value), time=now))
-    said = printable(text_of(reason, LONGEST_SAID)) if reason else ""
-    return Outcome("rejected", with_reply(say("said_no", time=now), said))
-
-
-async def _within(event: asyncio.Event, longest_s: float | None) -> None:
-    """Waits for an event, or until this time is up."""
-    try:
-        async with asyncio.timeout(longest_s):
-            await event.wait()
-    except TimeoutError:
-        pass

@@ -15,6 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, JsonValue
 from starlette.types import Message, Receive, Scope, Send
 
 from app.audit import Entry, Filter, OperatorLog, ReaderProcess, Row
+from app.commands.control_acts import ACTS
 from app.errors import InputError, LogError, NotFound
 from app.i18n import Param, Text, TextLike, say
 from app.panel.model import Panel
@@ -31,7 +32,12 @@ router = APIRouter()
 ROWS_ON_PAGE: Final = 50
 OUTCOMES: Final = (
     "published", "confirmed", "accepted", "succeeded", "rejected", "canceled", "aborted", "timed_out",
-    "refused", "unknown", "pressed", "began", "resumed", "removed",
+    "refused", "unknown", "pressed", "control", "began", "resumed", "removed",
+)  # fmt: skip
+# Entries of the kind "control": acts, and changes that no act made.
+CONTROL_ACTIONS: Final = (
+    *(f"control_{act}" for act in ACTS),
+    "control_lost", "control_idle", "control_first_page", "control_request_lost",
 )  # fmt: skip
 TAKEN_WITHIN_S: Final = 20.0  # a piece of an export: another one may be waited for
 START: Final = "http.response.start"
@@ -89,6 +95,7 @@ class LogContext(TypedDict):
     rows: list[Row]
     labels: dict[str, str]
     inputs: dict[str, str]
+    acts: dict[str, Text]
     outcomes: tuple[str, ...]
     off: TextLike
     banner: TextLike
@@ -120,6 +127,7 @@ async def page(request: Request, state: CurrentState, wanted: Annotated[Wanted, 
         rows=rows,
         labels={w.id: w.label for w in panel.widgets() if isinstance(w, Command)},
         inputs={w.id: w.label for w in panel.widgets() if isinstance(w, Entered)},
+        acts={action: _word(action) for action in CONTROL_ACTIONS},
         outcomes=OUTCOMES,
         off="" if state.log.enabled else say("log_off"),
         banner=state.banner,

@@ -1,27 +1,32 @@
 """Taking control of a robot, asking for it, giving it: JSON for scripts, forms without them."""
 
+import secrets
 from typing import Annotated, Final, TypeVar
 
 from fastapi import APIRouter, Path, Request
 from fastapi.responses import JSONResponse, RedirectResponse, Response
-from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, JsonValue
+from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
 
+from app.commands.control_acts import ACTS, ActReceipt, Asked
+from app.commands.press_context import PRESS_ID
+from app.commands.press_limits import RETRY_AFTER_S
 from app.errors import InputError, NotFound
-from app.i18n import TextLike, localized, say
+from app.i18n import localized
 from app.panel.base import ID
-from app.permission.clients import Client
-from app.permission.control_authority import LIFE_S, Refusal
+from app.permission.control_authority import LIFE_S
+from app.permission.control_authority_view import role, seen_as
+from app.permission.principal import Principal
 from app.runtime.robot_session import RobotSession
 from app.web.app_state import CurrentSession, CurrentState
 from app.web.client_cookie import keep, visitor, welcomed
 from app.web.described import FORM, JSON, described_body, errors, fields
 from app.web.language import language_of
 from app.web.request_body import as_model, body_of, form_of, json_of, kind_of
+from app.web.routes.presses import STATUS
 
 router = APIRouter()
 
-ACTS: Final[list[JsonValue]] = ["take", "ask", "give", "keep", "release"]
-Act = Annotated[str, Path(json_schema_extra={"enum": ACTS})]
+Act = Annotated[str, Path(json_schema_extra={"enum": list(ACTS)})]
 ASKER: Final = r"^[0-9a-f]{0,12}$"
 
 # A form's browser shows that it is there by loading its page anew, at the latest after this time.
@@ -31,13 +36,14 @@ FORM_FIELDS_MOST: Final = 8
 
 class Acting(BaseModel):
     """`to` is the id of who asks, for `give` and `keep`: the request that the operator saw; `at` is
-    when it was touched, in the server's own time."""
+    when it was touched, in the server's own time. The same `id` again is the same act."""
 
     model_config = ConfigDict(extra="forbid")
 
     to: Annotated[str, Field(pattern=ASKER)] = ""
     page: Annotated[str, Field(pattern=ID)] | None = None
     at: AwareDatetime | None = None
+    id: Annotated[str, Field(pattern=PRESS_ID)] | None = None
 
 
 class Here(BaseModel):
@@ -52,10 +58,16 @@ Fields = TypeVar("Fields", bound=BaseModel)
 
 
 class ControlAnswer(BaseModel):
-    """What came of an act: `browser` is the id of who asked, `reason` is "" where it was done."""
+    """The receipt of an act: `reason` is "" where it was done, `code` is its stable name; `browser` is
+    the id of the client, `control` who has control now."""
 
-    done: bool
+    id: str
+    act: str
+    outcome: str
+    code: str
     reason: str
+    at: AwareDatetime
+    done: bool
     browser: str
     control: dict[str, bool | str]
 
@@ -81,56 +93,64 @@ async def here(request: Request, state: CurrentState, session: CurrentSession) -
     | {
         303: {"description": "of a form: back to the page"},
         409: {"model": ControlAnswer, "description": "it was not done"},
+        429: {
+            "model": ControlAnswer,
+            "description": "more than a client may",
+            "headers": {"Retry-After": {"description": "seconds", "schema": {"type": "integer"}}},
+        },
+        503: {"model": ControlAnswer, "description": "the operator's log can't be written"},
     },
     openapi_extra=described_body(
-        Acting, fields(to={"pattern": ASKER}, page={"pattern": ID}), required=False
+        Acting,
+        fields(to={"pattern": ASKER}, page={"pattern": ID}, id={"pattern": PRESS_ID}),
+        required=False,
     ),
 )
 async def act(act: Act, request: Request, state: CurrentState, session: CurrentSession) -> Response:
     _required(session)
-    browser = visitor(request, state)
+    who = visitor(request, state)
     _, token = welcomed(request, state)  # without a cookie nothing is done yet, the next time it is
     form = kind_of(request) == FORM
     given = await _given(Acting, request)
-    reason: TextLike = "" if form or given.at is None else _late(session, act, given.at.timestamp())
-    refusal = "" if reason else _done(session, act, browser, given.to, FORM_LIFE_S if form else LIFE_S)
-    reason = say(refusal) if refusal else reason
-    session.show()
-    if form:
-        page = session.panel.page(given.page or "") or session.panel.pages[0]
-        query = f"?control={refusal}" if refusal else ""
-        answer: Response = RedirectResponse(f"{session.base}/pages/{page.id}{query}", status_code=303)
+    # One rendered page has one id for all its buttons, and each button is an act of its own.
+    act_id = (f"{given.id}.{act}" if form else given.id) if given.id else secrets.token_hex(8)
+    asked = Asked(act, who, given.to)
+    if not state.limits.admit(who):
+        receipt = session.control_acts.limited(asked, act_id)
     else:
-        body = {"done": not reason, "reason": reason, "browser": browser.id}
-        content = localized(body | {"control": session.control.view()}, language_of(request))
-        answer = JSONResponse(content, status_code=409 if reason else 200)
+        at = None if form or given.at is None else given.at.timestamp()
+        with state.in_flight.track():
+            receipt = await session.control_acts.act(asked, act_id, at, FORM_LIFE_S if form else LIFE_S)
+    answer = _page(session, given.page, receipt) if form else _json(request, session, who, receipt)
     return keep(answer, request, token)
+
+
+def _page(session: RobotSession, page_id: str | None, receipt: ActReceipt) -> Response:
+    """Back to the page, which shows why it was refused."""
+    page = session.panel.page(page_id or "") or session.panel.pages[0]
+    if receipt.cause == "limit":
+        query = f"?control={receipt.code}"
+    else:
+        query = f"?control={receipt.id}" if receipt.reason else ""
+    return RedirectResponse(f"{session.base}/pages/{page.id}{query}", status_code=303)
+
+
+def _json(request: Request, session: RobotSession, who: Principal, receipt: ActReceipt) -> Response:
+    control = session.control.view()
+    content = {
+        **receipt.as_json(),
+        "done": receipt.done,
+        "browser": who.client.id,
+        "control": seen_as(control, role(control, who, session.control.rules)),
+    }
+    headers = {"retry-after": str(RETRY_AFTER_S)} if receipt.cause == "limit" else None
+    content = localized(content, language_of(request))
+    return JSONResponse(content, status_code=STATUS[receipt.cause], headers=headers)
 
 
 def _required(session: RobotSession) -> None:
     if not session.control.rules.required:
         raise NotFound("on this panel nobody needs control: its file has no [control] required = true")
-
-
-def _done(session: RobotSession, act: str, client: Client, to: str, life_s: float) -> Refusal:
-    control = session.control
-    match act:
-        case "take":
-            return control.take(client, life_s)
-        case "ask":
-            return control.ask(client, life_s)
-        case "give":
-            return control.give(client, to)
-        case "keep":
-            return control.keep(client, to)
-        case "release":
-            return control.release(client)
-    raise NotFound(f'there is no "/control/{act:.40}": there is take, ask, give, keep, release, here')
-
-
-def _late(session: RobotSession, act: str, at: float) -> TextLike:
-    """Why what was touched then is not done any more; giving up is never too late."""
-    return "" if act == "release" else session.press_guard.late(at)
 
 
 async def _given(model: type[Fields], request: Request) -> Fields:

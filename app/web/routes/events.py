@@ -1,6 +1,7 @@
 """The event stream: a snapshot first, then changes, and a heartbeat that never stops."""
 
 import asyncio
+from collections.abc import Callable
 from typing import Final
 
 from fastapi import APIRouter, Request
@@ -8,6 +9,7 @@ from fastapi.responses import Response
 from starlette.types import Message, Receive, Scope, Send
 
 from app.i18n import ENGLISH
+from app.permission.control_authority_view import Role, role
 from app.view.heartbeat import beat
 from app.view.publisher import ViewPublisher, client_id_event
 from app.web.app_state import CurrentSession, CurrentState
@@ -35,17 +37,26 @@ async def events(
     request: Request, state: CurrentState, session: CurrentSession, once: bool = False
 ) -> Response:
     """`once`: the snapshot alone, for a browser that has no stream to spare."""
-    board = session.publisher
-    browser, token = welcomed(request, state) if board.view["control"]["required"] else (None, "")
-    first = client_id_event(browser.id) if browser else b""
+    board, rules = session.publisher, session.control.rules
+    who, token = welcomed(request, state) if rules.required else (None, "")
+    first = client_id_event(who.client.id) if who else b""
+
+    def role_now() -> Role:
+        return role(board.view["control"], who, rules) if who else ""
+
     answer: Response
     language = language_of(request)
     if once:
-        all_of_it = board.snapshot(language) + first + beat()
+        all_of_it = board.snapshot(language, role_now()) + first + beat()
         answer = Response(all_of_it, media_type=MEDIA_TYPE, headers=HEADERS)
     else:
-        answer = EventStream(board, first, state.metrics.streams, language)
+        answer = EventStream(board, first, state.metrics.streams, language, role_now)
     return keep(answer, request, token)
+
+
+def no_role() -> Role:
+    """Of all clients, where control is not required."""
+    return ""
 
 
 class EventStream(Response):
@@ -55,13 +66,20 @@ class EventStream(Response):
     media_type = MEDIA_TYPE
 
     def __init__(
-        self, publisher: ViewPublisher, first: bytes, streams: Open, language: str = ENGLISH
+        self,
+        publisher: ViewPublisher,
+        first: bytes,
+        streams: Open,
+        language: str = ENGLISH,
+        role: Callable[[], Role] = no_role,
     ) -> None:
-        """`first` comes with the snapshot; `streams` counts it while it is open."""
+        """`first` comes with the snapshot; `streams` counts it while it is open; `role` is what its
+        client is to who has control now."""
         self._board = publisher
         self._first = first
         self._streams = streams
         self._language = language
+        self._role = role
         self.status_code = 200
         self.background = None
         self.init_headers(HEADERS)
@@ -78,15 +96,18 @@ class EventStream(Response):
 
     async def _write(self, send: Send) -> None:
         board, heartbeat, language = self._board, self._board.heartbeat, self._language
-        version, view, beats = board.version, board.view, heartbeat.count
+        now = self._role()
+        version, view, beats = board.version, board.seen_as(now), heartbeat.count
         retry = f"retry: {RECONNECT_MS}\n\n".encode()
-        await send(_body(retry + board.snapshot(language) + self._first + beat()))
+        await send(_body(retry + board.snapshot(language, now) + self._first + beat()))
         while not board.closed:
             await board.news(version, beats)
-            chunk = board.since(version, view, language) if board.version > version else b""
+            was, now = now, self._role()
+            newer = board.version > version
+            chunk = board.since(version, view, language, was, now) if newer else b""
             if heartbeat.count > beats:
                 chunk += heartbeat.event
-            version, view, beats = board.version, board.view, heartbeat.count
+            version, view, beats = board.version, board.seen_as(now), heartbeat.count
             if chunk:
                 await send(_body(chunk))
         await send({"type": "http.response.body", "body": b"", "more_body": False})

@@ -32,8 +32,8 @@ from starlette.types import Message
 from app.audit.press_record import PendingEntry
 from app.commands.holds.lease import sent_at
 from app.commands.holds.receipts import RELEASED, ActiveHold
-from app.commands.press_context import SEEN
-from app.commands.receipts import PressContext, Receipt, with_doubt
+from app.commands.press_context import SEEN, PressContext
+from app.commands.receipts import Receipt, with_doubt
 from app.errors import InputError, LogError
 from app.i18n import localized, say
 from app.panel.template import needed
@@ -125,10 +125,10 @@ class _HoldSocket:
         self._session = session
         self._opened_at = time.monotonic()
         self._ended: asyncio.Future[Receipt] = asyncio.get_running_loop().create_future()
-        self._client = visitor(socket, state)
+        self._who = visitor(socket, state)
         self._language = language_of(socket)
         self._id = secrets.token_hex(8)  # of the hold: in the log, its receipt and its recording
-        self._context = session.press_guard.by(widget, self._client)
+        self._context = session.press_guard.by(widget, self._who)
         self._room = session.press_log.room(self._context.origin)
         self._pending: PendingEntry | None = None
         self._receipt: Receipt | None = None  # of its end, when all of it is known
@@ -163,7 +163,7 @@ class _HoldSocket:
                 said = await self._read()
         except TimeoutError:
             return refuse(by, say("hold_late"))
-        if not self._limits.admit(self._client):
+        if not self._limits.admit(self._who):
             return refuse(by, say("too_often"), "limit", trace=False)
         if isinstance(said, End):
             return refuse(by, say("hold_let_go"))
@@ -172,7 +172,7 @@ class _HoldSocket:
         sent = self._sent(said)
         inputs = self._session.dispatcher.with_defaults(holds.widget(widget), said.inputs)
         try:
-            by = self._context = self._session.press_guard.by(widget, self._client, said.seen)
+            by = self._context = self._session.press_guard.by(widget, self._who, said.seen)
             if not self._room and (left_out := holds.refusal(widget, inputs, sent, by)):
                 return left_out
             still_held = await self._written(widget, inputs, by)
@@ -222,7 +222,7 @@ class _HoldSocket:
                 async with asyncio.timeout(SILENCE_S):
                     said = await self._read()
                 if self._hear(said, holding):
-                    self._session.control.touch(self._client)
+                    self._session.control.touch(self._who)
                     await self._say(state="held")
                 elif isinstance(said, Beat) and self._receipt is not None:
                     await self._say(state="ended", **self._receipt.as_json())

@@ -4,7 +4,7 @@ import asyncio
 import secrets
 import time
 from collections.abc import Sequence
-from typing import Any, TypedDict, get_args
+from typing import Any, TypedDict
 from urllib.parse import urlencode
 
 from fastapi import APIRouter, Request
@@ -19,13 +19,12 @@ from app.i18n import Text, TextLike, say
 from app.panel.model import Page, Panel
 from app.panel.template import inputs_of
 from app.panel.widgets.families import Entered, Pressed
-from app.permission.clients import Client
-from app.permission.control_authority import Refusal
-from app.permission.control_authority_view import Role, role
+from app.permission.control_authority_view import role
+from app.permission.principal import Principal
 from app.printable import printable_texts
 from app.runtime.robot_session import RobotSession
 from app.view.sections import SECTIONS, Section
-from app.view.view import View, as_seen_by
+from app.view.view import View
 from app.web.app_state import AppState, CurrentState
 from app.web.client_cookie import by_hand, keep, welcomed
 from app.web.described import PAGE, Described, errors
@@ -46,7 +45,7 @@ RELOADED = "reloaded"  # by itself: nobody tapped for it
 RELOADED_S = 2.0  # a press on a page that should have reloaded before is one on an old page
 # How long after a page without scripts was due it is still thought to be there.
 GRACE_S = 5
-REFUSALS = get_args(Refusal)
+TOO_OFTEN = "control_too_often"
 WORDS = (
     "cancel",
     "robots",
@@ -98,8 +97,6 @@ class PageContext(TypedDict):
     again: str
     until: float
     browser: str
-    over: bool
-    role: Role
     refused: TextLike
 
 
@@ -157,20 +154,19 @@ def _render(request: Request, state: AppState, page: Page) -> Response:
     session = state.fleet.session(request.path_params.get("robot"))
     typed = any(isinstance(widget, Entered) for widget in page.widgets)
     refresh_s = REFRESH_WITH_INPUTS_S if typed else REFRESH_S
-    browser, token = welcomed(request, state)
+    who, token = welcomed(request, state)
     if session.control.rules.required:
-        session.control.loaded(browser, refresh_s + GRACE_S, by_hand(request))
+        session.control.loaded(who, refresh_s + GRACE_S, by_hand(request))
         session.show()
-    context = _context(request, state, session, page, browser, refresh_s)
+    context = _context(request, state, session, page, who, refresh_s)
     html = state.templates.render("screen.html", language_of(request), **context)
     return keep(HTMLResponse(html, headers={"cache-control": "no-store"}), request, token)
 
 
 def _context(
-    request: Request, state: AppState, session: RobotSession, page: Page, client: Client, refresh_s: int
+    request: Request, state: AppState, session: RobotSession, page: Page, who: Principal, refresh_s: int
 ) -> PageContext:
     board, rules = session.publisher, session.control.rules
-    refusal = request.query_params.get("control", "")
     receipt = session.presses.receipt(request.query_params.get("receipt", ""))
     again = {RELOADED: 1} | ({"receipt": receipt.id} if receipt else {})
     now, wall = clock.server_now(), time.time()
@@ -180,7 +176,7 @@ def _context(
         page=page,
         base=session.base,
         robot=session.entry.id if session.entry else "",
-        view=as_seen_by(board.view, client),
+        view=board.seen_as(role(board.view["control"], who, rules)),
         sections=SECTIONS,
         event_id=board.id,
         revision=board.revision,
@@ -200,11 +196,17 @@ def _context(
         since=None if RELOADED in request.query_params else round(now, 3),
         again=f"{session.base}/pages/{page.id}?{urlencode(again)}",
         until=round(now + refresh_s + RELOADED_S, 3),
-        browser=client.id,
-        over=rules.local and client.local,
-        role=role(board.view["control"], client, rules),
-        refused=say(refusal) if refusal and refusal in REFUSALS else "",
+        browser=who.client.id,
+        refused=_refused(session, request.query_params.get("control", "")),
     )
+
+
+def _refused(session: RobotSession, query: str) -> TextLike:
+    """Why an act on control was refused: `query` is its id, or the code where it is not kept."""
+    if query == TOO_OFTEN:
+        return say(TOO_OFTEN)
+    receipt = session.control_acts.receipt(query)
+    return receipt.reason if receipt else ""
 
 
 def _words(session: RobotSession, page: Page) -> dict[str, Any]:

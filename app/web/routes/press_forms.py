@@ -13,7 +13,7 @@ from app.commands.press_context import PRESS_ID
 from app.errors import InputError
 from app.i18n import say
 from app.panel.model import Page
-from app.permission.clients import Client
+from app.permission.principal import Principal
 from app.printable import printable_texts
 from app.runtime.robot_session import RobotSession
 from app.web.app_state import AppState
@@ -27,7 +27,7 @@ ASKED_S: Final = 30.0  # the answer is a press, and no later one
 async def pressed_by_form(
     state: AppState,
     session: RobotSession,
-    client: Client,
+    who: Principal,
     widget: str,
     inputs: dict[str, str],
     language: str,
@@ -44,12 +44,12 @@ async def pressed_by_form(
     press_id = f"{page_id}.{widget}"
     seen, until = inputs.pop("_seen", ""), _until(inputs)
     typed = session.dispatcher.typed(inputs)
-    if not state.limits.admit(client):
-        receipt = session.presses.limited(widget, typed, press_id, shown=True)
+    if not state.limits.admit(who):
+        receipt = session.presses.early_refusals.limited(widget, typed, press_id, shown=True)
         return RedirectResponse(page_after(session, widget, receipt.id), status_code=303)
-    by = session.press_guard.by(widget, client, seen, until)
+    by = session.press_guard.by(widget, who, seen, until)
     if too_soon:
-        work = session.presses.too_soon(widget, typed, press_id, before, by.origin)
+        work = session.presses.early_refusals.too_soon(widget, typed, press_id, before, by.origin)
     else:
         work = session.presses.press(widget, typed, press_id, by)
     receipt = await state.counted(work)

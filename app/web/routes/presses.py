@@ -14,7 +14,7 @@ from app.commands.press_limits import RETRY_AFTER_S
 from app.commands.receipts import Receipt
 from app.errors import InputError
 from app.i18n import localized
-from app.permission.clients import Client
+from app.permission.principal import Principal
 from app.runtime.robot_session import RobotSession
 from app.web.app_state import AppState, CurrentSession, CurrentState
 from app.web.client_cookie import visitor
@@ -111,16 +111,14 @@ async def press(
     widget: str, request: Request, state: CurrentState, session: CurrentSession
 ) -> Response:
     session.presses.widget(widget)
-    browser = visitor(request, state)
+    who = visitor(request, state)
     body = await body_of(request)
     kind = kind_of(request)
     if kind == JSON:
-        receipt = await pressed(state, session, browser, widget, as_model(Press, json_of(body)))
+        receipt = await pressed(state, session, who, widget, as_model(Press, json_of(body)))
         return _answer(request, receipt)
     if kind == FORM:
-        return await pressed_by_form(
-            state, session, browser, widget, form_of(body), language_of(request)
-        )
+        return await pressed_by_form(state, session, who, widget, form_of(body), language_of(request))
     raise InputError(f'a press is "{JSON}" or "{FORM}", not "{kind}"')
 
 
@@ -135,7 +133,7 @@ async def cancel(
     widget: str, request: Request, state: CurrentState, session: CurrentSession
 ) -> Response:
     session.presses.widget(widget)
-    browser = visitor(request, state)
+    who = visitor(request, state)
     body, kind = await body_of(request), kind_of(request)
     form = kind == FORM
     of = ""
@@ -143,25 +141,25 @@ async def cancel(
         of = form_of(body).get("_press", "")
     elif kind == JSON and body:
         of = as_model(Cancel, json_of(body)).press
-    if state.limits.admit_cancel(browser, session.base, widget, of[:LONGEST_ID]):
-        receipt = await state.counted(session.presses.cancel(widget, origin_of(browser), of))
+    if state.limits.admit_cancel(who, session.base, widget, of[:LONGEST_ID]):
+        receipt = await state.counted(session.presses.cancel(widget, origin_of(who), of))
     else:
-        receipt = session.presses.limited(widget, {}, "", "cancel_too_often", shown=form)
+        receipt = session.presses.early_refusals.limited(widget, {}, "", "cancel_too_often", shown=form)
     if form:
         return RedirectResponse(page_after(session, widget, receipt.id), status_code=303)
     return _answer(request, receipt)
 
 
 async def pressed(
-    state: AppState, session: RobotSession, client: Client, widget: str, given: Press
+    state: AppState, session: RobotSession, who: Principal, widget: str, given: Press
 ) -> Receipt:
     """What comes of a press that was given as JSON, by whatever way."""
     session.presses.widget(widget)
     press_id = given.id or secrets.token_hex(8)
-    if not state.limits.admit(client):
-        return session.presses.limited(widget, given.inputs, press_id)
+    if not state.limits.admit(who):
+        return session.presses.early_refusals.limited(widget, given.inputs, press_id)
     at = given.at.timestamp() if given.at else None
-    by = session.press_guard.by(widget, client, given.seen or "", at)
+    by = session.press_guard.by(widget, who, given.seen or "", at)
     return await state.counted(session.presses.press(widget, given.inputs, press_id, by))
 
 

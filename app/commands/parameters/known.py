@@ -1,0 +1,57 @@
+"""What is known of the parameters of one robot: the only place that writes it."""
+
+from collections.abc import Collection, Iterable
+from dataclasses import replace
+from typing import Any
+
+from app.panel.widgets.parameter import Parameter
+from app.robot.parameter_state import UNKNOWN, ParameterState, name_of, value_in
+from app.robot.state import RobotState
+from app.ros_logging import RobotLog
+
+
+class KnownParameters:
+    """By widget; used on the event loop only."""
+
+    def __init__(self, robot: RobotState, log: RobotLog) -> None:
+        self._robot = robot
+        self._log = log
+
+    def of(self, widget: Parameter) -> ParameterState:
+        return self._robot.parameters.get(widget.id, UNKNOWN)
+
+    def learn(self, widget: Parameter, state: ParameterState) -> None:
+        if state.state == "undeclared" and self.of(widget).state != "undeclared":
+            self._log.warning("%s has no parameter %s", widget.node, widget.parameter)
+        self._robot.parameters[widget.id] = state
+
+    def told(self, widget: Parameter, value: Any, wall: float) -> bool:
+        """An event of its node says that it has this value (a ParameterValue) now, at `wall` (seconds
+        since the epoch). False where that says too little: the node is to be asked."""
+        known = self.of(widget)
+        if known.state not in ("live", "missing"):
+            return False
+        if name_of(value.type) != widget.type:
+            self.learn(widget, ParameterState("mistyped", found=name_of(value.type), wall=wall))
+        else:
+            self.learn(widget, replace(known, state="live", value=value_in(widget, value), wall=wall))
+        return True
+
+    def unreadable(self, widgets: Iterable[Parameter], wall: float) -> None:
+        """Their node's answer can't be read."""
+        for widget in widgets:
+            self.learn(widget, ParameterState("unreadable", wall=wall))
+
+    def silent(self, node: str, widgets: Collection[Parameter]) -> None:
+        """Their node does not answer."""
+        if any(self.of(widget).state != "silent" for widget in widgets):
+            self._log.warning("%s does not answer when it is asked for its parameters", node)
+        for widget in widgets:
+            self.learn(widget, replace(self.of(widget), state="silent"))
+
+    def cut(self, widgets: Iterable[Parameter]) -> None:
+        """Their node is gone: what it told is from before."""
+        for widget in widgets:
+            known = self.of(widget)
+            cut = replace(known, state="cut") if known.value is not None else UNKNOWN
+            self._robot.parameters[widget.id] = cut

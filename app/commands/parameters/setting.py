@@ -1,0 +1,37 @@
+"""Setting a parameter by ROS 2's `set_parameters`: the request, and what its response says. Pure."""
+
+import time
+from functools import partial
+from typing import Final
+
+from app.clock import format_time
+from app.commands.service_calls import LONGEST_SAID, Request, with_reply
+from app.i18n import say
+from app.interfaces import Fields, Interfaces, text_of
+from app.panel.widgets.parameter import SET, Parameter, Value
+from app.printable import printable
+from app.robot.command_status import Outcome
+from app.robot.parameter_state import wire
+
+SET_PATHS: Final = ("results[0].successful", "results[0].reason", "results[1].successful")
+
+
+def set_request(interfaces: Interfaces, widget: Parameter, value: Value) -> Request:
+    """The request that sets one parameter, with what reads its response."""
+    service, type_name = SET
+    fields = {"parameters": [{"name": widget.parameter, "value": wire(widget, value)}]}
+    payload = interfaces.encode(interfaces.service(type_name)[0], fields)
+    name, read = f"{widget.node}/{service}", partial(_answer, widget, value)
+    return Request(widget.id, name, type_name, payload, widget.timeout_s, SET_PATHS, read)
+
+
+def _answer(widget: Parameter, value: Value, response: Fields) -> Outcome:
+    """What a response of SetParameters says of the one parameter that was to be set."""
+    now = format_time(time.time())
+    successful, reason, second = (response.get(path) for path in SET_PATHS)
+    if successful is None or second is not None:
+        return Outcome("unknown", say("answer_unreadable", wanted=SET[1]))
+    if successful:
+        return Outcome("succeeded", say("parameter_set", value=widget.written(value), time=now))
+    said = printable(text_of(reason, LONGEST_SAID)) if reason else ""
+    return Outcome("rejected", with_reply(say("said_no", time=now), said))

@@ -1,0 +1,137 @@
+"""May this client press this command now? An ordered table of checks: the first that locks is told.
+
+Everything that can be pressed is judged here: what the view shows as locked, presses, holds, calls,
+actions and parameters. A check is a row of `CHECKS`: a pure function from a question to a verdict, or
+None where it has nothing to say.
+"""
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Final, NamedTuple
+
+from app.errors import Cause
+from app.i18n import TextLike
+from app.panel.interlock import Interlock
+from app.panel.widgets.families import Command
+from app.permission.interlocks import (
+    NO_WAY,
+    PERMITTED,
+    Verdict,
+    command_blocked,
+    interlock_verdict,
+    link_verdict,
+    locked,
+)
+from app.permission.principal import Principal
+from app.robot.state import RobotState
+
+
+@dataclass(frozen=True, slots=True)
+class Grounds:
+    """What the server itself has against a press, beside the robot.
+
+    `ending` while it shuts down, `log_lock` why the operator's log locks ("" where it does not),
+    `control` whether who presses has control; `who` is None in a question for all clients.
+    """
+
+    control: Verdict = PERMITTED
+    log_lock: TextLike = ""
+    ending: bool = False
+    who: Principal | None = None
+
+
+NO_GROUNDS: Final = Grounds()
+
+
+class Question(NamedTuple):
+    """May `widget` be pressed at `now` (monotonic seconds)? `link` and `interlocks` (the widget's
+    own, in their order) are verdicts that are known already: they are the same for many widgets."""
+
+    widget: Command
+    robot: RobotState
+    now: float
+    link: Verdict
+    interlocks: Sequence[Verdict]
+    grounds: Grounds = NO_GROUNDS
+
+
+class Check(NamedTuple):
+    """`judge` gives a verdict, or None. Where a check locks `alone`, no later one is asked; else what
+    they lock is told beside it."""
+
+    name: str
+    judge: Callable[[Question], Verdict | None]
+    alone: bool = True
+
+
+def _ending(of: Question) -> Verdict | None:
+    return locked("ending") if of.grounds.ending else None
+
+
+def _log(of: Question) -> Verdict | None:
+    lock = of.grounds.log_lock
+    return Verdict(False, "log", lock) if lock else None
+
+
+CHECKS: Final = (
+    Check("link", lambda of: of.link),
+    Check("ending", _ending),
+    Check("log", _log),
+    Check("control", lambda of: of.grounds.control),
+    Check("command", lambda of: command_blocked(of.widget, of.robot, of.now), alone=False),
+    Check("interlocks", lambda of: combined(of.interlocks), alone=False),
+)
+
+# Why a receipt says that it was refused, by a verdict's code; "interlock" for all others.
+CAUSES: Final[Mapping[str, Cause]] = {
+    **dict.fromkeys((*NO_WAY, "no_service", "no_parameters", "getting_ready", "ending"), "link"),
+    "log": "log",
+}
+
+
+def permission(question: Question) -> Verdict:
+    """The verdict of all checks, in their order."""
+    verdicts = []
+    for _, judge, alone in CHECKS:
+        verdict = judge(question)
+        if verdict is None or verdict is PERMITTED:
+            continue
+        verdicts.append(verdict)
+        if alone and not verdict.permitted:
+            break
+    return combined(verdicts)
+
+
+def judged(
+    widget: Command,
+    interlocks: Iterable[Interlock],
+    robot: RobotState,
+    now: float,
+    grounds: Grounds = NO_GROUNDS,
+) -> Verdict:
+    """Whether a widget with these interlocks may be pressed or held now."""
+    permissions = [interlock_verdict(one, robot, now) for one in interlocks]
+    return permission(Question(widget, robot, now, link_verdict(robot, now), permissions, grounds))
+
+
+def combined(verdicts: Sequence[Verdict]) -> Verdict:
+    """The verdict of what all have to permit: the first that does not is told first."""
+    if not verdicts:
+        return PERMITTED
+    if len(verdicts) == 1:
+        return verdicts[0]
+    locking = [one for verdict in verdicts for one in _each(verdict) if not one.permitted]
+    until = min((one.until for one in verdicts), default=math.inf)
+    if not locking:
+        return PERMITTED if until == math.inf else Verdict(True, until=until)
+    return replace(locking[0], until=until, others=tuple(locking[1:]))
+
+
+def _each(verdict: Verdict) -> tuple[Verdict, ...]:
+    return (replace(verdict, others=()), *verdict.others) if verdict.others else (verdict,)
+
+
+def cause_of(code: str) -> Cause:
+    """Why a receipt says that the verdict with this code refused it."""
+    return CAUSES.get(code, "interlock")

@@ -1,0 +1,128 @@
+"""The table of checks: its order, its causes, and that one more row locks everything."""
+
+import math
+from typing import Any
+
+import pytest
+
+from app.commands.holds.receipts import ActiveHold
+from app.permission import press_permission
+from app.permission.interlocks import PERMITTED, Verdict
+from app.permission.press_permission import (
+    CHECKS,
+    Check,
+    Grounds,
+    Question,
+    cause_of,
+    combined,
+    judged,
+    permission,
+)
+from app.view.view import build_view
+from tests.commands.test_calls_and_goals import CALL
+from tests.commands.test_holds import Bench as HoldBench
+from tests.commands.test_presses import Bench as PressBench
+from tests.commands.test_presses import refused
+from tests.support.builders import FREE, GUARDED, MESSAGE, NOW, panel_of, permits, robot_there
+
+WHY = "An alarm is not acknowledged."
+ALARM = Verdict(False, "alarm", WHY)
+
+
+def locked(code: str) -> Verdict:
+    return Verdict(False, code, f"locked by {code}")
+
+
+def question(**more: Any) -> Question:
+    panel = panel_of(MESSAGE, FREE)
+    robot = robot_there(panel)
+    parts = {"link": PERMITTED, "interlocks": (), **more}
+    return Question(next(iter(panel.commands)), robot, NOW, **parts)
+
+
+@pytest.fixture
+def alarm(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One more row: what an alarm that locks will be."""
+    row = Check("alarm", lambda of: ALARM if of.widget.id != "message" else None)
+    monkeypatch.setattr(press_permission, "CHECKS", (*CHECKS[:3], row, *CHECKS[3:]))
+
+
+def test_the_first_that_locks_is_told() -> None:
+    everything = Grounds(locked("control"), "The disk is full.", ending=True)
+    asked = question(link=locked("link"), interlocks=[locked("one")], grounds=everything)
+    assert permission(asked).code == "link"
+    assert permission(question(interlocks=[locked("one")], grounds=everything)).code == "ending"
+    without = Grounds(locked("control"), "The disk is full.")
+    log = permission(question(interlocks=[locked("one")], grounds=without))
+    assert (log.code, log.reason, log.others) == ("log", "The disk is full.", ())
+    control = permission(question(interlocks=[locked("one")], grounds=Grounds(locked("control"))))
+    assert (control.code, control.others) == ("control", ())
+    both = permission(question(interlocks=[locked("one"), PERMITTED, locked("two")]))
+    assert both.reasons == ["locked by one", "locked by two"]
+    assert permission(question(interlocks=[PERMITTED])) is PERMITTED
+
+
+def test_when_time_alone_would_change_it_is_the_soonest_of_all() -> None:
+    soon, later = Verdict(True, until=NOW + 1), Verdict(True, until=NOW + 2)
+    assert permission(question(interlocks=[later, soon])).until == NOW + 1
+    assert permission(question()).until == math.inf
+
+
+def test_verdicts_of_several_are_told_in_their_order() -> None:
+    pair = combined([locked("one"), locked("two")])
+    assert combined([PERMITTED, locked("zero"), pair]).reasons == [
+        "locked by zero",
+        "locked by one",
+        "locked by two",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("code", "cause"),
+    [
+        ("no_bridge", "link"),
+        ("no_service", "link"),
+        ("ending", "link"),
+        ("log", "log"),
+        ("control_held", "interlock"),
+        ("forbidden", "interlock"),
+        ("alarm", "interlock"),
+    ],
+)
+def test_a_receipt_has_the_cause_of_the_code(code: str, cause: str) -> None:
+    assert cause_of(code) == cause
+
+
+@pytest.mark.usefixtures("alarm")
+def test_a_check_more_locks_a_press_and_a_call() -> None:
+    bench = PressBench(panel_of(MESSAGE, FREE, GUARDED, CALL))
+    for number, widget in enumerate(("free", "guarded", CALL["id"])):
+        receipt = bench.press(widget, {}, f"p{number}")
+        assert refused(bench, receipt) == ("interlock", f"Not sent: {WHY}")
+
+
+@pytest.mark.usefixtures("alarm")
+def test_a_check_more_keeps_a_hold_from_its_begin() -> None:
+    assert HoldBench().refused() == ("interlock", WHY)
+
+
+def test_a_check_more_ends_a_hold(monkeypatch: pytest.MonkeyPatch) -> None:
+    bench = HoldBench()
+    holding = bench.begun()
+    assert isinstance(holding, ActiveHold)
+    monkeypatch.setattr(press_permission, "CHECKS", (Check("alarm", lambda _: ALARM), *CHECKS))
+    bench.holds.step()
+    (receipt,) = bench.receipts
+    assert receipt.outcome == "aborted"
+    assert WHY in str(receipt.reason)
+
+
+@pytest.mark.usefixtures("alarm")
+def test_a_check_more_shows_in_the_view() -> None:
+    panel = panel_of(MESSAGE, FREE, GUARDED, CALL)
+    robot = robot_there(panel)
+    permits(robot)
+    shown = build_view(panel, robot, NOW).view["widgets"]
+    for widget in ("free", "guarded", CALL["id"]):
+        assert (shown[widget]["enabled"], shown[widget]["reason"]) == (False, WHY)
+    assert judged(next(iter(panel.commands)), (), robot, NOW) is ALARM

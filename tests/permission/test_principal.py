@@ -1,0 +1,32 @@
+"""Who presses: a client now, a user there once users log in."""
+
+from app.audit.press_record import origin_of
+from app.panel.rules import ControlRules
+from app.permission.clients import Clients
+from app.permission.control_authority import ControlAuthority
+from app.permission.principal import Principal
+
+CLIENT = Clients().seen("1" * 32, "192.0.2.1")
+
+
+def test_without_users_a_principal_is_its_client() -> None:
+    who = Principal(CLIENT)
+    assert (who.user, who.role) == ("", "operator")
+    assert (who.name, who.title, str(who)) == (CLIENT.name, CLIENT.title, str(CLIENT))
+
+
+def test_the_log_and_the_control_authority_name_the_user() -> None:
+    who = Principal(CLIENT, "Kim")
+    origin = origin_of(who, "ab-1")
+    assert (origin.who, origin.browser, origin.address) == ("Kim", CLIENT.id, "192.0.2.1")
+    control = ControlAuthority(ControlRules(required=True), "Robot 1")
+    assert control.take(who) == ""
+    assert control.view()["holder_name"] == "Kim"
+    assert control.view()["holder"] == CLIENT.id
+
+
+def test_another_user_of_the_same_client_has_the_clients_control() -> None:
+    """Control belongs to the client: it is the one screen that a robot is operated from."""
+    control = ControlAuthority(ControlRules(required=True), "")
+    control.take(Principal(CLIENT, "Kim"))
+    assert control.verdict(Principal(CLIENT, "Lee")).permitted
