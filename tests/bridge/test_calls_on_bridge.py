@@ -18,7 +18,7 @@ from playwright.sync_api import Page, expect
 from app.commands.service_calls import MOST_UNANSWERED
 from tests.support import cyclone
 from tests.support.cyclone import TYPES, Client, CycloneRobot, served
-from tests.support.parts import Bridge, Server, Stream, live, until
+from tests.support.parts import Bridge, Server, Stream, http_client, live, until
 
 cyclone_bridge = cyclone.cyclone_bridge
 own_cyclone_bridge = cyclone.own_cyclone_bridge
@@ -264,7 +264,7 @@ def waiting_widget(number: int, name: str) -> str:
 
 def press_alone(kiosk: Server, widget: str) -> httpx.Response:
     """A press with a connection of its own."""
-    with httpx.Client(base_url=kiosk.url, timeout=2 * WAITING_S, trust_env=False) as http:
+    with http_client(kiosk.url, 2 * WAITING_S) as http:
         return http.post(f"/widgets/{widget}", json={"inputs": {}})
 
 

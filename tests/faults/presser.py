@@ -12,7 +12,7 @@ from typing import Final
 
 import httpx
 
-from tests.support.parts import Server, until
+from tests.support.parts import Server, http_client, until
 
 PERIOD_S: Final = 0.03
 TWICE_EACH: Final = 5  # each fifth press is posted a second time, with the same id
@@ -47,7 +47,7 @@ class Presser:
         self._thread.start()
 
     def _press_on(self) -> None:
-        with httpx.Client(base_url=self._server.url, timeout=10, trust_env=False) as http:
+        with http_client(self._server.url, 10) as http:
             while not self._over.wait(self._period_s):
                 self._press(http, len(self.presses))
 

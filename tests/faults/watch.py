@@ -12,7 +12,7 @@ from typing import Any, Final
 
 import httpx
 
-from tests.support.parts import Server, events_in, until
+from tests.support.parts import Server, events_in, http_client, until
 
 DEAD_AFTER_S: Final = 10.0
 
@@ -42,7 +42,7 @@ class Watch:
     def _read(self) -> None:
         try:
             with (
-                httpx.Client(base_url=self._server.url, timeout=15, trust_env=False) as http,
+                http_client(self._server.url, 15) as http,
                 http.stream("GET", f"{self._server.base}/events") as response,
             ):
                 text = ""
@@ -111,7 +111,7 @@ def answering(server: Server) -> Iterator[None]:
     stood: list[str] = []
 
     def ask() -> None:
-        with httpx.Client(base_url=server.url, timeout=DEAD_AFTER_S, trust_env=False) as http:
+        with http_client(server.url, DEAD_AFTER_S) as http:
             while not over.wait(0.5):
                 try:
                     http.get("/healthz")

@@ -12,7 +12,7 @@ import pytest
 
 from app.web.client_cookie import COOKIE
 from tests.runtime.test_several_robots import entry, panel_file
-from tests.support.parts import ROOT, Server, until
+from tests.support.parts import ROOT, Server, http_client, until
 
 FAST_S = 2.0
 PROXY = "127.0.0.1"  # through which those who are not at the cell come
@@ -33,7 +33,7 @@ class Client:
 
     def __init__(self, server: Server, address: str = "", base: str = "") -> None:
         headers = {"x-forwarded-for": address} if address else {}
-        self.http = httpx.Client(base_url=server.url + base, headers=headers, trust_env=False)
+        self.http = http_client(server.url + base, headers=headers)
         self.http.get("/pages/operation")
 
     def control(self, act: str, **body: object) -> httpx.Response:
@@ -267,7 +267,7 @@ def test_a_link_on_another_site_does_not_change_who_somebody_is(kiosk: Server) -
 
 
 def test_without_a_cookie_control_is_not_taken_but_a_cookie_given(kiosk: Server) -> None:
-    with httpx.Client(base_url=kiosk.url, trust_env=False) as program:
+    with http_client(kiosk.url) as program:
         first = program.post("/control/take", json={})
         assert (first.status_code, first.json()["done"]) == (409, False)
         assert program.post("/control/take", json={}).json()["done"]
