@@ -118,11 +118,11 @@ def kiosk(running: Callable[[], Server], jogger: RosNode) -> Server:
     return mine
 
 
-def jogging(bridge: Bridge, node: RosNode, folder: Path) -> Server:
+def jogging(bridge: Bridge, node: RosNode, folder: Path, app: str = "app.main:app") -> Server:
     """A server whose robot permits."""
     panel = folder / "jog.toml"
     panel.write_text(PANEL)
-    mine = live(bridge.endpoint, folder, KIOSK_PANEL=str(panel))
+    mine = live(bridge.endpoint, folder, app=app, KIOSK_PANEL=str(panel))
     until(mine.ready, "ready")
     permit(mine, node, True)
     return mine
@@ -230,8 +230,9 @@ def measured(
     finger: Finger, node: RosNode, cause: Callable[[], Any], code: str, lift: bool = True
 ) -> Times:
     """Holds, lets the cause happen, and gives the times, if that is what ended the hold."""
-    for _ in range(TRIES):
-        finger.opens()
+    for attempt in range(TRIES):
+        if attempt:
+            finger.opens()
         before, ends = begun(finger, node)
         began = time.monotonic()
         cause()
