@@ -34,7 +34,7 @@ from tests.web.test_hold_socket import Socket, opened
 
 jogger = test_holds_in_browser.jogger
 
-ENTRIES = 300_000
+ENTRIES = 100_000
 EXPORTERS = 4
 TRIES = 20
 HELD_S = 1.0  # beside four exports the loop stood still for half a second, again and again

@@ -12,9 +12,10 @@ from app.audit import Entry, Filter
 from app.audit.queries import rows
 from app.audit.verify import verify
 from app.i18n import say
+from tests.faults.rig import several
 from tests.support.parts import Bridge, RosNode, Server, http_client, live, until
 
-KILLS = 30
+KILLS = several(8, 60)
 CLIENTS = 3
 LONGEST_LIFE_S = 0.5
 

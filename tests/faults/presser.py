@@ -12,11 +12,11 @@ from typing import Final
 
 import httpx
 
-from tests.support.parts import Server, http_client, until
+from tests.support.parts import ENOUGH_S, Server, http_client, until
 
 PERIOD_S: Final = 0.03
 TWICE_EACH: Final = 5  # each fifth press is posted a second time, with the same id
-SETTLE_S: Final = 3.0
+SETTLE_S: Final = ENOUGH_S
 
 _runs = itertools.count()
 _this = secrets.token_hex(3)
@@ -74,7 +74,9 @@ class Presser:
     def count(self, outcome: str, since: float = 0.0) -> int:
         return sum(p.outcome == outcome and p.at >= since for p in self.presses)
 
-    def goes_on(self, outcome: str = "published", since: float = 0.0, within_s: float = 20.0) -> None:
+    def goes_on(
+        self, outcome: str = "published", since: float = 0.0, within_s: float = ENOUGH_S
+    ) -> None:
         """Waits until a press since then got this outcome."""
         until(
             lambda: self.count(outcome, since), f"a press is {outcome}: {self.presses[-1:]}", within_s

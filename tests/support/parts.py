@@ -35,6 +35,8 @@ BRIDGE = Path(
 )
 ROS_PYTHON = Path(os.environ.get("TEST_ROS_PYTHON") or ROOT / ".venv-ros/bin/python")
 CHROMIUM = "/usr/bin/chromium"
+# The same engine without what a window needs: a page takes a quarter of the work.
+HEADLESS = "/usr/bin/chromium-headless-shell"
 CHROMIUM_FLAGS = [
     "--no-sandbox",
     "--disable-gpu",

@@ -1,5 +1,7 @@
-"""The application with times that a busy machine keeps, for `uvicorn tests.support.apps.patient:app`: its
-demo robot always permits operation, and a hold lasts long without a heartbeat."""
+"""The application with times that a busy machine keeps, for `uvicorn tests.support.apps.patient:app`.
+
+Its demo robot always permits operation, and a hold lasts long without a heartbeat.
+"""
 
 from app import main
 from app.commands.holds import controller, lease
