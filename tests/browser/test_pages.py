@@ -397,7 +397,11 @@ def test_the_first_page_is_small_and_asks_nobody_else(demo: Server, chromium: Br
     def asked() -> list[str]:
         return [request.url for request in requests if not request.url.startswith("data:")]
 
-    until(lambda: (page.wait_for_timeout(50), len(received) == len(asked()))[1], "all has come")
+    def all_came() -> bool:
+        page.wait_for_timeout(50)
+        return len(received) == len(asked())
+
+    until(all_came, "all has come")
     urls = asked()
     assert len(urls) <= 6, urls
     assert all(url.startswith(demo.url) for url in urls)

@@ -3,6 +3,7 @@
 import asyncio
 import itertools
 import logging
+import threading
 import time
 from collections.abc import Mapping
 from typing import Any, ClassVar
@@ -237,24 +238,32 @@ def test_a_link_that_is_lost_while_it_is_renewed_is_renewed_again(
     """And whatever Zenoh makes of it, it is tried until there is a session."""
     monkeypatch.setattr(robot_session, "RENEW_AGAIN_S", 0.01)
     renewals: list[str] = []
+    lost_again = threading.Event()
+
+    async def renewed(times: int) -> None:
+        async with asyncio.timeout(ENOUGH_S):
+            while len(renewals) < times:
+                await asyncio.sleep(0.01)
 
     async def lost() -> None:
         one = robot_session.RobotSession(small_panel(), config_to("tcp/127.0.0.1:1"), "r1", NullLog())
 
         def renew() -> None:
             renewals.append("renewed")
-            time.sleep(0.05)
+            assert lost_again.wait(ENOUGH_S)
             if len(renewals) == 2:
                 raise RuntimeError("no session")
 
         monkeypatch.setattr(one.link, "renew", renew)
         one.renew()
-        await asyncio.sleep(0.01)
+        await renewed(1)
         one.renew()
-        await asyncio.sleep(0.4)
+        lost_again.set()
+        await renewed(3)
+        await asyncio.sleep(0.1)
         assert len(renewals) == 3
         one.renew()
-        await asyncio.sleep(0.2)
+        await renewed(4)
         await one.stop()
 
     asyncio.run(lost())
