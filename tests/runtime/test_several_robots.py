@@ -15,6 +15,7 @@ from app.errors import PanelError
 from app.panel import load_panel
 from tests.support.builders import told
 from tests.support.parts import (
+    ENOUGH_S,
     ROOT,
     Bridge,
     Process,
@@ -288,7 +289,7 @@ def test_an_endpoint_that_is_none_ends_the_start_in_words(tmp_path: Path) -> Non
     command = [sys.executable, "-m", "uvicorn", "app.main:app", "--port", str(free_port())]
     kiosk = Process(command, {"KIOSK_PANEL": str(path), "KIOSK_MODE": "live"}, cwd=ROOT)
     try:
-        assert kiosk.wait(15) != 0
+        assert kiosk.wait(ENOUGH_S) != 0
     finally:
         kiosk.end()
     assert '"robot1:7447" is not a Zenoh endpoint: it must be like tcp/robot1:7447' in kiosk.text

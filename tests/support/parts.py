@@ -364,7 +364,7 @@ class Server:
 
     @contextmanager
     def stream(self) -> Iterator["Stream"]:
-        with self.http.stream("GET", f"{self.base}/events", timeout=5) as response:
+        with self.http.stream("GET", f"{self.base}/events", timeout=ENOUGH_S) as response:
             yield Stream(response)
 
     def end(self, number: signal.Signals = signal.SIGTERM, timeout_s: float = 25) -> int:

@@ -453,7 +453,7 @@ def test_the_demo_robot_as_a_program_of_its_own_can_not_be_mistaken(
         assert kiosk.press("operation1", "apart").json()["outcome"] == "published"
         until(lambda: "apart" in kiosk.widget("last_heard")["text"], "heard")
         robot.end()
-        until(lambda: not kiosk.widget("operation1")["enabled"], "locked", within_s=2)
+        until(lambda: not kiosk.widget("operation1")["enabled"], "locked")
     finally:
         robot.end()
 
