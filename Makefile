@@ -59,12 +59,13 @@ docs: .venv-docs/ready
 
 # FORM=short: as in `make test`.
 FORM ?= long
+FAULTS_TESTS := tests/faults/test_faults_of_*.py tests/permission/test_at_random.py tests/audit/test_killed.py \
+	tests/bridge/test_publishers_on_bridge.py tests/bridge/test_reference_system.py
 FAULTS_RESULTS := $(CACHE)/faults.jsonl
 faults: test-parts
 	mkdir -p $(CACHE)
 	rm -f $(FAULTS_RESULTS)
-	FAULTS=$(FORM) FAULTS_RESULTS=$(FAULTS_RESULTS) .venv/bin/pytest --timeout 0 tests/faults/test_faults_of_*.py tests/permission/test_at_random.py \
-		tests/audit/test_killed.py $(ARGS)
+	FAULTS=$(FORM) FAULTS_RESULTS=$(FAULTS_RESULTS) .venv/bin/pytest --timeout 0 $(FAULTS_TESTS) $(ARGS)
 	FAULTS=$(FORM) .venv/bin/python -m tests.faults.results $(FAULTS_RESULTS) docs/reliability.md
 
 soak: test-parts
