@@ -42,7 +42,7 @@ ifdef ARGS
 	.venv/bin/pytest $(ARGS)
 else
 	.venv/bin/pytest --real-time=without -n $(WORKERS) --dist loadfile --no-loadscope-reorder; first=$$?; \
-	.venv/bin/pytest --real-time=only && exit $$first
+	.venv/bin/pytest --real-time=only $$(grep -rl --include="test_*.py" pytest.mark.real_time tests) && exit $$first
 endif
 
 check: .venv/test
