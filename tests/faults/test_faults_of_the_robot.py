@@ -251,9 +251,7 @@ def test_garbage_on_all_that_is_listened_to(rig: Rig, server: Server) -> None:
         well(presser)
         lied_at = time.monotonic()
         until(lambda: (liar.put("kept", b"\0\1\0\0"), not watch.now("kept").enabled)[1], "it locks")
-        locked_s, _ = watch.locked_after(
-            lied_at, "kept", limit(SHOWN_WITHIN_S), "cannot be read"
-        )
+        locked_s, _ = watch.locked_after(lied_at, "kept", limit(SHOWN_WITHIN_S), "cannot be read")
         for number in range(GARBAGE):
             liar.put(LISTENED_TO[number % len(LISTENED_TO)], lie(chance))
         until(lambda: "cannot be read" in watch.widgets["heard"]["note"], "the readout says so")

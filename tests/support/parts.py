@@ -3,6 +3,7 @@ its own, on loopback, and each is ended by who started it."""
 
 import json
 import os
+import resource
 import secrets
 import signal
 import socket
@@ -54,6 +55,8 @@ CYCLONE_ON_LOOPBACK = (
     "</Interfaces></General></Domain></CycloneDDS>"
 )
 
+
+MOST_MEMORY = 2 << 30  # bytes of a node
 
 STOOD = "Timeout (0:00:20)!"  # a server stood still as it ended, and left
 
@@ -218,6 +221,11 @@ class RosNode(Commanded):
             },
             **options,
         )
+
+    def start(self) -> None:
+        """A request that Fast DDS misreads says how much memory it wants: not that of the machine."""
+        super().start()
+        resource.prlimit(self.pid, resource.RLIMIT_DATA, (MOST_MEMORY, MOST_MEMORY))
 
     def __getattr__(self, name: str) -> Callable[..., Any]:
         def do(*arguments: Any, **named: Any) -> Any:
