@@ -242,7 +242,7 @@ def test_who_lets_go_while_the_entry_is_written_holds_nothing(prompt: Server) ->
             db.close()
             said = socket.hear()
             assert (said["state"], said["status"]) == ("refused", 409)
-            assert "let go before it began" in said["reason"]
+            assert "released before the hold began" in said["reason"]
             assert socket.closed() == 4409
         assert prompt.widget("jog")["held"] is False
 
