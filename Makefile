@@ -32,7 +32,7 @@ dev: .venv/test
 # Everything: what measures real time alone and at last, the rest by WORKERS at once. With ARGS, of
 # pytest, only those tests, one after the other; such as need neither bridge nor ROS nor browser are run
 # without them.
-WORKERS ?= 2
+WORKERS ?= 3
 # What is read of the tests is kept, wherever else nothing of Python's is: to prepare it anew takes each
 # worker as long as all that it does with it.
 test: export PYTHONDONTWRITEBYTECODE :=
@@ -42,7 +42,7 @@ ifdef ARGS
 	.venv/bin/pytest $(ARGS)
 else
 	.venv/bin/pytest --real-time=without -n $(WORKERS) --dist loadfile --no-loadscope-reorder; first=$$?; \
-	.venv/bin/pytest --real-time=only && exit $$first
+	.venv/bin/pytest --real-time=only $$(grep -rl --include="test_*.py" pytest.mark.real_time tests) && exit $$first
 endif
 
 check: .venv/test
@@ -59,11 +59,13 @@ docs: .venv-docs/ready
 
 # FORM=short: as in `make test`.
 FORM ?= long
+FAULTS_TESTS := tests/faults/test_faults_of_*.py tests/permission/test_at_random.py tests/audit/test_killed.py \
+	tests/bridge/test_publishers_on_bridge.py tests/bridge/test_reference_system.py
 FAULTS_RESULTS := $(CACHE)/faults.jsonl
 faults: test-parts
 	mkdir -p $(CACHE)
 	rm -f $(FAULTS_RESULTS)
-	FAULTS=$(FORM) FAULTS_RESULTS=$(FAULTS_RESULTS) .venv/bin/pytest --timeout 0 tests/faults/test_faults_of_*.py tests/permission/test_at_random.py $(ARGS)
+	FAULTS=$(FORM) FAULTS_RESULTS=$(FAULTS_RESULTS) .venv/bin/pytest --timeout 0 $(FAULTS_TESTS) $(ARGS)
 	FAULTS=$(FORM) .venv/bin/python -m tests.faults.results $(FAULTS_RESULTS) docs/reliability.md
 
 soak: test-parts

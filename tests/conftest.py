@@ -4,6 +4,7 @@ import os
 import shutil
 import tempfile
 import time
+from collections import Counter
 from collections.abc import Callable, Generator, Iterator
 from contextlib import ExitStack
 from pathlib import Path
@@ -21,6 +22,7 @@ from tests.support.parts import (
     CHROMIUM,
     CHROMIUM_FLAGS,
     ENOUGH_S,
+    HEADLESS,
     ROOT,
     ROS_PYTHON,
     Bridge,
@@ -41,8 +43,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Tests of real time are tried once more where they fail, and no others; files that wait for real
-    parts begin, so that what only computes fills the rest."""
+    """Tests of real time are tried once more where they fail, and no others. Files with the most tests
+    on real parts begin: none of them is left at the end, and what only computes fills the rest."""
     wanted = config.getoption("--real-time")
     for item in items:
         assert not item.get_closest_marker("flaky"), f"{item.nodeid}: only `real_time` may be repeated"
@@ -54,13 +56,13 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         ]
         config.hook.pytest_deselected(items=left_out)
         items[:] = [one for one in items if one not in set(left_out)]
-    waiting = {one.path for one in items if needs_part(one)}
-    items.sort(key=lambda one: one.path not in waiting)
+    on_parts = Counter(one.path for one in items if needs_part(one))
+    items.sort(key=lambda one: -on_parts[one.path])
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:
     """Nothing is skipped: where a part is missing that a test needs, nothing is tested."""
-    missing = [str(p) for p in (BRIDGE, ROS_PYTHON, Path(CHROMIUM)) if not Path(p).exists()]
+    missing = [str(p) for p in (BRIDGE, ROS_PYTHON, CHROMIUM, HEADLESS) if not Path(p).exists()]
     if missing and needs_parts(session) and not session.config.option.collectonly:
         pytest.exit(f"missing: {', '.join(missing)}; `make test` installs them", returncode=3)
 
@@ -202,7 +204,7 @@ def chromium(fonts: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[B
         "FONTCONFIG_FILE": str(fonts_file(fonts, tmp_path_factory.mktemp("fonts"))),
     }
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=CHROMIUM_FLAGS, env=env)
+        browser = playwright.chromium.launch(executable_path=HEADLESS, args=CHROMIUM_FLAGS, env=env)
         yield browser
         browser.close()
 

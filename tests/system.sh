@@ -25,6 +25,7 @@ has_faketime() {
 need build-essential cc --version
 need cmake cmake --version
 need chromium chromium --version
+need chromium-headless-shell test -e /usr/bin/chromium-headless-shell
 need libclang-dev has_libclang
 need faketime has_faketime
 need iproute2 ip -V

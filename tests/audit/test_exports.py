@@ -29,12 +29,12 @@ from app.errors import LogError, TooMany
 from app.web.routes import audit_log as routes
 from tests.browser import test_holds_in_browser
 from tests.browser.test_holds_in_browser import PANEL, permit
-from tests.support.parts import Bridge, RosNode, Server, live, until
+from tests.support.parts import Bridge, RosNode, Server, http_client, live, until
 from tests.web.test_hold_socket import Socket, opened
 
 jogger = test_holds_in_browser.jogger
 
-ENTRIES = 300_000
+ENTRIES = 100_000
 EXPORTERS = 4
 TRIES = 20
 HELD_S = 1.0  # beside four exports the loop stood still for half a second, again and again
@@ -137,7 +137,7 @@ def searching(kiosk: Server) -> Iterator[list[int]]:
     ends, statuses = threading.Event(), list[int]()
 
     def search() -> None:
-        with httpx.Client(base_url=kiosk.url, timeout=30, trust_env=False) as http:
+        with http_client(kiosk.url, 30) as http:
             while not ends.wait(0.2):
                 answer = http.get("/log?text=nothing-has-it")
                 assert (answer.status_code == 429) is ("retry-after" in answer.headers)

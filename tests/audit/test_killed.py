@@ -12,9 +12,10 @@ from app.audit import Entry, Filter
 from app.audit.queries import rows
 from app.audit.verify import verify
 from app.i18n import say
-from tests.support.parts import Bridge, RosNode, Server, live, until
+from tests.faults.rig import several
+from tests.support.parts import Bridge, RosNode, Server, http_client, live, until
 
-KILLS = 30
+KILLS = several(8, 60)
 CLIENTS = 3
 LONGEST_LIFE_S = 0.5
 
@@ -25,7 +26,7 @@ def all_entries(folder: Path) -> list[Entry]:
 
 def press_on(url: str, client: int, receipts: dict[str, str]) -> None:
     """Presses, one after another, until the server is gone; keeps what it was told."""
-    with httpx.Client(base_url=url, timeout=10, trust_env=False) as http:
+    with http_client(url, 10) as http:
         for number in range(100_000):
             press_id = f"{http.base_url.port}-{client}-{number}"
             press = {"id": press_id, "inputs": {"message": press_id}}

@@ -18,7 +18,7 @@ from playwright.sync_api import Page, expect
 from app.commands.service_calls import MOST_UNANSWERED
 from tests.support import cyclone
 from tests.support.cyclone import TYPES, Client, CycloneRobot, served
-from tests.support.parts import Bridge, Server, Stream, live, until
+from tests.support.parts import Bridge, Server, Stream, http_client, live, until
 
 cyclone_bridge = cyclone.cyclone_bridge
 own_cyclone_bridge = cyclone.own_cyclone_bridge
@@ -28,6 +28,8 @@ robots = cyclone.robots
 robot = cyclone.robot
 
 FIBONACCI = "example_interfaces/action/Fibonacci"
+
+ANSWER_S = 10.0  # for which /nowhere would be waited
 
 PANEL = """
 title = "Cyclone cell"
@@ -81,6 +83,7 @@ kind = "call"
 label = "Nowhere"
 service = "/nowhere"
 type = "std_srvs/srv/Trigger"
+timeout_s = 10.0
 
 [[page.widget]]
 id = "other"
@@ -162,12 +165,11 @@ def test_the_robot_says_no_with_its_words(kiosk: Server, robot: CycloneRobot) ->
     assert robot.requests("/set_enabled") == [{"data": True}] * 2
 
 
-@pytest.mark.real_time
 def test_no_such_service_is_told_at_once(kiosk: Server) -> None:
     assert "does not offer /nowhere" in kiosk.widget("nowhere")["reason"]
     began = time.monotonic()
     receipt = press(kiosk, "nowhere")
-    assert time.monotonic() - began < 1
+    assert time.monotonic() - began < ANSWER_S
     assert (receipt.status_code, receipt.json()["outcome"]) == (503, "refused")
 
 
@@ -264,7 +266,7 @@ def waiting_widget(number: int, name: str) -> str:
 
 def press_alone(kiosk: Server, widget: str) -> httpx.Response:
     """A press with a connection of its own."""
-    with httpx.Client(base_url=kiosk.url, timeout=2 * WAITING_S, trust_env=False) as http:
+    with http_client(kiosk.url, 2 * WAITING_S) as http:
         return http.post(f"/widgets/{widget}", json={"inputs": {}})
 
 

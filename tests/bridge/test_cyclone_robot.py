@@ -7,7 +7,6 @@ from functools import partial
 from typing import Any
 
 import numpy
-import pytest
 import zenoh.ext
 
 from tests.support import cyclone
@@ -22,7 +21,7 @@ from tests.support.cyclone import (
     payloads,
     response,
 )
-from tests.support.parts import Bridge, until
+from tests.support.parts import ENOUGH_S, Bridge, until
 
 cyclone_bridge = cyclone.cyclone_bridge
 own_cyclone_bridge = cyclone.own_cyclone_bridge
@@ -38,6 +37,8 @@ TRIGGER = "std_srvs/srv/Trigger"
 ADD = "example_interfaces/srv/AddTwoInts"
 STRING = "std_msgs/msg/String"
 BOOL = "std_msgs/msg/Bool"
+
+SLOW_S = 4  # longer than another answer takes
 
 EMPTY_REQUEST = bytes.fromhex("00010000 00")
 
@@ -95,27 +96,26 @@ def test_calls_under_way_get_each_its_own_reply(robot: CycloneRobot, client: Cli
     assert [r["a"] for r in robot.requests("/add_two_ints")] == numbers
 
 
-@pytest.mark.real_time
 def test_a_slow_answer_comes_late_and_holds_nobody_up(robot: CycloneRobot, client: Client) -> None:
-    robot.answer_slow(seconds=2)
+    robot.answer_slow(seconds=SLOW_S)
     asked_at = time.monotonic()
-    slow = client.ask("slow", EMPTY_REQUEST)
+    slow = client.ask("slow", EMPTY_REQUEST, ENOUGH_S)
     client.call("reset", TRIGGER)
-    assert time.monotonic() - asked_at < 2
+    assert time.monotonic() - asked_at < SLOW_S
     assert response(TRIGGER, slow).message == "done"
-    assert time.monotonic() - asked_at >= 2
+    assert time.monotonic() - asked_at >= SLOW_S
 
 
-@pytest.mark.real_time
 def test_no_answer_is_a_timeout_and_no_server_is_nothing_at_once(
     robot: CycloneRobot, client: Client
 ) -> None:
     robot.answer_slow(seconds=None)
     assert errors(client.get("slow", EMPTY_REQUEST, timeout_s=0.5)) == {"Timeout"}
+    until(lambda: robot.requests("/slow"), "it came")
     assert robot.requests("/slow") == [{}]
     asked_at = time.monotonic()
-    assert client.get("nowhere", EMPTY_REQUEST) == []
-    assert time.monotonic() - asked_at < 2
+    assert client.get("nowhere", EMPTY_REQUEST, ENOUGH_S) == []
+    assert time.monotonic() - asked_at < ENOUGH_S / 2
 
 
 def test_a_big_endian_request_is_executed_and_its_reply_lost(
@@ -123,6 +123,7 @@ def test_a_big_endian_request_is_executed_and_its_reply_lost(
 ) -> None:
     request = bytes.fromhex("00000000 0000000000000001 0000000000000002")
     assert errors(client.get("add_two_ints", request, timeout_s=0.5)) == {"Timeout"}
+    until(lambda: robot.requests("/add_two_ints"), "it came")
     assert robot.requests("/add_two_ints") == [{"a": 1, "b": 2}]
 
 
@@ -430,7 +431,7 @@ def test_topics_go_both_ways_with_their_type_hashes(robot: CycloneRobot, client:
 
 # What happens when a part breaks.
 
-LEASE_S = 3.0
+LEASE_S = 6.0
 
 
 def test_a_killed_robot_times_out_until_its_lease_ends_and_comes_back(
@@ -441,14 +442,14 @@ def test_a_killed_robot_times_out_until_its_lease_ends_and_comes_back(
     robot.kill()
     assert errors(client.get("reset", EMPTY_REQUEST, timeout_s=0.3)) == {"Timeout"}
     assert set(client.tokens()) >= GRAPH
-    until(lambda: not client.tokens(), "its lease ends", within_s=LEASE_S + 3)
+    until(lambda: not client.tokens(), "its lease ends")
     assert client.get("reset", EMPTY_REQUEST) == []
     robot.start()
     cyclone.served(robot, client)
     assert client.call("reset", TRIGGER).success
     assert robot.requests("/reset") == [{}]
     robot.end()
-    until(lambda: not client.tokens(), "its leave is told", within_s=1)
+    until(lambda: not client.tokens(), "its leave is told", within_s=LEASE_S / 2)
 
 
 def test_a_robot_killed_and_started_at_once_is_lost_when_the_old_lease_ends(
@@ -459,7 +460,7 @@ def test_a_robot_killed_and_started_at_once_is_lost_when_the_old_lease_ends(
     cyclone.served(robot, client)
     robot.kill()
     robot.start()
-    until(lambda: not client.tokens(), "the bridge loses it", within_s=LEASE_S + 3)
+    until(lambda: not client.tokens(), "the bridge loses it")
     assert client.get("reset", EMPTY_REQUEST) == []
     assert robot.calls() == []
     robot.end()

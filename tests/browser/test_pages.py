@@ -4,6 +4,7 @@ import re
 import signal
 import time
 from collections import Counter
+from collections.abc import Callable
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
@@ -186,10 +187,29 @@ def test_without_scripts_a_press_is_a_form(server: Server, node: RosNode, chromi
     page.go_back()
     page.go_forward()
     page.reload()
-    # The page reloads itself: a lock shows without a touch.
+    server.press("operation", "the next")
+    until(lambda: "the next" in node.heard_data("/operation")[before:], "heard")
+    assert node.heard_data("/operation")[before:] == ["no script 日本語", "the next"]
+    context.close()
+
+
+def test_a_page_without_scripts_loads_itself_again(
+    bridge: Bridge,
+    node: RosNode,
+    tmp_path: Path,
+    servers: Callable[[Server], Server],
+    chromium: Browser,
+) -> None:
+    """A lock shows without a touch."""
+    mine = servers(live(bridge.endpoint, tmp_path, app="tests.support.apps.reloading:app"))
+    context = chromium.new_context(java_script_enabled=False)
+    page = context.new_page()
+    page.goto(mine.url)
+    expect(button(page, "Publish1")).to_be_disabled()
     permit(node, True)
-    expect(button(page, "Publish1")).to_be_enabled(timeout=40_000)
-    assert node.heard_data("/operation")[before:] == ["no script 日本語"]
+    expect(button(page, "Publish1")).to_be_enabled()
+    permit(node, False)
+    expect(button(page, "Publish1")).to_be_disabled()
     context.close()
 
 
@@ -219,6 +239,7 @@ def test_two_taps_of_a_finger_are_one_press(server: Server, node: RosNode, page:
     expect(page.locator("#receipt-operation")).to_contain_text("Sent")
     publish.click()
     expect(publish).not_to_have_attribute("aria-busy", "true")
+    until(lambda: len(node.heard("/operation")) > before, "heard")
     assert len(node.heard("/operation")) == before + 1
     publish.click()
     until(lambda: len(node.heard("/operation")) == before + 2, "a press after that is another one")
@@ -373,7 +394,16 @@ def test_the_first_page_is_small_and_asks_nobody_else(demo: Server, chromium: Br
     page.goto(demo.url)
     expect(button(page, "Publish")).to_be_enabled()
     page.wait_for_timeout(500)
-    urls = [request.url for request in requests if not request.url.startswith("data:")]
+
+    def asked() -> list[str]:
+        return [request.url for request in requests if not request.url.startswith("data:")]
+
+    def all_came() -> bool:
+        page.wait_for_timeout(50)
+        return len(received) == len(asked())
+
+    until(all_came, "all has come")
+    urls = asked()
     assert len(urls) <= 6, urls
     assert all(url.startswith(demo.url) for url in urls)
     assert len(received) == len(urls)

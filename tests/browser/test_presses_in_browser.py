@@ -17,6 +17,10 @@ from tests.support.parts import ROOT, TAP_AGAIN_MS, Server, until
 # Each press as it leaves: in which event, and how many buttons were busy by then.
 NOTE: Final = """
     window.left = [];
+    window.opened = 0;
+    window.WebSocket = class extends WebSocket {
+        constructor(url) { super(url); this.addEventListener("open", () => opened++); }
+    };
     const note = (by, text) => {
         const busy = document.querySelectorAll("[aria-busy]").length;
         left.push({ by, during: event?.type, busy, ...JSON.parse(text) });
@@ -74,15 +78,13 @@ def receipt(page: Page) -> Any:
     return page.locator("#receipt-operation")
 
 
-@pytest.mark.real_time
 @pytest.mark.parametrize("by", MADE_BY)
 def test_a_press_leaves_once_within_its_event_and_then_shows(shown: Page, by: str, way: str) -> None:
     if way == "post":
         shown.route("**/line.js", lambda route: route.abort())
     else:
-        with shown.expect_websocket():
-            shown.get_by_role("heading", name="Operation", exact=True).click()
-        shown.wait_for_timeout(300)  # it is open
+        shown.get_by_role("heading", name="Operation", exact=True).click()
+        shown.wait_for_function("() => opened")
     began = shown.evaluate("Date.now()")
     make(shown, by)
     shown.wait_for_function("() => left.length")

@@ -161,6 +161,7 @@ def test_a_press_in_a_browser_waits_for_no_stopped_server(
     expect(page.get_by_role("button", name="Publish", exact=True)).to_be_enabled()
     page.get_by_role("button", name="Publish", exact=True).click()
     expect(page.locator("#receipt-operation")).to_contain_text("Sent on /operation")
+    until(lambda: "never late" in node.heard_data("/operation"), "heard")
     assert node.heard_data("/operation").count("never late") == 1
 
 

@@ -12,11 +12,11 @@ from typing import Final
 
 import httpx
 
-from tests.support.parts import Server, until
+from tests.support.parts import ENOUGH_S, Server, http_client, until
 
 PERIOD_S: Final = 0.03
 TWICE_EACH: Final = 5  # each fifth press is posted a second time, with the same id
-SETTLE_S: Final = 3.0
+SETTLE_S: Final = ENOUGH_S
 
 _runs = itertools.count()
 _this = secrets.token_hex(3)
@@ -47,7 +47,7 @@ class Presser:
         self._thread.start()
 
     def _press_on(self) -> None:
-        with httpx.Client(base_url=self._server.url, timeout=10, trust_env=False) as http:
+        with http_client(self._server.url, 10) as http:
             while not self._over.wait(self._period_s):
                 self._press(http, len(self.presses))
 
@@ -74,7 +74,9 @@ class Presser:
     def count(self, outcome: str, since: float = 0.0) -> int:
         return sum(p.outcome == outcome and p.at >= since for p in self.presses)
 
-    def goes_on(self, outcome: str = "published", since: float = 0.0, within_s: float = 20.0) -> None:
+    def goes_on(
+        self, outcome: str = "published", since: float = 0.0, within_s: float = ENOUGH_S
+    ) -> None:
         """Waits until a press since then got this outcome."""
         until(
             lambda: self.count(outcome, since), f"a press is {outcome}: {self.presses[-1:]}", within_s

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
 
-from tests.support.parts import ROOT, Bridge, RosNode, Server, until, zenoh_file
+from tests.support.parts import ENOUGH_S, ROOT, Bridge, RosNode, Server, until, zenoh_file
 
 LONG: Final = os.environ.get("FAULTS") == "long"
 BOOL: Final = "std_msgs/msg/Bool"
@@ -89,6 +89,12 @@ def several(short: int, long: int) -> int:
     return long if LONG else short
 
 
+def limit(seconds: float) -> float:
+    """A limit of time as it is in the long form, which measures. The short one runs beside other tests:
+    what happens counts there, and `tests/faults/test_faults_on_bridge.py` asserts the times."""
+    return seconds if LONG else seconds + ENOUGH_S
+
+
 def ears(domain: int) -> RosNode:
     """A node that hears all that the panel sends."""
     node = RosNode(domain, "ears")
@@ -105,12 +111,12 @@ def permitting(node: RosNode) -> None:
     node.every("/pulsed", {"data": True}, PULSE_S)
 
 
-def kiosk(endpoint: str, folder: Path, port: int = 0, **environment: str) -> Server:
+def kiosk(endpoint: str, folder: Path, port: int = 0, panel: str = PANEL, **environment: str) -> Server:
     """A kiosk as users start it, which writes its stacks when it is aborted."""
-    panel = folder / "faults.toml"
-    panel.write_text(PANEL)
+    path = folder / "faults.toml"
+    path.write_text(panel)
     zenoh = str(zenoh_file(folder, endpoint))
-    given = {"KIOSK_PANEL": str(panel), "KIOSK_ZENOH": zenoh, "PYTHONFAULTHANDLER": "1"}
+    given = {"KIOSK_PANEL": str(path), "KIOSK_ZENOH": zenoh, "PYTHONFAULTHANDLER": "1"}
     return Server(ROOT, port, **given, **environment)
 
 
@@ -134,9 +140,11 @@ class Rig:
         return [(at, text) for at, text in self.ears.arrivals(SENT_ON[widget])]
 
     @contextmanager
-    def serving(self, folder: Path, endpoint: str = "", **environment: str) -> Iterator[Server]:
+    def serving(
+        self, folder: Path, endpoint: str = "", panel: str = PANEL, **environment: str
+    ) -> Iterator[Server]:
         """A kiosk on it that permits everything."""
-        server = kiosk(endpoint or self.endpoint, folder, 0, **environment)
+        server = kiosk(endpoint or self.endpoint, folder, 0, panel, **environment)
         try:
             permitted(server)
             yield server

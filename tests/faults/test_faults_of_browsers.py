@@ -3,18 +3,14 @@
 import time
 from concurrent.futures import ThreadPoolExecutor
 
-import pytest
-
 from tests.faults import fixtures
 from tests.faults.browsers import Browsers, asking, storm, unread
 from tests.faults.presser import Presser, accounted
 from tests.faults.results import ms, record
-from tests.faults.rig import TEXT, Rig, several
+from tests.faults.rig import TEXT, Rig, limit, several
 from tests.faults.trial import well
 from tests.faults.watch import Watch, answering, came_back, resources
-from tests.support.parts import Server, until
-
-pytestmark = pytest.mark.real_time
+from tests.support.parts import ENOUGH_S, Server, until
 
 rig = fixtures.rig
 server = fixtures.server
@@ -38,9 +34,9 @@ def test_a_browser_that_reads_nothing(rig: Rig, server: Server) -> None:
         well(presser)
         said = {"data": "{n} " + "long " * 30}
         telling = pool.submit(rig.robot.flood, "/heard", said, UPDATES_PER_S, READS_NOTHING_S)
-        until(telling.done, "the time is over", READS_NOTHING_S + 10)
+        until(telling.done, "the time is over", READS_NOTHING_S + ENOUGH_S)
         rig.robot.publish("/heard", {"data": "now"})
-        until(lambda: watch.widgets["heard"]["text"] == "now", "who reads sees it", 2)
+        until(lambda: watch.widgets["heard"]["text"] == "now", "who reads sees it", limit(2))
         well(presser)
         got = unread(deaf)
     presses = presser.end()
@@ -48,7 +44,7 @@ def test_a_browser_that_reads_nothing(rig: Rig, server: Server) -> None:
     watch.end()
     assert len(got) < MOST_UNREAD
     assert b'"text":"now"' in got
-    account = accounted(presses, lambda: rig.arrivals("guarded"), lambda _: True, 2.0)
+    account = accounted(presses, lambda: rig.arrivals("guarded"), lambda _: True, limit(2.0))
     came_back(server.process.pid, before, MARGIN_MB)
     record(
         f"a browser that reads nothing for {READS_NOTHING_S} s",
@@ -68,13 +64,13 @@ def test_two_hundred_browsers(rig: Rig, server: Server) -> None:
         browsers.forget()
         told_at = time.monotonic()
         rig.robot.publish("/kept", {"data": False})
-        until(lambda: browsers.showing(b'"enabled":false') == BROWSERS, "each is locked", 5)
+        until(lambda: browsers.showing(b'"enabled":false') == BROWSERS, "each is locked", limit(5))
         locked_s = time.monotonic() - told_at
         rig.robot.publish("/kept", {"data": True})
-        until(lambda: browsers.showing(b'"enabled":true') == BROWSERS, "each is open", 5)
+        until(lambda: browsers.showing(b'"enabled":true') == BROWSERS, "each is open", limit(5))
     presses = presser.end()
     browsers.close()
-    account = accounted(presses, lambda: rig.arrivals("paced"), lambda _: True, 2.0)
+    account = accounted(presses, lambda: rig.arrivals("paced"), lambda _: True, limit(2.0))
     after = came_back(server.process.pid, before, MARGIN_MB)
     record(
         f"{BROWSERS} browsers at once",
@@ -95,7 +91,7 @@ def test_browsers_that_come_and_go(rig: Rig, server: Server) -> None:
         times = storm(server, STORM_S)
         well(presser)
     presses = presser.end()
-    account = accounted(presses, lambda: rig.arrivals("guarded"), lambda _: True, 2.0)
+    account = accounted(presses, lambda: rig.arrivals("guarded"), lambda _: True, limit(2.0))
     after = came_back(server.process.pid, before, MARGIN_MB)
     watch.end()
     record(

@@ -4,17 +4,13 @@ import random
 import secrets
 from pathlib import Path
 
-import pytest
-
 from tests.faults import fixtures
 from tests.faults.kills import Life, kill_at_random_moments
 from tests.faults.presser import accounted
 from tests.faults.results import ms, record
-from tests.faults.rig import Rig, kiosk, several
+from tests.faults.rig import Rig, kiosk, limit, several
 from tests.faults.trial import UNDER_WAY_S
 from tests.support.parts import free_port
-
-pytestmark = pytest.mark.real_time
 
 rig = fixtures.rig
 
@@ -36,7 +32,7 @@ def test_a_server_killed_at_random_moments(rig: Rig, tmp_path: Path) -> None:
         presses,
         lambda: rig.arrivals("guarded"),
         lambda press: life_of[press.text].whole(press, UNDER_WAY_S),
-        LATE_S,
+        limit(LATE_S),
     )
     assert account.received, f"seed {seed}"
     unanswered = sum(not press.outcome for press in presses)

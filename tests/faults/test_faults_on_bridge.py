@@ -92,7 +92,7 @@ def test_after_a_return_an_old_permission_does_not_count(
 
 
 @pytest.mark.real_time
-def test_a_frozen_bridge_locks_within_three_seconds_and_opens_when_it_thaws(
+def test_a_frozen_bridge_locks_within_a_second_and_opens_when_it_thaws(
     own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:
     speaking(own_node)
@@ -103,7 +103,7 @@ def test_a_frozen_bridge_locks_within_three_seconds_and_opens_when_it_thaws(
         frozen_at = time.monotonic()
         own_bridge.freeze()
         locked_at, reason = next_lock(stream)
-    assert locked_at - frozen_at < 3.0
+    assert locked_at - frozen_at < 1.0
     assert "No connection to the robot" in reason
     own_bridge.thaw()
     opened(kiosk)
@@ -273,7 +273,6 @@ def test_what_the_robot_forbids_while_the_server_stands_still_counts_behind_all_
     until(says_so, "permitted anew", every_s=0.2)
 
 
-@pytest.mark.real_time
 def test_an_old_latched_value_is_no_fresh_one(
     own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:

@@ -7,7 +7,7 @@ from typing import Final
 
 from tests.faults.presser import Account, Press, Presser, accounted
 from tests.faults.results import ms, record
-from tests.faults.rig import Rig
+from tests.faults.rig import Rig, limit
 from tests.faults.watch import Watch, answering
 from tests.support.parts import Server, until
 
@@ -44,18 +44,22 @@ def tried(
     interlock: str = "kept",
     widget: str = "guarded",
     opens_within_s: float = 30.0,
+    because: str = "",
 ) -> Trial:
-    """Breaks it, waits for the lock and until `lasts_s` are over, mends it, waits until all is well."""
+    """Breaks it, waits for the lock and until `lasts_s` are over, mends it, waits until all is well.
+
+    `because` is in the reason of the lock that counts.
+    """
     watch, presser = Watch(server), Presser(server, widget)
     with answering(server):
         well(presser)
         broken_at = time.monotonic()
         breaks()
-        locked_s, reason = watch.locked_after(broken_at, interlock, locks_within_s)
+        locked_s, reason = watch.locked_after(broken_at, interlock, limit(locks_within_s), because)
         until(lambda: time.monotonic() >= broken_at + lasts_s, "the fault's time is over", lasts_s + 1)
         mended_at = time.monotonic()
         mends()
-        watch.opened(interlock, opens_within_s)
+        watch.opened(interlock, limit(opens_within_s))
         opened_at = watch.now(interlock).at
         well(presser)
     presses = presser.end()
@@ -64,7 +68,7 @@ def tried(
     def whole(press: Press) -> bool:
         return press.answered_at < broken_at - UNDER_WAY_S or press.at > opened_at
 
-    account = accounted(presses, lambda: rig.arrivals(widget), whole, late_s)
+    account = accounted(presses, lambda: rig.arrivals(widget), whole, limit(late_s))
     claimed = sum(p.outcome == "published" and broken_at < p.at < mended_at for p in presses)
     return Trial(locked_s, reason, opened_at - mended_at, account, claimed)
 

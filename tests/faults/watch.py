@@ -12,7 +12,7 @@ from typing import Any, Final
 
 import httpx
 
-from tests.support.parts import Server, events_in, until
+from tests.support.parts import ENOUGH_S, Server, events_in, http_client, until
 
 DEAD_AFTER_S: Final = 10.0
 
@@ -42,7 +42,7 @@ class Watch:
     def _read(self) -> None:
         try:
             with (
-                httpx.Client(base_url=self._server.url, timeout=15, trust_env=False) as http,
+                http_client(self._server.url, 15) as http,
                 http.stream("GET", f"{self._server.base}/events") as response,
             ):
                 text = ""
@@ -72,17 +72,19 @@ class Watch:
     def now(self, interlock: str) -> Seen:
         return self.seen[interlock][-1]
 
-    def locked_after(self, since: float, interlock: str, within_s: float) -> tuple[float, str]:
-        """Seconds from `since` to the first lock after it, and its reason."""
+    def locked_after(
+        self, since: float, interlock: str, within_s: float, because: str = ""
+    ) -> tuple[float, str]:
+        """Seconds from `since` to the first lock after it for that reason, and the whole reason."""
 
         def found() -> Seen | None:
             locks = (s for s in self.seen[interlock] if s.at >= since and not s.enabled)
-            return next(locks, None)
+            return next((s for s in locks if because in (s.reason or "")), None)
 
         lock: Seen = until(found, f"{interlock} locked, is {self.now(interlock)}", within_s)
         return lock.at - since, lock.reason or ""
 
-    def opened(self, interlock: str, within_s: float = 20.0) -> None:
+    def opened(self, interlock: str, within_s: float = ENOUGH_S) -> None:
         try:
             until(lambda: self.now(interlock).enabled, "", within_s)
         except AssertionError:
@@ -111,7 +113,7 @@ def answering(server: Server) -> Iterator[None]:
     stood: list[str] = []
 
     def ask() -> None:
-        with httpx.Client(base_url=server.url, timeout=DEAD_AFTER_S, trust_env=False) as http:
+        with http_client(server.url, DEAD_AFTER_S) as http:
             while not over.wait(0.5):
                 try:
                     http.get("/healthz")
@@ -160,7 +162,7 @@ def resources(pid: int) -> Resources:
     )
 
 
-def came_back(pid: int, before: Resources, margin_mb: float, within_s: float = 15.0) -> Resources:
+def came_back(pid: int, before: Resources, margin_mb: float, within_s: float = ENOUGH_S) -> Resources:
     """Waits until memory is within a margin of what it was, and threads and open files are no more."""
 
     def found() -> Resources | None:

@@ -2,6 +2,7 @@
 
 import asyncio
 import itertools
+import threading
 import time
 from collections.abc import Iterable, Mapping
 from typing import Any, ClassVar
@@ -9,6 +10,7 @@ from typing import Any, ClassVar
 import pytest
 
 from app.audit import NullLog
+from app.commands.holds import controller, lease
 from app.commands.holds.receipts import ActiveHold
 from app.commands.press_context import PressContext
 from app.commands.receipts import LONGEST_KEPT, Receipt
@@ -44,6 +46,7 @@ from tests.support.builders import (
     robot_there,
     small_panel,
 )
+from tests.support.parts import ENOUGH_S
 
 
 def flag(value: bool) -> bytes:
@@ -243,24 +246,32 @@ def test_a_link_that_is_lost_while_it_is_renewed_is_renewed_again(
     """And whatever Zenoh makes of it, it is tried until there is a session."""
     monkeypatch.setattr(renewal, "RENEW_AGAIN_S", 0.01)
     renewals: list[str] = []
+    lost_again = threading.Event()
+
+    async def renewed(times: int) -> None:
+        async with asyncio.timeout(ENOUGH_S):
+            while len(renewals) < times:
+                await asyncio.sleep(0.01)
 
     async def lost() -> None:
         one = session_of(small_panel(), "tcp/127.0.0.1:1")
 
         def renew() -> None:
             renewals.append("renewed")
-            time.sleep(0.05)
+            assert lost_again.wait(ENOUGH_S)
             if len(renewals) == 2:
                 raise RuntimeError("no session")
 
         monkeypatch.setattr(one.link, "renew", renew)
         one.renew()
-        await asyncio.sleep(0.01)
+        await renewed(1)
         one.renew()
-        await asyncio.sleep(0.4)
+        lost_again.set()
+        await renewed(3)
+        await asyncio.sleep(0.1)
         assert len(renewals) == 3
         one.renew()
-        await asyncio.sleep(0.2)
+        await renewed(4)
         await one.stop()
 
     asyncio.run(lost())
@@ -284,10 +295,12 @@ def test_a_publisher_that_was_replaced_between_two_turns_has_to_say_it_again() -
         assert interlock_verdict(interlock, robot, NOW).permitted is permitted
 
 
-@pytest.mark.real_time
 def test_a_kiosk_that_gives_its_session_up_ends_what_is_held_before(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    for module in (controller, lease):  # a busy machine misses heartbeats
+        monkeypatch.setattr(module, "LEASE_S", ENOUGH_S)
+
     async def scene() -> None:
         panel = panel_of(SPEED, JOG, {**HEARD, "topic": "/last_heard"}, mode="demo")
         with zenoh_peer.in_process("", panel.distro) as there:
@@ -303,7 +316,7 @@ def test_a_kiosk_that_gives_its_session_up_ends_what_is_held_before(
 
             monkeypatch.setattr(one.link, "put", noted)
             ended: list[Receipt] = []
-            async with asyncio.timeout(20):
+            async with asyncio.timeout(ENOUGH_S):
                 while not one.publisher.view["widgets"]["jog"]["enabled"]:
                     await asyncio.sleep(0.05)
                 hold = one.holds.begin("jog", HALF, time.monotonic(), FROM, ended.append)

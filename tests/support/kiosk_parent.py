@@ -1,5 +1,5 @@
 """A process that has read the server's libraries once, and begins kiosks by forking: reading them anew
-takes a second of work for each.
+takes a second of work for each. Message types, the panel's models and templates are prepared once, too.
 
 It is `python -m tests.support.kiosk_parent FD` in the project's folder. FD is a socket: each message is
 an order in JSON with two files, the kiosk's stderr and where its pid and then its exit code are told.
@@ -12,17 +12,25 @@ import json
 import os
 import runpy
 import select
+import shutil
 import signal
 import socket
 import sys
+import tempfile
 import threading
 import time
 from collections.abc import Mapping
+from functools import partialmethod
 from importlib import import_module
 from pathlib import Path
 from typing import Any, Final
 
+from jinja2 import Environment, FileSystemBytecodeCache
+
+from app.panel import load_panel
+
 MAIN: Final = Path("app/main.py")
+PANEL: Final = Path("app/panel.toml")
 UVICORN: Final = (
     "main",
     "lifespan.on",
@@ -49,6 +57,14 @@ def read_libraries() -> dict[str, str]:
                     import_module(f"{statement.module}.{part.name}")
     assert len(list(Path("/proc/self/task").iterdir())) == threading.active_count() == 1
     return {name: value for name, value in os.environ.items() if before.get(name) != value}
+
+
+def prepare(templates: str) -> None:
+    """Reads the message types and builds the models of a panel; the first kiosk compiles the templates
+    into that folder, the others read them there."""
+    load_panel(PANEL)
+    keep = partialmethod(Environment.__init__, bytecode_cache=FileSystemBytecodeCache(templates))
+    setattr(Environment, "__init__", keep)  # noqa: B010 - mypy takes no assignment to a method
 
 
 class Parent:
@@ -116,4 +132,8 @@ def become(arguments: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    Parent(socket.socket(fileno=int(sys.argv[1]))).run()
+    parent = Parent(socket.socket(fileno=int(sys.argv[1])))
+    compiled = tempfile.mkdtemp(prefix="templates-")
+    prepare(compiled)
+    parent.run()  # a kiosk leaves it by SystemExit
+    shutil.rmtree(compiled)

@@ -1,4 +1,7 @@
-"""The WebSocket of a hold, with the demo robot: who may open it, and what it answers."""
+"""The WebSocket of a hold, with the demo robot: who may open it, and what it answers.
+
+Where nothing depends on when a lease ends, the server has leases that a busy machine keeps.
+"""
 
 import csv
 import io
@@ -18,23 +21,32 @@ from websockets.sync.client import ClientConnection, connect
 
 from app.audit.database import NAME
 from tests.browser.test_holds_in_browser import PANEL, jogging, permit
-from tests.support.parts import ROOT, Bridge, RosNode, Server, until
-
-pytestmark = pytest.mark.real_time
+from tests.support.parts import ENOUGH_S, ROOT, Bridge, RosNode, Server, until
 
 TRIES: Final = 5
+PATIENT: Final = "tests.support.apps.patient:app"
+SHIPPED: Final = "app.main:app"
 
 
-def in_demo(folder: Path, **more: Any) -> Server:
+def in_demo(folder: Path, app: str = PATIENT, **more: Any) -> Server:
     """A server whose demo robot can be jogged, by the panel `jog.toml`."""
     panel = folder / "jog.toml"
     panel.write_text(PANEL)
-    return Server(ROOT, KIOSK_PANEL=str(panel), KIOSK_MODE="demo", **more)
+    return Server(ROOT, app=app, KIOSK_PANEL=str(panel), KIOSK_MODE="demo", **more)
 
 
 @pytest.fixture(scope="module")
 def demo(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     mine = in_demo(tmp_path_factory.mktemp("panel"))
+    until(mine.ready, "ready")
+    yield mine
+    mine.end()
+
+
+@pytest.fixture(scope="module")
+def prompt(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    """A server whose leases are as short as they are."""
+    mine = in_demo(tmp_path_factory.mktemp("prompt"), SHIPPED)
     until(mine.ready, "ready")
     yield mine
     mine.end()
@@ -51,7 +63,7 @@ class Socket:
         self.hear()
 
     def hear(self) -> dict[str, Any]:
-        said: dict[str, Any] = json.loads(self._connection.recv(timeout=5))
+        said: dict[str, Any] = json.loads(self._connection.recv(timeout=ENOUGH_S))
         self.stamp, self.at = said["stamp"], time.monotonic()
         return said
 
@@ -119,22 +131,19 @@ def test_a_hold_is_begun_kept_and_let_go(demo: Server) -> None:
 def test_an_input_with_a_default_may_be_left_out(demo: Server) -> None:
     with opened(demo) as socket:
         said = socket.begin(inputs={})
-        assert said.get("status") in (None, 409)  # on a busy machine it may come too late, and no worse
+        assert said["state"] == "held"
     log = csv.DictReader(io.StringIO(demo.http.get("/log.csv?every=true").text.removeprefix("\ufeff")))
-    values = {row["values"] for row in log if row["press"] == said.get("lease", said.get("id"))}
+    values = {row["values"] for row in log if row["press"] == said["lease"]}
     assert values - {""} == {'{"speed": 0.5}'}
 
 
 def test_a_hold_is_let_go_by_who_has_no_answer_yet(demo: Server) -> None:
-    for _ in range(TRIES):
-        with opened(demo) as socket:
-            socket.begin()
-            socket.say(do="end", why="released")
-            said = socket.hear()
-            if said["state"] == "ended" and said["outcome"] == "published":
-                assert said["reason"].startswith("Released at")
-                return
-    raise AssertionError(said)
+    with opened(demo) as socket:
+        socket.begin()
+        socket.say(do="end", why="released")
+        said = socket.hear()
+        assert (said["state"], said["outcome"]) == ("ended", "published")
+        assert said["reason"].startswith("Released at")
 
 
 def test_who_lets_go_before_a_hold_begins_is_told_that_it_did_not(demo: Server) -> None:
@@ -146,15 +155,15 @@ def test_who_lets_go_before_a_hold_begins_is_told_that_it_did_not(demo: Server) 
         assert socket.closed() == 4409
 
 
-def test_a_heartbeat_for_a_hold_that_is_over_is_told_so_and_revives_nothing(demo: Server) -> None:
-    with held(demo) as socket:
-        time.sleep(0.4)
+@pytest.mark.real_time
+def test_a_heartbeat_for_a_hold_that_is_over_is_told_so_and_revives_nothing(prompt: Server) -> None:
+    with held(prompt) as socket:
         said = socket.hear()
         assert (said["state"], said["outcome"]) == ("ended", "aborted")
         for _ in range(3):
             again = socket.beat()
             assert (again["state"], again["reason"]) == ("ended", said["reason"])
-        assert demo.widget("jog")["held"] is False
+        assert prompt.widget("jog")["held"] is False
         assert socket.closed() == 1000
 
 
@@ -162,10 +171,10 @@ def test_a_second_holder_is_refused(demo: Server) -> None:
     with held(demo) as first, opened(demo) as second:
         first.beat()
         said = second.begin()
-        if first.beat()["state"] == "held":  # else the machine stood still: nothing to compare
-            assert (said["state"], said["status"], said["outcome"]) == ("refused", 409, "refused")
-            assert said["reason"].endswith("held by another browser.")
-            assert second.closed() == 4409
+        assert first.beat()["state"] == "held"
+        assert (said["state"], said["status"], said["outcome"]) == ("refused", 409, "refused")
+        assert said["reason"].endswith("held by another browser.")
+        assert second.closed() == 4409
 
 
 @pytest.mark.parametrize(
@@ -218,27 +227,29 @@ def test_each_refused_hold_is_in_the_log(demo: Server) -> None:
     assert nonsense["of"] == ""
 
 
-def test_who_lets_go_while_the_entry_is_written_holds_nothing(demo: Server) -> None:
+@pytest.mark.real_time
+def test_who_lets_go_while_the_entry_is_written_holds_nothing(prompt: Server) -> None:
     """The disk takes the entry only after the finger was lifted."""
     for _ in range(TRIES):
-        with opened(demo) as socket:
-            db = sqlite3.connect(demo.data / NAME, isolation_level=None)
+        with opened(prompt) as socket:
+            db = sqlite3.connect(prompt.data / NAME, isolation_level=None)
             db.execute("BEGIN IMMEDIATE")
             socket.say(do="begin", inputs={"speed": 0.5}, seen=socket.seen)
             socket.say(do="end", why="released", lease="")
             time.sleep(0.1)
-            assert demo.widget("jog")["held"] is False
+            assert prompt.widget("jog")["held"] is False
             db.execute("ROLLBACK")
             db.close()
             said = socket.hear()
             assert (said["state"], said["status"]) == ("refused", 409)
-            assert "let go before it began" in said["reason"]
+            assert "released before the hold began" in said["reason"]
             assert socket.closed() == 4409
-        assert demo.widget("jog")["held"] is False
+        assert prompt.widget("jog")["held"] is False
 
 
-def test_a_begin_that_was_long_on_its_way_is_refused(demo: Server) -> None:
-    with opened(demo) as socket:
+@pytest.mark.real_time
+def test_a_begin_that_was_long_on_its_way_is_refused(prompt: Server) -> None:
+    with opened(prompt) as socket:
         time.sleep(0.3)
         said = socket.begin(after=0.0)
         assert (said["state"], "too late" in said["reason"]) == ("refused", True)
@@ -289,7 +300,7 @@ def test_each_of_several_robots_is_held_on_its_own(tmp_path: Path) -> None:
     )
     panel = tmp_path / "two.toml"
     panel.write_text(PANEL.replace("[[interlock]]", robots + "[[interlock]]"))
-    server = Server(ROOT, KIOSK_PANEL=str(panel), KIOSK_MODE="demo")
+    server = Server(ROOT, app=PATIENT, KIOSK_PANEL=str(panel), KIOSK_MODE="demo")
     try:
         until(server.ready, "ready")
         with held(server.robot("r2")) as socket:
@@ -309,7 +320,7 @@ def test_a_lost_bridge_ends_it_and_what_could_not_be_said_is_not_said_later(
 ) -> None:
     own_node.subscribe("/jog", "geometry_msgs/msg/Point", depth=1000)
     own_node.advertise("/operation_enabled", "std_msgs/msg/Bool")
-    server = jogging(own_bridge, own_node, tmp_path)
+    server = jogging(own_bridge, own_node, tmp_path, PATIENT)
     try:
         with held(server) as socket:
             until(lambda: own_node.heard("/jog"), "it moves", every_s=0.001)
@@ -330,7 +341,7 @@ def test_a_release_that_may_not_have_reached_the_bridge_is_not_published(
     own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:
     own_node.advertise("/operation_enabled", "std_msgs/msg/Bool")
-    kiosk = servers(jogging(own_bridge, own_node, tmp_path))
+    kiosk = servers(jogging(own_bridge, own_node, tmp_path, PATIENT))
     with held(kiosk) as socket:
         socket.beat()
         own_bridge.freeze()
@@ -343,12 +354,13 @@ def test_a_release_that_may_not_have_reached_the_bridge_is_not_published(
     assert said["reason"] in kiosk.http.get("/log.csv").text
 
 
-def test_a_server_that_stood_still_has_ended_it_when_it_wakes(demo: Server) -> None:
-    with held(demo) as socket:
-        demo.process.send(signal.SIGSTOP)
+@pytest.mark.real_time
+def test_a_server_that_stood_still_has_ended_it_when_it_wakes(prompt: Server) -> None:
+    with held(prompt) as socket:
+        prompt.process.send(signal.SIGSTOP)
         time.sleep(0.5)
         socket.say(do="beat", number=1, lease=socket.lease)
-        demo.process.send(signal.SIGCONT)
+        prompt.process.send(signal.SIGCONT)
         said = socket.hear()
         assert (said["state"], said["outcome"]) == ("ended", "aborted")
         assert "the panel server stalled" in said["reason"]
@@ -379,7 +391,7 @@ def test_a_server_that_ends_tells_it_though_the_robot_has_to_be_asked_first(
     own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:
     own_node.advertise("/operation_enabled", "std_msgs/msg/Bool")
-    kiosk = servers(jogging(own_bridge, own_node, tmp_path))
+    kiosk = servers(jogging(own_bridge, own_node, tmp_path, PATIENT))
     with held(kiosk) as socket:
         socket.beat()
         own_bridge.freeze()
@@ -388,7 +400,7 @@ def test_a_server_that_ends_tells_it_though_the_robot_has_to_be_asked_first(
         own_bridge.thaw()
     assert said["outcome"] == "unknown"
     assert "The robot may not have received the stop message" in said["reason"]
-    kiosk.process.wait(10)
+    kiosk.process.wait(ENOUGH_S)
 
 
 def test_a_server_that_ends_waits_for_no_browser_that_does_not_close(
@@ -396,12 +408,10 @@ def test_a_server_that_ends_waits_for_no_browser_that_does_not_close(
 ) -> None:
     mine = servers(in_demo(tmp_path))
     with held(mine) as socket:
-        began = time.monotonic()
         mine.process.send(signal.SIGTERM)
         assert socket.beat_until_it_ends()["state"] == "ended"
         assert socket.closed() in (1000, 1012)
-        mine.process.wait(10)
-        assert time.monotonic() - began < 6
+        mine.process.wait(15)  # it waits for nothing else, and for that 40 s
 
 
 def test_nobody_presses_a_hold(demo: Server) -> None:

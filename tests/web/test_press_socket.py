@@ -180,13 +180,25 @@ def publish(page: Page) -> Any:
     return page.get_by_role("button", name="Publish", exact=True)
 
 
+NOTE_OPENED: Final = """() => {
+    window.opened = 0;
+    window.WebSocket = class extends WebSocket {
+        constructor(url) { super(url); this.addEventListener("open", () => opened++); }
+    };
+}"""
+
+
+NOTE_ENDED: Final = NOTE_OPENED.replace('"open"', '"close"')
+
+
 def touched(page: Page) -> WebSocket:
     """The socket of a page that was touched for the first time, and not pressed."""
     expect(publish(page)).to_be_enabled()
     page.wait_for_function("() => document.querySelector('#clock').textContent")
+    page.evaluate(NOTE_OPENED)
     with page.expect_websocket() as opened:
         page.get_by_role("heading", name="P", exact=True).click()
-    page.wait_for_timeout(300)  # it is open
+    page.wait_for_function("() => opened")
     return opened.value
 
 
@@ -250,8 +262,9 @@ def test_a_press_whose_socket_breaks_is_not_known_and_not_repeated(
     page.goto(kiosk.url)
     expect(publish(page)).to_be_enabled()
     page.wait_for_function("() => document.querySelector('#clock').textContent")
+    page.evaluate(NOTE_ENDED if fault == "it does not open" else NOTE_OPENED)
     page.get_by_role("heading", name="P", exact=True).click()
-    page.wait_for_timeout(300)  # the socket is there, or not
+    page.wait_for_function("() => opened")  # the socket is there, or not
     publish(page).click()
     receipt = page.locator("#receipt-free")
     if fault == "it does not open":

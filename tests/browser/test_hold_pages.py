@@ -1,0 +1,129 @@
+"""What a page shows of a hold, with a finger or a key on it: on a server whose leases a busy machine
+keeps. `test_holds_in_browser.py` has the ends of holds, and measures them."""
+
+from collections.abc import Iterator
+from contextlib import suppress
+from functools import partial
+from typing import Final
+
+import pytest
+from playwright.sync_api import Browser, Page, Route, expect
+
+from tests.browser import test_holds_in_browser
+from tests.browser.test_holds_in_browser import TOPIC, TRIES, Finger, begun, ended, has_ended, jogging
+from tests.support.parts import Bridge, RosNode, Server, has_heard, until
+from tests.web.test_hold_socket import PATIENT
+
+jogger = test_holds_in_browser.jogger
+touched = test_holds_in_browser.touched
+
+# A network on which each message takes 45 ms.
+SLOW: Final = """
+    window.WebSocket = class extends WebSocket {
+      set onmessage(hear) { super.onmessage = (event) => setTimeout(() => hear(event), 45); }
+      set onclose(hear) { super.onclose = (event) => setTimeout(() => hear(event), 45); }
+      send(text) { setTimeout(() => this.readyState === WebSocket.OPEN && super.send(text), 45); }
+    };
+"""
+
+
+@pytest.fixture(scope="module")
+def kiosk(
+    bridge: Bridge, jogger: RosNode, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Server]:
+    mine = jogging(bridge, jogger, tmp_path_factory.mktemp("jog"), PATIENT)
+    yield mine
+    mine.end()
+
+
+@pytest.mark.parametrize("tap_ms", [0, 30, 80, 130, 190, 400])
+def test_a_tap_over_a_slow_way_has_its_receipt(
+    chromium: Browser, kiosk: Server, jogger: RosNode, tap_ms: int
+) -> None:
+    """However the finger's lifting meets the server's answers: 45 ms each way."""
+    context = chromium.new_context(has_touch=True)
+    context.add_init_script(SLOW)
+    finger = Finger(context.new_page(), kiosk)
+    for _ in range(TRIES):
+        ends = len(ended(kiosk))
+        finger.down()
+        finger.page.wait_for_timeout(tap_ms)
+        finger.up()
+        receipt = finger.page.locator("#receipt-jog")
+        expect(receipt).not_to_be_empty()
+        said = receipt.inner_text()
+        if "Released at" in said or "released before the hold began" in said:
+            break  # else the machine stood still
+    else:
+        raise AssertionError(said)
+    until(lambda: not kiosk.widget("jog")["held"], "no longer held")
+    assert [code for code, _ in ended(kiosk)[ends:]] in ([], ["hold_released"])
+    context.close()
+
+
+def test_a_key_that_is_held_is_a_hold_and_its_repeats_are_none(
+    touched: Finger, jogger: RosNode
+) -> None:
+    for _ in range(TRIES):
+        ends, before = len(ended(touched.server)), len(jogger.heard(TOPIC))
+        touched.button.focus()
+        touched.page.keyboard.down(" ")
+        for _ in range(5):
+            touched.page.keyboard.down(" ")  # what a keyboard repeats
+        until(partial(has_heard, jogger, TOPIC, before + 5), "it moves")
+        touched.page.keyboard.up(" ")
+        until(partial(has_ended, touched.server, ends), "it ends")
+        if ended(touched.server)[ends:][0][0] == "hold_released":
+            return
+    raise AssertionError(ended(touched.server))
+
+
+def test_another_browser_sees_it_and_is_refused(
+    touched: Finger, chromium: Browser, jogger: RosNode
+) -> None:
+    context = chromium.new_context(has_touch=True)
+    other = Finger(context.new_page(), touched.server)
+    holding = other.page.locator('[data-widget="jog"] .holding')
+    said = other.page.locator("#receipt-jog")
+    for _ in range(TRIES):
+        _, ends = begun(touched, jogger)
+        with suppress(AssertionError):  # it ended before that could be seen
+            expect(holding).to_contain_text("Held since")
+            other.down()
+            expect(said).not_to_be_empty()
+        other.up()
+        touched.up()
+        until(partial(has_ended, touched.server, ends), "it ends")
+        if ended(touched.server)[ends][0] == "hold_released":
+            break
+    expect(said).to_contain_text("held by another browser")
+    expect(holding).to_have_text("")
+    context.close()
+
+
+def test_without_scripts_it_is_locked_and_says_why(chromium: Browser, kiosk: Server) -> None:
+    context = chromium.new_context(java_script_enabled=False)
+    page = context.new_page()
+    page.goto(kiosk.url)
+    expect(page.get_by_role("button", name="Jog")).to_be_disabled()
+    expect(page.locator("#why-jog")).to_contain_text("hold-to-run needs JavaScript")
+    context.close()
+
+
+def test_a_page_that_did_not_load_whole_is_loaded_again(kiosk: Server, page: Page) -> None:
+    asked = []
+
+    def cut_once(route: Route) -> None:
+        asked.append(route.request.url)
+        if len(asked) == 1:
+            route.abort()
+        else:
+            route.continue_()
+
+    page.route("**/hold.js", cut_once)
+    page.goto(kiosk.url)
+    page.wait_for_function("() => performance.getEntriesByType('navigation')[0].type === 'reload'")
+    button = page.get_by_role("button", name="Jog")
+    expect(button).to_be_enabled()
+    button.dispatch_event("pointerdown", {"isPrimary": True, "button": 0, "pointerId": 7})
+    expect(button).to_have_attribute("aria-pressed", "true")

@@ -1,0 +1,17 @@
+"""The application with times that a busy machine keeps, for `uvicorn tests.support.apps.patient:app`.
+
+Its demo robot always permits operation, and a hold lasts long without a heartbeat.
+"""
+
+from app import main
+from app.commands.holds import controller, lease
+from app.simulator import robot
+from app.web.routes import hold_socket
+
+LEASE_S = 20.0
+
+for module in (controller, lease):
+    vars(module)["LEASE_S"] = LEASE_S
+vars(hold_socket).update(BEGIN_WITHIN_S=2 * LEASE_S, SILENCE_S=2 * LEASE_S)
+vars(robot)["PERMITTED_S"] = 1e9
+app = main.app
