@@ -114,7 +114,7 @@ def test_it_begins_with_a_snapshot_and_a_beat_and_goes_on_with_changes() -> None
             assert [name for name, _, _ in events_in(first["body"].decode())] == ["snapshot", "beat"]
             bench.says("one")
             await turns()
-            assert english(client.events("update")) == [{"heard": bench.board.view["widgets"]["heard"]}]
+            assert client.events("update") == [{"heard": english(bench.board.view["widgets"]["heard"])}]
 
     run(work)
 
