@@ -18,6 +18,7 @@ from app.web.metrics import Open
 from app.web.routes.events import EventStream
 from tests.support.builders import NOW, permits, robot_there, says, small_panel
 from tests.support.parts import events_in
+from tests.support.words import english
 
 PANEL = small_panel()
 SCOPE: dict[str, Any] = {"type": "http"}
@@ -113,7 +114,7 @@ def test_it_begins_with_a_snapshot_and_a_beat_and_goes_on_with_changes() -> None
             assert [name for name, _, _ in events_in(first["body"].decode())] == ["snapshot", "beat"]
             bench.says("one")
             await turns()
-            assert client.events("update") == [{"heard": bench.board.view["widgets"]["heard"]}]
+            assert client.events("update") == [{"heard": english(bench.board.view["widgets"]["heard"])}]
 
     run(work)
 

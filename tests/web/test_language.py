@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 
 from app.web.language import COOKIE, negotiated
-from tests.support.apps.translated import LANGUAGE
 from tests.support.parts import ROOT, Server, events_in, until
 
 AVAILABLE = ("de", "en", "pt-BR")
+LANGUAGE = "qps"  # of tests/support/apps/translated.py
 PSEUDO = {"accept-language": f"{LANGUAGE}, en;q=0.5"}
 BRACKETED = re.compile("⟦.*⟧", re.DOTALL)
 
