@@ -24,7 +24,9 @@ from app.panel.model import Panel
 from app.view.view import build_view
 from app.web.routes.hold_socket import WHYS
 from tests.support.builders import (
+    BOOL,
     BRIDGE,
+    ENABLED,
     FROM,
     INTERFACES,
     NOW,
@@ -320,6 +322,7 @@ def test_news_without_an_end_end_a_hold(bench: Bench) -> None:
 def test_a_permission_that_gets_too_old_ends_it_when_it_does() -> None:
     bench = Bench(panel=panel_of(SPEED, JOG, interlock={"max_age_s": 0.5}))
     bench.robot.settled_at = NOW - 10
+    endpoint(bench.robot, "MP", ENABLED, BOOL)
     holding = bench.begun()
     bench.keep(holding, 0.7)
     stopped_at, point = bench.way.sent[-1]

@@ -212,6 +212,7 @@ def test_a_press_before_the_robot_permitted_is_refused() -> None:
 
 def test_a_permission_is_judged_at_the_time_of_the_press() -> None:
     bench = Bench(small_panel({"max_age_s": 2}))
+    endpoint(bench.robot, "MP", ENABLED, BOOL)
     bench.now = NOW + 1.9
     assert bench.press("guarded", press_id="p1").outcome == "published"
     bench.now = NOW + 2
