@@ -168,13 +168,13 @@ def test_a_disk_that_hangs_blocks_no_loop_and_locks(
     async def work(log: OperatorLog) -> None:
         with log.notifying(lambda: changes.append(str(log.lock))):
             disk.open.clear()
-            with pytest.raises(LogError, match=r"can't be written: the disk did not take .* 0\.5 s"):
+            with pytest.raises(LogError, match=r"cannot be written: the disk did not store .* 0\.5 s"):
                 await log.pressed(pressed(1))
             began = time.monotonic()
             with pytest.raises(LogError):
                 await log.pressed(pressed(2))
             assert time.monotonic() - began < 0.4
-            assert "the disk did not take the entry" in str(log.lock)
+            assert "the disk did not store the entry" in str(log.lock)
             disk.open.set()
             await until_good(log)
             await log.pressed(pressed(3))

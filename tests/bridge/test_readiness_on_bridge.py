@@ -80,7 +80,7 @@ def test_a_bridge_whose_main_loop_hangs_is_seen_at_the_request(
         assert time.monotonic() - began < 3
         for answer in answers:
             assert (answer.status_code, answer.json()["code"]) == (503, "bridge_silent")
-        assert "does not answer" in answers[0].json()["reason"]
+        assert "does not respond" in answers[0].json()["reason"]
         assert kiosk.http.get("/healthz").status_code == 200
         until(lambda: not kiosk.widget("operation")["enabled"], "and soon all is locked", within_s=8)
     until(kiosk.ready, "ready again")

@@ -200,7 +200,7 @@ def test_what_nobody_hears_is_unknown_and_says_so(
     answer = kiosk.press("operation", "anybody?")
     assert answer.status_code == 200
     assert answer.json()["outcome"] == "unknown"
-    assert "no node is known to listen" in answer.json()["reason"]
+    assert "no node is known to subscribe" in answer.json()["reason"]
 
 
 def test_logs_are_in_ros_format_and_on_rosout(server: Server, node: RosNode) -> None:

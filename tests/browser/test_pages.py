@@ -27,7 +27,7 @@ TEXTS = [
     "x" * 80,
 ]
 SIZES = [(1280, 800), (1024, 600)]
-NO_SERVER = "no connection to the panel's server"
+NO_SERVER = "No connection to the panel server"
 TELL_WHEN_LOCKED = """() => new MutationObserver(() => window.lockedAt ??= Date.now()).observe(
     document.querySelector('[data-lamp="server"]'), { attributes: true },
 )"""

@@ -147,7 +147,7 @@ def short_cut(cable: Cable, rig: Rig, server: Server, seconds: float) -> None:
         interlock="pulsed",
         widget="paced",
     )
-    assert "older than 0.5 s" in trial.reason or "does not answer" in trial.reason
+    assert "older than 0.5 s" in trial.reason or "does not respond" in trial.reason
     assert trial.claimed == 0
     recorded(f"cable cut for {seconds} s (interlock with max_age_s = 0.5)", trial)
 

@@ -107,7 +107,7 @@ def test_it_tells_ready_when_it_serves_then_how_it_is_and_that_it_ends(address: 
         assert max(later - earlier for earlier, later in pairwise(times)) < INTERVAL_S
         until(lambda: ready(manager), "the state in words")
         process.send(signal.SIGTERM)
-        assert manager.until("STOPPING")["STATUS"] == "Stopping."
+        assert manager.until("STOPPING")["STATUS"] == "Shutting down."
     finally:
         process.end()
         manager.close()

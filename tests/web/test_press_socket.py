@@ -208,7 +208,7 @@ def test_a_page_presses_on_its_socket_and_gets_a_late_answer_there(kiosk: Server
     socket = touched(page)
     assert socket.url == f"ws://127.0.0.1:{kiosk.port}/presses"
     page.get_by_role("button", name=MUTE[2], exact=True).click()
-    expect(page.locator(f'[data-widget="{MUTE[2]}"] .result')).to_contain_text("waiting")
+    expect(page.locator(f'[data-widget="{MUTE[2]}"] .result')).to_contain_text("Waiting for the robot")
     publish(page).click()
     expect(page.locator("#receipt-free")).to_contain_text("Sent on /free at")
     expect(page.locator(f'[data-widget="{MUTE[2]}"] .result')).to_contain_text("No response within")

@@ -123,7 +123,7 @@ def test_what_was_seen_before_a_restart_does_not_count(demo: Server, way: str) -
     again = demo.press("operation", "from an old page", seen="deadbeef-7", id=own_id)
     assert again.json() == refused.json()
     assert (refused.status_code, refused.json()["outcome"]) == (409, "refused")
-    assert "started anew" in refused.json()["reason"]
+    assert "panel server restarted" in refused.json()["reason"]
     assert demo.press("operation", "x", seen=demo.snapshot()["id"]).status_code == 200
 
 
