@@ -3,14 +3,14 @@
 import time
 from typing import Final
 
-_WALL: Final = time.time()
-_BEGAN: Final = time.clock_gettime(time.CLOCK_BOOTTIME)
+_START_WALL: Final = time.time()
+_START_BOOTTIME: Final = time.clock_gettime(time.CLOCK_BOOTTIME)
 
 
 def server_now() -> float:
     """Seconds since the epoch: the wall clock at the process's start, and even from there, also while
     the machine sleeps. Heartbeats carry it, and a press returns it."""
-    return _WALL + time.clock_gettime(time.CLOCK_BOOTTIME) - _BEGAN
+    return _START_WALL + time.clock_gettime(time.CLOCK_BOOTTIME) - _START_BOOTTIME
 
 
 def format_age(seconds: float) -> str:

@@ -64,13 +64,13 @@ class Remark:
     line: int = 0
 
     @property
-    def where(self) -> str:
+    def location(self) -> str:
         """`page[0].widget[2].topic "speed", line 41`."""
         named = f'{self.place} "{self.id}"' if self.id else self.place
         return ", ".join(filter(None, (named, f"line {self.line}" if self.line else "")))
 
     def __str__(self) -> str:
-        return f"{self.where}: {self.message}" if self.where else self.message
+        return f"{self.location}: {self.message}" if self.location else self.message
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,7 +146,7 @@ class TooMany(KioskError):
 
     def __init__(self, message: TextLike, again_s: int) -> None:
         super().__init__(message)
-        self.again_s = again_s
+        self.retry_after_s = again_s
 
 
 class DecodeError(KioskError):
@@ -176,7 +176,7 @@ class LogGone(LogError):
 
     def __init__(self, message: TextLike, *, itself: bool) -> None:
         super().__init__(message)
-        self.itself = itself
+        self.is_main_file = itself
 
 
 class FolderInUse(LogError):

@@ -25,12 +25,12 @@ LEVELS: Mapping[str, int] = {name.lower(): level for level, (name, _) in SEVERIT
 log = logging.getLogger("kiosk")
 
 
-def severity(record: logging.LogRecord) -> tuple[str, int]:
+def ros_severity(record: logging.LogRecord) -> tuple[str, int]:
     """The nearest ROS severity at or below the record's level."""
     return SEVERITIES[max((at for at in SEVERITIES if at <= record.levelno), default=logging.DEBUG)]
 
 
-def stamp(record: logging.LogRecord) -> tuple[int, int]:
+def record_stamp(record: logging.LogRecord) -> tuple[int, int]:
     """Seconds and nanoseconds since the epoch."""
     return divmod(int(record.created * 1e9), 1_000_000_000)
 
@@ -55,13 +55,13 @@ class RosFormatter(logging.Formatter):
     """One record, one line; a traceback follows indented, so that no text can pose as a record."""
 
     def format(self, record: logging.LogRecord) -> str:
-        name, _ = severity(record)
-        seconds, nanoseconds = stamp(record)
+        name, _ = ros_severity(record)
+        seconds, nanoseconds = record_stamp(record)
         lines = printable(super().format(record)).replace("\n", "\n  ")
         return f"[{name}] [{seconds}.{nanoseconds:09}] [{NODE_NAME}]: {lines}"
 
 
-def on_rosout(text: str) -> Mapping[str, str]:
+def rosout_extra(text: str) -> Mapping[str, str]:
     """The `extra` of a record that has on /rosout another text, for every node of the robot can read
     that: not what an operator typed."""
     return {"rosout": text}
@@ -93,13 +93,13 @@ class RosoutHandler(logging.Handler):
 
 def log_fields(record: logging.LogRecord) -> dict[str, object]:
     """A record as the fields of `rcl_interfaces/msg/Log`."""
-    seconds, nanoseconds = stamp(record)
+    seconds, nanoseconds = record_stamp(record)
     text = getattr(record, "rosout", None) or record.getMessage()
     if record.exc_info:
         text += "\n" + logging.Formatter().formatException(record.exc_info)
     return {
         "stamp": {"sec": seconds, "nanosec": nanoseconds},
-        "level": severity(record)[1],
+        "level": ros_severity(record)[1],
         "name": NODE_NAME,
         "msg": printable(text),
         "file": record.filename,
@@ -108,7 +108,7 @@ def log_fields(record: logging.LogRecord) -> dict[str, object]:
     }
 
 
-def configure(level: str) -> None:
+def configure_logging(level: str) -> None:
     """Send every logger of the process to stderr in ROS's format, at `level` and above.
 
     uvicorn has set up its own loggers before the application is imported: they join in. A line

@@ -40,12 +40,12 @@ from app.concurrency import CancellableWaits
 from app.errors import Cause, FieldError, InputError, LinkError, LogError, NotFound, PressRefused
 from app.i18n import TextLike, say
 from app.panel.model import Panel
-from app.panel.widgets.families import Pressed
+from app.panel.widgets.families import PressCommand
 from app.panel.widgets.service_action import Action
 from app.permission.interlocks import Verdict
 from app.robot.command_status import Outcome
 from app.robot.state import RobotState
-from app.ros_logging import RobotLog, on_rosout
+from app.ros_logging import RobotLog, rosout_extra
 
 log = logging.getLogger("kiosk.presses")
 
@@ -154,7 +154,7 @@ class Presses:
 
     async def _canceled(self, widget: Action, press_id: str) -> tuple[Outcome, Cause]:
         try:
-            async with self._waits.one():
+            async with self._waits.cancellable():
                 answer = await self._dispatcher.cancel(widget, press_id)
         except TimeoutError:
             return Outcome("unknown", say("server_ends")), ""
@@ -164,7 +164,7 @@ class Presses:
         return answer, "interlock" if answer.outcome == "refused" else ""
 
     def _left_out(
-        self, widget: Pressed, inputs: Mapping[str, Any], press_id: str, context: PressContext
+        self, widget: PressCommand, inputs: Mapping[str, Any], press_id: str, context: PressContext
     ) -> Receipt | None:
         """The receipt of a refusal that the log only counts; None for every other press."""
         if self._press_log.room(context.origin):
@@ -185,7 +185,7 @@ class Presses:
 
     async def _once(
         self,
-        widget: Pressed,
+        widget: PressCommand,
         inputs: Mapping[str, Any],
         press_id: str,
         work: Coroutine[Any, Any, Receipt],
@@ -208,7 +208,7 @@ class Presses:
         return receipt
 
     async def _logged(
-        self, widget: Pressed, inputs: Mapping[str, Any], press_id: str, context: PressContext
+        self, widget: PressCommand, inputs: Mapping[str, Any], press_id: str, context: PressContext
     ) -> Receipt:
         own = self._dispatcher.needed(widget, inputs)
         try:
@@ -226,7 +226,7 @@ class Presses:
             receipt = await _closed(pending, receipt)
         level = logging.INFO if receipt.outcome in FINE else logging.WARNING
         who = named(context.origin)
-        told = on_rosout(f"press {press_id} of {widget.id} by {who}: {untyped(widget, receipt)}")
+        told = rosout_extra(f"press {press_id} of {widget.id} by {who}: {untyped(widget, receipt)}")
         self._log.log(level, "press %s of %s by %s with %.*s: %s: %s", press_id, widget.id, who,
                 LONGEST_LOGGED, own, receipt.outcome, receipt.reason, extra=told)  # fmt: skip
         return receipt
@@ -239,7 +239,7 @@ class Presses:
 
     async def _pressed(
         self,
-        widget: Pressed,
+        widget: PressCommand,
         inputs: Mapping[str, Any],
         press_id: str,
         pending: PendingEntry,
@@ -259,7 +259,7 @@ class Presses:
         try:
             correct = partial(self._correct, pending)
             look = partial(self._last_look, widget, pending, context)
-            async with self._waits.one():
+            async with self._waits.cancellable():
                 answer = await self._dispatcher.send(
                     widget, inputs, press_id, correct, pending.hash, look
                 )
@@ -275,7 +275,7 @@ class Presses:
             return refused("not_encoded", answer.text, "interlock")
         return receipt(answer, "time" if answer.outcome == "timed_out" else "")
 
-    def _last_look(self, widget: Pressed, pending: PendingEntry, context: PressContext) -> None:
+    def _last_look(self, widget: PressCommand, pending: PendingEntry, context: PressContext) -> None:
         """Right before it is sent: what came while it was judged and encoded counts, too."""
         for _ in range(MOST_LOOKS):
             if not self._news():
@@ -286,7 +286,7 @@ class Presses:
                 raise PressRefused(why, cause)
         raise PressRefused(say("catching_up"), "link")
 
-    def _ground(self, widget: Pressed, context: PressContext) -> tuple[Verdict, TextLike, Cause]:
+    def _ground(self, widget: PressCommand, context: PressContext) -> tuple[Verdict, TextLike, Cause]:
         """The verdict now, and why it may not be sent, "" if it may."""
         self._catch_up()
         verdict = judged(widget, context, self._panel, self._robot, self._monotonic())

@@ -11,32 +11,32 @@ from rosbags.typesys import Stores, get_typestore
 from app.interfaces.definitions import PLACEHOLDER, Field, Structure, Type
 
 # Rolling is what the next distribution will be: it has the messages of the newest that rosbags knows.
-AS: Final[Mapping[str, str]] = {"rolling": "lyrical"}
+ALIASES: Final[Mapping[str, str]] = {"rolling": "lyrical"}
 
 
-def messages_of(distro: str) -> dict[str, Structure]:
+def load_messages(distro: str) -> dict[str, Structure]:
     """By name, without defaults: rosbags drops them."""
-    definitions = get_typestore(Stores(f"ros2_{AS.get(distro, distro)}")).fielddefs
-    return {name: _structure(name, definition) for name, definition in definitions.items()}
+    definitions = get_typestore(Stores(f"ros2_{ALIASES.get(distro, distro)}")).fielddefs
+    return {name: _to_structure(name, definition) for name, definition in definitions.items()}
 
 
-def _structure(name: str, definition: Any) -> Structure:
+def _to_structure(name: str, definition: Any) -> Structure:
     """Out of rosbags' nested tuples: ([(name, type, value)…], [(field, type)…])."""
     constants, fields = definition
     return Structure(
         name,
-        tuple(Field(each, _type(described)) for each, described in fields if each != PLACEHOLDER),
+        tuple(Field(each, _to_type(described)) for each, described in fields if each != PLACEHOLDER),
         {each: value for each, _, value in constants},
         constant_types={each: kind for each, kind, _ in constants},
     )
 
 
-def _type(described: Any) -> Type:
+def _to_type(described: Any) -> Type:
     kind, detail = described
     if kind == Nodetype.NAME:
         return Type(detail)
     if kind == Nodetype.BASE:
         return Type(*detail)
     inner, size = detail
-    many: Literal["array", "sequence"] = "array" if kind == Nodetype.ARRAY else "sequence"
-    return replace(_type(inner), many=many, size=size)
+    container: Literal["array", "sequence"] = "array" if kind == Nodetype.ARRAY else "sequence"
+    return replace(_to_type(inner), container=container, size=size)

@@ -48,14 +48,14 @@ def action_types(name: str) -> ActionTypes:
     )
 
 
-def composed_service(name: str, request: Structure, response: Structure) -> Definitions:
+def compose_service(name: str, request: Structure, response: Structure) -> Definitions:
     """A service "package/srv/Name" with its event (service introspection's)."""
     event = Structure(
         f"{name}_Event",
         (
             Field("info", Type(EVENT_INFO)),
-            Field("request", Type(request.name, many="sequence", size=1)),
-            Field("response", Type(response.name, many="sequence", size=1)),
+            Field("request", Type(request.name, container="sequence", size=1)),
+            Field("response", Type(response.name, container="sequence", size=1)),
         ),
         source=request.source,
     )
@@ -71,7 +71,7 @@ def composed_service(name: str, request: Structure, response: Structure) -> Defi
     return Definitions({one.name: one for one in (request, response, event)}, {name: whole})
 
 
-def composed_action(name: str, goal: Structure, result: Structure, feedback: Structure) -> Definitions:
+def compose_action(name: str, goal: Structure, result: Structure, feedback: Structure) -> Definitions:
     """An action "package/action/Name" with its two services and its feedback message."""
     types, source = action_types(name), goal.source
     goal_id = Field("goal_id", UUID)
@@ -79,13 +79,13 @@ def composed_action(name: str, goal: Structure, result: Structure, feedback: Str
     def structure(each: str, *fields: Field) -> Structure:
         return Structure(each, fields, source=source)
 
-    send_goal = composed_service(
+    send_goal = compose_service(
         types.send_goal,
         structure(types.send_goal_request, goal_id, Field("goal", Type(goal.name))),
         structure(types.send_goal_response, Field("accepted", Type("bool")), Field("stamp", TIME)),
     )
     status = Field("status", Type("int8"))
-    get_result = composed_service(
+    get_result = compose_service(
         types.get_result,
         structure(types.get_result_request, goal_id),
         structure(types.get_result_response, status, Field("result", Type(result.name))),

@@ -27,18 +27,18 @@ def read(folder: Path, distro: str) -> Messages | None:
         head, _, body = _file(folder, distro).read_bytes().partition(b"\n")
     except OSError:
         return None
-    return _unpacked(json.loads(body)) if head == _head(distro, body) else None
+    return _unpack(json.loads(body)) if head == _header(distro, body) else None
 
 
 def write(folder: Path, distro: str, messages: Messages) -> None:
     """Keeps them, where the folder can be written; a reader finds the old file or the new one."""
-    body = json.dumps(_packed(messages), separators=(",", ":")).encode()
+    body = json.dumps(_pack(messages), separators=(",", ":")).encode()
     file = _file(folder, distro)
     aside = file.with_suffix(".new")
     with suppress(OSError):
         folder.parent.mkdir(parents=True, exist_ok=True)
         folder.mkdir(mode=0o700, exist_ok=True)
-        aside.write_bytes(_head(distro, body) + b"\n" + body)
+        aside.write_bytes(_header(distro, body) + b"\n" + body)
         aside.replace(file)
 
 
@@ -46,13 +46,13 @@ def _file(folder: Path, distro: str) -> Path:
     return folder / f"messages-{distro}.json"
 
 
-def _head(distro: str, body: bytes) -> bytes:
+def _header(distro: str, body: bytes) -> bytes:
     """What the first line says of the rest."""
     made_of = f"{distro} of rosbags {version('rosbags')}, format {FORMAT}"
     return f"{made_of}, sha256 {sha256(body).hexdigest()}".encode()
 
 
-def _packed(messages: Messages) -> Mapping[str, Any]:
+def _pack(messages: Messages) -> Mapping[str, Any]:
     """Name → its fields and its constants, as JSON has them."""
     return {
         name: [
@@ -63,7 +63,7 @@ def _packed(messages: Messages) -> Mapping[str, Any]:
     }
 
 
-def _unpacked(packed: Mapping[str, Any]) -> Messages:
+def _unpack(packed: Mapping[str, Any]) -> Messages:
     kind = lru_cache(None)(Type)
     return {
         name: Structure(

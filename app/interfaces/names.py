@@ -12,7 +12,7 @@ SERVICE_TYPE: Final = re.compile(r"[a-z][a-z0-9_]*/srv/[A-Z][A-Za-z0-9]*")
 ACTION_TYPE: Final = re.compile(r"[a-z][a-z0-9_]*/action/[A-Z][A-Za-z0-9]*")
 MESSAGE_TYPE: Final = re.compile(r"[a-z][a-z0-9_]*/msg/[A-Z][A-Za-z0-9]*")
 # What is no name, or longer than any, is not taken over from what others say: it would be shown.
-LONGEST_NAME: Final = 512  # ROS 2 has 255, and the bridge puts its namespace before that
+MAX_NAME: Final = 512  # ROS 2 has 255, and the bridge puts its namespace before that
 NO_TYPE: Final = "(not a type)"
 _ANY_TYPE = re.compile(r"[A-Za-z0-9_]+(/[A-Za-z0-9_]+)*")
 
@@ -30,11 +30,11 @@ ROSOUT_TOPIC: Final = "/rosout"
 ROSOUT: Final = Qos(transient_local=True, depth=1000)  # rmw_qos_profile_rosout_default
 
 
-def type_in(told: str) -> str:
+def valid_type(told: str) -> str:
     """The type that somebody names; `NO_TYPE`, which no panel is made for, where that can't be one."""
-    return told if len(told) <= LONGEST_NAME and _ANY_TYPE.fullmatch(told) else NO_TYPE
+    return told if len(told) <= MAX_NAME and _ANY_TYPE.fullmatch(told) else NO_TYPE
 
 
-def is_key(name: str) -> bool:
+def is_valid_name(name: str) -> bool:
     """Whether a name, without its first slash, can be one of ROS 2's."""
-    return len(name) <= LONGEST_NAME and TOPIC.fullmatch(f"/{name}") is not None
+    return len(name) <= MAX_NAME and TOPIC.fullmatch(f"/{name}") is not None

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Final
 
 from app.errors import InterfaceError
-from app.interfaces.definitions import Definitions, Structure, interface_of
+from app.interfaces.definitions import Definitions, Structure, interface_name
 from app.interfaces.derived_types import EVENT_INFO
-from app.interfaces.parsing import KINDS, parsed
+from app.interfaces.parsing import KINDS, parse_definition
 
 _PACKAGE_NAME: Final = re.compile(r"<name>\s*([^<\s]+)\s*</name>")
 # Where packages are in a folder: itself, side by side, in `share` of an install folder, and in
@@ -28,22 +28,22 @@ def read_folders(folders: Sequence[Path]) -> Definitions:
         packages = list(_packages(folder))
         if not packages:
             why = "has no interfaces: they must be in <package>/msg/*.msg, srv/*.srv, action/*.action"
-            hint = "".join(f"; {idl_hint(file)}" for file in list(idl_only([folder]).values())[:1])
+            hint = "".join(f"; {idl_hint(file)}" for file in list(find_idl_only([folder]).values())[:1])
             raise InterfaceError(f"{folder} {why}{hint}", folder)
         for package in packages:
-            name = _name(package)
+            name = _package_name(package)
             for file in _files(package):
-                _add(found, file, name)
-    return found.without(found.left_out)
+                _add_file(found, file, name)
+    return found.excluding(found.unusable)
 
 
-def stamp(folders: Sequence[Path]) -> tuple[tuple[Path, int, int], ...]:
+def file_stamps(folders: Sequence[Path]) -> tuple[tuple[Path, int, int], ...]:
     """Changes when a file of the folders does: each with its time and size."""
     files = [file for folder in folders for package in _packages(folder) for file in _files(package)]
-    return tuple((file, *_age_and_size(file)) for file in files)
+    return tuple((file, *_mtime_and_size(file)) for file in files)
 
 
-def _age_and_size(file: Path) -> tuple[int, int]:
+def _mtime_and_size(file: Path) -> tuple[int, int]:
     try:
         about = file.stat()
     except OSError:  # reading it will say why
@@ -51,14 +51,14 @@ def _age_and_size(file: Path) -> tuple[int, int]:
     return about.st_mtime_ns, about.st_size
 
 
-def idl_only(folders: Sequence[Path]) -> dict[str, Path]:
+def find_idl_only(folders: Sequence[Path]) -> dict[str, Path]:
     """Type → file of the interfaces that are there as `.idl` and not as the robot's own file."""
     found = {}
     for place in (place for folder in folders for place in _places(folder)):
         for kind in KINDS:
             for file in sorted((place / kind).glob("*.idl")):
                 if not file.with_suffix(f".{kind}").is_file():
-                    found[f"{_name(place)}/{kind}/{file.stem}"] = file
+                    found[f"{_package_name(place)}/{kind}/{file.stem}"] = file
     return found
 
 
@@ -83,7 +83,7 @@ def _files(package: Path) -> Iterator[Path]:
         yield from sorted((package / kind).glob(f"*.{kind}"))
 
 
-def _name(package: Path) -> str:
+def _package_name(package: Path) -> str:
     """The package's name as its package.xml has it; without one, its folder's."""
     try:
         match = _PACKAGE_NAME.search((package / "package.xml").read_text())
@@ -92,62 +92,64 @@ def _name(package: Path) -> str:
     return match[1] if match else package.resolve().name
 
 
-def _read(file: Path, package: str) -> Definitions:
+def _read_file(file: Path, package: str) -> Definitions:
     try:
         text = file.read_text("utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        raise InterfaceError(f"{file} can't be read: {_reason(error)}", file) from error
-    return parsed(text, package, file.suffix[1:], file.stem, file)
+        raise InterfaceError(f"{file} can't be read: {_error_text(error)}", file) from error
+    return parse_definition(text, package, file.suffix[1:], file.stem, file)
 
 
-def _reason(error: OSError | UnicodeDecodeError) -> str:
+def _error_text(error: OSError | UnicodeDecodeError) -> str:
     return str(error.strerror) if isinstance(error, OSError) else "it is not UTF-8"
 
 
-def _add(found: Definitions, file: Path, package: str) -> None:
+def _add_file(found: Definitions, file: Path, package: str) -> None:
     """What a file defines, beside what was found already; or why it is left out."""
     try:
-        read = _read(file, package)
+        read = _read_file(file, package)
         for name, structure in read.structures.items():
             known = found.structures.get(name, structure)
             if known != structure:
                 why = f"{name} is defined here and, differently, in {known.source}"
                 raise InterfaceError(f"{file}: {why}", file)
     except InterfaceError as error:
-        found.left_out.setdefault(f"{package}/{file.suffix[1:]}/{file.stem}", error)
+        found.unusable.setdefault(f"{package}/{file.suffix[1:]}/{file.stem}", error)
         return
     found.structures.update(read.structures)
-    found.wholes.update(read.wholes)
+    found.interface_types.update(read.interface_types)
 
 
-def complete(found: Definitions, known: Definitions, unread: Mapping[str, Path]) -> Definitions:
+def usable_definitions(
+    found: Definitions, known: Definitions, unread: Mapping[str, Path]
+) -> Definitions:
     """What can be used of `known` and, before it, of `found`; `unread` as `idl_only` tells.
 
     Left out is what needs something that is not there or left out itself, and what contains itself.
     Events, and so the hashes of services and actions, are left out where the distribution has none
     (humble).
     """
-    every = (known | _with_events_or_none(found, known)).without(found.left_out)
-    while left_out := _lacking_needs(every, unread) or _in_themselves(every.structures):
-        every = every.without(left_out)
+    every = (known | _without_unusable_events(found, known)).excluding(found.unusable)
+    while left_out := _missing_types(every, unread) or _recursive_types(every.structures):
+        every = every.excluding(left_out)
     return every
 
 
-def _lacking_needs(every: Definitions, unread: Mapping[str, Path]) -> dict[str, InterfaceError]:
+def _missing_types(every: Definitions, unread: Mapping[str, Path]) -> dict[str, InterfaceError]:
     """Why interfaces can't be used that need others which are not there."""
     return {
-        interface_of(structure.name): _lack(structure, field.name, need, every, unread)
+        interface_name(structure.name): _missing_type_error(structure, field.name, need, every, unread)
         for structure in every.structures.values()
-        for field, need in structure.needs()
+        for field, need in structure.nested_fields()
         if need not in every.structures
     }
 
 
-def _lack(
+def _missing_type_error(
     structure: Structure, field: str, need: str, every: Definitions, unread: Mapping[str, Path]
 ) -> InterfaceError:
     why = f'{structure.source or structure.name}: field "{field}" is of type {need}, which '
-    if (cause := every.left_out.get(interface_of(need))) is not None:
+    if (cause := every.unusable.get(interface_name(need))) is not None:
         return InterfaceError(f"{why}can't be used: {cause}", cause.source)
     near = get_close_matches(need, every.structures, n=1)
     hint = f"; did you mean {near[0]}?" if near else ": its package must be in a folder too"
@@ -155,7 +157,7 @@ def _lack(
     return InterfaceError(f"{why}is not there{hint}", structure.source)
 
 
-def _in_themselves(every: Mapping[str, Structure]) -> dict[str, InterfaceError]:
+def _recursive_types(every: Mapping[str, Structure]) -> dict[str, InterfaceError]:
     """Why interfaces can't be used that contain themselves, directly or through others."""
     done: set[str] = set()
     found: dict[str, InterfaceError] = {}
@@ -165,9 +167,9 @@ def _in_themselves(every: Mapping[str, Structure]) -> dict[str, InterfaceError]:
         if structure.name in above:
             why = f"{structure.name} contains itself ({' → '.join(path)})"
             error = InterfaceError(f"{structure.source}: {why}", structure.source)
-            found[interface_of(structure.name)] = error
+            found[interface_name(structure.name)] = error
         elif structure.name not in done:
-            for _, need in structure.needs():
+            for _, need in structure.nested_fields():
                 look(every[need], path)
             done.add(structure.name)
 
@@ -176,15 +178,18 @@ def _in_themselves(every: Mapping[str, Structure]) -> dict[str, InterfaceError]:
     return found
 
 
-def available(found: Definitions, known: Definitions) -> Definitions:
+def complete_definitions(found: Definitions, known: Definitions) -> Definitions:
     """The files of `found` whose every need is there, in others of them or in `known`."""
-    found = _with_events_or_none(found, known)
-    while lacking := _lacking(found, known):
-        found = Definitions(_except(found.structures, lacking), _except(found.wholes, lacking))
+    found = _without_unusable_events(found, known)
+    while lacking := _incomplete_files(found, known):
+        found = Definitions(
+            _excluding_files(found.structures, lacking),
+            _excluding_files(found.interface_types, lacking),
+        )
     return found
 
 
-def _with_events_or_none(found: Definitions, known: Definitions) -> Definitions:
+def _without_unusable_events(found: Definitions, known: Definitions) -> Definitions:
     """Without what can't be described: events, and so services and actions as wholes."""
     if EVENT_INFO in known.structures or EVENT_INFO in found.structures:
         return found
@@ -192,16 +197,20 @@ def _with_events_or_none(found: Definitions, known: Definitions) -> Definitions:
         {
             n: s
             for n, s in found.structures.items()
-            if EVENT_INFO not in {need for _, need in s.needs()}
+            if EVENT_INFO not in {need for _, need in s.nested_fields()}
         },
-        left_out=found.left_out,
+        unusable=found.unusable,
     )
 
 
-def _lacking(found: Definitions, known: Definitions) -> set[Path | None]:
+def _incomplete_files(found: Definitions, known: Definitions) -> set[Path | None]:
     every = known.structures.keys() | found.structures.keys()
-    return {s.source for s in found.structures.values() if any(n not in every for _, n in s.needs())}
+    return {
+        s.source for s in found.structures.values() if any(n not in every for _, n in s.nested_fields())
+    }
 
 
-def _except(structures: Mapping[str, Structure], files: set[Path | None]) -> dict[str, Structure]:
+def _excluding_files(
+    structures: Mapping[str, Structure], files: set[Path | None]
+) -> dict[str, Structure]:
     return {name: one for name, one in structures.items() if one.source not in files}

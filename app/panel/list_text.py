@@ -12,17 +12,17 @@ _ELEMENT: Final = re.compile(r'(?:\s*"(?P<quoted>(?:[^"]|"")*)"\s*|(?P<plain>[^"
 _PLAIN: Final = re.compile(r'[^\s",](?:[^",]*[^\s",])?')
 
 
-def listed(texts: Iterable[str]) -> str:
+def join_list(texts: Iterable[str]) -> str:
     """The elements as one text."""
     return ", ".join(texts)
 
 
-def quoted(text: str) -> str:
+def quote_element(text: str) -> str:
     """A text as an element."""
     return text if _PLAIN.fullmatch(text) else '"' + text.replace('"', '""') + '"'
 
 
-def elements(text: str) -> list[str]:
+def split_list(text: str) -> list[str]:
     """The elements of a text; ValueError where one is empty without quotes, or quotes don't match."""
     found: list[str] = []
     at = 0

@@ -6,13 +6,13 @@ from typing import Annotated, Final, Literal
 
 from pydantic import AfterValidator, Field
 
-from app.panel.base import Description, Endpoint, Folder, Id, Label, TopicQos, namespace_of
+from app.panel.base import Description, Endpoint, Folder, Id, Label, TopicQos, parse_namespace
 from app.panel.interlock import Interlock
 from app.panel.rules import ControlRules, LogRules, RecordRules
-from app.panel.widgets.families import Command, Display, OnTopic, Placed, Published
+from app.panel.widgets.families import BaseWidget, Command, Display, PublishCommand, TopicWidget
 from app.panel.widgets.kinds import Widget
 from app.panel.widgets.parameter import EVENT_TYPE, EVENTS, Parameter
-from app.panel.widgets.publish import Confirm, Publishing
+from app.panel.widgets.publish import Confirm, SinglePublish
 from app.panel.widgets.service_action import Action
 
 
@@ -22,12 +22,12 @@ class RobotEntry(Description):
 
     id: Id
     name: Label
-    namespace: Annotated[str, AfterValidator(namespace_of)] = ""
+    namespace: Annotated[str, AfterValidator(parse_namespace)] = ""
     connect: Annotated[tuple[Endpoint, ...], Field(strict=False)] = ()
 
 
 # rmw_qos_profile_parameter_events; the durability is given, so that no first event is missed.
-OF_EVENTS: Final = TopicQos(durability="volatile", depth=1000)
+EVENTS_QOS: Final = TopicQos(durability="volatile", depth=1000)
 
 
 class Page(Description):
@@ -42,7 +42,7 @@ class Panel(Description):
     language: Literal["en"] = "en"
     distro: Literal["humble", "iron", "jazzy", "kilted", "lyrical", "rolling"] = "jazzy"
     interfaces: Annotated[tuple[Folder, ...], Field(strict=False)] = ()
-    namespace: Annotated[str, AfterValidator(namespace_of)] = ""
+    namespace: Annotated[str, AfterValidator(parse_namespace)] = ""
     press_expires_s: Annotated[float, Field(ge=0.5, le=60)] = 2.0
     display_hz: Annotated[float, Field(ge=1, le=60)] = 20.0
     mm_per_px: Annotated[float, Field(gt=0.02, lt=1)] = 0.22
@@ -55,7 +55,7 @@ class Panel(Description):
     # Of the file, not in it: changes when what a browser has loaded is out of date.
     revision: Annotated[str, Field(exclude=True)] = ""
 
-    def widgets(self) -> Iterator[Placed]:
+    def widgets(self) -> Iterator[BaseWidget]:
         for page in self.pages:
             yield from page.widgets
 
@@ -81,26 +81,26 @@ class Panel(Description):
 
     def subscriptions(self) -> dict[str, str]:
         """Topic → type of all that the panel listens to."""
-        own = {one.topic: one.type for one in self.confirms() if one.type is not None}
+        own = {one.topic: one.type for one in self.confirmations() if one.type is not None}
         events = {EVENTS: EVENT_TYPE} if any(self.parameters()) else {}
-        return own | {of.topic: of.type for of in self.listening()} | events
+        return own | {of.topic: of.type for of in self.monitored()} | events
 
-    def fields(self) -> dict[str, list[str]]:
+    def subscribed_fields(self) -> dict[str, list[str]]:
         """Topic → the paths of all that the panel reads of it."""
         found: dict[str, list[str]] = {}
-        for of in self.listening():
+        for of in self.monitored():
             found.setdefault(of.topic, []).append(of.field)
-        for confirm in self.confirms():
+        for confirm in self.confirmations():
             found.setdefault(confirm.topic, []).append(confirm.field)
         return found
 
-    def confirms(self) -> Iterator[Confirm]:
+    def confirmations(self) -> Iterator[Confirm]:
         """All that shows that a command took effect."""
         for widget in self.widgets():
-            if isinstance(widget, Publishing) and widget.confirm is not None:
+            if isinstance(widget, SinglePublish) and widget.confirm is not None:
                 yield widget.confirm
 
-    def listening(self) -> Iterator[Interlock | Display]:
+    def monitored(self) -> Iterator[Interlock | Display]:
         """All that shows or judges what a topic says."""
         yield from self.interlocks
         yield from self.displays
@@ -114,10 +114,10 @@ class Panel(Description):
 
     def publications(self) -> dict[str, str]:
         """Topic → type of all that the panel publishes."""
-        return {w.topic: w.type for w in self.widgets() if isinstance(w, Published)}
+        return {w.topic: w.type for w in self.widgets() if isinstance(w, PublishCommand)}
 
     def qos(self, topic: str) -> TopicQos:
         """A topic's QoS, which is the same wherever the panel names it."""
-        named = {w.topic: w.qos for w in self.widgets() if isinstance(w, OnTopic)}
+        named = {w.topic: w.qos for w in self.widgets() if isinstance(w, TopicWidget)}
         named |= {one.topic: one.qos for one in self.interlocks}
-        return named.get(topic, OF_EVENTS if topic == EVENTS else TopicQos())
+        return named.get(topic, EVENTS_QOS if topic == EVENTS else TopicQos())

@@ -15,15 +15,15 @@ from typing import Final
 
 from app.errors import SettingsError
 
-LOOK_EVERY_S: Final = 0.02
-LISTENING_WITHIN_S: Final = 5.0  # a socket that the server was given listened before
-INTERNET: Final = frozenset({socket.AF_INET, socket.AF_INET6})
-LISTENS: Final = (socket.SOL_SOCKET, socket.SO_ACCEPTCONN)
-SEND_BUFFER: Final = 8_192  # bytes; Linux takes twice as many
-GONE_AFTER_MS: Final = 120_000  # in which a client confirms nothing of what it was sent
+POLL_INTERVAL_S: Final = 0.02
+LISTEN_TIMEOUT_S: Final = 5.0  # a socket that the server was given listened before
+INET_FAMILIES: Final = frozenset({socket.AF_INET, socket.AF_INET6})
+ACCEPTS_CONNECTIONS: Final = (socket.SOL_SOCKET, socket.SO_ACCEPTCONN)
+SEND_BUFFER_BYTES: Final = 8_192  # bytes; Linux takes twice as many
+USER_TIMEOUT_MS: Final = 120_000  # in which a client confirms nothing of what it was sent
 
 
-def opened() -> Iterator[tuple[str, socket.socket]]:
+def open_sockets() -> Iterator[tuple[str, socket.socket]]:
     """Each socket of this process, by its name in /proc, as a duplicate that is closed when the next is
     asked for."""
     for entry in Path("/proc/self/fd").iterdir():
@@ -34,21 +34,21 @@ def opened() -> Iterator[tuple[str, socket.socket]]:
                     yield name, one
 
 
-def listeners() -> Iterator[tuple[str, socket.socket]]:
+def listening_sockets() -> Iterator[tuple[str, socket.socket]]:
     """Those that listen."""
-    return ((name, one) for name, one in opened() if one.getsockopt(*LISTENS))
+    return ((name, one) for name, one in open_sockets() if one.getsockopt(*ACCEPTS_CONNECTIONS))
 
 
-async def listening(before: Collection[str]) -> None:
+async def wait_for_listener(before: Collection[str]) -> None:
     """Until there is another than those `before`; five seconds at most."""
     with suppress(TimeoutError):
-        async with asyncio.timeout(LISTENING_WITHIN_S):
-            while names() <= set(before):
-                await asyncio.sleep(LOOK_EVERY_S)
+        async with asyncio.timeout(LISTEN_TIMEOUT_S):
+            while listener_names() <= set(before):
+                await asyncio.sleep(POLL_INTERVAL_S)
 
 
-def names() -> set[str]:
-    return {name for name, _ in listeners()}
+def listener_names() -> set[str]:
+    return {name for name, _ in listening_sockets()}
 
 
 async def limit_send_buffer(ports: set[int]) -> list[tuple[str, int]]:
@@ -58,15 +58,15 @@ async def limit_send_buffer(ports: set[int]) -> list[tuple[str, int]]:
     """
     found: list[tuple[str, int]] = []
     with suppress(OSError):  # no /proc on this system
-        before = names()
-        await listening(before)
-        for name, one in listeners():
-            if name not in before and one.family in INTERNET:
+        before = listener_names()
+        await wait_for_listener(before)
+        for name, one in listening_sockets():
+            if name not in before and one.family in INET_FAMILIES:
                 host, port = one.getsockname()[:2]
                 ports.add(port)
                 found.append((host, port))
-                one.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER)
-                one.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, GONE_AFTER_MS)
+                one.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER_BYTES)
+                one.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, USER_TIMEOUT_MS)
     return found
 
 
@@ -74,20 +74,20 @@ def abort_unsent(ports: Collection[int]) -> None:
     """Cuts the connections that came by one of these ports and still have something to send: uvicorn
     waits for them for ever, also where nobody reads."""
     with suppress(OSError):
-        for _, one in opened():
-            if one.family in INTERNET and one.getsockname()[1] in ports and unsent(one):
+        for _, one in open_sockets():
+            if one.family in INET_FAMILIES and one.getsockname()[1] in ports and unsent_bytes(one):
                 with suppress(OSError):
                     one.shutdown(socket.SHUT_RDWR)
 
 
-def unsent(one: socket.socket) -> int:
+def unsent_bytes(one: socket.socket) -> int:
     """How many bytes wait in the kernel; 0 for one that listens."""
-    if one.getsockopt(*LISTENS):
+    if one.getsockopt(*ACCEPTS_CONNECTIONS):
         return 0
     return int.from_bytes(fcntl.ioctl(one, termios.TIOCOUTQ, bytes(4)), sys.byteorder)
 
 
-def check_free(host: str, port: int) -> None:
+def check_port_free(host: str, port: int) -> None:
     """SettingsError where nobody could listen there now."""
     where = f"can't listen on {host} port {port}"
     try:

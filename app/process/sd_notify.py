@@ -11,22 +11,22 @@ from typing import Final
 
 log = logging.getLogger("kiosk.systemd")
 
-LONGEST: Final = 2000  # bytes of a state in words
+MAX_STATUS_BYTES: Final = 2000  # bytes of a state in words
 
 
 class ServiceManager:
     """systemd, or another that speaks its protocol; `interval_s` is None without a watchdog."""
 
     def __init__(self, env: Mapping[str, str] = os.environ) -> None:
-        self._address = _address(env.get("NOTIFY_SOCKET", ""))
-        self.interval_s = _interval(env) if self._address else None
+        self._address = _socket_address(env.get("NOTIFY_SOCKET", ""))
+        self.interval_s = _watchdog_interval_s(env) if self._address else None
         self._failed = False
 
     @property
-    def listens(self) -> bool:
+    def is_enabled(self) -> bool:
         return bool(self._address)
 
-    def tell(self, *lines: str) -> None:
+    def notify(self, *lines: str) -> None:
         """Sends `NAME=value` lines at once or not at all."""
         if not self._address:
             return
@@ -41,12 +41,12 @@ class ServiceManager:
             self._failed = True
 
 
-def status(text: str) -> str:
+def status_line(text: str) -> str:
     """The line for a state in words."""
-    return "STATUS=" + " ".join(text.split())[:LONGEST]
+    return "STATUS=" + " ".join(text.split())[:MAX_STATUS_BYTES]
 
 
-def _address(given: str) -> str:
+def _socket_address(given: str) -> str:
     """A path, or an abstract socket ("@name"), whose name starts with a zero byte."""
     if given.startswith("@"):
         return "\0" + given[1:]
@@ -56,7 +56,7 @@ def _address(given: str) -> str:
     return given
 
 
-def _interval(env: Mapping[str, str]) -> float | None:
+def _watchdog_interval_s(env: Mapping[str, str]) -> float | None:
     """Seconds between pings at most, if they are this process's to send."""
     given = env.get("WATCHDOG_USEC", "")
     if not given or env.get("WATCHDOG_PID") not in (None, "", str(os.getpid())):

@@ -11,10 +11,10 @@ from app.recording.mcap_file import SUFFIX, UNFINISHED, recover
 log = logging.getLogger("kiosk.recording")
 
 
-AHEAD_S: Final = 60.0  # a file from later than that was written while the clock was wrong
+CLOCK_SKEW_S: Final = 60.0  # a file from later than that was written while the clock was wrong
 
 
-def name_of(moment: float, robot: str, widget: str) -> str:
+def recording_name(moment: float, robot: str, widget: str) -> str:
     """A file's name without its ending, sorted by time; `moment` is in seconds since the epoch."""
     at = datetime.fromtimestamp(moment, UTC).strftime("%Y%m%dT%H%M%S.%f")[:-3] + "Z"
     return "-".join(filter(None, (at, robot, widget)))
@@ -26,7 +26,7 @@ class RecordingDirectory:
     def __init__(self, path: Path, most: int) -> None:
         """`most` is in bytes, for all that is finished and all that is being written."""
         self.path = path
-        self._most = most
+        self._max_bytes = most
 
     def open(self) -> None:
         """Makes it, and finishes what an earlier process left unfinished."""
@@ -43,13 +43,13 @@ class RecordingDirectory:
     def make_room(self, size: int) -> None:
         """Removes the oldest recordings until `size` more bytes fit in. Where the clock was set back,
         those from the future are taken for the oldest, and what is new stays."""
-        latest = name_of(time.time() + AHEAD_S, "", "")
+        latest = recording_name(time.time() + CLOCK_SKEW_S, "", "")
         files = sorted(self.path.glob(f"*{SUFFIX}"), key=lambda file: (file.name < latest, file.name))
         sizes = [file.stat().st_size for file in files]
         total = sum(sizes)
         for file, bytes_ in zip(files, sizes, strict=True):
-            if total + size <= self._most:
+            if total + size <= self._max_bytes:
                 return
             file.unlink(missing_ok=True)
             total -= bytes_
-            log.info("removed %s: recordings take %.0f MB at most", file.name, self._most / 1e6)
+            log.info("removed %s: recordings take %.0f MB at most", file.name, self._max_bytes / 1e6)

@@ -17,7 +17,7 @@ from mcap.writer import CompressionType, Writer
 SUFFIX: Final = ".mcap"
 UNFINISHED: Final = ".mcap.unfinished"
 PROFILE: Final = "ros2"
-PRESSES: Final = "/web_ui/presses"
+PRESS_TOPIC: Final = "/web_ui/presses"
 PRESS_SCHEMA: Final[Mapping[str, Any]] = {
     "$schema": "https://json-schema.org/draft/2020-12/schema",
     "title": "web_ui/Press",
@@ -52,7 +52,7 @@ class McapFile:
 
     def __init__(self, folder: Path, name: str, about: Mapping[str, str]) -> None:
         self._folder, self._path = folder, folder / f"{name}{UNFINISHED}"
-        self._finished = folder / f"{name}{SUFFIX}"
+        self._final_path = folder / f"{name}{SUFFIX}"
         flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
         self._stream = os.fdopen(os.open(self._path, flags, 0o600), "wb")
         self._channels: dict[str, int] = {}
@@ -81,9 +81,11 @@ class McapFile:
         def register() -> int:
             told = json.dumps(PRESS_SCHEMA).encode()
             schema = self._writer.register_schema(str(PRESS_SCHEMA["title"]), "jsonschema", told)
-            return self._writer.register_channel(PRESSES, "json", schema)
+            return self._writer.register_channel(PRESS_TOPIC, "json", schema)
 
-        self._writer.add_message(self._channel(PRESSES, register), at, json.dumps(press).encode(), at)
+        self._writer.add_message(
+            self._channel(PRESS_TOPIC, register), at, json.dumps(press).encode(), at
+        )
         self._writer.flush()
 
     def add_raw(self, schema: Schema | None, channel: ChannelRecord, message: Message) -> None:
@@ -100,7 +102,7 @@ class McapFile:
         number = self._channel(channel.topic, register)
         self._writer.add_message(number, message.log_time, message.data, message.publish_time)
 
-    def note(self, name: str, about: Mapping[str, str]) -> None:
+    def add_metadata(self, name: str, about: Mapping[str, str]) -> None:
         """Metadata of the file."""
         self._writer.add_metadata(name, dict(about))
 
@@ -109,9 +111,9 @@ class McapFile:
         self._writer.finish()
         self._stream.flush()
         os.fsync(self._stream.fileno())
-        self._path.rename(self._finished)
+        self._path.rename(self._final_path)
         self._stream.close()
-        return self._finished
+        return self._final_path
 
     def abandon(self) -> None:
         """Leaves nothing of it, as far as the disk lets it."""
@@ -136,38 +138,38 @@ def recover(folder: Path, unfinished: Path) -> Path | None:
             return None
         file = McapFile(folder, f"{unfinished.name.removesuffix(UNFINISHED)}.recovered", {})
         try:
-            found = _finished(file) if _copied(stream, file) else None
+            found = _finish_recovered(file) if _copy_messages(stream, file) else None
         finally:
             file.abandon()  # if it is not finished
         unfinished.unlink()
     return found
 
 
-def _finished(file: McapFile) -> Path:
-    file.note("recovered", {"why": "the server ended while it was recording"})
+def _finish_recovered(file: McapFile) -> Path:
+    file.add_metadata("recovered", {"why": "the server ended while it was recording"})
     return file.finish()
 
 
-def _copied(stream: IO[bytes], file: McapFile) -> int:
+def _copy_messages(stream: IO[bytes], file: McapFile) -> int:
     """How many messages could be read."""
     schemas: dict[int, Schema] = {}
     channels: dict[int, ChannelRecord] = {}
     count = 0
-    for record in _readable(stream):
+    for record in _read_records(stream):
         match record:
             case Schema():
                 schemas[record.id] = record
             case ChannelRecord():
                 channels[record.id] = record
             case Metadata():
-                file.note(record.name, record.metadata)
+                file.add_metadata(record.name, record.metadata)
             case Message() if channel := channels.get(record.channel_id):
                 file.add_raw(schemas.get(channel.schema_id), channel, record)
                 count += 1
     return count
 
 
-def _readable(stream: IO[bytes]) -> Iterator[McapRecord]:
+def _read_records(stream: IO[bytes]) -> Iterator[McapRecord]:
     """The records until the first that is broken, in whatever way: it was being written."""
     with suppress(Exception):
         yield from StreamReader(stream).records

@@ -33,7 +33,7 @@ class CommandStatus:
     outcome: OutcomeCode | Literal[""] = ""
     text: TextLike = ""
     fraction: float | None = None
-    stoppable: bool = False
+    can_cancel: bool = False
     goal: str = ""
     press: str = ""
 
@@ -50,8 +50,10 @@ class Outcome:
 
 
 OnCorrection = Callable[[str, Outcome], None]  # (press id, what is known of it now)
-LastLook = Callable[[], None]  # right before it is sent; raises PressRefused where it no longer may be
+FinalCheck = Callable[
+    [], None
+]  # right before it is sent; raises PressRefused where it no longer may be
 
 
-def no_look() -> None:
+def no_check() -> None:
     """Of what nobody has to permit."""

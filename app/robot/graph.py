@@ -30,27 +30,29 @@ class Route:
     direction: Direction
     key: str
     type: str
-    whole: bool = True
+    has_reader: bool = True
 
 
-Of = TypeVarTuple("Of")
-Found = TypeVar("Found")
+Arguments = TypeVarTuple("Arguments")
+Result = TypeVar("Result")
 
 
-def remembered(look: Callable[["Graph", *Of], Found]) -> Callable[["Graph", *Of], Found]:
-    """What is found is kept until the graph changes: it is asked far more often than that."""
+def cached_until_change(
+    query: Callable[["Graph", *Arguments], Result],
+) -> Callable[["Graph", *Arguments], Result]:
+    """Caches the results of a query until the graph changes: queries are far more frequent."""
 
-    def asked(graph: "Graph", *of: *Of) -> Found:
-        question = (look, of)
-        found: Found
+    def cached(graph: "Graph", *arguments: *Arguments) -> Result:
+        key = (query, arguments)
+        result: Result
         try:
-            found = graph.known[question]
+            result = graph.cache[key]
         except KeyError:
-            found = graph.known[question] = look(graph, *of)
-        return found
+            result = graph.cache[key] = query(graph, *arguments)
+        return result
 
-    asked.__doc__ = look.__doc__
-    return asked
+    cached.__doc__ = query.__doc__
+    return cached
 
 
 class Graph:
@@ -66,68 +68,68 @@ class Graph:
         """`namespace` tells this robot's bridges from those of others; None: all are its. Of tokens for
         other key expressions than `keys` nothing is kept; None: all are."""
         self.own_zid = own_zid  # whose tokens are not the robot's
-        self._names = None if keys is None else frozenset(map(in_token, keys))
-        self.known: dict[Any, Any] = {}  # see `remembered`
+        self._relevant_names = None if keys is None else frozenset(map(in_token, keys))
+        self.cache: dict[Any, Any] = {}  # see `remembered`
         self._namespace = namespace
         self._bridges: set[str] = set()
-        self._fits: dict[str, bool] = {}  # whether a bridge's namespace is the robot's
+        self._namespace_matches: dict[str, bool] = {}  # whether a bridge's namespace is the robot's
         self._tokens: defaultdict[str, dict[str, Endpoint]] = defaultdict(dict)
-        self._since: dict[str, float] = {}  # of servers' tokens
+        self._alive_since: dict[str, float] = {}  # of servers' tokens
         self._routes: defaultdict[str, list[Route]] = defaultdict(list)
         self._nodes: defaultdict[str, list[Endpoint]] = defaultdict(list)
-        self._answered: Mapping[str, str] | None = None
+        self._bridge_versions: Mapping[str, str] | None = None
 
-    def concerns(self, token_key: str) -> bool:
+    def is_relevant(self, token_key: str) -> bool:
         """Whether a token is a bridge's own, or about one of the key expressions that count."""
-        if self._names is None:
+        if self._relevant_names is None:
             return True
         name = name_in(token_key)
-        return not name or name in self._names
+        return not name or name in self._relevant_names
 
-    def has(self, token_key: str) -> bool:
+    def has_token(self, token_key: str) -> bool:
         """Whether a token is there by all that was taken."""
         return (endpoint := parsed(token_key)) is not None and token_key in self._tokens.get(
             endpoint.key, {}
         )
 
-    def apply(self, token_key: str, alive: bool, now: float = -math.inf) -> str | None:
+    def apply_token(self, token_key: str, alive: bool, now: float = -math.inf) -> str | None:
         """Takes one token's appearance (`now`, monotonic seconds) or end; returns the zid of a
         bridge that came or went."""
-        endpoint = parsed(token_key) if self.concerns(token_key) else None
+        endpoint = parsed(token_key) if self.is_relevant(token_key) else None
         if endpoint is None or endpoint.zid == self.own_zid:
             return None
-        self.known.clear()
+        self.cache.clear()
         if endpoint.role is None:
-            return self._bridge(endpoint.zid, alive)
+            return self._apply_bridge(endpoint.zid, alive)
         if alive:
             self._tokens[endpoint.key][token_key] = endpoint
             if endpoint.role in ("SS", "AS"):
-                self._since[token_key] = now
+                self._alive_since[token_key] = now
         else:
-            self._end(endpoint.key, token_key)
+            self._remove_token(endpoint.key, token_key)
         return None
 
-    def _end(self, key: str, token_key: str) -> None:
+    def _remove_token(self, key: str, token_key: str) -> None:
         """Of a node that went nothing is kept: many come once and never again."""
         tokens = self._tokens.get(key, {})
         tokens.pop(token_key, None)
         if not tokens:
             self._tokens.pop(key, None)
-        self._since.pop(token_key, None)
+        self._alive_since.pop(token_key, None)
 
-    def _bridge(self, zid: str, alive: bool) -> str:
+    def _apply_bridge(self, zid: str, alive: bool) -> str:
         if alive:
             self._bridges.add(zid)
-            self._answered = None  # it was not asked yet
+            self._bridge_versions = None  # it was not asked yet
         else:
             self._bridges.discard(zid)
-            self._fits.pop(zid, None)
+            self._namespace_matches.pop(zid, None)
         return zid
 
-    def learn(self, routes: Iterable[Route], nodes: Iterable[Endpoint] = ()) -> None:
+    def update_routes(self, routes: Iterable[Route], nodes: Iterable[Endpoint] = ()) -> None:
         """Takes what the bridges said of their routes, and of the publishers and subscribers of
         the nodes behind them: a route has one type, whatever they have."""
-        self.known.clear()
+        self.cache.clear()
         self._routes.clear()
         self._nodes.clear()
         for route in routes:
@@ -135,77 +137,77 @@ class Graph:
         for node in nodes:
             self._nodes[node.key].append(node)
 
-    def answered(self, versions: Mapping[str, str]) -> None:
+    def update_versions(self, versions: Mapping[str, str]) -> None:
         """Takes which bridges answered when they were asked, and with which version."""
-        self.known.clear()
-        self._answered = versions
+        self.cache.clear()
+        self._bridge_versions = versions
 
-    def configured(self, namespaces: Mapping[str, str]) -> None:
+    def update_namespaces(self, namespaces: Mapping[str, str]) -> None:
         """Takes the namespace of each bridge that told it ("" for none)."""
-        self.known.clear()
+        self.cache.clear()
         for zid, namespace in namespaces.items():
-            self._fits[zid] = self._namespace is None or within(self._namespace, namespace)
+            self._namespace_matches[zid] = self._namespace is None or within(self._namespace, namespace)
 
     @property
-    @remembered
+    @cached_until_change
     def bridges(self) -> frozenset[str]:
         """Those of this robot; one that has not told its namespace may be, if no other is."""
-        told = {zid for zid in self._bridges if self._fits.get(zid)}
-        return frozenset(told or self._bridges - self._fits.keys())
+        told = {zid for zid in self._bridges if self._namespace_matches.get(zid)}
+        return frozenset(told or self._bridges - self._namespace_matches.keys())
 
     @property
-    @remembered
-    def silent(self) -> bool:
+    @cached_until_change
+    def has_silent_bridge(self) -> bool:
         """A bridge is there by its token, but did not answer when all were asked."""
-        asked = self._answered
+        asked = self._bridge_versions
         return asked is not None and bool(self.bridges - asked.keys())
 
     @property
-    @remembered
-    def simulated(self) -> bool:
+    @cached_until_change
+    def is_simulated(self) -> bool:
         """A bridge that answered is a demo robot's."""
-        asked = self._answered or {}
+        asked = self._bridge_versions or {}
         return any(asked.get(zid) == DEMO_VERSION for zid in self.bridges)
 
-    @remembered
-    def _on_robot(self, role: Role, key: str) -> list[Endpoint]:
+    @cached_until_change
+    def _endpoints(self, role: Role, key: str) -> list[Endpoint]:
         tokens = self._tokens.get(key, {}).values()
         return [e for e in tokens if e.role == role and e.zid in self._bridges]
 
-    def behind(self, role: Role, key: str) -> frozenset[str]:
+    def bridges_with(self, role: Role, key: str) -> frozenset[str]:
         """The bridges behind which a node publishes, subscribes or serves."""
-        return frozenset(e.zid for e in self._on_robot(role, key))
+        return frozenset(e.zid for e in self._endpoints(role, key))
 
-    def on_robot(self, role: Role, key: str) -> bool:
+    def has_endpoint(self, role: Role, key: str) -> bool:
         """Whether a node behind a bridge publishes, subscribes or serves."""
-        return bool(self._on_robot(role, key))
+        return bool(self._endpoints(role, key))
 
     def server_type(self, role: ServerRole, key: str) -> str | None:
         """The type of the robot's service or action; None if it offers none of this name now."""
-        return next((e.type for e in self._on_robot(role, key)), None)
+        return next((e.type for e in self._endpoints(role, key)), None)
 
-    @remembered
+    @cached_until_change
     def served_since(self, role: ServerRole, key: str) -> float:
         """When (monotonic seconds) the last server of this name came; -inf where there is none."""
         tokens = self._tokens.get(key, {}).items()
-        here = (self._since[t] for t, e in tokens if e.role == role and e.zid in self._bridges)
+        here = (self._alive_since[t] for t, e in tokens if e.role == role and e.zid in self._bridges)
         return max(here, default=-math.inf)
 
-    def latched(self, key: str) -> bool | None:
+    def is_transient_local(self, key: str) -> bool | None:
         """Whether the robot's publisher is TRANSIENT_LOCAL; None if it has none now."""
-        return next((e.transient_local for e in self._on_robot("MP", key)), None)
+        return next((e.transient_local for e in self._endpoints("MP", key)), None)
 
-    @remembered
-    def unheard(self, key: str) -> bool:
+    @cached_until_change
+    def is_unrouted(self, key: str) -> bool:
         """Whether the robot publishes a topic that its bridge does not read for the panel."""
-        publishing = {e.zid for e in self._on_robot("MP", key)}
+        publishing = {e.zid for e in self._endpoints("MP", key)}
         return any(
-            r.direction == "pub" and not r.whole and r.zid in publishing
+            r.direction == "pub" and not r.has_reader and r.zid in publishing
             for r in self._routes.get(key, [])
         )
 
-    @remembered
-    def wrong_type(self, role: TopicRole, key: str, type_name: str) -> str | None:
+    @cached_until_change
+    def mismatched_type(self, role: TopicRole, key: str, type_name: str) -> str | None:
         """The other type that this topic has, if it is not what the panel needs for `role`."""
         theirs, others, direction = _COUNTERPARTS[role]
         for endpoint in chain(self._tokens.get(key, {}).values(), self._nodes.get(key, [])):
@@ -218,21 +220,23 @@ class Graph:
                 return route.type
         return None
 
-    @remembered
-    def wrong_qos(self, role: TopicRole, key: str, qos: Qos) -> str | None:
+    @cached_until_change
+    def mismatched_qos(self, role: TopicRole, key: str, qos: Qos) -> str | None:
         """The code of the sentence that says what DDS would not match, for what the panel does.
 
         Of several publishers each counts: one that is not heard may say something else. Of several
         subscribers one that hears is enough.
         """
-        theirs = self._on_robot(_COUNTERPARTS[role][0], key)
-        doubts = [_unheard(e, qos) if role == "MS" else _unheard_by(e, qos) for e in theirs]
+        theirs = self._endpoints(_COUNTERPARTS[role][0], key)
+        doubts = [
+            _reader_mismatch(e, qos) if role == "MS" else _writer_mismatch(e, qos) for e in theirs
+        ]
         if role == "MP" and None in doubts:
             return None
         return next(filter(None, doubts), None)
 
 
-def _unheard(publisher: Endpoint, qos: Qos) -> str | None:
+def _reader_mismatch(publisher: Endpoint, qos: Qos) -> str | None:
     """Why a reader of this QoS would not hear a publisher."""
     if qos.reliable and publisher.reliable is False:
         return "publishes_best_effort"
@@ -241,7 +245,7 @@ def _unheard(publisher: Endpoint, qos: Qos) -> str | None:
     return None
 
 
-def _unheard_by(subscriber: Endpoint, qos: Qos) -> str | None:
+def _writer_mismatch(subscriber: Endpoint, qos: Qos) -> str | None:
     """Why a subscriber would not hear a writer of this QoS."""
     if not qos.reliable and subscriber.reliable:
         return "asks_for_reliable"

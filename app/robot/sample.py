@@ -10,7 +10,7 @@ class Buffer(Protocol):
     def __len__(self) -> int: ...
 
 
-class PassedOver(NamedTuple):
+class SkippedPayload(NamedTuple):
     """A payload that came and went before anybody looked, and when: see `Sample`."""
 
     payload: Buffer
@@ -35,5 +35,5 @@ class Sample(NamedTuple):
     source: str | None
     skipped: int = 0
     sent: float | None = None
-    between: tuple[PassedOver, ...] = ()
+    skipped_payloads: tuple[SkippedPayload, ...] = ()
     overrun: bool = False

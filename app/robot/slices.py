@@ -12,11 +12,11 @@ from typing import Final
 
 from app.interfaces import FieldReader, Fields, Walk
 
-AT_ONCE_S: Final = 0.01  # of one turn in which something came, for all that is read in it
-LATER_S: Final = 0.003  # of each turn after that
-SMALL: Final = 2_000  # bytes: read at once, however much came in this turn
+FIRST_SHARE_S: Final = 0.01  # of one turn in which something came, for all that is read in it
+LATER_SHARE_S: Final = 0.003  # of each turn after that
+SMALL_BYTES: Final = 2_000  # bytes: read at once, however much came in this turn
 
-GoOn = Callable[[float], bool]  # reads on until then (monotonic seconds); whether it is through
+Resume = Callable[[float], bool]  # reads on until then (monotonic seconds); whether it is through
 
 
 class Slices:
@@ -25,30 +25,30 @@ class Slices:
     def __init__(self, monotonic: Callable[[], float] = time.monotonic) -> None:
         self._now = monotonic
         self._until: float | None = None  # of this turn; None: nothing was read in it yet
-        self._later: deque[GoOn] = deque()
+        self._pending: deque[Resume] = deque()
 
     def read(self, walk: Walk, size: int) -> Fields | None:
         """Reads a message of so many bytes; None where this turn's share is over before it is through.
         DecodeError where it is none."""
-        until = self._share()
-        if size > SMALL and self._now() >= until:
+        until = self._turn_deadline()
+        if size > SMALL_BYTES and self._now() >= until:
             return None
         return self.read_until(walk, until)
 
     def read_until(self, walk: Walk, until: float) -> Fields | None:
         """The same, to a moment."""
-        while (fields := walk.go_on()) is None:
+        while (fields := walk.advance()) is None:
             if self._now() >= until:
                 return None
         return fields
 
-    def later(self, go_on: GoOn) -> None:
+    def schedule(self, go_on: Resume) -> None:
         """Calls it once a turn from the next one on, until it is through."""
-        self._later.append(go_on)
-        if len(self._later) == 1:
-            asyncio.get_running_loop().call_soon(self._go_on)
+        self._pending.append(go_on)
+        if len(self._pending) == 1:
+            asyncio.get_running_loop().call_soon(self._resume_next)
 
-    async def whole(self, reader: FieldReader, data: bytes) -> Fields:
+    async def read_all(self, reader: FieldReader, data: bytes) -> Fields:
         """Reads a message, however many turns that takes; DecodeError where it is none."""
         walk = reader.walk(data)
         if (fields := self.read(walk, len(data))) is not None:
@@ -64,31 +64,31 @@ class Slices:
                     done.set_exception(error)
             return done.done()
 
-        self.later(go_on)
+        self.schedule(go_on)
         return await done
 
-    def _share(self) -> float:
+    def _turn_deadline(self) -> float:
         """Until when what came in this turn may be read."""
         if self._until is None:
             try:
-                asyncio.get_running_loop().call_soon(self._turn)
+                asyncio.get_running_loop().call_soon(self._end_turn)
             except RuntimeError:
                 return float("inf")
-            self._until = self._now() + AT_ONCE_S
+            self._until = self._now() + FIRST_SHARE_S
         return self._until
 
-    def _turn(self) -> None:
+    def _end_turn(self) -> None:
         self._until = None
 
-    def _go_on(self) -> None:
+    def _resume_next(self) -> None:
         """One of those that wait, each in its turn."""
-        go_on = self._later[0]
+        go_on = self._pending[0]
         through = True
         try:
-            through = go_on(self._now() + LATER_S)
+            through = go_on(self._now() + LATER_SHARE_S)
         finally:
-            self._later.popleft()
+            self._pending.popleft()
             if not through:
-                self._later.append(go_on)
-            if self._later:
-                asyncio.get_running_loop().call_soon(self._go_on)
+                self._pending.append(go_on)
+            if self._pending:
+                asyncio.get_running_loop().call_soon(self._resume_next)

@@ -15,7 +15,7 @@ from app.interfaces import FieldReader, Fields, Walk
 from app.robot.sample import Sample
 from app.robot.slices import Slices
 
-UNREAD_MOST: Final = 16  # messages of a watched topic that wait to be read; of other topics the newest
+MAX_UNREAD: Final = 16  # messages of a watched topic that wait to be read; of other topics the newest
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,9 +32,9 @@ class Reading:
         """The field at a path that the panel names; None where it is not there."""
         return None if self.fields is None else self.fields.get(path)
 
-    def several(self, path: str) -> bool:
+    def is_ambiguous(self, path: str) -> bool:
         """Whether it is not known because more than one element has the path's key."""
-        return self.fields is not None and self.fields.several(path)
+        return self.fields is not None and self.fields.is_ambiguous(path)
 
 
 WAITING: Final = Reading("waiting")
@@ -58,13 +58,13 @@ class Topic:
         self._unreadable = unreadable
         self._read_later = read_later
         self._watched = watched
-        self._unread: deque[Sample] = deque(maxlen=UNREAD_MOST)
-        self._walk: _Walked | None = None  # before the unread
-        self._put_off = False
-        self._last = WAITING
+        self._unread: deque[Sample] = deque(maxlen=MAX_UNREAD)
+        self._walk: _PendingRead | None = None  # before the unread
+        self._deferred = False
+        self._last_reading = WAITING
         self.sample: Sample | None = None  # the newest
 
-    def take(self, sample: Sample) -> None:
+    def update(self, sample: Sample) -> None:
         """A newer message."""
         self.sample = sample
         if self._walk is None or not self._watched:
@@ -73,66 +73,66 @@ class Topic:
 
     def reading(self) -> Reading:
         """What it says now."""
-        if not self._put_off and not self._read():
-            self._put_off = True
-            self._slices.later(self._go_on)
+        if not self._deferred and not self._read():
+            self._deferred = True
+            self._slices.schedule(self._resume)
         if self._walk is None and not self._unread:
-            return self._last
-        return replace(self._last, status="reading")
+            return self._last_reading
+        return replace(self._last_reading, status="reading")
 
-    def cut(self) -> None:
+    def invalidate(self) -> None:
         """What it said no longer says what is so."""
         if self.sample is not None:
-            self._last = replace(self.reading(), status="cut")
+            self._last_reading = replace(self.reading(), status="cut")
             self._unread.clear()
             self._walk = None
 
     def _read(self) -> bool:
         """Reads what this turn allows; whether that was all."""
-        while (walked := self._next()) is not None:
+        while (walked := self._next_read()) is not None:
             reading = self._read_one(walked, lambda: self._slices.read(walked.walk, walked.size))
             if reading is None:
                 return False
         return True
 
-    def _go_on(self, until: float) -> bool:
+    def _resume(self, until: float) -> bool:
         """The same in a later turn; each that is through by then is told."""
-        walked = self._next()
+        walked = self._next_read()
         if walked is not None:
             reading = self._read_one(walked, lambda: self._slices.read_until(walked.walk, until))
-            self._put_off = self._next() is not None
+            self._deferred = self._next_read() is not None
             if reading is not None:
                 self._read_later(reading)
         else:
-            self._put_off = False
-        return not self._put_off
+            self._deferred = False
+        return not self._deferred
 
-    def _next(self) -> "_Walked | None":
+    def _next_read(self) -> "_PendingRead | None":
         """The one that is to be read now."""
         if self._walk is None and self._unread:
             sample = self._unread.popleft()
             data = bytes(sample.payload)
-            self._walk = _Walked(sample, self._reader.walk(data), len(data))
+            self._walk = _PendingRead(sample, self._reader.walk(data), len(data))
         return self._walk
 
-    def _read_one(self, walked: "_Walked", read: Callable[[], Fields | None]) -> Reading | None:
+    def _read_one(self, walked: "_PendingRead", read: Callable[[], Fields | None]) -> Reading | None:
         """Its reading, which is the last then; None where it is not through."""
         sample = walked.sample
         try:
             fields = read()
         except DecodeError as error:
             self._unreadable(sample, error)
-            self._last = Reading("unreadable", None, sample.at, sample.wall)
+            self._last_reading = Reading("unreadable", None, sample.at, sample.wall)
         else:
             if fields is None:
                 return None
-            self._last = Reading("message", fields, sample.at, sample.wall)
+            self._last_reading = Reading("message", fields, sample.at, sample.wall)
         self._walk = None
-        return self._last
+        return self._last_reading
 
 
 @dataclass(frozen=True, slots=True)
-class _Walked:
+class _PendingRead:
     """A message that is being read, of so many bytes."""
 
     sample: Sample

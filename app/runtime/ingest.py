@@ -66,7 +66,7 @@ class Ingest:
         }
         self._events = robot.key(EVENTS)
         # What is judged by them is judged by each value that they had, however short.
-        self.watched = self._interlocks.keys() | {robot.key(one.topic) for one in panel.confirms()}
+        self.watched = self._interlocks.keys() | {robot.key(one.topic) for one in panel.confirmations()}
         self.prompt = self.watched | self._status.keys() | {self._events}
         self.whole = frozenset() if recorder is None else recorder.keys
         topics = map(robot.key, panel.subscriptions())
@@ -82,10 +82,10 @@ class Ingest:
         ordered = sorted(changes.samples.items(), key=lambda one: one[0] not in self._interlocks)
         for key, sample in ordered:
             if sample.overrun and key in self._interlocks:
-                self._robot.doubt(key)
+                self._robot.invalidate(key)
                 show()
-            for payload, at, wall in sample.between:
-                passed = sample._replace(payload=payload, at=at, wall=wall, between=())
+            for payload, at, wall in sample.skipped_payloads:
+                passed = sample._replace(payload=payload, at=at, wall=wall, skipped_payloads=())
                 if self._changes(key, passed, shown()) == "now":
                     show()
             change = self._changes(key, sample, shown())
@@ -127,7 +127,7 @@ class Ingest:
     def _record(self, changes: Changes) -> None:
         if self._recorder is not None:
             for key, sample in changes.kept:
-                self._guarded(key, sample, self._recorder.hear)
+                self._guarded(key, sample, self._recorder.record_sample)
 
     def _guarded(self, key: str, sample: Sample, take: Callable[[str, Sample], None]) -> None:
         try:
@@ -143,9 +143,9 @@ class Ingest:
         else:
             if key == self._events:
                 self._parameters.hear(sample)
-            self._robot.take(key, sample)
+            self._robot.update(key, sample)
             if self._confirmations.awaits(key):
-                self._confirmations.hear(key, self._robot.reading_of(key))
+                self._confirmations.hear(key, self._robot.reading_by_key(key))
 
     def read(self, key: str, reading: Reading, shown: Mapping[str, Enabled]) -> Change:
         """A message that took more than one turn is read: whether a permission may be another one by it
@@ -160,18 +160,18 @@ class Ingest:
         came, now, robot = False, time.monotonic(), self._robot
         had_bridge = bool(robot.graph.bridges)
         for key, token in tokens.items():
-            if not robot.graph.concerns(key):
+            if not robot.graph.is_relevant(key):
                 continue
             self._publisher(key, token)
             if token.lost_seq:
                 self._parameters.lose(key)
-            if token.lost_seq and (zid := robot.graph.apply(key, False)):
-                robot.cut(zid, token.lost_seq)
+            if token.lost_seq and (zid := robot.graph.apply_token(key, False)):
+                robot.mark_bridge_lost(zid, token.lost_seq)
                 self._log.warning("bridge %s lost", zid)
                 had_bridge = had_bridge and bool(robot.graph.bridges)
             if token.lost_seq and token.alive:
-                robot.follow_publishers(token.lost_seq)  # gone, be it for a moment
-            if token.alive and (zid := robot.graph.apply(key, True, now)):
+                robot.update_publishers(token.lost_seq)  # gone, be it for a moment
+            if token.alive and (zid := robot.graph.apply_token(key, True, now)):
                 self._log.info("bridge %s found", zid)
                 came = True
         return came and not had_bridge
@@ -179,14 +179,14 @@ class Ingest:
     def _publisher(self, key: str, token: Token) -> None:
         """Whether a publisher has appeared, be it for a moment: until it says something, nobody knows
         what it permits."""
-        graph, silent = self._robot.graph, self._robot.silent
+        graph, silent = self._robot.graph, self._robot.silent_publishers
         endpoint = bridge_dialect.parsed(key)
         if endpoint is None or endpoint.zid == graph.own_zid:
             return
-        if token.came_seq and (token.lost_before or not graph.has(key)):  # else it is told twice
-            silent.appeared(endpoint, token.came_seq, token.came_at, token.lost_before)
+        if token.came_seq and (token.lost_before or not graph.has_token(key)):  # else it is told twice
+            silent.add_publisher(endpoint, token.came_seq, token.came_at, token.lost_before)
         if token.lost_seq:
-            silent.lost(endpoint, token.lost_seq)
+            silent.remove_publisher(endpoint, token.lost_seq)
 
 
 def _change(verdict: Verdict, shown: Enabled) -> Change:

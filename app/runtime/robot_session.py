@@ -21,7 +21,7 @@ from app.commands.presses import Presses
 from app.commands.service_calls import ServiceCalls
 from app.errors import LinkError, NotFound
 from app.i18n import TextLike
-from app.interfaces import interfaces_of
+from app.interfaces import load_interfaces
 from app.interfaces.names import ROSOUT_TOPIC
 from app.panel.model import Panel, RobotEntry
 from app.panel.widgets.parameter import Parameter
@@ -70,12 +70,12 @@ class RobotSession:
         self.base = f"/robots/{entry.id}" if entry else ""
         self._operators_log = operators_log
         self._following = ExitStack()
-        self.interfaces = interfaces_of(panel.distro, panel.interfaces)
+        self.interfaces = load_interfaces(panel.distro, panel.interfaces)
         self._loop = asyncio.get_running_loop()
         self.link = ZenohSession(config, self._wake)
         self.robot = RobotState(panel, self.interfaces, self.link.zid, entry, slices)
         self.robot.endpoints = self.link.endpoints
-        self.robot.read_later = self._read_later
+        self.robot.on_late_reading = self._read_later
         self._log = RobotLog(log, self.robot.name)
         self.control = ControlAuthority(panel.control, self.robot.name, tell=self._log.info)
         self.refresher = ViewRefresher(
@@ -159,7 +159,7 @@ class RobotSession:
     async def start(self) -> None:
         """Declares everything; whether anybody is there shows later."""
         await self._recovery.start()
-        self.interfaces.prepare(
+        self.interfaces.prepare_codecs(
             {*self.panel.subscriptions().values(), *self.panel.publications().values()}
         )
         publish = [self.robot.key(topic) for topic in (*self.panel.publications(), ROSOUT_TOPIC)]
@@ -213,7 +213,7 @@ class RobotSession:
             return None
         from app.recording import Recorder
 
-        recordings.follow(self.show)
+        recordings.add_listener(self.show)
         name = self.entry.id if self.entry else ""
         rules = self.panel.record
         return Recorder(self.panel, rules, self.interfaces, self.robot, name, recordings)
@@ -245,7 +245,7 @@ class RobotSession:
 
     def renew(self) -> None:
         """A new Zenoh session: until it is joined, nobody is known to be there."""
-        self.robot.lose()
+        self.robot.mark_link_lost()
         self._follow(came=False)
         self.show()
         self._lost = True
@@ -318,7 +318,7 @@ class RobotSession:
 
     def _follow(self, came: bool) -> None:
         """After every change of the graph; `came`: there is a bridge where there was none."""
-        self.robot.follow_publishers()
+        self.robot.update_publishers()
         self._calls.follow()
         self._actions.follow()
         self._parameters.follow()

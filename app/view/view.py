@@ -86,7 +86,7 @@ def build_view(
     locks = {w: Verdict(False, "log", lock) for w in verdicts} if lock else verdicts
     widgets = {w.id: show(w, robot, now, locks.get(w.id, PERMITTED)) for w in panel.widgets()}
     link, until = link_statuses(panel, robot, passable, locks, now)
-    banner = say("simulated") if simulated or robot.graph.simulated else ""
+    banner = say("simulated") if simulated or robot.graph.is_simulated else ""
     view = View(
         link=link,
         interlocks={i: enabled(verdict) for i, verdict in interlocks.items()},

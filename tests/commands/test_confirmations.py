@@ -16,7 +16,7 @@ from app.commands.receipts import Receipt
 from app.errors import PanelError
 from app.panel import load_panel
 from app.panel.model import Panel
-from app.robot.state import PassedOver, RobotState, Sample
+from app.robot.state import RobotState, Sample, SkippedPayload
 from app.ros_logging import RobotLog
 from app.runtime.ingest import Ingest
 from app.transport.inbox import Changes
@@ -107,8 +107,8 @@ def test_what_came_unseen_confirms_by_when_it_came() -> None:
         press = asyncio.create_task(desk.press())
         await asyncio.sleep(0)
         on, off = (INTERFACES.encode(TEXT, {"data": text}) for text in ("on", "off"))
-        between = (PassedOver(on, came_at, came_at),)
-        newest = Sample(off, 9, 100.2, 100.2, BRIDGE, between=between)
+        between = (SkippedPayload(on, came_at, came_at),)
+        newest = Sample(off, 9, 100.2, 100.2, BRIDGE, skipped_payloads=between)
         changes = Changes({desk.robot.key("/heard"): newest}, {}, link_up=True)
         intake.take(changes, dict, lambda: None)
         return await press

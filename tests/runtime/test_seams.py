@@ -16,7 +16,7 @@ from app.commands.service_calls import with_fields
 from app.panel.model import Panel
 from app.permission.clients import anonymous
 from app.permission.interlocks import interlock_verdict
-from app.robot.state import PassedOver, RobotState, Sample
+from app.robot.state import RobotState, Sample, SkippedPayload
 from app.ros_logging import RobotLog
 from app.runtime import robot_session
 from app.runtime.ingest import Ingest
@@ -50,8 +50,8 @@ def flag(value: bool) -> bytes:
 
 
 def sample(payload: bytes, *between: bytes) -> Sample:
-    passed = tuple(PassedOver(one, NOW, NOW) for one in between)
-    return Sample(payload, 9, NOW, NOW, BRIDGE, between=passed)
+    passed = tuple(SkippedPayload(one, NOW, NOW) for one in between)
+    return Sample(payload, 9, NOW, NOW, BRIDGE, skipped_payloads=passed)
 
 
 class Broken:
@@ -186,7 +186,7 @@ def test_each_sample_that_is_kept_whole_is_recorded_and_no_other() -> None:
 
 def test_a_list_that_is_too_short_is_shown_as_nothing() -> None:
     type_name = "sensor_msgs/msg/JointState"
-    names = INTERFACES.fields(type_name, ["name[0]", "name[1]"])
+    names = INTERFACES.field_reader(type_name, ["name[0]", "name[1]"])
     payload = INTERFACES.encode(type_name, JOINTS)
     assert with_fields("{name[0]}, {name[1]}", names.read(payload)) == "a, —"
 
@@ -264,7 +264,7 @@ def test_a_publisher_that_was_replaced_between_two_turns_has_to_say_it_again() -
     robot = robot_there(panel)
     interlock = panel.interlocks[0]
     token = endpoint(robot, "MP", ENABLED, BOOL)
-    robot.follow_publishers()
+    robot.update_publishers()
     permits(robot)
     intake = intake_of(panel, robot, Deaf())
     page = Page(panel, robot)
@@ -272,7 +272,7 @@ def test_a_publisher_that_was_replaced_between_two_turns_has_to_say_it_again() -
     old, new = Sample(flag(True), 6, NOW, NOW, BRIDGE), Sample(flag(True), 8, NOW, NOW, BRIDGE)
     for said, permitted in ((old, False), (new, True)):
         intake.take(Changes({key: said}, {token: Token(True, 7)}, True), page.shown, page.show)
-        robot.follow_publishers()
+        robot.update_publishers()
         assert interlock_verdict(interlock, robot, NOW).permitted is permitted
 
 
@@ -301,7 +301,7 @@ def test_a_kiosk_that_gives_its_session_up_ends_what_is_held_before(
                 hold = one.holds.begin("jog", HALF, time.monotonic(), FROM, ended.append)
                 assert isinstance(hold, ActiveHold)
                 lost = one.robot.key("/last_heard")
-                monkeypatch.setattr(type(one.robot.graph), "unheard", lambda _, key: key == lost)
+                monkeypatch.setattr(type(one.robot.graph), "is_unrouted", lambda _, key: key == lost)
                 for number in itertools.count(1):
                     if ended:
                         break

@@ -23,13 +23,20 @@ from app.concurrency import spawn_logged
 from app.dialect import bridge_dialect
 from app.errors import DecodeError
 from app.i18n import TextLike, say
-from app.interfaces import Fields, Interfaces, text_of
+from app.interfaces import Fields, Interfaces, plain_text
 from app.panel.model import Panel
 from app.panel.widgets.parameter import DESCRIBE, EVENT_TYPE, GET, SET, Parameter, Value
 from app.permission.interlocks import SERVER_SETTLE_S, parameters_offered
 from app.printable import printable
-from app.robot.command_status import LastLook, OnCorrection, Outcome, no_look
-from app.robot.parameter_state import UNKNOWN, ParameterState, name_of, parameter_states, value_in, wire
+from app.robot.command_status import FinalCheck, OnCorrection, Outcome, no_check
+from app.robot.parameter_state import (
+    UNKNOWN,
+    ParameterState,
+    decode_value,
+    encode_value,
+    read_parameter_state,
+    type_name,
+)
 from app.robot.state import RobotState, Sample
 from app.ros_logging import RobotLog
 
@@ -173,10 +180,12 @@ class ParameterSync:
         known = self._known(widget)
         if known.state not in ("live", "missing"):
             node.wanted.set()
-        elif name_of(value.type) != widget.type:
-            self._learn(widget, ParameterState("mistyped", found=name_of(value.type), wall=wall))
+        elif type_name(value.type) != widget.type:
+            self._learn(widget, ParameterState("mistyped", robot_type=type_name(value.type), wall=wall))
         else:
-            self._learn(widget, replace(known, state="live", value=value_in(widget, value), wall=wall))
+            self._learn(
+                widget, replace(known, state="live", value=decode_value(widget, value), wall=wall)
+            )
 
     async def _follow_node(self, node: _Node) -> None:
         """Asks a node, as often as there is need, until it is cut off."""
@@ -200,7 +209,7 @@ class ParameterSync:
 
     async def _read(self, node: _Node) -> Read:
         """Asks for all of a node's parameters: whether it told all, not all, or nothing."""
-        self._robot.asking |= {widget.id for widget in node.widgets}
+        self._robot.querying |= {widget.id for widget in node.widgets}
         self._changed()
         try:
             return await self._answered(node)
@@ -225,14 +234,14 @@ class ParameterSync:
         values |= node.heard  # told after it was asked
         for widget in node.widgets:
             name = widget.parameter
-            found = parameter_states(widget, descriptors.get(name), values.get(name), time.time())
+            found = read_parameter_state(widget, descriptors.get(name), values.get(name), time.time())
             self._learn(widget, found)
         self._changed()
         live = all(self._known(widget).state == "live" for widget in node.widgets)
         return "whole" if live else "partly"
 
     def _end_asking(self, node: _Node) -> None:
-        self._robot.asking -= {widget.id for widget in node.widgets}
+        self._robot.querying -= {widget.id for widget in node.widgets}
 
     def read_again(self, widget: Parameter) -> TextLike:
         """Asks the node of a parameter once more, unless it is being asked or has just answered; why it
@@ -241,7 +250,7 @@ class ParameterSync:
         if node.task is None:
             return say("no_parameters", node=widget.node)
         fresh = time.monotonic() - node.told_at < AGAIN_S
-        if widget.id not in self._robot.asking and not fresh:
+        if widget.id not in self._robot.querying and not fresh:
             node.ask_now()
         return ""
 
@@ -257,12 +266,12 @@ class ParameterSync:
         value: Value,
         press_id: str,
         corrected: OnCorrection,
-        look: LastLook = no_look,
+        look: FinalCheck = no_check,
     ) -> Outcome:
         """Sets a parameter, as a call does; whatever came of it, the node is asked how it is now."""
         service, type_name = SET
-        fields = {"parameters": [{"name": widget.parameter, "value": wire(widget, value)}]}
-        payload = self._interfaces.encode(self._interfaces.service(type_name)[0], fields)
+        fields = {"parameters": [{"name": widget.parameter, "value": encode_value(widget, value)}]}
+        payload = self._interfaces.encode(self._interfaces.service_types(type_name)[0], fields)
         name, read = f"{widget.node}/{service}", partial(_answer, widget, value)
         request = Request(widget.id, name, type_name, payload, widget.timeout_s, SET_PATHS, read)
         node = self._nodes[widget.node]
@@ -303,8 +312,8 @@ def _answer(widget: Parameter, value: Value, response: Fields) -> Outcome:
     if successful is None or second is not None:
         return Outcome("unknown", say("answer_unreadable", wanted=SET[1]))
     if successful:
-        return Outcome("succeeded", say("parameter_set", value=widget.written(value), time=now))
-    said = printable(text_of(reason, LONGEST_SAID)) if reason else ""
+        return Outcome("succeeded", say("parameter_set", value=widget.value_text(value), time=now))
+    said = printable(plain_text(reason, LONGEST_SAID)) if reason else ""
     return Outcome("rejected", with_reply(say("said_no", time=now), said))
 
 

@@ -3,23 +3,26 @@
 from collections.abc import Mapping
 from typing import Final
 
-from app.interfaces.cdr.formats import HEADER
-from app.interfaces.cdr.reader import Order
+from app.interfaces.cdr.formats import HEADER_BYTES
+from app.interfaces.cdr.reader import ByteOrder
 
-LITTLE_ENDIAN: Final = b"\0\1\0\0"
-ORDERS: Final[Mapping[bytes, Order]] = {b"\0\0": ">", b"\0\1": "<"}  # the last two bytes are options
+LITTLE_ENDIAN_HEADER: Final = b"\0\1\0\0"
+ORDERS: Final[Mapping[bytes, ByteOrder]] = {
+    b"\0\0": ">",
+    b"\0\1": "<",
+}  # the last two bytes are options
 ALIGNMENT: Final = 4  # bytes: a message may be padded to a multiple of it (RTPS 2.5, 9.4.2.12)
 
 
-def opened(data: bytes) -> "tuple[memoryview[int], Order]":
+def split_header(data: bytes) -> "tuple[memoryview[int], ByteOrder]":
     """The fields of a message, and their byte order; ValueError where it does not begin as one."""
-    order = ORDERS.get(data[:2]) if len(data) >= HEADER else None
+    order = ORDERS.get(data[:2]) if len(data) >= HEADER_BYTES else None
     if order is None:
         raise ValueError("it does not begin as plain CDR does")
-    return memoryview(data)[HEADER:], order
+    return memoryview(data)[HEADER_BYTES:], order
 
 
-def judge_end(body: "memoryview[int]", end: int) -> None:
+def check_end(body: "memoryview[int]", end: int) -> None:
     """ValueError where a message whose fields end here is longer or shorter."""
     if len(body) != end and len(body) != end + -end % ALIGNMENT:
-        raise ValueError(f"it ends at {HEADER + end}")
+        raise ValueError(f"it ends at {HEADER_BYTES + end}")

@@ -27,15 +27,15 @@ FORMATS: Final[Mapping[str, str]] = {
     **dict.fromkeys(("byte", "char", "octet"), "B"),
 }
 SIZES: Final[Mapping[str, int]] = {name: calcsize(f"<{form}") for name, form in FORMATS.items()}
-HEADER: Final = 4  # bytes
-LENGTH: Final = 4  # bytes of the count before a text or a sequence
+HEADER_BYTES: Final = 4  # bytes
+LENGTH_BYTES: Final = 4  # bytes of the count before a text or a sequence
 
 
-def runs(fields: Iterable[Field]) -> Iterator[list[Field]]:
+def group_runs(fields: Iterable[Field]) -> Iterator[list[Field]]:
     """The fields in their order; neighbours that are single numbers of one size are together."""
 
     def size(one: Field) -> Any:
-        return SIZES.get(one.type.name) if one.type.many == "one" else None
+        return SIZES.get(one.type.name) if one.type.container == "one" else None
 
     for each, group in groupby(fields, size):
         together = list(group)

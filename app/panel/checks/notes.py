@@ -7,14 +7,14 @@ from app.interfaces import Interfaces
 from app.panel.model import Panel
 
 
-def notes_in(panel: Panel, interfaces: Interfaces) -> Iterator[Note]:
+def find_notes(panel: Panel, interfaces: Interfaces) -> Iterator[Note]:
     """Notes by their places in the panel file; ids and lines are added by who prints them."""
-    yield from _trusted(panel)
-    yield from _unused(panel)
-    yield from _left_out(panel, interfaces)
+    yield from _unbounded_trust_notes(panel)
+    yield from _unused_interlock_notes(panel)
+    yield from _unusable_type_notes(panel, interfaces)
 
 
-def _trusted(panel: Panel) -> Iterator[Note]:
+def _unbounded_trust_notes(panel: Panel) -> Iterator[Note]:
     """Interlocks whose last value is trusted for good: see docs/permissions.md."""
     for i, interlock in enumerate(panel.interlocks):
         if interlock.max_age_s is None and not interlock.require_publisher:
@@ -26,7 +26,7 @@ def _trusted(panel: Panel) -> Iterator[Note]:
             )
 
 
-def _unused(panel: Panel) -> Iterator[Note]:
+def _unused_interlock_notes(panel: Panel) -> Iterator[Note]:
     """Interlocks that lock nothing."""
     used = {name for widget in panel.commands for name in widget.interlocks}
     for i, interlock in enumerate(panel.interlocks):
@@ -35,10 +35,10 @@ def _unused(panel: Panel) -> Iterator[Note]:
             yield Note(f"interlock[{i}]", what)
 
 
-def _left_out(panel: Panel, interfaces: Interfaces) -> Iterator[Note]:
+def _unusable_type_notes(panel: Panel, interfaces: Interfaces) -> Iterator[Note]:
     """Types of each folder that can't be used; the panel needs none of them."""
     for f, folder in enumerate(panel.interfaces):
-        errors = interfaces.left_out.items()
+        errors = interfaces.unusable.items()
         own = [(n, why) for n, why in errors if why.source and why.source.is_relative_to(folder)]
         if own:
             name, why = own[0]

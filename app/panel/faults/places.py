@@ -8,7 +8,7 @@ from typing import Any, Final, TypeVar
 from app.errors import Remark
 from app.panel.faults.toml_lines import Path, lines_of
 
-LONGEST_ID: Final = 64
+MAX_ID: Final = 64
 _OWNER: Final = re.compile(r"(?:page\[(?P<page>[0-9]+)\]\.)?(?P<key>[a-z]+)\[(?P<index>[0-9]+)\]")
 _LAST: Final = re.compile(r"(?:\[[0-9]+\]|\.?[^.\[\]]*)$")
 
@@ -23,14 +23,14 @@ def place_of(path: Path) -> str:
     return place
 
 
-def located(remarks: Iterable[AnyRemark], text: str, tables: Any) -> Iterator[AnyRemark]:
+def add_locations(remarks: Iterable[AnyRemark], text: str, tables: Any) -> Iterator[AnyRemark]:
     """Remarks about a TOML text and the tables that it is, with their ids and lines."""
     lines: dict[str, int] = {}
     for path, line in _lines(text).items():
         lines.setdefault(place_of(path), line)
     for remark in remarks:
         place = remark.place
-        known = remark.line or _line(place, lines)
+        known = remark.line or _nearest_line(place, lines)
         yield replace(remark, id=remark.id or id_at(place, tables), line=known)
 
 
@@ -43,7 +43,7 @@ def id_at(place: str, tables: Any) -> str:
     except (LookupError, TypeError):
         return ""
     tells = isinstance(known, str) and known.isprintable() and '"' not in known
-    return known[:LONGEST_ID] if tells else ""
+    return known[:MAX_ID] if tells else ""
 
 
 def _lines(text: str) -> dict[Path, int]:
@@ -53,7 +53,7 @@ def _lines(text: str) -> dict[Path, int]:
         return {}
 
 
-def _line(place: str, lines: dict[str, int]) -> int:
+def _nearest_line(place: str, lines: dict[str, int]) -> int:
     """That of a place or, where it is not there, of what it should be in; 0 where there is none."""
     while place and place not in lines:
         place = _LAST.sub("", place)

@@ -43,18 +43,18 @@ class _Scanner:
 
     def document(self) -> None:
         table: Path = ()
-        while self._next():
+        while self._peek():
             if self._text[self._at] == "[":
                 table = self._header()
             else:
                 self._pair(table)
 
-    def _next(self) -> str:
+    def _peek(self) -> str:
         """The next character that is no space and no comment; "" at the end."""
-        self._take(_SPACE)
+        self._match(_SPACE)
         return self._text[self._at : self._at + 1]
 
-    def _take(self, pattern: re.Pattern[str]) -> str:
+    def _match(self, pattern: re.Pattern[str]) -> str:
         """What a pattern matches here, which is taken; "" where it does not."""
         match = pattern.match(self._text, self._at)
         if match is None:
@@ -91,11 +91,11 @@ class _Scanner:
         """The parts of a key: `a."b.c"` has two. What stands after it, and its spaces, is next."""
         parts = []
         while True:
-            self._take(_SPACE)
-            quoted = self._take(_QUOTED)
-            parts.append(tomllib.loads(f"_ = {quoted}")["_"] if quoted else self._take(_BARE))
-            if not self._take(_DOT):
-                self._take(_SPACE)
+            self._match(_SPACE)
+            quoted = self._match(_QUOTED)
+            parts.append(tomllib.loads(f"_ = {quoted}")["_"] if quoted else self._match(_BARE))
+            if not self._match(_DOT):
+                self._match(_SPACE)
                 return parts
 
     def _pair(self, table: Path) -> None:
@@ -105,7 +105,7 @@ class _Scanner:
             path = (*path, part)
             self.lines.setdefault(path, line)
         self._at += len("=")
-        self._next()
+        self._peek()
         self._value(path)
 
     def _value(self, path: Path) -> None:
@@ -115,12 +115,12 @@ class _Scanner:
             case "{":
                 self._inline_table(path)
             case _:
-                self._take(_VALUE)
+                self._match(_VALUE)
 
     def _list(self, path: Path) -> None:
         self._at += 1
         index = 0
-        while self._next() != "]":
+        while self._peek() != "]":
             self.lines[*path, index] = self._line()
             self._value((*path, index))
             index += 1
@@ -129,11 +129,11 @@ class _Scanner:
 
     def _inline_table(self, path: Path) -> None:
         self._at += 1
-        while self._next() != "}":
+        while self._peek() != "}":
             self._pair(path)
             self._comma()
         self._at += 1
 
     def _comma(self) -> None:
-        if self._next() == ",":
+        if self._peek() == ",":
             self._at += 1

@@ -15,7 +15,7 @@ from pydantic import Field
 from app.dialect.endpoint import Role
 from app.errors import Fault
 from app.interfaces import Interfaces
-from app.interfaces.validation import shown
+from app.interfaces.validation import format_value
 from app.panel.base import (
     Description,
     FieldPath,
@@ -29,24 +29,24 @@ from app.panel.base import (
     Type,
 )
 from app.panel.checks.types import field_faults
-from app.panel.faults.wording import listing
+from app.panel.faults.wording import list_names
 
 
 @dataclass(frozen=True, slots=True)
-class Checking:
+class CheckContext:
     """What a widget is checked against: the inputs of its page by their ids, the ids of all inputs
     (`anywhere`) and of all interlocks, the types of the topics that the panel listens to. Faults of
     the widgets in `faulty` are reported already: what depends on them is not checked."""
 
     interfaces: Interfaces
     inputs: Mapping[str, "Input"]
-    anywhere: Collection[str]
+    all_inputs: Collection[str]
     interlocks: Collection[str]
     types: Mapping[str, str]
     faulty: Collection[str] = ()
 
 
-class Placed(Description):
+class BaseWidget(Description):
     """What every widget has; `span` is its width in twelfths of the page."""
 
     id: Id
@@ -57,9 +57,9 @@ class Placed(Description):
     # Why a key that is missing is needed, where that is not plain.
     why_needed: ClassVar[Mapping[str, str]] = {}
     # The types that the server itself needs for this kind.
-    own_types: ClassVar[tuple[str, ...]] = ()
+    required_types: ClassVar[tuple[str, ...]] = ()
 
-    def faults(self, place: str, checking: Checking) -> Iterator[Fault]:
+    def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
         """What is wrong though the shape is right; `place` is the widget's in the panel file."""
         yield from ()
 
@@ -67,12 +67,12 @@ class Placed(Description):
         """What has to be on the robot, as (role, ROS name)."""
         yield from ()
 
-    def resolved(self, interfaces: Interfaces) -> Self:
+    def with_constants(self, interfaces: Interfaces) -> Self:
         """The same with values for the names of constants; of a checked widget."""
         return self
 
 
-class Entered(Placed):
+class EntryWidget(BaseWidget):
     """A widget in which a value is entered: it comes with a press under the widget's id."""
 
     @property
@@ -80,22 +80,22 @@ class Entered(Placed):
         """The default that the panel file gives, as a press gives it; None where it gives none."""
         return None
 
-    def typed(self, text: str) -> Any:
+    def parse_text(self, text: str) -> Any:
         """A form's text as a value of this widget's type; the text itself where it is none."""
         return text
 
 
-class Input(Entered):
+class Input(EntryWidget):
     """A value that messages take by the input's id."""
 
     @property
     @abstractmethod
-    def gives(self) -> str:
+    def value_description(self) -> str:
         """What kind of values it gives, for the sentence of a fault."""
 
     @property
     @abstractmethod
-    def about(self) -> str:
+    def comment(self) -> str:
         """What it gives and what it starts with, for a comment in a preview."""
 
     @abstractmethod
@@ -103,16 +103,16 @@ class Input(Entered):
         """The values at which a template would fail first: limits, every option, true and false."""
 
     @abstractmethod
-    def checked(self, given: Any) -> Any:
+    def check_value(self, given: Any) -> Any:
         """The value that a message takes; InputError with a sentence that names label and limits."""
 
-    def gives_for(self, value: Any, *, narrow: bool) -> str:
+    def describe_value(self, value: Any, *, narrow: bool) -> str:
         """What it gives where `value` does not fit; `narrow`: its type does, and only the value is
         out of a range."""
-        return shown(value) if narrow else self.gives
+        return format_value(value) if narrow else self.value_description
 
 
-class OnTopic(Placed):
+class TopicWidget(BaseWidget):
     """A widget that publishes a topic, or shows it."""
 
     topic: Topic
@@ -120,7 +120,7 @@ class OnTopic(Placed):
     qos: TopicQos = TopicQos()
 
 
-class Display(OnTopic):
+class Display(TopicWidget):
     """A field of a topic, shown; older than `max_age_s` it is shown as old."""
 
     field: FieldPath = "data"
@@ -129,14 +129,14 @@ class Display(OnTopic):
     def endpoints(self) -> Iterator[tuple[Role, str]]:
         yield "MP", self.topic
 
-    def faults(self, place: str, checking: Checking) -> Iterator[Fault]:
+    def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
         interfaces = checking.interfaces
         faults = list(field_faults(place, self.type, self.field, interfaces))
         yield from faults
         if faults:
             return
         field_type = interfaces.type_at(self.type, self.field)
-        if field_type.nested or field_type.many != "one":
+        if field_type.is_nested or field_type.container != "one":
             who = f"an {self.kind}" if self.kind[0] in "aeiou" else f"a {self.kind}"
             what = f'"{self.field}" is {field_type}: {who} shows one value of it, not all'
             yield Fault(f"{place}.field", what)
@@ -148,7 +148,7 @@ class Display(OnTopic):
         yield from ()
 
 
-class Sent(NamedTuple):
+class SentMessage(NamedTuple):
     """A message that a command sends: when, its type ("" where it has none that the panel file names),
     and its fields with the ids of inputs in them; `comments` are by fields (".seq")."""
 
@@ -158,7 +158,7 @@ class Sent(NamedTuple):
     comments: Mapping[str, str] = {}
 
 
-class Command(Placed):
+class Command(BaseWidget):
     """A widget that acts on the robot, where its interlocks permit."""
 
     interlocks: Interlocks = Field(default=(), alias="interlock")
@@ -168,18 +168,18 @@ class Command(Placed):
         """All that may name inputs."""
 
     @abstractmethod
-    def sent(self, interfaces: Interfaces) -> Iterator[Sent]:
+    def sent_messages(self, interfaces: Interfaces) -> Iterator[SentMessage]:
         """What it sends, in its order; of a checked widget."""
 
-    def faults(self, place: str, checking: Checking) -> Iterator[Fault]:
+    def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
         for i, name in enumerate(self.interlocks):
             if name not in checking.interlocks:
                 at = f"[{i}]" if len(self.interlocks) > 1 else ""
-                what = f'no interlock "{name}"; there is {listing(checking.interlocks)}'
+                what = f'no interlock "{name}"; there is {list_names(checking.interlocks)}'
                 yield Fault(f"{place}.interlock{at}", what, cause=f"interlock {name}")
 
 
-class Pressed(Command):
+class PressCommand(Command):
     """A command that is given by one press; with `confirm_press` the page asks first."""
 
     confirm_press: bool = False
@@ -193,7 +193,7 @@ class Pressed(Command):
         return [self.template]
 
 
-class Published(OnTopic, Command):
+class PublishCommand(TopicWidget, Command):
     """A command that publishes."""
 
     @property
@@ -204,7 +204,7 @@ class Published(OnTopic, Command):
     def endpoints(self) -> Iterator[tuple[Role, str]]:
         yield "MS", self.topic
 
-    def faults(self, place: str, checking: Checking) -> Iterator[Fault]:
+    def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
         if self.topic == "/rosout":
             what = "/rosout is where the kiosk's own log goes: choose another"
             yield Fault(f"{place}.topic", what)
