@@ -1,4 +1,4 @@
-"""`uvicorn app.main:app`: the only wiring."""
+"""The application: `uvicorn app.main:app`. Connects the rooms."""
 
 import asyncio
 import gc
@@ -50,14 +50,12 @@ from app.web.serving import check_port, urls
 
 log = logging.getLogger("kiosk")
 
-READ_TIMEOUT_S = 1.0  # by a browser, when the server ends
-RESPONSE_TIMEOUT_S = (
-    2.0  # by the robot, when the server ends; then it is not known what came of a press
-)
+READ_TIMEOUT_S = 1.0  # for browsers to read their responses at shutdown
+RESPONSE_TIMEOUT_S = 2.0  # for the robot to respond at shutdown; then the result of a press is unknown
 
 
 def create_app(settings: Settings | None = None) -> FastAPI:
-    """The application; raises KioskError where its settings or its panel are unusable."""
+    """The application; KioskError if its settings or its panel file are unusable."""
     settings = settings or Settings.from_environment()
     ros_logging.configure_logging(settings.log_level)
     panel = load_panel(settings.panel, lambda of: settings.data_folder(mode_of(settings, of)))
@@ -101,7 +99,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         title="Operator panel",
         summary="The HTTP interface of a robot cell's touch panel.",
         lifespan=lifespan,
-        docs_url=None,  # they load scripts from elsewhere
+        docs_url=None,  # these pages load scripts from other servers
         redoc_url=None,
         max_body_size=LONGEST,
         exception_handlers=HANDLERS,
@@ -126,7 +124,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
 async def _app_state(
     settings: Settings, panel: Panel, server: ServerConfig | None
 ) -> AsyncIterator[AppState]:
-    """All that requests need, open."""
+    """Opens everything that requests need, and closes it at the end."""
     async with open_log(settings, panel) as oplog:
         check_port(server)
         kinds: set[str] = {widget.kind for widget in panel.widgets()}
@@ -135,7 +133,7 @@ async def _app_state(
         assets = load_assets(shipped_path("static"), shipped_path("templates"), panel.mm_per_px, kinds)
         revision = f"{panel.revision}-{assets.revision}"
         if settings.dev:
-            revision += f"-{secrets.token_hex(4)}"  # open pages load whatever was changed
+            revision += f"-{secrets.token_hex(4)}"  # open pages reload after every restart
         limits = PressLimits(partial(oplog.suppress, limited=True))
         metrics = Metrics(lambda: oplog.left_out, lambda: limits.refused)
         async with open_fleet(settings, panel, revision, oplog, zenoh_peer.in_process) as fleet:
@@ -145,14 +143,14 @@ async def _app_state(
 
 
 async def _log_urls(server: ServerConfig | None, ports: set[int], hosts: Sequence[str]) -> None:
-    """Tells where browsers find the panel, as soon as they do."""
+    """Waits until the server listens, then logs its URLs."""
     listening = await listen_sockets.limit_send_buffer(ports)
     if listening:
         log.info("the panel is at %s", ", ".join(urls(server, listening, hosts)))
 
 
 def _watchdog(state: AppState) -> Watchdog:
-    """What tells the service manager of the robots that the state has at the time."""
+    """The watchdog of all robot sessions."""
     return Watchdog(
         ServiceManager(),
         lambda: [(session.robot.name, session.link) for session in state.fleet.sessions],
@@ -161,8 +159,8 @@ def _watchdog(state: AppState) -> Watchdog:
 
 
 def _app_or_exit() -> FastAPI:
-    """The application for uvicorn. Its errors are sentences, without a traceback; in development a
-    faulty panel file is a page."""
+    """The application for uvicorn. Errors exit with a message and no traceback. In development a panel
+    file with faults is served as a page that lists them."""
     try:
         settings = Settings.from_environment()
         try:

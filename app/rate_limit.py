@@ -1,4 +1,4 @@
-"""How often somebody may do something: token buckets, one for each who does it."""
+"""Rate limits: one token bucket for each client."""
 
 import time
 from collections import OrderedDict
@@ -11,7 +11,7 @@ MAX_BUCKETS: Final = 500
 
 @dataclass(frozen=True, slots=True)
 class Quota:
-    """So many at once, and so many a second after these."""
+    """`burst` actions at once, then `per_s` a second."""
 
     burst: float
     per_s: float
@@ -19,14 +19,14 @@ class Quota:
 
 @dataclass(slots=True)
 class _Bucket:
-    """What is left, at a time in monotonic seconds."""
+    """`tokens` left at `updated_at` (monotonic seconds)."""
 
     tokens: float
     updated_at: float
 
 
 class TokenBuckets:
-    """One quota for each key; those not used for the longest time are forgotten, and full again."""
+    """One bucket for each key. The least recently used buckets are dropped, which refills them."""
 
     def __init__(self, quota: Quota, monotonic: Callable[[], float] = time.monotonic) -> None:
         self._quota = quota
@@ -34,12 +34,12 @@ class TokenBuckets:
         self._buckets: OrderedDict[Hashable, _Bucket] = OrderedDict()
 
     def has_token(self, key: Hashable) -> bool:
-        """Whether there is one left now."""
+        """Whether the key has a token now."""
         bucket = self._buckets.get(key)
         return bucket is None or self._refill(bucket) >= 1
 
     def take_token(self, key: Hashable) -> None:
-        """Takes one, which has to be there."""
+        """Takes a token; `has_token` must be true."""
         bucket = self._buckets.setdefault(key, _Bucket(self._quota.burst, self._monotonic()))
         self._buckets.move_to_end(key)
         bucket.tokens = self._refill(bucket) - 1

@@ -1,4 +1,4 @@
-"""The environment, read once and frozen."""
+"""The settings, from environment variables."""
 
 import os
 import re
@@ -23,14 +23,14 @@ VARIABLES = ("PANEL", "ZENOH", "MODE", "DATA", "HOSTS", "PROXIES", "LOG_LEVEL", 
 
 
 def shipped_path(name: str) -> Path:
-    """A file or folder of the project: in the package when installed, beside it in a checkout."""
+    """The path of a shipped file or folder: in the installed package, or beside it in a checkout."""
     inside = PACKAGE / name
     return inside if inside.exists() else PACKAGE.parent / name
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settings:
-    """What `KIOSK_…` variables say; see the README's table."""
+    """The values of the `KIOSK_…` variables; see docs/reference/settings.md."""
 
     panel: Path
     zenoh: Path
@@ -42,14 +42,14 @@ class Settings:
     data: Path | None = None
 
     def data_folder(self, mode: Mode) -> Path:
-        """Where databases live; a demo that nobody gave a folder never mixes with a real panel's."""
+        """The data folder. Without `KIOSK_DATA` a demo has a folder apart from a live panel's."""
         if self.data is not None:
             return self.data
         return state_home() / APP / "demo" if mode == "demo" else state_home() / APP
 
     @classmethod
     def from_environment(cls, env: Mapping[str, str] = os.environ) -> "Settings":
-        """Raises SettingsError that names the variable and what would be right."""
+        """Reads and checks the variables; SettingsError names the variable and what would be right."""
         _check_names(name for name in env if name.startswith(PREFIX))
         level = (env.get("KIOSK_LOG_LEVEL") or "info").lower()
         if level not in LOG_LEVELS:
@@ -67,13 +67,13 @@ class Settings:
 
 
 def state_home() -> Path:
-    """The user's folder for state (XDG Base Directory Specification); a relative one does not count."""
+    """The user's state folder (XDG Base Directory Specification). A relative path is ignored."""
     given = Path(os.environ.get("XDG_STATE_HOME", ""))
     return given if given.is_absolute() else Path("~/.local/state").expanduser()
 
 
 def _check_names(variables: Iterable[str]) -> None:
-    """A variable that nobody reads would be a setting that silently does not hold."""
+    """SettingsError for an unknown variable: a typing error must not go unnoticed."""
     for variable in variables:
         name = variable.removeprefix(PREFIX)
         if name not in VARIABLES:

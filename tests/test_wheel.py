@@ -60,7 +60,10 @@ def test_an_installed_wheel_serves_from_any_folder(tmp_path: Path) -> None:
         assert "Pick up" in httpx.get(f"http://127.0.0.1:{port}/", trust_env=False).text
     finally:
         served.end()
-    services = "from app.interfaces import load_interfaces as of; of('jazzy').service_types('std_srvs/srv/SetBool')"
+    services = (
+        "from app.interfaces import load_interfaces as of; "
+        "of('jazzy').service_types('std_srvs/srv/SetBool')"
+    )
     subprocess.run([str(python), "-c", services], cwd=elsewhere, check=True, timeout=60)
     # Installed, it needs no file of the checkout: these are its own.
     assert str(ROOT) not in check.stdout

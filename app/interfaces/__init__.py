@@ -1,7 +1,7 @@
 """ROS 2 interfaces without ROS: definitions, checked values, CDR and type hashes.
 
-The definitions of messages are rosbags' (`rosbags.typesys`); what it has not is here: services,
-actions, packages from files, defaults, and the codec with checks that name the field.
+Message definitions come from rosbags (`rosbags.typesys`). This package adds services, actions, packages
+from files, defaults, and a codec whose errors name the field.
 """
 
 from app.interfaces.cdr.fields import FieldReader, Fields, Walk

@@ -1,5 +1,5 @@
-"""The messages of a distribution, as rosbags has them: to import this takes as long as a tenth of the
-server's start, so it is done only where what was read before is not kept (`kept`)."""
+"""The message definitions of a distribution, from rosbags. Importing this module is slow, so it is done
+only if the cache (`distribution_cache`) has none."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -10,18 +10,18 @@ from rosbags.typesys import Stores, get_typestore
 
 from app.interfaces.definitions import PLACEHOLDER, Field, Structure, Type
 
-# Rolling is what the next distribution will be: it has the messages of the newest that rosbags knows.
+# Rolling uses the messages of the newest distribution that rosbags knows.
 ALIASES: Final[Mapping[str, str]] = {"rolling": "lyrical"}
 
 
 def load_messages(distro: str) -> dict[str, Structure]:
-    """By name, without defaults: rosbags drops them."""
+    """Name → structure, without default values: rosbags drops them."""
     definitions = get_typestore(Stores(f"ros2_{ALIASES.get(distro, distro)}")).fielddefs
     return {name: _to_structure(name, definition) for name, definition in definitions.items()}
 
 
 def _to_structure(name: str, definition: Any) -> Structure:
-    """Out of rosbags' nested tuples: ([(name, type, value)…], [(field, type)…])."""
+    """A structure from rosbags' nested tuples: ([(name, type, value)…], [(field, type)…])."""
     constants, fields = definition
     return Structure(
         name,

@@ -1,4 +1,4 @@
-"""What interfaces are made of: structures of typed fields with constants and defaults. No I/O."""
+"""Interface definitions: structures of typed fields, constants and default values. No I/O."""
 
 import keyword
 from collections.abc import Iterator, Mapping
@@ -17,7 +17,7 @@ FLOAT_TYPES: Final = ("float32", "float64")
 STRING_TYPES: Final = ("string", "wstring")
 BASE_TYPES: Final = frozenset(("bool", *INTEGER_RANGES, *FLOAT_TYPES, *STRING_TYPES))
 
-# What ROS puts into a message without fields, so that it has one byte.
+# The field of one byte that ROS adds to a message without fields.
 PLACEHOLDER: Final = "structure_needs_at_least_one_member"
 
 
@@ -54,8 +54,7 @@ class Type:
 
 
 def zero_value(kind: Type) -> Any:
-    """What a field of a type has that nobody gave a value, as ROS makes it: a plain value, of another
-    structure a table without fields."""
+    """The zero value of a type, as ROS initializes it: a plain value; `{}` for a nested structure."""
     match kind.container:
         case "sequence":
             return []
@@ -75,13 +74,13 @@ def zero_value(kind: Type) -> Any:
 
 
 def attribute_name(name: str) -> str:
-    """A field's name in a message object: a keyword of Python's gets a "_" after it."""
+    """A field's attribute in a message object: a Python keyword gets a "_" appended."""
     return f"{name}_" if keyword.iskeyword(name) else name
 
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """`default` is None where the definition has none."""
+    """A field of a structure; `default` is None if the definition has none."""
 
     name: str
     type: Type
@@ -89,18 +88,18 @@ class Field:
 
     @property
     def attribute(self) -> str:
-        """The field's name in a message object."""
+        """The field's attribute in a message object."""
         return attribute_name(self.name)
 
     @property
     def default_value(self) -> Any:
-        """The plain value of a field that a message leaves out: its default, else zero."""
+        """The plain value of a field that is not given: its default, else zero."""
         return zero_value(self.type) if self.default is None else self.default
 
 
 @dataclass(frozen=True, slots=True)
 class Structure:
-    """A message, or a part of a service or an action; `source` is the file it was read from.
+    """A message, or a part of a service or an action; `source` is its file.
     `constant_types` has the base type of each constant."""
 
     name: str
@@ -110,22 +109,25 @@ class Structure:
     constant_types: Mapping[str, str] = field(default_factory=dict, compare=False)
 
     def nested_fields(self) -> Iterator[tuple[Field, str]]:
-        """Each field whose type is another structure, with that one's name."""
+        """(field, structure name) of each field whose type is a structure."""
         return ((one, one.type.name) for one in self.fields if one.type.is_nested)
 
 
 @dataclass(frozen=True, slots=True)
 class Definitions:
-    """Structures by name. `wholes` are services and actions as REP 2016 describes them: nothing
-    that is ever sent, but what their type hashes are of. `left_out` has why an interface can't be
-    used, by its name: that of a service, and not that of its request."""
+    """Structures by name.
+
+    `interface_types` are services and actions as REP 2016 describes them: they are never sent, but have
+    type hashes. `unusable` has the error of each interface that can't be used, by the interface's name
+    (that of a service, not of its request).
+    """
 
     structures: dict[str, Structure] = field(default_factory=dict)
     interface_types: dict[str, Structure] = field(default_factory=dict)
     unusable: dict[str, InterfaceError] = field(default_factory=dict)
 
     def __or__(self, over: "Definitions") -> "Definitions":
-        """Both; where both have a name, it is as in `over`."""
+        """Both; `over` takes precedence."""
         return Definitions(
             self.structures | over.structures,
             self.interface_types | over.interface_types,
@@ -133,7 +135,7 @@ class Definitions:
         )
 
     def excluding(self, left_out: Mapping[str, InterfaceError]) -> "Definitions":
-        """What is left where these interfaces can't be used."""
+        """The definitions without these interfaces."""
         return Definitions(
             {
                 name: one
@@ -153,7 +155,7 @@ class Definitions:
 
 
 def interface_name(name: str) -> str:
-    """What the file of a structure defines: "cell_msgs/srv/Change", for its "…/Change_Request". No
-    interface has a "_" in its own name."""
+    """The interface of a structure: "cell_msgs/srv/Change" for "cell_msgs/srv/Change_Request". The name
+    of an interface has no "_"."""
     package, _, rest = name.rpartition("/")
     return f"{package}/{rest.partition('_')[0]}"

@@ -1,4 +1,4 @@
-"""What ROS 2 makes of a service and of an action: the structures that really are sent.
+"""The message types that ROS 2 derives from a service and from an action.
 
 Source: rosidl (services and their events, since iron) and the design of actions (design.ros2.org,
 "actions"); the names are those of `ros2 interface` and of type descriptions.
@@ -16,7 +16,7 @@ EVENT_INFO: Final = "service_msgs/msg/ServiceEventInfo"
 
 @dataclass(frozen=True, slots=True)
 class ActionTypes:
-    """Names of all that an action is made of; each is a message type, except the three services."""
+    """The names of the types of an action: message types, and three services."""
 
     goal: str
     result: str

@@ -1,7 +1,7 @@
-"""A distribution's messages, kept in a file: read at the first start, they are at hand at the next.
+"""A file cache of a distribution's message definitions, for a faster start.
 
-The file is made on the user's machine and may be deleted at any time. One that is damaged, or of
-another version of rosbags or of this format, is as good as none.
+The file may be deleted at any time. A damaged file, or one of another version of rosbags or of this
+format, is ignored.
 """
 
 import json
@@ -16,13 +16,13 @@ from typing import Any, Final
 
 from app.interfaces.definitions import Field, Structure, Type
 
-FORMAT: Final = 1  # of `_packed`, and of what `stock` makes
+FORMAT: Final = 1  # of `_pack` and `bundled_messages`
 
 Messages = dict[str, Structure]
 
 
 def read(folder: Path, distro: str) -> Messages | None:
-    """The messages, or None where nothing is kept that can be used."""
+    """The messages; None without a usable file."""
     try:
         head, _, body = _file(folder, distro).read_bytes().partition(b"\n")
     except OSError:
@@ -31,7 +31,7 @@ def read(folder: Path, distro: str) -> Messages | None:
 
 
 def write(folder: Path, distro: str, messages: Messages) -> None:
-    """Keeps them, where the folder can be written; a reader finds the old file or the new one."""
+    """Writes the file atomically, if the folder can be written."""
     body = json.dumps(_pack(messages), separators=(",", ":")).encode()
     file = _file(folder, distro)
     aside = file.with_suffix(".new")
@@ -47,13 +47,13 @@ def _file(folder: Path, distro: str) -> Path:
 
 
 def _header(distro: str, body: bytes) -> bytes:
-    """What the first line says of the rest."""
+    """The first line: what the body is made of, and its hash."""
     made_of = f"{distro} of rosbags {version('rosbags')}, format {FORMAT}"
     return f"{made_of}, sha256 {sha256(body).hexdigest()}".encode()
 
 
 def _pack(messages: Messages) -> Mapping[str, Any]:
-    """Name → its fields and its constants, as JSON has them."""
+    """Name → (fields, constants) as JSON values."""
     return {
         name: [
             [[one.name, *astuple(one.type)] for one in message.fields],

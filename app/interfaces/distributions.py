@@ -1,4 +1,4 @@
-"""What every robot of a distribution has: rosbags' messages, and definitions shipped here."""
+"""The interfaces of a ROS 2 distribution: rosbags' messages and definitions shipped in `builtin/`."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -15,7 +15,7 @@ DISTROS: Final = ("humble", "iron", "jazzy", "kilted", "lyrical", "rolling")
 # Definitions beside rosbags' messages: services, actions, and packages that it lacks.
 BUILTIN: Final = Path(__file__).parent / "builtin"
 
-# rosbags drops the defaults of its messages; these are all that they have in ROS.
+# rosbags drops default values; these are all that its messages have in ROS.
 DEFAULTS: Final[Mapping[str, Mapping[str, Any]]] = {
     "geometry_msgs/msg/Quaternion": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0},
     "rcl_interfaces/msg/ParameterDescriptor": {"read_only": False, "dynamic_typing": False},
@@ -33,7 +33,7 @@ def _builtin_definitions() -> Definitions:
 
 
 def read_distribution(distro: str, folder: Path | None = None) -> Definitions:
-    """What every robot of a distribution has: read once, and kept for the next start in `folder`."""
+    """The definitions of a distribution: loaded once, and cached in `folder` for the next start."""
     if distro not in _cache:
         messages = _with_defaults(distro, _load_messages(distro, folder))
         stock = Definitions(messages)

@@ -7,8 +7,8 @@
     value   = text without spaces, quotes, "=" and brackets
             / "'" text "'" / '"' text '"'      (a quote inside is written twice)
 
-In "list[key=value]" the key is a field of the list's elements or, where they have none of this name, a
-list beside it whose element at the same place has the value.
+In "list[key=value]" the key is a field of the list's elements. If they have no field of this name, it
+is a list beside it whose element at the same index has the value.
 """
 
 import re
@@ -29,7 +29,7 @@ EXPECTED: Final = (
 
 
 class Key(NamedTuple):
-    """Chooses the element of a list by what one of its fields says, or a list beside it."""
+    """Selects an element of a list by the value of one of its fields, or of a list beside it."""
 
     path: str
     value: str
@@ -40,7 +40,7 @@ Step = str | int | Key
 
 class _Parsed(NamedTuple):
     steps: tuple[Step, ...]
-    parent: str  # the path of the message that the last name is in, "" for the whole
+    parent: str  # the path of the message that contains the last name, "" for the whole message
 
 
 @lru_cache(4096)
@@ -50,7 +50,7 @@ def _parse(path: str) -> _Parsed:
     while at < len(path) or not steps:
         match = _STEP.match(path, at)
         named = match is not None and match["name"] is not None
-        # It begins with a name, and each further one has a dot before it.
+        # The path begins with a name; each further name follows a dot.
         if match is None or (not named and not at) or (named and bool(match["dot"]) != (at > 0)):
             raise InterfaceError(f'"{path}" is not a field: {EXPECTED}')
         if named:
@@ -70,15 +70,15 @@ def _unquote(text: str) -> str:
 
 
 def path_steps(path: str) -> tuple[Step, ...]:
-    """What a path goes through: names, indexes and keys; InterfaceError where it is not written so."""
+    """The steps of a path: names, indexes and keys; InterfaceError for a malformed path."""
     return _parse(path).steps
 
 
 def parent_path(path: str) -> str:
-    """The path of the message that has the field, or the list with the element; "" for the whole."""
+    """The path of the message that contains the field, or the list; "" for the whole message."""
     return _parse(path).parent
 
 
 def field_name(path: str) -> str:
-    """The last name in a path: that of the field, or of the list with the element."""
+    """The last name in a path: that of the field, or of the list."""
     return next(step for step in reversed(path_steps(path)) if isinstance(step, str))

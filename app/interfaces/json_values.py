@@ -8,19 +8,19 @@ from typing import Any, Final
 
 from app.interfaces.definitions import PLACEHOLDER
 
-# JavaScript's numbers are doubles: beyond this, neighbouring integers become one.
+# JavaScript's numbers are doubles: beyond this, integers are not exact.
 MAX_EXACT_INTEGER: Final = 2**53
 NON_JSON_FORMATS: Final = frozenset(
     "fdqQ"
-)  # lists whose elements may be what JSON or a browser can't hold
+)  # formats of elements that JSON or a browser may not be able to hold
 
 
 def to_plain(message: Any) -> Any:
-    """A decoded message, or any value in one, as JSON's types.
+    """A decoded message, or any value in it, as JSON types.
 
-    A message becomes a dict of its fields in their order, an array or `bytes` a list. What JSON
-    or a browser's numbers can't hold becomes text: integers beyond ±2^53 ("9007199254740993"),
-    "NaN", "Infinity" and "-Infinity".
+    A message becomes a dict of its fields in order, an array or `bytes` a list. Values that JSON or a
+    browser's numbers can't hold become text: integers beyond ±2^53 ("9007199254740993"), "NaN",
+    "Infinity" and "-Infinity".
     """
     if message is None or isinstance(message, bool | str):
         return message
@@ -36,8 +36,8 @@ def to_plain(message: Any) -> Any:
 
 
 def plain_text(value: Any, most: int) -> str:
-    """A value in a decoded message as `str(to_plain(value))` writes it, cut to `most` characters; what
-    is cut away is not even looked at: a list may have any length."""
+    """A value in a decoded message as `str(to_plain(value))`, cut to `most` characters. The rest is not
+    read: a list may have any length."""
     text = ""
     for piece in _text_pieces(value, most) if _is_compound(value) else [str(to_plain(value))]:
         text += piece
@@ -51,7 +51,7 @@ def _is_compound(value: Any) -> bool:
 
 
 def _text_pieces(value: Any, most: int) -> Iterator[str]:
-    """How a list or a message is written, and what is in it."""
+    """The text of a value, in pieces."""
     if isinstance(value, str):
         yield repr(value[: most + 1])
     elif not _is_compound(value):
@@ -73,13 +73,13 @@ def _non_finite_text(value: float) -> str:
 
 
 def _plain_numbers(values: "memoryview[Any]") -> list[Any]:
-    """All at once where every element is plain as it is."""
+    """A list of numbers as plain values."""
     listed = values.tolist()
     return [to_plain(item) for item in listed] if values.format in NON_JSON_FORMATS else listed
 
 
 @lru_cache(4096)
 def _field_names(of: type[Any]) -> tuple[tuple[str, str], ...]:
-    """(attribute, field name) of a message class; no ROS name ends with "_" by itself."""
+    """(attribute, field name) of a message class. No ROS field name ends with "_"."""
     own = [one.name for one in fields(of) if one.name != PLACEHOLDER]
     return tuple((name, name.removesuffix("_")) for name in own)

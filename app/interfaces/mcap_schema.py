@@ -1,5 +1,5 @@
-"""Definitions as text in the format "ros2msg": a message, then each that it is made of, after a
-separator and its name. Source: the MCAP format registry, and rosbag2's recordings. No I/O."""
+"""Definitions as text in the format "ros2msg": a message, then each structure that it references, after
+a separator line and its name. Source: the MCAP format registry, and rosbag2's recordings. No I/O."""
 
 from collections.abc import Callable, Iterator
 from typing import Any, Final
@@ -11,7 +11,7 @@ SEPARATOR: Final = "=" * 80
 
 
 def definition_text(structure: Structure, find: Callable[[str], Structure]) -> str:
-    """The whole text; `find` gives the structures that it is made of."""
+    """The definition as text; `find` returns referenced structures by name."""
     inner = referenced_structures(structure, find)
     parts = [
         _structure_text(structure),

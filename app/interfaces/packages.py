@@ -1,4 +1,5 @@
-"""Folders of interface packages → definitions. The only module here that reads files."""
+"""Reads interface definitions from folders of ROS packages. The only module of this room that reads
+files."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -12,16 +13,16 @@ from app.interfaces.derived_types import EVENT_INFO
 from app.interfaces.parsing import KINDS, parse_definition
 
 _PACKAGE_NAME: Final = re.compile(r"<name>\s*([^<\s]+)\s*</name>")
-# Where packages are in a folder: itself, side by side, in `share` of an install folder, and in
-# those of an install folder that has one for each package.
+# Where a folder has packages: itself, its subfolders, `share` of a merged install folder, and `share`
+# of each package in an isolated one.
 _PLACES: Final = (".", "*", "share/*", "*/share/*")
 
 
 def read_folders(folders: Sequence[Path]) -> Definitions:
-    """All interfaces in folders laid out like ROS packages, workspaces' `share` too.
+    """All interfaces in folders of ROS packages, such as a workspace's `share`.
 
-    A file that can't be read is left out, and so is a type in which two folders differ; whether all
-    that the others need is there, `complete` says. InterfaceError where a folder has no interfaces.
+    Files that can't be read, and types that two folders define differently, are `unusable`.
+    `usable_definitions` checks references. InterfaceError if a folder has no interfaces.
     """
     found = Definitions()
     for folder in folders:
@@ -38,7 +39,7 @@ def read_folders(folders: Sequence[Path]) -> Definitions:
 
 
 def file_stamps(folders: Sequence[Path]) -> tuple[tuple[Path, int, int], ...]:
-    """Changes when a file of the folders does: each with its time and size."""
+    """(path, mtime in ns, size) of each file of the folders; differs when a file has changed."""
     files = [file for folder in folders for package in _packages(folder) for file in _files(package)]
     return tuple((file, *_mtime_and_size(file)) for file in files)
 
@@ -46,13 +47,13 @@ def file_stamps(folders: Sequence[Path]) -> tuple[tuple[Path, int, int], ...]:
 def _mtime_and_size(file: Path) -> tuple[int, int]:
     try:
         about = file.stat()
-    except OSError:  # reading it will say why
+    except OSError:  # reading it will raise the error
         return 0, 0
     return about.st_mtime_ns, about.st_size
 
 
 def find_idl_only(folders: Sequence[Path]) -> dict[str, Path]:
-    """Type → file of the interfaces that are there as `.idl` and not as the robot's own file."""
+    """Type → file of the interfaces that exist as `.idl` only."""
     found = {}
     for place in (place for folder in folders for place in _places(folder)):
         for kind in KINDS:
@@ -63,7 +64,7 @@ def find_idl_only(folders: Sequence[Path]) -> dict[str, Path]:
 
 
 def idl_hint(file: Path) -> str:
-    """What is wrong with an interface that is there as `.idl` only, and what would be right."""
+    """The message about an interface that exists as `.idl` only."""
     return f"{file} is not read, as no .idl is: put {file.stem}.{file.parent.name} beside it"
 
 
@@ -84,7 +85,7 @@ def _files(package: Path) -> Iterator[Path]:
 
 
 def _package_name(package: Path) -> str:
-    """The package's name as its package.xml has it; without one, its folder's."""
+    """The package's name from its package.xml, else from its folder."""
     try:
         match = _PACKAGE_NAME.search((package / "package.xml").read_text())
     except (OSError, UnicodeDecodeError):
@@ -105,7 +106,7 @@ def _error_text(error: OSError | UnicodeDecodeError) -> str:
 
 
 def _add_file(found: Definitions, file: Path, package: str) -> None:
-    """What a file defines, beside what was found already; or why it is left out."""
+    """Adds the definitions of a file to `found`, or its error."""
     try:
         read = _read_file(file, package)
         for name, structure in read.structures.items():
@@ -123,11 +124,12 @@ def _add_file(found: Definitions, file: Path, package: str) -> None:
 def usable_definitions(
     found: Definitions, known: Definitions, unread: Mapping[str, Path]
 ) -> Definitions:
-    """What can be used of `known` and, before it, of `found`; `unread` as `idl_only` tells.
+    """The usable definitions of `known` and `found`; `found` takes precedence. `unread` as of
+    `find_idl_only`.
 
-    Left out is what needs something that is not there or left out itself, and what contains itself.
-    Events, and so the hashes of services and actions, are left out where the distribution has none
-    (humble).
+    Unusable are interfaces that reference missing or unusable ones, and those that contain themselves.
+    Without service events in the distribution (humble), events and the hashes of services and actions
+    are left out.
     """
     every = (known | _without_unusable_events(found, known)).excluding(found.unusable)
     while left_out := _missing_types(every, unread) or _recursive_types(every.structures):
@@ -136,7 +138,7 @@ def usable_definitions(
 
 
 def _missing_types(every: Definitions, unread: Mapping[str, Path]) -> dict[str, InterfaceError]:
-    """Why interfaces can't be used that need others which are not there."""
+    """The errors of interfaces that reference missing structures."""
     return {
         interface_name(structure.name): _missing_type_error(structure, field.name, need, every, unread)
         for structure in every.structures.values()
@@ -158,11 +160,11 @@ def _missing_type_error(
 
 
 def _recursive_types(every: Mapping[str, Structure]) -> dict[str, InterfaceError]:
-    """Why interfaces can't be used that contain themselves, directly or through others."""
+    """The errors of interfaces that contain themselves, directly or through others."""
     done: set[str] = set()
     found: dict[str, InterfaceError] = {}
 
-    def look(structure: Structure, above: tuple[str, ...]) -> None:
+    def visit(structure: Structure, above: tuple[str, ...]) -> None:
         path = (*above, structure.name)
         if structure.name in above:
             why = f"{structure.name} contains itself ({' → '.join(path)})"
@@ -170,16 +172,16 @@ def _recursive_types(every: Mapping[str, Structure]) -> dict[str, InterfaceError
             found[interface_name(structure.name)] = error
         elif structure.name not in done:
             for _, need in structure.nested_fields():
-                look(every[need], path)
+                visit(every[need], path)
             done.add(structure.name)
 
     for structure in every.values():
-        look(structure, ())
+        visit(structure, ())
     return found
 
 
 def complete_definitions(found: Definitions, known: Definitions) -> Definitions:
-    """The files of `found` whose every need is there, in others of them or in `known`."""
+    """The files of `found` whose references all exist in `found` or `known`."""
     found = _without_unusable_events(found, known)
     while lacking := _incomplete_files(found, known):
         found = Definitions(
@@ -190,7 +192,7 @@ def complete_definitions(found: Definitions, known: Definitions) -> Definitions:
 
 
 def _without_unusable_events(found: Definitions, known: Definitions) -> Definitions:
-    """Without what can't be described: events, and so services and actions as wholes."""
+    """`found` without service events if their type does not exist."""
     if EVENT_INFO in known.structures or EVENT_INFO in found.structures:
         return found
     return Definitions(

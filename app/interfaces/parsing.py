@@ -1,4 +1,4 @@
-"""The text of .msg, .srv and .action files → structures. No I/O.
+"""Parses the text of .msg, .srv and .action files. No I/O.
 
 Source: the ROS 2 interface definition language (design.ros2.org, "legacy_interface_definition").
 """
@@ -41,10 +41,10 @@ Line = tuple[int, str]
 
 
 def parse_definition(text: str, package: str, kind: str, name: str, source: Path) -> Definitions:
-    """What one file defines; `kind` is its suffix: "msg", "srv" or "action".
+    """The definitions of one file; `kind` is its suffix: "msg", "srv" or "action".
 
-    A service and an action become all the structures that ROS makes of them. InterfaceError names
-    file and line.
+    A service or an action yields all types that ROS derives from it. InterfaceError names file and
+    line.
     """
     if not PACKAGE.fullmatch(package):
         raise InterfaceError(f'{source}: "{package}" is not a package name: a-z, 0-9 and "_"', source)
@@ -68,7 +68,7 @@ def parse_definition(text: str, package: str, kind: str, name: str, source: Path
 
 
 def _split_sections(text: str) -> list[list[Line]]:
-    """Numbered lines with something in them, parted at the separators."""
+    """The numbered lines without blank ones and comments, split at the separators."""
     sections: list[list[Line]] = [[]]
     for number, line in enumerate(text.removeprefix("\ufeff").splitlines(), 1):
         line = line.strip()
@@ -153,7 +153,7 @@ _LIST: Final = re.compile(r"""\[((?:"(?:[^"\\]|\\.)*"|'(?:[^'\\]|\\.)*'|[^#'"\]]
 
 
 def parse_literal(kind: Type, text: str) -> Any:
-    """The value written as `text`, which a comment may follow; ValueError says what is wrong."""
+    """The value of a literal, which a comment may follow; ValueError if it is malformed."""
     if kind.is_nested:
         raise ValueError(f"{kind} takes no default: only base types do")
     if kind.container != "one":
@@ -197,7 +197,7 @@ def _parse_value(kind: Type, text: str) -> Any:
 
 
 def _parse_scalar(name: str, text: str) -> Any:
-    """The value, whether or not it is in range; None where it is not written as one."""
+    """The value, without a check of its range; None if the text is malformed."""
     if name == "bool":
         return BOOLS.get(text.lower())
     if name in STRING_TYPES:
@@ -219,7 +219,7 @@ def _parse_integer(text: str) -> int:
 
 
 def _unquote(text: str) -> str:
-    """Without the quotes around it, if it has any; an escaped quote inside is the quote alone."""
+    """The text without enclosing quotes, if any; escaped quotes inside are unescaped."""
     if len(text) > 1 and text[0] in "\"'" and text[-1] == text[0]:
         return text[1:-1].replace("\\" + text[0], text[0])
     return text

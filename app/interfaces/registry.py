@@ -1,4 +1,4 @@
-"""The ROS 2 interfaces that a panel may name, and their values to and from CDR bytes."""
+"""The ROS 2 interfaces of a panel: lookup, encoding and decoding."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
@@ -26,21 +26,21 @@ from app.interfaces.packages import (
 from app.interfaces.type_hash import type_hash
 from app.interfaces.validation import Check, field_check, message_check
 
-MAX_SUGGESTIONS: Final = 3  # names that may be meant
-PACKAGE_SIMILARITY: Final = 0.8  # all packages of messages end alike
+MAX_SUGGESTIONS: Final = 3
+PACKAGE_SIMILARITY: Final = 0.8  # high, because most package names end in "_msgs"
 
 
 class Interfaces:
-    """Message, service and action types of one distribution and of folders of packages.
+    """The message, service and action types of one distribution and of folders of packages.
 
-    A message type is "package/msg/Name"; a part of a service or an action is one too, named as ROS
-    names it: "std_srvs/srv/SetBool_Request", "example_interfaces/action/Fibonacci_Feedback".
+    A message type is "package/msg/Name". Parts of services and actions are message types too, named as
+    in ROS: "std_srvs/srv/SetBool_Request", "example_interfaces/action/Fibonacci_Feedback".
     """
 
     def __init__(self, distro: str = "jazzy", folders: Sequence[Path] = ()) -> None:
-        """`folders` are packages, or have packages in them (a workspace's `share`); what they
-        define goes before the distribution's. A file that can't be used is no fault until its type is
-        asked for: `left_out` says why. InterfaceError names a folder without interfaces."""
+        """`folders` are packages, or contain packages (a workspace's `share`); their definitions take
+        precedence over the distribution's. A file that can't be used is an error only when its type is
+        requested: see `unusable`. InterfaceError names a folder without interfaces."""
         known = read_distribution(distro)
         self._distro = distro
         self._idl_only = find_idl_only(folders)
@@ -56,16 +56,16 @@ class Interfaces:
 
     @property
     def structures(self) -> Mapping[str, Structure]:
-        """The definition of every type that can be encoded, parts of services and actions too."""
+        """The structure of every type that can be encoded, including parts of services and actions."""
         return self._structures
 
     @property
     def unusable(self) -> Mapping[str, InterfaceError]:
-        """Why an interface that the folders have can't be used, by its name."""
+        """The error of each interface of the folders that can't be used, by name."""
         return self._definitions.unusable
 
     def require(self, type_name: str) -> None:
-        """Raises InterfaceError, with the nearest known names, if there is no such type."""
+        """InterfaceError, with similar names, if the type does not exist."""
         if type_name not in self._structures:
             raise self._unknown_type_error(type_name, self._structures)
 
@@ -97,14 +97,14 @@ class Interfaces:
         return str(self.type_at(type_name, path))
 
     def type_at(self, type_name: str, path: str) -> Type:
-        """The same; InterfaceError where the type has no such field."""
+        """The same as `Type`; InterfaceError if the type has no such field."""
         self.require(type_name)
         return self._resolver.type_at(type_name, path)
 
     def field_reader(self, type_name: str, paths: Iterable[str]) -> FieldReader:
-        """What reads the fields at these paths of each message, and passes over the rest.
+        """A reader of the fields at these paths, which skips the rest of each message.
 
-        InterfaceError where the type has no such field.
+        InterfaceError if the type has no such field.
         """
         self.require(type_name)
         key = type_name, tuple(dict.fromkeys(paths))
@@ -114,40 +114,39 @@ class Interfaces:
         return self._field_readers[key]
 
     def type_hash(self, type_name: str) -> str:
-        """The REP 2016 type hash, `RIHS01_…`, as the robot's own nodes compute it.
+        """The REP 2016 type hash, `RIHS01_…`, of a message, a part, a service or an action.
 
-        Of a message, a part, a service or an action. InterfaceError where the distribution has no
-        such hash: before iron, services and actions.
+        InterfaceError if the distribution has none: services and actions before iron.
         """
         if type_name not in self._hashes:
             self._hashes[type_name] = type_hash(self._find(type_name), self._find)
         return self._hashes[type_name]
 
     def definition(self, type_name: str) -> str:
-        """The definition of a message with all that it is made of, in the format "ros2msg"."""
+        """The definition of a message and of all types in it, in the format "ros2msg"."""
         self.require(type_name)
         return definition_text(self._structures[type_name], self._structures.__getitem__)
 
     def encode(self, type_name: str, fields: Mapping[str, Any]) -> bytes:
-        """The message as XCDR1 bytes with their encapsulation header (00 01 00 00).
+        """The message as XCDR1 bytes with the encapsulation header (00 01 00 00).
 
-        A field that is left out has its default, else zero. Each must be one of the type's and fit its
-        definition: else FieldError, which names it. Lists may be NumPy arrays, those of 8-bit unsigned
-        numbers `bytes`.
+        A field that is not given has its default, else zero. FieldError names a field that does not
+        exist or does not fit its definition. Lists may be NumPy arrays, lists of 8-bit unsigned numbers
+        `bytes`.
         """
         check = self._checks.get(type_name) or self._check(type_name)
         return self._codec.serialize(check(fields), type_name)
 
     def decode(self, type_name: str, data: bytes) -> Any:
-        """The message object (fields as attributes); DecodeError if these bytes are not one, or have
-        more elements than are read at once: see `fields`."""
+        """The message object (fields as attributes). DecodeError if the bytes are no such message, or
+        have too many elements to be decoded at once: see `field_reader`."""
         try:
             return self._codec.deserialize(data, type_name)
-        except Exception as error:  # whatever arrived, it must not stop the panel
+        except Exception as error:  # no received bytes may stop the panel
             raise DecodeError(f"{len(data)} bytes are not a {type_name}: {error}") from error
 
     def prepare_codecs(self, type_names: Iterable[str]) -> None:
-        """The first use of a type compiles its codec: now, not at the first press."""
+        """Compiles the codecs of these types, so that the first press does not wait for it."""
         for type_name in type_names:
             self.type_hash(type_name)
             with suppress(DecodeError):
@@ -173,7 +172,7 @@ class Interfaces:
         return found
 
     def _service_or_action_names(self, kind: str) -> list[str]:
-        """Services or actions that are there, with or without hashes."""
+        """The names of all services ("/srv/") or actions ("/action/")."""
         ending = "_Response" if kind == "/srv/" else "_FeedbackMessage"
         return [n.removesuffix(ending) for n in self._structures if kind in n and n.endswith(ending)]
 
@@ -193,8 +192,8 @@ class Interfaces:
 
 
 def _suggestions(name: str, known: Sequence[str]) -> list[str]:
-    """Names like one that there is not: of its package, or of one that is called almost so; then the
-    same name of other packages."""
+    """Names similar to an unknown one: in its package or a similar package; then the same name in other
+    packages."""
     package, _, rest = name.partition("/")
     packages = {one.partition("/")[0] for one in known}
     near: list[str] = []
@@ -207,13 +206,13 @@ def _suggestions(name: str, known: Sequence[str]) -> list[str]:
 
 
 def _similar(rest: str, known: Sequence[str]) -> list[str]:
-    """Those whose last part is like that of a name."""
+    """The names whose last part is similar."""
     last = {one.rpartition("/")[2]: one for one in known}
     return [last[one] for one in get_close_matches(rest.rpartition("/")[2], last, n=MAX_SUGGESTIONS)]
 
 
 def load_interfaces(distro: str, folders: Sequence[Path] = ()) -> Interfaces:
-    """The one instance for a distribution and folders, read anew only when a file has changed."""
+    """The shared instance for a distribution and folders; it is read again when a file has changed."""
     return _cached_interfaces(distro, tuple(folders), file_stamps(folders))
 
 

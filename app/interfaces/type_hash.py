@@ -1,4 +1,4 @@
-"""Type hashes as ROS computes them (REP 2016, version 1): the SHA-256 of a description in JSON."""
+"""Type hashes (REP 2016, version 1): the SHA-256 of a type description in JSON."""
 
 import json
 from collections.abc import Callable, Mapping
@@ -27,14 +27,14 @@ BASE_IDS: Final[Mapping[str, int]] = {
     "string": 17,
     "wstring": 18,
 }
-BOUNDED_TEXT: Final = 4  # is added to a text's number, and the next three to any
+BOUNDED_TEXT: Final = 4  # added to the number of a string type; the next three to that of any type
 ARRAY: Final = 48
 BOUNDED_SEQUENCE: Final = 96
 SEQUENCE: Final = 144
 
 
 def type_hash(structure: Structure, find: Callable[[str], Structure]) -> str:
-    """`RIHS01_` and 64 hexadecimal digits; `find` gives the structures that it is made of."""
+    """`RIHS01_` and 64 hexadecimal digits; `find` returns referenced structures by name."""
     inner = referenced_structures(structure, find)
     whole = {
         "type_description": _describe_structure(structure),
@@ -46,7 +46,7 @@ def type_hash(structure: Structure, find: Callable[[str], Structure]) -> str:
 def referenced_structures(
     structure: Structure, find: Callable[[str], Structure]
 ) -> dict[str, Structure]:
-    """All structures that one is made of, by name; not itself."""
+    """All structures that one references, directly or indirectly, by name; without itself."""
     inner: dict[str, Structure] = {}
     _collect(structure, find, inner)
     return inner

@@ -1,4 +1,4 @@
-"""What a field takes: plain values checked against their definitions, and what is wrong with them."""
+"""Checks plain values against field definitions."""
 
 import datetime
 import math
@@ -11,7 +11,7 @@ from app.errors import FieldError
 from app.interfaces.cdr.formats import FORMATS
 from app.interfaces.definitions import INTEGER_RANGES, Structure, Type
 
-Check = Callable[[Any], Any]  # what came → what is sent; FieldError with "" or "[3]" as its field
+Check = Callable[[Any], Any]  # given value → value to encode; FieldError with "" or "[3]" as its field
 
 FLOAT_MAX: Final[Mapping[str, float]] = {
     "float32": (2 - 2**-23) * 2.0**127,
@@ -27,7 +27,7 @@ _shortener.maxother = MAX_SHOWN_CHARS
 
 
 def format_value(given: Any, depth: int = MAX_SHOWN_DEPTH) -> str:
-    """A value as TOML and JSON write it, for an error message: never longer than a line."""
+    """A value as TOML and JSON write it, cut to a line, for an error message."""
     match given:
         case None:
             return "null"
@@ -52,7 +52,7 @@ def format_value(given: Any, depth: int = MAX_SHOWN_DEPTH) -> str:
 
 
 def _quote(text: str) -> str:
-    """In double quotes; what would not show, or show as something else, is escaped."""
+    """The text in double quotes; characters that are not printable are escaped."""
     cut = f"{text[:MAX_SHOWN_CHARS]}…" if len(text) > MAX_SHOWN_CHARS else text
     escaped = cut.replace("\\", "\\\\").replace('"', '\\"')
     return '"' + "".join(c if c.isprintable() else _escape(ord(c)) for c in escaped) + '"'
@@ -79,7 +79,7 @@ def scalar_check(kind: Type) -> Check:
 
 
 def _to_python_scalar(given: Any) -> Any:
-    """A scalar of an array library as Python's own."""
+    """A scalar of an array library as a Python scalar."""
     return given.item() if hasattr(given, "item") else given
 
 
@@ -176,8 +176,8 @@ def message_check(structure: Structure, make: Callable[..., Any], checks: Sequen
 
 
 def list_check(kind: Type, element: Check) -> Check:
-    """The check of an array or a sequence, whose elements `element` checks; bytes stand for 8-bit
-    numbers, and an array of any library with one dimension for a list."""
+    """The check of an array or a sequence; `element` checks its elements. `bytes` are accepted for
+    8-bit numbers, and one-dimensional arrays of any library for lists."""
 
     def many(given: Any) -> Any:
         if isinstance(given, bytes | bytearray | memoryview) and FORMATS.get(kind.name) == "B":
@@ -212,7 +212,7 @@ def _check_length(kind: Type, length: int) -> None:
 
 
 def _prefix_field(step: str, error: FieldError) -> FieldError:
-    """The same error, one step further out: "c" within "b[3]" is "b[3].c"."""
+    """The error with `step` before its field: "c" in "b[3]" becomes "b[3].c"."""
     joint = "." if error.field and not error.field.startswith("[") else ""
     return FieldError(f"{step}{joint}{error.field}", error.message)
 
@@ -224,6 +224,6 @@ def _unknown_field_error(structure: Structure, given: Mapping[str, Any]) -> Fiel
 
 
 def field_check(kind: Type, nested: Callable[[str], Check]) -> Check:
-    """The check of a field; `nested` finds that of another structure."""
+    """The check of a field; `nested` returns the check of a structure by name."""
     one = nested(kind.name) if kind.is_nested else scalar_check(kind)
     return one if kind.container == "one" else list_check(kind, one)

@@ -1,4 +1,4 @@
-"""What descriptions are made of: checked names, what every widget has, a topic's QoS."""
+"""Base class and field types of the descriptions: checked names, ids, QoS."""
 
 import re
 from collections.abc import Mapping
@@ -50,7 +50,7 @@ def _check_action_type(given: str) -> str:
 
 
 def catalogue_default(code: str) -> Any:
-    """A field whose default is a sentence of the catalogue: each reader sees it in their language."""
+    """A field whose default is a text of the catalogue, rendered in the language of each reader."""
 
     def described(schema: dict[str, Any]) -> None:
         schema["default"] = render(say(code))
@@ -66,7 +66,7 @@ def parse_namespace(given: str) -> str:
 
 
 def _check_endpoint(given: str) -> str:
-    """Where a session connects to, as Zenoh writes it; Zenoh tells of a wrong one only at the start."""
+    """Checks a Zenoh endpoint; Zenoh itself reports a malformed one only when the session opens."""
     found = ENDPOINT.fullmatch(given)
     if found is None or not 0 < int(found["port"] or 1) <= MAX_PORT:
         raise ValueError(
@@ -76,7 +76,7 @@ def _check_endpoint(given: str) -> str:
 
 
 def _resolve_folder(given: Any, info: ValidationInfo) -> Path:
-    """Relative to the panel file's folder, which is the context of the validation."""
+    """The folder's path, relative to the panel file's folder, which is the validation context."""
     if not isinstance(given, str) or not given:
         raise ValueError(f"must be the path of a folder, not {format_value(given)}")
     folder = Path(info.context or "") / given
@@ -100,7 +100,7 @@ def _check_written_field(given: str) -> str:
 
 
 def _parse_interlocks(given: Any) -> tuple[str, ...]:
-    """One id, or a list of them."""
+    """The ids, from one id or a list of them."""
     named = [given] if isinstance(given, str) else given
     if not isinstance(named, list | tuple):
         raise ValueError(f"must be the id of an interlock, or a list of ids, not {format_value(given)}")
@@ -115,13 +115,13 @@ def _parse_interlocks(given: Any) -> tuple[str, ...]:
 
 
 def non_empty(given: tuple[Any, ...]) -> tuple[Any, ...]:
-    """A list of tables that can't be empty."""
+    """ValueError for an empty list of tables."""
     if not given:
         raise ValueError("is empty: it must have one table at least")
     return given
 
 
-# The protocols are those of the Zenoh that a kiosk has; behind the address stand metadata and settings.
+# The protocols are those of Zenoh for Python; metadata and settings follow the address.
 ENDPOINT: Final = re.compile(
     r"(?:(?:tcp|udp|tls|quic|ws)/[^\s/?#]+:(?P<port>[0-9]{1,5})|unixsock-stream/[^\s?#]+)"
     r"(?:\?[^\s?#]+)?(?:#[^\s#]+)?"
@@ -152,7 +152,7 @@ class Description(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, defer_build=True)
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
-        """Without the cached properties of the original: they were computed from its fields."""
+        """A copy without the original's cached properties, which depend on its fields."""
         copied = super().model_copy(update=update, deep=deep)
         for name in copied.__dict__.keys() - type(copied).model_fields:
             del copied.__dict__[name]
@@ -160,7 +160,8 @@ class Description(BaseModel):
 
 
 class TopicQos(Description):
-    """A topic's QoS; no durability means volatile to publish, and the publisher's to listen."""
+    """A topic's QoS. Without `durability`, a publisher is volatile and a subscription uses the
+    publisher's."""
 
     reliability: Literal["reliable", "best_effort"] = "reliable"
     durability: Literal["volatile", "transient_local"] | None = None

@@ -1,4 +1,4 @@
-"""Values that a panel file names of a field: what constants' names stand for, and what never fits."""
+"""Values of a field in a panel file: names of constants, and values that the field can't have."""
 
 from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
@@ -24,28 +24,27 @@ class HasField(Protocol):
 
 
 def parent_type(source: HasField, interfaces: Interfaces) -> str:
-    """The type whose constants a field's values have: that of the message around it."""
+    """The type of the message that contains the field: its constants are those of the field."""
     where = parent_path(source.field)
     return interfaces.field_type(source.type, where) if where else source.type
 
 
 def resolve_constant(given: Any, kind: Type, constants: Mapping[str, Any]) -> Any:
-    """What an interlock's condition means: a text is a constant's name where the field is none.
-
-    A name that there is no constant of stays what it is.
+    """The value of an interlock's condition. A text is a constant's name if the field is no text; an
+    unknown name is returned as it is.
     """
     named = isinstance(given, str) and kind.name not in STRING_TYPES
     return constants.get(given, given) if named else given
 
 
 def comparison_value(given: Any, kind: Type, constants: Mapping[str, Any]) -> Any:
-    """The same as the field's type has it: the float32 for 0.1 is another number than the float64."""
+    """The same in the field's type: 0.1 as float32 is another number than as float64."""
     value = resolve_constant(given, kind, constants)
     return to_float32(value) if kind.name == "float32" else value
 
 
 def resolve_interlock(interlock: Interlock, interfaces: Interfaces) -> Interlock:
-    """The same with the values of the constants that its conditions name."""
+    """The interlock with values in place of constants' names in its conditions."""
     kind = interfaces.type_at(interlock.type, interlock.field)
     constants = interfaces.constants(parent_type(interlock, interfaces))
     values = {
@@ -58,8 +57,8 @@ def resolve_interlock(interlock: Interlock, interfaces: Interfaces) -> Interlock
 
 
 def _constant_names(interlock: Interlock, kind: Type, constants: Mapping[str, Any]) -> dict[Any, str]:
-    """Value → name of the constants which are named as those that the conditions name; of several for
-    one value none. Without what begins all of them, where that is the field's own name."""
+    """Value → name of the constants with the same prefix as those in the conditions, without values
+    that several constants have. The prefix is removed if it is the field's name."""
     given = [one for key in interlock.conditions for one in _as_tuple(getattr(interlock, key))]
     named = [one for one in given if isinstance(one, str) and kind.name not in STRING_TYPES]
     if not named:
@@ -74,7 +73,7 @@ def _constant_names(interlock: Interlock, kind: Type, constants: Mapping[str, An
 
 
 def _common_prefix(names: Sequence[str]) -> str:
-    """The words that all begin with, each with its "_"."""
+    """The words that all names begin with, each with its "_"."""
     begins = zip(*(name.split("_")[:-1] for name in names), strict=False)
     return "".join(f"{words[0]}_" for words in takewhile(lambda words: len({*words}) == 1, begins))
 
@@ -84,7 +83,7 @@ def _as_tuple(given: Any) -> tuple[Any, ...]:
 
 
 def value_mismatch(value: Any, kind: str) -> str | None:
-    """Why a field of this type never has this value."""
+    """Why a field of this type can't have this value; None if it can."""
     if kind in ("float32", "float64"):
         number = isinstance(value, int | float) and not isinstance(value, bool)
         return None if number else f"must be a number ({kind}), not {format_value(value)}"
@@ -104,7 +103,7 @@ def value_mismatch(value: Any, kind: str) -> str | None:
 
 
 def unknown_constant(name: str, kind: str, type_name: str, constants: Mapping[str, Any]) -> str:
-    """What would be right where a whole number is meant, and a text is no constant's name."""
+    """The message about a text that is no constant's name, in place of a whole number."""
     right = f"a whole number ({kind}) or the name of a constant of {type_name}"
     what = f"must be {right}, not {format_value(name)}"
     fitting = [one for one, value in constants.items() if value_mismatch(value, kind) is None]

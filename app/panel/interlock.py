@@ -1,4 +1,4 @@
-"""The description of an interlock: a value of the robot's that permits."""
+"""The description of an interlock: a field of a topic that permits commands."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any, Final
@@ -31,8 +31,8 @@ Condition = Annotated[bool | int | float | str, BeforeValidator(_check_condition
 
 
 class Interlock(Description):
-    """A field of the robot's that permits: a bool that is true or, with conditions, a value that meets
-    all of them. Never seen, stale or cut off locks."""
+    """A field of a topic that permits commands: a bool that is true or, with conditions, a value that
+    meets all of them. A value that was never received, is stale or cut off locks."""
 
     id: Id
     label: Label | None = None
@@ -58,19 +58,19 @@ class Interlock(Description):
 
     @property
     def conditions(self) -> dict[str, Any]:
-        """Those that are given, by their keys."""
+        """Key → value of the given conditions."""
         given = {key: getattr(self, key) for key in CONDITIONS}
         return {key: value for key, value in given.items() if value is not None}
 
     @property
     def constants(self) -> Mapping[Any, str]:
-        """Value → name, of the constants by which the field's values are told; of the checked panel."""
+        """Value → name of the constants by which the field's values are shown; set on load."""
         return self._constants
 
     def with_constants(
         self, conditions: Mapping[str, Any], constants: Mapping[Any, str]
     ) -> "Interlock":
-        """The same with values for the names of constants in its conditions."""
+        """The interlock with values in place of constants' names in its conditions."""
         made = self.model_copy(update=dict(conditions))
         made._constants = constants
         return made

@@ -1,4 +1,4 @@
-"""Reading a panel file, and every fault in it with its place."""
+"""Loads a panel file and reports every fault with its place."""
 
 from collections.abc import Callable, Collection, Iterable, Iterator
 from pathlib import Path
@@ -17,15 +17,15 @@ CacheFolder = Callable[[Panel], Path | None]
 
 
 def load_panel(path: Path, kept: CacheFolder = lambda _: None) -> Panel:
-    """The checked panel; PanelError has every fault, `unreadable` where it is not even TOML.
+    """The checked panel. PanelError has every fault; it is `unreadable` if the file is no TOML.
 
-    `kept` says in which folder what is read of the distribution may be kept for the next start.
+    `kept` returns the folder in which the distribution's definitions may be cached.
     """
     return _load(read_toml(path), kept)
 
 
 class Checked(NamedTuple):
-    """A good panel; `notes` are worth a look, `sent` is what each press sends."""
+    """A panel without faults, with hints (`notes`) and the messages of each press (`previews`)."""
 
     panel: Panel
     notes: tuple[Note, ...]
@@ -33,7 +33,7 @@ class Checked(NamedTuple):
 
 
 def check_panel(path: Path) -> Checked:
-    """The checked panel, with what there is to say of it; PanelError as `load_panel`."""
+    """The checked panel with notes and previews; PanelError as in `load_panel`."""
     from app.panel.checks.notes import find_notes
     from app.panel.faults.places import add_locations
     from app.panel.preview import previews
@@ -62,7 +62,7 @@ def _load(file: TomlFile, kept: CacheFolder = lambda _: None) -> Panel:
 
 
 def _resolve_constants(panel: Panel, interfaces: Interfaces) -> Panel:
-    """The checked panel, with the value of each constant that a lamp or an interlock names."""
+    """The panel with values in place of constants' names in lamps and interlocks."""
     pages = [
         page.model_copy(update={"widgets": tuple(w.with_constants(interfaces) for w in page.widgets)})
         for page in panel.pages
@@ -81,11 +81,11 @@ def _type_faults(panel: Panel, faulty: Collection[str] = ()) -> Iterator[Fault]:
     yield from find_faults(panel, interfaces, faulty)
 
 
-# Modules that only a panel with a fault needs are read then: a start is the quicker for it.
+# Modules for panels with faults are imported only when needed, for a faster start.
 
 
 def _shape_faults(error: ValidationError, tables: dict[str, Any], folder: Path) -> list[Fault]:
-    """What is wrong with the shape, and beside that."""
+    """Faults of keys and values, and all others that can still be found."""
     from app.panel.faults.shape import find_shape_faults
     from app.panel.faults.stand_ins import make_stand_ins
 
@@ -98,9 +98,9 @@ def _shape_faults(error: ValidationError, tables: dict[str, Any], folder: Path) 
 
 
 def _sorted_faults(faults: Iterable[Fault], file: TomlFile) -> tuple[Fault, ...]:
-    """One for each mistake, with its line, in the order of the file."""
+    """One fault for each mistake, with its line, in the order of the file."""
     from app.panel.faults.duplicates import merge_duplicates
     from app.panel.faults.places import add_locations
 
-    told = add_locations(merge_duplicates(faults), file.text, file.tables)
-    return tuple(sorted(told, key=lambda fault: fault.line))
+    merged = add_locations(merge_duplicates(faults), file.text, file.tables)
+    return tuple(sorted(merged, key=lambda fault: fault.line))

@@ -1,4 +1,4 @@
-"""A message's fields as lines of text, much as `ros2 topic echo` writes them."""
+"""A message's fields as lines of text, similar to `ros2 topic echo`."""
 
 import json
 import math
@@ -8,12 +8,12 @@ from typing import Any, Final
 from app.errors import FieldError
 from app.panel.template import placeholders
 
-MAX_EQUAL_WRITTEN: Final = 9  # elements of a list that are all the same
+MAX_EQUAL_WRITTEN: Final = 9  # elements of a list of equal values
 Comments = Mapping[str, str]  # by input ids ("speed"), and by places of fields (".poses[0].x")
 
 
 def message_lines(fields: Mapping[str, Any], comments: Comments, place: str = "") -> Iterator[str]:
-    """A line for each field; what is said of an input stands behind the text that names it."""
+    """A line for each field, with comments about inputs and fields."""
     for name, value in fields.items():
         yield from _field_lines(name, value, comments, f"{place}.{name}")
 
@@ -32,7 +32,7 @@ def _field_lines(name: str, value: Any, comments: Comments, place: str) -> Itera
 
 
 def _item_lines(value: Any, comments: Comments, place: str) -> Iterator[str]:
-    """An element of a list with tables in it: the first line has a dash."""
+    """An element of a list of tables: its first line has a dash."""
     if not isinstance(value, Mapping) or not value:
         yield f"- {_format(value)}"
         return
@@ -43,7 +43,7 @@ def _item_lines(value: Any, comments: Comments, place: str) -> Iterator[str]:
 def _comment(value: Any, comments: Comments, place: str) -> str:
     try:
         names = [name for _, name in placeholders(value)]
-    except FieldError:  # braces that are no input's: they were put in by one
+    except FieldError:  # braces in a value that an input gave
         names = []
     about = [comments[key] for key in (place, *dict.fromkeys(names)) if key in comments]
     return "; ".join([*about, *([f"{len(value)} of them"] if _all_equal(value) else [])])

@@ -1,6 +1,6 @@
-"""Ranges of numbers as panels and ROS 2's parameter descriptors give them, open where they say so.
+"""Ranges of numbers with optional limits, of panel files and of ROS 2 parameter descriptors.
 
-A value of a descriptor's range is whole steps from its lowest, or its highest
+A value in a descriptor's range is a whole number of steps from its lowest value, or is its highest
 (rcl_interfaces/msg/FloatingPointRange, IntegerRange).
 """
 
@@ -16,21 +16,21 @@ from app.i18n import TextLike, say
 from app.interfaces import to_plain
 from app.panel.values import number_text
 
-# rclcpp takes a double for on a step when it is this near, in units of the last place.
+# rclcpp accepts a double that is this near to a step, in units of the last place.
 NEAR_ULP: Final = 100
-MIN_WITH_EXPONENT: Final = 1e16  # whole doubles from here on have an exponent
+MIN_WITH_EXPONENT: Final = 1e16  # larger doubles are written with an exponent
 
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """From `low` to `high` in steps of `step`; each is None where there is no such limit."""
+    """From `low` to `high` in steps of `step`; None: no limit."""
 
     low: float | None = None
     high: float | None = None
     step: float | None = None
 
     def contains(self, value: float) -> bool:
-        """Whether a value is inside and on a step."""
+        """Whether a value is within the limits and on a step."""
         if self.low is not None and value < self.low:
             return False
         if self.high is not None and value > self.high:
@@ -38,7 +38,7 @@ class Range:
         return value == self.high or self.is_on_step(value)
 
     def is_on_step(self, value: float) -> bool:
-        """Exactly as numbers are written, or as near as doubles come to it."""
+        """Whether a value is on a step: exactly for integers, within `NEAR_ULP` for doubles."""
         if self.step is None:
             return True
         low, step = _exact(self.low or 0), _exact(self.step)
@@ -51,7 +51,8 @@ class Range:
         )
 
     def narrowed_by(self, other: "Range") -> "Range":
-        """This range, narrowed by another; on this one's steps, where the other has none."""
+        """This range narrowed by another. If the other has no step, the limits are on this range's
+        steps."""
         low, high = self.low, self.high
         if other.low is not None and (low is None or other.low > low):
             low = other.low if other.step is not None else self._nearest_step(other.low, math.ceil)
@@ -64,7 +65,7 @@ class Range:
         return self.low is not None and self.high is not None and self.low > self.high
 
     def _nearest_step(self, value: float, rounded: Callable[[Fraction], int]) -> float:
-        """The step of this range at or beside a value."""
+        """The step of this range at or next to a value."""
         if self.step is None or self.low is None:
             return value
         low, step = _exact(self.low), _exact(self.step)
@@ -73,7 +74,7 @@ class Range:
 
 
 def range_text(limits: Range, unit: str) -> TextLike:
-    """A range as an operator reads it: "0 to 1.5 m/s, in steps of 0.1"; "" where all is open."""
+    """A range as text: "0 to 1.5 m/s, in steps of 0.1"; "" without limits."""
     unit = f" {unit}" if unit else ""
     low, high = _number_text(limits.low), _number_text(limits.high)
     text: TextLike
@@ -92,7 +93,7 @@ def range_text(limits: Range, unit: str) -> TextLike:
 
 
 def decimal_text(number: float) -> str:
-    """A number exactly, as HTML has it; what is none as "NaN", "Infinity" or "-Infinity"."""
+    """A number exactly, as in HTML; "NaN", "Infinity" or "-Infinity"."""
     if isinstance(number, int) or not math.isfinite(number):
         return str(to_plain(number))
     return number_text(number) if abs(number) < MIN_WITH_EXPONENT else repr(number)
@@ -108,7 +109,7 @@ def to_float32(number: float) -> float:
 
 
 def shortest_float(number: float) -> float:
-    """A float32 as it is written: 0.1 for 0.10000000149011612; any other number as it is."""
+    """The shortest double of a float32: 0.1 for 0.10000000149011612. Any other number is unchanged."""
     if not math.isfinite(number) or to_float32(number) != number:
         return number
     written = (float(f"{number:.{digits}g}") for digits in range(6, 10))

@@ -1,5 +1,5 @@
-"""What each press of a panel sends, whole: with all that its message leaves out, and with the ids of
-inputs where their values will stand."""
+"""Previews of the messages of each press: with default values of fields that are not given, and with
+the ids of inputs in place of their values."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -13,7 +13,7 @@ from app.panel.widgets.families import Command, Input
 
 
 def previews(panel: Panel, interfaces: Interfaces) -> Iterator[Remark]:
-    """One for each widget that can be pressed or held, at its place."""
+    """A remark for each widget that can be pressed or held."""
     for p, page in enumerate(panel.pages):
         comments = {w.id: w.comment for w in page.widgets if isinstance(w, Input)}
         comments[NOW] = "the time of sending"
@@ -33,7 +33,7 @@ def _preview_lines(widget: Command, interfaces: Interfaces, comments: Comments) 
 
 
 def complete_value(given: Any, kind: Type, interfaces: Interfaces) -> Any:
-    """A value of a template with all that it leaves out; a text that names inputs stays as it is."""
+    """A value of a template with default values added; texts with input ids are unchanged."""
     if isinstance(given, list | tuple) and kind.container != "one":
         return [complete_value(one, kind.element, interfaces) for one in given]
     if isinstance(given, Mapping) and kind.is_nested:

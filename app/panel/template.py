@@ -1,4 +1,5 @@
-"""Message templates: `{ data = "{message}" }` with the values of the inputs it names, and `"{now}"`."""
+"""Message templates, such as `{ data = "{message}" }`: filled with the values of inputs, and
+`"{now}"`."""
 
 import re
 import time
@@ -10,16 +11,16 @@ from typing import Any, Final
 from app.errors import FieldError
 from app.panel.widgets.families import Command
 
-# In what is shown of an answer: a path in its type. (In what is sent: the id of an input.)
+# In texts about a response: a field's path. (In messages to send, a placeholder is an input's id.)
 RESPONSE_PLACEHOLDER: Final = re.compile(r"\{([^{}]*)\}")
 
-NOW: Final = "now"  # no input's id: what it stands for is the time of sending, of the type TIME
+NOW: Final = "now"  # reserved: the time of sending, of the type TIME
 TIME: Final = "builtin_interfaces/msg/Time"
 NS_PER_S: Final = 10**9
 
 
 def add_now(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Values of inputs, and what `{now}` stands for at this moment."""
+    """The values of inputs with the current time as `{now}`."""
     seconds, rest = divmod(time.time_ns(), NS_PER_S)
     return {**values, NOW: {"sec": seconds, "nanosec": rest}}
 
@@ -43,8 +44,8 @@ def fill(template: Any, inputs: Mapping[str, Any], where: str = "") -> Any:
 
 
 def set_field(fields: Any, path: str, value: Any) -> Any:
-    """Fields of a message with a value at a path like "header.seq" or "data[2]"; they themselves stay
-    as they are. FieldError where a list on the way is too short."""
+    """A copy of a message's fields with a value at a path such as "header.seq" or "data[2]". FieldError
+    if a list in the path is too short."""
     return _set_at(fields, re.findall(r"[^.\[\]]+|\[[0-9]+\]", path), path, value)
 
 
@@ -63,7 +64,7 @@ def _set_at(fields: Any, steps: list[str], path: str, value: Any) -> Any:
 
 
 def value_at(template: Any, where: str) -> Any:
-    """What stands in a template at a field like "poses[0].x", or at the nearest one around it."""
+    """The value in a template at a field such as "poses[0].x", or at the nearest one around it."""
     found = template
     for name, index in re.findall(r"([^.\[\]]+)|\[([0-9]+)\]", where):
         if isinstance(found, Mapping) and name in found:
@@ -76,7 +77,7 @@ def value_at(template: Any, where: str) -> Any:
 
 
 def _text(value: Any, where: str) -> str:
-    """A value among other text, as TOML writes it."""
+    """A value within a text, as TOML writes it."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str | int | float):
@@ -85,7 +86,7 @@ def _text(value: Any, where: str) -> str:
 
 
 def placeholders(template: Any, where: str = "") -> Iterator[tuple[str, str]]:
-    """(place, input id) for each placeholder; FieldError where braces don't match."""
+    """(place, input id) of each placeholder; FieldError for unmatched braces."""
     if isinstance(template, Mapping):
         for key, value in template.items():
             yield from placeholders(value, f"{where}.{key}".strip("."))
@@ -102,12 +103,12 @@ def input_ids(widget: Command) -> list[str]:
 
 
 def needed_inputs(widget: Command, given: Mapping[str, Any]) -> dict[str, Any]:
-    """Of all that came with a press or a hold, the inputs that it needs."""
+    """The inputs of a press or a hold that the widget needs."""
     return {name: given[name] for name in input_ids(widget) if name in given}
 
 
 def placeholder_ids(templates: Iterable[Any]) -> list[str]:
-    """The ids of the inputs that templates name, each once."""
+    """The ids of the inputs in templates, each once."""
     every = (name for template in templates for _, name in placeholders(template))
     return [name for name in dict.fromkeys(every) if name != NOW]
 

@@ -1,4 +1,4 @@
-"""The end of the process, in its order."""
+"""Graceful shutdown on SIGTERM, SIGINT and SIGHUP."""
 
 import asyncio
 import faulthandler
@@ -14,19 +14,20 @@ log = logging.getLogger("kiosk")
 
 ShutdownCallback = Callable[[], Awaitable[None]]
 
-# Else something stands still: where is told, and the process leaves it. More than an end waits for (the
-# robot 2 s, readers 1 s, a disk 3 s, a session 3 s, the operator's log 10 s), and less than the unit's
+# After this time the process writes a traceback and exits. Longer than all waits of a shutdown together
+# (robot 2 s, readers 1 s, disk 3 s, session 3 s, operator's log 10 s), shorter than the unit's
 # TimeoutStopSec.
 SHUTDOWN_TIMEOUT_S: Final = 20.0
 
 
 @contextmanager
 def graceful_shutdown(loop: asyncio.AbstractEventLoop, end: ShutdownCallback) -> Iterator[None]:
-    """Awaits `end` as soon as the process is told to end, and then tells whoever listened for that.
+    """Awaits `end` on SIGTERM, SIGINT or SIGHUP, then calls the signal handlers that were installed
+    before.
 
-    uvicorn waits for open streams before it runs the lifespan's end: they must end first. WebSockets it
-    closes: they must have their answers first. A terminal that closes ends it in the same order, unless
-    nohup started it. What stands still, in a library or on a disk, does not keep the process.
+    uvicorn waits for open streams before the lifespan ends, so they must end first. It closes
+    WebSockets, so they must get their responses first. SIGHUP (a closed terminal) is ignored under
+    nohup. A library or disk that hangs does not keep the process alive.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -45,7 +46,7 @@ def graceful_shutdown(loop: asyncio.AbstractEventLoop, end: ShutdownCallback) ->
 
 
 class _ShutdownSequence:
-    """From the first signal to those who listened for it."""
+    """The sequence from the first signal to the previous handlers."""
 
     def __init__(
         self,
@@ -59,13 +60,15 @@ class _ShutdownSequence:
         self._started = self._forwarded = False
 
     def handle_signal(self, number: int, frame: FrameType | None) -> None:
-        """A second SIGINT waits for nothing more. A SIGTERM after a SIGINT is of uvicorn's reloader: it
-        changes nothing."""
+        """A second SIGINT skips the waiting. A SIGTERM after a SIGINT comes from uvicorn's reloader and
+        is ignored."""
         if number == signal.SIGHUP:
             signal.raise_signal(signal.SIGTERM)
         elif not self._started:
             self._started = True
-            faulthandler.dump_traceback_later(SHUTDOWN_TIMEOUT_S, exit=True)  # no thread of Python's
+            faulthandler.dump_traceback_later(
+                SHUTDOWN_TIMEOUT_S, exit=True
+            )  # works without a running Python thread
             asyncio.run_coroutine_threadsafe(self._shut_down(number, frame), self._loop)
         elif self._forwarded or number == signal.SIGINT:
             self._forward(number, frame)
@@ -74,7 +77,7 @@ class _ShutdownSequence:
         try:
             await self._end()
         except Exception:
-            log.exception("the end is not in order")
+            log.exception("shutdown failed")
         finally:
             if not self._forwarded:
                 self._forward(number, frame)

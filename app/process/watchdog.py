@@ -1,8 +1,8 @@
-"""Tells the service manager that the server serves, how it is, and that it still turns.
+"""Reports readiness, status and liveness to the service manager.
 
-A ping goes out while the event loop turns and every robot's link responds. What it is to catch is a
-deadlock between Zenoh's callbacks and a lock: nothing in the process ends it, a restart does. A bridge
-that is away is no failure of the process.
+A watchdog ping is sent while the event loop runs and every robot's link responds. It detects a deadlock
+between Zenoh's callbacks and a lock, which only a restart ends. A lost bridge is no failure of the
+process.
 """
 
 import asyncio
@@ -23,7 +23,7 @@ POLL_INTERVAL_S: Final = 0.05
 
 class RespondingLink(Protocol):
     def respond(self) -> None:
-        """Returns when nothing in it stands still; blocks for as long as something does."""
+        """Returns if the link is not stalled; blocks while it is."""
 
 
 class Watchdog:
@@ -35,7 +35,7 @@ class Watchdog:
         links: Callable[[], Iterable[tuple[str, RespondingLink]]],
         state: Callable[[], TextLike],
     ) -> None:
-        """`links` are those of now, with their robots' names; `state` is the server's, in words."""
+        """`links` returns (robot's name, link) of all sessions; `state` returns the status text."""
         self._manager = manager
         self._links = links
         self._status_text = state
@@ -45,7 +45,7 @@ class Watchdog:
         self._every_s = (manager.interval_s or 2 * STATUS_INTERVAL_S) / 2
 
     async def run(self) -> None:
-        """Says READY when the server listens, then how it is, for ever."""
+        """Sends READY when the server listens, then status and pings until it is cancelled."""
         if not self._manager.is_enabled:
             return
         await wait_for_listener(listener_names())
@@ -62,18 +62,19 @@ class Watchdog:
             await asyncio.sleep(self._every_s)
 
     def notify_stopping(self) -> None:
-        """The server was told to end."""
+        """Reports that the server is stopping."""
         if not self._stopping:
             self._stopping = True
             self._manager.notify("STOPPING=1", status_line(render(say("stopping"))))
 
     async def _unresponsive_links(self) -> str:
-        """The robots whose links did not respond in a quarter of the interval; "" for none."""
+        """The names of the robots whose links did not respond in a quarter of the interval; "" for
+        none."""
         loop = asyncio.get_running_loop()
         links = [(name or render(say("robot")), link) for name, link in self._links()]
         for _, link in links:
             if id(link) not in self._probes:
-                # A thread of its own: the executor's may all be busy, and this one may never end.
+                # A separate thread: the executor's may all be busy, and this one may never end.
                 thread = threading.Thread(target=link.respond, name="watchdog", daemon=True)
                 self._probes[id(link)] = thread
                 thread.start()

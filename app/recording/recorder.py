@@ -1,4 +1,4 @@
-"""What one robot's kiosk takes and what is pressed, recorded around each press. On the event loop."""
+"""Records one robot's samples and presses around each press. Used on the event loop only."""
 
 import asyncio
 import time
@@ -18,11 +18,11 @@ from app.recording.writer import Recording, Recordings
 from app.robot.state import RobotState, Sample
 
 RECHECK_S: Final = 1.0
-MAX_WAIT_S: Final = 600.0  # after a press, a recording waits for its receipt no longer
+MAX_WAIT_S: Final = 600.0  # how long a recording waits for the receipt of a press
 
 
 class Recorder:
-    """Keeps a ring, and has a recording open from a press until `after_s` after the last one."""
+    """Keeps the ring buffer, and a recording from a press until `after_s` after the last one."""
 
     def __init__(
         self,
@@ -33,7 +33,7 @@ class Recorder:
         robot_id: str,
         recordings: Recordings,
     ) -> None:
-        """`robot_id` is "" where there is only one."""
+        """`robot_id` is "" if the panel has only one robot."""
         self._recordings = recordings
         self._rules = rules
         self._robot_id = robot_id
@@ -54,11 +54,11 @@ class Recorder:
 
     @property
     def keys(self) -> frozenset[str]:
-        """The keys of the topics that are recorded."""
+        """The key expressions of the recorded topics."""
         return frozenset(self._channels)
 
     def record_sample(self, key: str, sample: Sample) -> None:
-        """A sample that the kiosk took."""
+        """A sample was received."""
         if key in self._channels:
             one = to_buffered(key, sample)
             self._ring.add(one)
@@ -66,7 +66,7 @@ class Recorder:
                 self._recording.add(one)
 
     def pressed(self, press_id: str, widget: str, who: str, inputs: Mapping[str, Any]) -> None:
-        """A press, before it is judged."""
+        """A press was made; it is not checked yet."""
         if self._recording is None or self._recording.is_full:
             self._begin_recording(widget)
         self._pending_presses[press_id] = who
@@ -75,13 +75,13 @@ class Recorder:
                    reason=None, at=at)  # fmt: skip
 
     def answered(self, receipt: Receipt) -> None:
-        """What came of a press, or what is known of it by now."""
+        """A press got its receipt, or a correction of it."""
         who = self._pending_presses.pop(receipt.id, "")
         self._write_press(id=receipt.id, widget=receipt.widget, who=who, values=dict(receipt.inputs),
                    outcome=receipt.outcome, reason=render(receipt.reason), at=receipt.at)  # fmt: skip
 
     def stop(self) -> None:
-        """Ends the recording that is open."""
+        """Ends the current recording."""
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
@@ -102,7 +102,7 @@ class Recorder:
 
     def _write_press(self, **press: Any) -> None:
         if self._recording is None:
-            return  # a correction of what was pressed long ago
+            return  # a late correction
         self._recording.add_press(press, time.time_ns())
         self._last_event_at = time.monotonic()
         self._stop_after(self._rules.after_s)

@@ -1,4 +1,4 @@
-"""The thread that writes recordings. What it can't write is left out, never waited for."""
+"""The thread that writes recordings. Samples that it can't write in time are dropped."""
 
 import asyncio
 import logging
@@ -16,27 +16,27 @@ from app.recording.ring_buffer import OVERHEAD_BYTES, Buffered
 
 log = logging.getLogger("kiosk.recording")
 
-MAX_QUEUED_BYTES: Final = 128 * 1024 * 1024  # bytes handed over and not written yet, of all robots
-MAX_RING_BYTES: Final = 64 * 1024 * 1024  # bytes in the rings of all robots
-STOP_TIMEOUT_S: Final = 5.0  # given to a disk when the server ends
+MAX_QUEUED_BYTES: Final = 128 * 1024 * 1024  # not written yet, of all robots
+MAX_RING_BYTES: Final = 64 * 1024 * 1024  # of all robots
+STOP_TIMEOUT_S: Final = 5.0  # for the disk at shutdown
 
 Work = Callable[[], None]
 
 
 class Recordings:
-    """All recordings of one panel; opened by `start`, closed by `stop`.
+    """The recordings of one panel, from `start` to `stop`.
 
-    `fault` is what an operator reads while recordings can't be written, "" if they can.
+    `fault` is the sentence for the operator while recordings can't be written, else "".
     """
 
     def __init__(self, path: Path, max_mb: float, robots: int) -> None:
-        """Each of `robots` may have one file open at a time: together they fill half the folder."""
+        """Each of `robots` may have one open file; together they may fill half the folder."""
         most = int(max_mb * 1_000_000)
         self._folder = RecordingDirectory(path, most)
         self.file_bytes = most // (2 * (robots + 1))
         self.ring_bytes = min(
             MAX_RING_BYTES // robots, self.file_bytes // 2
-        )  # half is for what comes after
+        )  # half is for samples after the press
         self._queue: queue.SimpleQueue[tuple[int, Work | None]] = queue.SimpleQueue()
         self._count_lock = threading.Lock()
         self._queued_bytes = 0
@@ -47,23 +47,23 @@ class Recordings:
         self._thread = threading.Thread(target=self._run, name="recordings", daemon=True)
 
     def start(self) -> None:
-        """Begins to write; the folder is made, cleared of halves and bounded on the thread."""
+        """Starts the thread, which first prepares the folder."""
         self.enqueue(0, self._prepare)
         self._thread.start()
 
     def stop(self) -> None:
-        """Writes what was handed over; blocks, but for `ENDING_S` at most."""
+        """Writes what is queued; blocks for `STOP_TIMEOUT_S` at most."""
         self._queue.put((0, None))
         self._thread.join(STOP_TIMEOUT_S)
         if self._thread.is_alive():
-            log.error("the disk does not take what was recorded: it is left unfinished")
+            log.error("the disk is too slow: a recording is left unfinished")
 
-    def add_listener(self, told: Callable[[], None]) -> None:
-        """`told` is called on the event loop when `fault` has changed."""
-        self._listeners.append(told)
+    def add_listener(self, listener: Callable[[], None]) -> None:
+        """`listener` is called on the event loop when `fault` has changed."""
+        self._listeners.append(listener)
 
     def enqueue(self, size: int, work: Work) -> bool:
-        """Has the thread do something that holds `size` bytes; False where too much waits."""
+        """Queues `work`, which holds `size` bytes, for the thread; False if the queue is full."""
         with self._count_lock:
             if size and self._queued_bytes + size > MAX_QUEUED_BYTES:
                 return False
@@ -74,7 +74,7 @@ class Recordings:
     def begin(
         self, name: str, channels: Mapping[str, Channel], about: Mapping[str, str]
     ) -> "Recording":
-        """A new recording; `channels` are by the keys of their topics."""
+        """A new recording; `channels` are by key expression."""
         return Recording(self, name, channels, about)
 
     # Below: on the thread.
@@ -97,7 +97,7 @@ class Recordings:
         self._set_fault("")
 
     def report_failure(self, error: Exception) -> None:
-        """What went wrong with a file; the next press tries again."""
+        """Sets the fault. The next press starts a new file."""
         why = (isinstance(error, OSError) and error.strerror) or str(error)
         log.error("recording stopped, in %s: %s", self._folder.path, why)
         self._set_fault(say("not_recorded", why=why))
@@ -115,23 +115,23 @@ class Recordings:
                 return
             try:
                 work()
-            except Exception:  # a mistake in one recording must not end all
+            except Exception:  # an error in one recording must not end the thread
                 log.exception("recording failed")
-            del work  # and with it what it held
+            del work  # releases its samples
             with self._count_lock:
                 self._queued_bytes -= size
 
     def _set_fault(self, fault: TextLike) -> None:
         if fault != self.fault:
             self.fault = fault
-            with suppress(RuntimeError):  # the loop is closed: nobody looks any more
-                for told in self._listeners:
-                    self._loop.call_soon_threadsafe(told)
+            with suppress(RuntimeError):  # the loop is closed
+                for listener in self._listeners:
+                    self._loop.call_soon_threadsafe(listener)
 
 
 class Recording:
-    """One file, from the loop's side: everything is handed over. `full`: it takes no more samples, for
-    the next press begins another one."""
+    """One file, as the event loop uses it: all work is queued for the thread. When it `is_full` it
+    takes no more samples, and the next press begins another file."""
 
     def __init__(
         self,
@@ -155,7 +155,7 @@ class Recording:
         return self._bytes_left <= 0 or self._abandoned or not self._accepted
 
     def add(self, one: Buffered) -> None:
-        """A sample of a topic."""
+        """Adds a sample."""
         self._bytes_left -= one.size
         if self.is_full or not self._recordings.enqueue(
             one.size, lambda: self._run_guarded(lambda: self._write_sample(one))
@@ -163,7 +163,7 @@ class Recording:
             self._dropped += 1
 
     def add_press(self, press: Mapping[str, Any], at: int) -> None:
-        """A press or its receipt, at nanoseconds since the epoch; also where it is full."""
+        """Adds a press or its receipt, also to a full file. `at` is in nanoseconds since the epoch."""
         size = OVERHEAD_BYTES + len(str(press))
         self._recordings.enqueue(size, lambda: self._run_guarded(lambda: self._write_press(press, at)))
 

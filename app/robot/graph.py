@@ -1,6 +1,6 @@
-"""What the liveliness tokens and the bridges' admin space say: who is there, with which types.
+"""The robot's ROS graph, from the bridges' liveliness tokens and admin space.
 
-Kept by topic key, so that asking costs the same however large the robot's graph is.
+Endpoints are indexed by key expression, so that a query costs the same for any size of graph.
 """
 
 import math
@@ -14,17 +14,21 @@ from app.dialect.bridge_dialect import DEMO_VERSION, in_token, name_in, parsed
 from app.dialect.endpoint import Direction, Endpoint, Role, ServerRole, TopicRole, within
 from app.interfaces.names import Qos
 
-# Whose type must equal the panel's, for what the panel does with a topic. A route of the bridge
-# has one type for all: who created it first has fixed it, be it the robot or another panel.
+# The endpoints whose type must equal the panel's, by the panel's role on a topic. A route of the bridge
+# has one type: that of the endpoint that created it, of the robot or of another panel.
 _COUNTERPARTS: Mapping[TopicRole, tuple[Role, Role, Direction]] = {
-    "MS": ("MP", "MS", "pub"),  # the panel listens: the robot's publisher, other panels' readers
-    "MP": ("MS", "MP", "sub"),  # the panel publishes: the robot's subscriber, other panels' writers
+    "MS": (
+        "MP",
+        "MS",
+        "pub",
+    ),  # the panel subscribes: the robot's publishers, other panels' subscribers
+    "MP": ("MS", "MP", "sub"),  # the panel publishes: the robot's subscribers, other panels' publishers
 }
 
 
 @dataclass(frozen=True, slots=True)
 class Route:
-    """A bridge's route for a topic; `whole` is False where its DDS reader is missing."""
+    """A bridge's route for a topic; `has_reader` is False if its DDS reader is missing."""
 
     zid: str
     direction: Direction
@@ -56,8 +60,8 @@ def cached_until_change(
 
 
 class Graph:
-    """The ROS graph behind all bridges; changed by `apply`, `learn` and `answered` only, on the
-    event loop."""
+    """The ROS graph behind all bridges. Changed on the event loop only, by `apply_token` and the
+    `update_…` methods."""
 
     def __init__(
         self,
@@ -65,9 +69,9 @@ class Graph:
         namespace: str | None = None,
         keys: Collection[str] | None = None,
     ) -> None:
-        """`namespace` tells this robot's bridges from those of others; None: all are its. Of tokens for
-        other key expressions than `keys` nothing is kept; None: all are."""
-        self.own_zid = own_zid  # whose tokens are not the robot's
+        """`namespace` selects this robot's bridges; None: all are this robot's. Tokens of key
+        expressions that are not in `keys` are ignored; None: all are kept."""
+        self.own_zid = own_zid  # of this session: its tokens are ignored
         self._relevant_names = None if keys is None else frozenset(map(in_token, keys))
         self.cache: dict[Any, Any] = {}  # see `remembered`
         self._namespace = namespace
@@ -80,21 +84,21 @@ class Graph:
         self._bridge_versions: Mapping[str, str] | None = None
 
     def is_relevant(self, token_key: str) -> bool:
-        """Whether a token is a bridge's own, or about one of the key expressions that count."""
+        """Whether a token is that of a bridge, or of a relevant key expression."""
         if self._relevant_names is None:
             return True
         name = name_in(token_key)
         return not name or name in self._relevant_names
 
     def has_token(self, token_key: str) -> bool:
-        """Whether a token is there by all that was taken."""
+        """Whether a token is alive."""
         return (endpoint := parsed(token_key)) is not None and token_key in self._tokens.get(
             endpoint.key, {}
         )
 
     def apply_token(self, token_key: str, alive: bool, now: float = -math.inf) -> str | None:
-        """Takes one token's appearance (`now`, monotonic seconds) or end; returns the zid of a
-        bridge that came or went."""
+        """Adds a token (at `now`, monotonic seconds) or removes it. Returns the zid of a bridge that
+        appeared or disappeared, else None."""
         endpoint = parsed(token_key) if self.is_relevant(token_key) else None
         if endpoint is None or endpoint.zid == self.own_zid:
             return None
@@ -110,7 +114,7 @@ class Graph:
         return None
 
     def _remove_token(self, key: str, token_key: str) -> None:
-        """Of a node that went nothing is kept: many come once and never again."""
+        """Keeps nothing of an ended node: many nodes appear only once."""
         tokens = self._tokens.get(key, {})
         tokens.pop(token_key, None)
         if not tokens:
@@ -120,15 +124,15 @@ class Graph:
     def _apply_bridge(self, zid: str, alive: bool) -> str:
         if alive:
             self._bridges.add(zid)
-            self._bridge_versions = None  # it was not asked yet
+            self._bridge_versions = None  # the new bridge has not been queried yet
         else:
             self._bridges.discard(zid)
             self._namespace_matches.pop(zid, None)
         return zid
 
     def update_routes(self, routes: Iterable[Route], nodes: Iterable[Endpoint] = ()) -> None:
-        """Takes what the bridges said of their routes, and of the publishers and subscribers of
-        the nodes behind them: a route has one type, whatever they have."""
+        """Replaces the bridges' routes, and the publishers and subscribers of the nodes behind them,
+        whose types may differ from the route's."""
         self.cache.clear()
         self._routes.clear()
         self._nodes.clear()
@@ -138,12 +142,12 @@ class Graph:
             self._nodes[node.key].append(node)
 
     def update_versions(self, versions: Mapping[str, str]) -> None:
-        """Takes which bridges answered when they were asked, and with which version."""
+        """Replaces the versions of the bridges that responded, by zid."""
         self.cache.clear()
         self._bridge_versions = versions
 
     def update_namespaces(self, namespaces: Mapping[str, str]) -> None:
-        """Takes the namespace of each bridge that told it ("" for none)."""
+        """Adds the namespaces of bridges, by zid ("" for none)."""
         self.cache.clear()
         for zid, namespace in namespaces.items():
             self._namespace_matches[zid] = self._namespace is None or within(self._namespace, namespace)
@@ -151,23 +155,24 @@ class Graph:
     @property
     @cached_until_change
     def bridges(self) -> frozenset[str]:
-        """Those of this robot; one that has not told its namespace may be, if no other is."""
-        told = {zid for zid in self._bridges if self._namespace_matches.get(zid)}
-        return frozenset(told or self._bridges - self._namespace_matches.keys())
+        """The zids of this robot's bridges. If none has its namespace, those with an unknown
+        namespace."""
+        matching = {zid for zid in self._bridges if self._namespace_matches.get(zid)}
+        return frozenset(matching or self._bridges - self._namespace_matches.keys())
 
     @property
     @cached_until_change
     def has_silent_bridge(self) -> bool:
-        """A bridge is there by its token, but did not answer when all were asked."""
-        asked = self._bridge_versions
-        return asked is not None and bool(self.bridges - asked.keys())
+        """Whether a bridge has a token but did not respond to the last query."""
+        versions = self._bridge_versions
+        return versions is not None and bool(self.bridges - versions.keys())
 
     @property
     @cached_until_change
     def is_simulated(self) -> bool:
-        """A bridge that answered is a demo robot's."""
-        asked = self._bridge_versions or {}
-        return any(asked.get(zid) == DEMO_VERSION for zid in self.bridges)
+        """Whether a bridge is that of the simulated robot."""
+        versions = self._bridge_versions or {}
+        return any(versions.get(zid) == DEMO_VERSION for zid in self.bridges)
 
     @cached_until_change
     def _endpoints(self, role: Role, key: str) -> list[Endpoint]:
@@ -175,7 +180,7 @@ class Graph:
         return [e for e in tokens if e.role == role and e.zid in self._bridges]
 
     def bridges_with(self, role: Role, key: str) -> frozenset[str]:
-        """The bridges behind which a node publishes, subscribes or serves."""
+        """The zids of the bridges behind which a node publishes, subscribes or serves."""
         return frozenset(e.zid for e in self._endpoints(role, key))
 
     def has_endpoint(self, role: Role, key: str) -> bool:
@@ -183,23 +188,23 @@ class Graph:
         return bool(self._endpoints(role, key))
 
     def server_type(self, role: ServerRole, key: str) -> str | None:
-        """The type of the robot's service or action; None if it offers none of this name now."""
+        """The type of the robot's service or action; None if there is no server now."""
         return next((e.type for e in self._endpoints(role, key)), None)
 
     @cached_until_change
     def served_since(self, role: ServerRole, key: str) -> float:
-        """When (monotonic seconds) the last server of this name came; -inf where there is none."""
+        """When the newest server of this name appeared (monotonic seconds); -inf without one."""
         tokens = self._tokens.get(key, {}).items()
-        here = (self._alive_since[t] for t, e in tokens if e.role == role and e.zid in self._bridges)
-        return max(here, default=-math.inf)
+        times = (self._alive_since[t] for t, e in tokens if e.role == role and e.zid in self._bridges)
+        return max(times, default=-math.inf)
 
     def is_transient_local(self, key: str) -> bool | None:
-        """Whether the robot's publisher is TRANSIENT_LOCAL; None if it has none now."""
+        """Whether the robot's publisher is TRANSIENT_LOCAL; None without a publisher."""
         return next((e.transient_local for e in self._endpoints("MP", key)), None)
 
     @cached_until_change
     def is_unrouted(self, key: str) -> bool:
-        """Whether the robot publishes a topic that its bridge does not read for the panel."""
+        """Whether the robot publishes a topic that its bridge does not forward to the panel."""
         publishing = {e.zid for e in self._endpoints("MP", key)}
         return any(
             r.direction == "pub" and not r.has_reader and r.zid in publishing
@@ -208,7 +213,7 @@ class Graph:
 
     @cached_until_change
     def mismatched_type(self, role: TopicRole, key: str, type_name: str) -> str | None:
-        """The other type that this topic has, if it is not what the panel needs for `role`."""
+        """The type of a counterpart or route that differs from `type_name`; None if all are equal."""
         theirs, others, direction = _COUNTERPARTS[role]
         for endpoint in chain(self._tokens.get(key, {}).values(), self._nodes.get(key, [])):
             counts = endpoint.role == (theirs if endpoint.zid in self._bridges else others)
@@ -222,22 +227,22 @@ class Graph:
 
     @cached_until_change
     def mismatched_qos(self, role: TopicRole, key: str, qos: Qos) -> str | None:
-        """The code of the sentence that says what DDS would not match, for what the panel does.
+        """The code of the sentence about a QoS that does not match; None if it matches.
 
-        Of several publishers each counts: one that is not heard may say something else. Of several
-        subscribers one that hears is enough.
+        All publishers must match: one that is not received may publish something else. One matching
+        subscriber is enough.
         """
         theirs = self._endpoints(_COUNTERPARTS[role][0], key)
-        doubts = [
+        mismatches = [
             _reader_mismatch(e, qos) if role == "MS" else _writer_mismatch(e, qos) for e in theirs
         ]
-        if role == "MP" and None in doubts:
+        if role == "MP" and None in mismatches:
             return None
-        return next(filter(None, doubts), None)
+        return next(filter(None, mismatches), None)
 
 
 def _reader_mismatch(publisher: Endpoint, qos: Qos) -> str | None:
-    """Why a reader of this QoS would not hear a publisher."""
+    """Why a subscription with this QoS does not match a publisher."""
     if qos.reliable and publisher.reliable is False:
         return "publishes_best_effort"
     if qos.transient_local and not publisher.transient_local:
@@ -246,7 +251,7 @@ def _reader_mismatch(publisher: Endpoint, qos: Qos) -> str | None:
 
 
 def _writer_mismatch(subscriber: Endpoint, qos: Qos) -> str | None:
-    """Why a subscriber would not hear a writer of this QoS."""
+    """Why a subscriber does not match a publisher with this QoS."""
     if not qos.reliable and subscriber.reliable:
         return "asks_for_reliable"
     if not qos.transient_local and subscriber.transient_local:

@@ -1,4 +1,4 @@
-"""What a node says of a parameter that it declares, and what may be set by it: pure.
+"""The state of a node's parameter and the values that may be set. Pure.
 
 Shapes: rcl_interfaces/msg/ParameterValue and ParameterDescriptor, of ROS 2's parameter services.
 """
@@ -12,7 +12,7 @@ from app.i18n import TextLike, joined, say
 from app.panel.number_range import Range, range_text
 from app.panel.widgets.parameter import Parameter, Value
 
-# rcl_interfaces/msg/ParameterType: a type is its place here.
+# The names of rcl_interfaces/msg/ParameterType, by their numbers.
 TYPE_NAMES: Final = (
     "not set", "bool", "integer", "double", "string", "byte[]", "bool[]", "integer[]", "double[]",
     "string[]",
@@ -30,7 +30,7 @@ EMPTY_VALUE: Final[Mapping[str, Any]] = {
     "double_array_value": (),
     "string_array_value": (),
 }
-MAX_LIST_LENGTH: Final = 1000  # values that can be set; of longer lists so many and one more are known
+MAX_LIST_LENGTH: Final = 1000  # values that can be set; of a longer list one value more is kept
 
 State = Literal["waiting", "live", "cut", "silent", "missing", "undeclared", "mistyped", "unreadable"]
 UNLIMITED: Final = Range()
@@ -38,10 +38,10 @@ UNLIMITED: Final = Range()
 
 @dataclass(frozen=True, slots=True)
 class ParameterState:
-    """What is known of a parameter; `found` is the type that it has on the robot.
+    """What is known of a parameter; `robot_type` is its type on the robot.
 
-    `value` is None where there is none; of one that is `cut` or `silent` it is the last known.
-    `wall` (seconds since the epoch) is when the node told it.
+    `value` is None without a value; in the states `cut` and `silent` it is the last known one. `wall`
+    (seconds since the epoch) is when it was received.
     """
 
     state: State
@@ -59,7 +59,7 @@ UNKNOWN: Final = ParameterState("waiting")
 def read_parameter_state(
     parameter: Parameter, descriptor: Any, value: Any, wall: float
 ) -> ParameterState:
-    """From a ParameterDescriptor and a ParameterValue, each None where the node gave none."""
+    """The state from a ParameterDescriptor and a ParameterValue, each None if the node sent none."""
     kind = NOT_SET if value is None else value.type
     described_as = NOT_SET if descriptor is None or descriptor.dynamic_typing else descriptor.type
     if kind == described_as == NOT_SET and not (descriptor is not None and descriptor.dynamic_typing):
@@ -86,7 +86,7 @@ def type_name(kind: int) -> str:
 
 
 def decode_value(parameter: Parameter, value: Any) -> Value:
-    """The value of a ParameterValue whose type is the parameter's."""
+    """The value in a ParameterValue of the parameter's type."""
     found: Any = getattr(value, _value_field(parameter))
     return tuple(found[: MAX_LIST_LENGTH + 1]) if parameter.is_list else found
 
@@ -105,7 +105,7 @@ def _value_field(parameter: Parameter) -> str:
 
 
 def described_range(parameter: Parameter, descriptor: Any) -> Range:
-    """The range that a node describes; without a limit where it gives none that is a number."""
+    """The range in a ParameterDescriptor; limits that are not finite are left open."""
     ranges = (
         descriptor.integer_range
         if parameter.element_type == "integer"
@@ -122,7 +122,7 @@ def _finite(number: float) -> float | None:
 
 
 def panel_range(parameter: Parameter) -> Range:
-    """What the panel itself allows."""
+    """The range that the panel file allows."""
     limits = (parameter.min, parameter.max, parameter.step)
     if parameter.element_type == "integer":
         return Range(*(None if one is None else int(one) for one in limits))
@@ -130,12 +130,12 @@ def panel_range(parameter: Parameter) -> Range:
 
 
 def allowed_range(parameter: Parameter, known: ParameterState) -> Range:
-    """What both the node and the panel allow."""
+    """The range that both the node and the panel file allow."""
     return known.range.narrowed_by(panel_range(parameter))
 
 
 def has_allowed_value(parameter: Parameter, known: ParameterState) -> bool:
-    """Whether there is a value that both the node and the panel allow."""
+    """Whether both the node and the panel file allow at least one value."""
     if not (parameter.options and parameter.has_numbers):
         return not allowed_range(parameter, known).is_empty
     values = (one.value if parameter.is_list else [one.value] for one in parameter.options)
@@ -143,13 +143,13 @@ def has_allowed_value(parameter: Parameter, known: ParameterState) -> bool:
 
 
 def panel_limits_text(parameter: Parameter) -> TextLike:
-    """What the panel lets be set, as an operator reads it."""
+    """The values that the panel file allows, as text for an operator."""
     labels = joined((option.label for option in parameter.options), "between_names")
     return labels or limits_text(parameter, panel_range(parameter))
 
 
 def limits_text(parameter: Parameter, limits: Range) -> TextLike:
-    """What may be set, as an operator reads it; "" where nothing has to be said."""
+    """The allowed values as text for an operator; "" if no text is needed."""
     if parameter.options:
         return ""
     if parameter.is_list:
@@ -158,7 +158,7 @@ def limits_text(parameter: Parameter, limits: Range) -> TextLike:
 
 
 def each_text(parameter: Parameter, limits: Range) -> TextLike:
-    """What one value may be."""
+    """The allowed values of one element, as text."""
     match parameter.element_type:
         case "bool":
             return say("either", first=parameter.on, last=parameter.off)

@@ -1,5 +1,5 @@
-"""Which ends of the robot's nodes (publishers, subscribers, servers) a panel needs, and which of them
-went though their bridge stayed."""
+"""The endpoints of the robot (publishers, subscribers, servers) that a panel needs, and which of them
+are missing while their bridge is connected."""
 
 from collections.abc import Iterator, Mapping
 from typing import Final
@@ -13,8 +13,8 @@ ROLE_ORDER: Final[Mapping[Role, int]] = {"MP": 0, "MS": 1, "SS": 2, "AS": 2}
 
 
 def required_endpoints(panel: Panel) -> Iterator[RequiredEndpoint]:
-    """What the panel talks with, as (role, ROS name). Every node publishes its parameters' events:
-    they show none of the panel's."""
+    """The endpoints that the panel needs, as (role, ROS name). Without the topic of parameter events,
+    which every node publishes."""
     for interlock in panel.interlocks:
         yield "MP", interlock.topic
     of_widgets = (end for widget in panel.widgets() for end in widget.endpoints())
@@ -22,7 +22,7 @@ def required_endpoints(panel: Panel) -> Iterator[RequiredEndpoint]:
 
 
 class EndpointPresence:
-    """Remembers behind which bridges each end was seen last: one entry for each that is needed."""
+    """The bridges behind which each required endpoint was last seen."""
 
     def __init__(self, needed: Mapping[RequiredEndpoint, RequiredEndpoint]) -> None:
         """`needed`: (role, ROS name) → (role, key expression)."""
@@ -30,22 +30,22 @@ class EndpointPresence:
         self.last_bridges: dict[RequiredEndpoint, frozenset[str]] = {}
 
     def update(self, graph: Graph) -> None:
-        """After every change of the graph."""
+        """Updates the presence; call it after every change of the graph."""
         for end, (role, key) in self.required.items():
             if bridges := graph.bridges_with(role, key):
                 self.last_bridges[end] = bridges
-        graph.cache.clear()  # what was found with what was behind them before
+        graph.cache.clear()  # results depend on `last_bridges` too
 
     def clear(self) -> None:
-        """The link was lost: what is seen after it is seen for the first time."""
+        """Forgets all endpoints; call it when the link is lost."""
         self.last_bridges.clear()
 
     def any_present(self, graph: Graph) -> bool:
-        """Whether a node is there that the panel talks with."""
+        """Whether any required endpoint exists."""
         return _any_present(graph, self)
 
     def missing(self, graph: Graph) -> list[str]:
-        """The ROS names of what was there and is not, while its bridge is."""
+        """The ROS names of endpoints that have disappeared while their bridge is connected."""
         return _missing(graph, self)
 
 

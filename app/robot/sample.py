@@ -1,17 +1,17 @@
-"""What comes of a topic, as it came."""
+"""Received messages, undecoded."""
 
 from typing import NamedTuple, Protocol
 
 
 class Buffer(Protocol):
-    """Bytes, or what becomes bytes when asked (Zenoh's buffers: no copy until then)."""
+    """Bytes, or a Zenoh buffer, which is copied only by `bytes()`."""
 
     def __bytes__(self) -> bytes: ...
     def __len__(self) -> int: ...
 
 
 class SkippedPayload(NamedTuple):
-    """A payload that came and went before anybody looked, and when: see `Sample`."""
+    """The payload of a skipped sample, with its times as in `Sample`."""
 
     payload: Buffer
     at: float
@@ -19,13 +19,13 @@ class SkippedPayload(NamedTuple):
 
 
 class Sample(NamedTuple):
-    """One message as it came: `at` monotonic seconds, `wall` seconds since the epoch.
+    """One received message: `at` in monotonic seconds, `wall` in seconds since the epoch.
 
-    `source` is the zid of the bridge that sent it (from its timestamp), None if it did not say;
-    `seq` orders samples and losses of bridges as this session saw them; `skipped` is how many came
-    just before it that nobody looked at; `sent` is the timestamp of its sender's clock, in seconds
-    since the epoch; `between` are other payloads that came and went unseen, for watched topics, and
-    `overrun` says that there were more before these, of which nobody knows what they said.
+    `source` is the zid of the bridge that sent it (from its timestamp), None if unknown. `seq` orders
+    samples and losses of bridges as this session saw them. `skipped` is the number of samples since the
+    one read before. `sent` is the timestamp of the sender's clock, in seconds since the epoch.
+    `skipped_payloads` are the skipped samples of a watched topic; `overrun` is true if there were more
+    of them than are kept.
     """
 
     payload: Buffer

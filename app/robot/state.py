@@ -1,6 +1,6 @@
-"""What the kiosk knows of the robot at this moment; changed on the event loop only.
+"""The current state of one robot. Changed on the event loop only.
 
-One latest sample per topic, as raw bytes, read when it is first asked for.
+Keeps the latest sample of each topic as raw bytes, and decodes it at the first read.
 """
 
 import logging
@@ -34,11 +34,11 @@ from app.ros_logging import RobotLog
 
 log = logging.getLogger("kiosk.robot")
 
-UNREADABLE_LOG_S = 60.0  # one line per topic in this time, at most
+UNREADABLE_LOG_S = 60.0  # at most one log line for each topic in this time
 
 
 class RobotState:
-    """Latest samples, the graph, and the state of the link."""
+    """The latest samples, the graph, parameters, and the state of the link."""
 
     def __init__(
         self,
@@ -48,14 +48,14 @@ class RobotState:
         entry: RobotEntry | None = None,
         slices: Slices | None = None,
     ) -> None:
-        """`entry` is which of the panel's robots this is, where it has several; `slices` is of all that
-        is read on one event loop."""
+        """`entry` is this robot's entry if the panel has several; `slices` is shared by all robots of
+        an event loop."""
         self.name = entry.name if entry else ""
         self.namespace = entry.namespace if entry else panel.namespace
         self.link_up = False
-        self.endpoints: tuple[str, ...] = ()  # where its bridge is looked for, as Zenoh names it
-        self.settled_at = math.inf  # monotonic: when a bridge that came has set up its routes
-        self._keys: dict[str, str] = {}  # of what the panel names
+        self.endpoints: tuple[str, ...] = ()  # the bridge's, as Zenoh names them
+        self.settled_at = math.inf  # monotonic: when a new bridge will have set up its routes
+        self._keys: dict[str, str] = {}  # ROS name → key expression
         self._own_namespace = entry.namespace if entry else None
         needed = list(required_endpoints(panel))
         named = (*panel.subscriptions(), *panel.publications(), *(n for _, n in needed), ROSOUT_TOPIC)
@@ -63,23 +63,19 @@ class RobotState:
         self.graph = Graph(own_zid, self._own_namespace, self._required_keys)
         self._interlock_keys = frozenset(self.key(interlock.topic) for interlock in panel.interlocks)
         self.silent_publishers = SilentPublishers(self._interlock_keys)
-        self.command_status: dict[str, CommandStatus] = {}  # of what widgets have asked, by their ids
-        self.parameters: dict[
-            str, ParameterState
-        ] = {}  # what nodes said of them, by their widgets' ids
-        self.querying: set[str] = set()  # ids of parameter widgets whose nodes are being asked
-        self.held_since: dict[str, Text] = {}  # by the ids of hold widgets: since when, in words
+        self.command_status: dict[str, CommandStatus] = {}  # by widget id
+        self.parameters: dict[str, ParameterState] = {}  # by widget id
+        self.querying: set[str] = set()  # ids of parameter widgets with a pending query
+        self.held_since: dict[str, Text] = {}  # id of a hold widget → since when, as text
         self._log = RobotLog(log, self.name)
-        self.is_responding = True  # False: its bridges are silent, though nobody knows yet why
-        self.is_caught_up = (
-            True  # False: the event loop stood still, and may not know what came meanwhile
-        )
+        self.is_responding = True  # False: its bridges do not respond
+        self.is_caught_up = True  # False: the event loop stalled, and the inbox has not been read yet
         self.presence = EndpointPresence(
             {(role, name): (role, self.key(name)) for role, name in needed}
         )
         self.undecodable: Counter[str] = Counter()
         self.slices = slices or Slices()
-        # Gets what took more than one turn to read: the topic's key, and what it said.
+        # Called with (key, reading) of a message that took more than one turn to decode.
         self.on_late_reading: Callable[[str, Reading], None] = lambda _key, _reading: None
         self._interfaces = interfaces
         self._publisher_required = [self.key(i.topic) for i in panel.interlocks if i.require_publisher]
@@ -88,7 +84,7 @@ class RobotState:
         self._logged_at: dict[str, float] = {}
 
     def _make_topics(self, panel: Panel) -> Iterator[tuple[str, Topic]]:
-        """A topic for each that the panel listens to, by its key."""
+        """(key, topic) of each topic that the panel subscribes to."""
         fields = panel.subscribed_fields()
         watched = {one.topic for one in panel.interlocks} | {one.topic for one in panel.confirmations()}
         for topic, type_name in panel.subscriptions().items():
@@ -113,13 +109,13 @@ class RobotState:
         return key
 
     def update(self, key: str, sample: Sample) -> None:
-        """A newer sample of a topic."""
+        """Adds a newer sample of a topic."""
         self.silent_publishers.record_message(key, sample.source, sample.seq, sample.at)
         if (topic := self._topics.get(key)) is not None:
             topic.update(sample)
 
     def mark_bridge_lost(self, bridge: str, seq: int) -> None:
-        """A bridge went away at `seq`: what came by it before no longer says what is so."""
+        """A bridge was lost at `seq`: samples that it sent before are no longer valid."""
         self.silent_publishers.remove_bridge(bridge)
         for topic in self._topics.values():
             sample = topic.sample
@@ -127,8 +123,8 @@ class RobotState:
                 topic.invalidate()
 
     def update_publishers(self, before: float = math.inf) -> None:
-        """After every change of the graph: where a publisher is required, what it said (`before` this
-        number of a sample) goes with it, and its successor has to say it again."""
+        """Call after every change of the graph. If a required publisher has ended, its samples (before
+        the sequence number `before`) become invalid, and a new publisher must republish the value."""
         self.presence.update(self.graph)
         for key in self._publisher_required:
             if self.graph.has_endpoint("MP", key):
@@ -140,11 +136,11 @@ class RobotState:
                     topic.invalidate()
 
     def invalidate(self, key: str) -> None:
-        """It is not known what a topic said last."""
+        """The last value of a topic is unknown."""
         self._topics[key].invalidate()
 
     def mark_link_lost(self) -> None:
-        """The link is lost: nobody is known to be there, and nothing that came says what is so."""
+        """The link was lost: the graph is empty, and no sample is valid."""
         self.link_up = False
         self.settled_at = math.inf
         self.graph = Graph("", self._own_namespace, self._required_keys)
@@ -154,11 +150,11 @@ class RobotState:
             topic.invalidate()
 
     def reading(self, topic: str) -> Reading:
-        """The latest of a topic that the panel listens to."""
+        """The latest reading of a topic that the panel subscribes to."""
         return self.reading_by_key(self.key(topic))
 
     def reading_by_key(self, key: str) -> Reading:
-        """The same by the topic's key."""
+        """The same by the topic's key expression."""
         known = self._topics[key]
         found, sample = known.reading(), known.sample
         if sample is None or sample.source is None or sample.source in self.graph.bridges:
@@ -166,11 +162,11 @@ class RobotState:
         return replace(found, status="cut")
 
     def constants(self, display: Display) -> Mapping[str, Any]:
-        """Name → value of the constants of the message that a display's field is in."""
+        """Name → value of the constants of the message that contains a display's field."""
         return self._interfaces.constants(parent_type(display, self._interfaces))
 
     def count_unreadable(self, key: str, sample: Sample, error: DecodeError) -> None:
-        """Counts a sample that can't be read; logs one of a topic in `UNREADABLE_LOG_S`."""
+        """Counts a sample that can't be decoded; logs at most one of a topic in `UNREADABLE_LOG_S`."""
         self.undecodable[key] += 1
         if sample.at - self._logged_at.get(key, -math.inf) >= UNREADABLE_LOG_S:
             self._logged_at[key] = sample.at

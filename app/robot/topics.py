@@ -1,7 +1,7 @@
-"""What a topic said last, read where the panel names a field of it.
+"""The latest message of a topic, with the fields that the panel names.
 
-The newest counts. What takes longer to read than a turn of the event loop allows is read on in the next
-turns, one message after the other; until the newest is read, it is not known what the topic says now.
+The newest message counts. A message that takes longer to decode than a turn of the event loop allows is
+continued in the next turns. Until the newest is decoded, the topic's value is unknown.
 """
 
 import math
@@ -15,13 +15,17 @@ from app.interfaces import FieldReader, Fields, Walk
 from app.robot.sample import Sample
 from app.robot.slices import Slices
 
-MAX_UNREAD: Final = 16  # messages of a watched topic that wait to be read; of other topics the newest
+MAX_UNREAD: Final = 16  # undecoded messages of a watched topic; of other topics only the newest is kept
 
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """The latest of a topic: not seen yet, seen before a cut, not readable, not read to its end yet
-    (with what the one before said), or a message."""
+    """The latest message of a topic.
+
+    `status`: no message yet ("waiting"); received before a cut ("cut"); not decodable ("unreadable");
+    being decoded, with the fields of the one before ("reading"); a valid message ("message"). `at` is
+    in monotonic seconds, `wall` in seconds since the epoch.
+    """
 
     status: Literal["waiting", "cut", "unreadable", "reading", "message"]
     fields: Fields | None = None
@@ -29,11 +33,11 @@ class Reading:
     wall: float = 0.0
 
     def value(self, path: str) -> Any:
-        """The field at a path that the panel names; None where it is not there."""
+        """The field at a path; None if the message has no such element."""
         return None if self.fields is None else self.fields.get(path)
 
     def is_ambiguous(self, path: str) -> bool:
-        """Whether it is not known because more than one element has the path's key."""
+        """Whether the value is unknown because several elements have the path's key."""
         return self.fields is not None and self.fields.is_ambiguous(path)
 
 
@@ -52,7 +56,8 @@ class Topic:
         unreadable: Callable[[Sample, DecodeError], None],
         read_later: Callable[[Reading], None],
     ) -> None:
-        """Of a `watched` one each message counts; `read_later` gets what took more than one turn."""
+        """Of a `watched` topic each message counts. `on_late_reading` takes a reading that needed more
+        than one turn; `on_unreadable` a sample that can't be decoded."""
         self._reader = reader
         self._slices = slices
         self._unreadable = unreadable
@@ -65,14 +70,14 @@ class Topic:
         self.sample: Sample | None = None  # the newest
 
     def update(self, sample: Sample) -> None:
-        """A newer message."""
+        """Adds a newer message."""
         self.sample = sample
         if self._walk is None or not self._watched:
             self._unread.clear()
         self._unread.append(sample)
 
     def reading(self) -> Reading:
-        """What it says now."""
+        """The current reading."""
         if not self._deferred and not self._read():
             self._deferred = True
             self._slices.schedule(self._resume)
@@ -81,14 +86,14 @@ class Topic:
         return replace(self._last_reading, status="reading")
 
     def invalidate(self) -> None:
-        """What it said no longer says what is so."""
+        """The last value is no longer valid."""
         if self.sample is not None:
             self._last_reading = replace(self.reading(), status="cut")
             self._unread.clear()
             self._walk = None
 
     def _read(self) -> bool:
-        """Reads what this turn allows; whether that was all."""
+        """Decodes as much as this turn allows; returns whether that was all."""
         while (walked := self._next_read()) is not None:
             reading = self._read_one(walked, lambda: self._slices.read(walked.walk, walked.size))
             if reading is None:
@@ -96,7 +101,7 @@ class Topic:
         return True
 
     def _resume(self, until: float) -> bool:
-        """The same in a later turn; each that is through by then is told."""
+        """The same in a later turn; reports the reading if it is complete."""
         walked = self._next_read()
         if walked is not None:
             reading = self._read_one(walked, lambda: self._slices.read_until(walked.walk, until))
@@ -108,7 +113,7 @@ class Topic:
         return not self._deferred
 
     def _next_read(self) -> "_PendingRead | None":
-        """The one that is to be read now."""
+        """The message to be decoded now; None without one."""
         if self._walk is None and self._unread:
             sample = self._unread.popleft()
             data = bytes(sample.payload)
@@ -116,7 +121,7 @@ class Topic:
         return self._walk
 
     def _read_one(self, walked: "_PendingRead", read: Callable[[], Fields | None]) -> Reading | None:
-        """Its reading, which is the last then; None where it is not through."""
+        """The message's reading, kept as the last one; None if it is not complete."""
         sample = walked.sample
         try:
             fields = read()
@@ -133,7 +138,7 @@ class Topic:
 
 @dataclass(frozen=True, slots=True)
 class _PendingRead:
-    """A message that is being read, of so many bytes."""
+    """A message that is being decoded; `size` in bytes."""
 
     sample: Sample
     walk: Walk

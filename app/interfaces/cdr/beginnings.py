@@ -1,6 +1,6 @@
-"""The beginning of a value that has any size: as much of it as is ever shown.
+"""Decodes the beginning of a value of any size: as much as is ever shown.
 
-Of a list or a message so many parts are built; what comes after is not even looked at.
+Of a list or a message, at most `MAX_PARTS` parts are built; the rest is not read.
 """
 
 from collections.abc import Callable, Sequence
@@ -10,27 +10,28 @@ from app.interfaces.cdr.formats import is_number
 from app.interfaces.cdr.reader import Read
 from app.interfaces.definitions import Field, Type
 
-MAX_PARTS: Final = 1000  # parts: each is two characters at the least when it is shown
+MAX_PARTS: Final = 1000  # each is shown with two characters at least
 
 StructureFactory = Callable[
     [str], tuple[Sequence[Field], Callable[..., Any]]
-]  # a structure's fields and class
+]  # structure name → its fields and class
 
 
 class TruncatedReader:
-    """Builds one value; used once."""
+    """Decodes one value; used once."""
 
     def __init__(
         self, reader: Callable[[Type], Read], make: StructureFactory, body: "memoryview[int]"
     ) -> None:
-        """`reader` reads what is no structure, and no list of such."""
+        """`reader` returns the reader of a type that is neither a structure nor a list of
+        structures."""
         self._reader_for = reader
         self._factory = make
         self._body = body
         self._parts_left = MAX_PARTS
 
     def read(self, kind: Type, at: int) -> Any:
-        """The value that begins at a place."""
+        """The value that begins at the offset `at`."""
         return self._read_value(kind, at)[0]
 
     def _read_value(self, kind: Type, at: int) -> tuple[Any, int]:

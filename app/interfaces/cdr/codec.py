@@ -1,4 +1,4 @@
-"""Message objects to and from CDR."""
+"""Message objects to and from CDR bytes."""
 
 from collections.abc import Mapping
 from dataclasses import field, make_dataclass
@@ -13,12 +13,13 @@ from app.interfaces.cdr.steps import ReadPlans
 from app.interfaces.cdr.writer import Write, message_writer
 from app.interfaces.definitions import PLACEHOLDER, Field, Structure, Type
 
-SMALL_MESSAGE_BYTES: Final = 20_000  # have few elements
-MAX_ELEMENTS: Final = 2_000  # of a message that is read whole
+SMALL_MESSAGE_BYTES: Final = 20_000  # has few elements
+MAX_ELEMENTS: Final = 2_000  # of a message that is decoded at once
 
 
 class Codec:
-    """Serializes the structures of one set of definitions; each is prepared at its first use."""
+    """Encodes and decodes the structures of one set of definitions. Each codec is compiled at its first
+    use."""
 
     def __init__(self, structures: Mapping[str, Structure]) -> None:
         self._structures = structures
@@ -34,7 +35,8 @@ class Codec:
         return bytes(out)
 
     def deserialize(self, data: bytes, name: str) -> Any:
-        """The message object; ValueError, `struct.error` or UnicodeError where it is none."""
+        """The message object; ValueError, `struct.error` or UnicodeError if the bytes are no such
+        message."""
         if len(data) > SMALL_MESSAGE_BYTES:
             self._check_element_count(data, name)
         body, order = split_header(data)
@@ -43,7 +45,7 @@ class Codec:
         return message
 
     def _check_element_count(self, data: bytes, name: str) -> None:
-        """ValueError for a message of so many elements that building them would take its time."""
+        """ValueError for a message with too many elements to be decoded at once."""
         if name not in self._counters:
             ops = self._plans.make_program(name, Selection(), each=True)
             self._counters[name] = FieldReader(name, ops, self._fields_and_class)
@@ -54,7 +56,7 @@ class Codec:
         raise ValueError(f"it has more than {MAX_ELEMENTS} elements, which are not read at once")
 
     def field_reader(self, name: str, wanted: Selection) -> FieldReader:
-        """What reads some fields of each message of a type."""
+        """A reader of the selected fields of a type."""
         ops = self._plans.make_program(name, wanted)
         return FieldReader(name, ops, self._fields_and_class)
 

@@ -1,4 +1,4 @@
-"""What is around a message's fields: the encapsulation header before them, padding behind them."""
+"""The encapsulation header before a message's fields, and the padding after them."""
 
 from collections.abc import Mapping
 from typing import Final
@@ -15,7 +15,7 @@ ALIGNMENT: Final = 4  # bytes: a message may be padded to a multiple of it (RTPS
 
 
 def split_header(data: bytes) -> "tuple[memoryview[int], ByteOrder]":
-    """The fields of a message, and their byte order; ValueError where it does not begin as one."""
+    """(bytes of the fields, byte order) of a message; ValueError if the header is not plain CDR."""
     order = ORDERS.get(data[:2]) if len(data) >= HEADER_BYTES else None
     if order is None:
         raise ValueError("it does not begin as plain CDR does")
@@ -23,6 +23,6 @@ def split_header(data: bytes) -> "tuple[memoryview[int], ByteOrder]":
 
 
 def check_end(body: "memoryview[int]", end: int) -> None:
-    """ValueError where a message whose fields end here is longer or shorter."""
+    """ValueError unless the message ends at `end`, or after padding."""
     if len(body) != end and len(body) != end + -end % ALIGNMENT:
         raise ValueError(f"it ends at {HEADER_BYTES + end}")

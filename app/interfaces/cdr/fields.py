@@ -1,4 +1,4 @@
-"""Fields of a message by their paths, each read at its place."""
+"""Reads fields of a message by their paths, without decoding the rest."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
@@ -14,7 +14,7 @@ from app.interfaces.definitions import Type
 
 
 class Fields:
-    """What a message says at some paths. A text, a list or a message among them is read as far as it is
+    """The values of a message at some paths. Texts, lists and structures are decoded as far as they are
     ever shown."""
 
     __slots__ = ("_ambiguous", "_values")
@@ -24,16 +24,16 @@ class Fields:
         self._ambiguous = several
 
     def get(self, path: str) -> Any:
-        """The value; None where there is no such element, or more than one with its key."""
+        """The value; None if no element matches the path, or several have its key."""
         return self._values.get(path)
 
     def is_ambiguous(self, path: str) -> bool:
-        """Whether the value is not known because more than one element has its key."""
+        """Whether several elements have the path's key."""
         return path in self._ambiguous
 
 
 class Walk:
-    """One message that is being read."""
+    """One message that is being decoded, in slices."""
 
     __slots__ = ("_body", "_data", "_order", "_reader", "_scan")
 
@@ -43,8 +43,8 @@ class Walk:
         self._scan: Scan | None = None
 
     def advance(self) -> Fields | None:
-        """Reads on for some milliseconds at the most; None where it is not through then. DecodeError
-        where these bytes are no such message."""
+        """Decodes one slice, which takes some milliseconds at most; None if the message is not complete
+        yet. DecodeError if the bytes are no such message."""
         reader = self._reader
         try:
             if self._scan is None:
@@ -55,7 +55,7 @@ class Walk:
                 return None
             check_end(self._body, self._scan.at)
             return reader.collect_fields(self._scan, self._body, self._order)
-        except Exception as error:  # whatever arrived, it must not stop the panel
+        except Exception as error:  # no received bytes may stop the panel
             size = len(self._data)
             raise DecodeError(f"{size} bytes are not a {reader.type_name}: {error}") from error
 
@@ -73,18 +73,18 @@ class FieldReader:
         }
 
     def walk(self, data: bytes) -> Walk:
-        """Begins to read a message."""
+        """Starts to decode a message."""
         return Walk(self, data)
 
     def read(self, data: bytes) -> Fields:
-        """Reads it to its end; DecodeError if these bytes are no such message."""
+        """Decodes a whole message; DecodeError if the bytes are no such message."""
         walk = Walk(self, data)
         while (fields := walk.advance()) is None:
             pass
         return fields
 
     def collect_fields(self, going: Scan, body: "memoryview[int]", order: ByteOrder) -> Fields:
-        """The values, of a message that was gone through."""
+        """The values of a message that was scanned to its end."""
         values = {}
         reader = self.readers[order]
         for mark, at in going.marks.items():
@@ -100,7 +100,7 @@ class FieldReader:
 
 
 class _Readers:
-    """What reads values, by their types."""
+    """Cached value readers by type."""
 
     def __init__(self, order: ByteOrder) -> None:
         self._order = order

@@ -1,7 +1,7 @@
-"""How much room fields of a fixed size take in CDR, so that they can be passed over by arithmetic.
+"""The sizes of fixed-size fields in CDR, to skip them by arithmetic.
 
-What begins at an offset is padded to its own alignment, so its room depends on the offset modulo eight:
-a `Room` has the bytes, with padding, for each of these.
+A field is padded to its alignment, so its size depends on its offset modulo eight. `PaddedSizes` has
+the bytes, with padding, for each of these.
 """
 
 from collections.abc import Callable, Iterable
@@ -18,7 +18,7 @@ NO_SIZE: Final[PaddedSizes] = (0,) * PHASES
 
 
 def padded_sizes(kind: Type, fields: FieldsOf) -> PaddedSizes | None:
-    """The room of a field; None where it has no fixed size."""
+    """The padded sizes of a field; None if it has no fixed size."""
     if kind.container == "sequence":
         return None
     if is_number(kind):
@@ -31,7 +31,7 @@ def padded_sizes(kind: Type, fields: FieldsOf) -> PaddedSizes | None:
 
 
 def combined_sizes(kinds: Iterable[Type], fields: FieldsOf) -> PaddedSizes | None:
-    """The room of several fields, one after the other."""
+    """The padded sizes of consecutive fields; None if one has no fixed size."""
     whole = NO_SIZE
     for kind in kinds:
         room = padded_sizes(kind, fields)
@@ -48,8 +48,8 @@ def concatenated(one: PaddedSizes, next_one: PaddedSizes) -> PaddedSizes:
 
 
 def end_offset(room: PaddedSizes, at: int, count: int) -> int:
-    """Where `count` elements end that begin at `at`, one after the other: the padding repeats itself
-    after eight of them at most."""
+    """The end offset of `count` consecutive elements that begin at `at`. The padding repeats after
+    eight elements at most."""
     starts: dict[int, int] = {}  # phase → how many elements were before the one that began with it
     ends: list[int] = []
     for number in range(count):

@@ -1,7 +1,7 @@
-"""From CDR bytes to values. What is no such message raises ValueError or `struct.error`.
+"""Decodes CDR bytes. Malformed bytes raise ValueError or `struct.error`.
 
-A reader is made once per structure and byte order, as nested closures. Lists of numbers are views of
-what came, not copies: an image costs no more than its header.
+A reader is compiled once for each structure and byte order, as nested closures. Lists of numbers are
+views of the received bytes, not copies: an image costs no more than its header.
 """
 
 import sys
@@ -15,15 +15,15 @@ from app.interfaces.cdr.formats import FORMATS, LENGTH_BYTES, SIZES, group_runs,
 from app.interfaces.definitions import Field, Type
 
 ByteOrder = Literal["<", ">"]  # little-endian, big-endian; as `struct` names them
-Read = Callable[["memoryview[int]", int], tuple[Any, int]]  # bytes, where → value, where it ends
+Read = Callable[["memoryview[int]", int], tuple[Any, int]]  # (bytes, offset) → (value, end offset)
 ReadStep = Callable[
     ["memoryview[int]", int, list[Any]], int
-]  # the same; the values are added to a list
+]  # (bytes, offset, list to append values to) → end offset
 
 NATIVE: Final[ByteOrder] = "<" if sys.byteorder == "little" else ">"
 MIN_STRING_BYTES: Final = LENGTH_BYTES + 1
 MAX_UTF16_UNIT: Final = 0xFFFF  # of UTF-16
-MAX_TEXT: Final = 50_000  # bytes or units that are read of one value
+MAX_TEXT: Final = 50_000  # bytes or UTF-16 units that are decoded of one value
 ELLIPSIS: Final = "…"
 BOOLS: Final = b"\0\1"
 # `struct` takes any byte for a bool: as a number it can be checked.
@@ -33,7 +33,7 @@ _FORMATS_READ: Final = {**FORMATS, "bool": "B"}
 def message_reader(
     fields: Sequence[Field], make: Callable[..., Any], order: ByteOrder, nested: Callable[[str], Read]
 ) -> Read:
-    """Reads a whole structure; `nested` finds the reader of another one."""
+    """The reader of a structure; `nested` returns the reader of another structure by name."""
     steps = [_field_step(run, order, nested) for run in group_runs(fields)]
 
     def read(data: "memoryview[int]", at: int) -> tuple[Any, int]:
@@ -46,7 +46,7 @@ def message_reader(
 
 
 def value_reader(kind: Type, order: ByteOrder) -> Read:
-    """Reads a value that is no structure: a number, a bool, a list of them, the beginning of a text."""
+    """The reader of a number, a bool, a list of them, or the beginning of a text."""
     if not is_number(kind):
         return (_string_reader if kind.name == "string" else _wstring_reader)(order, MAX_TEXT)
     if kind.container != "one":
@@ -96,7 +96,7 @@ def _numbers_step(kinds: Sequence[Type], order: ByteOrder) -> ReadStep:
 
 
 def _to_bool(byte: int) -> bool:
-    """CDR has 0 and 1 only: whoever sends something else may mean anything."""
+    """ValueError for a byte that is not 0 or 1, the only bools of CDR."""
     if byte > 1:
         raise ValueError(f"a bool is {byte}, not 0 or 1")
     return byte == 1
@@ -141,7 +141,7 @@ def _number_list_reader(kind: Type, order: ByteOrder) -> Read:
 
 
 def _view_numbers(data: "memoryview[int]", form: Any, order: ByteOrder) -> Any:
-    """A list of numbers as `struct` names their format."""
+    """A view of a list of numbers; `form` is their format character."""
     if form == "?":
         for byte in bytes(data).translate(None, BOOLS)[:1]:
             _to_bool(byte)
@@ -154,7 +154,7 @@ def _view_numbers(data: "memoryview[int]", form: Any, order: ByteOrder) -> Any:
 
 
 def _count_reader(kind: Type, order: ByteOrder) -> Read:
-    """How many elements come: as many as an array has, or as it says before a sequence."""
+    """The reader of the number of elements: fixed for an array, before the elements of a sequence."""
     if kind.container == "array":
         return lambda _, at: (kind.size, at)
     return _length_reader(order)
@@ -171,8 +171,8 @@ def _length_reader(order: ByteOrder) -> Read:
 
 
 def _string_reader(order: ByteOrder, most: int | None = None) -> Read:
-    """Of a "string": UTF-8 with a NUL at its end, which counts. Of more than `most` bytes these, with a
-    mark that something is missing."""
+    """The reader of a "string": UTF-8 with a terminating NUL, which counts. A longer text is cut to
+    `most` bytes and ends with `ELLIPSIS`."""
     length = _length_reader(order)
 
     def text(data: "memoryview[int]", at: int) -> tuple[str, int]:
@@ -188,8 +188,9 @@ def _string_reader(order: ByteOrder, most: int | None = None) -> Read:
 
 
 def _wstring_reader(order: ByteOrder, most: int | None = None) -> Read:
-    """Of a "wstring": a count of UTF-16 units, each in four bytes, no terminator and no byte order
-    mark (so do rmw_fastrtps and rmw_cyclonedds; source: rosidl_typesupport_fastrtps, and tried)."""
+    """The reader of a "wstring": a count of UTF-16 units, each in four bytes, without terminator and
+    byte order mark (as in rmw_fastrtps and rmw_cyclonedds; source: rosidl_typesupport_fastrtps, and
+    tried)."""
     length = _length_reader(order)
 
     def text(data: "memoryview[int]", at: int) -> tuple[str, int]:

@@ -1,7 +1,7 @@
-"""Going through a message for what is wanted of it, without building the rest.
+"""Scans a message for selected fields, without building the rest.
 
-However long a message is, some hundred elements at a time: between them something else may be done.
-All of the message is passed over, so that what is too short or too long is never taken for one.
+A long message is scanned in slices of some hundred elements. The whole message is scanned, so that one
+that is too short or too long is detected.
 """
 
 from array import array
@@ -16,14 +16,14 @@ from app.interfaces.cdr.selection import Lookup
 from app.interfaces.cdr.steps import Choice, Mark, Op, Step
 from app.interfaces.definitions import Type
 
-ReaderFor = Callable[[Type], Read]  # what reads a value of a type
-Hits = dict[Any, list[tuple[int, int]]]  # a key's value → (number, place) of the elements that have it
-Position = tuple[int, int]  # the place that is gone to, and the step
+ReaderFor = Callable[[Type], Read]
+Hits = dict[Any, list[tuple[int, int]]]  # a key's value → (index, offset) of the elements that have it
+Position = tuple[int, int]  # (offset, step) to continue at
 
 SLICE_ELEMENTS: Final = 100  # elements
-MAX_HITS: Final = 2  # elements of one key: several
+MAX_HITS: Final = 2  # of one key: two are ambiguous
 
-# The steps that most elements have.
+# The most frequent steps.
 TEXT: Final = Step.TEXT
 PASS: Final = Step.PASS
 NEXT: Final = Step.NEXT
@@ -35,8 +35,8 @@ END: Final = Step.END
 
 @dataclass(slots=True)
 class _ListScan:
-    """A list whose elements are looked at, `start` is where the one of this index begins. Then those
-    `chosen` are read (places and steps), and it goes on at `resume`."""
+    """A list whose elements are scanned; the element `index` begins at the offset `start`. Then the
+    `chosen` ones are read (offset, step), and the scan continues at `resume`."""
 
     choice: Choice
     indexes: Mapping[int, int]
@@ -52,8 +52,8 @@ class _ListScan:
 
 
 class Scan:
-    """One time through one message: by `at` it is now, in the end where the message ends. `marks` are
-    the places where what is wanted begins, `several` the paths whose key more than one element has."""
+    """A scan of one message. `at` is the current offset, finally that of the message's end. `marks` are
+    the offsets of the selected fields, `ambiguous` the paths whose key several elements have."""
 
     __slots__ = (
         "_body", "_counts", "_hits", "_loops", "_ops", "_reader", "_step", "_words", "ambiguous", "at",
@@ -67,7 +67,7 @@ class Scan:
         self._body = body
         self._words = _as_words(body, order)
         self._reader = reader
-        self._loops: list[Any] = []  # elements to come, or `_Looking`
+        self._loops: list[Any] = []  # remaining elements, or `_ListScan`
         self._hits: dict[Lookup, Hits] = {}
         self._counts: dict[Lookup, int] = {}
         self._step = 0
@@ -76,8 +76,8 @@ class Scan:
         self.ambiguous: set[str] = set()
 
     def advance(self) -> bool:
-        """Goes over a slice; whether that was the last. ValueError or IndexError where the bytes are no
-        such message."""
+        """Scans a slice; returns whether the message is complete. ValueError or IndexError if the bytes
+        are no such message."""
         ops, body, words, loops = self._ops, self._body, self._words, self._loops
         at, step = self.at, self._step
         left = SLICE_ELEMENTS
@@ -124,7 +124,7 @@ class Scan:
         return False
 
     def _read_count(self, at: int, least: int) -> tuple[int, int]:
-        """How many elements come, which must have their bytes, and where the first begins."""
+        """(number of elements, offset of the first); ValueError if there are not enough bytes."""
         at = (at + 3) & -LENGTH_BYTES
         count = self._words[at >> 2]
         at += LENGTH_BYTES
@@ -204,7 +204,7 @@ class Scan:
         return at, looking.choice.body
 
     def _end_list(self, at: int) -> Position:
-        """Each element was looked at: those with the keys are chosen too."""
+        """All elements were scanned: chooses those with the keys."""
         looking: _ListScan = self._loops[-1]
         if looking.resume is None:
             looking.resume = at
@@ -215,7 +215,7 @@ class Scan:
         return self._next_chosen(at, 0, None)
 
     def _next_chosen(self, _at: int, _step: int, _: None) -> Position:
-        """On to the next one that was chosen, or behind the list."""
+        """The next chosen element, or the end of the list."""
         looking: _ListScan = self._loops[-1]
         if looking.chosen:
             return looking.chosen.pop()
@@ -224,7 +224,8 @@ class Scan:
         return looking.resume, looking.choice.after
 
     def _choose_by_sibling(self, at: int, _: int, choice: Choice) -> Position:
-        """Elements of a list by what the one beside it says; both must be equally long."""
+        """Chooses elements of a list by the values of a list beside it, which must have the same
+        length."""
         assert choice.key is not None
         assert choice.mark is not None
         indexes = {index: step for index, _, step in self._elements_by_key(choice.key, choice)}
@@ -235,7 +236,7 @@ class Scan:
         return self._begin_list(place, choice, indexes, at)
 
     def _elements_by_key(self, key: Lookup, choice: Choice) -> list[tuple[int, int, int]]:
-        """(index, place, step) of each element that alone has what it is chosen by."""
+        """(index, offset, step) of each element that is the only one with its key."""
         chosen = []
         hits = self._hits.get(key, {})
         for value, step in choice.by_lookup[key].items():
@@ -261,7 +262,7 @@ HANDLERS: Final[Mapping[Step, Callable[[Scan, int, int, Any], Position]]] = {
 
 
 def _as_words(body: "memoryview[int]", order: ByteOrder) -> Sequence[int]:
-    """All that may be the length of something."""
+    """The message as 32-bit words: any of them may be a length."""
     whole = body[: len(body) & -LENGTH_BYTES]
     if order == NATIVE:
         return whole.cast("I")

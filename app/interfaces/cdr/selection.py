@@ -1,4 +1,4 @@
-"""Which fields of a message are wanted: their paths resolved against a type, as a tree."""
+"""The selected fields of a message: paths resolved against a type, as a tree."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -17,15 +17,15 @@ Structures = Mapping[str, Structure]
 
 @dataclass(eq=False, slots=True)
 class Lookup:
-    """What is compared with a key: the field of that type of each element of a list."""
+    """A field of each element of a list, to be compared with the values of keys."""
 
     type: Type
     values: set[Any] = field(default_factory=set)
-    texts: dict[bytes, str] = field(default_factory=dict)  # as they lie in a message
-    sizes: set[int] = field(default_factory=set)  # with their lengths before them
+    texts: dict[bytes, str] = field(default_factory=dict)  # as encoded in a message
+    sizes: set[int] = field(default_factory=set)  # of encoded texts, with their length fields
 
     def prepare(self) -> None:
-        """Texts are compared without being decoded."""
+        """Encodes the texts: they are compared without decoding."""
         if self.type.name == "string":
             self.texts = {f"{value}\0".encode(): value for value in self.values}
             self.sizes = {LENGTH_BYTES + len(text) for text in self.texts}
@@ -33,10 +33,10 @@ class Lookup:
 
 @dataclass(eq=False, slots=True)
 class Selection:
-    """A field on the way to what is wanted, or wanted itself: `paths` then says for which.
+    """A node of the tree. `paths` are those that end here.
 
-    Of a list, elements are chosen by their index, by a field of theirs (`keys`: path of that field →
-    value → element) or by the list of this name beside it (`beside`).
+    Elements of a list are selected by index (`by_index`), by a field of theirs (`by_field`: path of
+    that field → value → element) or by the list of this name beside it (`by_sibling`).
     """
 
     paths: list[str] = field(default_factory=list)
@@ -44,10 +44,10 @@ class Selection:
     by_index: "dict[int, Selection]" = field(default_factory=dict)
     by_field: "dict[str, dict[Any, Selection]]" = field(default_factory=dict)
     by_sibling: "dict[str, dict[Any, Selection]]" = field(default_factory=dict)
-    lookup: Lookup | None = None  # it is a key itself
+    lookup: Lookup | None = None  # if it is a key itself
 
     def all_paths(self) -> Iterable[str]:
-        """The paths of all that is wanted in it."""
+        """The paths that end here or below."""
         yield from self.paths
         chosen = (*self.by_field.values(), *self.by_sibling.values())
         inner = chain(self.fields.values(), self.by_index.values(), *(one.values() for one in chosen))
@@ -62,7 +62,7 @@ class Resolver:
         self._structures = structures
 
     def select(self, type_name: str, paths: Iterable[str]) -> Selection:
-        """The tree of these paths; InterfaceError where the type has no such field."""
+        """The tree of these paths; InterfaceError if the type has no such field."""
         root = Selection()
         for path in paths:
             self._add_path(root, Type(type_name), path)
@@ -104,7 +104,7 @@ class Resolver:
         return node.by_sibling.setdefault(key.path, {}).setdefault(value, Selection())
 
     def _key_type(self, element: Type, path: str) -> Type | None:
-        """The type of a single field in an element; None where there is none of this name."""
+        """The type of a field of an element; None if it does not exist."""
         at = element
         for name in path.split("."):
             found = next((one.type for one in self._fields(at) if one.name == name), None)
@@ -114,7 +114,7 @@ class Resolver:
         return at
 
     def _key_value(self, key: Key, kind: Type, holder: str, path: str) -> Any:
-        """The key's value as the field has it; of whole numbers a constant's name too."""
+        """The key's value with the field's type; for an integer field also by a constant's name."""
         what = f'"{key.path}" (in "{path}") is {kind}'
         if kind.is_nested or kind.container != "one" or kind.name in FLOAT_TYPES:
             raise InterfaceError(f"{what}: a key is a text, a whole number or a bool")

@@ -1,7 +1,6 @@
-"""What a reader does with the bytes of a message, step by step: passes over what is not wanted, notes
-where what is wanted begins.
+"""The steps of a scan: skip fields that are not selected, mark those that are.
 
-A program is flat, so that `reading` can stop anywhere and go on later.
+A program is a flat list of steps, so that a scan can stop anywhere and continue later.
 """
 
 from collections.abc import Callable, Mapping
@@ -16,7 +15,7 @@ from app.interfaces.definitions import STRING_TYPES, Type
 
 
 class Step(IntEnum):
-    """The steps, each with what it is about."""
+    """The kinds of steps, with their operands."""
 
     PASS = auto()  # a Room
     TEXT = auto()
@@ -26,19 +25,19 @@ class Step(IntEnum):
     ALIKE = auto()  # a Room: a sequence of such elements
     EACH = auto()  # a sequence: the step after its elements, and the least bytes of one
     TIMES = auto()  # an array: how many elements
-    NEXT = auto()  # an element is over: the first step of the next one
-    NOTE = auto()  # a Mark: what begins here
+    NEXT = auto()  # the end of an element: the first step of the next one
+    NOTE = auto()  # a Mark of this offset
     CHOOSE = auto()  # a Choice, of elements of the list that begins here
-    COMPARE = auto()  # a Lookup, with the key that is here
-    CHOSEN = auto()  # an element of a Choice was looked at
-    DONE = auto()  # a chosen element was read
-    BESIDE = auto()  # a Choice, of elements of a list that was passed over before
+    COMPARE = auto()  # a Lookup to compare with the value here
+    CHOSEN = auto()  # the end of a scanned element of a Choice
+    DONE = auto()  # the end of a chosen element
+    BESIDE = auto()  # a Choice, of elements of a list that was skipped before
     END = auto()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mark:
-    """A place: of a field that is wanted (for `paths`), or of a list."""
+    """The place of a selected field (of `paths`), or of a list."""
 
     type: Type
     paths: tuple[str, ...] = ()
@@ -46,11 +45,12 @@ class Mark:
 
 @dataclass(slots=True, eq=False)
 class Choice:
-    """Elements of a list that are wanted: the first step of each one's own, by index or by what a key
-    of theirs says; `body` and `after` are the steps that look at one, and those after the list.
+    """Selected elements of a list: index → step, and lookup → value → step. `body` is the first step of
+    the scan of an element, `after` the first one after the list.
 
-    `count` is that of an array, None of a sequence; `room` of an element where nothing in it is looked
-    at. Of a list beside another one `place` is where it began, and `key` what was found in the other.
+    `count` is that of an array, None for a sequence. `sizes` are those of an element whose content is
+    not scanned. For a list selected by another one, `mark` is where it begins and `key` the lookup in
+    the other.
     """
 
     count: int | None
@@ -70,14 +70,14 @@ Op = tuple[Step, Any, Any]
 
 
 class ReadPlans:
-    """Makes the programs of one set of definitions."""
+    """Compiles the programs of one set of definitions."""
 
     def __init__(self, fields: FieldsOf) -> None:
         self._fields = fields
         self._known_sizes: dict[Type, PaddedSizes | None] = {}
 
     def make_program(self, type_name: str, wanted: Selection, each: bool = False) -> tuple[Op, ...]:
-        """Of a whole message; `each`: each element of its lists is gone to, but for numbers."""
+        """The program of a message. `each`: every element of its lists is a step, except numbers."""
         made = _ProgramBuilder(self._fields, self._sizes if not each else self._sizes_of_numbers)
         made.add_structure(type_name, wanted)
         made.add(Step.END)
@@ -93,7 +93,7 @@ class ReadPlans:
 
 
 class _ProgramBuilder:
-    """One program; a run of fields of fixed sizes is one step."""
+    """Builds one program. Consecutive fields of fixed sizes are one step."""
 
     def __init__(self, fields: FieldsOf, room: Callable[[Type], PaddedSizes | None]) -> None:
         self.steps: list[Op] = []
@@ -107,7 +107,7 @@ class _ProgramBuilder:
 
     @property
     def _next_step(self) -> int:
-        """The next step."""
+        """The number of the next step."""
         self._flush()
         return len(self.steps)
 
@@ -117,7 +117,8 @@ class _ProgramBuilder:
             self._pending = NO_SIZE
 
     def add_structure(self, type_name: str, wanted: Selection | None, in_list: bool = False) -> None:
-        """Its fields, and what is chosen by lists beside others when all have been passed."""
+        """Adds the fields of a structure, then the elements that are selected by lists beside
+        theirs."""
         inner = {} if wanted is None else wanted.fields
         keys = _keys_beside(inner, {one.name: one.type for one in self._fields(type_name)})
         places: dict[str, Mark] = {}
@@ -150,7 +151,7 @@ class _ProgramBuilder:
             self._skip(kind, in_list)
 
     def _skip(self, kind: Type, in_list: bool) -> None:
-        """What nothing is wanted of. A bool that is no bool is seen, but for those in lists."""
+        """Skips a field. A malformed bool is detected, except in lists."""
         if kind == Type("bool") and not in_list:
             self.add(Step.BOOL)
         elif kind.container == "one" and kind.is_nested and not in_list:
@@ -178,7 +179,7 @@ class _ProgramBuilder:
             self.steps[at] = (Step.EACH, self._next_step, min_size(kind.element))
 
     def _select_elements(self, kind: Type, wanted: Selection, key: Lookup | None) -> None:
-        """A list of which elements are wanted, by their indexes or keys, or which is a key itself."""
+        """Adds a list with selected elements, or one that is a key itself."""
         looked = Selection(lookup=key)
         found: dict[Lookup, Mapping[Any, Selection]] = {}
         for path, values in wanted.by_field.items():
@@ -204,7 +205,7 @@ class _ProgramBuilder:
         wanted: Selection,
         looked: Selection | None = None,
     ) -> None:
-        """The steps that look at each element, and those of each one that is chosen."""
+        """Adds the steps that scan each element, and those of each selected one."""
         self.add(do, choice)
         choice.body = self._next_step
         if choice.sizes is None:
@@ -227,7 +228,7 @@ class _ProgramBuilder:
 
 
 def _keys_beside(inner: Mapping[str, Selection], types: Mapping[str, Type]) -> dict[str, Lookup]:
-    """The lists by which elements of others beside them are chosen."""
+    """The lists by which elements of lists beside them are selected."""
     keys: dict[str, Lookup] = {}
     for one in inner.values():
         for name, values in one.by_sibling.items():
@@ -242,7 +243,7 @@ def _descend(node: Selection, path: str) -> Selection:
 
 
 def min_size(element: Type) -> int:
-    """The bytes that an element has at the least."""
+    """The smallest encoded size of an element, in bytes."""
     return (
         LENGTH_BYTES + 1
         if element.name == "string"

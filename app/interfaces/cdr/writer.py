@@ -1,4 +1,4 @@
-"""From checked values to CDR bytes, little-endian. A writer is made once per structure."""
+"""Encodes checked values as little-endian CDR. A writer is compiled once for each structure."""
 
 from collections.abc import Callable, Sequence
 from struct import Struct, pack, unpack
@@ -7,13 +7,13 @@ from typing import Any, Final
 from app.interfaces.cdr.formats import FORMATS, HEADER_BYTES, LENGTH_BYTES, SIZES, group_runs, is_number
 from app.interfaces.definitions import Field, Type
 
-Write = Callable[[bytearray, Any], None]  # what is written so far, and a value that is added to it
+Write = Callable[[bytearray, Any], None]  # (output, value to append)
 
 _COUNT: Final = Struct("<I")
 
 
 def message_writer(fields: Sequence[Field], nested: Callable[[str], Write]) -> Write:
-    """Writes a message object; `nested` finds the writer of another structure."""
+    """The writer of a message object; `nested` returns the writer of a structure by name."""
     steps = [_field_step(run, nested) for run in group_runs(fields)]
 
     def write(out: bytearray, message: Any) -> None:
@@ -86,7 +86,7 @@ def _write_string(out: bytearray, text: str) -> None:
 
 
 def _write_wstring(out: bytearray, text: str) -> None:
-    """As `decoding` reads it: four bytes for each UTF-16 unit."""
+    """Four bytes for each UTF-16 unit, see `reader`."""
     content = text.encode("utf-16-le")
     count = len(content) // 2
     _write_count(out, count)
@@ -99,5 +99,5 @@ def _write_count(out: bytearray, count: int) -> None:
 
 
 def _align(out: bytearray, size: int) -> None:
-    """Up to the next multiple of `size` behind the header, with zeros."""
+    """Pads with zeros to the next multiple of `size` after the header."""
     out.extend(bytes((HEADER_BYTES - len(out)) % size))

@@ -1,4 +1,4 @@
-"""What can be wrong in an interlock whose shape is right: its field, and conditions that never hold."""
+"""Checks of interlocks: the field's type, and conditions that can't be met."""
 
 import math
 import re
@@ -23,7 +23,7 @@ BEST_EFFORT: Final = (
     "is missing: of a best-effort topic any message may be lost, the one that forbids too; "
     "give the age in seconds after which it locks"
 )
-EXCLUSIVE_CONDITIONS: Final = ("equals", "one_of")  # beside them nothing else has a meaning
+EXCLUSIVE_CONDITIONS: Final = ("equals", "one_of")  # exclude all other conditions
 UNCONDITIONED: Final = (
     "an interlock needs a bool, or conditions: equals, not_equals, min and max, or one_of"
 )
@@ -67,7 +67,7 @@ def _condition_faults(
 def _value_faults(
     place: str, interlock: Interlock, kind: Type, interfaces: Interfaces
 ) -> Iterator[Fault]:
-    """Each value has to be one that the field can have."""
+    """Faults of values that the field can't have."""
     type_name = parent_type(interlock, interfaces)
     constants = interfaces.constants(type_name)
     for key, given in interlock.conditions.items():
@@ -96,7 +96,7 @@ def _number_only_fault(place: str, key: str, interlock: Interlock, kind: Type) -
 
 
 def _value_mismatch(value: Any, kind: Type) -> str | None:
-    """Why the field never has this value."""
+    """Why the field can't have this value; None if it can."""
     try:
         scalar_check(kind)(value)
     except FieldError as error:

@@ -1,5 +1,5 @@
-"""What can be wrong in a panel file whose shape is right: what each widget checks itself, and names,
-types and topics across widgets."""
+"""Checks of a panel file with valid keys and values: those of each widget, and ids, types and topics
+across widgets."""
 
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from itertools import islice
@@ -19,9 +19,10 @@ from app.panel.widgets.publish import Confirm, SinglePublish
 
 
 def find_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = ()) -> Iterator[Fault]:
-    """Every fault of names, types and templates; of each message the first that its type has.
+    """All faults of names, types and templates; at most one for each message.
 
-    `faulty` are ids of widgets whose faults are told already: what depends on them is not judged.
+    `faulty` are the ids of widgets whose faults are reported already: checks that depend on them are
+    skipped.
     """
     yield from _required_type_faults(panel, interfaces)
     yield from _robot_faults(panel)
@@ -30,22 +31,22 @@ def find_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = 
     yield from _duplicate_ids("page", [page.id for page in panel.pages])
     ids, inputs = list(_id_faults(panel)), list(_input_faults(panel, interfaces))
     yield from (*ids, *inputs)
-    told = [fault.place for fault in (*ids, *inputs)]
+    reported = [fault.place for fault in (*ids, *inputs)]
     faulty = {
         *faulty,
-        *(widget.id for place, widget in _widgets_with_places(panel) if _contains_any(place, told)),
+        *(widget.id for place, widget in _widgets_with_places(panel) if _contains_any(place, reported)),
     }
-    judged = [*_interlock_faults(panel, interfaces), *_widget_faults(panel, interfaces, faulty)]
+    found = [*_interlock_faults(panel, interfaces), *_widget_faults(panel, interfaces, faulty)]
     missed = {"interlock" if fault.place.startswith("interlock") else "input" for fault in ids}
-    judged = [fault for fault in judged if fault.cause.partition(" ")[0] not in missed]
-    yield from judged
-    yield from _topic_conflicts(panel, [fault.place for fault in judged])
+    found = [fault for fault in found if fault.cause.partition(" ")[0] not in missed]
+    yield from found
+    yield from _topic_conflicts(panel, [fault.place for fault in found])
     yield from type_faults((at, w) for at, w in _widgets_with_places(panel) if isinstance(w, Parameter))
     yield from _record_faults(panel)
 
 
 def _id_faults(panel: Panel) -> Iterator[Fault]:
-    """Ids that can't be: what is meant by such a one may be missed elsewhere by its right name."""
+    """Faults of ids. Their items may be missing elsewhere under the correct id."""
     yield from _duplicate_ids("interlock", [interlock.id for interlock in panel.interlocks])
     yield from _duplicate_widget_ids(panel)
     for place, widget in _widgets_with_places(panel):
@@ -53,20 +54,20 @@ def _id_faults(panel: Panel) -> Iterator[Fault]:
             yield Fault(f"{place}.id", f'"{NOW}" is reserved, as {NOW_RULE}: choose another id')
 
 
-def _contains_any(place: str, told: Iterable[str]) -> bool:
-    """Whether one of the places told is in another one."""
-    return any(each.startswith(f"{place}.") for each in told)
+def _contains_any(place: str, places: Iterable[str]) -> bool:
+    """Whether `place` contains one of `places`."""
+    return any(each.startswith(f"{place}.") for each in places)
 
 
 def _widgets_with_places(panel: Panel) -> Iterator[tuple[str, BaseWidget]]:
-    """Every widget, with its place."""
+    """(place, widget) of every widget."""
     for p, page in enumerate(panel.pages):
         yield from ((f"page[{p}].widget[{w}]", widget) for w, widget in enumerate(page.widgets))
 
 
 def _required_type_faults(panel: Panel, interfaces: Interfaces) -> Iterator[Fault]:
-    """The first type that the kiosk needs for this panel and can't use: a folder of interfaces may have
-    these types too, and files of them that are wrong."""
+    """A fault for the first type that the server needs and can't use. A folder of interfaces may define
+    such a type incorrectly."""
     of_kinds = (name for widget in panel.widgets() for name in widget.required_types)
     for name in dict.fromkeys((ROSOUT, *of_kinds)):
         try:
@@ -85,7 +86,7 @@ def _check_context(
     widgets: Sequence[BaseWidget] = (),
     faulty: Collection[str] = (),
 ) -> CheckContext:
-    """What the widgets of a page are checked against."""
+    """The context for the checks of a page's widgets."""
     return CheckContext(
         interfaces,
         inputs={w.id: w for w in widgets if isinstance(w, Input)},
@@ -117,7 +118,7 @@ def _widget_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str]
 
 
 def _record_faults(panel: Panel) -> Iterator[Fault]:
-    """What is recorded is what the panel listens to anyway."""
+    """Faults of recorded topics that the panel does not subscribe to."""
     known = panel.subscriptions()
     for t, topic in enumerate((panel.record and panel.record.topics) or ()):
         if topic not in known:
@@ -126,7 +127,7 @@ def _record_faults(panel: Panel) -> Iterator[Fault]:
 
 
 def _robot_faults(panel: Panel) -> Iterator[Fault]:
-    """Several robots are told apart by id, by name and by where their topics are."""
+    """Faults of robots: each needs its own id, name, and namespace or endpoints."""
     yield from _duplicate_ids("robot", [robot.id for robot in panel.robots])
     if panel.robots and panel.namespace:
         yield Fault("namespace", "is of the one robot: with [[robot]] each has its own")
@@ -137,7 +138,8 @@ def _robot_faults(panel: Panel) -> Iterator[Fault]:
 def _duplicate_robot_faults(
     place: str, robot: RobotEntry, others: Sequence[RobotEntry]
 ) -> Iterator[Fault]:
-    """What it has as another one. A copy, which has the same id, is told elsewhere."""
+    """Faults of a robot with the name or the address of another one. An equal id is reported
+    elsewhere."""
     for a, above in enumerate(others if robot.id not in [one.id for one in others] else ()):
         if robot.name == above.name:
             yield Fault(f"{place}.name", f'"{robot.name}" is already the name of robot[{a}]')
@@ -158,14 +160,14 @@ def _duplicate_widget_ids(panel: Panel) -> Iterator[Fault]:
     for p, page in enumerate(panel.pages):
         for w, widget in enumerate(page.widgets):
             place = f"page[{p}].widget[{w}]"
-            if widget.id in seen and page.id not in ids[:p]:  # of a page's copy that is told
+            if widget.id in seen and page.id not in ids[:p]:  # not in a page with a duplicate id
                 yield Fault(f"{place}.id", f'"{widget.id}" is already the id of {seen[widget.id]}')
             seen.setdefault(widget.id, place)
 
 
-def _topic_conflicts(panel: Panel, told: Sequence[str]) -> Iterator[Fault]:
-    """A topic has one type and one QoS, wherever the panel names it. Where a fault of either place is
-    `told` already, its type may be the mistake."""
+def _topic_conflicts(panel: Panel, reported: Sequence[str]) -> Iterator[Fault]:
+    """Faults of topics with several types or QoS in the panel. Places that are `reported` already are
+    skipped: their type may be the mistake."""
     places: list[tuple[str, Interlock | TopicWidget | Confirm]] = []
     confirms: list[tuple[str, Confirm]] = []
     places += [(f"interlock[{i}]", one) for i, one in enumerate(panel.interlocks)]
@@ -178,12 +180,12 @@ def _topic_conflicts(panel: Panel, told: Sequence[str]) -> Iterator[Fault]:
     for place, one in (*places, *confirms):
         above, first = firsts.setdefault(one.topic, (place, one))
         if one.type != first.type:
-            if not _contains_any(place, told) and not _contains_any(above, told):
+            if not _contains_any(place, reported) and not _contains_any(above, reported):
                 what = f"{one.topic} is {one.type} here but {first.type} above"
                 yield Fault(f"{place}.type", what, cause=f"topic {one.topic}")
             continue
         if isinstance(one, Confirm) or isinstance(first, Confirm):
-            continue  # it takes the topic's, whatever that is
+            continue  # it has no QoS of its own
         if one.qos != first.qos:
             what = f"{one.topic} has another QoS at {above}: a topic has one"
             yield Fault(f"{place}.qos", what, cause=f"topic {one.topic}")

@@ -1,4 +1,4 @@
-"""Templates tried at load, with examples of what their inputs give."""
+"""Checks templates by encoding them with example values of their inputs."""
 
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import suppress
@@ -17,8 +17,7 @@ ON_OTHER_PAGE: Final = " on this page: an input is read from the page it is on"
 def template_faults(
     place: str, template: Mapping[str, Any], type_name: str, checking: CheckContext
 ) -> Iterator[Fault]:
-    """The first fault of a template for a type, at `place`. One that names an input that is faulty is
-    not tried: that is told already."""
+    """The faults of a template for a type, at `place`. A template with a faulty input is not tried."""
     interfaces, inputs = checking.interfaces, checking.inputs
     try:
         names = list(placeholders(template))
@@ -33,7 +32,7 @@ def template_faults(
 
 
 def example_values(inputs: Mapping[str, Input]) -> Iterator[dict[str, Any]]:
-    """Values of inputs by their ids, with each example of each once at least."""
+    """Values of inputs by id; each example of each input appears at least once."""
     tried = {name: one.examples() for name, one in inputs.items()}
     for turn in range(max(map(len, tried.values()), default=1)):
         yield {name: some[min(turn, len(some) - 1)] for name, some in tried.items()}
@@ -55,7 +54,8 @@ def _misplaced_now_faults(
     names: list[tuple[str, str]],
     interfaces: Interfaces,
 ) -> Iterator[Fault]:
-    """`"{now}"` alone, where a time is meant. A field that the type does not have is told elsewhere."""
+    """Faults of `"{now}"` that is not alone, or not in a time field. An unknown field is reported
+    elsewhere."""
     for where in (where for where, name in names if name == NOW):
         with suppress(InterfaceError):
             kind = interfaces.field_type(type_name, where)
@@ -75,7 +75,7 @@ def _encoding_faults(
             interfaces.encode(type_name, fill(template, add_now(values)))
         except FieldError as error:
             message = _fault_message(error, template, type_name, inputs, values, interfaces)
-            # An input that does not fit may be in several messages.
+            # The same input may be in several messages.
             cause = f"value {message}" if message.startswith("input ") else ""
             yield Fault(f"{place}.{error.field}".rstrip("."), message, cause=cause)
             return
@@ -89,14 +89,14 @@ def _fault_message(
     values: Mapping[str, Any],
     interfaces: Interfaces,
 ) -> str:
-    """What is wrong, by the input that gave it and the type that the field has."""
+    """The fault's message, with the input that caused it and the field's type."""
     written = value_at(template, error.field)
     names = [name for _, name in placeholders(written)] if isinstance(written, str) else []
     if not names:
         return error.message
     try:
         field = interfaces.field_type(type_name, error.field)
-    except InterfaceError:  # what is written there is no field
+    except InterfaceError:  # the template has an unknown field
         return error.message
     if written != f"{{{names[0]}}}":
         return error.message if _detail(error) else f'"{written}" makes text; the field is {field}'
@@ -106,5 +106,5 @@ def _fault_message(
 
 
 def _detail(error: FieldError) -> str:
-    """What the types alone do not say: a range, a length."""
+    """The details of an error that is not about the type: a range, a length."""
     return "" if error.message.startswith("must be") else f": {error.message}"

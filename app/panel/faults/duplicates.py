@@ -1,4 +1,4 @@
-"""One fault for one mistake, though it shows in many places."""
+"""Merges faults with one cause."""
 
 import re
 from collections.abc import Iterable
@@ -12,7 +12,7 @@ OWNER: Final = re.compile(r"page\[[0-9]+\]\.widget\[[0-9]+\]\.")
 
 
 def merge_duplicates(faults: Iterable[Fault]) -> list[Fault]:
-    """Of faults with one cause the first, which tells of the others."""
+    """The first fault of each cause, with the places of the others in its message."""
     groups: dict[str, list[Fault]] = {}
     for number, fault in enumerate(faults):
         groups.setdefault(fault.cause or f"#{number}", []).append(fault)

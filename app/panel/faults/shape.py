@@ -1,4 +1,4 @@
-"""Faults of a panel file's shape: keys and values that are not as the descriptions have them."""
+"""Faults of a panel file's shape: keys and values that do not match the descriptions."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,18 +18,18 @@ from app.panel.widgets.kinds import KINDS
 
 @dataclass(frozen=True, slots=True)
 class ShapeFaults:
-    """Faults; what is in one of the places of `follow` follows from one of them."""
+    """`faults`; further faults in `covered_places` are consequences of these."""
 
     faults: list[Fault]
     covered_places: tuple[str, ...]
 
     def covers(self, fault: Fault) -> bool:
-        """Whether a fault that was found later is told already."""
+        """Whether another fault is a consequence of these."""
         return any(_is_in(fault.place, place) for place in self.covered_places)
 
 
 def find_shape_faults(error: ValidationError, tables: Mapping[str, Any]) -> ShapeFaults:
-    """One fault for each mistake that pydantic found in the tables of a panel file."""
+    """One fault for each mistake that pydantic found in a panel file's tables."""
     faults: list[Fault] = []
     keys: dict[Path, TableKeys] = {}
     for one in error.errors():
@@ -59,7 +59,7 @@ def _is_in(place: str, around: str) -> bool:
 
 
 def _resolve_location(location: tuple[str | int, ...]) -> tuple[Model, Path]:
-    """The description that a location is in, and the location without pydantic's kind tags."""
+    """(description, path) of a pydantic location; the path has no kind tags."""
     model: Model = Panel
     path: Path = ()
     before: str | int = ""

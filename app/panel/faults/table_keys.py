@@ -23,7 +23,7 @@ ITS_HEADER: Final = "is its header missing above?"
 
 @dataclass(frozen=True, slots=True)
 class TableKeys:
-    """What is wrong with the keys of one table."""
+    """The missing and unknown keys of one table."""
 
     path: Path
     model: Model
@@ -32,12 +32,12 @@ class TableKeys:
     unknown: list[str] = field(default_factory=list)
 
     def fault(self, key: str, what: str) -> Fault:
-        """Of a key or, if that is "", of the table."""
+        """A fault of a key or, if that is "", of the table."""
         return Fault(place_of((*self.path, key) if key else self.path), what)
 
 
 def inner_model(model: Model, key: str | int) -> Model | None:
-    """The description inside `model` that a table under `key` becomes."""
+    """The description of a table under `key`; None if the key is no table."""
     for name, about in model.model_fields.items():
         if (about.alias or name) == key:
             return next((t for t in _types(about.annotation) if issubclass(t, BaseModel)), None)
@@ -59,11 +59,11 @@ def _required_keys(model: Model) -> set[str]:
     return {about.alias or name for name, about in model.model_fields.items() if about.is_required()}
 
 
-Consequences = list[tuple[str, Fault]]  # a place, and the fault from which all else in it follows
+Consequences = list[tuple[str, Fault]]  # (place, the fault that causes all others in it)
 
 
 def key_faults(tables: Mapping[Path, TableKeys]) -> tuple[list[Fault], Consequences]:
-    """The faults of tables by their paths, and what follows from them."""
+    """The faults of tables (by path), and their consequences."""
     faults: list[Fault] = []
     follow: Consequences = []
     for table in tables.values():
@@ -77,7 +77,7 @@ def key_faults(tables: Mapping[Path, TableKeys]) -> tuple[list[Fault], Consequen
 
 
 def _misplaced_keys(table: TableKeys, tables: Mapping[Path, TableKeys]) -> Iterator[Fault]:
-    """Keys that are meant for a table around this one, and stand too far below."""
+    """Faults of keys that belong to a table around this one."""
     path = table.path
     for key in list(table.unknown) if path else ():
         around = (tables[path[:n]] for n in range(len(path)) if path[:n] in tables)
@@ -97,7 +97,7 @@ def _misplaced_keys(table: TableKeys, tables: Mapping[Path, TableKeys]) -> Itera
 
 
 def _misspelt_keys(table: TableKeys, follow: Consequences) -> Iterator[Fault]:
-    """Unknown keys that are almost another one; where that is a table, its parts are elsewhere."""
+    """Faults of unknown keys that are similar to a known one."""
     for key in list(table.unknown):
         meant = closest_name(key, table.missing) or closest_name(key, known_keys(table.model))
         if not meant:
@@ -112,7 +112,7 @@ def _misspelt_keys(table: TableKeys, follow: Consequences) -> Iterator[Fault]:
 
 
 def _missing_header(table: TableKeys, follow: Consequences) -> list[Fault]:
-    """Keys of another table, whose header is not there."""
+    """A fault of keys of another table whose header is missing."""
     keys = set(table.unknown)
     names = [name for name, model in _other_tables(table) if keys <= set(known_keys(model))]
     if len(keys) < 2 or not names:
@@ -125,7 +125,7 @@ def _missing_header(table: TableKeys, follow: Consequences) -> list[Fault]:
 
 
 def _other_tables(table: TableKeys) -> Iterator[tuple[str, Model]]:
-    """Tables whose keys may stand in this one: those in it, and all others of the file."""
+    """(name, description) of the tables in this one, then of all others of the file."""
     header = ".".join(step for step in table.path if isinstance(step, str))
     for key in known_keys(table.model):
         if model := inner_model(table.model, key):
@@ -142,7 +142,7 @@ def _other_tables(table: TableKeys) -> Iterator[tuple[str, Model]]:
 
 
 def _wrong_kind(table: TableKeys, follow: Consequences) -> list[Fault]:
-    """A widget whose keys are those of another kind."""
+    """A fault of a widget that has the keys of another kind."""
     keys = set(table.table)
     kinds = [
         kind
@@ -163,7 +163,7 @@ def _wrong_kind(table: TableKeys, follow: Consequences) -> list[Fault]:
 
 
 def _remaining_faults(table: TableKeys) -> list[Fault]:
-    """What is unknown is told together, and what is missing."""
+    """One fault for the remaining unknown keys, and one for the missing keys."""
     missing, unknown = table.missing, table.unknown
     here = f"known here: {', '.join(known_keys(table.model))}"
     if len(missing) == len(unknown) == 1:
@@ -183,6 +183,6 @@ def _remaining_faults(table: TableKeys) -> list[Fault]:
 
 
 def _quote_names(names: Sequence[str]) -> str:
-    """Names in quotes, with commas and an "and"."""
+    """Quoted names with commas and an "and"."""
     *others, last = (f'"{name}"' for name in names)
     return f"{', '.join(others)} and {last}" if others else last

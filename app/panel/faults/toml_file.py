@@ -1,4 +1,4 @@
-"""A panel file as it stands on the disk: its text and its tables, or why it is no TOML."""
+"""Reads a panel file as TOML."""
 
 import hashlib
 import re
@@ -20,7 +20,7 @@ TABLES: Final = (
     "states", *FREE_FORM_TABLES,
 )  # fmt: skip
 TABLE_SIMILARITY: Final = 0.8
-# What Python's reader says of a key or a table that is there twice, in plainer words.
+# Messages of Python's TOML reader about duplicate keys and tables → plainer ones.
 PLAIN_MESSAGES: Final[Mapping[str, str]] = {
     "Cannot overwrite a value": "this key or table is above already, perhaps as another kind of table",
     "Cannot mutate immutable namespace": "nothing can be added to what is whole already:",
@@ -29,7 +29,7 @@ PLAIN_MESSAGES: Final[Mapping[str, str]] = {
 
 @dataclass(frozen=True, slots=True)
 class TomlFile:
-    """`revision` changes with the file's bytes."""
+    """A parsed file; `revision` is a hash of its bytes."""
 
     path: Path
     text: str
@@ -38,7 +38,7 @@ class TomlFile:
 
 
 def read_toml(path: Path) -> TomlFile:
-    """PanelError, `unreadable`, with the line where it is no TOML."""
+    """The parsed file; PanelError (`unreadable`) with the line if it is no TOML."""
     try:
         data = path.read_bytes()
         text = data.decode("utf-8-sig")  # some editors begin a file with a mark
@@ -52,13 +52,13 @@ def read_toml(path: Path) -> TomlFile:
 
 
 def _misspelt_header(text: str) -> Fault | None:
-    """The first header that is almost a known one: what stands below it is taken for another table's,
-    and what is wrong shows far from there."""
+    """A fault of the first header that is similar to a known one. Its keys count as those of another
+    table, so that the parser's error is far from it."""
     for number, line in enumerate(text.splitlines(), 1):
         header = HEADER.fullmatch(line)
         for part in header[1].split(".") if header else ():
             if part in FREE_FORM_TABLES:
-                break  # what a message has inside, nobody knows here
+                break  # the tables of a message are not known here
             meant = get_close_matches(part, TABLES, n=1, cutoff=TABLE_SIMILARITY)
             if meant and meant[0] != part:
                 what = f'there is no table "{part}"; did you mean "{meant[0]}"?'
@@ -77,13 +77,13 @@ def _read_fault(error: Exception) -> Fault:
             return _syntax_fault(str(error))
         case RecursionError():
             return Fault("", "it has too many brackets in brackets")
-    return Fault("", "a number has too many digits")  # the one other ValueError of Python's reader
+    return Fault("", "a number has too many digits")  # the only other ValueError of Python's reader
 
 
-def _syntax_fault(said: str) -> Fault:
-    """What Python's reader said, with the names of tables as the file has them."""
-    found = AT_LINE.fullmatch(said)
-    what, line = (found[1], found[2]) if found else (said, None)
+def _syntax_fault(text: str) -> Fault:
+    """The fault of a syntax error, with the names of tables as in the file."""
+    found = AT_LINE.fullmatch(text)
+    what, line = (found[1], found[2]) if found else (text, None)
     for theirs, plainer in PLAIN_MESSAGES.items():
         what = what.replace(theirs, plainer)
     what = NAMES.sub(lambda names: ".".join(re.findall("'([^']*)'", names[1])), what)

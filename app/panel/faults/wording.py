@@ -1,4 +1,4 @@
-"""What is wrong with one value of a panel file, in the file's own terms, and what would be right."""
+"""Messages about values of a panel file."""
 
 import re
 from collections.abc import Iterable, Mapping
@@ -10,7 +10,7 @@ from app.panel.values import number_text
 
 NAME_SIMILARITY: Final = 0.7
 MAX_LISTED: Final = 12
-# What a text must be like, by its key.
+# The rule of a text, by its key.
 PATTERNS: Final[Mapping[str, str]] = {
     "id": 'is not an id: a-z, 0-9 and "_", a letter first, 64 at most',
     "format": 'is not a format: it must be like ".1f", "+.2e" or ",d"',
@@ -18,7 +18,7 @@ PATTERNS: Final[Mapping[str, str]] = {
     "parameter": "is not the name of a parameter: it has no spaces",
     "default": "has a NUL character, at which a ROS string ends",
 }
-# What a list must be like, by its key.
+# The elements of a list, by its key.
 LIST_WORDS: Final[Mapping[str, str]] = {
     "interfaces": 'folders: write ["folder"]',
     "connect": 'Zenoh endpoints: write ["tcp/robot1:7447"]',
@@ -30,7 +30,7 @@ LIST_WORDS: Final[Mapping[str, str]] = {
     "robot": "tables: write [[robot]]",
     "interlock": "tables: write [[interlock]]",
 }
-# Of a number, by the name of its limit.
+# The limits of a number, by pydantic's names.
 LIMITS: Final[Mapping[str, str]] = {
     "ge": "{} or more",
     "gt": "more than {}",
@@ -40,7 +40,7 @@ LIMITS: Final[Mapping[str, str]] = {
 
 
 def describe_error(error: Mapping[str, Any], key: str) -> str:
-    """One of the errors that pydantic has of a value under a key; never in its own words."""
+    """The message about an error of pydantic; never pydantic's own text."""
     kind, given, about = error["type"], format_value(error["input"]), error.get("ctx", {})
     match kind:
         case "value_error":
@@ -65,12 +65,12 @@ def describe_error(error: Mapping[str, Any], key: str) -> str:
 
 
 def closest_name(name: str, known: Iterable[str]) -> str:
-    """The name that is meant, most likely; "" where none is like it: many keys are short and alike."""
+    """The most similar name; "" if none is similar enough: many keys are short and alike."""
     return next(iter(get_close_matches(name, list(known), n=1, cutoff=NAME_SIMILARITY)), "")
 
 
 def list_names(names: Iterable[str]) -> str:
-    """What there is, for a fault: the first names and how many more, "none" where there is none."""
+    """The first names and the number of others, for a fault; "none" without names."""
     every = list(names)
     more = f" and {len(every) - MAX_LISTED} more" if len(every) > MAX_LISTED else ""
     return ", ".join(every[:MAX_LISTED]) + more or "none"

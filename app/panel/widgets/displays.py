@@ -1,4 +1,4 @@
-"""Descriptions of what is shown: values and lamps."""
+"""The descriptions of displays: readouts and lamps."""
 
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Final, Literal, Self
@@ -14,7 +14,7 @@ from app.panel.faults.wording import list_names
 from app.panel.widgets.families import Display
 from app.panel.widgets.numbers import Unit
 
-# [+] [,] [.digits] [f, e, g, % or d]: a part of Python's, in which nothing can go wrong.
+# [+] [,] [.digits] [f, e, g, % or d]: the part of Python's format language that can't fail.
 FORMAT: Final = r"^\+?,?(\.[0-9]{1,2}[feg%]|[feg%d])$"
 SHAPE_AND_TEXT: Final = "only the colour would tell them apart"
 
@@ -22,7 +22,7 @@ Factor = Annotated[float, Field(allow_inf_nan=False)]
 
 
 class Readout(Display):
-    """A field's value, as `value * scale + offset` in a format, or by the name of a constant."""
+    """Shows a field as `value * scale + offset` in a format, or as the name of a constant."""
 
     kind: Literal["readout"]
     format: Annotated[str, Field(pattern=FORMAT)] | None = None
@@ -43,8 +43,8 @@ def _check_state_value(given: Any) -> Any:
 
 
 class LampState(Description):
-    """How a lamp shows one value, which may be a constant's name. What is normal is grey, white or
-    black; colour is for the rest."""
+    """How a lamp shows one value, which may be a constant's name. Normal states are grey, white or
+    black; colours are for abnormal ones."""
 
     value: Annotated[bool | int | str, BeforeValidator(_check_state_value)]
     text: Label
@@ -53,7 +53,7 @@ class LampState(Description):
 
 
 class Indicator(Display):
-    """A lamp: one state for each value; a value without one shows as unknown."""
+    """A lamp with a state for each value. A value without a state is shown as unknown."""
 
     kind: Literal["indicator"]
     states: Annotated[tuple[LampState, ...], Field(strict=False), AfterValidator(non_empty)]
@@ -73,9 +73,8 @@ class Indicator(Display):
 
 
 def resolve_state_value(given: bool | int | str, kind: str, constants: Mapping[str, Any]) -> Any:
-    """What a lamp's state is for: a text is a constant's name where the field is a whole number.
-
-    A name that there is no constant of stays what it is.
+    """The value of a lamp's state. A text is a constant's name if the field is a whole number; an
+    unknown name is returned as it is.
     """
     named = isinstance(given, str) and kind in INTEGER_RANGES
     return constants.get(str(given), given) if named else given

@@ -1,4 +1,4 @@
-"""Commands that act for as long as a button is held, with the fields that the kiosk itself fills in."""
+"""Hold-to-run commands, with the fields that the server fills in."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -20,10 +20,10 @@ COUNTER_TYPES: Final = (r"uint(8|16|32|64)", "uint8, uint16, uint32 or uint64")
 
 
 class Hold(PublishCommand):
-    """Published `rate_hz` times a second while its button is held, and `release` once after.
+    """Publishes `message` `rate_hz` times a second while its button is held, and `release` once after.
 
-    `deadline_field` gets the milliseconds within which the next message must come, 0 in the last
-    one; `counter_field` counts the messages.
+    `deadline_field` gets the milliseconds within which the next message arrives, 0 in the last one;
+    `counter_field` counts the messages.
     """
 
     kind: Literal["hold"]
@@ -46,7 +46,7 @@ class Hold(PublishCommand):
 
     @property
     def deadline_ms(self) -> int:
-        """Three periods, 100 ms at least: two messages may be late or lost before the robot stops."""
+        """Three periods, at least 100 ms: two messages may be late or lost before the robot stops."""
         return max(100, round(3000 / self.rate_hz))
 
     def templates(self) -> list[Any]:
@@ -84,7 +84,7 @@ class Hold(PublishCommand):
 
 
 def fill_own_fields(hold: Hold, fields: Mapping[str, Any], deadline_ms: int, count: int) -> Any:
-    """The fields of a message with its deadline and its number, where the hold has places for them."""
+    """The fields of a message with its deadline and its number, if the hold has fields for them."""
     whole: Any = fields
     if hold.deadline_field is not None:
         whole = set_field(whole, hold.deadline_field, deadline_ms)
@@ -118,7 +118,7 @@ def _own_field_faults(place: str, hold: Hold, interfaces: Interfaces) -> Iterato
 
 
 def _has_field(template: Mapping[str, Any], path: str) -> bool:
-    """Whether a template says the field itself; in a list each element must stand there anyway."""
+    """Whether a template sets the field. A list must have all its elements in any case."""
     found: Any = template
     for step in path.split("."):
         if "[" in step or not isinstance(found, Mapping) or step not in found:

@@ -1,4 +1,4 @@
-"""Inputs of texts and choices: what an operator enters, and what is checked of it."""
+"""The descriptions of text, select and toggle inputs, and checks of their values."""
 
 import json
 from collections.abc import Iterator, Sequence
@@ -40,7 +40,7 @@ class TextInput(Input):
         return ["x" * self.max_length]
 
     def check_value(self, given: Any) -> str:
-        """Lengths count characters, as an operator does."""
+        """The text; lengths are in characters."""
         if not isinstance(given, str):
             raise InputError(f'{self.label} ("{self.id}") must be text, not {format_value(given)}')
         if len(given) > self.max_length:
@@ -54,7 +54,7 @@ class TextInput(Input):
 
 
 def _check_json_value(given: Any) -> Any:
-    """An option's value; what it has inside is as TOML has it, but no dates."""
+    """An option's value: anything of TOML that JSON has too."""
     try:
         json.dumps(given)
     except TypeError:
@@ -63,7 +63,7 @@ def _check_json_value(given: Any) -> Any:
 
 
 class Option(Description):
-    """What can be chosen; `key` is its value as a form posts it."""
+    """An option of a select; `key` is its value in a form."""
 
     value: Annotated[Any, AfterValidator(_check_json_value)]
     label: Label
@@ -81,7 +81,7 @@ class SelectInput(Input):
 
     @property
     def initial_text(self) -> str:
-        """The key of the option that is chosen at first."""
+        """The key of the option that is selected initially."""
         first = (option for option in self.options if same_value(option.value, self.default))
         return next(first, self.options[0]).key
 
@@ -104,7 +104,7 @@ class SelectInput(Input):
         return [option.value for option in self.options]
 
     def check_value(self, given: Any) -> Any:
-        """The option whose value was given, or whose key: so it comes from a form and a browser."""
+        """The value of the option with the given value or key; forms and browsers send keys."""
         for option in self.options:
             if same_value(option.value, given) or option.key == given:
                 return option.value
@@ -155,7 +155,7 @@ class ToggleInput(Input):
 
 
 def option_faults(place: str, options: Sequence[Option]) -> Iterator[Fault]:
-    """Options that can't be told apart."""
+    """Faults of options with equal keys or labels."""
     keys = [option.key for option in options]
     labels = [option.label for option in options]
     for i, (key, label) in enumerate(zip(keys, labels, strict=True)):

@@ -1,4 +1,4 @@
-"""The kinds of widgets that a panel file may name: a row for each."""
+"""The table of widget kinds."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, Final, TypeVar, Union
@@ -29,7 +29,7 @@ KINDS: Final[Mapping[str, type[BaseWidget]]] = {
     "indicator": Indicator,
 }
 
-# What a table of a panel file becomes, by its "kind".
+# The description of a widget's table, by its "kind".
 if TYPE_CHECKING:
     Widget = BaseWidget
 else:
@@ -39,8 +39,8 @@ Row = TypeVar("Row")
 
 
 def find_row(rows: Mapping[type[Any], Row], widget: BaseWidget) -> Row:
-    """What a table of rows by kinds or families has for a widget: the row of its kind, else that of
-    the nearest family. TypeError where there is none."""
+    """The row of a widget's kind in a table by kinds and families, else that of its nearest family.
+    TypeError without one."""
     for of in type(widget).__mro__:
         if of in rows:
             return rows[of]

@@ -1,4 +1,4 @@
-"""Inputs of numbers: their limits and steps, and what is checked of an entered number."""
+"""The descriptions of number inputs: limits, steps, and checks of a value."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -14,8 +14,8 @@ from app.panel.base import Span
 from app.panel.values import number_text
 from app.panel.widgets.families import BaseWidget, CheckContext, Input
 
-MAX_EXACT_NUMBER: Final = 2.0**53  # beyond this a browser's numbers are not exact
-# Reads each character once, however long a text is: what two parts could take is tried again and again.
+MAX_EXACT_NUMBER: Final = 2.0**53  # beyond this, numbers of a browser are not exact
+# No two parts match the same text: a long text causes no backtracking.
 DECIMAL: Final = re.compile(r"\s*[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?\s*", re.ASCII)
 
 Number = Annotated[float, Field(ge=-MAX_EXACT_NUMBER, le=MAX_EXACT_NUMBER)]
@@ -23,7 +23,7 @@ Unit = Annotated[str, Field(max_length=20)]
 
 
 class SteppedWidget(BaseWidget):
-    """What has − and + beside it."""
+    """A widget with − and + buttons."""
 
     @property
     def decrease_label(self) -> Text:
@@ -35,10 +35,10 @@ class SteppedWidget(BaseWidget):
 
 
 class Numeric(SteppedWidget, Input):
-    """A number with limits; whole numbers, if its lowest and its step are whole.
+    """A number with limits; a whole number if `min` and `step` are whole.
 
-    Without a `step` any number between the limits is taken; but limits that are written as whole
-    numbers, as 0 and not as 0.0, are those of whole numbers.
+    Without a `step` any number between the limits is accepted. If both limits are written as whole
+    numbers (0, not 0.0), the step is 1.
     """
 
     min: Number
@@ -51,14 +51,14 @@ class Numeric(SteppedWidget, Input):
     @model_validator(mode="before")
     @classmethod
     def _default_step(cls, given: Any) -> Any:
-        """Only here it shows how the limits are written."""
+        """Sets the default step; only the raw table shows how the limits are written."""
         limits = [given.get(key) for key in ("min", "max")] if isinstance(given, Mapping) else []
         whole = limits and all(type(limit) is int for limit in limits)
         return {"step": 1, **given} if whole else given
 
     @property
     def initial_text(self) -> str:
-        """What a page shows at first."""
+        """The initial text of its entry."""
         return "" if self.default is None else number_text(self.default)
 
     @property
@@ -77,13 +77,13 @@ class Numeric(SteppedWidget, Input):
 
     @property
     def html_attributes(self) -> dict[str, str]:
-        """Limits and step as HTML has them."""
+        """Limits and step as HTML attributes."""
         step = "any" if self.step is None else number_text(self.step)
         return {"min": number_text(self.min), "max": number_text(self.max), "step": step}
 
     @property
     def limits_text(self) -> Text:
-        """What a number may be, as an operator reads it: "0 to 1.5 m/s, in steps of 0.1"."""
+        """The limits as text: "0 to 1.5 m/s, in steps of 0.1"."""
         low, high = number_text(self.min), number_text(self.max)
         unit = f" {self.unit}" if self.unit else ""
         if self.step is None:
@@ -95,11 +95,11 @@ class Numeric(SteppedWidget, Input):
         return None if self.default is None else self.to_type(self.default)
 
     def to_type(self, value: float) -> int | float:
-        """A value of this input, as a message takes it."""
+        """A value of this input as an int or a float, as a message needs it."""
         return int(value) if self.is_whole else value
 
     def is_on_step(self, value: float) -> bool:
-        """Whether a value is whole steps away from the lowest, exactly as both are written."""
+        """Whether a value is a whole number of steps from `min`, in exact decimal arithmetic."""
         if self.step is None:
             return True
         low, step = Fraction(repr(self.min)), Fraction(repr(self.step))
@@ -120,7 +120,7 @@ class Numeric(SteppedWidget, Input):
             raise InputError(say("number_empty", label=label, limits=allowed))
         if isinstance(given, bool) or not isinstance(given, int | float):
             raise InputError(say("no_number", label=label, limits=allowed, given=format_value(given)))
-        # Limits first: what is beyond them may be no float at all, or take long to divide.
+        # Limits first: a value beyond them may be no float, or take long to divide.
         if not self.min <= given <= self.max or not self.is_on_step(float(given)):
             small = isinstance(given, float) and abs(given) <= MAX_EXACT_NUMBER
             text = number_text(given) if small else format_value(given)

@@ -1,4 +1,4 @@
-"""The description of a ROS 2 parameter of a node, shown and set, and what can be wrong in it."""
+"""The description of a ROS 2 parameter that is shown and set, and its checks."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from math import isfinite
@@ -26,7 +26,7 @@ Value = Scalar | tuple[Scalar, ...]
 EVENTS: Final = "/parameter_events"
 EVENT_TYPE: Final = "rcl_interfaces/msg/ParameterEvent"
 
-# The services of a node that a parameter needs, with their types.
+# The node's parameter services that are used, with their types.
 GET: Final = ("get_parameters", "rcl_interfaces/srv/GetParameters")
 DESCRIBE: Final = ("describe_parameters", "rcl_interfaces/srv/DescribeParameters")
 SET: Final = ("set_parameters", "rcl_interfaces/srv/SetParameters")
@@ -50,9 +50,9 @@ def _check_node(given: str) -> str:
 
 
 class Parameter(SteppedWidget, EntryWidget, PressCommand):
-    """A parameter of a node; `min`, `max` and `step` narrow what the node describes.
+    """A parameter of a node; `min`, `max` and `step` narrow the range that the node describes.
 
-    It is its own input: a press sets the value that comes under the widget's id.
+    It is an input too: a press sets the value that it has under the widget's id.
     """
 
     kind: Literal["parameter"]
@@ -133,26 +133,26 @@ class Parameter(SteppedWidget, EntryWidget, PressCommand):
 
     @property
     def press_label(self) -> Text:
-        """What the button is called where its place does not tell what it sets."""
+        """The accessible name of the button that sets the value."""
         return say("set_named", label=self.label)
 
     @property
     def read_label(self) -> Text:
-        """What the button is called that asks its node once more."""
+        """The accessible name of the button that queries the node again."""
         return say("read_named", label=self.label)
 
     def find_option(self, value: Any) -> Option | None:
-        """The option that has this value."""
+        """The option with this value; None without one."""
         value = list(value) if isinstance(value, tuple) else value
         return next((one for one in self.options if same_value(one.value, value)), None)
 
     def value_text(self, value: Value) -> TextLike:
-        """A value as an operator reads it, exactly."""
+        """A value as text for an operator: an option's label, or the exact value with its unit."""
         option = self.find_option(value)
         return self.unlisted_text(value) if option is None else option.label
 
     def unlisted_text(self, value: Value) -> TextLike:
-        """The same of a value that is no option's."""
+        """The same for a value that no option has."""
         if value == ():
             return say("empty")
         if isinstance(value, bool):
@@ -161,7 +161,7 @@ class Parameter(SteppedWidget, EntryWidget, PressCommand):
         return f"{text} {self.unit}" if self.unit else text
 
     def entry_text(self, value: Value) -> str:
-        """A value as it is entered where no option is chosen. True and false are entered in lists only:
+        """A value as the text of its entry. True and false are entered in lists only:
         as the panel file calls them, or in English."""
         if isinstance(value, tuple):
             return join_list(
@@ -194,7 +194,7 @@ def _option_faults(place: str, parameter: Parameter) -> Iterator[Fault]:
 
 
 def is_valid_value(kind: str, value: Any) -> bool:
-    """Whether a value of TOML or JSON is one of a single parameter's type."""
+    """Whether a value of TOML or JSON has the type of a single parameter."""
     match kind:
         case "bool":
             return isinstance(value, bool)
@@ -227,7 +227,7 @@ def _limit_faults(place: str, parameter: Parameter, given: Mapping[str, float]) 
 
 
 def type_faults(parameters: Iterable[tuple[str, Parameter]]) -> Iterator[Fault]:
-    """A parameter has one type, wherever the panel names it; each comes with its place."""
+    """Faults of a parameter with several types in the panel; `parameters` are (place, widget)."""
     firsts: dict[tuple[str, str], str] = {}
     for place, widget in parameters:
         first = firsts.setdefault((widget.node, widget.parameter), widget.type)

@@ -1,4 +1,4 @@
-"""Commands that publish a message once, and what shows that one took effect."""
+"""Commands that publish a message once, and the confirmation of their effect."""
 
 import re
 from collections.abc import Iterator
@@ -16,9 +16,8 @@ from app.panel.widgets.templated import TemplateCommand
 
 
 class Confirm(Description):
-    """A field of the robot's that shows that a command took effect: it comes to have the value
-    `equals` (or that of an input, `"{id}"`) in time. The type is that which the panel gives for
-    the topic elsewhere, if there is none here."""
+    """A field that confirms the effect of a command: it must have the value `equals` (or that of an
+    input, `"{id}"`) within `within_s`. The default type is that of the topic elsewhere in the panel."""
 
     topic: Topic
     type: Type | None = None
@@ -28,8 +27,8 @@ class Confirm(Description):
 
 
 class SinglePublish(TemplateCommand, PublishCommand):
-    """A press that publishes a message; with `one_shot` it is locked until its effect is confirmed, or
-    did not show."""
+    """A press that publishes a message. With `one_shot` it is locked until its effect is confirmed, or
+    the time for that is over."""
 
     message: dict[str, Any]
     confirm: Confirm | None = None

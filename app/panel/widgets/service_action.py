@@ -1,4 +1,4 @@
-"""Commands that call a service or send an action's goal."""
+"""Commands that call a service or send a goal to an action."""
 
 import re
 from abc import abstractmethod
@@ -21,7 +21,7 @@ ACTION_SERVER_TYPES: Final = ("action_msgs/msg/GoalStatusArray", "action_msgs/sr
 
 
 class ServerCommand(TemplateCommand):
-    """A command that a server on the robot answers within `timeout_s`."""
+    """A command to a service or action server, which must respond within `timeout_s`."""
 
     type: str
     timeout_s: Seconds = 5.0
@@ -38,8 +38,8 @@ class ServerCommand(TemplateCommand):
 
 
 class Call(ServerCommand):
-    """A service call; `success` and `message` are fields of the response, found by themselves
-    where it has a bool and a string of these names; `answer` is shown with `{field}` filled in."""
+    """A service call. `success` and `message` are fields of the response; by default a bool and a
+    string of these names. `answer` is shown with `{field}` filled in."""
 
     kind: Literal["call"]
     service: Topic
@@ -77,8 +77,8 @@ class Call(ServerCommand):
 
 
 class Action(ServerCommand):
-    """An action's goal with a cancel button; `progress` is a field of the feedback that goes from
-    0 to `progress_max`; `feedback` and `result` are shown with `{field}` filled in."""
+    """A goal of an action, with a cancel button. `progress` is a field of the feedback, from 0 to
+    `progress_max`; `feedback` and `result` are shown with `{field}` filled in."""
 
     kind: Literal["action"]
     action: Topic
@@ -128,7 +128,7 @@ def _text_faults(place: str, type_name: str, template: str, interfaces: Interfac
 def _path_faults(
     place: str, type_name: str, path: str, kind: str, interfaces: Interfaces
 ) -> Iterator[Fault]:
-    """A fault if there is no such field, or not of this kind (a regular expression)."""
+    """A fault if the field does not exist, or its type does not match `kind` (a regular expression)."""
     try:
         found = interfaces.field_type(type_name, path)
     except InterfaceError as error:

@@ -1,4 +1,4 @@
-"""What commands that send one message, request or goal have in common."""
+"""The family of commands that send one message, request or goal."""
 
 from abc import abstractmethod
 from collections.abc import Iterator
@@ -12,18 +12,18 @@ from app.panel.widgets.families import CheckContext, PressCommand, SentMessage
 
 
 class TemplateCommand(PressCommand):
-    """A press that fills in a template of one type."""
+    """A press that sends a filled template of one type."""
 
     template_key: ClassVar[str]  # the key that holds the template
 
     @property
     @abstractmethod
     def action_text(self) -> str:
-        """What a press does, with the types that the panel file names: "publishes /a (a/msg/B)"."""
+        """What a press does, for a preview: "publishes /a (a/msg/B)"."""
 
     @abstractmethod
     def template_type(self, interfaces: Interfaces) -> str:
-        """The type of what is sent; InterfaceError if it is not there."""
+        """The message type of the template; InterfaceError if it does not exist."""
 
     def sent_messages(self, interfaces: Interfaces) -> Iterator[SentMessage]:
         yield SentMessage(self.action_text, self.template_type(interfaces), self.template)
@@ -39,5 +39,5 @@ class TemplateCommand(PressCommand):
         yield from self.response_faults(place, checking)
 
     def response_faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
-        """What is wrong in the keys about what comes of a press."""
+        """Faults of the keys about the response."""
         yield from ()
