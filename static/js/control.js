@@ -1,30 +1,31 @@
-// Who has control of the robot: the bar that says so, the lock on every button of who has not, and
-// the holder's sign of life. Loaded only where the panel requires control.
-const TAP_AGAIN_MS = 700;
-const ANSWER_WITHIN_MS = 5000;
-const BEATS_PER_SIGN = 3; // the server beats twice a second, and gives up who is silent for 5 s
-const TOUCH_AGAIN_MS = 1000;
-const LOCK = { enabled: false, more: "" }; // and its reasons
+// Control of the robot: the bar that shows its holder, the lock in all other browsers, and the holder's
+// keep-alive. Loaded only where the panel requires control.
+import { setText } from "./show.js";
+
+const TAP_AGAIN_MS = 700; // as in press.js
+const RESPONSE_TIMEOUT_MS = 5000;
+const BEATS_PER_KEEP_ALIVE = 3; // two heartbeats a second; the server releases a holder after 5 s of silence
+const TOUCH_INTERVAL_MS = 1000;
+const LOCK = { enabled: false, more: "" }; // besides its reasons
 const TEXT = { asking: "asker_text", holding: "holder_text", asked: "holder_text" };
 
 export class Control {
   #bar;
-  #said = new Map(); // what the server says of each button, whoever has control
+  #locks = new Map(); // widget id → the server's attributes of its lock
   #state = null;
-  #passable = true;
+  #linkOk = true;
   #beats = 0;
   #touchedAt = -Infinity;
-  #to = ""; // who asked when the finger went down
+  #to = ""; // the asker when the finger went down
   #busy = false;
-  #showAgain;
+  #showWidget;
   #timeOf;
 
-  // `showAgain` gets (widget id, attributes) where a lock has changed; `timeOf` gives the server's own
-  // time of an event.
-  constructor(bar, showAgain, timeOf) {
+  // `showWidget` takes (widget id, attributes) of a changed lock; `timeOf` returns the server's time of an event.
+  constructor(bar, showWidget, timeOf) {
     this.#bar = bar;
     this.#timeOf = timeOf;
-    this.#showAgain = showAgain;
+    this.#showWidget = showWidget;
     for (const kind of ["pointerdown", "keydown"]) addEventListener(kind, () => this.#touch(), true);
     this.#bar.addEventListener("submit", (event) => {
       event.preventDefault();
@@ -41,17 +42,17 @@ export class Control {
     return over === undefined ? "held" : "over";
   }
 
-  get #mine() {
+  get #isHolder() {
     return this.#state && ["holding", "asked"].includes(this.#role);
   }
 
   show(state) {
     this.#state = state;
-    this.#bar.querySelector(".refused").textContent = "";
+    setText(this.#bar.querySelector(".refused"), "");
     this.#draw();
   }
 
-  // The id of this browser, from the stream: the page may have been loaded without its cookie.
+  // The id of this browser, from the stream: the page may have been requested without its cookie.
   browser({ id }) {
     if (this.#bar.dataset.me === id) return;
     this.#bar.dataset.me = id;
@@ -59,94 +60,90 @@ export class Control {
   }
 
   link(lamps) {
-    this.#passable = lamps.bridge.state === "ok";
-    this.#lockAgain();
+    this.#linkOk = lamps.bridge.state === "ok";
+    this.#updateLocks();
   }
 
   lost() {
     this.#state = null;
-    this.#said.clear();
+    this.#locks.clear();
     this.#bar.querySelector(".who").textContent = document.body.dataset.unknown;
     for (const button of this.#bar.querySelectorAll("button")) button.disabled = true;
   }
 
-  // The attributes as this page shows them. A lost link is told before who has control.
+  // The attributes as this page shows them. A lost link goes before a lack of control.
   over(id, attributes) {
-    if (!("enabled" in attributes || this.#said.has(id))) return attributes;
-    const all = { ...this.#said.get(id), ...attributes };
-    const said = Object.entries(all).filter(([name]) => name in LOCK || name.startsWith("reason"));
-    this.#said.set(id, Object.fromEntries(said));
-    return { ...attributes, ...this.#locked(this.#said.get(id)) };
+    if (!("enabled" in attributes || this.#locks.has(id))) return attributes;
+    const lock = Object.entries({ ...this.#locks.get(id), ...attributes }).filter(([name]) => name in LOCK || name.startsWith("reason"));
+    this.#locks.set(id, Object.fromEntries(lock));
+    return { ...attributes, ...this.#locked(this.#locks.get(id)) };
   }
 
   beat() {
     if (!this.#state || !["holding", "asked", "asking"].includes(this.#role)) return;
     this.#beats += 1;
-    if (this.#beats >= BEATS_PER_SIGN) this.#sign(false);
+    if (this.#beats >= BEATS_PER_KEEP_ALIVE) this.#keepAlive(false);
   }
 
-  #locked(said) {
-    if (this.#mine || !this.#state || !this.#passable) return said;
-    const told = Object.keys(said).map((name) => [name, LOCK[name] ?? this.#state.text]);
-    return Object.fromEntries(told);
+  #locked(lock) {
+    if (this.#isHolder || !this.#state || !this.#linkOk) return lock;
+    return Object.fromEntries(Object.keys(lock).map((name) => [name, LOCK[name] ?? this.#state.text]));
   }
 
-  #lockAgain() {
-    for (const [id, said] of this.#said) this.#showAgain(id, said);
+  #updateLocks() {
+    for (const [id, lock] of this.#locks) this.#showWidget(id, lock);
   }
 
   #draw() {
     const role = this.#role;
     this.#bar.dataset.role = role;
     this.#bar.elements.to.value = this.#state.asker;
-    const who = this.#bar.querySelector(".who");
-    const text = this.#state[TEXT[role] ?? "text"];
-    if (who.textContent !== text) who.textContent = text;
+    setText(this.#bar.querySelector(".who"), this.#state[TEXT[role] ?? "text"]);
     for (const button of this.#bar.querySelectorAll("button")) {
       button.hidden = !button.dataset.roles.split(" ").includes(role);
       button.disabled = false;
     }
-    this.#lockAgain();
+    this.#updateLocks();
   }
 
   #touch() {
     this.#to = this.#bar.elements.to.value;
     const now = performance.now();
-    if (!this.#mine || now - this.#touchedAt < TOUCH_AGAIN_MS) return;
+    if (!this.#isHolder || now - this.#touchedAt < TOUCH_INTERVAL_MS) return;
     this.#touchedAt = now;
-    this.#sign(true);
+    this.#keepAlive(true);
   }
 
-  #sign(touched) {
+  #keepAlive(touched) {
     this.#beats = 0;
-    this.#post("here", { touched }, true).catch(() => {}); // the next one may get through
+    this.#post("here", { touched }, true).catch(() => {}); // the next one may succeed
   }
 
-  // A second tap is the same act: it must not meet the button that came in its place.
+  // A second tap is the same action: it must not press the button that replaces this one.
   async #act(button, at) {
     if (this.#busy || button.disabled) return;
     this.#busy = true;
     this.#bar.setAttribute("aria-busy", "true");
     const pause = new Promise((resolve) => setTimeout(resolve, TAP_AGAIN_MS));
-    const said = this.#bar.querySelector(".refused");
+    const refusal = this.#bar.querySelector(".refused");
     try {
-      const act = button.getAttribute("formaction").split("/").at(-1);
-      const answer = await (await this.#post(act, { to: this.#to, at })).json();
-      said.textContent = answer.reason ?? answer.error;
+      const action = button.getAttribute("formaction").split("/").at(-1);
+      const response = await (await this.#post(action, { to: this.#to, at })).json();
+      refusal.textContent = response.reason ?? response.error;
     } catch {
-      said.textContent = document.body.dataset.unsure;
+      refusal.textContent = document.body.dataset.unsure;
     }
     await pause;
     this.#busy = false;
     this.#bar.removeAttribute("aria-busy");
   }
 
-  #post(act, body, keepalive = false) {
-    return fetch(`${document.body.dataset.base}/control/${act}`, {
+  #post(action, body, keepalive = false) {
+    return fetch(`${document.body.dataset.base}/control/${action}`, {
       method: "POST",
       headers: { "Content-Type": "application/json" },
       body: JSON.stringify(body),
-      signal: AbortSignal.timeout(ANSWER_WITHIN_MS),
+      signal: AbortSignal.timeout(RESPONSE_TIMEOUT_MS),
       keepalive,
     });
   }

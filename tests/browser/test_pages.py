@@ -374,7 +374,7 @@ def test_the_first_page_is_small_and_asks_nobody_else(demo: Server, chromium: Br
     expect(button(page, "Publish")).to_be_enabled()
     page.wait_for_timeout(500)
     urls = [request.url for request in requests if not request.url.startswith("data:")]
-    assert len(urls) <= 6, urls
+    assert len(urls) <= 9, urls
     assert all(url.startswith(demo.url) for url in urls)
     assert len(received) == len(urls)
     assert received.total() < 16_000
