@@ -1,20 +1,20 @@
-"""The server's own time, and times and ages as an operator reads them."""
+"""The server's clock, and times and ages as text."""
 
 import time
 from typing import Final
 
-_WALL: Final = time.time()
-_BEGAN: Final = time.clock_gettime(time.CLOCK_BOOTTIME)
+_START_WALL: Final = time.time()
+_START_BOOTTIME: Final = time.clock_gettime(time.CLOCK_BOOTTIME)
 
 
 def server_now() -> float:
-    """Seconds since the epoch: the wall clock at the process's start, and even from there, also while
-    the machine sleeps. Heartbeats carry it, and a press returns it."""
-    return _WALL + time.clock_gettime(time.CLOCK_BOOTTIME) - _BEGAN
+    """Seconds since the epoch: the wall clock at the start of the process plus the boot-time clock
+    since then. It never jumps. Heartbeats carry it, and a press returns it."""
+    return _START_WALL + time.clock_gettime(time.CLOCK_BOOTTIME) - _START_BOOTTIME
 
 
 def format_age(seconds: float) -> str:
-    """An age as an operator says it: "4 s", "12 min", "3 h"."""
+    """An age as text: "4 s", "12 min", "3 h"."""
     if seconds < 60:
         return f"{int(seconds)} s"
     if seconds < 3600:
@@ -23,10 +23,10 @@ def format_age(seconds: float) -> str:
 
 
 def format_datetime(wall: float) -> str:
-    """Date and time in the server's zone, of seconds since the epoch."""
+    """Date and time of `wall` (seconds since the epoch) in the server's time zone."""
     return time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(wall))
 
 
 def format_time(wall: float) -> str:
-    """The time of day in the server's zone, of seconds since the epoch."""
+    """Time of day of `wall` (seconds since the epoch) in the server's time zone."""
     return time.strftime("%H:%M:%S", time.localtime(wall))

@@ -1,4 +1,4 @@
-"""Tasks that no one awaits, waits that shutdown cancels, and commands that shutdown waits for."""
+"""Background tasks, waits that shutdown cancels, and commands that shutdown waits for."""
 
 import asyncio
 import logging
@@ -12,7 +12,7 @@ from app.ros_logging import RobotLog
 def spawn_logged(
     work: Coroutine[Any, Any, None], log: logging.Logger | RobotLog, failure: str
 ) -> "asyncio.Task[None]":
-    """A task whose failure is logged, not lost."""
+    """Starts `work` as a task. An exception in it is logged as `failure`."""
 
     def done(task: "asyncio.Task[None]") -> None:
         if not task.cancelled() and (error := task.exception()):
@@ -24,55 +24,55 @@ def spawn_logged(
 
 
 class CancellableWaits:
-    """On the event loop."""
+    """Waits that end when `cancel_all` is called. Used on the event loop only."""
 
-    __slots__ = ("_given_up", "_limits")
+    __slots__ = ("_cancelled", "_timeouts")
 
     def __init__(self) -> None:
-        self._limits: set[asyncio.Timeout] = set()
-        self._given_up = False
+        self._timeouts: set[asyncio.Timeout] = set()
+        self._cancelled = False
 
     def cancel_all(self) -> None:
-        """Ends all of them, and each later one where it first waits; once."""
-        self._given_up = True
-        for limit in self._limits:
+        """Cancels all current waits, and every later one at its first `await`. Call it once."""
+        self._cancelled = True
+        for limit in self._timeouts:
             limit.reschedule(asyncio.get_running_loop().time())
 
     @asynccontextmanager
-    async def one(self) -> AsyncIterator[None]:
-        """TimeoutError where it was given up; what never waits is done in any case."""
-        limit = asyncio.timeout(0 if self._given_up else None)
-        self._limits.add(limit)
+    async def cancellable(self) -> AsyncIterator[None]:
+        """Runs the block; TimeoutError if it is cancelled while it waits."""
+        limit = asyncio.timeout(0 if self._cancelled else None)
+        self._timeouts.add(limit)
         try:
             async with limit:
                 yield
         finally:
-            self._limits.discard(limit)
+            self._timeouts.discard(limit)
 
 
 class InFlight:
-    """On the event loop."""
+    """Commands whose response has not been sent yet. Used on the event loop only."""
 
-    __slots__ = ("_many", "_none")
+    __slots__ = ("_count", "_idle")
 
     def __init__(self) -> None:
-        self._many = 0
-        self._none = asyncio.Event()
-        self._none.set()
+        self._count = 0
+        self._idle = asyncio.Event()
+        self._idle.set()
 
     @contextmanager
     def track(self) -> Iterator[None]:
-        """While it lasts, somebody waits for an answer."""
-        self._many += 1
-        self._none.clear()
+        """Counts one command while the block runs."""
+        self._count += 1
+        self._idle.clear()
         try:
             yield
         finally:
-            self._many -= 1
-            if not self._many:
-                self._none.set()
+            self._count -= 1
+            if not self._count:
+                self._idle.set()
 
     async def drained(self, within_s: float) -> None:
-        """Until nobody waits for one; `within_s` at most."""
+        """Waits until no command is in flight, at most `within_s` seconds."""
         with suppress(TimeoutError):
-            await asyncio.wait_for(self._none.wait(), within_s)
+            await asyncio.wait_for(self._idle.wait(), within_s)

@@ -1,24 +1,24 @@
-"""Every error that the kiosk raises by itself.
+"""The exceptions of this package, with the HTTP status of each.
 
-    KioskError                 what a client gets for it
-    ├── SettingsError          –    an environment variable or a file it names is unusable
-    ├── PanelError             –    the panel file has faults; `faults` has each with its place
-    ├── InterfaceError         –    a ROS 2 type or field that the definitions don't have
-    ├── FieldError             422  a value that its field does not take; `field` names it
-    ├── InputError             422  a request that is not what the contract says
-    ├── NotFound               404  no such page or widget
-    ├── PressRefused           409  what permitted it is gone, right before it would have been sent
-    ├── TooSlow                408  a body that took too long
-    ├── TooMany                429  more than may be done at a time; `again_s` says when to try again
-    ├── DecodeError            –    bytes that are not a message of the type
+    KioskError
+    ├── SettingsError          –    an environment variable, or a file it names, is unusable
+    ├── PanelError             –    the panel file has faults; `faults` lists them with their places
+    ├── InterfaceError         –    a ROS 2 type or field does not exist in the definitions
+    ├── FieldError             422  a field does not accept a value; `field` is its path
+    ├── InputError             422  a request is malformed
+    ├── NotFound               404  a page or widget does not exist
+    ├── PressRefused           409  the permission was lost right before the message was sent
+    ├── TooSlow                408  a request body took too long
+    ├── TooMany                429  a limit is reached; `retry_after_s` is when to try again
+    ├── DecodeError            –    bytes are not a message of the type
     ├── LinkError              503  Zenoh refused; nothing was sent
     └── LogError               503  the operator's log can't be written or read
-        ├── SearchTooLong      503  what is searched for takes too long to find
-        ├── LogCorrupt         –    its file is damaged: a new one has to be begun
-        ├── LogGone            –    its file, or one beside it, was removed or renamed
-        └── FolderInUse        –    another process holds the data folder, or may do so
+        ├── SearchTooLong      503  a search takes too long
+        ├── LogCorrupt         –    the log's file is damaged; a new one is needed
+        ├── LogGone            –    the log's file, or one beside it, was removed or renamed
+        └── FolderInUse        –    another process holds the data folder, or may hold it
 
-One handler (`routes.on_kiosk_error`) maps them to HTTP; "–" never reaches a client by itself.
+`app/web/error_pages.py` maps them to HTTP responses. "–": never sent to a client as such.
 """
 
 from dataclasses import dataclass, field
@@ -28,13 +28,13 @@ from typing import Literal
 from app.i18n import Text, TextLike
 from app.printable import printable
 
-# Why a receipt says that a press was refused.
+# The cause of a refusal, as a receipt has it.
 Cause = Literal["", "interlock", "input", "link", "log", "time", "limit"]
 
 
 class KioskError(Exception):
-    """The root; `status` is the HTTP status of an answer that carries it. Its message may name what a
-    robot or a browser sent, and goes to pages and terminals; `text` is it for a reader's language."""
+    """The base class; `status` is the HTTP status of its response, `text` the message for a reader's
+    language. Its text is made printable, because it may contain text of a robot or a browser."""
 
     status = 500
 
@@ -54,8 +54,10 @@ class SettingsError(KioskError):
 
 @dataclass(frozen=True, slots=True)
 class Remark:
-    """About one place of a panel file: `place` as in `page[0].widget[2].topic`, "" for the whole file;
-    `id` of the widget, interlock, robot or page that it is in, and `line` from 1, where they are known.
+    """A remark about one place of a panel file.
+
+    `place` is like `page[0].widget[2].topic`, "" for the whole file. `id` is that of the widget,
+    interlock, robot or page around it, "" if unknown. `line` counts from 1, 0 if unknown.
     """
 
     place: str
@@ -64,18 +66,18 @@ class Remark:
     line: int = 0
 
     @property
-    def where(self) -> str:
+    def location(self) -> str:
         """`page[0].widget[2].topic "speed", line 41`."""
         named = f'{self.place} "{self.id}"' if self.id else self.place
         return ", ".join(filter(None, (named, f"line {self.line}" if self.line else "")))
 
     def __str__(self) -> str:
-        return f"{self.where}: {self.message}" if self.where else self.message
+        return f"{self.location}: {self.message}" if self.location else self.message
 
 
 @dataclass(frozen=True, slots=True)
 class Fault(Remark):
-    """What keeps a panel file from being used. Faults of one `cause` that is not "" are one mistake."""
+    """An error in a panel file. Faults with the same `cause` (not "") are one mistake."""
 
     cause: str = field(default="", compare=False)
 
@@ -83,7 +85,7 @@ class Fault(Remark):
 
 
 class Note(Remark):
-    """What is no fault, and still worth a look."""
+    """A hint about a panel file that is not an error."""
 
     __slots__ = ()
 
@@ -100,8 +102,8 @@ class PanelError(KioskError):
 
 
 class InterfaceError(KioskError):
-    """`source` is the interface file or folder at fault, if it is one of those, `package` the package
-    that is not there at all."""
+    """`source` is the interface file or folder at fault, or None. `package` is the missing package, or
+    ""."""
 
     def __init__(self, message: str, source: Path | None = None, package: str = "") -> None:
         super().__init__(message)
@@ -127,7 +129,7 @@ class NotFound(KioskError):
 
 
 class PressRefused(KioskError):
-    """`cause` is that of the receipt which tells it."""
+    """`reason` and `cause` are those of the receipt."""
 
     status = 409
 
@@ -146,7 +148,7 @@ class TooMany(KioskError):
 
     def __init__(self, message: TextLike, again_s: int) -> None:
         super().__init__(message)
-        self.again_s = again_s
+        self.retry_after_s = again_s
 
 
 class DecodeError(KioskError):
@@ -158,7 +160,7 @@ class LinkError(KioskError):
 
 
 class LogError(KioskError):
-    """The message is why, to stand in a sentence: "no space left on device"."""
+    """The message is a reason to be put into a sentence: "no space left on device"."""
 
     status = 503
 
@@ -176,7 +178,7 @@ class LogGone(LogError):
 
     def __init__(self, message: TextLike, *, itself: bool) -> None:
         super().__init__(message)
-        self.itself = itself
+        self.is_main_file = itself
 
 
 class FolderInUse(LogError):

@@ -1,4 +1,4 @@
-"""`uvicorn app.main:app`: the only wiring."""
+"""The application: `uvicorn app.main:app`. Connects the rooms."""
 
 import asyncio
 import gc
@@ -22,7 +22,7 @@ from app.process.sd_notify import ServiceManager
 from app.process.shutdown import graceful_shutdown
 from app.process.watchdog import Watchdog
 from app.runtime.assembly import check_zenoh, mode_of, open_fleet, open_log
-from app.settings import Settings, shipped
+from app.settings import Settings, shipped_path
 from app.simulator import zenoh_peer
 from app.web.app_state import AppState, named_robot
 from app.web.asgi import Application, StartErrorsInWords
@@ -50,14 +50,14 @@ from app.web.serving import check_port, urls
 
 log = logging.getLogger("kiosk")
 
-READ_WITHIN_S = 1.0  # by a browser, when the server ends
-ANSWERED_WITHIN_S = 2.0  # by the robot, when the server ends; then it is not known what came of a press
+READ_TIMEOUT_S = 1.0  # for browsers to read their responses at shutdown
+RESPONSE_TIMEOUT_S = 2.0  # for the robot to respond at shutdown; then the result of a press is unknown
 
 
 def create_app(settings: Settings | None = None) -> FastAPI:
-    """The application; raises KioskError where its settings or its panel are unusable."""
+    """The application; KioskError if its settings or its panel file are unusable."""
     settings = settings or Settings.from_environment()
-    ros_logging.configure(settings.log_level)
+    ros_logging.configure_logging(settings.log_level)
     panel = load_panel(settings.panel, lambda of: settings.data_folder(mode_of(settings, of)))
     check_zenoh(settings, panel)
 
@@ -68,22 +68,22 @@ def create_app(settings: Settings | None = None) -> FastAPI:
             loop = asyncio.get_running_loop()
 
             async def ending() -> None:
-                watchdog.end()
+                watchdog.notify_stopping()
                 try:
                     state.fleet.close()
                     state.log.close()
-                    await state.in_flight.drained(ANSWERED_WITHIN_S)
+                    await state.in_flight.drained(RESPONSE_TIMEOUT_S)
                 finally:
                     state.fleet.cancel_all()
-                    await state.in_flight.drained(READ_WITHIN_S)
-                    loop.call_later(READ_WITHIN_S, listen_sockets.abort_unsent, ports)
+                    await state.in_flight.drained(READ_TIMEOUT_S)
+                    loop.call_later(READ_TIMEOUT_S, listen_sockets.abort_unsent, ports)
 
             ports: set[int] = set()
             watchdog = _watchdog(state)
             with graceful_shutdown(loop, ending):
                 works = (
                     watchdog.run(),
-                    _listening(app.state.server, ports, settings.hosts),
+                    _log_urls(app.state.server, ports, settings.hosts),
                     pages.compiled(state.templates.environment(panel.language)),
                 )
                 tasks = [asyncio.create_task(work) for work in works]
@@ -93,13 +93,13 @@ def create_app(settings: Settings | None = None) -> FastAPI:
                     for task in tasks:
                         task.cancel()
                     await asyncio.gather(*tasks, return_exceptions=True)
-                    watchdog.end()
+                    watchdog.notify_stopping()
 
     app = Application(
         title="Operator panel",
         summary="The HTTP interface of a robot cell's touch panel.",
         lifespan=lifespan,
-        docs_url=None,  # they load scripts from elsewhere
+        docs_url=None,  # these pages load scripts from other servers
         redoc_url=None,
         max_body_size=LONGEST,
         exception_handlers=HANDLERS,
@@ -124,33 +124,33 @@ def create_app(settings: Settings | None = None) -> FastAPI:
 async def _app_state(
     settings: Settings, panel: Panel, server: ServerConfig | None
 ) -> AsyncIterator[AppState]:
-    """All that requests need, open."""
+    """Opens everything that requests need, and closes it at the end."""
     async with open_log(settings, panel) as oplog:
         check_port(server)
         kinds: set[str] = {widget.kind for widget in panel.widgets()}
         if any(len(widget.interlocks) > 1 for widget in panel.commands):
             kinds.add("interlocks")
-        assets = load_assets(shipped("static"), shipped("templates"), panel.mm_per_px, kinds)
+        assets = load_assets(shipped_path("static"), shipped_path("templates"), panel.mm_per_px, kinds)
         revision = f"{panel.revision}-{assets.revision}"
         if settings.dev:
-            revision += f"-{secrets.token_hex(4)}"  # open pages load whatever was changed
+            revision += f"-{secrets.token_hex(4)}"  # open pages reload after every restart
         limits = PressLimits(partial(oplog.suppress, limited=True))
         metrics = Metrics(lambda: oplog.left_out, lambda: limits.refused)
         async with open_fleet(settings, panel, revision, oplog, zenoh_peer.in_process) as fleet:
             metrics.follow(fleet)
-            templates = PageTemplates(shipped("templates"))
+            templates = PageTemplates(shipped_path("templates"))
             yield AppState(fleet, assets, templates, metrics, oplog, limits)
 
 
-async def _listening(server: ServerConfig | None, ports: set[int], hosts: Sequence[str]) -> None:
-    """Tells where browsers find the panel, as soon as they do."""
+async def _log_urls(server: ServerConfig | None, ports: set[int], hosts: Sequence[str]) -> None:
+    """Waits until the server listens, then logs its URLs."""
     listening = await listen_sockets.limit_send_buffer(ports)
     if listening:
         log.info("the panel is at %s", ", ".join(urls(server, listening, hosts)))
 
 
 def _watchdog(state: AppState) -> Watchdog:
-    """What tells the service manager of the robots that the state has at the time."""
+    """The watchdog of all robot sessions."""
     return Watchdog(
         ServiceManager(),
         lambda: [(session.robot.name, session.link) for session in state.fleet.sessions],
@@ -159,8 +159,8 @@ def _watchdog(state: AppState) -> Watchdog:
 
 
 def _app_or_exit() -> FastAPI:
-    """The application for uvicorn. Its errors are sentences, without a traceback; in development a
-    faulty panel file is a page."""
+    """The application for uvicorn. Errors exit with a message and no traceback. In development a panel
+    file with faults is served as a page that lists them."""
     try:
         settings = Settings.from_environment()
         try:

@@ -1,4 +1,4 @@
-"""How often somebody may do something: token buckets, one for each who does it."""
+"""Rate limits: one token bucket for each client."""
 
 import time
 from collections import OrderedDict
@@ -6,48 +6,48 @@ from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from typing import Final
 
-REMEMBERED: Final = 500
+MAX_BUCKETS: Final = 500
 
 
 @dataclass(frozen=True, slots=True)
 class Quota:
-    """So many at once, and so many a second after these."""
+    """`burst` actions at once, then `per_s` a second."""
 
-    at_once: float
+    burst: float
     per_s: float
 
 
 @dataclass(slots=True)
 class _Bucket:
-    """What is left, at a time in monotonic seconds."""
+    """`tokens` left at `updated_at` (monotonic seconds)."""
 
-    left: float
-    at: float
+    tokens: float
+    updated_at: float
 
 
-class Buckets:
-    """One quota for each key; those not used for the longest time are forgotten, and full again."""
+class TokenBuckets:
+    """One bucket for each key. The least recently used buckets are dropped, which refills them."""
 
     def __init__(self, quota: Quota, monotonic: Callable[[], float] = time.monotonic) -> None:
         self._quota = quota
         self._monotonic = monotonic
         self._buckets: OrderedDict[Hashable, _Bucket] = OrderedDict()
 
-    def has(self, key: Hashable) -> bool:
-        """Whether there is one left now."""
+    def has_token(self, key: Hashable) -> bool:
+        """Whether the key has a token now."""
         bucket = self._buckets.get(key)
-        return bucket is None or self._now(bucket) >= 1
+        return bucket is None or self._refill(bucket) >= 1
 
-    def take(self, key: Hashable) -> None:
-        """Takes one, which has to be there."""
-        bucket = self._buckets.setdefault(key, _Bucket(self._quota.at_once, self._monotonic()))
+    def take_token(self, key: Hashable) -> None:
+        """Takes a token; `has_token` must be true."""
+        bucket = self._buckets.setdefault(key, _Bucket(self._quota.burst, self._monotonic()))
         self._buckets.move_to_end(key)
-        bucket.left = self._now(bucket) - 1
-        while len(self._buckets) > REMEMBERED:
+        bucket.tokens = self._refill(bucket) - 1
+        while len(self._buckets) > MAX_BUCKETS:
             self._buckets.popitem(last=False)
 
-    def _now(self, bucket: _Bucket) -> float:
+    def _refill(self, bucket: _Bucket) -> float:
         now, quota = self._monotonic(), self._quota
-        bucket.left = min(quota.at_once, bucket.left + (now - bucket.at) * quota.per_s)
-        bucket.at = now
-        return bucket.left
+        bucket.tokens = min(quota.burst, bucket.tokens + (now - bucket.updated_at) * quota.per_s)
+        bucket.updated_at = now
+        return bucket.tokens

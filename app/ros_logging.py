@@ -1,6 +1,6 @@
-"""Logs as ROS 2 writes them: `[INFO] [1704573791.462327908] [web_ui]: message`.
+"""Log output in ROS 2's format: `[INFO] [1704573791.462327908] [web_ui]: message`.
 
-Format and level numbers are rcutils' (rcl_interfaces/msg/Log has the same numbers).
+Format and level numbers are those of rcutils and rcl_interfaces/msg/Log.
 """
 
 import logging
@@ -25,53 +25,54 @@ LEVELS: Mapping[str, int] = {name.lower(): level for level, (name, _) in SEVERIT
 log = logging.getLogger("kiosk")
 
 
-def severity(record: logging.LogRecord) -> tuple[str, int]:
+def ros_severity(record: logging.LogRecord) -> tuple[str, int]:
     """The nearest ROS severity at or below the record's level."""
     return SEVERITIES[max((at for at in SEVERITIES if at <= record.levelno), default=logging.DEBUG)]
 
 
-def stamp(record: logging.LogRecord) -> tuple[int, int]:
+def record_stamp(record: logging.LogRecord) -> tuple[int, int]:
     """Seconds and nanoseconds since the epoch."""
     return divmod(int(record.created * 1e9), 1_000_000_000)
 
 
 class RobotLog(logging.LoggerAdapter[logging.Logger]):
-    """What is logged of one of several robots begins with its name, and is on its /rosout alone."""
+    """A logger of one robot: records begin with the robot's name and go to its /rosout only."""
 
     def __init__(self, logger: logging.Logger, robot: str) -> None:
-        """`robot` is "" where there is only one."""
+        """`robot` is the robot's name, "" if the panel has only one."""
         super().__init__(logger, {"robot": robot})
         self._prefix = f"{robot}: " if robot else ""
 
     def process(
         self, msg: Any, kwargs: MutableMapping[str, Any]
     ) -> tuple[Any, MutableMapping[str, Any]]:
-        told = {name: f"{self._prefix}{text}" for name, text in kwargs.get("extra", {}).items()}
-        extra = {**(self.extra or {}), **told}
+        given = {name: f"{self._prefix}{text}" for name, text in kwargs.get("extra", {}).items()}
+        extra = {**(self.extra or {}), **given}
         return f"{self._prefix.replace('%', '%%')}{msg}", {**kwargs, "extra": extra}
 
 
 class RosFormatter(logging.Formatter):
-    """One record, one line; a traceback follows indented, so that no text can pose as a record."""
+    """Formats a record as one line. Further lines are indented, so that no text can look like a
+    record."""
 
     def format(self, record: logging.LogRecord) -> str:
-        name, _ = severity(record)
-        seconds, nanoseconds = stamp(record)
+        name, _ = ros_severity(record)
+        seconds, nanoseconds = record_stamp(record)
         lines = printable(super().format(record)).replace("\n", "\n  ")
         return f"[{name}] [{seconds}.{nanoseconds:09}] [{NODE_NAME}]: {lines}"
 
 
-def on_rosout(text: str) -> Mapping[str, str]:
-    """The `extra` of a record that has on /rosout another text, for every node of the robot can read
-    that: not what an operator typed."""
+def rosout_extra(text: str) -> Mapping[str, str]:
+    """The `extra` of a record with another text on /rosout: every node of the robot can read that, so
+    it must not contain what an operator typed."""
     return {"rosout": text}
 
 
 class RosoutHandler(logging.Handler):
-    """Hands each record on as the fields of `rcl_interfaces/msg/Log`.
+    """Passes each record to a callback as the fields of `rcl_interfaces/msg/Log`.
 
-    The callback runs on whatever thread logs; what it raises is dropped, for a log that can't be
-    sent must not become a log record of its own.
+    The callback runs on the thread that logs. Its exceptions are dropped: a failure to send a record
+    must not create another record.
     """
 
     def __init__(self, publish: Callable[[Mapping[str, object]], None], robot: str = "") -> None:
@@ -93,13 +94,13 @@ class RosoutHandler(logging.Handler):
 
 def log_fields(record: logging.LogRecord) -> dict[str, object]:
     """A record as the fields of `rcl_interfaces/msg/Log`."""
-    seconds, nanoseconds = stamp(record)
+    seconds, nanoseconds = record_stamp(record)
     text = getattr(record, "rosout", None) or record.getMessage()
     if record.exc_info:
         text += "\n" + logging.Formatter().formatException(record.exc_info)
     return {
         "stamp": {"sec": seconds, "nanosec": nanoseconds},
-        "level": severity(record)[1],
+        "level": ros_severity(record)[1],
         "name": NODE_NAME,
         "msg": printable(text),
         "file": record.filename,
@@ -108,11 +109,11 @@ def log_fields(record: logging.LogRecord) -> dict[str, object]:
     }
 
 
-def configure(level: str) -> None:
-    """Send every logger of the process to stderr in ROS's format, at `level` and above.
+def configure_logging(level: str) -> None:
+    """Sends all log records at `level` and above to stderr in ROS 2's format.
 
-    uvicorn has set up its own loggers before the application is imported: they join in. A line
-    per request is of use only to who looks for it, so it comes with `debug`.
+    uvicorn configures its loggers before it imports the application; they are redirected. Its line for
+    each request is logged at `debug` only.
     """
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(RosFormatter())

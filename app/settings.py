@@ -1,4 +1,4 @@
-"""The environment, read once and frozen."""
+"""The settings, from environment variables."""
 
 import os
 import re
@@ -19,18 +19,18 @@ LOOPBACK_HOSTS = ("127.0.0.1", "localhost", "[::1]")
 HOST_NAME = re.compile(r"\[[0-9a-f:.]+\]|[a-z0-9._-]+")
 LOG_LEVELS = ("debug", "info", "warn", "error", "fatal")
 PREFIX = "KIOSK_"
-NAMES = ("PANEL", "ZENOH", "MODE", "DATA", "HOSTS", "PROXIES", "LOG_LEVEL", "DEV")
+VARIABLES = ("PANEL", "ZENOH", "MODE", "DATA", "HOSTS", "PROXIES", "LOG_LEVEL", "DEV")
 
 
-def shipped(name: str) -> Path:
-    """A file or folder of the project: in the package when installed, beside it in a checkout."""
+def shipped_path(name: str) -> Path:
+    """The path of a shipped file or folder: in the installed package, or beside it in a checkout."""
     inside = PACKAGE / name
     return inside if inside.exists() else PACKAGE.parent / name
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settings:
-    """What `KIOSK_…` variables say; see the README's table."""
+    """The values of the `KIOSK_…` variables; see docs/reference/settings.md."""
 
     panel: Path
     zenoh: Path
@@ -42,48 +42,48 @@ class Settings:
     data: Path | None = None
 
     def data_folder(self, mode: Mode) -> Path:
-        """Where databases live; a demo that nobody gave a folder never mixes with a real panel's."""
+        """The data folder. Without `KIOSK_DATA` a demo has a folder apart from a live panel's."""
         if self.data is not None:
             return self.data
         return state_home() / APP / "demo" if mode == "demo" else state_home() / APP
 
     @classmethod
     def from_environment(cls, env: Mapping[str, str] = os.environ) -> "Settings":
-        """Raises SettingsError that names the variable and what would be right."""
-        _known(name for name in env if name.startswith(PREFIX))
+        """Reads and checks the variables; SettingsError names the variable and what would be right."""
+        _check_names(name for name in env if name.startswith(PREFIX))
         level = (env.get("KIOSK_LOG_LEVEL") or "info").lower()
         if level not in LOG_LEVELS:
             raise SettingsError(f'KIOSK_LOG_LEVEL is "{level}": one of {", ".join(LOG_LEVELS)}')
         return cls(
-            panel=_path(env, "KIOSK_PANEL", PACKAGE / "panel.toml"),
-            zenoh=_path(env, "KIOSK_ZENOH", shipped("zenoh.json5")),
-            mode=_mode(env.get("KIOSK_MODE", "")),
-            hosts=(*LOOPBACK_HOSTS, *_hosts(env.get("KIOSK_HOSTS", ""))),
-            proxies=tuple(_proxies(env.get("KIOSK_PROXIES", ""))),
+            panel=_parse_path(env, "KIOSK_PANEL", PACKAGE / "panel.toml"),
+            zenoh=_parse_path(env, "KIOSK_ZENOH", shipped_path("zenoh.json5")),
+            mode=_parse_mode(env.get("KIOSK_MODE", "")),
+            hosts=(*LOOPBACK_HOSTS, *_parse_hosts(env.get("KIOSK_HOSTS", ""))),
+            proxies=tuple(_parse_proxies(env.get("KIOSK_PROXIES", ""))),
             log_level=level,
             dev=env.get("KIOSK_DEV", "") not in ("", "0"),
-            data=_path(env, "KIOSK_DATA", None),
+            data=_parse_path(env, "KIOSK_DATA", None),
         )
 
 
 def state_home() -> Path:
-    """The user's folder for state (XDG Base Directory Specification); a relative one does not count."""
+    """The user's state folder (XDG Base Directory Specification). A relative path is ignored."""
     given = Path(os.environ.get("XDG_STATE_HOME", ""))
     return given if given.is_absolute() else Path("~/.local/state").expanduser()
 
 
-def _known(variables: Iterable[str]) -> None:
-    """A variable that nobody reads would be a setting that silently does not hold."""
+def _check_names(variables: Iterable[str]) -> None:
+    """SettingsError for an unknown variable: a typing error must not go unnoticed."""
     for variable in variables:
         name = variable.removeprefix(PREFIX)
-        if name not in NAMES:
-            close = get_close_matches(name.upper(), NAMES, 1)
-            there = ", ".join(PREFIX + known for known in NAMES)
+        if name not in VARIABLES:
+            close = get_close_matches(name.upper(), VARIABLES, 1)
+            there = ", ".join(PREFIX + known for known in VARIABLES)
             hint = f"did you mean {PREFIX}{close[0]}?" if close else f"there are {there}"
             raise SettingsError(f"{variable} is not a setting of this server: {hint}")
 
 
-def _mode(given: str) -> Mode | None:
+def _parse_mode(given: str) -> Mode | None:
     match given:
         case "":
             return None
@@ -92,12 +92,12 @@ def _mode(given: str) -> Mode | None:
     raise SettingsError(f'KIOSK_MODE is "{given}": it must be "demo" or "live"')
 
 
-def _listed(given: str) -> Iterator[str]:
+def _split_list(given: str) -> Iterator[str]:
     return filter(None, (part.strip().lower() for part in given.split(",")))
 
 
-def _hosts(given: str) -> Iterator[str]:
-    for host in _listed(given):
+def _parse_hosts(given: str) -> Iterator[str]:
+    for host in _split_list(given):
         if not HOST_NAME.fullmatch(host):
             raise SettingsError(
                 f'KIOSK_HOSTS has "{host}": names or addresses with commas between, without port '
@@ -106,8 +106,8 @@ def _hosts(given: str) -> Iterator[str]:
         yield host
 
 
-def _proxies(given: str) -> Iterator[str]:
-    for proxy in _listed(given):
+def _parse_proxies(given: str) -> Iterator[str]:
+    for proxy in _split_list(given):
         try:
             ip_network(proxy)
         except ValueError:
@@ -119,9 +119,9 @@ def _proxies(given: str) -> Iterator[str]:
 
 
 @overload
-def _path(env: Mapping[str, str], name: str, default: Path) -> Path: ...
+def _parse_path(env: Mapping[str, str], name: str, default: Path) -> Path: ...
 @overload
-def _path(env: Mapping[str, str], name: str, default: None) -> Path | None: ...
-def _path(env: Mapping[str, str], name: str, default: Path | None) -> Path | None:
+def _parse_path(env: Mapping[str, str], name: str, default: None) -> Path | None: ...
+def _parse_path(env: Mapping[str, str], name: str, default: Path | None) -> Path | None:
     given = env.get(name)
     return Path(given).expanduser().resolve() if given else default

@@ -13,7 +13,7 @@ from typing import Any, Final
 import pytest
 
 from app.panel import load_panel
-from app.settings import NAMES, PREFIX
+from app.settings import PREFIX, VARIABLES
 from app.web.serving import OPTIONS
 from bench.report import BEGIN, END
 from tests.support.parts import ROOT, Server, as_response, until
@@ -218,7 +218,7 @@ def test_the_settings_page_starts_the_server_with_its_limits() -> None:
 
 def test_every_variable_is_a_setting() -> None:
     named = set(re.findall(rf"\b{PREFIX}([A-Z_]*[A-Z])\b", str(PAGES)))
-    assert named <= set(NAMES)
+    assert named <= set(VARIABLES)
 
 
 def test_every_target_of_make_is_one() -> None:

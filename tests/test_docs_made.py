@@ -11,7 +11,7 @@ import pytest
 from jsonschema_rs import Draft7Validator
 
 from app.i18n import BETWEEN, ENGLISH, sentences
-from app.settings import NAMES
+from app.settings import VARIABLES
 from docs._generate import locks, places, schema
 from docs._generate import settings as variables
 from docs._generate.__main__ import filled, out_of_date
@@ -161,7 +161,7 @@ def test_a_new_sentence_without_advice_is_named(monkeypatch: pytest.MonkeyPatch)
 
 
 def test_each_setting_is_described() -> None:
-    assert set(variables.ABOUT) == set(NAMES)
+    assert set(variables.ABOUT) == set(VARIABLES)
 
 
 def test_each_dependency_has_its_reason() -> None:

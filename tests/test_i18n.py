@@ -12,7 +12,7 @@ from app.clock import format_age
 from app.i18n import ENGLISH, Text, joined, localized, render, say, sentences, text_in
 from app.i18n.__main__ import faults, placeholders
 from app.i18n.catalogue import catalogues_in, files
-from app.settings import PACKAGE, shipped
+from app.settings import PACKAGE, shipped_path
 
 SPEAKERS = ("say", "said", "locked", "refused")  # functions whose first argument is a code
 PREFIXES = (
@@ -56,7 +56,7 @@ def test_every_sentence_gets_all_that_it_is_about() -> None:
 
 def test_every_sentence_is_said_somewhere() -> None:
     sources = [path for path in PACKAGE.rglob("*.py")]
-    sources += [path for name in ("templates", "static") for path in shipped(name).rglob("*.*")]
+    sources += [path for name in ("templates", "static") for path in shipped_path(name).rglob("*.*")]
     words = set(re.findall(r"\w+", "\n".join(path.read_text() for path in sources)))
     ends = {code: {code.removeprefix(prefix) for prefix in ("", *PREFIXES)} for code in SENTENCES}
     assert [code for code, said in ends.items() if not words & said] == []

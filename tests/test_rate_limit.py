@@ -6,7 +6,7 @@ from app.audit import Origin
 from app.commands.press_limits import OF_ADDRESS, OF_ALL, OF_CANCELS, OF_CLIENT, PressLimits
 from app.permission.clients import Client, anonymous
 from app.permission.principal import Principal
-from app.rate_limit import REMEMBERED, Buckets, Quota
+from app.rate_limit import MAX_BUCKETS, Quota, TokenBuckets
 
 AT_THE_CELL = "127.0.0.1"
 
@@ -41,12 +41,12 @@ def browser(number: int, address: str = "10.0.0.7") -> Principal:
 
 def test_so_many_at_once_and_then_so_many_a_second() -> None:
     now = 0.0
-    buckets = Buckets(Quota(10, 2), lambda: now)
+    buckets = TokenBuckets(Quota(10, 2), lambda: now)
 
     def taken(key: str) -> int:
         count = 0
-        while buckets.has(key):
-            buckets.take(key)
+        while buckets.has_token(key):
+            buckets.take_token(key)
             count += 1
         return count
 
@@ -60,19 +60,19 @@ def test_so_many_at_once_and_then_so_many_a_second() -> None:
 
 
 def test_only_those_are_remembered_that_did_it_last() -> None:
-    buckets = Buckets(Quota(1, 1), lambda: 0.0)
-    for key in range(10 * REMEMBERED):
-        buckets.take(key)
-    assert len(buckets._buckets) == REMEMBERED
-    assert not buckets.has(10 * REMEMBERED - 1)
-    assert buckets.has(0)
+    buckets = TokenBuckets(Quota(1, 1), lambda: 0.0)
+    for key in range(10 * MAX_BUCKETS):
+        buckets.take_token(key)
+    assert len(buckets._buckets) == MAX_BUCKETS
+    assert not buckets.has_token(10 * MAX_BUCKETS - 1)
+    assert buckets.has_token(0)
 
 
 def test_a_client_has_its_limit_and_takes_nothing_from_another(pressing: Pressing) -> None:
-    assert pressing.admitted(browser(1), 1000) == OF_CLIENT.at_once
+    assert pressing.admitted(browser(1), 1000) == OF_CLIENT.burst
     assert pressing.admitted(browser(2), 10) == 10
     pressing.now += 10
-    assert pressing.admitted(browser(1), 1000) == OF_CLIENT.at_once
+    assert pressing.admitted(browser(1), 1000) == OF_CLIENT.burst
     pressing.now += 0.5
     assert pressing.admitted(browser(1), 1000) == OF_CLIENT.per_s / 2
 
@@ -82,21 +82,21 @@ def test_in_the_long_run_no_more_than_its_rate_is_admitted(pressing: Pressing) -
     for _ in range(9240):  # a press each millisecond or so
         pressing.now += 1 / 924
         admitted += pressing.limits.admit(browser(1))
-    assert admitted <= OF_CLIENT.at_once + 10 * OF_CLIENT.per_s
+    assert admitted <= OF_CLIENT.burst + 10 * OF_CLIENT.per_s
 
 
 def test_who_makes_up_cookies_has_the_limit_of_an_address(pressing: Pressing) -> None:
-    assert sum(pressing.admitted(browser(n), 10) for n in range(1000)) == OF_ADDRESS.at_once
+    assert sum(pressing.admitted(browser(n), 10) for n in range(1000)) == OF_ADDRESS.burst
     assert pressing.admitted(browser(1, "10.0.0.8"), 10) == 10
 
 
 def test_programs_without_a_cookie_are_one_client(pressing: Pressing) -> None:
-    assert pressing.admitted(program("10.0.0.7"), 1000) == OF_CLIENT.at_once
+    assert pressing.admitted(program("10.0.0.7"), 1000) == OF_CLIENT.burst
     assert pressing.admitted(browser(1), 10) == 10
 
 
 def test_a_whole_network_has_a_limit_and_leaves_the_cell_its_own(pressing: Pressing) -> None:
-    assert sum(pressing.admitted(program(f"10.0.1.{n}"), 50) for n in range(250)) == OF_ALL.at_once
+    assert sum(pressing.admitted(program(f"10.0.1.{n}"), 50) for n in range(250)) == OF_ALL.burst
     assert pressing.admitted(browser(1, AT_THE_CELL), 10) == 10
 
 
@@ -110,7 +110,7 @@ def test_a_cancel_is_one_too_many_only_if_this_goals_was_asked_for_just_now(pres
     """No press, no other goal and nobody else's cancels keep anybody from stopping a robot."""
     pressing.admitted(browser(1), 1000)
     sum(pressing.admitted(program(f"10.0.1.{n}"), 50) for n in range(250))
-    assert pressing.canceled(browser(1), 1000, "/robots/r1", "count", "p1") == OF_CANCELS.at_once
+    assert pressing.canceled(browser(1), 1000, "/robots/r1", "count", "p1") == OF_CANCELS.burst
     assert pressing.canceled(browser(1), 3, "/robots/r1", "count", "p2") == 3
     assert pressing.canceled(browser(1), 3, "/robots/r2", "count", "p1") == 3
     pressing.now += 1

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping
 
 import pytest
 
-from app.interfaces import interfaces_of
-from app.ros_logging import LEVELS, RobotLog, RosFormatter, RosoutHandler, configure, log_fields
+from app.interfaces import load_interfaces
+from app.ros_logging import LEVELS, RobotLog, RosFormatter, RosoutHandler, configure_logging, log_fields
 
 LINE = re.compile(r"\[(DEBUG|INFO|WARN|ERROR|FATAL)\] \[\d+\.\d{9}\] \[web_ui\]: ")
 
@@ -105,7 +105,7 @@ def test_a_record_becomes_the_fields_of_the_ros_log_message() -> None:
     ],
 )
 def test_a_record_can_be_sent_on_rosout(text: str, sent: str) -> None:
-    interfaces = interfaces_of("jazzy")
+    interfaces = load_interfaces("jazzy")
     payload = interfaces.encode("rcl_interfaces/msg/Log", log_fields(record(text)))
     assert interfaces.decode("rcl_interfaces/msg/Log", payload).msg == sent
 
@@ -129,7 +129,7 @@ def test_a_record_that_can_not_be_sent_is_dropped_in_silence(
 @pytest.mark.usefixtures("logging_as_before")
 @pytest.mark.parametrize("level", list(LEVELS))
 def test_the_kiosk_logs_at_its_level_and_above(level: str, capsys: pytest.CaptureFixture[str]) -> None:
-    configure(level)
+    configure_logging(level)
     for number in LEVELS.values():
         logging.getLogger("kiosk.part").log(number, "level %d", number)
     seen = re.findall(r"level (\d+)", capsys.readouterr().err)
@@ -138,7 +138,7 @@ def test_the_kiosk_logs_at_its_level_and_above(level: str, capsys: pytest.Captur
 
 @pytest.mark.usefixtures("logging_as_before")
 def test_uvicorn_logs_in_the_same_format(capsys: pytest.CaptureFixture[str]) -> None:
-    configure("info")
+    configure_logging("info")
     logging.getLogger("uvicorn.error").info("Uvicorn running")
     line = capsys.readouterr().err
     assert LINE.match(line)
@@ -150,7 +150,7 @@ def test_uvicorn_logs_in_the_same_format(capsys: pytest.CaptureFixture[str]) -> 
 def test_a_line_per_request_comes_with_debug_only(
     level: str, shown: bool, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    configure(level)
+    configure_logging(level)
     logging.getLogger("uvicorn.access").info("GET /")
     assert ("GET /" in capsys.readouterr().err) is shown
 
@@ -166,7 +166,7 @@ def test_a_control_of_the_upper_half_is_escaped_too(control: str) -> None:
 
 @pytest.mark.usefixtures("logging_as_before")
 def test_others_are_logged_at_the_level_too(capsys: pytest.CaptureFixture[str]) -> None:
-    configure("error")
+    configure_logging("error")
     logging.getLogger("asyncio").warning("too quiet")
     logging.getLogger("asyncio").error("loud enough")
     shown = capsys.readouterr().err

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from app.errors import SettingsError
-from app.settings import PACKAGE, Settings, shipped
+from app.settings import PACKAGE, Settings, shipped_path
 
 
 def test_without_variables_the_shipped_files_are_used() -> None:
@@ -112,7 +112,7 @@ def test_kiosk_data_is_the_folder_of_whatever_mode(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["templates", "static", "zenoh.json5", "panel.toml"])
 def test_what_the_project_ships_is_found(name: str) -> None:
-    assert shipped(name).exists()
+    assert shipped_path(name).exists()
 
 
 @pytest.mark.parametrize("hosts", ["panel.local:8000", "::1", "http://panel", "panel/", "a b"])

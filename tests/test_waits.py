@@ -9,7 +9,7 @@ from app.concurrency import CancellableWaits
 
 async def waits(on: CancellableWaits, event: asyncio.Event) -> str:
     try:
-        async with on.one():
+        async with on.cancellable():
             await event.wait()
     except TimeoutError:
         return "given up"
@@ -23,7 +23,7 @@ async def _both_and_a_later_one() -> None:
     mine.cancel_all()
     assert list(await asyncio.gather(first, second)) == ["given up", "given up"]
     assert await waits(mine, event) == "given up"
-    async with mine.one():
+    async with mine.cancellable():
         pass  # nothing in it waits
 
 

@@ -61,7 +61,8 @@ def test_an_installed_wheel_serves_from_any_folder(tmp_path: Path) -> None:
     finally:
         served.end()
     services = (
-        "from app.interfaces import interfaces_of as of; of('jazzy').service('std_srvs/srv/SetBool')"
+        "from app.interfaces import load_interfaces as of; "
+        "of('jazzy').service_types('std_srvs/srv/SetBool')"
     )
     subprocess.run([str(python), "-c", services], cwd=elsewhere, check=True, timeout=60)
     # Installed, it needs no file of the checkout: these are its own.

@@ -22,7 +22,7 @@ from app.audit.entry import Entry, Origin
 from app.audit.queries import Filter, OpenPress, Row
 from app.audit.reader_process import ReaderProcess
 from app.audit.readers import Readers
-from app.audit.refusal_quota import SUMMED_UP_S, RefusalQuota
+from app.audit.refusal_quota import SUMMARY_INTERVAL_S, RefusalQuota
 from app.audit.ticket import Limits, Results, Ticket
 from app.audit.writer_thread import WriterThread
 from app.errors import LogError
@@ -43,13 +43,15 @@ class OperatorLog:
         self.folder = folder
         self._limits = limits
         self._folder = DataDir(folder)
-        self._changed: set[Callable[[], None]] = set()
+        self._listeners: set[Callable[[], None]] = set()
         self._readers = Readers(folder)
         self._stuck: set[Ticket] = set()
         self._loop = asyncio.get_running_loop()
         self._refusals = RefusalQuota()
-        self._telling: asyncio.TimerHandle | None = None
-        self._writer = WriterThread(self._folder, limits, secrets.token_hex(4), mode, self._tell)
+        self._summary_timer: asyncio.TimerHandle | None = None
+        self._writer = WriterThread(
+            self._folder, limits, secrets.token_hex(4), mode, self._post_results
+        )
 
     async def start(self) -> None:
         """Opens the log; FolderInUse when another server has the folder. What else may be wrong is
@@ -57,18 +59,18 @@ class OperatorLog:
         with suppress(OSError):  # the keeper meets it again, and says it
             await self._folder.hold_soon()
         self._writer.start()
-        await self._own(self._writer.tried.wait)
+        await self._wait_on_thread(self._writer.tried.wait)
 
     async def stop(self) -> None:
         """Writes what is waiting, and lets go of the folder."""
-        if self._telling is not None:
-            self._telling.cancel()
-            self._add_left_out()
-        await self._own(self._writer.stop)
+        if self._summary_timer is not None:
+            self._summary_timer.cancel()
+            self._write_summary()
+        await self._wait_on_thread(self._writer.stop)
         self._readers.stop()
         self._folder.release()
 
-    async def _own(self, wait: Callable[[float], object]) -> None:
+    async def _wait_on_thread(self, wait: Callable[[float], object]) -> None:
         """Waits on a thread of its own, whatever else the process's threads are busy with."""
         thread = ThreadPoolExecutor(1, "operators-log-wait")
         waited = self._loop.run_in_executor(thread, wait, ENDED_WITHIN_S)
@@ -89,12 +91,12 @@ class OperatorLog:
     @property
     def fault(self) -> TextLike:
         """The sentence that says that the log can't be written; "" while it can."""
-        why = self._why
-        sentence = "log_unwritable" if self._needed else "log_unwritable_free"
+        why = self._fault_reason
+        sentence = "log_unwritable" if self._is_required else "log_unwritable_free"
         return say(sentence, why=why) if why else ""
 
     @property
-    def _why(self) -> TextLike:
+    def _fault_reason(self) -> TextLike:
         if self._stuck and not self._writer.fault:
             return say("log_slow", seconds=f"{PRESSED_WITHIN_S:g}")
         return self._writer.fault
@@ -102,21 +104,21 @@ class OperatorLog:
     @property
     def lock(self) -> TextLike:
         """Why nothing may be pressed; "" while it may."""
-        return self.fault if self._needed else ""
+        return self.fault if self._is_required else ""
 
     @property
-    def _needed(self) -> bool:
+    def _is_required(self) -> bool:
         """Whether nothing is sent that is not logged."""
         return self._limits.required or self._writer.displaced
 
     @contextmanager
     def notifying(self, changed: Callable[[], None]) -> Iterator[None]:
         """`changed` is called, on the loop, whenever `fault` has changed."""
-        self._changed.add(changed)
+        self._listeners.add(changed)
         try:
             yield
         finally:
-            self._changed.discard(changed)
+            self._listeners.discard(changed)
 
     async def pressed(self, entry: Entry) -> Entry | None:
         """Writes the entry of a press that is about to be sent, and returns it as it stands.
@@ -125,9 +127,9 @@ class OperatorLog:
         where the log has a press of this id: nothing is written then.
         """
         try:
-            return await self._written(entry)
+            return await self._write_press(entry)
         except LogError as error:
-            if self._needed:
+            if self._is_required:
                 raise LogError(self.fault or say("log_unwritable", why=error.text)) from error
             return None
 
@@ -136,7 +138,7 @@ class OperatorLog:
         if entry.outcome == "refused":
             self._refusals.take(entry)
         try:
-            await self._within(self._add(entry), CLOSED_WITHIN_S)
+            await self._wait_for_result(self._add(entry), CLOSED_WITHIN_S)
         except LogError as error:
             return error.text
         return ""
@@ -153,23 +155,25 @@ class OperatorLog:
         """Counts a refusal that is no entry, `limited` one that was not even judged; one entry tells of
         those of a while."""
         if self._refusals.suppress(origin, limited):
-            self._tell_left_out_later()
+            self._schedule_summary()
 
     @property
     def left_out(self) -> int:
         """How many refusals are no entries, since the start."""
         return self._refusals.left_out
 
-    def _tell_left_out_later(self) -> None:
-        self._telling = self._loop.call_later(SUMMED_UP_S, self._tell_left_out)
+    def _schedule_summary(self) -> None:
+        self._summary_timer = self._loop.call_later(
+            SUMMARY_INTERVAL_S, self._write_summary_when_possible
+        )
 
-    def _tell_left_out(self) -> None:
-        if self._why:
-            self._tell_left_out_later()
+    def _write_summary_when_possible(self) -> None:
+        if self._fault_reason:
+            self._schedule_summary()
         else:
-            self._add_left_out()
+            self._write_summary()
 
-    def _add_left_out(self) -> None:
+    def _write_summary(self) -> None:
         for entry in self._refusals.summary_due():
             self._writer.add(Ticket(entry, self._loop.create_future()), None)
 
@@ -192,21 +196,21 @@ class OperatorLog:
         """Presses of these widgets, not before `since` (ms), of which the end is not known, the newest
         first; LogError when that can't be read, or what was cut off is not closed yet."""
         if self.head is None:
-            raise LogError(say("log_unreadable", why=self._why or say("log_closed")))
+            raise LogError(say("log_unreadable", why=self._fault_reason or say("log_closed")))
         return await self._readers.open_presses(robot, widgets, since)
 
-    async def _written(self, entry: Entry) -> Entry:
-        if why := self._why:
+    async def _write_press(self, entry: Entry) -> Entry:
+        if why := self._fault_reason:
             raise LogError(why)
         ticket = self._add(entry)
         try:
-            return await self._within(ticket, PRESSED_WITHIN_S)
+            return await self._wait_for_result(ticket, PRESSED_WITHIN_S)
         except BaseException:
             ticket.abandoned = True
             self._close_abandoned(ticket)
             raise
 
-    async def _within(self, ticket: Ticket, seconds: float) -> Entry:
+    async def _wait_for_result(self, ticket: Ticket, seconds: float) -> Entry:
         timer = self._loop.call_later(seconds, ticket.wake)
         try:
             await ticket.waiter
@@ -214,7 +218,7 @@ class OperatorLog:
             timer.cancel()
         if ticket.result is None:
             self._stuck.add(ticket)
-            self._say_changed()
+            self._notify_listeners()
             raise LogError(say("log_slow", seconds=f"{seconds:g}"))
         if isinstance(ticket.result, Entry):
             return ticket.result
@@ -233,16 +237,16 @@ class OperatorLog:
             raise LogError(say("log_full_queue"))
         return ticket
 
-    def _tell(self, results: Results, changed: bool) -> None:
+    def _post_results(self, results: Results, changed: bool) -> None:
         """On the keeper's threads; wakes the loop only where there is something to tell."""
         if not (results or changed):
             return
         try:
-            self._loop.call_soon_threadsafe(self._told, results, changed)
+            self._loop.call_soon_threadsafe(self._deliver_results, results, changed)
         except RuntimeError:  # the loop is closed: the process ends
             log.debug("nobody is told of %d entries", len(results))
 
-    def _told(self, results: Results, changed: bool) -> None:
+    def _deliver_results(self, results: Results, changed: bool) -> None:
         for ticket, result in results:
             ticket.result = result
             ticket.wake()
@@ -252,8 +256,8 @@ class OperatorLog:
                 self._stuck.discard(ticket)
                 changed = True
         if changed:
-            self._say_changed()
+            self._notify_listeners()
 
-    def _say_changed(self) -> None:
-        for listener in tuple(self._changed):
+    def _notify_listeners(self) -> None:
+        for listener in tuple(self._listeners):
             listener()

@@ -19,7 +19,7 @@ from app.i18n import say
 
 LOCK: Final = "server.lock"
 HELD_BY_OTHER_S: Final = 5.0  # a server that is started anew waits so long for the old one's lock
-ASKED_AGAIN_S: Final = 0.1
+RETRY_S: Final = 0.1
 
 
 class DataDir:
@@ -32,7 +32,7 @@ class DataDir:
 
     def hold(self) -> None:
         """Makes and locks the folder; FolderInUse says who has it, OSError that it can't be made."""
-        if self._fd is not None and self._in_place(self._fd):
+        if self._fd is not None and self._lock_is_in_place(self._fd):
             return
         self.path.parent.mkdir(parents=True, exist_ok=True)
         self.path.mkdir(mode=0o700, exist_ok=True)
@@ -40,7 +40,7 @@ class DataDir:
         try:
             fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            raise FolderInUse(f"{self.path} is in use by {_holder(fd)}: give each server its own "
+            raise FolderInUse(f"{self.path} is in use by {_read_holder(fd)}: give each server its own "
                               "KIOSK_DATA, and one worker") from None  # fmt: skip
         else:
             self.release()
@@ -48,14 +48,14 @@ class DataDir:
         finally:
             if fd >= 0:
                 os.close(fd)
-        self._sign(self._fd)
+        self._write_holder(self._fd)
 
     def check(self) -> None:
         """FolderInUse where its lock was removed, renamed or replaced: another server may have it."""
-        if self._fd is not None and not self._in_place(self._fd):
+        if self._fd is not None and not self._lock_is_in_place(self._fd):
             raise FolderInUse(say("log_taken", name=LOCK))
 
-    def _in_place(self, fd: int) -> bool:
+    def _lock_is_in_place(self, fd: int) -> bool:
         try:
             return os.path.samestat(os.fstat(fd), os.stat(self._lock))
         except OSError:
@@ -71,7 +71,7 @@ class DataDir:
             except FolderInUse:
                 if loop.time() > end:
                     raise
-            await asyncio.sleep(ASKED_AGAIN_S)
+            await asyncio.sleep(RETRY_S)
 
     def release(self) -> None:
         """Lets others have it; the file stays."""
@@ -79,7 +79,7 @@ class DataDir:
             os.close(self._fd)
             self._fd = None
 
-    def _sign(self, fd: int) -> None:
+    def _write_holder(self, fd: int) -> None:
         since = datetime.now(UTC).isoformat(timespec="seconds")
         about = {"pid": os.getpid(), "since": since, "command": shlex.join(sys.argv)}
         with suppress(OSError):  # on a full disk it has the lock all the same
@@ -87,7 +87,7 @@ class DataDir:
             os.pwrite(fd, json.dumps(about).encode(), 0)
 
 
-def _holder(fd: int) -> str:
+def _read_holder(fd: int) -> str:
     """Who has the lock, as it signed; it may be about to."""
     try:
         about = json.loads(os.pread(fd, 4096, 0))

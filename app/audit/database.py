@@ -17,7 +17,7 @@ NAME: Final = "operators-log.sqlite3"
 SUFFIXES: Final = ("", "-wal", "-shm")
 APPLICATION: Final = 0x4F504C47  # "OPLG"
 VERSION: Final = 2
-PATIENCE_S: Final = 1.0  # with a program of somebody's that has the file locked
+BUSY_TIMEOUT_S: Final = 1.0  # with a program of somebody's that has the file locked
 
 # `undone` has the presses of which the end is not known; it can be made from `entry` anew.
 SCHEMA: Final = """
@@ -35,7 +35,7 @@ CREATE TABLE about (key TEXT PRIMARY KEY, value ANY NOT NULL) STRICT, WITHOUT RO
 # By which a press that comes again is found; older files get it when they are opened.
 INDEX: Final = "CREATE INDEX IF NOT EXISTS entry_press ON entry (press) WHERE press <> ''"
 
-WORDS: Final = {
+ERROR_TEXTS: Final = {
     "SQLITE_FULL": "no space left on device",
     "SQLITE_READONLY": "the file is read-only",
     "SQLITE_CANTOPEN": "the file can't be opened",
@@ -58,7 +58,7 @@ DAMAGED: Final = frozenset({"SQLITE_CORRUPT", "SQLITE_NOTADB"})
 
 
 @contextmanager
-def in_words() -> Iterator[None]:
+def as_log_error() -> Iterator[None]:
     """What SQLite and the system raise, as LogError; LogCorrupt where the file is damaged."""
     try:
         yield
@@ -67,32 +67,32 @@ def in_words() -> Iterator[None]:
         short = "_".join(name.split("_")[:2])
         if short in DAMAGED:
             raise LogCorrupt(f"the file is damaged: {error}") from error
-        raise LogError(WORDS.get(short, str(error))) from error
+        raise LogError(ERROR_TEXTS.get(short, str(error))) from error
     except OSError as error:
         words = "not a folder" if isinstance(error, FileExistsError) else error.strerror or str(error)
         where = f" ({error.filename})" if error.filename else ""
         raise LogError(words[:1].lower() + words[1:] + where) from error
 
 
-def opened(folder: Path, after: Head | None = None) -> sqlite3.Connection:
+def open_database(folder: Path, after: Head | None = None) -> sqlite3.Connection:
     """The file open for writing, made if it was not there: its first entry then follows the entry
     `after`, which another file has, or none.
 
     Raises LogCorrupt where it is no such file, LogError where it can't be opened.
     """
     path = folder / NAME
-    with in_words():
+    with as_log_error():
         os.close(os.open(path, os.O_RDWR | os.O_CREAT, 0o600))
-        db = sqlite3.connect(path, timeout=PATIENCE_S, isolation_level=None)
+        db = sqlite3.connect(path, timeout=BUSY_TIMEOUT_S, isolation_level=None)
         try:
-            _prepare(db, after)
+            _check_or_create(db, after)
         except BaseException:
             db.close()
             raise
     return db
 
 
-def _prepare(db: sqlite3.Connection, after: Head | None) -> None:
+def _check_or_create(db: sqlite3.Connection, after: Head | None) -> None:
     db.execute("PRAGMA auto_vacuum = INCREMENTAL")  # counts for a new file only
     db.execute("PRAGMA journal_mode = WAL")
     db.execute("PRAGMA synchronous = NORMAL")
@@ -106,7 +106,7 @@ def _prepare(db: sqlite3.Connection, after: Head | None) -> None:
         )
     )
     if not application and not version and not tables:
-        _begin(db, after)
+        _create_tables(db, after)
     elif application != APPLICATION or tables != 3:
         raise LogCorrupt("the file is not an operator's log")
     elif version == 1:
@@ -116,7 +116,7 @@ def _prepare(db: sqlite3.Connection, after: Head | None) -> None:
     db.execute(INDEX)
 
 
-def _begin(db: sqlite3.Connection, after: Head | None) -> None:
+def _create_tables(db: sqlite3.Connection, after: Head | None) -> None:
     genesis, first = (after.hash, after.seq + 1) if after else (secrets.token_hex(32), 1)
     db.executescript(
         f"BEGIN; {SCHEMA} PRAGMA application_id = {APPLICATION}; PRAGMA user_version = {VERSION};"
@@ -132,15 +132,15 @@ def _add_text(db: sqlite3.Connection) -> None:
                      f"PRAGMA user_version = {VERSION}; COMMIT")  # fmt: skip
 
 
-def read_only(folder: Path) -> sqlite3.Connection:
+def open_read_only(folder: Path) -> sqlite3.Connection:
     """A connection of a reader's, which holds up no writer."""
-    with in_words():
+    with as_log_error():
         path = folder / NAME
         path.stat()
         db = sqlite3.connect(
             f"{path.absolute().as_uri()}?mode=ro",
             uri=True,
-            timeout=PATIENCE_S,
+            timeout=BUSY_TIMEOUT_S,
             isolation_level=None,
         )
         if db.execute("PRAGMA user_version").fetchone()[0] == 1:  # no server has opened it since
@@ -182,7 +182,7 @@ def _inode(path: str) -> tuple[int, int]:
     return found.st_dev, found.st_ino
 
 
-def clear(folder: Path) -> str:
+def clear_remains(folder: Path) -> str:
     """Makes room for a new log where one was taken away: what another program put there is put aside
     under the name that is returned, "" where nothing was."""
     main, wal, shm = _paths(folder)
@@ -201,7 +201,7 @@ def set_aside(folder: Path, word: Literal["damaged", "found"] = "damaged") -> st
     while any((folder / (name + suffix)).exists() for suffix in SUFFIXES):
         number += 1
         name = f"{stem}.{word}-{stamp}.{number}.sqlite3"
-    with in_words():
+    with as_log_error():
         for suffix in reversed(SUFFIXES):
             old = folder / (NAME + suffix)
             if old.exists():

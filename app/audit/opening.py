@@ -4,7 +4,7 @@ import logging
 from collections.abc import Sequence
 from pathlib import Path
 
-from app.audit.database import NAME, Head, clear, in_words, set_aside
+from app.audit.database import NAME, Head, as_log_error, clear_remains, set_aside
 from app.audit.entry import Entry, entered
 from app.audit.store import Store
 from app.errors import LogCorrupt, LogError, LogGone
@@ -19,13 +19,13 @@ class Opening:
     def __init__(self, folder: Path, boot: str) -> None:
         self._folder = folder
         self._boot = boot
-        self._lost: LogError | None = None
-        self._begun: TextLike = ""
+        self._cause: LogError | None = None
+        self._new_file_reason: TextLike = ""
 
     def lost(self, error: LogError) -> None:
         """The file was closed for this; what needs a new one stays known until there is one."""
-        if not isinstance(self._lost, LogCorrupt | LogGone):
-            self._lost = error
+        if not isinstance(self._cause, LogCorrupt | LogGone):
+            self._cause = error
 
     def store(self, head: Head | None) -> Store:
         """The file, open: a new one where the old one is damaged or gone. `head` is the newest entry
@@ -35,23 +35,23 @@ class Opening:
         except LogCorrupt as error:
             name = set_aside(self._folder)
             log.error("the operator's log is damaged (%s): it is kept as %s", error, name)
-            self._lost, self._begun = None, say("log_began_anew", name=name)
+            self._cause, self._new_file_reason = None, say("log_began_anew", name=name)
             return Store(self._folder, self._boot, head)
 
     def _store(self, head: Head | None) -> Store:
-        lost = self._lost
+        lost = self._cause
         if isinstance(lost, LogCorrupt):
             raise lost
-        taken = isinstance(lost, LogGone) and lost.itself
-        if not self._begun and (taken or (head and not (self._folder / NAME).exists())):
-            self._begun = self._why_gone(head)
+        taken = isinstance(lost, LogGone) and lost.is_main_file
+        if not self._new_file_reason and (taken or (head and not (self._folder / NAME).exists())):
+            self._new_file_reason = self._clear_and_explain(head)
         store = Store(self._folder, self._boot, head)
-        self._lost = None
+        self._cause = None
         return store
 
-    def _why_gone(self, head: Head | None) -> TextLike:
-        with in_words():
-            found = clear(self._folder)
+    def _clear_and_explain(self, head: Head | None) -> TextLike:
+        with as_log_error():
+            found = clear_remains(self._folder)
         gone = say("log_began_for_gone", last=head.seq if head else 0)
         why = joined([gone, say("log_found", name=found) if found else ""])
         log.error("%s", why)
@@ -63,8 +63,8 @@ class Opening:
         `first` in the first entry of a file is that entry's own number: its chain may begin there.
         """
         found = store.head
-        if not found.count and (self._begun or found.seq or store.was_there):
-            why = self._begun or say("log_began_empty", last=found.seq)
+        if not found.count and (self._new_file_reason or found.seq or store.opened_before):
+            why = self._new_file_reason or say("log_began_empty", last=found.seq)
             return [entered("began", values={"first": found.seq + 1}, reason=why)]
         if head is None or head.seq <= found.seq:
             return []
@@ -74,7 +74,7 @@ class Opening:
 
     def written(self) -> None:
         """What was to be told first stands in the file."""
-        self._begun = ""
+        self._new_file_reason = ""
 
 
 def cut_off(store: Store) -> Sequence[Entry]:

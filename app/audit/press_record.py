@@ -53,7 +53,7 @@ class PendingEntry:
         self._entry = entry
         self._board = board
         self._fault = fault
-        self._judged = {"verdict": "", "board": ""}
+        self._verdict = {"verdict": "", "board": ""}
         self.corrected_to: Outcome | None = None
 
     @property
@@ -63,25 +63,25 @@ class PendingEntry:
 
     def judged(self, verdict: str) -> None:
         """By which verdict, and by which version of the board: the one that there is now."""
-        self._judged = {"verdict": verdict, "board": self._board()}
+        self._verdict = {"verdict": verdict, "board": self._board()}
 
     async def closed(self, outcome: str, reason: TextLike) -> TextLike:
         """Writes what came of it; returns when that is on the disk, or why it is not."""
         if self._entry is None:
             return self._fault
-        return await self._log.closed(self._entry.follow_up("closed", outcome, reason, **self._judged))
+        return await self._log.closed(self._entry.follow_up("closed", outcome, reason, **self._verdict))
 
     def broke_off(self, sentence: str) -> None:
         """Nobody will know what came of it."""
         if self._entry is not None:
-            self._log.add(self._entry.follow_up("closed", "unknown", say(sentence), **self._judged))
+            self._log.add(self._entry.follow_up("closed", "unknown", say(sentence), **self._verdict))
 
     def corrected(self, answer: Outcome) -> None:
         """More is known now than when it was closed."""
         self.corrected_to = answer
         if self._entry is not None:
             text = answer.text
-            self._log.add(self._entry.follow_up("corrected", answer.outcome, text, **self._judged))
+            self._log.add(self._entry.follow_up("corrected", answer.outcome, text, **self._verdict))
 
 
 class PressLog:
@@ -109,13 +109,13 @@ class PressLog:
         action: str = "press",
     ) -> PendingEntry:
         """Written before anything is sent; LogError and Repeated as `Log` has them."""
-        entry = entered("pressed", origin, inputs, **self._about(widget, press_id, action))
+        entry = entered("pressed", origin, inputs, **self._columns(widget, press_id, action))
         written = await self._log.pressed(entry)
         return PendingEntry(self._log, written, self._board, self._log.fault)
 
     async def canceled(self, widget: str, origin: Origin) -> PendingEntry:
         """A cancel is written if it can be: no log that fails keeps anybody from stopping a robot."""
-        entry = entered("pressed", origin, {}, **self._about(widget, "", "cancel"))
+        entry = entered("pressed", origin, {}, **self._columns(widget, "", "cancel"))
         try:
             written = await self._log.pressed(entry)
         except LogError as error:
@@ -144,7 +144,7 @@ class PressLog:
         action: str = "press",
     ) -> TextLike:
         """A press that was not even judged; returns when it is on the disk, or why it is not."""
-        about = self._about(widget, press_id, action)
+        about = self._columns(widget, press_id, action)
         entry = entered("refused", origin, inputs, outcome="refused", reason=reason, **about)
         return await self._log.closed(entry)
 
@@ -152,16 +152,16 @@ class PressLog:
         self, action: str, act_id: str, origin: Origin, outcome: str, reason: TextLike
     ) -> TextLike:
         """An act that is no press; returns when it is on the disk, or why it is not."""
-        about = self._about("", act_id, action)
+        about = self._columns("", act_id, action)
         return await self._log.closed(
             entered("control", origin, {}, outcome=outcome, reason=reason, **about)
         )
 
     def note(self, action: str, origin: Origin, reason: TextLike) -> None:
         """Control changed by no act."""
-        self._log.add(entered("control", origin, {}, reason=reason, **self._about("", "", action)))
+        self._log.add(entered("control", origin, {}, reason=reason, **self._columns("", "", action)))
 
-    def _about(self, widget: str, press_id: str, action: str) -> dict[str, str]:
+    def _columns(self, widget: str, press_id: str, action: str) -> dict[str, str]:
         return {"widget": widget, "press": press_id, "action": action, "robot": self._robot}
 
 

@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from app.audit.database import in_words, read_only
+from app.audit.database import as_log_error, open_read_only
 from app.audit.entry import FIELDS, Entry
 from app.errors import LogError, SearchTooLong
 
@@ -19,7 +19,7 @@ STEPS_BETWEEN_LOOKS: Final = 10_000
 MOST_LOOKED_AT: Final = 20_000  # entries, from the newest back
 
 # What has become more by now is told by a later entry.
-DONE: Final = "(e.kind <> 'pressed' OR e.seq IN (SELECT seq FROM undone))"
+CLOSED_CONDITION: Final = "(e.kind <> 'pressed' OR e.seq IN (SELECT seq FROM undone))"
 CONDITIONS: Final = {
     "since": "e.at >= :since",
     "until": "e.at < :until",
@@ -85,7 +85,7 @@ def rows(
     """The newest `count` entries before the number `before`, the newest first; LogError, SearchTooLong
     where that takes longer than `longest_s`."""
     query, values = _query(wanted, before, count)
-    return [Row(Entry(*row[:-1]), row[-1]) for row in _found(folder, query, values, longest_s)]
+    return [Row(Entry(*row[:-1]), row[-1]) for row in _fetch(folder, query, values, longest_s)]
 
 
 def open_presses(folder: Path, robot: str, widgets: Collection[str], since: int) -> list[OpenPress]:
@@ -108,7 +108,7 @@ def open_presses(folder: Path, robot: str, widgets: Collection[str], since: int)
           AND said IN ('', 'accepted', 'unknown', 'timed_out')
         ORDER BY p.seq DESC
     """
-    found = _found(folder, query, {"robot": robot, "since": since, **names})
+    found = _fetch(folder, query, {"robot": robot, "since": since, **names})
     return [
         OpenPress(Entry(*row[:-4]), outcome, reason, text, bool(accepted))
         for row in found
@@ -116,14 +116,14 @@ def open_presses(folder: Path, robot: str, widgets: Collection[str], since: int)
     ]
 
 
-def _found(
+def _fetch(
     folder: Path, query: str, values: Mapping[str, Any], longest_s: float = LONGEST_SEARCH_S
 ) -> list[Any]:
-    db = read_only(folder)
+    db = open_read_only(folder)
     end = time.monotonic() + longest_s
     db.set_progress_handler(lambda: time.monotonic() > end, STEPS_BETWEEN_LOOKS)
     try:
-        with in_words():
+        with as_log_error():
             return db.execute(query, values).fetchall()
     except LogError as error:
         if time.monotonic() > end:
@@ -137,7 +137,7 @@ def _query(wanted: Filter, before: int | None, count: int) -> tuple[str, dict[st
     given = {name: value for name, value in asdict(wanted).items() if value not in (None, "")}
     conditions = [CONDITIONS[name] for name in given if name in CONDITIONS]
     if not wanted.every:
-        conditions.append(DONE)
+        conditions.append(CLOSED_CONDITION)
     if before is not None:
         conditions.append("e.seq < :before")
     where = f"WHERE {' AND '.join(conditions)}" if conditions else ""

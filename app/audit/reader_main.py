@@ -20,11 +20,11 @@ from app.audit.queries import Filter, Row, rows
 from app.errors import LogError
 from app.i18n import ENGLISH
 
-NICER: Final = 10  # than the server, which has no time to lose
+NICE_INCREMENT: Final = 10  # than the server, which has no time to lose
 
 
 @dataclass(frozen=True, slots=True)
-class Wish:
+class ReadRequest:
     """Entries before a number, the newest first: `count` at most, or all as CSV where that is None."""
 
     folder: Path
@@ -38,18 +38,18 @@ class Wish:
         return json.dumps(asdict(self) | {"folder": str(self.folder)}).encode()
 
 
-def wish_in(text: bytes) -> Wish:
+def parse_request(text: bytes) -> ReadRequest:
     given = json.loads(text)
     folder, wanted = Path(given.pop("folder")), Filter(**given.pop("wanted"))
-    return Wish(folder, wanted, **given)
+    return ReadRequest(folder, wanted, **given)
 
 
-def rows_in(text: bytes) -> list[Row]:
+def parse_rows(text: bytes) -> list[Row]:
     """The entries that were wanted."""
     return [Row(Entry(*entry), pressed_at) for entry, pressed_at in json.loads(text)]
 
 
-def read(wish: Wish) -> Iterator[bytes]:
+def read(wish: ReadRequest) -> Iterator[bytes]:
     """What is wanted, some at a time; LogError."""
     if wish.count is not None:
         found = rows(wish.folder, wish.wanted, wish.before, wish.count)
@@ -60,8 +60,8 @@ def read(wish: Wish) -> Iterator[bytes]:
 
 
 def main(given: BinaryIO, out: BinaryIO) -> int:
-    wish = wish_in(given.read())
-    os.nice(NICER)
+    wish = parse_request(given.read())
+    os.nice(NICE_INCREMENT)
     try:
         for piece in read(wish):
             out.write(piece)

@@ -10,14 +10,14 @@ from pathlib import Path
 from typing import Final, TypeVar
 
 from app.audit.queries import Filter, OpenPress, Row, open_presses, rows
-from app.audit.reader_main import Wish, rows_in
+from app.audit.reader_main import ReadRequest, parse_rows
 from app.audit.reader_process import ReaderProcess
 from app.audit.reader_slots import ReaderSlots
 from app.errors import LogError, SearchTooLong
 from app.i18n import ENGLISH, say
 
-SEARCHES_MOST: Final = 2  # at a time
-THREADS: Final = SEARCHES_MOST + 1  # one for what the server itself has to know
+MAX_SEARCHES: Final = 2  # at a time
+THREADS: Final = MAX_SEARCHES + 1  # one for what the server itself has to know
 QUICK_S: Final = 0.03  # a search that takes longer is done by another process
 SEARCH_AGAIN_S: Final = 2
 EXPORT_AGAIN_S: Final = 10
@@ -31,7 +31,7 @@ class Readers:
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._threads = ThreadPoolExecutor(THREADS, "operators-log-reader")
-        self._searching = ReaderSlots(SEARCHES_MOST, SEARCH_AGAIN_S, say("log_searched"))
+        self._searching = ReaderSlots(MAX_SEARCHES, SEARCH_AGAIN_S, say("log_searched"))
         self._exporting = ReaderSlots(1, EXPORT_AGAIN_S, say("log_exported"))
         self._processes: set[ReaderProcess] = set()
         self._closed = False
@@ -43,8 +43,10 @@ class Readers:
             try:
                 return await self._read(partial(rows, self._folder, wanted, before, count, QUICK_S))
             except SearchTooLong:
-                async with self._apart(Wish(self._folder, wanted, before, count)) as process:
-                    return rows_in(await process.whole())
+                async with self._reader_process(
+                    ReadRequest(self._folder, wanted, before, count)
+                ) as process:
+                    return parse_rows(await process.whole())
 
     async def open_presses(self, robot: str, widgets: Collection[str], since: int) -> list[OpenPress]:
         """See `unended` of app/audit/queries.py."""
@@ -56,9 +58,9 @@ class Readers:
     ) -> AsyncIterator[ReaderProcess]:
         """All that is wanted before a number, as CSV in a language, while this lasts; TooMany beside
         another one, LogError when the server ends."""
-        wish = Wish(self._folder, wanted, before, gzip=gzip, language=language)
+        wish = ReadRequest(self._folder, wanted, before, gzip=gzip, language=language)
         with self._exporting.one():
-            async with self._apart(wish) as process:
+            async with self._reader_process(wish) as process:
                 yield process
 
     def close(self) -> None:
@@ -80,7 +82,7 @@ class Readers:
             raise LogError(say("log_unreadable", why=error.text)) from error
 
     @asynccontextmanager
-    async def _apart(self, wish: Wish) -> AsyncIterator[ReaderProcess]:
+    async def _reader_process(self, wish: ReadRequest) -> AsyncIterator[ReaderProcess]:
         if self._closed:
             raise LogError(say("ending"))
         process = ReaderProcess(wish)

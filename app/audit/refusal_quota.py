@@ -15,16 +15,16 @@ from app.audit.entry import Entry, Origin, entered
 from app.clock import format_time
 from app.i18n import render, say
 
-SUMMED_UP_S: Final = 60.0  # from the first that is left out to the entry that tells of it
-TOLD_APART: Final = 5  # browsers in that time; the rest is told together
-REMEMBERED: Final = 500  # browsers and addresses
+SUMMARY_INTERVAL_S: Final = 60.0  # from the first that is left out to the entry that tells of it
+MAX_BROWSERS: Final = 5  # browsers in that time; the rest is told together
+MAX_QUOTAS: Final = 500  # browsers and addresses
 
 
 @dataclass(frozen=True, slots=True)
 class Allowance:
     """So many at once, and one more each `every_s` seconds."""
 
-    at_once: float
+    burst: float
     every_s: float
 
 
@@ -33,7 +33,7 @@ OF_ADDRESS: Final = Allowance(200, 15.0)
 OF_ALL: Final = Allowance(600, 10.0)
 
 
-class Whose(Protocol):
+class HasOrigin(Protocol):
     """An origin, or an entry of it."""
 
     @property
@@ -42,25 +42,25 @@ class Whose(Protocol):
     def browser(self) -> str: ...
 
 
-class _Left:
+class _Balance:
     """What is left of an allowance, at a time in monotonic seconds; less than nothing is a debt."""
 
     def __init__(self, of: Allowance, now: float) -> None:
         self._of = of
-        self._left = of.at_once
+        self._left = of.burst
         self._at = now
 
-    def now(self, now: float) -> float:
-        self._left = min(self._of.at_once, self._left + (now - self._at) / self._of.every_s)
+    def refill(self, now: float) -> float:
+        self._left = min(self._of.burst, self._left + (now - self._at) / self._of.every_s)
         self._at = now
         return self._left
 
     def take(self, now: float) -> None:
-        self._left = self.now(now) - 1
+        self._left = self.refill(now) - 1
 
 
 @dataclass(slots=True)
-class _More:
+class _Suppressed:
     """Refusals of one browser that are no entries; `limited`: they were not even judged."""
 
     origin: Origin
@@ -79,25 +79,25 @@ class RefusalQuota:
     ) -> None:
         self._monotonic = monotonic
         self._wall = wall
-        self._all = _Left(OF_ALL, monotonic())
-        self._left: OrderedDict[tuple[str, ...], _Left] = OrderedDict()
-        self._more: dict[tuple[str, str, bool], _More] = {}
+        self._all = _Balance(OF_ALL, monotonic())
+        self._left: OrderedDict[tuple[str, ...], _Balance] = OrderedDict()
+        self._more: dict[tuple[str, str, bool], _Suppressed] = {}
         self.left_out = 0
 
-    def allowed(self, whose: Whose) -> bool:
+    def allowed(self, whose: HasOrigin) -> bool:
         """Whether a refusal may be an entry."""
         now = self._monotonic()
         known = (self._left.get(key) for key in _keys(whose))
-        return all(left is None or left.now(now) >= 1 for left in (self._all, *known))
+        return all(left is None or left.refill(now) >= 1 for left in (self._all, *known))
 
-    def take(self, whose: Whose) -> None:
+    def take(self, whose: HasOrigin) -> None:
         """A refusal became an entry."""
         now = self._monotonic()
         self._all.take(now)
         for key, of in zip(_keys(whose), (OF_BROWSER, OF_ADDRESS), strict=True):
-            self._left.setdefault(key, _Left(of, now)).take(now)
+            self._left.setdefault(key, _Balance(of, now)).take(now)
             self._left.move_to_end(key)
-        while len(self._left) > REMEMBERED:
+        while len(self._left) > MAX_QUOTAS:
             self._left.popitem(last=False)
 
     def suppress(self, origin: Origin, limited: bool = False) -> bool:
@@ -105,9 +105,9 @@ class RefusalQuota:
         it is the first since all were told."""
         first = not self._more
         key = (origin.address, origin.browser, limited)
-        if key not in self._more and len(self._more) >= TOLD_APART:
+        if key not in self._more and len(self._more) >= MAX_BROWSERS:
             key, origin = ("", "", limited), Origin(address="", who=render(say("others")))
-        self._more.setdefault(key, _More(origin, limited, self._wall())).count += 1
+        self._more.setdefault(key, _Suppressed(origin, limited, self._wall())).count += 1
         self.left_out += not limited
         return first
 
@@ -117,11 +117,11 @@ class RefusalQuota:
         return [_entry(one) for one in more.values()]
 
 
-def _keys(whose: Whose) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def _keys(whose: HasOrigin) -> tuple[tuple[str, ...], tuple[str, ...]]:
     return (whose.address, whose.browser), (whose.address,)
 
 
-def _entry(more: _More) -> Entry:
+def _entry(more: _Suppressed) -> Entry:
     origin = more.origin
     name = " ".join(filter(None, (origin.who, f"({origin.address})" if origin.address else "")))
     sentence = "log_more_limited" if more.limited else "log_more_refused"

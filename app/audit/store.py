@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final, Literal
 
-from app.audit.database import NAME, PATIENCE_S, Files, Head, in_words, opened
+from app.audit.database import BUSY_TIMEOUT_S, NAME, Files, Head, as_log_error, open_database
 from app.audit.entry import FIELDS, Entry, entered
 from app.errors import LogError
 from app.i18n import TextLike, say
@@ -29,11 +29,11 @@ class Store:
 
     def __init__(self, folder: Path, boot: str, after: Head | None = None) -> None:
         """Raises LogError, LogCorrupt; a new file goes on `after` an entry of another one."""
-        self._db = opened(folder, after)
+        self._db = open_database(folder, after)
         self._wal = -1
         self._boot = boot
         try:
-            with in_words():
+            with as_log_error():
                 self._read_head()
                 self._db.execute("INSERT OR REPLACE INTO about VALUES ('opened', ?)", (boot,))
                 self._wal = os.open(folder / f"{NAME}-wal", os.O_RDONLY | os.O_CLOEXEC)
@@ -48,7 +48,7 @@ class Store:
         newest = self._db.execute("SELECT seq, hash FROM entry ORDER BY seq DESC LIMIT 1").fetchone()
         oldest = self._db.execute("SELECT seq FROM entry ORDER BY seq LIMIT 1").fetchone()
         before = (int(about["first"]) - 1, str(about["genesis"]))
-        self.was_there = about.get("opened", self._boot) != self._boot  # before this server
+        self.opened_before = about.get("opened", self._boot) != self._boot  # before this server
         self._seq: int
         self._hash: str
         self._seq, self._hash = newest or before
@@ -60,7 +60,7 @@ class Store:
 
     def check(self) -> None:
         """LogError unless what is written goes to the files that are in the folder."""
-        with in_words():
+        with as_log_error():
             self._files.check()
 
     def append(self, entries: Sequence[Entry]) -> list[Entry]:
@@ -69,12 +69,12 @@ class Store:
 
     def sync(self) -> None:
         """On the disk is, after this, all that was committed before. May be called by any thread."""
-        with in_words():
+        with as_log_error():
             os.fdatasync(self._wal)
 
     def undone(self) -> list[Entry]:
         """Presses of servers before this one of which the end is not known."""
-        with in_words():
+        with as_log_error():
             rows = self._db.execute(
                 f"SELECT {COLUMNS} FROM entry WHERE boot <> ? AND seq IN (SELECT seq FROM undone)"
                 " ORDER BY seq",
@@ -82,9 +82,9 @@ class Store:
             ).fetchall()
         return [Entry(*row) for row in rows]
 
-    def told(self, press: Entry) -> list[Entry]:
+    def entries_of_press(self, press: Entry) -> list[Entry]:
         """All that the log has of the press with this id on this robot, the oldest first."""
-        with in_words():
+        with as_log_error():
             rows = self._db.execute(
                 f"SELECT {COLUMNS} FROM entry WHERE press = ? AND press <> '' AND robot = ?"
                 " AND action = 'press' ORDER BY seq",
@@ -94,7 +94,7 @@ class Store:
 
     def answered(self, seq: int) -> bool:
         """Whether a press that is not done has an outcome already."""
-        with in_words():
+        with as_log_error():
             found = self._db.execute("SELECT outcome FROM undone WHERE seq = ?", (seq,)).fetchone()
         return bool(found and found[0])
 
@@ -104,7 +104,7 @@ class Store:
         What was removed, and why, is an entry of its own; it has the hash of the last of them, by
         which what is left can be verified.
         """
-        with in_words():
+        with as_log_error():
             if last := self._last_older(now_ms - days * DAY_MS):
                 return self._remove(last, "days", say("log_removed_days", days=f"{days:g}"))
             if last := self._last_beyond(size_mb * 1_000_000):
@@ -156,11 +156,11 @@ class Store:
             seq += 1
             sealed.append(entry.sealed(seq, self._boot, last))
             last = sealed[-1].hash
-        with in_words():
+        with as_log_error():
             self._db.execute("BEGIN IMMEDIATE")
             try:
                 self._db.executemany(INSERT, sealed)
-                self._note_undone(sealed)
+                self._update_undone(sealed)
                 if removed:
                     self._db.execute("DELETE FROM entry WHERE seq <= ?", (removed,))
                     self._db.execute("DELETE FROM undone WHERE seq <= ?", (removed,))
@@ -173,7 +173,7 @@ class Store:
         self._oldest = max(self._oldest, removed + 1)
         return sealed
 
-    def _note_undone(self, sealed: Sequence[Entry]) -> None:
+    def _update_undone(self, sealed: Sequence[Entry]) -> None:
         for entry in sealed:
             if entry.kind == "pressed":
                 self._db.execute("INSERT INTO undone VALUES (?, '')", (entry.seq,))
@@ -186,7 +186,7 @@ class Store:
 
     def probe(self) -> None:
         """Whether there is room, and the disk takes it: written, synced, and taken out again."""
-        with in_words():
+        with as_log_error():
             self._db.execute(
                 "INSERT OR REPLACE INTO about VALUES ('probe', zeroblob(?))", (PROBE_BYTES,)
             )
@@ -194,7 +194,7 @@ class Store:
             self._db.execute("DELETE FROM about WHERE key = 'probe'")
 
     def wal_bytes(self) -> int:
-        with in_words():
+        with as_log_error():
             return os.fstat(self._wal).st_size
 
     def checkpoint(self) -> None:
@@ -203,17 +203,17 @@ class Store:
         What a reader still needs stays for the next time. The first commit after it waits for the
         disk, so that is done here.
         """
-        with in_words():
+        with as_log_error():
             self._db.execute("PRAGMA busy_timeout = 0")
             try:
                 self._db.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchall()
             finally:
-                self._db.execute(f"PRAGMA busy_timeout = {int(PATIENCE_S * 1000)}")
+                self._db.execute(f"PRAGMA busy_timeout = {int(BUSY_TIMEOUT_S * 1000)}")
             self._db.execute("UPDATE about SET value = ? WHERE key = 'opened'", (self._boot,))
 
     def complete(self) -> None:
         """Takes all that is beside the file into it, also where it is in the folder no more."""
-        with in_words():
+        with as_log_error():
             self._db.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchall()
 
     def close(self) -> None:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from app.audit.database import in_words, read_only
+from app.audit.database import as_log_error, open_read_only
 from app.audit.entry import Entry
 from app.audit.store import COLUMNS
 from app.errors import LogError
@@ -29,9 +29,9 @@ class Verified:
 def verify(folder: Path, noted: str = "") -> Verified:
     """Checks the whole log, as it is at this moment, and that a head which was noted once is in it,
     unless that is ""; LogError where it can't be read."""
-    db = read_only(folder)
+    db = open_read_only(folder)
     try:
-        with in_words():
+        with as_log_error():
             db.execute("BEGIN")
             (genesis,) = db.execute("SELECT value FROM about WHERE key = 'genesis'").fetchone() or ("",)
             return _Chain(genesis, noted).follow(_entries(db))
@@ -67,7 +67,7 @@ class _Chain:
             self._first = self._first or entry
             if self._noted in (entry.hash, entry.prev):
                 self._noted = ""
-            self._begins = self._begins or self._tells_the_begin(self._first, entry)
+            self._begins = self._begins or self._explains_begin(self._first, entry)
             self._kinds.add(entry.kind)
             self._last, self._seq = (entry.prev, entry.hash), entry.seq
             self._count += 1
@@ -102,7 +102,7 @@ class _Chain:
             return f"entry {entry.seq} does not follow the one before it"
         return ""
 
-    def _tells_the_begin(self, first: Entry, entry: Entry) -> bool:
+    def _explains_begin(self, first: Entry, entry: Entry) -> bool:
         """Whether an entry shows that the log may begin with its first one. The genesis, which has no
         hash of its own, is enough for number 1 only."""
         if entry.kind == "removed":

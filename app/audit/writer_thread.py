@@ -11,7 +11,7 @@ from contextlib import suppress
 from typing import Final
 
 from app.audit.data_dir import DataDir
-from app.audit.database import Head, in_words
+from app.audit.database import Head, as_log_error
 from app.audit.entry import Entry, entered
 from app.audit.opening import Opening, cut_off
 from app.audit.store import Store
@@ -22,26 +22,28 @@ from app.i18n import TextLike, say
 
 log = logging.getLogger("kiosk.log")
 
-TRIED_AGAIN_S: Final = (0.5, 1.0, 2.0, 4.0, 8.0)  # the last one again and again
+RETRY_DELAYS_S: Final = (0.5, 1.0, 2.0, 4.0, 8.0)  # the last one again and again
 HOUR_S: Final = 3600.0
 CLOCK_SET_BY_S: Final = 60.0  # what moves it by more is no drift
-QUIET_S: Final = 1.0  # after so long without a press there is time for the file
-LOOKED_S: Final = 1.0  # between two looks whether the files are still in the folder
+IDLE_S: Final = 1.0  # after so long without a press there is time for the file
+FILE_CHECK_S: Final = 1.0  # between two looks whether the files are still in the folder
 WAL_BYTES: Final = 16_000_000  # then it can wait no longer
-TIDIED_S: Final = 0.1  # between two looks while presses come: each keeps the press from its interpreter
+TIDY_INTERVAL_S: Final = (
+    0.1  # between two looks while presses come: each keeps the press from its interpreter
+)
 CHECKPOINT_S: Final = 5.0  # between two that can't wait: a reader may hold them up
 TIDY_AFTER: Final = 1000  # entries
-MOST_OWED: Final = 1000
+MAX_UNWRITTEN: Final = 1000
 
 
-class Steady:
+class ClockSteadiness:
     """Whether the wall's clock can be trusted to tell what is old: nobody set it for an hour."""
 
     def __init__(self) -> None:
         self._ahead: float | None = None  # of the clock that nobody sets
         self._since = 0.0
 
-    def steady(self, wall: float, now: float) -> bool:
+    def is_steady(self, wall: float, now: float) -> bool:
         if self._ahead is None or abs(wall - now - self._ahead) > CLOCK_SET_BY_S:
             self._since = now
         self._ahead = wall - now
@@ -63,17 +65,17 @@ class WriterThread:
         self._folder = folder
         self._limits = limits
         self._mode = mode
-        self._tell = tell
+        self._report = tell
         self.fault: TextLike = ""
         self.displaced = False  # another server has the folder, or may
         self.head: Head | None = None
         self.tried = threading.Event()
         self._queue: queue.SimpleQueue[Ticket | None] = queue.SimpleQueue()  # None only wakes
-        self._owed: deque[Entry] = deque(maxlen=MOST_OWED)
+        self._unwritten: deque[Entry] = deque(maxlen=MAX_UNWRITTEN)
         self._opening = Opening(folder.path, boot)
         self._store: Store | None = None
-        self._began = False
-        self._lost_sync: LogError | None = None
+        self._start_logged = False
+        self._sync_error: LogError | None = None
         self._failures = 0
         self._fault_since = ""
         self._try_at = 0.0
@@ -82,9 +84,9 @@ class WriterThread:
         self._tidy_at = 0.0
         self._since_tidy = 0
         self._fresh_wal = True
-        self._steady = Steady()
+        self._clock = ClockSteadiness()
         self._ended = False
-        self._syncer = Syncer(lambda results: self._tell(results, False), self._sync_failed)
+        self._syncer = Syncer(lambda results: self._report(results, False), self._sync_failed)
         self._thread = threading.Thread(target=self._run, name="operators-log", daemon=True)
 
     # On the event loop.
@@ -116,14 +118,14 @@ class WriterThread:
                 self.tried.set()
             batch = self._next()
             ended = self._ended and not self._queue.qsize()
-            if self._lost_sync is not None:
-                self._broken(self._lost_sync)
+            if self._sync_error is not None:
+                self._handle_failure(self._sync_error)
             if batch:
                 self._write(batch)
             if self._store is not None and (not batch or time.monotonic() >= self._tidy_at):
                 self._tidy(self._store, quiet=not batch)
-                self._tidy_at = time.monotonic() + TIDIED_S
-        self._syncer.end(QUIET_S * 5)
+                self._tidy_at = time.monotonic() + TIDY_INTERVAL_S
+        self._syncer.end(IDLE_S * 5)
         self._close()
 
     def _next(self) -> list[Ticket]:
@@ -138,94 +140,94 @@ class WriterThread:
     def _idle_s(self) -> float:
         if self._store is None:
             return max(0.0, self._try_at - time.monotonic())
-        return min(max(0.0, self._hourly_at - time.monotonic()), LOOKED_S, QUIET_S)
+        return min(max(0.0, self._hourly_at - time.monotonic()), FILE_CHECK_S, IDLE_S)
 
     def _write(self, batch: list[Ticket]) -> None:
         wanted = [ticket for ticket in batch if not ticket.abandoned]
         if len(wanted) < len(batch):
             given_up = LogError(say("log_abandoned"))
-            self._tell([(ticket, given_up) for ticket in batch if ticket.abandoned], False)
+            self._report([(ticket, given_up) for ticket in batch if ticket.abandoned], False)
         if self._store is None:
             self._fail(wanted, LogError(self.fault))
             return
         try:
-            wanted = self._new(self._store, wanted)
+            wanted = self._without_repeated(self._store, wanted)
             sealed = self._store.append([ticket.entry for ticket in wanted])
             self._check(self._store)
         except LogError as error:
-            self._broken(error)
+            self._handle_failure(error)
             self._fail(wanted, error)
             return
         self.head = self._store.head
         self._fresh_wal = False
         self._since_tidy += len(sealed)
         results: Results = list(zip(wanted, sealed, strict=True))
-        self._tell([(ticket, entry) for ticket, entry in results if not ticket.durable], False)
+        self._report([(ticket, entry) for ticket, entry in results if not ticket.durable], False)
         if durable := [(ticket, entry) for ticket, entry in results if ticket.durable]:
             self._syncer.add(durable)
 
-    def _new(self, store: Store, tickets: Sequence[Ticket]) -> list[Ticket]:
+    def _without_repeated(self, store: Store, tickets: Sequence[Ticket]) -> list[Ticket]:
         """Those that are no presses which the log has already: of these it is told what it knows."""
         new: list[Ticket] = []
         known: Results = []
         for ticket in tickets:
-            found = store.told(ticket.entry) if ticket.entry.is_press else []
+            found = store.entries_of_press(ticket.entry) if ticket.entry.is_press else []
             if found and found[0].is_press:
                 told = [one for one in found if one.of == found[0].seq]
                 known.append((ticket, Repeated(found[0], told[-1] if told else None)))
             else:
                 new.append(ticket)
-        self._tell(known, False)
+        self._report(known, False)
         return new
 
     def _fail(self, tickets: Sequence[Ticket], error: LogError) -> None:
-        self._owed += [ticket.entry for ticket in tickets if ticket.entry.of is not None]
-        self._tell([(ticket, error) for ticket in tickets], False)
+        self._unwritten += [ticket.entry for ticket in tickets if ticket.entry.of is not None]
+        self._report([(ticket, error) for ticket in tickets], False)
 
     def _check(self, store: Store) -> None:
         """LogError unless what was written is in the folder, and the folder is this server's alone."""
         store.check()
-        with in_words():
+        with as_log_error():
             self._folder.check()
 
-    def _broken(self, error: LogError) -> None:
+    def _handle_failure(self, error: LogError) -> None:
         """From now on nothing is written, until the file could be opened again."""
-        self._lost_sync = None
+        self._sync_error = None
         self._close(complete=isinstance(error, LogGone))
         self.displaced = isinstance(error, FolderInUse)
         self._opening.lost(error)
-        wait = TRIED_AGAIN_S[min(self._failures, len(TRIED_AGAIN_S) - 1)]
+        wait = RETRY_DELAYS_S[min(self._failures, len(RETRY_DELAYS_S) - 1)]
         self._failures += 1
         self._try_at = time.monotonic() + wait
         if self.fault != error.text:
             log.error("the operator's log can't be written: %s", error)
             self._fault_since = self._fault_since or time.strftime("%H:%M:%S")
             self.fault = error.text
-            self._tell([], True)
+            self._report([], True)
 
     def _open(self) -> None:
         try:
-            with in_words():
+            with as_log_error():
                 self._folder.hold()
             self._store = store = self._opening.store(self.head)
             self._syncer.use(store)
             store.probe()
-            self._catch_up(store)
+            self._write_first_entries(store)
             self._check(store)
         except LogError as error:
-            self._broken(error)
+            self._handle_failure(error)
             return
         self._failures, self._fresh_wal, self._hourly_at = 0, False, 0.0
         self.displaced = False
         if self.fault:
             log.info("the operator's log can be written again")
             self.fault = self._fault_since = ""
-            self._tell([], True)
+            self._report([], True)
 
-    def _catch_up(self, store: Store) -> None:
+    def _write_first_entries(self, store: Store) -> None:
         """What the file has to be told before anything new."""
-        entries = [*self._opening.first_entries(store, self.head), *self._owed]
-        if not self._began:
+        entries = [*self._opening.first_entries(store, self.head), *self._unwritten]
+        if not self._start_logged:
             entries += cut_off(store)
             values = {"mode": self._mode}
             entries.append(entered("began", values=values, reason=say("log_began")))
@@ -234,8 +236,8 @@ class WriterThread:
             entries.append(entered("resumed", reason=text))
         store.append(entries)
         self._opening.written()
-        self._owed.clear()
-        self._began = True
+        self._unwritten.clear()
+        self._start_logged = True
         self.head = store.head
         store.sync()
 
@@ -246,14 +248,14 @@ class WriterThread:
             self._remove_old(store)
             self._empty_wal(store, quiet)
         except LogError as error:
-            self._broken(error)
+            self._handle_failure(error)
 
     def _remove_old(self, store: Store) -> None:
         now = time.monotonic()
         if now < self._hourly_at and self._since_tidy < TIDY_AFTER:
             return
         limits = self._limits
-        days = limits.days if self._steady.steady(time.time(), now) else math.inf
+        days = limits.days if self._clock.is_steady(time.time(), now) else math.inf
         more = store.remove_old(days, limits.size_mb, time.time_ns() // 1_000_000)
         self._since_tidy = TIDY_AFTER if more else 0
         self._fresh_wal = self._fresh_wal and not more
@@ -285,6 +287,6 @@ class WriterThread:
 
     def _sync_failed(self, results: Results) -> None:
         """What is not known to be on the disk is not known to be in the log."""
-        self._tell(results, False)
-        self._lost_sync = next(error for _, error in results if isinstance(error, LogError))
+        self._report(results, False)
+        self._sync_error = next(error for _, error in results if isinstance(error, LogError))
         self._queue.put(None)

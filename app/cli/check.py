@@ -35,7 +35,7 @@ def checked(path: Path, verbose: bool = False) -> int:
         return UNREADABLE if error.unreadable else FAULTY
     said = [_summary(path, found.panel), *map(str, found.notes)]
     if verbose:
-        said += [line for remark in found.sent for line in str(remark).splitlines()]
+        said += [line for remark in found.previews for line in str(remark).splitlines()]
     print("\n  ".join(said), flush=True)
     return GOOD
 

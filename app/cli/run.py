@@ -14,7 +14,7 @@ import uvicorn
 
 from app.cli.parser import Parser
 from app.errors import KioskError
-from app.process.listen_sockets import check_free
+from app.process.listen_sockets import check_port_free
 from app.settings import LOG_LEVELS, Settings
 from app.web.serving import OPTIONS
 
@@ -41,7 +41,7 @@ def main(arguments: Sequence[str], prog: str = PROG) -> int:
             _readable(file)
         os.environ.update(_environment(vars(given)))
         Settings.from_environment()
-        check_free(given.host, given.port)
+        check_port_free(given.host, given.port)
     except (KioskError, OSError) as error:
         print(error, file=sys.stderr)
         return 1

@@ -58,7 +58,7 @@ class Cancels:
 
     async def _canceled(self, widget: Action, press_id: str) -> tuple[Outcome, Cause]:
         try:
-            async with self._waits.one():
+            async with self._waits.cancellable():
                 answer = await self._dispatcher.cancel(widget, press_id)
         except TimeoutError:
             return Outcome("unknown", say("server_ends")), ""

@@ -13,8 +13,8 @@ from typing import Any, Final
 
 from app.clock import format_time
 from app.i18n import TextLike, joined, say
-from app.panel.values import same
-from app.panel.widgets.publish import Confirm, Publishing
+from app.panel.values import same_value
+from app.panel.widgets.publish import Confirm, SinglePublish
 from app.robot.command_status import CommandStatus, OnCorrection, Outcome
 from app.robot.state import Reading, RobotState
 from app.ros_logging import RobotLog
@@ -29,7 +29,7 @@ CLOSE: Final = 1e-6  # a float32 comes back as the nearest one
 class _Waiting:
     """A command that was sent at `since` (monotonic seconds) and is not confirmed yet."""
 
-    widget: Publishing
+    widget: SinglePublish
     confirm: Confirm
     equals: Any
     press_id: str
@@ -51,7 +51,7 @@ class Confirmations:
 
     async def awaited(
         self,
-        widget: Publishing,
+        widget: SinglePublish,
         equals: Any,
         press_id: str,
         since: float,
@@ -126,7 +126,7 @@ class Confirmations:
         if self._latest.get(waiting.widget.id) == waiting.press_id:
             self._show(waiting.widget, CommandStatus(outcome=answer.outcome, text=answer.text))
 
-    def _show(self, widget: Publishing, progress: CommandStatus) -> None:
+    def _show(self, widget: SinglePublish, progress: CommandStatus) -> None:
         self._robot.command_status[widget.id] = progress
         self._changed()
 
@@ -135,4 +135,4 @@ def equal(value: Any, wanted: Any) -> bool:
     """Whether a field has the value; floats as near as the type has them."""
     if isinstance(value, float) and isinstance(wanted, int | float):
         return math.isclose(value, wanted, rel_tol=CLOSE, abs_tol=0.0)
-    return same(value, wanted)
+    return same_value(value, wanted)

@@ -12,7 +12,7 @@ from typing import Final
 from app.audit import Origin
 from app.audit.press_record import origin_of
 from app.permission.principal import Principal
-from app.rate_limit import Buckets, Quota
+from app.rate_limit import Quota, TokenBuckets
 
 # A finger taps ten times a second at most; a program that follows a control loop presses 50 times.
 OF_CLIENT: Final = Quota(100, 50)
@@ -30,32 +30,32 @@ class PressLimits:
     ) -> None:
         """`leave_out` tells the operator's log of a press that is not one of its entries."""
         self._leave_out = leave_out
-        self._clients = Buckets(OF_CLIENT, monotonic)
-        self._addresses = Buckets(OF_ADDRESS, monotonic)
-        self._all = Buckets(OF_ALL, monotonic)
-        self._cancels = Buckets(OF_CANCELS, monotonic)
+        self._clients = TokenBuckets(OF_CLIENT, monotonic)
+        self._addresses = TokenBuckets(OF_ADDRESS, monotonic)
+        self._all = TokenBuckets(OF_ALL, monotonic)
+        self._cancels = TokenBuckets(OF_CANCELS, monotonic)
         self.refused = 0
 
     def admit(self, who: Principal) -> bool:
         """Whether it may press once more now; what may not is counted, here and for the log."""
-        asked: list[tuple[Buckets, Hashable]] = [
+        asked: list[tuple[TokenBuckets, Hashable]] = [
             (self._clients, (who.client.address, who.client.id)),
             (self._addresses, who.client.address),
         ]
         if not who.client.local:
             asked.append((self._all, ""))
-        if not all(buckets.has(key) for buckets, key in asked):
+        if not all(buckets.has_token(key) for buckets, key in asked):
             return self._refuse(who)
         for buckets, key in asked:
-            buckets.take(key)
+            buckets.take_token(key)
         return True
 
     def admit_cancel(self, who: Principal, *goal: str) -> bool:
         """The same for a cancel: it is one too many only if this very goal's was asked for that often
         just now, so that nobody is kept from stopping a robot."""
-        if not self._cancels.has(goal):
+        if not self._cancels.has_token(goal):
             return self._refuse(who)
-        self._cancels.take(goal)
+        self._cancels.take_token(goal)
         return True
 
     def _refuse(self, who: Principal) -> bool:

@@ -38,9 +38,9 @@ from app.commands.repeated import RepeatedPresses
 from app.concurrency import CancellableWaits
 from app.errors import Cause, FieldError, InputError, LinkError, LogError, PressRefused
 from app.i18n import TextLike, say
-from app.panel.widgets.families import Pressed
+from app.panel.widgets.families import PressCommand
 from app.robot.command_status import Outcome
-from app.ros_logging import RobotLog, on_rosout
+from app.ros_logging import RobotLog, rosout_extra
 
 log = logging.getLogger("kiosk.presses")
 
@@ -85,7 +85,7 @@ class Presses:
         """Nothing more is sent; a goal can be canceled until the end."""
         self._judge.close()
 
-    def widget(self, widget_id: str) -> Pressed:
+    def widget(self, widget_id: str) -> PressCommand:
         """What can be pressed; NotFound for everything else."""
         return self._dispatcher.widget(widget_id)
 
@@ -130,7 +130,7 @@ class Presses:
 
     async def _once(
         self,
-        widget: Pressed,
+        widget: PressCommand,
         inputs: Mapping[str, Any],
         press_id: str,
         work: Coroutine[Any, Any, Receipt],
@@ -153,7 +153,7 @@ class Presses:
         return receipt
 
     async def _logged(
-        self, widget: Pressed, inputs: Mapping[str, Any], press_id: str, context: PressContext
+        self, widget: PressCommand, inputs: Mapping[str, Any], press_id: str, context: PressContext
     ) -> Receipt:
         own = self._dispatcher.needed(widget, inputs)
         try:
@@ -171,7 +171,7 @@ class Presses:
             receipt = await closed(pending, receipt)
         level = logging.INFO if receipt.outcome in FINE else logging.WARNING
         who = named(context.origin)
-        told = on_rosout(f"press {press_id} of {widget.id} by {who}: {untyped(widget, receipt)}")
+        told = rosout_extra(f"press {press_id} of {widget.id} by {who}: {untyped(widget, receipt)}")
         self._log.log(level, "press %s of %s by %s with %.*s: %s: %s", press_id, widget.id, who,
                 LONGEST_LOGGED, own, receipt.outcome, receipt.reason, extra=told)  # fmt: skip
         return receipt
@@ -184,7 +184,7 @@ class Presses:
 
     async def _pressed(
         self,
-        widget: Pressed,
+        widget: PressCommand,
         inputs: Mapping[str, Any],
         press_id: str,
         pending: PendingEntry,
@@ -204,7 +204,7 @@ class Presses:
         try:
             correct = partial(self._correct, pending)
             look = partial(self._judge.last_look, widget, pending, context)
-            async with self._waits.one():
+            async with self._waits.cancellable():
                 answer = await self._dispatcher.send(
                     widget, inputs, press_id, correct, pending.hash, look
                 )

@@ -12,8 +12,8 @@ from app.audit import Entry, Origin
 from app.audit.press_record import PendingEntry
 from app.errors import Cause
 from app.i18n import TextLike, render, say
-from app.panel.template import needed
-from app.panel.widgets.families import Command, Entered, Pressed
+from app.panel.template import needed_inputs
+from app.panel.widgets.families import Command, EntryWidget, PressCommand
 from app.robot.command_status import Outcome, OutcomeCode
 
 RECEIPTS_KEPT: Final = 1000
@@ -120,13 +120,13 @@ def receipt_of(
 ) -> Receipt:
     """What came of a press just now."""
     at = datetime.now(UTC).isoformat(timespec="milliseconds")
-    own, entered = ({**of} if _short(of) else {} for of in (needed(widget, inputs), inputs))
+    own, entered = ({**of} if _short(of) else {} for of in (needed_inputs(widget, inputs), inputs))
     told = answer.outcome, answer.text, at, cause
     return Receipt(press_id, widget.id, *told, own, fingerprint(inputs), entered)
 
 
 def recalled(
-    widget: Pressed, inputs: Mapping[str, Any], press: Entry, told: Entry | None, cause: Cause
+    widget: PressCommand, inputs: Mapping[str, Any], press: Entry, told: Entry | None, cause: Cause
 ) -> Receipt:
     """What the operator's log knows of a press: where it was told nothing, nobody will know."""
     if told is None:
@@ -154,7 +154,7 @@ def corrected(receipt: Receipt, answer: Outcome) -> Receipt:
 
 def untyped(widget: Command, receipt: Receipt) -> str:
     """The outcome, with its reason where that repeats nothing of what was typed in."""
-    if receipt.cause == "input" or isinstance(widget, Entered):
+    if receipt.cause == "input" or isinstance(widget, EntryWidget):
         return receipt.outcome
     return f"{receipt.outcome}: {render(receipt.reason)}"
 

@@ -16,9 +16,9 @@ from app.commands.press_judge import PressJudge
 from app.commands.receipts import Receipt, Receipts, named, receipt_of, untyped, with_doubt
 from app.errors import FieldError, InputError
 from app.i18n import BETWEEN, Text, TextLike, joined, say
-from app.panel.widgets.families import Pressed
+from app.panel.widgets.families import PressCommand
 from app.robot.command_status import Outcome
-from app.ros_logging import RobotLog, on_rosout
+from app.ros_logging import RobotLog, rosout_extra
 
 
 class EarlyRefusals:
@@ -75,7 +75,7 @@ class EarlyRefusals:
         return receipt
 
     def left_out(
-        self, widget: Pressed, inputs: Mapping[str, Any], press_id: str, context: PressContext
+        self, widget: PressCommand, inputs: Mapping[str, Any], press_id: str, context: PressContext
     ) -> Receipt | None:
         """The receipt of a refusal that the log only counts; None for every other press.
 
@@ -97,7 +97,12 @@ class EarlyRefusals:
         return self.counted(receipt_of(widget, inputs, press_id, answer, cause), context.origin)
 
     async def refuse(
-        self, widget: Pressed, inputs: Mapping[str, Any], press_id: str, why: TextLike, origin: Origin
+        self,
+        widget: PressCommand,
+        inputs: Mapping[str, Any],
+        press_id: str,
+        why: TextLike,
+        origin: Origin,
     ) -> Receipt:
         """The receipt has an id of its own: that of the press is another's, or may still be one's."""
         own_id = _own_id(press_id)
@@ -107,7 +112,7 @@ class EarlyRefusals:
         own = self._dispatcher.needed(widget, inputs)
         self._receipts.begin(own_id, widget.id, origin, own)
         who = named(origin)
-        told = on_rosout(f"press {own_id} of {widget.id} by {who}: {untyped(widget, receipt)}")
+        told = rosout_extra(f"press {own_id} of {widget.id} by {who}: {untyped(widget, receipt)}")
         self._log.warning("press %s of %s by %s: %s", own_id, widget.id, who, why, extra=told)
         receipt = with_doubt(
             receipt, await self._press_log.refused(widget.id, own, own_id, origin, why)

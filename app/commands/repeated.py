@@ -9,7 +9,7 @@ from app.commands.receipts import Receipt, named, recalled
 from app.commands.refusals import EarlyRefusals
 from app.errors import Cause, FieldError, InputError
 from app.i18n import say
-from app.panel.widgets.families import Pressed
+from app.panel.widgets.families import PressCommand
 from app.permission.interlocks import PERMITTED
 from app.permission.press_permission import cause_of
 from app.ros_logging import RobotLog
@@ -24,7 +24,7 @@ class RepeatedPresses:
         self._log = log
 
     async def receipt(
-        self, widget: Pressed, inputs: Mapping[str, Any], origin: Origin, known: Repeated
+        self, widget: PressCommand, inputs: Mapping[str, Any], origin: Origin, known: Repeated
     ) -> Receipt:
         """What the log knows of the press; a refusal where its id is that of another press."""
         press, told = known.press, known.told
@@ -37,7 +37,7 @@ class RepeatedPresses:
                 named(origin), press.seq, receipt.outcome, receipt.reason)  # fmt: skip
         return receipt
 
-    def _cause(self, widget: Pressed, inputs: Mapping[str, Any], told: Entry | None) -> Cause:
+    def _cause(self, widget: PressCommand, inputs: Mapping[str, Any], told: Entry | None) -> Cause:
         """Why it was refused, as far as an entry tells: inputs that never fit were refused for that."""
         if told is None or told.outcome not in ("refused", "timed_out"):
             return ""

@@ -16,13 +16,13 @@ from app.clock import format_time
 from app.concurrency import spawn_logged
 from app.errors import DecodeError
 from app.i18n import Text, TextLike, joined, say
-from app.interfaces import Fields, Interfaces, text_of
-from app.panel.template import PLACE
+from app.interfaces import Fields, Interfaces, plain_text
+from app.panel.template import RESPONSE_PLACEHOLDER
 from app.panel.widgets.service_action import Call
 from app.printable import printable
-from app.robot.command_status import CommandStatus, LastLook, OnCorrection, Outcome, no_look
+from app.robot.command_status import CommandStatus, FinalCheck, OnCorrection, Outcome, no_check
 from app.robot.state import RobotState
-from app.ros_logging import RobotLog, on_rosout
+from app.ros_logging import RobotLog, rosout_extra
 
 log = logging.getLogger("kiosk.calls")
 
@@ -107,20 +107,20 @@ class ServiceCalls:
         payload: bytes,
         press_id: str,
         corrected: OnCorrection,
-        look: LastLook = no_look,
+        look: FinalCheck = no_check,
     ) -> Outcome:
         """Calls the service of a widget; see `ask`."""
-        _, response_type = self._interfaces.service(widget.type)
+        _, response_type = self._interfaces.service_types(widget.type)
         success = field_of(self._interfaces, response_type, widget.success, "success", "bool")
         message = field_of(self._interfaces, response_type, widget.message, "message", "string")
-        paths = (*filter(None, (success, message)), *PLACE.findall(widget.answer))
+        paths = (*filter(None, (success, message)), *RESPONSE_PLACEHOLDER.findall(widget.answer))
         read = partial(_read_call, widget, success, message)
         to = (widget.id, widget.service, widget.type)
         request = Request(*to, payload, widget.timeout_s, paths, read)
         return await self.ask(request, press_id, corrected, look)
 
     async def ask(
-        self, request: Request, press_id: str, corrected: OnCorrection, look: LastLook = no_look
+        self, request: Request, press_id: str, corrected: OnCorrection, look: FinalCheck = no_check
     ) -> Outcome:
         """Sends a request and waits; `corrected` gets the answer that comes after the time."""
         key = self._robot.key(request.service)
@@ -170,17 +170,17 @@ class ServiceCalls:
         asked = waiting.request
         answer = await self._read(asked, reply)
         said = f"press {waiting.press_id}: a late answer: {answer.outcome}"
-        self._log.warning("%s: %s", said, answer.text, extra=on_rosout(said))
+        self._log.warning("%s: %s", said, answer.text, extra=rosout_extra(said))
         corrected(waiting.press_id, answer)
         if self._latest.get(asked.widget) == waiting.press_id:
             self._show(asked, CommandStatus(outcome=answer.outcome, text=answer.text))
 
     async def _read(self, asked: Request, reply: bytes) -> Outcome:
         self._ever_answered.add(asked.service)
-        _, response_type = self._interfaces.service(asked.type)
-        reader = self._interfaces.fields(response_type, asked.paths)
+        _, response_type = self._interfaces.service_types(asked.type)
+        reader = self._interfaces.field_reader(response_type, asked.paths)
         try:
-            fields = await self._robot.slices.whole(reader, reply)
+            fields = await self._robot.slices.read_all(reader, reply)
         except DecodeError as error:
             self._log.error("%s: %s", asked.service, error)
             return Outcome("unknown", say("answer_unreadable", wanted=asked.type))
@@ -223,6 +223,6 @@ def with_fields(template: str, fields: Fields, within: str = "") -> str:
 
     def shown(path: str) -> str:
         value = fields.get(within + path)
-        return NOTHING if value is None else printable(text_of(value, LONGEST_SAID))
+        return NOTHING if value is None else printable(plain_text(value, LONGEST_SAID))
 
-    return PLACE.sub(lambda found: shown(found[1]), template)
+    return RESPONSE_PLACEHOLDER.sub(lambda found: shown(found[1]), template)

@@ -11,13 +11,13 @@ from typing import Any, Final
 from app.dialect.endpoint import Direction, Endpoint, OwnEndpoint, ServerRole, TopicRole
 from app.interfaces.names import (
     ACTION_TYPE,
-    LONGEST_NAME,
+    MAX_NAME,
     MESSAGE_TYPE,
     TOPIC,
     Qos,
-    is_key,
+    is_valid_name,
     key_of,
-    type_in,
+    valid_type,
 )
 
 TOKENS: Final = "@/*/@ros2_lv/**"  # every liveliness token of every bridge and kiosk
@@ -68,13 +68,13 @@ def parsed(token_key: str) -> Endpoint | None:
         return None
     if found["server"] is not None:
         server: ServerRole = "SS" if found["server"] == "SS" else "AS"
-        key, type_name = _unescaped(found["name"]), type_in(_unescaped(found["server_type"]))
-        return Endpoint(found["zid"], server, key, type_name) if is_key(key) else None
+        key, type_name = _unescaped(found["name"]), valid_type(_unescaped(found["server_type"]))
+        return Endpoint(found["zid"], server, key, type_name) if is_valid_name(key) else None
     if found["role"] is None:
         return Endpoint(found["zid"])
     role: TopicRole = "MP" if found["role"] == "MP" else "MS"
-    key, type_name = _unescaped(found["key"]), type_in(_unescaped(found["type"]))
-    if not is_key(key):
+    key, type_name = _unescaped(found["key"]), valid_type(_unescaped(found["type"]))
+    if not is_valid_name(key):
         return None
     reliable = {"0": False, "1": True}.get(found["reliability"])
     return Endpoint(found["zid"], role, key, type_name, found["durability"] == "1", reliable)
@@ -96,9 +96,9 @@ def endpoints_of(admin_key: str, node: Mapping[str, Any], namespace: str) -> Ite
     for role, name in roles:
         for topic in node[name]:
             whole = namespace + topic["name"]
-            if len(whole) <= LONGEST_NAME and TOPIC.fullmatch(whole):
+            if len(whole) <= MAX_NAME and TOPIC.fullmatch(whole):
                 key = key_of(topic["name"], namespace)
-                yield Endpoint(zid_of(admin_key), role, key, type_in(topic["type"]))
+                yield Endpoint(zid_of(admin_key), role, key, valid_type(topic["type"]))
 
 
 def zid_of(admin_key: str) -> str:

@@ -1,22 +1,22 @@
 """ROS 2 interfaces without ROS: definitions, checked values, CDR and type hashes.
 
-The definitions of messages are rosbags' (`rosbags.typesys`); what it has not is here: services,
-actions, packages from files, defaults, and the codec with checks that name the field.
+Message definitions come from rosbags (`rosbags.typesys`). This package adds services, actions, packages
+from files, defaults, and a codec whose errors name the field.
 """
 
 from app.interfaces.cdr.fields import FieldReader, Fields, Walk
-from app.interfaces.definitions import INTEGERS, PLACEHOLDER, TEXTS, Field, Structure, Type
+from app.interfaces.definitions import INTEGER_RANGES, PLACEHOLDER, STRING_TYPES, Field, Structure, Type
 from app.interfaces.derived_types import ActionTypes
 from app.interfaces.distributions import DISTROS, read_distribution
-from app.interfaces.field_path import around, name_of
-from app.interfaces.json_values import text_of, to_plain
-from app.interfaces.registry import Interfaces, interfaces_of
+from app.interfaces.field_path import field_name, parent_path
+from app.interfaces.json_values import plain_text, to_plain
+from app.interfaces.registry import Interfaces, load_interfaces
 
 __all__ = [
     "DISTROS",
-    "INTEGERS",
+    "INTEGER_RANGES",
     "PLACEHOLDER",
-    "TEXTS",
+    "STRING_TYPES",
     "ActionTypes",
     "Field",
     "FieldReader",
@@ -25,10 +25,10 @@ __all__ = [
     "Structure",
     "Type",
     "Walk",
-    "around",
-    "interfaces_of",
-    "name_of",
+    "field_name",
+    "load_interfaces",
+    "parent_path",
+    "plain_text",
     "read_distribution",
-    "text_of",
     "to_plain",
 ]

@@ -1,5 +1,5 @@
-"""The messages of a distribution, as rosbags has them: to import this takes as long as a tenth of the
-server's start, so it is done only where what was read before is not kept (`kept`)."""
+"""The message definitions of a distribution, from rosbags. Importing this module is slow, so it is done
+only if the cache (`distribution_cache`) has none."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -10,33 +10,33 @@ from rosbags.typesys import Stores, get_typestore
 
 from app.interfaces.definitions import PLACEHOLDER, Field, Structure, Type
 
-# Rolling is what the next distribution will be: it has the messages of the newest that rosbags knows.
-AS: Final[Mapping[str, str]] = {"rolling": "lyrical"}
+# Rolling uses the messages of the newest distribution that rosbags knows.
+ALIASES: Final[Mapping[str, str]] = {"rolling": "lyrical"}
 
 
-def messages_of(distro: str) -> dict[str, Structure]:
-    """By name, without defaults: rosbags drops them."""
-    definitions = get_typestore(Stores(f"ros2_{AS.get(distro, distro)}")).fielddefs
-    return {name: _structure(name, definition) for name, definition in definitions.items()}
+def load_messages(distro: str) -> dict[str, Structure]:
+    """Name → structure, without default values: rosbags drops them."""
+    definitions = get_typestore(Stores(f"ros2_{ALIASES.get(distro, distro)}")).fielddefs
+    return {name: _to_structure(name, definition) for name, definition in definitions.items()}
 
 
-def _structure(name: str, definition: Any) -> Structure:
-    """Out of rosbags' nested tuples: ([(name, type, value)…], [(field, type)…])."""
+def _to_structure(name: str, definition: Any) -> Structure:
+    """A structure from rosbags' nested tuples: ([(name, type, value)…], [(field, type)…])."""
     constants, fields = definition
     return Structure(
         name,
-        tuple(Field(each, _type(described)) for each, described in fields if each != PLACEHOLDER),
+        tuple(Field(each, _to_type(described)) for each, described in fields if each != PLACEHOLDER),
         {each: value for each, _, value in constants},
         constant_types={each: kind for each, kind, _ in constants},
     )
 
 
-def _type(described: Any) -> Type:
+def _to_type(described: Any) -> Type:
     kind, detail = described
     if kind == Nodetype.NAME:
         return Type(detail)
     if kind == Nodetype.BASE:
         return Type(*detail)
     inner, size = detail
-    many: Literal["array", "sequence"] = "array" if kind == Nodetype.ARRAY else "sequence"
-    return replace(_type(inner), many=many, size=size)
+    container: Literal["array", "sequence"] = "array" if kind == Nodetype.ARRAY else "sequence"
+    return replace(_to_type(inner), container=container, size=size)

@@ -1,4 +1,4 @@
-"""What interfaces are made of: structures of typed fields with constants and defaults. No I/O."""
+"""Interface definitions: structures of typed fields, constants and default values. No I/O."""
 
 import keyword
 from collections.abc import Iterator, Mapping
@@ -8,16 +8,16 @@ from typing import Any, Final, Literal
 
 from app.errors import InterfaceError
 
-INTEGERS: Final[Mapping[str, tuple[int, int]]] = {
+INTEGER_RANGES: Final[Mapping[str, tuple[int, int]]] = {
     **{f"int{bits}": (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) for bits in (8, 16, 32, 64)},
     **{f"uint{bits}": (0, 2**bits - 1) for bits in (8, 16, 32, 64)},
     **dict.fromkeys(("byte", "char", "octet"), (0, 255)),
 }
-FLOATS: Final = ("float32", "float64")
-TEXTS: Final = ("string", "wstring")
-BASE_TYPES: Final = frozenset(("bool", *INTEGERS, *FLOATS, *TEXTS))
+FLOAT_TYPES: Final = ("float32", "float64")
+STRING_TYPES: Final = ("string", "wstring")
+BASE_TYPES: Final = frozenset(("bool", *INTEGER_RANGES, *FLOAT_TYPES, *STRING_TYPES))
 
-# What ROS puts into a message without fields, so that it has one byte.
+# The field of one byte that ROS adds to a message without fields.
 PLACEHOLDER: Final = "structure_needs_at_least_one_member"
 
 
@@ -31,21 +31,21 @@ class Type:
 
     name: str
     bound: int = 0
-    many: Literal["one", "array", "sequence"] = "one"
+    container: Literal["one", "array", "sequence"] = "one"
     size: int = 0
 
     @property
-    def nested(self) -> bool:
+    def is_nested(self) -> bool:
         return "/" in self.name
 
     @property
     def element(self) -> "Type":
         """The type of one element of an array or a sequence."""
-        return replace(self, many="one", size=0)
+        return replace(self, container="one", size=0)
 
     def __str__(self) -> str:
         one = f"{self.name}<={self.bound}" if self.bound else self.name
-        match self.many:
+        match self.container:
             case "one":
                 return one
             case "array":
@@ -53,35 +53,34 @@ class Type:
         return f"{one}[<={self.size}]" if self.size else f"{one}[]"
 
 
-def zero(kind: Type) -> Any:
-    """What a field of a type has that nobody gave a value, as ROS makes it: a plain value, of another
-    structure a table without fields."""
-    match kind.many:
+def zero_value(kind: Type) -> Any:
+    """The zero value of a type, as ROS initializes it: a plain value; `{}` for a nested structure."""
+    match kind.container:
         case "sequence":
             return []
         case "array":
-            return [zero(kind.element)] * kind.size
-    if kind.nested:
+            return [zero_value(kind.element)] * kind.size
+    if kind.is_nested:
         return {}
     return (
         False
         if kind.name == "bool"
         else ""
-        if kind.name in TEXTS
+        if kind.name in STRING_TYPES
         else 0.0
-        if kind.name in FLOATS
+        if kind.name in FLOAT_TYPES
         else 0
     )
 
 
-def attribute(name: str) -> str:
-    """A field's name in a message object: a keyword of Python's gets a "_" after it."""
+def attribute_name(name: str) -> str:
+    """A field's attribute in a message object: a Python keyword gets a "_" appended."""
     return f"{name}_" if keyword.iskeyword(name) else name
 
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """`default` is None where the definition has none."""
+    """A field of a structure; `default` is None if the definition has none."""
 
     name: str
     type: Type
@@ -89,18 +88,18 @@ class Field:
 
     @property
     def attribute(self) -> str:
-        """The field's name in a message object."""
-        return attribute(self.name)
+        """The field's attribute in a message object."""
+        return attribute_name(self.name)
 
     @property
-    def left_out(self) -> Any:
-        """The plain value of a field that a message leaves out: its default, else zero."""
-        return zero(self.type) if self.default is None else self.default
+    def default_value(self) -> Any:
+        """The plain value of a field that is not given: its default, else zero."""
+        return zero_value(self.type) if self.default is None else self.default
 
 
 @dataclass(frozen=True, slots=True)
 class Structure:
-    """A message, or a part of a service or an action; `source` is the file it was read from.
+    """A message, or a part of a service or an action; `source` is its file.
     `constant_types` has the base type of each constant."""
 
     name: str
@@ -109,43 +108,54 @@ class Structure:
     source: Path | None = field(default=None, compare=False)
     constant_types: Mapping[str, str] = field(default_factory=dict, compare=False)
 
-    def needs(self) -> Iterator[tuple[Field, str]]:
-        """Each field whose type is another structure, with that one's name."""
-        return ((one, one.type.name) for one in self.fields if one.type.nested)
+    def nested_fields(self) -> Iterator[tuple[Field, str]]:
+        """(field, structure name) of each field whose type is a structure."""
+        return ((one, one.type.name) for one in self.fields if one.type.is_nested)
 
 
 @dataclass(frozen=True, slots=True)
 class Definitions:
-    """Structures by name. `wholes` are services and actions as REP 2016 describes them: nothing
-    that is ever sent, but what their type hashes are of. `left_out` has why an interface can't be
-    used, by its name: that of a service, and not that of its request."""
+    """Structures by name.
+
+    `interface_types` are services and actions as REP 2016 describes them: they are never sent, but have
+    type hashes. `unusable` has the error of each interface that can't be used, by the interface's name
+    (that of a service, not of its request).
+    """
 
     structures: dict[str, Structure] = field(default_factory=dict)
-    wholes: dict[str, Structure] = field(default_factory=dict)
-    left_out: dict[str, InterfaceError] = field(default_factory=dict)
+    interface_types: dict[str, Structure] = field(default_factory=dict)
+    unusable: dict[str, InterfaceError] = field(default_factory=dict)
 
     def __or__(self, over: "Definitions") -> "Definitions":
-        """Both; where both have a name, it is as in `over`."""
+        """Both; `over` takes precedence."""
         return Definitions(
             self.structures | over.structures,
-            self.wholes | over.wholes,
-            self.left_out | over.left_out,
+            self.interface_types | over.interface_types,
+            self.unusable | over.unusable,
         )
 
-    def without(self, left_out: Mapping[str, InterfaceError]) -> "Definitions":
-        """What is left where these interfaces can't be used."""
+    def excluding(self, left_out: Mapping[str, InterfaceError]) -> "Definitions":
+        """The definitions without these interfaces."""
         return Definitions(
-            {name: one for name, one in self.structures.items() if interface_of(name) not in left_out},
-            {name: one for name, one in self.wholes.items() if interface_of(name) not in left_out},
-            self.left_out | {**left_out},
+            {
+                name: one
+                for name, one in self.structures.items()
+                if interface_name(name) not in left_out
+            },
+            {
+                name: one
+                for name, one in self.interface_types.items()
+                if interface_name(name) not in left_out
+            },
+            self.unusable | {**left_out},
         )
 
-    def described(self, name: str) -> Structure | None:
-        return self.structures.get(name) or self.wholes.get(name)
+    def find(self, name: str) -> Structure | None:
+        return self.structures.get(name) or self.interface_types.get(name)
 
 
-def interface_of(name: str) -> str:
-    """What the file of a structure defines: "cell_msgs/srv/Change", for its "…/Change_Request". No
-    interface has a "_" in its own name."""
+def interface_name(name: str) -> str:
+    """The interface of a structure: "cell_msgs/srv/Change" for "cell_msgs/srv/Change_Request". The name
+    of an interface has no "_"."""
     package, _, rest = name.rpartition("/")
     return f"{package}/{rest.partition('_')[0]}"

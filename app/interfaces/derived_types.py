@@ -1,4 +1,4 @@
-"""What ROS 2 makes of a service and of an action: the structures that really are sent.
+"""The message types that ROS 2 derives from a service and from an action.
 
 Source: rosidl (services and their events, since iron) and the design of actions (design.ros2.org,
 "actions"); the names are those of `ros2 interface` and of type descriptions.
@@ -16,7 +16,7 @@ EVENT_INFO: Final = "service_msgs/msg/ServiceEventInfo"
 
 @dataclass(frozen=True, slots=True)
 class ActionTypes:
-    """Names of all that an action is made of; each is a message type, except the three services."""
+    """The names of the types of an action: message types, and three services."""
 
     goal: str
     result: str
@@ -48,14 +48,14 @@ def action_types(name: str) -> ActionTypes:
     )
 
 
-def composed_service(name: str, request: Structure, response: Structure) -> Definitions:
+def compose_service(name: str, request: Structure, response: Structure) -> Definitions:
     """A service "package/srv/Name" with its event (service introspection's)."""
     event = Structure(
         f"{name}_Event",
         (
             Field("info", Type(EVENT_INFO)),
-            Field("request", Type(request.name, many="sequence", size=1)),
-            Field("response", Type(response.name, many="sequence", size=1)),
+            Field("request", Type(request.name, container="sequence", size=1)),
+            Field("response", Type(response.name, container="sequence", size=1)),
         ),
         source=request.source,
     )
@@ -71,7 +71,7 @@ def composed_service(name: str, request: Structure, response: Structure) -> Defi
     return Definitions({one.name: one for one in (request, response, event)}, {name: whole})
 
 
-def composed_action(name: str, goal: Structure, result: Structure, feedback: Structure) -> Definitions:
+def compose_action(name: str, goal: Structure, result: Structure, feedback: Structure) -> Definitions:
     """An action "package/action/Name" with its two services and its feedback message."""
     types, source = action_types(name), goal.source
     goal_id = Field("goal_id", UUID)
@@ -79,13 +79,13 @@ def composed_action(name: str, goal: Structure, result: Structure, feedback: Str
     def structure(each: str, *fields: Field) -> Structure:
         return Structure(each, fields, source=source)
 
-    send_goal = composed_service(
+    send_goal = compose_service(
         types.send_goal,
         structure(types.send_goal_request, goal_id, Field("goal", Type(goal.name))),
         structure(types.send_goal_response, Field("accepted", Type("bool")), Field("stamp", TIME)),
     )
     status = Field("status", Type("int8"))
-    get_result = composed_service(
+    get_result = compose_service(
         types.get_result,
         structure(types.get_result_request, goal_id),
         structure(types.get_result_response, status, Field("result", Type(result.name))),

@@ -1,7 +1,7 @@
-"""A distribution's messages, kept in a file: read at the first start, they are at hand at the next.
+"""A file cache of a distribution's message definitions, for a faster start.
 
-The file is made on the user's machine and may be deleted at any time. One that is damaged, or of
-another version of rosbags or of this format, is as good as none.
+The file may be deleted at any time. A damaged file, or one of another version of rosbags or of this
+format, is ignored.
 """
 
 import json
@@ -16,29 +16,29 @@ from typing import Any, Final
 
 from app.interfaces.definitions import Field, Structure, Type
 
-FORMAT: Final = 1  # of `_packed`, and of what `stock` makes
+FORMAT: Final = 1  # of `_pack` and `bundled_messages`
 
 Messages = dict[str, Structure]
 
 
 def read(folder: Path, distro: str) -> Messages | None:
-    """The messages, or None where nothing is kept that can be used."""
+    """The messages; None without a usable file."""
     try:
         head, _, body = _file(folder, distro).read_bytes().partition(b"\n")
     except OSError:
         return None
-    return _unpacked(json.loads(body)) if head == _head(distro, body) else None
+    return _unpack(json.loads(body)) if head == _header(distro, body) else None
 
 
 def write(folder: Path, distro: str, messages: Messages) -> None:
-    """Keeps them, where the folder can be written; a reader finds the old file or the new one."""
-    body = json.dumps(_packed(messages), separators=(",", ":")).encode()
+    """Writes the file atomically, if the folder can be written."""
+    body = json.dumps(_pack(messages), separators=(",", ":")).encode()
     file = _file(folder, distro)
     aside = file.with_suffix(".new")
     with suppress(OSError):
         folder.parent.mkdir(parents=True, exist_ok=True)
         folder.mkdir(mode=0o700, exist_ok=True)
-        aside.write_bytes(_head(distro, body) + b"\n" + body)
+        aside.write_bytes(_header(distro, body) + b"\n" + body)
         aside.replace(file)
 
 
@@ -46,14 +46,14 @@ def _file(folder: Path, distro: str) -> Path:
     return folder / f"messages-{distro}.json"
 
 
-def _head(distro: str, body: bytes) -> bytes:
-    """What the first line says of the rest."""
+def _header(distro: str, body: bytes) -> bytes:
+    """The first line: what the body is made of, and its hash."""
     made_of = f"{distro} of rosbags {version('rosbags')}, format {FORMAT}"
     return f"{made_of}, sha256 {sha256(body).hexdigest()}".encode()
 
 
-def _packed(messages: Messages) -> Mapping[str, Any]:
-    """Name → its fields and its constants, as JSON has them."""
+def _pack(messages: Messages) -> Mapping[str, Any]:
+    """Name → (fields, constants) as JSON values."""
     return {
         name: [
             [[one.name, *astuple(one.type)] for one in message.fields],
@@ -63,7 +63,7 @@ def _packed(messages: Messages) -> Mapping[str, Any]:
     }
 
 
-def _unpacked(packed: Mapping[str, Any]) -> Messages:
+def _unpack(packed: Mapping[str, Any]) -> Messages:
     kind = lru_cache(None)(Type)
     return {
         name: Structure(

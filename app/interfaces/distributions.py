@@ -1,4 +1,4 @@
-"""What every robot of a distribution has: rosbags' messages, and definitions shipped here."""
+"""The interfaces of a ROS 2 distribution: rosbags' messages and definitions shipped in `builtin/`."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -8,14 +8,14 @@ from typing import Any, Final
 
 from app.interfaces import distribution_cache
 from app.interfaces.definitions import Definitions, Structure
-from app.interfaces.packages import available, read_folders
+from app.interfaces.packages import complete_definitions, read_folders
 
 DISTROS: Final = ("humble", "iron", "jazzy", "kilted", "lyrical", "rolling")
 
 # Definitions beside rosbags' messages: services, actions, and packages that it lacks.
 BUILTIN: Final = Path(__file__).parent / "builtin"
 
-# rosbags drops the defaults of its messages; these are all that they have in ROS.
+# rosbags drops default values; these are all that its messages have in ROS.
 DEFAULTS: Final[Mapping[str, Mapping[str, Any]]] = {
     "geometry_msgs/msg/Quaternion": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0},
     "rcl_interfaces/msg/ParameterDescriptor": {"read_only": False, "dynamic_typing": False},
@@ -24,29 +24,29 @@ DEFAULTS: Final[Mapping[str, Mapping[str, Any]]] = {
 }
 NO_DEFAULTS: Final = {"humble": "sensor_msgs/msg/NavSatStatus", "iron": "sensor_msgs/msg/NavSatStatus"}
 
-_read: dict[str, Definitions] = {}
+_cache: dict[str, Definitions] = {}
 
 
 @cache
-def _builtin() -> Definitions:
+def _builtin_definitions() -> Definitions:
     return read_folders([BUILTIN])
 
 
 def read_distribution(distro: str, folder: Path | None = None) -> Definitions:
-    """What every robot of a distribution has: read once, and kept for the next start in `folder`."""
-    if distro not in _read:
-        messages = _with_defaults(distro, _messages(distro, folder))
+    """The definitions of a distribution: loaded once, and cached in `folder` for the next start."""
+    if distro not in _cache:
+        messages = _with_defaults(distro, _load_messages(distro, folder))
         stock = Definitions(messages)
-        _read[distro] = available(_builtin(), stock) | stock
-    return _read[distro]
+        _cache[distro] = complete_definitions(_builtin_definitions(), stock) | stock
+    return _cache[distro]
 
 
-def _messages(distro: str, folder: Path | None) -> dict[str, Structure]:
+def _load_messages(distro: str, folder: Path | None) -> dict[str, Structure]:
     messages = distribution_cache.read(folder, distro) if folder else None
     if messages is None:
-        from app.interfaces.bundled_messages import messages_of
+        from app.interfaces.bundled_messages import load_messages
 
-        messages = messages_of(distro)
+        messages = load_messages(distro)
         if folder:
             distribution_cache.write(folder, distro, messages)
     return messages

@@ -8,76 +8,78 @@ from typing import Any, Final
 
 from app.interfaces.definitions import PLACEHOLDER
 
-# JavaScript's numbers are doubles: beyond this, neighbouring integers become one.
-MOST: Final = 2**53
-UNEVEN: Final = frozenset("fdqQ")  # lists whose elements may be what JSON or a browser can't hold
+# JavaScript's numbers are doubles: beyond this, integers are not exact.
+MAX_EXACT_INTEGER: Final = 2**53
+NON_JSON_FORMATS: Final = frozenset(
+    "fdqQ"
+)  # formats of elements that JSON or a browser may not be able to hold
 
 
 def to_plain(message: Any) -> Any:
-    """A decoded message, or any value in one, as JSON's types.
+    """A decoded message, or any value in it, as JSON types.
 
-    A message becomes a dict of its fields in their order, an array or `bytes` a list. What JSON
-    or a browser's numbers can't hold becomes text: integers beyond ±2^53 ("9007199254740993"),
-    "NaN", "Infinity" and "-Infinity".
+    A message becomes a dict of its fields in order, an array or `bytes` a list. Values that JSON or a
+    browser's numbers can't hold become text: integers beyond ±2^53 ("9007199254740993"), "NaN",
+    "Infinity" and "-Infinity".
     """
     if message is None or isinstance(message, bool | str):
         return message
     if isinstance(message, int):
-        return message if -MOST <= message <= MOST else str(message)
+        return message if -MAX_EXACT_INTEGER <= message <= MAX_EXACT_INTEGER else str(message)
     if isinstance(message, float):
-        return message if math.isfinite(message) else _unusual(message)
+        return message if math.isfinite(message) else _non_finite_text(message)
     if isinstance(message, memoryview):
-        return _numbers(message)
+        return _plain_numbers(message)
     if isinstance(message, list | tuple | bytes | bytearray):
         return [to_plain(item) for item in message]
-    return {name: to_plain(getattr(message, each)) for each, name in _names(message.__class__)}
+    return {name: to_plain(getattr(message, each)) for each, name in _field_names(message.__class__)}
 
 
-def text_of(value: Any, most: int) -> str:
-    """A value in a decoded message as `str(to_plain(value))` writes it, cut to `most` characters; what
-    is cut away is not even looked at: a list may have any length."""
+def plain_text(value: Any, most: int) -> str:
+    """A value in a decoded message as `str(to_plain(value))`, cut to `most` characters. The rest is not
+    read: a list may have any length."""
     text = ""
-    for piece in _pieces(value, most) if _nests(value) else [str(to_plain(value))]:
+    for piece in _text_pieces(value, most) if _is_compound(value) else [str(to_plain(value))]:
         text += piece
         if len(text) > most:
             return text[: most - 1] + "…"
     return text
 
 
-def _nests(value: Any) -> bool:
+def _is_compound(value: Any) -> bool:
     return isinstance(value, memoryview | list | tuple | bytes | bytearray) or is_dataclass(value)
 
 
-def _pieces(value: Any, most: int) -> Iterator[str]:
-    """How a list or a message is written, and what is in it."""
+def _text_pieces(value: Any, most: int) -> Iterator[str]:
+    """The text of a value, in pieces."""
     if isinstance(value, str):
         yield repr(value[: most + 1])
-    elif not _nests(value):
+    elif not _is_compound(value):
         yield repr(to_plain(value))
     elif is_dataclass(value):
-        for number, (each, name) in enumerate(_names(value.__class__)):
+        for number, (each, name) in enumerate(_field_names(value.__class__)):
             yield f"{', ' if number else '{'}{name!r}: "
-            yield from _pieces(getattr(value, each), most)
-        yield "}" if _names(value.__class__) else "{}"
+            yield from _text_pieces(getattr(value, each), most)
+        yield "}" if _field_names(value.__class__) else "{}"
     else:
         for number, item in enumerate(value):
             yield ", " if number else "["
-            yield from _pieces(item, most)
+            yield from _text_pieces(item, most)
         yield "]" if len(value) else "[]"
 
 
-def _unusual(value: float) -> str:
+def _non_finite_text(value: float) -> str:
     return "NaN" if math.isnan(value) else "Infinity" if value > 0 else "-Infinity"
 
 
-def _numbers(values: "memoryview[Any]") -> list[Any]:
-    """All at once where every element is plain as it is."""
+def _plain_numbers(values: "memoryview[Any]") -> list[Any]:
+    """A list of numbers as plain values."""
     listed = values.tolist()
-    return [to_plain(item) for item in listed] if values.format in UNEVEN else listed
+    return [to_plain(item) for item in listed] if values.format in NON_JSON_FORMATS else listed
 
 
 @lru_cache(4096)
-def _names(of: type[Any]) -> tuple[tuple[str, str], ...]:
-    """(attribute, field name) of a message class; no ROS name ends with "_" by itself."""
+def _field_names(of: type[Any]) -> tuple[tuple[str, str], ...]:
+    """(attribute, field name) of a message class. No ROS field name ends with "_"."""
     own = [one.name for one in fields(of) if one.name != PLACEHOLDER]
     return tuple((name, name.removesuffix("_")) for name in own)

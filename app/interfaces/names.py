@@ -1,25 +1,25 @@
-"""ROS 2 names and QoS: which texts are names of topics, namespaces and types."""
+"""ROS 2 names and QoS: the syntax of topics, namespaces and types."""
 
 import re
 from dataclasses import dataclass
 from typing import Final
 
-# A token that the bridge can't parse ends its main loop while its process stays up: what does not
-# match these must never become a token.
+# A liveliness token that the bridge can't parse ends its main loop while its process stays up. So a
+# name that does not match these must never become a token.
 TOPIC: Final = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)+")
 NAMESPACE: Final = re.compile(r"(/[A-Za-z_][A-Za-z0-9_]*)*")
 SERVICE_TYPE: Final = re.compile(r"[a-z][a-z0-9_]*/srv/[A-Z][A-Za-z0-9]*")
 ACTION_TYPE: Final = re.compile(r"[a-z][a-z0-9_]*/action/[A-Z][A-Za-z0-9]*")
 MESSAGE_TYPE: Final = re.compile(r"[a-z][a-z0-9_]*/msg/[A-Z][A-Za-z0-9]*")
-# What is no name, or longer than any, is not taken over from what others say: it would be shown.
-LONGEST_NAME: Final = 512  # ROS 2 has 255, and the bridge puts its namespace before that
+# A name received from others that is malformed or longer is not used: it would be shown.
+MAX_NAME: Final = 512  # ROS 2 has 255, and the bridge puts its namespace before that
 NO_TYPE: Final = "(not a type)"
 _ANY_TYPE = re.compile(r"[A-Za-z0-9_]+(/[A-Za-z0-9_]+)*")
 
 
 @dataclass(frozen=True, slots=True)
 class Qos:
-    """A topic's QoS; depth is of KEEP_LAST."""
+    """A topic's QoS; `depth` is that of KEEP_LAST."""
 
     reliable: bool = True
     transient_local: bool = False
@@ -54,11 +54,11 @@ def status(action_key: str) -> str:
     return of_action(action_key, "status")
 
 
-def type_in(told: str) -> str:
+def valid_type(told: str) -> str:
     """The type that somebody names; `NO_TYPE`, which no panel is made for, where that can't be one."""
-    return told if len(told) <= LONGEST_NAME and _ANY_TYPE.fullmatch(told) else NO_TYPE
+    return told if len(told) <= MAX_NAME and _ANY_TYPE.fullmatch(told) else NO_TYPE
 
 
-def is_key(name: str) -> bool:
-    """Whether a name, without its first slash, can be one of ROS 2's."""
-    return len(name) <= LONGEST_NAME and TOPIC.fullmatch(f"/{name}") is not None
+def is_valid_name(name: str) -> bool:
+    """Whether a name without its leading slash is a valid ROS 2 name."""
+    return len(name) <= MAX_NAME and TOPIC.fullmatch(f"/{name}") is not None

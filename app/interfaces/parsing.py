@@ -1,4 +1,4 @@
-"""The text of .msg, .srv and .action files → structures. No I/O.
+"""Parses the text of .msg, .srv and .action files. No I/O.
 
 Source: the ROS 2 interface definition language (design.ros2.org, "legacy_interface_definition").
 """
@@ -10,15 +10,15 @@ from typing import Any, Final, Literal, NoReturn
 from app.errors import FieldError, InterfaceError
 from app.interfaces.definitions import (
     BASE_TYPES,
-    FLOATS,
-    INTEGERS,
-    TEXTS,
+    FLOAT_TYPES,
+    INTEGER_RANGES,
+    STRING_TYPES,
     Definitions,
     Field,
     Structure,
     Type,
 )
-from app.interfaces.derived_types import composed_action, composed_service
+from app.interfaces.derived_types import compose_action, compose_service
 from app.interfaces.validation import scalar_check
 
 PACKAGE: Final = re.compile(r"[a-z](?:_?[a-z0-9])*")
@@ -40,11 +40,11 @@ KINDS: Final = ("msg", "srv", "action")
 Line = tuple[int, str]
 
 
-def parsed(text: str, package: str, kind: str, name: str, source: Path) -> Definitions:
-    """What one file defines; `kind` is its suffix: "msg", "srv" or "action".
+def parse_definition(text: str, package: str, kind: str, name: str, source: Path) -> Definitions:
+    """The definitions of one file; `kind` is its suffix: "msg", "srv" or "action".
 
-    A service and an action become all the structures that ROS makes of them. InterfaceError names
-    file and line.
+    A service or an action yields all types that ROS derives from it. InterfaceError names file and
+    line.
     """
     if not PACKAGE.fullmatch(package):
         raise InterfaceError(f'{source}: "{package}" is not a package name: a-z, 0-9 and "_"', source)
@@ -52,23 +52,23 @@ def parsed(text: str, package: str, kind: str, name: str, source: Path) -> Defin
         why = "is not an interface name: letters and digits, a capital first"
         raise InterfaceError(f'{source}: "{name}" {why}', source)
     whole = f"{package}/{kind}/{name}"
-    sections = _sections(text)
+    sections = _split_sections(text)
     wanted = KINDS.index(kind) + 1
     if len(sections) != wanted:
         why = f'has {len(sections) - 1} "{SEPARATOR}" lines; a .{kind} file has {wanted - 1}'
         raise InterfaceError(f"{source}: {why}", source)
     if kind == "msg":
-        return Definitions({whole: _structure(whole, sections[0], source)})
+        return Definitions({whole: _parse_structure(whole, sections[0], source)})
     endings = ("Request", "Response") if kind == "srv" else ("Goal", "Result", "Feedback")
     parts = [
-        _structure(f"{whole}_{ending}", lines, source)
+        _parse_structure(f"{whole}_{ending}", lines, source)
         for ending, lines in zip(endings, sections, strict=True)
     ]
-    return composed_service(whole, *parts) if kind == "srv" else composed_action(whole, *parts)
+    return compose_service(whole, *parts) if kind == "srv" else compose_action(whole, *parts)
 
 
-def _sections(text: str) -> list[list[Line]]:
-    """Numbered lines with something in them, parted at the separators."""
+def _split_sections(text: str) -> list[list[Line]]:
+    """The numbered lines without blank ones and comments, split at the separators."""
     sections: list[list[Line]] = [[]]
     for number, line in enumerate(text.removeprefix("\ufeff").splitlines(), 1):
         line = line.strip()
@@ -79,48 +79,48 @@ def _sections(text: str) -> list[list[Line]]:
     return sections
 
 
-def _structure(name: str, lines: list[Line], source: Path) -> Structure:
+def _parse_structure(name: str, lines: list[Line], source: Path) -> Structure:
     fields: dict[str, Field] = {}
     constants: dict[str, Any] = {}
     types: dict[str, str] = {}
     for number, line in lines:
         try:
             match = _LINE.fullmatch(line) or _fail(f'"{line}" is not "type name"')
-            kind = _type(match["type"], name.split("/")[0])
+            kind = _parse_type(match["type"], name.split("/")[0])
             each, value = match["name"], match["value"]
             if each in fields or each in constants:
                 _fail(f'"{each}" is there twice')
             if match["is"]:
-                constants[each] = _constant(kind, each, value)
+                constants[each] = _parse_constant(kind, each, value)
                 types[each] = kind.name
             else:
-                fields[each] = _field(kind, each, value)
+                fields[each] = _parse_field(kind, each, value)
         except ValueError as error:
             raise InterfaceError(f"{source}:{number}: {error}", source) from None
     return Structure(name, tuple(fields.values()), constants, source, types)
 
 
-def _constant(kind: Type, name: str, value: str) -> Any:
-    if kind.nested or kind.many != "one":
+def _parse_constant(kind: Type, name: str, value: str) -> Any:
+    if kind.is_nested or kind.container != "one":
         _fail(f"a constant is of a base type, not {kind}")
     if not CONSTANT.fullmatch(name):
         _fail(f'"{name}" is not a constant\'s name: A-Z, 0-9 and single "_"')
-    return literal(kind, value)
+    return parse_literal(kind, value)
 
 
-def _field(kind: Type, name: str, value: str) -> Field:
+def _parse_field(kind: Type, name: str, value: str) -> Field:
     if not FIELD.fullmatch(name):
         _fail(f'"{name}" is not a field\'s name: a-z, 0-9 and single "_", a letter first')
     default = value if value and not value.startswith("#") else None
-    return Field(name, kind, None if default is None else literal(kind, default))
+    return Field(name, kind, None if default is None else parse_literal(kind, default))
 
 
-def _type(text: str, package: str) -> Type:
+def _parse_type(text: str, package: str) -> Type:
     match = _TYPE.fullmatch(text) or _fail(f'"{text}" is not a type')
     name, bound, size = match["name"], match["bound"], match["size"]
     if name not in BASE_TYPES or name == "octet":
         name = _OLD_NAMES.get(name) or _full_name(name, package)
-    if bound is not None and (name not in TEXTS or not int(bound)):
+    if bound is not None and (name not in STRING_TYPES or not int(bound)):
         _fail(f'"{text}": only a string has a bound, of 1 at least')
     if size and not int(size):
         _fail(f'"{text}": a list has 1 element at least')
@@ -152,29 +152,29 @@ _ELEMENT: Final = re.compile(r"""\s*("(?:[^"\\]|\\.)*"|'(?:[^'\\]|\\.)*'|[^,'"\s
 _LIST: Final = re.compile(r"""\[((?:"(?:[^"\\]|\\.)*"|'(?:[^'\\]|\\.)*'|[^#'"\]])*)\]\s*(?:#.*)?""")
 
 
-def literal(kind: Type, text: str) -> Any:
-    """The value written as `text`, which a comment may follow; ValueError says what is wrong."""
-    if kind.nested:
+def parse_literal(kind: Type, text: str) -> Any:
+    """The value of a literal, which a comment may follow; ValueError if it is malformed."""
+    if kind.is_nested:
         raise ValueError(f"{kind} takes no default: only base types do")
-    if kind.many != "one":
-        return _list(kind, text)
-    quoted = _QUOTED.fullmatch(text) if kind.name in TEXTS else None
-    return _value(kind, quoted[1] if quoted else text.partition("#")[0].strip())
+    if kind.container != "one":
+        return _parse_list(kind, text)
+    quoted = _QUOTED.fullmatch(text) if kind.name in STRING_TYPES else None
+    return _parse_value(kind, quoted[1] if quoted else text.partition("#")[0].strip())
 
 
-def _list(kind: Type, text: str) -> list[Any]:
+def _parse_list(kind: Type, text: str) -> list[Any]:
     match = _LIST.fullmatch(text)
     if match is None:
         raise ValueError(f"{text} is not a list: the default of {kind} must be like [1, 2]")
-    values = [_value(kind.element, one) for one in _elements(match[1])]
-    if kind.many == "array" and len(values) != kind.size:
+    values = [_parse_value(kind.element, one) for one in _split_elements(match[1])]
+    if kind.container == "array" and len(values) != kind.size:
         raise ValueError(f"{kind} needs {kind.size} elements, not {len(values)}")
     if kind.size and len(values) > kind.size:
         raise ValueError(f"{kind} takes {kind.size} elements at most, not {len(values)}")
     return values
 
 
-def _elements(inside: str) -> list[str]:
+def _split_elements(inside: str) -> list[str]:
     found: list[str] = []
     at = 0
     while inside[at:].strip():
@@ -186,8 +186,8 @@ def _elements(inside: str) -> list[str]:
     return found
 
 
-def _value(kind: Type, text: str) -> Any:
-    value = _read(kind.name, text)
+def _parse_value(kind: Type, text: str) -> Any:
+    value = _parse_scalar(kind.name, text)
     if value is None:
         raise ValueError(f"{text or 'nothing'} is not a value of {kind}")
     try:
@@ -196,30 +196,30 @@ def _value(kind: Type, text: str) -> Any:
         raise ValueError(f"{text}: {error.message}") from None
 
 
-def _read(name: str, text: str) -> Any:
-    """The value, whether or not it is in range; None where it is not written as one."""
+def _parse_scalar(name: str, text: str) -> Any:
+    """The value, without a check of its range; None if the text is malformed."""
     if name == "bool":
         return BOOLS.get(text.lower())
-    if name in TEXTS:
-        return _unquoted(text)
+    if name in STRING_TYPES:
+        return _unquote(text)
     try:
-        if name in INTEGERS:
-            return _integer(text)
-        assert name in FLOATS
+        if name in INTEGER_RANGES:
+            return _parse_integer(text)
+        assert name in FLOAT_TYPES
         return float(text)
     except ValueError:
         return None
 
 
-def _integer(text: str) -> int:
+def _parse_integer(text: str) -> int:
     try:
         return int(text)
     except ValueError:
         return int(text, 0)
 
 
-def _unquoted(text: str) -> str:
-    """Without the quotes around it, if it has any; an escaped quote inside is the quote alone."""
+def _unquote(text: str) -> str:
+    """The text without enclosing quotes, if any; escaped quotes inside are unescaped."""
     if len(text) > 1 and text[0] in "\"'" and text[-1] == text[0]:
         return text[1:-1].replace("\\" + text[0], text[0])
     return text

@@ -1,4 +1,4 @@
-"""The ROS 2 interfaces that a panel may name, and their values to and from CDR bytes."""
+"""The ROS 2 interfaces of a panel: lookup, encoding and decoding."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
@@ -9,42 +9,44 @@ from typing import Any, Final
 
 from app.errors import DecodeError, InterfaceError
 from app.interfaces.cdr.codec import Codec
-from app.interfaces.cdr.encapsulation import LITTLE_ENDIAN
+from app.interfaces.cdr.encapsulation import LITTLE_ENDIAN_HEADER
 from app.interfaces.cdr.fields import FieldReader
 from app.interfaces.cdr.selection import Resolver
-from app.interfaces.definitions import Structure, Type, interface_of
+from app.interfaces.definitions import Structure, Type, interface_name
 from app.interfaces.derived_types import ActionTypes, action_types
 from app.interfaces.distributions import read_distribution
 from app.interfaces.mcap_schema import definition_text
 from app.interfaces.packages import (
-    complete,
+    file_stamps,
+    find_idl_only,
     idl_hint,
-    idl_only,
     read_folders,
-    stamp,
+    usable_definitions,
 )
 from app.interfaces.type_hash import type_hash
 from app.interfaces.validation import Check, field_check, message_check
 
-MOST_NEAR: Final = 3  # names that may be meant
-LIKE_A_PACKAGE: Final = 0.8  # all packages of messages end alike
+MAX_SUGGESTIONS: Final = 3
+PACKAGE_SIMILARITY: Final = 0.8  # high, because most package names end in "_msgs"
 
 
 class Interfaces:
-    """Message, service and action types of one distribution and of folders of packages.
+    """The message, service and action types of one distribution and of folders of packages.
 
-    A message type is "package/msg/Name"; a part of a service or an action is one too, named as ROS
-    names it: "std_srvs/srv/SetBool_Request", "example_interfaces/action/Fibonacci_Feedback".
+    A message type is "package/msg/Name". Parts of services and actions are message types too, named as
+    in ROS: "std_srvs/srv/SetBool_Request", "example_interfaces/action/Fibonacci_Feedback".
     """
 
     def __init__(self, distro: str = "jazzy", folders: Sequence[Path] = ()) -> None:
-        """`folders` are packages, or have packages in them (a workspace's `share`); what they
-        define goes before the distribution's. A file that can't be used is no fault until its type is
-        asked for: `left_out` says why. InterfaceError names a folder without interfaces."""
+        """`folders` are packages, or contain packages (a workspace's `share`); their definitions take
+        precedence over the distribution's. A file that can't be used is an error only when its type is
+        requested: see `unusable`. InterfaceError names a folder without interfaces."""
         known = read_distribution(distro)
         self._distro = distro
-        self._unread = idl_only(folders)
-        self._definitions = complete(read_folders(folders), known, self._unread) if folders else known
+        self._idl_only = find_idl_only(folders)
+        self._definitions = (
+            usable_definitions(read_folders(folders), known, self._idl_only) if folders else known
+        )
         self._structures = self._definitions.structures
         self._codec = Codec(self._structures)
         self._checks: dict[str, Check] = {}
@@ -54,31 +56,35 @@ class Interfaces:
 
     @property
     def structures(self) -> Mapping[str, Structure]:
-        """The definition of every type that can be encoded, parts of services and actions too."""
+        """The structure of every type that can be encoded, including parts of services and actions."""
         return self._structures
 
     @property
-    def left_out(self) -> Mapping[str, InterfaceError]:
-        """Why an interface that the folders have can't be used, by its name."""
-        return self._definitions.left_out
+    def unusable(self) -> Mapping[str, InterfaceError]:
+        """The error of each interface of the folders that can't be used, by name."""
+        return self._definitions.unusable
 
     def require(self, type_name: str) -> None:
-        """Raises InterfaceError, with the nearest known names, if there is no such type."""
+        """InterfaceError, with similar names, if the type does not exist."""
         if type_name not in self._structures:
-            raise self._unknown(type_name, self._structures)
+            raise self._unknown_type_error(type_name, self._structures)
 
-    def service(self, type_name: str) -> tuple[str, str]:
+    def service_types(self, type_name: str) -> tuple[str, str]:
         """(request type, response type) of a service like "std_srvs/srv/SetBool"."""
         request, response = f"{type_name}_Request", f"{type_name}_Response"
         if request not in self._structures or response not in self._structures:
-            raise self._unknown(type_name, self._wholes("/srv/"), "a service")
+            raise self._unknown_type_error(
+                type_name, self._service_or_action_names("/srv/"), "a service"
+            )
         return request, response
 
-    def action(self, type_name: str) -> ActionTypes:
+    def action_types(self, type_name: str) -> ActionTypes:
         """The types of an action like "example_interfaces/action/Fibonacci"."""
         types = action_types(type_name)
         if types.feedback_message not in self._structures:
-            raise self._unknown(type_name, self._wholes("/action/"), "an action")
+            raise self._unknown_type_error(
+                type_name, self._service_or_action_names("/action/"), "an action"
+            )
         return types
 
     def constants(self, type_name: str) -> Mapping[str, Any]:
@@ -91,61 +97,60 @@ class Interfaces:
         return str(self.type_at(type_name, path))
 
     def type_at(self, type_name: str, path: str) -> Type:
-        """The same; InterfaceError where the type has no such field."""
+        """The same as `Type`; InterfaceError if the type has no such field."""
         self.require(type_name)
         return self._resolver.type_at(type_name, path)
 
-    def fields(self, type_name: str, paths: Iterable[str]) -> FieldReader:
-        """What reads the fields at these paths of each message, and passes over the rest.
+    def field_reader(self, type_name: str, paths: Iterable[str]) -> FieldReader:
+        """A reader of the fields at these paths, which skips the rest of each message.
 
-        InterfaceError where the type has no such field.
+        InterfaceError if the type has no such field.
         """
         self.require(type_name)
         key = type_name, tuple(dict.fromkeys(paths))
         if key not in self._field_readers:
-            wanted = self._resolver.wanted(*key)
-            self._field_readers[key] = self._codec.fields(type_name, wanted)
+            wanted = self._resolver.select(*key)
+            self._field_readers[key] = self._codec.field_reader(type_name, wanted)
         return self._field_readers[key]
 
     def type_hash(self, type_name: str) -> str:
-        """The REP 2016 type hash, `RIHS01_…`, as the robot's own nodes compute it.
+        """The REP 2016 type hash, `RIHS01_…`, of a message, a part, a service or an action.
 
-        Of a message, a part, a service or an action. InterfaceError where the distribution has no
-        such hash: before iron, services and actions.
+        InterfaceError if the distribution has none: services and actions before iron.
         """
         if type_name not in self._hashes:
-            self._hashes[type_name] = type_hash(self._described(type_name), self._described)
+            self._hashes[type_name] = type_hash(self._find(type_name), self._find)
         return self._hashes[type_name]
 
     def definition(self, type_name: str) -> str:
-        """The definition of a message with all that it is made of, in the format "ros2msg"."""
+        """The definition of a message and of all types in it, in the format "ros2msg"."""
         self.require(type_name)
         return definition_text(self._structures[type_name], self._structures.__getitem__)
 
     def encode(self, type_name: str, fields: Mapping[str, Any]) -> bytes:
-        """The message as XCDR1 bytes with their encapsulation header (00 01 00 00).
+        """The message as XCDR1 bytes with the encapsulation header (00 01 00 00).
 
-        A field that is left out has its default, else zero. Each must be one of the type's and fit its
-        definition: else FieldError, which names it. Lists may be NumPy arrays, those of 8-bit unsigned
-        numbers `bytes`.
+        A field that is not given has its default, else zero. FieldError names a field that does not
+        exist or does not fit its definition. Lists may be NumPy arrays, lists of 8-bit unsigned numbers
+        `bytes`.
         """
         check = self._checks.get(type_name) or self._check(type_name)
         return self._codec.serialize(check(fields), type_name)
 
     def decode(self, type_name: str, data: bytes) -> Any:
-        """The message object (fields as attributes); DecodeError if these bytes are not one, or have
-        more elements than are read at once: see `fields`."""
+        """The message object (fields as attributes). DecodeError if the bytes are no such message, or
+        have too many elements to be decoded at once: see `field_reader`."""
         try:
             return self._codec.deserialize(data, type_name)
-        except Exception as error:  # whatever arrived, it must not stop the panel
+        except Exception as error:  # no received bytes may stop the panel
             raise DecodeError(f"{len(data)} bytes are not a {type_name}: {error}") from error
 
-    def prepare(self, type_names: Iterable[str]) -> None:
-        """The first use of a type compiles its codec: now, not at the first press."""
+    def prepare_codecs(self, type_names: Iterable[str]) -> None:
+        """Compiles the codecs of these types, so that the first press does not wait for it."""
         for type_name in type_names:
             self.type_hash(type_name)
             with suppress(DecodeError):
-                self.decode(type_name, LITTLE_ENDIAN)
+                self.decode(type_name, LITTLE_ENDIAN_HEADER)
 
     def _check(self, type_name: str) -> Check:
         if type_name not in self._checks:
@@ -159,26 +164,26 @@ class Interfaces:
     def _field_check(self, kind: Type) -> Check:
         return field_check(kind, self._check)
 
-    def _described(self, type_name: str) -> Structure:
-        found = self._definitions.described(type_name)
+    def _find(self, type_name: str) -> Structure:
+        found = self._definitions.find(type_name)
         if found is None:
-            names = {*self._structures, *self._definitions.wholes}
-            raise self._unknown(type_name, names, "a type with a hash")
+            names = {*self._structures, *self._definitions.interface_types}
+            raise self._unknown_type_error(type_name, names, "a type with a hash")
         return found
 
-    def _wholes(self, kind: str) -> list[str]:
-        """Services or actions that are there, with or without hashes."""
+    def _service_or_action_names(self, kind: str) -> list[str]:
+        """The names of all services ("/srv/") or actions ("/action/")."""
         ending = "_Response" if kind == "/srv/" else "_FeedbackMessage"
         return [n.removesuffix(ending) for n in self._structures if kind in n and n.endswith(ending)]
 
-    def _unknown(self, name: str, known: Any, what: str = "an interface") -> InterfaceError:
-        if (cause := self.left_out.get(interface_of(name))) is not None:
+    def _unknown_type_error(self, name: str, known: Any, what: str = "an interface") -> InterfaceError:
+        if (cause := self.unusable.get(interface_name(name))) is not None:
             return InterfaceError(f'"{name}" can\'t be used: {cause}', cause.source)
-        if name in self._unread:
-            return InterfaceError(f'"{name}" is not there: {idl_hint(self._unread[name])}')
+        if name in self._idl_only:
+            return InterfaceError(f'"{name}" is not there: {idl_hint(self._idl_only[name])}')
         why = f'"{name}" is not {what} of ROS 2 {self._distro}'
-        every, package = [*known, *self.left_out], name.partition("/")[0]
-        if near := _near(name, every):
+        every, package = [*known, *self.unusable], name.partition("/")[0]
+        if near := _suggestions(name, every):
             return InterfaceError(f"{why}; did you mean {' or '.join(near)}?")
         if "/" not in name or any(one.startswith(f"{package}/") for one in every):
             return InterfaceError(why)
@@ -186,31 +191,31 @@ class Interfaces:
         return InterfaceError(f"{why}; {hint}", package=package)
 
 
-def _near(name: str, known: Sequence[str]) -> list[str]:
-    """Names like one that there is not: of its package, or of one that is called almost so; then the
-    same name of other packages."""
+def _suggestions(name: str, known: Sequence[str]) -> list[str]:
+    """Names similar to an unknown one: in its package or a similar package; then the same name in other
+    packages."""
     package, _, rest = name.partition("/")
     packages = {one.partition("/")[0] for one in known}
     near: list[str] = []
-    for each in get_close_matches(package, packages, n=1, cutoff=LIKE_A_PACKAGE):
+    for each in get_close_matches(package, packages, n=1, cutoff=PACKAGE_SIMILARITY):
         own = [one.partition("/")[2] for one in known if one.startswith(f"{each}/")]
-        near += [f"{each}/{one}" for one in _like(rest, own)]
+        near += [f"{each}/{one}" for one in _similar(rest, own)]
     same = [one for one in known if one.endswith(f"/{rest}")]
-    near += get_close_matches(name, same, n=MOST_NEAR, cutoff=0)
-    return list(dict.fromkeys(near))[:MOST_NEAR]
+    near += get_close_matches(name, same, n=MAX_SUGGESTIONS, cutoff=0)
+    return list(dict.fromkeys(near))[:MAX_SUGGESTIONS]
 
 
-def _like(rest: str, known: Sequence[str]) -> list[str]:
-    """Those whose last part is like that of a name."""
+def _similar(rest: str, known: Sequence[str]) -> list[str]:
+    """The names whose last part is similar."""
     last = {one.rpartition("/")[2]: one for one in known}
-    return [last[one] for one in get_close_matches(rest.rpartition("/")[2], last, n=MOST_NEAR)]
+    return [last[one] for one in get_close_matches(rest.rpartition("/")[2], last, n=MAX_SUGGESTIONS)]
 
 
-def interfaces_of(distro: str, folders: Sequence[Path] = ()) -> Interfaces:
-    """The one instance for a distribution and folders, read anew only when a file has changed."""
-    return _made(distro, tuple(folders), stamp(folders))
+def load_interfaces(distro: str, folders: Sequence[Path] = ()) -> Interfaces:
+    """The shared instance for a distribution and folders; it is read again when a file has changed."""
+    return _cached_interfaces(distro, tuple(folders), file_stamps(folders))
 
 
 @lru_cache(8)
-def _made(distro: str, folders: tuple[Path, ...], _stamp: object) -> Interfaces:
+def _cached_interfaces(distro: str, folders: tuple[Path, ...], _stamp: object) -> Interfaces:
     return Interfaces(distro, folders)

@@ -1,4 +1,4 @@
-"""Type hashes as ROS computes them (REP 2016, version 1): the SHA-256 of a description in JSON."""
+"""Type hashes (REP 2016, version 1): the SHA-256 of a type description in JSON."""
 
 import json
 from collections.abc import Callable, Mapping
@@ -27,54 +27,58 @@ BASE_IDS: Final[Mapping[str, int]] = {
     "string": 17,
     "wstring": 18,
 }
-BOUNDED_TEXT: Final = 4  # is added to a text's number, and the next three to any
+BOUNDED_TEXT: Final = 4  # added to the number of a string type; the next three to that of any type
 ARRAY: Final = 48
 BOUNDED_SEQUENCE: Final = 96
 SEQUENCE: Final = 144
 
 
-def type_hash(of: Structure, find: Callable[[str], Structure]) -> str:
-    """`RIHS01_` and 64 hexadecimal digits; `find` gives the structures that it is made of."""
-    inner = gathered(of, find)
+def type_hash(structure: Structure, find: Callable[[str], Structure]) -> str:
+    """`RIHS01_` and 64 hexadecimal digits; `find` returns referenced structures by name."""
+    inner = referenced_structures(structure, find)
     whole = {
-        "type_description": _described(of),
-        "referenced_type_descriptions": [_described(inner[name]) for name in sorted(inner)],
+        "type_description": _describe_structure(structure),
+        "referenced_type_descriptions": [_describe_structure(inner[name]) for name in sorted(inner)],
     }
     return f"RIHS01_{sha256(json.dumps(whole).encode()).hexdigest()}"
 
 
-def gathered(of: Structure, find: Callable[[str], Structure]) -> dict[str, Structure]:
-    """All structures that one is made of, by name; not itself."""
+def referenced_structures(
+    structure: Structure, find: Callable[[str], Structure]
+) -> dict[str, Structure]:
+    """All structures that one references, directly or indirectly, by name; without itself."""
     inner: dict[str, Structure] = {}
-    _gather(of, find, inner)
+    _collect(structure, find, inner)
     return inner
 
 
-def _gather(of: Structure, find: Callable[[str], Structure], inner: dict[str, Structure]) -> None:
-    for _, name in of.needs():
+def _collect(
+    structure: Structure, find: Callable[[str], Structure], inner: dict[str, Structure]
+) -> None:
+    for _, name in structure.nested_fields():
         if name not in inner:
             inner[name] = find(name)
-            _gather(inner[name], find, inner)
+            _collect(inner[name], find, inner)
 
 
-def _described(of: Structure) -> dict[str, Any]:
-    fields = of.fields or (Field(PLACEHOLDER, Type("uint8")),)
-    return {"type_name": of.name, "fields": [_field(one) for one in fields]}
+def _describe_structure(structure: Structure) -> dict[str, Any]:
+    fields = structure.fields or (Field(PLACEHOLDER, Type("uint8")),)
+    return {"type_name": structure.name, "fields": [_describe_field(one) for one in fields]}
 
 
-def _field(one: Field) -> dict[str, Any]:
+def _describe_field(one: Field) -> dict[str, Any]:
     described = {
         "type_id": _type_id(one.type),
         "capacity": one.type.size,
         "string_capacity": one.type.bound,
-        "nested_type_name": one.type.name if one.type.nested else "",
+        "nested_type_name": one.type.name if one.type.is_nested else "",
     }
     return {"name": one.name, "type": described}
 
 
 def _type_id(of: Type) -> int:
-    one = NESTED if of.nested else BASE_IDS[of.name] + (BOUNDED_TEXT if of.bound else 0)
-    match of.many:
+    one = NESTED if of.is_nested else BASE_IDS[of.name] + (BOUNDED_TEXT if of.bound else 0)
+    match of.container:
         case "one":
             return one
         case "array":

@@ -1,4 +1,4 @@
-"""What a field takes: plain values checked against their definitions, and what is wrong with them."""
+"""Checks plain values against field definitions."""
 
 import datetime
 import math
@@ -9,94 +9,95 @@ from typing import Any, Final
 
 from app.errors import FieldError
 from app.interfaces.cdr.formats import FORMATS
-from app.interfaces.definitions import INTEGERS, Structure, Type
+from app.interfaces.definitions import INTEGER_RANGES, Structure, Type
 
-Check = Callable[[Any], Any]  # what came → what is sent; FieldError with "" or "[3]" as its field
+Check = Callable[[Any], Any]  # given value → value to encode; FieldError with "" or "[3]" as its field
 
 FLOAT_MAX: Final[Mapping[str, float]] = {
     "float32": (2 - 2**-23) * 2.0**127,
     "float64": math.inf,
 }
 
-LONGEST_SHOWN: Final = 60  # characters
-MOST_SHOWN: Final = 3  # elements of a list or a table
-DEEPEST_SHOWN: Final = 3
+MAX_SHOWN_CHARS: Final = 60  # characters
+MAX_SHOWN_ELEMENTS: Final = 3  # elements of a list or a table
+MAX_SHOWN_DEPTH: Final = 3
 
-_short = reprlib.Repr()
-_short.maxother = LONGEST_SHOWN
+_shortener = reprlib.Repr()
+_shortener.maxother = MAX_SHOWN_CHARS
 
 
-def shown(given: Any, depth: int = DEEPEST_SHOWN) -> str:
-    """A value as TOML and JSON write it, for an error message: never longer than a line."""
+def format_value(given: Any, depth: int = MAX_SHOWN_DEPTH) -> str:
+    """A value as TOML and JSON write it, cut to a line, for an error message."""
     match given:
         case None:
             return "null"
         case bool():
             return "true" if given else "false"
         case str():
-            return _quoted(given)
+            return _quote(given)
         case datetime.date() | datetime.time():
             return given.isoformat()
         case Mapping() | list() | tuple() if not depth:
             return "…"
         case Mapping():
             items = (
-                f"{key} = {shown(one, depth - 1)}" for key, one in islice(given.items(), MOST_SHOWN)
+                f"{key} = {format_value(one, depth - 1)}"
+                for key, one in islice(given.items(), MAX_SHOWN_ELEMENTS)
             )
-            return f"{{{_cut(items, len(given))}}}"
+            return f"{{{_join_limited(items, len(given))}}}"
         case list() | tuple():
-            elements = (shown(one, depth - 1) for one in given[:MOST_SHOWN])
-            return f"[{_cut(elements, len(given))}]"
-    return _short.repr(given)
+            elements = (format_value(one, depth - 1) for one in given[:MAX_SHOWN_ELEMENTS])
+            return f"[{_join_limited(elements, len(given))}]"
+    return _shortener.repr(given)
 
 
-def _quoted(text: str) -> str:
-    """In double quotes; what would not show, or show as something else, is escaped."""
-    cut = f"{text[:LONGEST_SHOWN]}…" if len(text) > LONGEST_SHOWN else text
+def _quote(text: str) -> str:
+    """The text in double quotes; characters that are not printable are escaped."""
+    cut = f"{text[:MAX_SHOWN_CHARS]}…" if len(text) > MAX_SHOWN_CHARS else text
     escaped = cut.replace("\\", "\\\\").replace('"', '\\"')
-    return '"' + "".join(c if c.isprintable() else _escaped(ord(c)) for c in escaped) + '"'
+    return '"' + "".join(c if c.isprintable() else _escape(ord(c)) for c in escaped) + '"'
 
 
-def _escaped(code: int) -> str:
+def _escape(code: int) -> str:
     return f"\\u{code:04x}" if code <= 0xFFFF else f"\\U{code:08x}"
 
 
-def _cut(parts: Iterable[str], count: int) -> str:
-    text = ", ".join(parts) + (", …" if count > MOST_SHOWN else "")
-    return f"{text[:LONGEST_SHOWN]}…" if len(text) > LONGEST_SHOWN else text
+def _join_limited(parts: Iterable[str], count: int) -> str:
+    text = ", ".join(parts) + (", …" if count > MAX_SHOWN_ELEMENTS else "")
+    return f"{text[:MAX_SHOWN_CHARS]}…" if len(text) > MAX_SHOWN_CHARS else text
 
 
 def scalar_check(kind: Type) -> Check:
     """The check of one value of a base type."""
     if kind.name == "bool":
-        return _bool
-    if kind.name in INTEGERS:
-        return _integer(kind.name)
+        return _check_bool
+    if kind.name in INTEGER_RANGES:
+        return _integer_check(kind.name)
     if kind.name in FLOAT_MAX:
-        return _float(kind.name)
-    return _text(kind)
+        return _float_check(kind.name)
+    return _text_check(kind)
 
 
-def _plain(given: Any) -> Any:
-    """A scalar of an array library as Python's own."""
+def _to_python_scalar(given: Any) -> Any:
+    """A scalar of an array library as a Python scalar."""
     return given.item() if hasattr(given, "item") else given
 
 
-def _bool(given: Any) -> bool:
-    value = _plain(given)
+def _check_bool(given: Any) -> bool:
+    value = _to_python_scalar(given)
     if value is True or value is False:
         return bool(value)
-    raise FieldError("", f"must be true or false, not {shown(given)}")
+    raise FieldError("", f"must be true or false, not {format_value(given)}")
 
 
-def _integer(name: str) -> Check:
-    low, high = INTEGERS[name]
+def _integer_check(name: str) -> Check:
+    low, high = INTEGER_RANGES[name]
 
     def check(given: Any) -> int:
         if type(given) is not int:
-            given = _plain(given)
+            given = _to_python_scalar(given)
             if type(given) is not int:
-                raise FieldError("", f"must be a whole number ({name}), not {shown(given)}")
+                raise FieldError("", f"must be a whole number ({name}), not {format_value(given)}")
         if low <= given <= high:
             return given
         raise FieldError("", f"{given} is out of range: {name} goes from {low} to {high}")
@@ -104,17 +105,17 @@ def _integer(name: str) -> Check:
     return check
 
 
-def _float(name: str) -> Check:
+def _float_check(name: str) -> Check:
     highest = FLOAT_MAX[name]
 
     def check(given: Any) -> float:
-        given = _plain(given)
+        given = _to_python_scalar(given)
         if type(given) not in (int, float):
-            raise FieldError("", f"must be a number ({name}), not {shown(given)}")
+            raise FieldError("", f"must be a number ({name}), not {format_value(given)}")
         try:
             value = float(given)
         except OverflowError:
-            raise FieldError("", f"{shown(given)} is out of range for {name}") from None
+            raise FieldError("", f"{format_value(given)} is out of range for {name}") from None
         if abs(value) > highest and not math.isinf(value):
             raise FieldError("", f"{given} is out of range: {name} goes to {highest:g}")
         return value
@@ -122,7 +123,7 @@ def _float(name: str) -> Check:
     return check
 
 
-def _text(kind: Type) -> Check:
+def _text_check(kind: Type) -> Check:
     name, bound = kind.name, kind.bound
     encoding, unit, units = (
         ("utf-8", 1, "bytes") if name == "string" else ("utf-16-le", 2, "UTF-16 units")
@@ -130,7 +131,7 @@ def _text(kind: Type) -> Check:
 
     def check(given: Any) -> str:
         if not isinstance(given, str):
-            raise FieldError("", f"must be text ({name}), not {shown(given)}")
+            raise FieldError("", f"must be text ({name}), not {format_value(given)}")
         if "\0" in given:
             raise FieldError("", "has a NUL character, at which a ROS string ends")
         size = len(given)
@@ -151,32 +152,32 @@ def message_check(structure: Structure, make: Callable[..., Any], checks: Sequen
     """The check of a whole structure: a mapping of its fields → `make(*values)`."""
     names = {field.name for field in structure.fields}
     plan = [
-        (field.name, check, check(field.left_out))
+        (field.name, check, check(field.default_value))
         for field, check in zip(structure.fields, checks, strict=True)
     ]
 
     def message(given: Any) -> Any:
         if type(given) is not dict and not isinstance(given, Mapping):
             raise FieldError(
-                "", f"must be a table of the fields of {structure.name}, not {shown(given)}"
+                "", f"must be a table of the fields of {structure.name}, not {format_value(given)}"
             )
         if not given.keys() <= names:
-            raise _unknown(structure, given)
+            raise _unknown_field_error(structure, given)
         name = ""
         try:
             values = []
             for name, check, left_out in plan:
                 values.append(check(given[name]) if name in given else left_out)
         except FieldError as error:
-            raise _within(name, error) from None
+            raise _prefix_field(name, error) from None
         return make(*values)
 
     return message
 
 
 def list_check(kind: Type, element: Check) -> Check:
-    """The check of an array or a sequence, whose elements `element` checks; bytes stand for 8-bit
-    numbers, and an array of any library with one dimension for a list."""
+    """The check of an array or a sequence; `element` checks its elements. `bytes` are accepted for
+    8-bit numbers, and one-dimensional arrays of any library for lists."""
 
     def many(given: Any) -> Any:
         if isinstance(given, bytes | bytearray | memoryview) and FORMATS.get(kind.name) == "B":
@@ -186,43 +187,43 @@ def list_check(kind: Type, element: Check) -> Check:
         if getattr(given, "ndim", 0) == 1:
             given = given.tolist()
         if not isinstance(given, Sequence) or isinstance(given, str | bytes | bytearray | memoryview):
-            raise FieldError("", f"must be a list ({kind}), not {shown(given)}")
+            raise FieldError("", f"must be a list ({kind}), not {format_value(given)}")
         _check_length(kind, len(given))
-        return _each(given, element)
+        return _check_elements(given, element)
 
     return many
 
 
-def _each(given: Sequence[Any], check: Check) -> list[Any]:
+def _check_elements(given: Sequence[Any], check: Check) -> list[Any]:
     made: list[Any] = []
     try:
         for item in given:
             made.append(check(item))
     except FieldError as error:
-        raise _within(f"[{len(made)}]", error) from None
+        raise _prefix_field(f"[{len(made)}]", error) from None
     return made
 
 
 def _check_length(kind: Type, length: int) -> None:
-    if kind.many == "array" and length != kind.size:
+    if kind.container == "array" and length != kind.size:
         raise FieldError("", f"must have {kind.size} elements, not {length}")
-    if kind.many == "sequence" and kind.size and length > kind.size:
+    if kind.container == "sequence" and kind.size and length > kind.size:
         raise FieldError("", f"may have {kind.size} elements at most, not {length}")
 
 
-def _within(step: str, error: FieldError) -> FieldError:
-    """The same error, one step further out: "c" within "b[3]" is "b[3].c"."""
+def _prefix_field(step: str, error: FieldError) -> FieldError:
+    """The error with `step` before its field: "c" in "b[3]" becomes "b[3].c"."""
     joint = "." if error.field and not error.field.startswith("[") else ""
     return FieldError(f"{step}{joint}{error.field}", error.message)
 
 
-def _unknown(structure: Structure, given: Mapping[str, Any]) -> FieldError:
+def _unknown_field_error(structure: Structure, given: Mapping[str, Any]) -> FieldError:
     names = [field.name for field in structure.fields]
     name = next(name for name in given if name not in names)
     return FieldError(str(name), f"unknown field; {structure.name} has {', '.join(names) or 'none'}")
 
 
 def field_check(kind: Type, nested: Callable[[str], Check]) -> Check:
-    """The check of a field; `nested` finds that of another structure."""
-    one = nested(kind.name) if kind.nested else scalar_check(kind)
-    return one if kind.many == "one" else list_check(kind, one)
+    """The check of a field; `nested` returns the check of a structure by name."""
+    one = nested(kind.name) if kind.is_nested else scalar_check(kind)
+    return one if kind.container == "one" else list_check(kind, one)

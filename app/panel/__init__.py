@@ -1,4 +1,4 @@
-"""The panel file: TOML in, frozen and checked descriptions out."""
+"""The panel file: parses TOML into frozen, checked descriptions."""
 
 from app.panel.interlock import Interlock
 from app.panel.load import Checked, check_panel, load_panel

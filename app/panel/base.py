@@ -1,4 +1,4 @@
-"""What descriptions are made of: checked names, what every widget has, a topic's QoS."""
+"""Base class and field types of the descriptions: checked names, ids, QoS."""
 
 import re
 from collections.abc import Mapping
@@ -10,46 +10,47 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 
 from app.errors import InterfaceError
 from app.i18n import TextLike, render, say
-from app.interfaces.field_path import Key, steps
+from app.interfaces.field_path import Key, path_steps
 from app.interfaces.names import ACTION_TYPE, MESSAGE_TYPE, NAMESPACE, SERVICE_TYPE, TOPIC, Qos
-from app.interfaces.validation import shown
+from app.interfaces.validation import format_value
 
 
-def _topic(given: str) -> str:
+def _check_topic(given: str) -> str:
     if not TOPIC.fullmatch(given) or "__" in given:
         raise ValueError(
-            f'{shown(given)} is not an absolute ROS 2 topic name: it starts with "/", and each part is '
-            'letters, digits and single "_", and starts with no digit'
+            f'{format_value(given)} is not an absolute ROS 2 topic name: it starts with "/", and each '
+            'part is letters, digits and single "_", and starts with no digit'
         )
     return given
 
 
-def _type(given: str) -> str:
+def _check_message_type(given: str) -> str:
     if not MESSAGE_TYPE.fullmatch(given):
         raise ValueError(
-            f"{shown(given)} is not a ROS 2 message type: it must be like std_msgs/msg/Bool"
+            f"{format_value(given)} is not a ROS 2 message type: it must be like std_msgs/msg/Bool"
         )
     return given
 
 
-def _service(given: str) -> str:
+def _check_service_type(given: str) -> str:
     if not SERVICE_TYPE.fullmatch(given):
         raise ValueError(
-            f"{shown(given)} is not a ROS 2 service type: it must be like std_srvs/srv/SetBool"
+            f"{format_value(given)} is not a ROS 2 service type: it must be like std_srvs/srv/SetBool"
         )
     return given
 
 
-def _action(given: str) -> str:
+def _check_action_type(given: str) -> str:
     if not ACTION_TYPE.fullmatch(given):
         raise ValueError(
-            f"{shown(given)} is no ROS 2 action type: it must be like nav2_msgs/action/NavigateToPose"
+            f"{format_value(given)} is no ROS 2 action type: "
+            "it must be like nav2_msgs/action/NavigateToPose"
         )
     return given
 
 
-def said(code: str) -> Any:
-    """A field whose default is a sentence of the catalogue: each reader sees it in their language."""
+def catalogue_default(code: str) -> Any:
+    """A field whose default is a text of the catalogue, rendered in the language of each reader."""
 
     def described(schema: dict[str, Any]) -> None:
         schema["default"] = render(say(code))
@@ -57,76 +58,78 @@ def said(code: str) -> Any:
     return Field(default_factory=lambda: say(code), json_schema_extra=described)
 
 
-def namespace_of(given: str) -> str:
+def parse_namespace(given: str) -> str:
     whole = f"/{given.strip('/')}" if given.strip("/") else ""
     if not NAMESPACE.fullmatch(whole) or "__" in whole:
-        raise ValueError(f"{shown(given)} is not a ROS 2 namespace: it must be like /robot1")
+        raise ValueError(f"{format_value(given)} is not a ROS 2 namespace: it must be like /robot1")
     return whole
 
 
-def _endpoint(given: str) -> str:
-    """Where a session connects to, as Zenoh writes it; Zenoh tells of a wrong one only at the start."""
+def _check_endpoint(given: str) -> str:
+    """Checks a Zenoh endpoint; Zenoh itself reports a malformed one only when the session opens."""
     found = ENDPOINT.fullmatch(given)
-    if found is None or not 0 < int(found["port"] or 1) <= MOST_PORT:
-        raise ValueError(f"{shown(given)} is not a Zenoh endpoint: it must be like tcp/robot1:7447")
+    if found is None or not 0 < int(found["port"] or 1) <= MAX_PORT:
+        raise ValueError(
+            f"{format_value(given)} is not a Zenoh endpoint: it must be like tcp/robot1:7447"
+        )
     return given
 
 
-def _folder(given: Any, info: ValidationInfo) -> Path:
-    """Relative to the panel file's folder, which is the context of the validation."""
+def _resolve_folder(given: Any, info: ValidationInfo) -> Path:
+    """The folder's path, relative to the panel file's folder, which is the validation context."""
     if not isinstance(given, str) or not given:
-        raise ValueError(f"must be the path of a folder, not {shown(given)}")
+        raise ValueError(f"must be the path of a folder, not {format_value(given)}")
     folder = Path(info.context or "") / given
     if not folder.is_dir():
         raise ValueError(f"{folder} is not a folder: it must be a ROS package or have some in it")
     return folder
 
 
-def _field(given: str) -> str:
+def _check_field_path(given: str) -> str:
     try:
-        steps(given)
+        path_steps(given)
     except InterfaceError as error:
         raise ValueError(str(error)) from None
     return given
 
 
-def _written_field(given: str) -> str:
-    if any(isinstance(step, Key) for step in steps(_field(given))):
+def _check_written_field(given: str) -> str:
+    if any(isinstance(step, Key) for step in path_steps(_check_field_path(given))):
         raise ValueError(f'"{given}" is filled in: an element is given by its number, as in data[2]')
     return given
 
 
-def _interlocks(given: Any) -> tuple[str, ...]:
-    """One id, or a list of them."""
+def _parse_interlocks(given: Any) -> tuple[str, ...]:
+    """The ids, from one id or a list of them."""
     named = [given] if isinstance(given, str) else given
     if not isinstance(named, list | tuple):
-        raise ValueError(f"must be the id of an interlock, or a list of ids, not {shown(given)}")
+        raise ValueError(f"must be the id of an interlock, or a list of ids, not {format_value(given)}")
     if not named:
         raise ValueError("is an empty list: name an interlock, or leave the key out")
     for i, one in enumerate(named):
         if not isinstance(one, str) or not re.fullmatch(ID, one):
-            raise ValueError(f'{shown(one)} is not an id: a-z, 0-9 and "_", a letter first')
+            raise ValueError(f'{format_value(one)} is not an id: a-z, 0-9 and "_", a letter first')
         if one in named[:i]:
-            raise ValueError(f"names {shown(one)} twice")
+            raise ValueError(f"names {format_value(one)} twice")
     return tuple(named)
 
 
-def some(given: tuple[Any, ...]) -> tuple[Any, ...]:
-    """A list of tables that can't be empty."""
+def non_empty(given: tuple[Any, ...]) -> tuple[Any, ...]:
+    """ValueError for an empty list of tables."""
     if not given:
         raise ValueError("is empty: it must have one table at least")
     return given
 
 
-# The protocols are those of the Zenoh that a kiosk has; behind the address stand metadata and settings.
+# The protocols are those of Zenoh for Python; metadata and settings follow the address.
 ENDPOINT: Final = re.compile(
     r"(?:(?:tcp|udp|tls|quic|ws)/[^\s/?#]+:(?P<port>[0-9]{1,5})|unixsock-stream/[^\s?#]+)"
     r"(?:\?[^\s?#]+)?(?:#[^\s#]+)?"
 )
-MOST_PORT: Final = 65535
+MAX_PORT: Final = 65535
 ID: Final = r"^[a-z][a-z0-9_]{0,63}$"
 Id = Annotated[str, Field(pattern=ID)]
-Interlocks = Annotated[tuple[str, ...], BeforeValidator(_interlocks)]
+Interlocks = Annotated[tuple[str, ...], BeforeValidator(_parse_interlocks)]
 Label = Annotated[str, Field(min_length=1, max_length=120)]
 # A label that the panel file may leave to the catalogue: Pydantic knows only of what a file gives.
 if TYPE_CHECKING:
@@ -134,14 +137,14 @@ if TYPE_CHECKING:
 else:
     SaidLabel = Label
 Span = Annotated[int, Field(ge=1, le=12)]
-Topic = Annotated[str, AfterValidator(_topic), Field(max_length=255)]
-Type = Annotated[str, AfterValidator(_type)]
-ServiceType = Annotated[str, AfterValidator(_service)]
-ActionType = Annotated[str, AfterValidator(_action)]
-FieldPath = Annotated[str, AfterValidator(_field)]
-WrittenField = Annotated[str, AfterValidator(_written_field)]  # without keys
-Endpoint = Annotated[str, AfterValidator(_endpoint)]
-Folder = Annotated[Path, BeforeValidator(_folder)]
+Topic = Annotated[str, AfterValidator(_check_topic), Field(max_length=255)]
+Type = Annotated[str, AfterValidator(_check_message_type)]
+ServiceType = Annotated[str, AfterValidator(_check_service_type)]
+ActionType = Annotated[str, AfterValidator(_check_action_type)]
+FieldPath = Annotated[str, AfterValidator(_check_field_path)]
+WrittenField = Annotated[str, AfterValidator(_check_written_field)]  # without keys
+Endpoint = Annotated[str, AfterValidator(_check_endpoint)]
+Folder = Annotated[Path, BeforeValidator(_resolve_folder)]
 Seconds = Annotated[float, Field(gt=0, le=86400, allow_inf_nan=False)]
 
 
@@ -149,7 +152,7 @@ class Description(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, defer_build=True)
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
-        """Without the cached properties of the original: they were computed from its fields."""
+        """A copy without the original's cached properties, which depend on its fields."""
         copied = super().model_copy(update=update, deep=deep)
         for name in copied.__dict__.keys() - type(copied).model_fields:
             del copied.__dict__[name]
@@ -157,12 +160,13 @@ class Description(BaseModel):
 
 
 class TopicQos(Description):
-    """A topic's QoS; no durability means volatile to publish, and the publisher's to listen."""
+    """A topic's QoS. Without `durability`, a publisher is volatile and a subscription uses the
+    publisher's."""
 
     reliability: Literal["reliable", "best_effort"] = "reliable"
     durability: Literal["volatile", "transient_local"] | None = None
     depth: Annotated[int, Field(ge=1, le=10_000)] = 10
 
     @cached_property
-    def on_wire(self) -> Qos:
+    def wire_qos(self) -> Qos:
         return Qos(self.reliability == "reliable", self.durability == "transient_local", self.depth)

@@ -1,17 +1,17 @@
-"""Values that a panel file names of a field: what constants' names stand for, and what never fits."""
+"""Values of a field in a panel file: names of constants, and values that the field can't have."""
 
 from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from itertools import takewhile
 from typing import Any, Final, Protocol
 
-from app.interfaces import INTEGERS, TEXTS, Interfaces, Type, around, name_of
-from app.interfaces.validation import shown
-from app.panel.faults.wording import listing
+from app.interfaces import INTEGER_RANGES, STRING_TYPES, Interfaces, Type, field_name, parent_path
+from app.interfaces.validation import format_value
+from app.panel.faults.wording import list_names
 from app.panel.interlock import Interlock
-from app.panel.number_range import single
+from app.panel.number_range import to_float32
 
-NUMBERS: Final = frozenset({*INTEGERS, "float32", "float64"})
+NUMBERS: Final = frozenset({*INTEGER_RANGES, "float32", "float64"})
 
 
 class HasField(Protocol):
@@ -23,49 +23,48 @@ class HasField(Protocol):
     def field(self) -> str: ...
 
 
-def holder(of: HasField, interfaces: Interfaces) -> str:
-    """The type whose constants a field's values have: that of the message around it."""
-    where = around(of.field)
-    return interfaces.field_type(of.type, where) if where else of.type
+def parent_type(source: HasField, interfaces: Interfaces) -> str:
+    """The type of the message that contains the field: its constants are those of the field."""
+    where = parent_path(source.field)
+    return interfaces.field_type(source.type, where) if where else source.type
 
 
-def meant(given: Any, kind: Type, constants: Mapping[str, Any]) -> Any:
-    """What an interlock's condition means: a text is a constant's name where the field is none.
-
-    A name that there is no constant of stays what it is.
+def resolve_constant(given: Any, kind: Type, constants: Mapping[str, Any]) -> Any:
+    """The value of an interlock's condition. A text is a constant's name if the field is no text; an
+    unknown name is returned as it is.
     """
-    named = isinstance(given, str) and kind.name not in TEXTS
+    named = isinstance(given, str) and kind.name not in STRING_TYPES
     return constants.get(given, given) if named else given
 
 
-def compared(given: Any, kind: Type, constants: Mapping[str, Any]) -> Any:
-    """The same as the field's type has it: the float32 for 0.1 is another number than the float64."""
-    value = meant(given, kind, constants)
-    return single(value) if kind.name == "float32" else value
+def comparison_value(given: Any, kind: Type, constants: Mapping[str, Any]) -> Any:
+    """The same in the field's type: 0.1 as float32 is another number than as float64."""
+    value = resolve_constant(given, kind, constants)
+    return to_float32(value) if kind.name == "float32" else value
 
 
-def resolved_interlock(of: Interlock, interfaces: Interfaces) -> Interlock:
-    """The same with the values of the constants that its conditions name."""
-    kind = interfaces.type_at(of.type, of.field)
-    constants = interfaces.constants(holder(of, interfaces))
+def resolve_interlock(interlock: Interlock, interfaces: Interfaces) -> Interlock:
+    """The interlock with values in place of constants' names in its conditions."""
+    kind = interfaces.type_at(interlock.type, interlock.field)
+    constants = interfaces.constants(parent_type(interlock, interfaces))
     values = {
-        key: tuple(compared(one, kind, constants) for one in given)
+        key: tuple(comparison_value(one, kind, constants) for one in given)
         if key == "one_of"
-        else compared(given, kind, constants)
-        for key, given in of.conditions.items()
+        else comparison_value(given, kind, constants)
+        for key, given in interlock.conditions.items()
     }
-    return of.resolved(values, _names(of, kind, constants))
+    return interlock.with_constants(values, _constant_names(interlock, kind, constants))
 
 
-def _names(of: Interlock, kind: Type, constants: Mapping[str, Any]) -> dict[Any, str]:
-    """Value → name of the constants which are named as those that the conditions name; of several for
-    one value none. Without what begins all of them, where that is the field's own name."""
-    given = [one for key in of.conditions for one in _each(getattr(of, key))]
-    named = [one for one in given if isinstance(one, str) and kind.name not in TEXTS]
+def _constant_names(interlock: Interlock, kind: Type, constants: Mapping[str, Any]) -> dict[Any, str]:
+    """Value → name of the constants with the same prefix as those in the conditions, without values
+    that several constants have. The prefix is removed if it is the field's name."""
+    given = [one for key in interlock.conditions for one in _as_tuple(getattr(interlock, key))]
+    named = [one for one in given if isinstance(one, str) and kind.name not in STRING_TYPES]
     if not named:
         return {}
-    own = f"{name_of(of.field)}_".upper()
-    alike = own if all(name.startswith(own) for name in named) else _alike(named)
+    own = f"{field_name(interlock.field)}_".upper()
+    alike = own if all(name.startswith(own) for name in named) else _common_prefix(named)
     found: dict[Any, list[str]] = {}
     for name, value in constants.items():
         if name.startswith(alike):
@@ -73,38 +72,41 @@ def _names(of: Interlock, kind: Type, constants: Mapping[str, Any]) -> dict[Any,
     return {value: names[0] for value, names in found.items() if len(names) == 1}
 
 
-def _alike(names: Sequence[str]) -> str:
-    """The words that all begin with, each with its "_"."""
+def _common_prefix(names: Sequence[str]) -> str:
+    """The words that all names begin with, each with its "_"."""
     begins = zip(*(name.split("_")[:-1] for name in names), strict=False)
     return "".join(f"{words[0]}_" for words in takewhile(lambda words: len({*words}) == 1, begins))
 
 
-def _each(given: Any) -> tuple[Any, ...]:
+def _as_tuple(given: Any) -> tuple[Any, ...]:
     return given if isinstance(given, tuple) else (given,)
 
 
-def misfit(value: Any, kind: str) -> str | None:
-    """Why a field of this type never has this value."""
+def value_mismatch(value: Any, kind: str) -> str | None:
+    """Why a field of this type can't have this value; None if it can."""
     if kind in ("float32", "float64"):
         number = isinstance(value, int | float) and not isinstance(value, bool)
-        return None if number else f"must be a number ({kind}), not {shown(value)}"
+        return None if number else f"must be a number ({kind}), not {format_value(value)}"
     if kind == "bool":
-        return None if isinstance(value, bool) else f"must be true or false (bool), not {shown(value)}"
-    if kind in INTEGERS:
-        low, high = INTEGERS[kind]
+        return (
+            None
+            if isinstance(value, bool)
+            else f"must be true or false (bool), not {format_value(value)}"
+        )
+    if kind in INTEGER_RANGES:
+        low, high = INTEGER_RANGES[kind]
         if isinstance(value, bool) or not isinstance(value, int):
-            return f"must be a whole number ({kind}), not {shown(value)}"
+            return f"must be a whole number ({kind}), not {format_value(value)}"
         inside = low <= value <= high
         return None if inside else f"{value} is out of range: {kind} goes from {low} to {high}"
-    return None if isinstance(value, str) else f"must be text ({kind}), not {shown(value)}"
+    return None if isinstance(value, str) else f"must be text ({kind}), not {format_value(value)}"
 
 
-def no_constant(name: str, kind: str, type_name: str, constants: Mapping[str, Any]) -> str:
-    """What would be right where a whole number is meant, and a text is no constant's name."""
-    what = (
-        f"must be a whole number ({kind}) or the name of a constant of {type_name}, not {shown(name)}"
-    )
-    fitting = [one for one, value in constants.items() if misfit(value, kind) is None]
+def unknown_constant(name: str, kind: str, type_name: str, constants: Mapping[str, Any]) -> str:
+    """The message about a text that is no constant's name, in place of a whole number."""
+    right = f"a whole number ({kind}) or the name of a constant of {type_name}"
+    what = f"must be {right}, not {format_value(name)}"
+    fitting = [one for one, value in constants.items() if value_mismatch(value, kind) is None]
     near = get_close_matches(name, fitting, n=1, cutoff=0.5)
-    has = f"it has {listing(fitting)}"
+    has = f"it has {list_names(fitting)}"
     return f"{what}; did you mean {near[0]}? {has}" if near else f"{what}; {has}"

@@ -1,38 +1,38 @@
-"""The description of an interlock: a value of the robot's that permits."""
+"""The description of an interlock: a field of a topic that permits commands."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any, Final
 
 from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr
 
-from app.interfaces.validation import shown
+from app.interfaces.validation import format_value
 from app.panel.base import Description, FieldPath, Id, Label, Seconds, Topic, TopicQos, Type
 from app.panel.widgets.numbers import Unit
 
 CONDITIONS: Final = ("equals", "not_equals", "min", "max", "one_of")
 
 
-def _condition(given: Any) -> Any:
+def _check_condition(given: Any) -> Any:
     if not isinstance(given, bool | int | float | str):
-        raise ValueError(f"must be a number, true or false, or text, not {shown(given)}")
+        raise ValueError(f"must be a number, true or false, or text, not {format_value(given)}")
     if given != given:
         raise ValueError("NaN is no value that could permit")
     return given
 
 
-def _some(given: tuple[Any, ...]) -> tuple[Any, ...]:
+def _non_empty(given: tuple[Any, ...]) -> tuple[Any, ...]:
     if not given:
         raise ValueError("is empty: it must have one value at least")
     return given
 
 
 # A value of the field's type, or the name of a constant of the message around it.
-Condition = Annotated[bool | int | float | str, BeforeValidator(_condition)]
+Condition = Annotated[bool | int | float | str, BeforeValidator(_check_condition)]
 
 
 class Interlock(Description):
-    """A field of the robot's that permits: a bool that is true or, with conditions, a value that meets
-    all of them. Never seen, stale or cut off locks."""
+    """A field of a topic that permits commands: a bool that is true or, with conditions, a value that
+    meets all of them. A value that was never received, is stale or cut off locks."""
 
     id: Id
     label: Label | None = None
@@ -43,7 +43,9 @@ class Interlock(Description):
     not_equals: Condition | None = None
     min: Condition | None = None
     max: Condition | None = None
-    one_of: Annotated[tuple[Condition, ...], Field(strict=False), AfterValidator(_some)] | None = None
+    one_of: Annotated[tuple[Condition, ...], Field(strict=False), AfterValidator(_non_empty)] | None = (
+        None
+    )
     unit: Unit = ""
     max_age_s: Seconds | None = None
     require_publisher: bool = False
@@ -56,17 +58,19 @@ class Interlock(Description):
 
     @property
     def conditions(self) -> dict[str, Any]:
-        """Those that are given, by their keys."""
+        """Key → value of the given conditions."""
         given = {key: getattr(self, key) for key in CONDITIONS}
         return {key: value for key, value in given.items() if value is not None}
 
     @property
     def constants(self) -> Mapping[Any, str]:
-        """Value → name, of the constants by which the field's values are told; of the checked panel."""
+        """Value → name of the constants by which the field's values are shown; set on load."""
         return self._constants
 
-    def resolved(self, conditions: Mapping[str, Any], constants: Mapping[Any, str]) -> "Interlock":
-        """The same with values for the names of constants in its conditions."""
+    def with_constants(
+        self, conditions: Mapping[str, Any], constants: Mapping[Any, str]
+    ) -> "Interlock":
+        """The interlock with values in place of constants' names in its conditions."""
         made = self.model_copy(update=dict(conditions))
         made._constants = constants
         return made

@@ -1,29 +1,29 @@
-"""Lists as an operator reads and enters them: values with commas between them.
+"""Lists as text: values separated by commas.
 
-A text with a comma, a quote or spaces around it stands in quotes, in which a quote is written twice.
+A text with a comma, a quote or enclosing spaces is quoted; a quote inside is doubled.
 """
 
 import re
 from collections.abc import Iterable
 from typing import Final
 
-# No part can take what another one could: else a long text would be tried again and again.
+# No two parts match the same text: a long text causes no backtracking.
 _ELEMENT: Final = re.compile(r'(?:\s*"(?P<quoted>(?:[^"]|"")*)"\s*|(?P<plain>[^",]*))(?P<end>,|\Z)')
 _PLAIN: Final = re.compile(r'[^\s",](?:[^",]*[^\s",])?')
 
 
-def listed(texts: Iterable[str]) -> str:
-    """The elements as one text."""
+def join_list(texts: Iterable[str]) -> str:
+    """The elements joined to one text."""
     return ", ".join(texts)
 
 
-def quoted(text: str) -> str:
-    """A text as an element."""
+def quote_element(text: str) -> str:
+    """A text as an element, quoted if necessary."""
     return text if _PLAIN.fullmatch(text) else '"' + text.replace('"', '""') + '"'
 
 
-def elements(text: str) -> list[str]:
-    """The elements of a text; ValueError where one is empty without quotes, or quotes don't match."""
+def split_list(text: str) -> list[str]:
+    """The elements of a text; ValueError for an empty element without quotes, or unmatched quotes."""
     found: list[str] = []
     at = 0
     more = bool(text.strip())

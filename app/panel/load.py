@@ -1,4 +1,4 @@
-"""Reading a panel file, and every fault in it with its place."""
+"""Loads a panel file and reports every fault with its place."""
 
 from collections.abc import Callable, Collection, Iterable, Iterator
 from pathlib import Path
@@ -7,100 +7,100 @@ from typing import Any, NamedTuple
 from pydantic import ValidationError
 
 from app.errors import Fault, InterfaceError, Note, PanelError, Remark
-from app.interfaces import Interfaces, interfaces_of, read_distribution
-from app.panel.checks.panel import faults_in
-from app.panel.constants import resolved_interlock
+from app.interfaces import Interfaces, load_interfaces, read_distribution
+from app.panel.checks.panel import find_faults
+from app.panel.constants import resolve_interlock
 from app.panel.faults.toml_file import TomlFile, read_toml
 from app.panel.model import Panel
 
-Kept = Callable[[Panel], Path | None]
+CacheFolder = Callable[[Panel], Path | None]
 
 
-def load_panel(path: Path, kept: Kept = lambda _: None) -> Panel:
-    """The checked panel; PanelError has every fault, `unreadable` where it is not even TOML.
+def load_panel(path: Path, kept: CacheFolder = lambda _: None) -> Panel:
+    """The checked panel. PanelError has every fault; it is `unreadable` if the file is no TOML.
 
-    `kept` says in which folder what is read of the distribution may be kept for the next start.
+    `kept` returns the folder in which the distribution's definitions may be cached.
     """
-    return _panel(read_toml(path), kept)
+    return _load(read_toml(path), kept)
 
 
 class Checked(NamedTuple):
-    """A good panel; `notes` are worth a look, `sent` is what each press sends."""
+    """A panel without faults, with hints (`notes`) and the messages of each press (`previews`)."""
 
     panel: Panel
     notes: tuple[Note, ...]
-    sent: tuple[Remark, ...]
+    previews: tuple[Remark, ...]
 
 
 def check_panel(path: Path) -> Checked:
-    """The checked panel, with what there is to say of it; PanelError as `load_panel`."""
-    from app.panel.checks.notes import notes_in
-    from app.panel.faults.places import located
+    """The checked panel with notes and previews; PanelError as in `load_panel`."""
+    from app.panel.checks.notes import find_notes
+    from app.panel.faults.places import add_locations
     from app.panel.preview import previews
 
     file = read_toml(path)
-    panel = _panel(file)
-    interfaces = interfaces_of(panel.distro, panel.interfaces)
-    notes = located(notes_in(panel, interfaces), file.text, file.tables)
-    sent = located(previews(panel, interfaces), file.text, file.tables)
+    panel = _load(file)
+    interfaces = load_interfaces(panel.distro, panel.interfaces)
+    notes = add_locations(find_notes(panel, interfaces), file.text, file.tables)
+    sent = add_locations(previews(panel, interfaces), file.text, file.tables)
     return Checked(panel, tuple(notes), tuple(sent))
 
 
-def _panel(file: TomlFile, kept: Kept = lambda _: None) -> Panel:
+def _load(file: TomlFile, kept: CacheFolder = lambda _: None) -> Panel:
     tables = {key: value for key, value in file.tables.items() if key != "revision"}
     faults = [] if tables == file.tables else [Fault("revision", "unknown key")]
     try:
         panel = Panel.model_validate(tables | {"revision": file.revision}, context=file.path.parent)
     except ValidationError as error:
-        faults += _faults_of_shape(error, tables, file.path.parent)
+        faults += _shape_faults(error, tables, file.path.parent)
     else:
         read_distribution(panel.distro, kept(panel))
-        faults += _faults_with_types(panel)
+        faults += _type_faults(panel)
     if faults:
-        raise PanelError(str(file.path), _told(faults, file))
-    return _resolved(panel, interfaces_of(panel.distro, panel.interfaces))
+        raise PanelError(str(file.path), _sorted_faults(faults, file))
+    return _resolve_constants(panel, load_interfaces(panel.distro, panel.interfaces))
 
 
-def _resolved(panel: Panel, interfaces: Interfaces) -> Panel:
-    """The checked panel, with the value of each constant that a lamp or an interlock names."""
+def _resolve_constants(panel: Panel, interfaces: Interfaces) -> Panel:
+    """The panel with values in place of constants' names in lamps and interlocks."""
     pages = [
-        page.model_copy(update={"widgets": tuple(w.resolved(interfaces) for w in page.widgets)})
+        page.model_copy(update={"widgets": tuple(w.with_constants(interfaces) for w in page.widgets)})
         for page in panel.pages
     ]
-    interlocks = tuple(resolved_interlock(one, interfaces) for one in panel.interlocks)
+    interlocks = tuple(resolve_interlock(one, interfaces) for one in panel.interlocks)
     return panel.model_copy(update={"pages": tuple(pages), "interlocks": interlocks})
 
 
-def _faults_with_types(panel: Panel, faulty: Collection[str] = ()) -> Iterator[Fault]:
+def _type_faults(panel: Panel, faulty: Collection[str] = ()) -> Iterator[Fault]:
     try:
-        interfaces = interfaces_of(panel.distro, panel.interfaces)
+        interfaces = load_interfaces(panel.distro, panel.interfaces)
     except InterfaceError as error:
         at = next((i for i, folder in enumerate(panel.interfaces) if folder == error.source), 0)
         yield Fault(f"interfaces[{at}]", str(error))
         return
-    yield from faults_in(panel, interfaces, faulty)
+    yield from find_faults(panel, interfaces, faulty)
 
 
-# Modules that only a panel with a fault needs are read then: a start is the quicker for it.
+# Modules for panels with faults are imported only when needed, for a faster start.
 
 
-def _faults_of_shape(error: ValidationError, tables: dict[str, Any], folder: Path) -> list[Fault]:
-    """What is wrong with the shape, and beside that."""
-    from app.panel.faults.shape import shape_of
-    from app.panel.faults.stand_ins import rest_of
+def _shape_faults(error: ValidationError, tables: dict[str, Any], folder: Path) -> list[Fault]:
+    """Faults of keys and values, and all others that can still be found."""
+    from app.panel.faults.shape import find_shape_faults
+    from app.panel.faults.stand_ins import make_stand_ins
 
-    shape, rest = shape_of(error, tables), rest_of(tables, error)
-    panel = rest and rest.panel(folder)
+    shape, rest = find_shape_faults(error, tables), make_stand_ins(tables, error)
+    panel = rest and rest.validate(folder)
     if not rest or not panel:
         return shape.faults
-    others = filter(rest.judges, _faults_with_types(panel, rest.faulty))
-    return shape.faults + [fault for fault in others if not shape.explains(fault)]
+    others = filter(rest.is_real, _type_faults(panel, rest.faulty))
+    return shape.faults + [fault for fault in others if not shape.covers(fault)]
 
 
-def _told(faults: Iterable[Fault], file: TomlFile) -> tuple[Fault, ...]:
-    """One for each mistake, with its line, in the order of the file."""
-    from app.panel.faults.duplicates import one_for_each
-    from app.panel.faults.places import located
+def _sorted_faults(faults: Iterable[Fault], file: TomlFile) -> tuple[Fault, ...]:
+    """One fault for each mistake, with its line, in the order of the file."""
+    from app.panel.faults.duplicates import merge_duplicates
+    from app.panel.faults.places import add_locations
 
-    told = located(one_for_each(faults), file.text, file.tables)
-    return tuple(sorted(told, key=lambda fault: fault.line))
+    merged = add_locations(merge_duplicates(faults), file.text, file.tables)
+    return tuple(sorted(merged, key=lambda fault: fault.line))

@@ -1,4 +1,4 @@
-"""A message's fields as lines of text, much as `ros2 topic echo` writes them."""
+"""A message's fields as lines of text, similar to `ros2 topic echo`."""
 
 import json
 import math
@@ -6,35 +6,35 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
 from app.errors import FieldError
-from app.panel.template import named
+from app.panel.template import placeholders
 
-MOST_WRITTEN: Final = 9  # elements of a list that are all the same
+MAX_EQUAL_WRITTEN: Final = 9  # elements of a list of equal values
 Comments = Mapping[str, str]  # by input ids ("speed"), and by places of fields (".poses[0].x")
 
 
 def message_lines(fields: Mapping[str, Any], comments: Comments, place: str = "") -> Iterator[str]:
-    """A line for each field; what is said of an input stands behind the text that names it."""
+    """A line for each field, with comments about inputs and fields."""
     for name, value in fields.items():
-        yield from _field(name, value, comments, f"{place}.{name}")
+        yield from _field_lines(name, value, comments, f"{place}.{name}")
 
 
-def _field(name: str, value: Any, comments: Comments, place: str) -> Iterator[str]:
+def _field_lines(name: str, value: Any, comments: Comments, place: str) -> Iterator[str]:
     if isinstance(value, Mapping) and value:
         yield f"{name}:"
         yield from (f"  {line}" for line in message_lines(value, comments, place))
     elif isinstance(value, list) and any(isinstance(item, Mapping) for item in value):
         yield f"{name}:"
         for index, item in enumerate(value):
-            yield from _item(item, comments, f"{place}[{index}]")
+            yield from _item_lines(item, comments, f"{place}[{index}]")
     else:
         about = _comment(value, comments, place)
-        yield f"{name}: {_written(value)}{f'  # {about}' if about else ''}"
+        yield f"{name}: {_format(value)}{f'  # {about}' if about else ''}"
 
 
-def _item(value: Any, comments: Comments, place: str) -> Iterator[str]:
-    """An element of a list with tables in it: the first line has a dash."""
+def _item_lines(value: Any, comments: Comments, place: str) -> Iterator[str]:
+    """An element of a list of tables: its first line has a dash."""
     if not isinstance(value, Mapping) or not value:
-        yield f"- {_written(value)}"
+        yield f"- {_format(value)}"
         return
     for number, line in enumerate(message_lines(value, comments, place)):
         yield f"  {line}" if number else f"- {line}"
@@ -42,23 +42,25 @@ def _item(value: Any, comments: Comments, place: str) -> Iterator[str]:
 
 def _comment(value: Any, comments: Comments, place: str) -> str:
     try:
-        names = [name for _, name in named(value)]
-    except FieldError:  # braces that are no input's: they were put in by one
+        names = [name for _, name in placeholders(value)]
+    except FieldError:  # braces in a value that an input gave
         names = []
     about = [comments[key] for key in (place, *dict.fromkeys(names)) if key in comments]
-    return "; ".join([*about, *([f"{len(value)} of them"] if _all_the_same(value) else [])])
+    return "; ".join([*about, *([f"{len(value)} of them"] if _all_equal(value) else [])])
 
 
-def _all_the_same(value: Any) -> bool:
-    return isinstance(value, Sequence) and len(value) > MOST_WRITTEN and len({*map(str, value)}) == 1
+def _all_equal(value: Any) -> bool:
+    return (
+        isinstance(value, Sequence) and len(value) > MAX_EQUAL_WRITTEN and len({*map(str, value)}) == 1
+    )
 
 
-def _written(value: Any) -> str:
+def _format(value: Any) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, float) and not math.isfinite(value):
         return ".nan" if math.isnan(value) else ".inf" if value > 0 else "-.inf"
     if isinstance(value, list):
-        shown = [*map(_written, value[:2]), "…"] if _all_the_same(value) else map(_written, value)
+        shown = [*map(_format, value[:2]), "…"] if _all_equal(value) else map(_format, value)
         return f"[{', '.join(shown)}]"
     return json.dumps(value, ensure_ascii=False) if isinstance(value, str | dict) else str(value)

@@ -1,4 +1,4 @@
-"""The descriptions that a panel file becomes. What a key means is in the README."""
+"""The descriptions of a panel and its pages. docs/reference/panel-file.md describes each key."""
 
 from collections.abc import Iterator
 from functools import cached_property
@@ -6,28 +6,29 @@ from typing import Annotated, Final, Literal
 
 from pydantic import AfterValidator, Field
 
-from app.panel.base import Description, Endpoint, Folder, Id, Label, TopicQos, namespace_of
+from app.panel.base import Description, Endpoint, Folder, Id, Label, TopicQos, parse_namespace
 from app.panel.interlock import Interlock
 from app.panel.rules import ControlRules, LogRules, RecordRules
-from app.panel.widgets.families import Command, Display, OnTopic, Placed, Published
+from app.panel.widgets.families import BaseWidget, Command, Display, PublishCommand, TopicWidget
 from app.panel.widgets.kinds import Widget
 from app.panel.widgets.parameter import EVENT_TYPE, EVENTS, Parameter
-from app.panel.widgets.publish import Confirm, Publishing
+from app.panel.widgets.publish import Confirm, SinglePublish
 from app.panel.widgets.service_action import Action
 
 
 class RobotEntry(Description):
-    """One of several robots that the panel is for; `connect` are the Zenoh endpoints where it is
-    reached, those of the Zenoh configuration where there are none."""
+    """One of several robots of a panel; `connect` are its Zenoh endpoints, by default those of the
+    Zenoh configuration."""
 
     id: Id
     name: Label
-    namespace: Annotated[str, AfterValidator(namespace_of)] = ""
+    namespace: Annotated[str, AfterValidator(parse_namespace)] = ""
     connect: Annotated[tuple[Endpoint, ...], Field(strict=False)] = ()
 
 
-# rmw_qos_profile_parameter_events; the durability is given, so that no first event is missed.
-OF_EVENTS: Final = TopicQos(durability="volatile", depth=1000)
+# rmw_qos_profile_parameter_events. An explicit durability: the subscription does not wait for the
+# publisher's.
+EVENTS_QOS: Final = TopicQos(durability="volatile", depth=1000)
 
 
 class Page(Description):
@@ -42,7 +43,7 @@ class Panel(Description):
     language: Literal["en"] = "en"
     distro: Literal["humble", "iron", "jazzy", "kilted", "lyrical", "rolling"] = "jazzy"
     interfaces: Annotated[tuple[Folder, ...], Field(strict=False)] = ()
-    namespace: Annotated[str, AfterValidator(namespace_of)] = ""
+    namespace: Annotated[str, AfterValidator(parse_namespace)] = ""
     press_expires_s: Annotated[float, Field(ge=0.5, le=60)] = 2.0
     display_hz: Annotated[float, Field(ge=1, le=60)] = 20.0
     mm_per_px: Annotated[float, Field(gt=0.02, lt=1)] = 0.22
@@ -52,16 +53,16 @@ class Panel(Description):
     log: LogRules = LogRules()
     interlocks: Annotated[tuple[Interlock, ...], Field(strict=False)] = Field((), alias="interlock")
     pages: Annotated[tuple[Page, ...], Field(strict=False)] = Field(alias="page")
-    # Of the file, not in it: changes when what a browser has loaded is out of date.
+    # Computed from the file: differs when loaded pages are out of date.
     revision: Annotated[str, Field(exclude=True)] = ""
 
-    def widgets(self) -> Iterator[Placed]:
+    def widgets(self) -> Iterator[BaseWidget]:
         for page in self.pages:
             yield from page.widgets
 
     @cached_property
     def commands(self) -> tuple[Command, ...]:
-        """All that can be pressed."""
+        """The widgets that can be pressed or held."""
         return tuple(w for w in self.widgets() if isinstance(w, Command))
 
     @cached_property
@@ -75,49 +76,49 @@ class Panel(Description):
         return next((i for i in self.interlocks if i.id == interlock_id), None)
 
     def interlocks_of(self, widget: Command) -> tuple[Interlock, ...]:
-        """Those that all have to permit a press, in the order of the file."""
+        """The interlocks that must permit a press, in the widget's order."""
         known = {one.id: one for one in self.interlocks}
         return tuple(known[name] for name in widget.interlocks)
 
     def subscriptions(self) -> dict[str, str]:
-        """Topic → type of all that the panel listens to."""
-        own = {one.topic: one.type for one in self.confirms() if one.type is not None}
+        """Topic → type of all subscriptions."""
+        own = {one.topic: one.type for one in self.confirmations() if one.type is not None}
         events = {EVENTS: EVENT_TYPE} if any(self.parameters()) else {}
-        return own | {of.topic: of.type for of in self.listening()} | events
+        return own | {of.topic: of.type for of in self.monitored()} | events
 
-    def fields(self) -> dict[str, list[str]]:
-        """Topic → the paths of all that the panel reads of it."""
+    def subscribed_fields(self) -> dict[str, list[str]]:
+        """Topic → paths of the fields that the panel reads."""
         found: dict[str, list[str]] = {}
-        for of in self.listening():
+        for of in self.monitored():
             found.setdefault(of.topic, []).append(of.field)
-        for confirm in self.confirms():
+        for confirm in self.confirmations():
             found.setdefault(confirm.topic, []).append(confirm.field)
         return found
 
-    def confirms(self) -> Iterator[Confirm]:
-        """All that shows that a command took effect."""
+    def confirmations(self) -> Iterator[Confirm]:
+        """The topics that confirm commands."""
         for widget in self.widgets():
-            if isinstance(widget, Publishing) and widget.confirm is not None:
+            if isinstance(widget, SinglePublish) and widget.confirm is not None:
                 yield widget.confirm
 
-    def listening(self) -> Iterator[Interlock | Display]:
-        """All that shows or judges what a topic says."""
+    def monitored(self) -> Iterator[Interlock | Display]:
+        """The interlocks and displays: everything with a subscription to a field."""
         yield from self.interlocks
         yield from self.displays
 
     def actions(self) -> dict[str, str]:
-        """Action → type of all that the panel may send goals to."""
+        """Action → type of all actions that the panel may send goals to."""
         return {w.action: w.type for w in self.widgets() if isinstance(w, Action)}
 
     def parameters(self) -> Iterator[Parameter]:
         yield from (w for w in self.widgets() if isinstance(w, Parameter))
 
     def publications(self) -> dict[str, str]:
-        """Topic → type of all that the panel publishes."""
-        return {w.topic: w.type for w in self.widgets() if isinstance(w, Published)}
+        """Topic → type of all topics that the panel publishes."""
+        return {w.topic: w.type for w in self.widgets() if isinstance(w, PublishCommand)}
 
     def qos(self, topic: str) -> TopicQos:
-        """A topic's QoS, which is the same wherever the panel names it."""
-        named = {w.topic: w.qos for w in self.widgets() if isinstance(w, OnTopic)}
+        """A topic's QoS, which is the same in all places of the panel file."""
+        named = {w.topic: w.qos for w in self.widgets() if isinstance(w, TopicWidget)}
         named |= {one.topic: one.qos for one in self.interlocks}
-        return named.get(topic, OF_EVENTS if topic == EVENTS else TopicQos())
+        return named.get(topic, EVENTS_QOS if topic == EVENTS else TopicQos())

@@ -1,6 +1,6 @@
-"""Ranges of numbers as panels and ROS 2's parameter descriptors give them, open where they say so.
+"""Ranges of numbers with optional limits, of panel files and of ROS 2 parameter descriptors.
 
-A value of a descriptor's range is whole steps from its lowest, or its highest
+A value in a descriptor's range is a whole number of steps from its lowest value, or is its highest
 (rcl_interfaces/msg/FloatingPointRange, IntegerRange).
 """
 
@@ -14,31 +14,31 @@ from typing import Final
 
 from app.i18n import TextLike, say
 from app.interfaces import to_plain
-from app.panel.values import digits
+from app.panel.values import number_text
 
-# rclcpp takes a double for on a step when it is this near, in units of the last place.
+# rclcpp accepts a double that is this near to a step, in units of the last place.
 NEAR_ULP: Final = 100
-WRITTEN_OUT: Final = 1e16  # whole doubles from here on have an exponent
+MIN_WITH_EXPONENT: Final = 1e16  # larger doubles are written with an exponent
 
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """From `low` to `high` in steps of `step`; each is None where there is no such limit."""
+    """From `low` to `high` in steps of `step`; None: no limit."""
 
     low: float | None = None
     high: float | None = None
     step: float | None = None
 
-    def holds(self, value: float) -> bool:
-        """Whether a value is inside and on a step."""
+    def contains(self, value: float) -> bool:
+        """Whether a value is within the limits and on a step."""
         if self.low is not None and value < self.low:
             return False
         if self.high is not None and value > self.high:
             return False
-        return value == self.high or self.on_step(value)
+        return value == self.high or self.is_on_step(value)
 
-    def on_step(self, value: float) -> bool:
-        """Exactly as numbers are written, or as near as doubles come to it."""
+    def is_on_step(self, value: float) -> bool:
+        """Whether a value is on a step: exactly for integers, within `NEAR_ULP` for doubles."""
         if self.step is None:
             return True
         low, step = _exact(self.low or 0), _exact(self.step)
@@ -50,21 +50,22 @@ class Range:
             sys.float_info.epsilon
         )
 
-    def within(self, other: "Range") -> "Range":
-        """This range, narrowed by another; on this one's steps, where the other has none."""
+    def narrowed_by(self, other: "Range") -> "Range":
+        """This range narrowed by another. If the other has no step, the limits are on this range's
+        steps."""
         low, high = self.low, self.high
         if other.low is not None and (low is None or other.low > low):
-            low = other.low if other.step is not None else self._step_at(other.low, math.ceil)
+            low = other.low if other.step is not None else self._nearest_step(other.low, math.ceil)
         if other.high is not None and (high is None or other.high < high):
-            high = other.high if other.step is not None else self._step_at(other.high, math.floor)
+            high = other.high if other.step is not None else self._nearest_step(other.high, math.floor)
         return Range(low, high, self.step if other.step is None else other.step)
 
     @property
-    def empty(self) -> bool:
+    def is_empty(self) -> bool:
         return self.low is not None and self.high is not None and self.low > self.high
 
-    def _step_at(self, value: float, rounded: Callable[[Fraction], int]) -> float:
-        """The step of this range at or beside a value."""
+    def _nearest_step(self, value: float, rounded: Callable[[Fraction], int]) -> float:
+        """The step of this range at or next to a value."""
         if self.step is None or self.low is None:
             return value
         low, step = _exact(self.low), _exact(self.step)
@@ -72,33 +73,33 @@ class Range:
         return int(found) if isinstance(self.low, int) else float(found)
 
 
-def described(of: Range, unit: str) -> TextLike:
-    """A range as an operator reads it: "0 to 1.5 m/s, in steps of 0.1"; "" where all is open."""
+def range_text(limits: Range, unit: str) -> TextLike:
+    """A range as text: "0 to 1.5 m/s, in steps of 0.1"; "" without limits."""
     unit = f" {unit}" if unit else ""
-    low, high = _written(of.low), _written(of.high)
+    low, high = _number_text(limits.low), _number_text(limits.high)
     text: TextLike
-    if of.low is not None and of.high is not None:
+    if limits.low is not None and limits.high is not None:
         text = say("limits_both", low=low, high=high, unit=unit)
-    elif of.low is not None:
+    elif limits.low is not None:
         text = say("limits_low", low=low, unit=unit)
-    elif of.high is not None:
+    elif limits.high is not None:
         text = say("limits_high", high=high, unit=unit)
     else:
         text = ""
-    if of.step is None or (of.step == 1 and isinstance(of.step, int)):
+    if limits.step is None or (limits.step == 1 and isinstance(limits.step, int)):
         return text
-    steps = say("limits_step", step=_written(of.step))
+    steps = say("limits_step", step=_number_text(limits.step))
     return say("and_further", first=text, last=steps) if text else steps
 
 
-def decimal(number: float) -> str:
-    """A number exactly, as HTML has it; what is none as "NaN", "Infinity" or "-Infinity"."""
+def decimal_text(number: float) -> str:
+    """A number exactly, as in HTML; "NaN", "Infinity" or "-Infinity"."""
     if isinstance(number, int) or not math.isfinite(number):
         return str(to_plain(number))
-    return digits(number) if abs(number) < WRITTEN_OUT else repr(number)
+    return number_text(number) if abs(number) < MIN_WITH_EXPONENT else repr(number)
 
 
-def single(number: float) -> float:
+def to_float32(number: float) -> float:
     """The nearest float32."""
     try:
         found: float = unpack("f", pack("f", number))[0]
@@ -107,16 +108,16 @@ def single(number: float) -> float:
     return found
 
 
-def shortest(number: float) -> float:
-    """A float32 as it is written: 0.1 for 0.10000000149011612; any other number as it is."""
-    if not math.isfinite(number) or single(number) != number:
+def shortest_float(number: float) -> float:
+    """The shortest double of a float32: 0.1 for 0.10000000149011612. Any other number is unchanged."""
+    if not math.isfinite(number) or to_float32(number) != number:
         return number
     written = (float(f"{number:.{digits}g}") for digits in range(6, 10))
-    return next(one for one in written if single(one) == number)
+    return next(one for one in written if to_float32(one) == number)
 
 
-def _written(number: float | None) -> str:
-    return "" if number is None else decimal(number)
+def _number_text(number: float | None) -> str:
+    return "" if number is None else decimal_text(number)
 
 
 def _exact(number: float) -> Fraction:

@@ -1,5 +1,5 @@
-"""What each press of a panel sends, whole: with all that its message leaves out, and with the ids of
-inputs where their values will stand."""
+"""Previews of the messages of each press: with default values of fields that are not given, and with
+the ids of inputs in place of their values."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -13,31 +13,34 @@ from app.panel.widgets.families import Command, Input
 
 
 def previews(panel: Panel, interfaces: Interfaces) -> Iterator[Remark]:
-    """One for each widget that can be pressed or held, at its place."""
+    """A remark for each widget that can be pressed or held."""
     for p, page in enumerate(panel.pages):
-        comments = {w.id: w.about for w in page.widgets if isinstance(w, Input)}
+        comments = {w.id: w.comment for w in page.widgets if isinstance(w, Input)}
         comments[NOW] = "the time of sending"
         for w, widget in enumerate(page.widgets):
             if isinstance(widget, Command):
-                lines = _preview(widget, interfaces, comments)
+                lines = _preview_lines(widget, interfaces, comments)
                 yield Remark(f"page[{p}].widget[{w}]", "\n".join(lines))
 
 
-def _preview(widget: Command, interfaces: Interfaces, comments: Comments) -> Iterator[str]:
-    for sent in widget.sent(interfaces):
+def _preview_lines(widget: Command, interfaces: Interfaces, comments: Comments) -> Iterator[str]:
+    for sent in widget.sent_messages(interfaces):
         yield sent.when
         if sent.type_name:
-            fields = whole(sent.fields, Type(sent.type_name), interfaces)
+            fields = complete_value(sent.fields, Type(sent.type_name), interfaces)
             every = {**comments, **sent.comments}
             yield from (f"  {line}" for line in message_lines(fields, every))
 
 
-def whole(given: Any, kind: Type, interfaces: Interfaces) -> Any:
-    """A value of a template with all that it leaves out; a text that names inputs stays as it is."""
-    if isinstance(given, list | tuple) and kind.many != "one":
-        return [whole(one, kind.element, interfaces) for one in given]
-    if isinstance(given, Mapping) and kind.nested:
+def complete_value(given: Any, kind: Type, interfaces: Interfaces) -> Any:
+    """A value of a template with default values added; texts with input ids are unchanged."""
+    if isinstance(given, list | tuple) and kind.container != "one":
+        return [complete_value(one, kind.element, interfaces) for one in given]
+    if isinstance(given, Mapping) and kind.is_nested:
         fields = interfaces.structures[kind.name].fields
-        return {f.name: whole(given.get(f.name, f.left_out), f.type, interfaces) for f in fields}
+        return {
+            f.name: complete_value(given.get(f.name, f.default_value), f.type, interfaces)
+            for f in fields
+        }
     number = isinstance(given, int) and not isinstance(given, bool)
     return float(given) if number and kind.name.startswith("float") else given

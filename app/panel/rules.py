@@ -8,7 +8,7 @@ from app.panel.base import Description, Seconds, Topic
 
 
 class ControlRules(Description):
-    """`takeover_after_s` without a touch by the holder lets a request through; `local`: browsers on
+    """After `takeover_after_s` without a touch by the holder, a request succeeds. `local`: browsers on
     the kiosk's own machine may always take over."""
 
     required: bool
@@ -17,8 +17,8 @@ class ControlRules(Description):
 
 
 class LogRules(Description):
-    """`required`: while the log can't be written, nothing can be pressed. The oldest entries go
-    after `days`, or when the file is larger than `size_mb` megabytes."""
+    """`required`: while the log can't be written, controls lock. The oldest entries are removed after
+    `days`, or when the file is larger than `size_mb` megabytes."""
 
     enabled: bool = True
     required: bool = True
@@ -27,9 +27,9 @@ class LogRules(Description):
 
 
 class RecordRules(Description):
-    """Around each press what was received is recorded, from `before_s` before it to `after_s` after
-    it. `topics` are some of those that the panel listens to, None for all. The oldest files go when
-    the folder is larger than `max_mb` megabytes."""
+    """Records received messages from `before_s` before each press to `after_s` after it. `topics` are
+    some of the panel's subscriptions, None for all. The oldest files are removed when the folder is
+    larger than `max_mb` megabytes."""
 
     before_s: Annotated[float, Field(ge=0, le=600, allow_inf_nan=False)] = 10.0
     after_s: Annotated[float, Field(ge=0, le=600, allow_inf_nan=False)] = 10.0

@@ -1,4 +1,5 @@
-"""Message templates: `{ data = "{message}" }` with the values of the inputs it names, and `"{now}"`."""
+"""Message templates, such as `{ data = "{message}" }`: filled with the values of inputs, and
+`"{now}"`."""
 
 import re
 import time
@@ -10,60 +11,60 @@ from typing import Any, Final
 from app.errors import FieldError
 from app.panel.widgets.families import Command
 
-# In what is shown of an answer: a path in its type. (In what is sent: the id of an input.)
-PLACE: Final = re.compile(r"\{([^{}]*)\}")
+# In texts about a response: a field's path. (In messages to send, a placeholder is an input's id.)
+RESPONSE_PLACEHOLDER: Final = re.compile(r"\{([^{}]*)\}")
 
-NOW: Final = "now"  # no input's id: what it stands for is the time of sending, of the type TIME
+NOW: Final = "now"  # reserved: the time of sending, of the type TIME
 TIME: Final = "builtin_interfaces/msg/Time"
-A_SECOND_NS: Final = 10**9
+NS_PER_S: Final = 10**9
 
 
-def with_now(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Values of inputs, and what `{now}` stands for at this moment."""
-    seconds, rest = divmod(time.time_ns(), A_SECOND_NS)
+def add_now(values: Mapping[str, Any]) -> dict[str, Any]:
+    """The values of inputs with the current time as `{now}`."""
+    seconds, rest = divmod(time.time_ns(), NS_PER_S)
     return {**values, NOW: {"sec": seconds, "nanosec": rest}}
 
 
-def filled(template: Any, inputs: Mapping[str, Any], where: str = "") -> Any:
+def fill(template: Any, inputs: Mapping[str, Any], where: str = "") -> Any:
     """The template with each `{id}` replaced by that input's value.
 
     A string that is nothing but `{id}` becomes the value itself, with its type; `{{` and `}}`
     stand for braces. Values are put in once: braces in them are only text.
     """
     if isinstance(template, Mapping):
-        return {k: filled(v, inputs, f"{where}.{k}".strip(".")) for k, v in template.items()}
+        return {k: fill(v, inputs, f"{where}.{k}".strip(".")) for k, v in template.items()}
     if isinstance(template, list | tuple):
-        return [filled(item, inputs, f"{where}[{i}]") for i, item in enumerate(template)]
+        return [fill(item, inputs, f"{where}[{i}]") for i, item in enumerate(template)]
     if not isinstance(template, str):
         return template
-    parts = _parts(template, where)
+    parts = _parse_text(template, where)
     if len(parts) == 1 and parts[0][0] == "" and parts[0][1] is not None:
         return inputs[parts[0][1]]
     return "".join(text + ("" if name is None else _text(inputs[name], where)) for text, name in parts)
 
 
-def placed(fields: Any, path: str, value: Any) -> Any:
-    """Fields of a message with a value at a path like "header.seq" or "data[2]"; they themselves stay
-    as they are. FieldError where a list on the way is too short."""
-    return _placed(fields, re.findall(r"[^.\[\]]+|\[[0-9]+\]", path), path, value)
+def set_field(fields: Any, path: str, value: Any) -> Any:
+    """A copy of a message's fields with a value at a path such as "header.seq" or "data[2]". FieldError
+    if a list in the path is too short."""
+    return _set_at(fields, re.findall(r"[^.\[\]]+|\[[0-9]+\]", path), path, value)
 
 
-def _placed(fields: Any, steps: list[str], path: str, value: Any) -> Any:
+def _set_at(fields: Any, steps: list[str], path: str, value: Any) -> Any:
     if not steps:
         return value
     step, rest = steps[0], steps[1:]
     if not step.startswith("["):
         known = dict(fields) if isinstance(fields, Mapping) else {}
-        return known | {step: _placed(known.get(step, {}), rest, path, value)}
+        return known | {step: _set_at(known.get(step, {}), rest, path, value)}
     index, known_items = int(step[1:-1]), list(fields) if isinstance(fields, list | tuple) else []
     if index >= len(known_items):
         raise FieldError(path, f"there is no {step}: the message has {len(known_items)} elements")
-    known_items[index] = _placed(known_items[index], rest, path, value)
+    known_items[index] = _set_at(known_items[index], rest, path, value)
     return known_items
 
 
-def at(template: Any, where: str) -> Any:
-    """What stands in a template at a field like "poses[0].x", or at the nearest one around it."""
+def value_at(template: Any, where: str) -> Any:
+    """The value in a template at a field such as "poses[0].x", or at the nearest one around it."""
     found = template
     for name, index in re.findall(r"([^.\[\]]+)|\[([0-9]+)\]", where):
         if isinstance(found, Mapping) and name in found:
@@ -76,7 +77,7 @@ def at(template: Any, where: str) -> Any:
 
 
 def _text(value: Any, where: str) -> str:
-    """A value among other text, as TOML writes it."""
+    """A value within a text, as TOML writes it."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str | int | float):
@@ -84,36 +85,36 @@ def _text(value: Any, where: str) -> str:
     raise FieldError(where, "a list or a table can't stand in a text: write the input's id alone")
 
 
-def named(template: Any, where: str = "") -> Iterator[tuple[str, str]]:
-    """(place, input id) for each placeholder; FieldError where braces don't match."""
+def placeholders(template: Any, where: str = "") -> Iterator[tuple[str, str]]:
+    """(place, input id) of each placeholder; FieldError for unmatched braces."""
     if isinstance(template, Mapping):
         for key, value in template.items():
-            yield from named(value, f"{where}.{key}".strip("."))
+            yield from placeholders(value, f"{where}.{key}".strip("."))
     elif isinstance(template, list | tuple):
         for i, item in enumerate(template):
-            yield from named(item, f"{where}[{i}]")
+            yield from placeholders(item, f"{where}[{i}]")
     elif isinstance(template, str):
-        yield from ((where, name) for _, name in _parts(template, where) if name is not None)
+        yield from ((where, name) for _, name in _parse_text(template, where) if name is not None)
 
 
-def inputs_of(widget: Command) -> list[str]:
+def input_ids(widget: Command) -> list[str]:
     """The ids of the inputs that a command needs."""
-    return names_in(widget.templates())
+    return placeholder_ids(widget.templates())
 
 
-def needed(widget: Command, given: Mapping[str, Any]) -> dict[str, Any]:
-    """Of all that came with a press or a hold, the inputs that it needs."""
-    return {name: given[name] for name in inputs_of(widget) if name in given}
+def needed_inputs(widget: Command, given: Mapping[str, Any]) -> dict[str, Any]:
+    """The inputs of a press or a hold that the widget needs."""
+    return {name: given[name] for name in input_ids(widget) if name in given}
 
 
-def names_in(templates: Iterable[Any]) -> list[str]:
-    """The ids of the inputs that templates name, each once."""
-    every = (name for template in templates for _, name in named(template))
+def placeholder_ids(templates: Iterable[Any]) -> list[str]:
+    """The ids of the inputs in templates, each once."""
+    every = (name for template in templates for _, name in placeholders(template))
     return [name for name in dict.fromkeys(every) if name != NOW]
 
 
 @lru_cache(1000)
-def _parts(text: str, where: str) -> tuple[tuple[str, str | None], ...]:
+def _parse_text(text: str, where: str) -> tuple[tuple[str, str | None], ...]:
     """((literal text, input id after it or None), …)"""
     try:
         parsed = list(Formatter().parse(text))

@@ -15,14 +15,20 @@ from app.dialect.endpoint import TopicRole
 from app.i18n import TextLike, joined, say
 from app.interfaces.names import Qos
 from app.panel.interlock import Interlock
-from app.panel.widgets.families import Command, OnTopic, Published
-from app.panel.widgets.kinds import row_of
+from app.panel.widgets.families import Command, PublishCommand, TopicWidget
+from app.panel.widgets.kinds import find_row
 from app.panel.widgets.parameter import DESCRIBE, GET, SET, Parameter
-from app.panel.widgets.service_action import Served
+from app.panel.widgets.service_action import ServerCommand
 from app.permission.conditions import permits, unmet
 from app.robot.command_status import IDLE
-from app.robot.graph import Graph, remembered
-from app.robot.parameter_state import UNKNOWN, ParameterState, each_text, ours_text, suits
+from app.robot.graph import Graph, cached_until_change
+from app.robot.parameter_state import (
+    UNKNOWN,
+    ParameterState,
+    each_text,
+    has_allowed_value,
+    panel_limits_text,
+)
 from app.robot.state import Reading, RobotState
 
 
@@ -66,13 +72,13 @@ def link_verdict(robot: RobotState, now: float) -> Verdict:
         return _no_link(robot.endpoints)
     if not robot.graph.bridges:
         return locked("no_bridge_of" if robot.name else "no_bridge", name=robot.name)
-    if robot.graph.silent:
+    if robot.graph.has_silent_bridge:
         return locked("bridge_silent")
     if now < robot.settled_at:
         return Verdict(False, "joining", say("joining"), robot.settled_at)
-    if not robot.answers:
+    if not robot.is_responding:
         return locked("bridge_silent")
-    if not robot.caught_up:
+    if not robot.is_caught_up:
         return locked("catching_up")
     return PERMITTED
 
@@ -95,12 +101,12 @@ def interlock_verdict(interlock: Interlock, robot: RobotState, now: float) -> Ve
     topic, key = interlock.topic, robot.key(interlock.topic)
     if doubt := topic_mismatch("MS", interlock, robot):
         return doubt
-    if interlock.require_publisher and not robot.graph.on_robot("MP", key):
+    if interlock.require_publisher and not robot.graph.has_endpoint("MP", key):
         return locked("no_publisher", topic=topic)
     reading = robot.reading(topic)
     if reading.status != "message":
         return locked(reading.status, topic=topic, wanted=interlock.type)
-    if robot.silent.any(key, robot.graph.bridges):
+    if robot.silent_publishers.has_silent(key, robot.graph.bridges):
         return locked("new_publisher", topic=topic)
     if not permits(interlock, reading.value(interlock.field)):
         return _forbidden(interlock, reading)
@@ -123,7 +129,7 @@ def _fresh_since(robot: RobotState, key: str) -> float:
 
 def _forbidden(interlock: Interlock, reading: Reading) -> Verdict:
     value = reading.value(interlock.field)
-    if reading.several(interlock.field):
+    if reading.is_ambiguous(interlock.field):
         return locked("several", field=interlock.field, topic=interlock.topic)
     if value is None:
         return locked("missing", field=interlock.field, topic=interlock.topic)
@@ -135,10 +141,10 @@ def _forbidden(interlock: Interlock, reading: Reading) -> Verdict:
 def command_blocked(widget: Command, robot: RobotState, now: float) -> Verdict | None:
     """Why a command may not be sent, beside the link and its interlocks; None where nothing is known
     against it."""
-    return row_of(AGAINST, widget)(widget, robot, now)
+    return find_row(AGAINST, widget)(widget, robot, now)
 
 
-def publish_blocked(of: Published, robot: RobotState) -> Verdict | None:
+def publish_blocked(of: PublishCommand, robot: RobotState) -> Verdict | None:
     """Why a message may not be published: another type, or the last one's effect is awaited."""
     if doubt := topic_mismatch("MP", of, robot):
         return doubt
@@ -147,10 +153,10 @@ def publish_blocked(of: Published, robot: RobotState) -> Verdict | None:
     return None
 
 
-def call_blocked(call: Served, robot: RobotState, now: float) -> Verdict | None:
+def call_blocked(call: ServerCommand, robot: RobotState, now: float) -> Verdict | None:
     """Why a service may not be called or a goal not be sent: its server is not there with its type,
     or an answer is awaited."""
-    role, name = call.role, call.server
+    role, name = call.role, call.server_name
     key = robot.key(name)
     found = robot.graph.server_type(role, key)
     if found is None:
@@ -166,14 +172,14 @@ def call_blocked(call: Served, robot: RobotState, now: float) -> Verdict | None:
     return locked("perhaps_busy") if known.outcome == "unknown" else locked("busy")
 
 
-def set_blocked(of: Parameter, robot: RobotState) -> Verdict | None:
+def set_blocked(parameter: Parameter, robot: RobotState) -> Verdict | None:
     """Why a parameter may not be set: its node is not there or has not told what may be set, or an
     answer is awaited."""
-    if doubt := parameters_offered(of.node, robot) or unsettable(
-        of, robot.parameters.get(of.id, UNKNOWN)
+    if doubt := parameters_offered(parameter.node, robot) or unsettable(
+        parameter, robot.parameters.get(parameter.id, UNKNOWN)
     ):
         return doubt
-    return locked("busy") if robot.command_status.get(of.id, IDLE).busy else None
+    return locked("busy") if robot.command_status.get(parameter.id, IDLE).busy else None
 
 
 def parameters_offered(node: str, robot: RobotState) -> Verdict | None:
@@ -187,7 +193,7 @@ def parameters_offered(node: str, robot: RobotState) -> Verdict | None:
     return None
 
 
-def unsettable(of: Parameter, known: ParameterState) -> Verdict | None:
+def unsettable(parameter: Parameter, known: ParameterState) -> Verdict | None:
     """Why a parameter can't be set, by what its node says of it."""
     code = {
         "waiting": "parameter_waiting",
@@ -197,16 +203,18 @@ def unsettable(of: Parameter, known: ParameterState) -> Verdict | None:
         "mistyped": "parameter_mistyped",
         "unreadable": "parameter_unreadable",
     }.get(known.state)
-    node, name = of.node, of.parameter
+    node, name = parameter.node, parameter.parameter
     if code == "parameter_silent" and known.wall == 0.0:
         return Verdict(False, code, _silent_parameter(node, name))
     if code is not None:
-        return locked(code, node=node, name=name, found=known.found, wanted=of.type)
+        return locked(code, node=node, name=name, found=known.robot_type, wanted=parameter.type)
     if known.read_only:
         return locked("parameter_read_only", node=node, name=name)
-    if not suits(of, known):
-        theirs = each_text(of, known.range)
-        return locked("parameter_apart", node=node, name=name, theirs=theirs, ours=ours_text(of))
+    if not has_allowed_value(parameter, known):
+        theirs = each_text(parameter, known.range)
+        return locked(
+            "parameter_apart", node=node, name=name, theirs=theirs, ours=panel_limits_text(parameter)
+        )
     return None
 
 
@@ -214,22 +222,31 @@ def _silent_parameter(node: str, name: str) -> TextLike:
     return joined([say("parameter_silent", node=node, name=name), say("cyclone_hint")])
 
 
-def topic_mismatch(role: TopicRole, of: Interlock | OnTopic, robot: RobotState) -> Verdict | None:
+def topic_mismatch(
+    role: TopicRole, interlock: Interlock | TopicWidget, robot: RobotState
+) -> Verdict | None:
     """Why a topic can't be trusted, by what the graph shows: another type, a QoS that DDS would
     not match, a bridge that does not pass it on. `role` is what the panel does with it: publish ("MP")
     or listen ("MS")."""
-    return _misfit(robot.graph, role, robot.key(of.topic), of.topic, of.type, of.qos.on_wire)
+    return _misfit(
+        robot.graph,
+        role,
+        robot.key(interlock.topic),
+        interlock.topic,
+        interlock.type,
+        interlock.qos.wire_qos,
+    )
 
 
-@remembered
+@cached_until_change
 def _misfit(
     graph: Graph, role: TopicRole, key: str, topic: str, type_name: str, qos: Qos
 ) -> Verdict | None:
-    if found := graph.wrong_type(role, key, type_name):
+    if found := graph.mismatched_type(role, key, type_name):
         return locked("wrong_type", topic=topic, found=found, wanted=type_name)
-    if code := graph.wrong_qos(role, key, qos):
+    if code := graph.mismatched_qos(role, key, qos):
         return locked(code, topic=topic)
-    return locked("unheard", topic=topic) if role == "MS" and graph.unheard(key) else None
+    return locked("unheard", topic=topic) if role == "MS" and graph.is_unrouted(key) else None
 
 
 @lru_cache(maxsize=256)
@@ -240,7 +257,7 @@ def locked(code: str, **about: TextLike) -> Verdict:
 
 # What the robot may have against a command, beside the way to it and its interlocks: by family.
 AGAINST: Final[Mapping[type[Any], Callable[[Any, RobotState, float], Verdict | None]]] = {
-    Published: lambda of, robot, _: publish_blocked(of, robot),
-    Served: call_blocked,
+    PublishCommand: lambda of, robot, _: publish_blocked(of, robot),
+    ServerCommand: call_blocked,
     Parameter: lambda of, robot, _: set_blocked(of, robot),
 }

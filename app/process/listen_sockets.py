@@ -1,5 +1,5 @@
-"""The sockets on which this process listens. uvicorn opens its own, after everything else has started,
-and tells nobody: they are looked for."""
+"""The listening sockets of this process. uvicorn opens them after everything else has started and has
+no callback for it, so they are found in /proc."""
 
 import asyncio
 import errno
@@ -15,17 +15,17 @@ from typing import Final
 
 from app.errors import SettingsError
 
-LOOK_EVERY_S: Final = 0.02
-LISTENING_WITHIN_S: Final = 5.0  # a socket that the server was given listened before
-INTERNET: Final = frozenset({socket.AF_INET, socket.AF_INET6})
-LISTENS: Final = (socket.SOL_SOCKET, socket.SO_ACCEPTCONN)
-SEND_BUFFER: Final = 8_192  # bytes; Linux takes twice as many
-GONE_AFTER_MS: Final = 120_000  # in which a client confirms nothing of what it was sent
+POLL_INTERVAL_S: Final = 0.02
+LISTEN_TIMEOUT_S: Final = 5.0  # a socket passed to the server listens from the start
+INET_FAMILIES: Final = frozenset({socket.AF_INET, socket.AF_INET6})
+ACCEPTS_CONNECTIONS: Final = (socket.SOL_SOCKET, socket.SO_ACCEPTCONN)
+SEND_BUFFER_BYTES: Final = 8_192  # Linux doubles it
+USER_TIMEOUT_MS: Final = 120_000  # TCP_USER_TIMEOUT
 
 
-def opened() -> Iterator[tuple[str, socket.socket]]:
-    """Each socket of this process, by its name in /proc, as a duplicate that is closed when the next is
-    asked for."""
+def open_sockets() -> Iterator[tuple[str, socket.socket]]:
+    """Yields (name in /proc, socket) for each socket of this process. The socket is a duplicate, closed
+    after its iteration."""
     for entry in Path("/proc/self/fd").iterdir():
         with suppress(OSError):
             name = os.readlink(entry)
@@ -34,61 +34,63 @@ def opened() -> Iterator[tuple[str, socket.socket]]:
                     yield name, one
 
 
-def listeners() -> Iterator[tuple[str, socket.socket]]:
-    """Those that listen."""
-    return ((name, one) for name, one in opened() if one.getsockopt(*LISTENS))
+def listening_sockets() -> Iterator[tuple[str, socket.socket]]:
+    """`open_sockets` that listen."""
+    return ((name, one) for name, one in open_sockets() if one.getsockopt(*ACCEPTS_CONNECTIONS))
 
 
-async def listening(before: Collection[str]) -> None:
-    """Until there is another than those `before`; five seconds at most."""
+async def wait_for_listener(before: Collection[str]) -> None:
+    """Waits until a socket listens that is not in `before`, at most `LISTEN_TIMEOUT_S`."""
     with suppress(TimeoutError):
-        async with asyncio.timeout(LISTENING_WITHIN_S):
-            while names() <= set(before):
-                await asyncio.sleep(LOOK_EVERY_S)
+        async with asyncio.timeout(LISTEN_TIMEOUT_S):
+            while listener_names() <= set(before):
+                await asyncio.sleep(POLL_INTERVAL_S)
 
 
-def names() -> set[str]:
-    return {name for name, _ in listeners()}
+def listener_names() -> set[str]:
+    return {name for name, _ in listening_sockets()}
 
 
 async def limit_send_buffer(ports: set[int]) -> list[tuple[str, int]]:
-    """Narrows what the next sockets to listen accept, and adds their ports: of what a browser does not
-    read little waits in the kernel, where nobody can take it back; the rest is never written. One that
-    is gone without a word, or reads nothing for minutes, does not keep its connection. Their addresses.
+    """Waits for the server's sockets, limits the send buffer of their connections and adds their ports
+    to `ports`. Returns their (host, port).
+
+    A small buffer means that little old data waits in the kernel for a browser that does not read. A
+    client that disappears, or does not read for `USER_TIMEOUT_MS`, is disconnected.
     """
     found: list[tuple[str, int]] = []
     with suppress(OSError):  # no /proc on this system
-        before = names()
-        await listening(before)
-        for name, one in listeners():
-            if name not in before and one.family in INTERNET:
+        before = listener_names()
+        await wait_for_listener(before)
+        for name, one in listening_sockets():
+            if name not in before and one.family in INET_FAMILIES:
                 host, port = one.getsockname()[:2]
                 ports.add(port)
                 found.append((host, port))
-                one.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER)
-                one.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, GONE_AFTER_MS)
+                one.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER_BYTES)
+                one.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, USER_TIMEOUT_MS)
     return found
 
 
 def abort_unsent(ports: Collection[int]) -> None:
-    """Cuts the connections that came by one of these ports and still have something to send: uvicorn
-    waits for them for ever, also where nobody reads."""
+    """Closes the connections of these ports that have unsent data: uvicorn would wait for them without
+    a limit."""
     with suppress(OSError):
-        for _, one in opened():
-            if one.family in INTERNET and one.getsockname()[1] in ports and unsent(one):
+        for _, one in open_sockets():
+            if one.family in INET_FAMILIES and one.getsockname()[1] in ports and unsent_bytes(one):
                 with suppress(OSError):
                     one.shutdown(socket.SHUT_RDWR)
 
 
-def unsent(one: socket.socket) -> int:
-    """How many bytes wait in the kernel; 0 for one that listens."""
-    if one.getsockopt(*LISTENS):
+def unsent_bytes(one: socket.socket) -> int:
+    """The number of bytes in the send queue; 0 for a listening socket."""
+    if one.getsockopt(*ACCEPTS_CONNECTIONS):
         return 0
     return int.from_bytes(fcntl.ioctl(one, termios.TIOCOUTQ, bytes(4)), sys.byteorder)
 
 
-def check_free(host: str, port: int) -> None:
-    """SettingsError where nobody could listen there now."""
+def check_port_free(host: str, port: int) -> None:
+    """SettingsError if the address can't be listened on now."""
     where = f"can't listen on {host} port {port}"
     try:
         found = socket.getaddrinfo(host or None, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)

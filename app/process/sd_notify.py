@@ -1,6 +1,6 @@
-"""The service manager's protocol: what this process tells it, and how often it wants to hear.
+"""The service manager's notification protocol: state messages and the watchdog interval.
 
-Source: sd_notify(3) and sd_watchdog_enabled(3). Nothing is told where nobody asked for it.
+Source: sd_notify(3) and sd_watchdog_enabled(3). Without `NOTIFY_SOCKET` nothing is sent.
 """
 
 import logging
@@ -11,23 +11,24 @@ from typing import Final
 
 log = logging.getLogger("kiosk.systemd")
 
-LONGEST: Final = 2000  # bytes of a state in words
+MAX_STATUS_BYTES: Final = 2000
 
 
 class ServiceManager:
-    """systemd, or another that speaks its protocol; `interval_s` is None without a watchdog."""
+    """systemd, or another service manager with its protocol. `interval_s` is the watchdog's, None
+    without one."""
 
     def __init__(self, env: Mapping[str, str] = os.environ) -> None:
-        self._address = _address(env.get("NOTIFY_SOCKET", ""))
-        self.interval_s = _interval(env) if self._address else None
+        self._address = _socket_address(env.get("NOTIFY_SOCKET", ""))
+        self.interval_s = _watchdog_interval_s(env) if self._address else None
         self._failed = False
 
     @property
-    def listens(self) -> bool:
+    def is_enabled(self) -> bool:
         return bool(self._address)
 
-    def tell(self, *lines: str) -> None:
-        """Sends `NAME=value` lines at once or not at all."""
+    def notify(self, *lines: str) -> None:
+        """Sends `NAME=value` lines without blocking; a failure is logged once."""
         if not self._address:
             return
         try:
@@ -41,13 +42,13 @@ class ServiceManager:
             self._failed = True
 
 
-def status(text: str) -> str:
-    """The line for a state in words."""
-    return "STATUS=" + " ".join(text.split())[:LONGEST]
+def status_line(text: str) -> str:
+    """The `STATUS=` line of a text."""
+    return "STATUS=" + " ".join(text.split())[:MAX_STATUS_BYTES]
 
 
-def _address(given: str) -> str:
-    """A path, or an abstract socket ("@name"), whose name starts with a zero byte."""
+def _socket_address(given: str) -> str:
+    """The socket address of a path or of an abstract socket ("@name"); "" if it is neither."""
     if given.startswith("@"):
         return "\0" + given[1:]
     if given and not given.startswith("/"):
@@ -56,8 +57,8 @@ def _address(given: str) -> str:
     return given
 
 
-def _interval(env: Mapping[str, str]) -> float | None:
-    """Seconds between pings at most, if they are this process's to send."""
+def _watchdog_interval_s(env: Mapping[str, str]) -> float | None:
+    """The watchdog interval in seconds; None if this process has none."""
     given = env.get("WATCHDOG_USEC", "")
     if not given or env.get("WATCHDOG_PID") not in (None, "", str(os.getpid())):
         return None

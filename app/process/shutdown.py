@@ -1,4 +1,4 @@
-"""The end of the process, in its order."""
+"""Graceful shutdown on SIGTERM, SIGINT and SIGHUP."""
 
 import asyncio
 import faulthandler
@@ -12,21 +12,22 @@ from typing import Any, Final
 
 log = logging.getLogger("kiosk")
 
-End = Callable[[], Awaitable[None]]
+ShutdownCallback = Callable[[], Awaitable[None]]
 
-# Else something stands still: where is told, and the process leaves it. More than an end waits for (the
-# robot 2 s, readers 1 s, a disk 3 s, a session 3 s, the operator's log 10 s), and less than the unit's
+# After this time the process writes a traceback and exits. Longer than all waits of a shutdown together
+# (robot 2 s, readers 1 s, disk 3 s, session 3 s, operator's log 10 s), shorter than the unit's
 # TimeoutStopSec.
-ENDED_WITHIN_S: Final = 20.0
+SHUTDOWN_TIMEOUT_S: Final = 20.0
 
 
 @contextmanager
-def graceful_shutdown(loop: asyncio.AbstractEventLoop, end: End) -> Iterator[None]:
-    """Awaits `end` as soon as the process is told to end, and then tells whoever listened for that.
+def graceful_shutdown(loop: asyncio.AbstractEventLoop, end: ShutdownCallback) -> Iterator[None]:
+    """Awaits `end` on SIGTERM, SIGINT or SIGHUP, then calls the signal handlers that were installed
+    before.
 
-    uvicorn waits for open streams before it runs the lifespan's end: they must end first. WebSockets it
-    closes: they must have their answers first. A terminal that closes ends it in the same order, unless
-    nohup started it. What stands still, in a library or on a disk, does not keep the process.
+    uvicorn waits for open streams before the lifespan ends, so they must end first. It closes
+    WebSockets, so they must get their responses first. SIGHUP (a closed terminal) is ignored under
+    nohup. A library or disk that hangs does not keep the process alive.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -34,7 +35,7 @@ def graceful_shutdown(loop: asyncio.AbstractEventLoop, end: End) -> Iterator[Non
     listened = {n: signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
     if listened[signal.SIGHUP] is not signal.SIG_DFL:
         del listened[signal.SIGHUP]
-    hear = _Ending(loop, end, listened).hear
+    hear = _ShutdownSequence(loop, end, listened).handle_signal
     for number in listened:
         signal.signal(number, hear)
     try:
@@ -44,40 +45,45 @@ def graceful_shutdown(loop: asyncio.AbstractEventLoop, end: End) -> Iterator[Non
             signal.signal(number, listener)
 
 
-class _Ending:
-    """From the first signal to those who listened for it."""
+class _ShutdownSequence:
+    """The sequence from the first signal to the previous handlers."""
 
     def __init__(
-        self, loop: asyncio.AbstractEventLoop, end: End, listened: Mapping[signal.Signals, Any]
+        self,
+        loop: asyncio.AbstractEventLoop,
+        end: ShutdownCallback,
+        listened: Mapping[signal.Signals, Any],
     ) -> None:
         self._loop = loop
         self._end = end
-        self._listened = listened
-        self._begun = self._passed_on = False
+        self._previous_handlers = listened
+        self._started = self._forwarded = False
 
-    def hear(self, number: int, frame: FrameType | None) -> None:
-        """A second SIGINT waits for nothing more. A SIGTERM after a SIGINT is of uvicorn's reloader: it
-        changes nothing."""
+    def handle_signal(self, number: int, frame: FrameType | None) -> None:
+        """A second SIGINT skips the waiting. A SIGTERM after a SIGINT comes from uvicorn's reloader and
+        is ignored."""
         if number == signal.SIGHUP:
             signal.raise_signal(signal.SIGTERM)
-        elif not self._begun:
-            self._begun = True
-            faulthandler.dump_traceback_later(ENDED_WITHIN_S, exit=True)  # no thread of Python's
-            asyncio.run_coroutine_threadsafe(self._first(number, frame), self._loop)
-        elif self._passed_on or number == signal.SIGINT:
-            self._pass_on(number, frame)
+        elif not self._started:
+            self._started = True
+            faulthandler.dump_traceback_later(
+                SHUTDOWN_TIMEOUT_S, exit=True
+            )  # works without a running Python thread
+            asyncio.run_coroutine_threadsafe(self._shut_down(number, frame), self._loop)
+        elif self._forwarded or number == signal.SIGINT:
+            self._forward(number, frame)
 
-    async def _first(self, number: int, frame: FrameType | None) -> None:
+    async def _shut_down(self, number: int, frame: FrameType | None) -> None:
         try:
             await self._end()
         except Exception:
-            log.exception("the end is not in order")
+            log.exception("shutdown failed")
         finally:
-            if not self._passed_on:
-                self._pass_on(number, frame)
+            if not self._forwarded:
+                self._forward(number, frame)
 
-    def _pass_on(self, number: int, frame: FrameType | None) -> None:
-        self._passed_on = True
-        listener = self._listened[signal.Signals(number)]
+    def _forward(self, number: int, frame: FrameType | None) -> None:
+        self._forwarded = True
+        listener = self._previous_handlers[signal.Signals(number)]
         if callable(listener):
             listener(number, frame)

@@ -1,7 +1,7 @@
 """Recordings around each press: MCAP files that Foxglove, Lichtblick and rosbag2 open.
 
-A ring keeps what was received lately; a press makes a recording of it, which goes on for a while.
-Files are written on a thread of their own, and nothing that happens there holds up a press.
+A ring buffer keeps the latest samples. A press starts a recording with them, which continues for a
+while. A separate thread writes the files, so that it never delays a press.
 """
 
 from app.recording.recorder import Recorder

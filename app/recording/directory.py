@@ -1,4 +1,4 @@
-"""The folder of recordings: bounded, and without halves of an earlier start."""
+"""The folder of recordings: limits its size and finishes files of an earlier process."""
 
 import logging
 import time
@@ -11,45 +11,45 @@ from app.recording.mcap_file import SUFFIX, UNFINISHED, recover
 log = logging.getLogger("kiosk.recording")
 
 
-AHEAD_S: Final = 60.0  # a file from later than that was written while the clock was wrong
+CLOCK_SKEW_S: Final = 60.0  # a file further in the future was written while the clock was wrong
 
 
-def name_of(moment: float, robot: str, widget: str) -> str:
-    """A file's name without its ending, sorted by time; `moment` is in seconds since the epoch."""
+def recording_name(moment: float, robot: str, widget: str) -> str:
+    """A file's name without its suffix. Names sort by time. `moment` is in seconds since the epoch."""
     at = datetime.fromtimestamp(moment, UTC).strftime("%Y%m%dT%H%M%S.%f")[:-3] + "Z"
     return "-".join(filter(None, (at, robot, widget)))
 
 
 class RecordingDirectory:
-    """OSError where it can't be used."""
+    """The folder of recordings. Its methods raise OSError if it can't be used."""
 
     def __init__(self, path: Path, most: int) -> None:
-        """`most` is in bytes, for all that is finished and all that is being written."""
+        """`most` is the limit in bytes for finished and unfinished files together."""
         self.path = path
-        self._most = most
+        self._max_bytes = most
 
     def open(self) -> None:
-        """Makes it, and finishes what an earlier process left unfinished."""
+        """Creates the folder, and finishes the files that an earlier process left."""
         self.path.mkdir(mode=0o700, parents=True, exist_ok=True)
         self.make_room(0)
         for left in sorted(self.path.glob(f"*{UNFINISHED}")):
             if left.name.endswith(f".recovered{UNFINISHED}"):
-                left.unlink()  # made again from what it was made of
+                left.unlink()  # it is recovered again from its source
         for left in sorted(self.path.glob(f"*{UNFINISHED}")):
             if found := recover(self.path, left):
                 log.warning("%s was left unfinished and is recovered as far as it goes", found)
         self.make_room(0)
 
     def make_room(self, size: int) -> None:
-        """Removes the oldest recordings until `size` more bytes fit in. Where the clock was set back,
-        those from the future are taken for the oldest, and what is new stays."""
-        latest = name_of(time.time() + AHEAD_S, "", "")
+        """Removes the oldest recordings until `size` more bytes fit. Recordings from the future (the
+        clock was set back) count as the oldest."""
+        latest = recording_name(time.time() + CLOCK_SKEW_S, "", "")
         files = sorted(self.path.glob(f"*{SUFFIX}"), key=lambda file: (file.name < latest, file.name))
         sizes = [file.stat().st_size for file in files]
         total = sum(sizes)
         for file, bytes_ in zip(files, sizes, strict=True):
-            if total + size <= self._most:
+            if total + size <= self._max_bytes:
                 return
             file.unlink(missing_ok=True)
             total -= bytes_
-            log.info("removed %s: recordings take %.0f MB at most", file.name, self._most / 1e6)
+            log.info("removed %s: recordings take %.0f MB at most", file.name, self._max_bytes / 1e6)

@@ -1,4 +1,4 @@
-"""One recording as an MCAP file (mcap.dev): profile "ros2", messages as they were received."""
+"""One recording as an MCAP file (mcap.dev): profile "ros2", messages as received."""
 
 import fcntl
 import json
@@ -17,7 +17,7 @@ from mcap.writer import CompressionType, Writer
 SUFFIX: Final = ".mcap"
 UNFINISHED: Final = ".mcap.unfinished"
 PROFILE: Final = "ros2"
-PRESSES: Final = "/web_ui/presses"
+PRESS_TOPIC: Final = "/web_ui/presses"
 PRESS_SCHEMA: Final[Mapping[str, Any]] = {
     "$schema": "https://json-schema.org/draft/2020-12/schema",
     "title": "web_ui/Press",
@@ -37,7 +37,7 @@ PRESS_SCHEMA: Final[Mapping[str, Any]] = {
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """A topic as a recording names it; `definition` is the type's, in the format "ros2msg"."""
+    """A topic in a recording; `definition` is that of its type, in the format "ros2msg"."""
 
     topic: str
     type: str
@@ -45,14 +45,14 @@ class Channel:
 
 
 class McapFile:
-    """Open from its making to `finish` or `abandon`; OSError where the disk does not take it.
+    """An MCAP file that is being written, until `finish` or `abandon`. Methods raise OSError.
 
-    Until it is finished it has another name, and a lock that ends with the process.
+    Until it is finished it has another suffix, and a lock that the system releases with the process.
     """
 
     def __init__(self, folder: Path, name: str, about: Mapping[str, str]) -> None:
         self._folder, self._path = folder, folder / f"{name}{UNFINISHED}"
-        self._finished = folder / f"{name}{SUFFIX}"
+        self._final_path = folder / f"{name}{SUFFIX}"
         flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
         self._stream = os.fdopen(os.open(self._path, flags, 0o600), "wb")
         self._channels: dict[str, int] = {}
@@ -67,7 +67,7 @@ class McapFile:
             raise
 
     def add(self, channel: Channel, payload: bytes, received: int, sent: int) -> None:
-        """A message in CDR; times are nanoseconds since the epoch."""
+        """Adds a message in CDR; times are nanoseconds since the epoch."""
 
         def register() -> int:
             schema = self._writer.register_schema(channel.type, "ros2msg", channel.definition.encode())
@@ -76,18 +76,20 @@ class McapFile:
         self._writer.add_message(self._channel(channel.topic, register), received, payload, sent)
 
     def add_press(self, press: Mapping[str, Any], at: int) -> None:
-        """A press as `PRESS_SCHEMA` has it; it is on the disk when this returns."""
+        """Adds a press in the form of `PRESS_SCHEMA`, and flushes the file."""
 
         def register() -> int:
-            told = json.dumps(PRESS_SCHEMA).encode()
-            schema = self._writer.register_schema(str(PRESS_SCHEMA["title"]), "jsonschema", told)
-            return self._writer.register_channel(PRESSES, "json", schema)
+            text = json.dumps(PRESS_SCHEMA).encode()
+            schema = self._writer.register_schema(str(PRESS_SCHEMA["title"]), "jsonschema", text)
+            return self._writer.register_channel(PRESS_TOPIC, "json", schema)
 
-        self._writer.add_message(self._channel(PRESSES, register), at, json.dumps(press).encode(), at)
+        self._writer.add_message(
+            self._channel(PRESS_TOPIC, register), at, json.dumps(press).encode(), at
+        )
         self._writer.flush()
 
     def add_raw(self, schema: Schema | None, channel: ChannelRecord, message: Message) -> None:
-        """A message of another file, as it is there."""
+        """Adds a message of another file unchanged."""
 
         def register() -> int:
             own = 0
@@ -100,21 +102,21 @@ class McapFile:
         number = self._channel(channel.topic, register)
         self._writer.add_message(number, message.log_time, message.data, message.publish_time)
 
-    def note(self, name: str, about: Mapping[str, str]) -> None:
-        """Metadata of the file."""
+    def add_metadata(self, name: str, about: Mapping[str, str]) -> None:
+        """Adds a metadata record."""
         self._writer.add_metadata(name, dict(about))
 
     def finish(self) -> Path:
-        """The file under its own name, all on the disk."""
+        """Completes the file, syncs it and gives it its final name, which is returned."""
         self._writer.finish()
         self._stream.flush()
         os.fsync(self._stream.fileno())
-        self._path.rename(self._finished)
+        self._path.rename(self._final_path)
         self._stream.close()
-        return self._finished
+        return self._final_path
 
     def abandon(self) -> None:
-        """Leaves nothing of it, as far as the disk lets it."""
+        """Removes the file, if possible."""
         with suppress(OSError):
             self._stream.close()
         with suppress(OSError):
@@ -127,8 +129,8 @@ class McapFile:
 
 
 def recover(folder: Path, unfinished: Path) -> Path | None:
-    """Finishes what an ended process left, as far as it goes; None where there was no message in it,
-    or where another process still writes it. OSError where the disk does not take it."""
+    """Copies the readable part of an unfinished file into a finished one and returns its path. None if
+    it has no message, or if another process still writes it. OSError if it can't be written."""
     with open(unfinished, "rb") as stream:
         try:
             fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -136,38 +138,38 @@ def recover(folder: Path, unfinished: Path) -> Path | None:
             return None
         file = McapFile(folder, f"{unfinished.name.removesuffix(UNFINISHED)}.recovered", {})
         try:
-            found = _finished(file) if _copied(stream, file) else None
+            found = _finish_recovered(file) if _copy_messages(stream, file) else None
         finally:
             file.abandon()  # if it is not finished
         unfinished.unlink()
     return found
 
 
-def _finished(file: McapFile) -> Path:
-    file.note("recovered", {"why": "the server ended while it was recording"})
+def _finish_recovered(file: McapFile) -> Path:
+    file.add_metadata("recovered", {"why": "the server ended while it was recording"})
     return file.finish()
 
 
-def _copied(stream: IO[bytes], file: McapFile) -> int:
-    """How many messages could be read."""
+def _copy_messages(stream: IO[bytes], file: McapFile) -> int:
+    """Copies the readable records; returns the number of messages."""
     schemas: dict[int, Schema] = {}
     channels: dict[int, ChannelRecord] = {}
     count = 0
-    for record in _readable(stream):
+    for record in _read_records(stream):
         match record:
             case Schema():
                 schemas[record.id] = record
             case ChannelRecord():
                 channels[record.id] = record
             case Metadata():
-                file.note(record.name, record.metadata)
+                file.add_metadata(record.name, record.metadata)
             case Message() if channel := channels.get(record.channel_id):
                 file.add_raw(schemas.get(channel.schema_id), channel, record)
                 count += 1
     return count
 
 
-def _readable(stream: IO[bytes]) -> Iterator[McapRecord]:
-    """The records until the first that is broken, in whatever way: it was being written."""
+def _read_records(stream: IO[bytes]) -> Iterator[McapRecord]:
+    """The records before the first one that can't be read."""
     with suppress(Exception):
         yield from StreamReader(stream).records

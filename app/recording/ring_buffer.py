@@ -1,4 +1,4 @@
-"""What was received lately: bounded by its age and by its bytes."""
+"""The latest samples, limited by age and bytes."""
 
 from collections import deque
 from collections.abc import Iterator
@@ -7,50 +7,53 @@ from typing import Final
 
 from app.robot.state import Sample
 
-OVERHEAD: Final = 512  # bytes that a sample costs beside its payload
-COPIED: Final = 64 * 1024  # a smaller payload would keep the whole buffer that it was received in
+OVERHEAD_BYTES: Final = 512  # memory of a sample besides its payload
+COPY_BELOW_BYTES: Final = (
+    64 * 1024
+)  # a smaller payload is copied, so that it does not keep its receive buffer
 
 
 @dataclass(frozen=True, slots=True)
 class Buffered:
-    """A sample of the topic with this key; `size` is in bytes, with what it costs to keep."""
+    """A sample of the topic `key`; `size` is its memory in bytes."""
 
     key: str
     sample: Sample
     size: int
 
 
-def buffered(key: str, sample: Sample) -> Buffered:
-    """A large payload is not copied: who writes it turns it into bytes."""
+def to_buffered(key: str, sample: Sample) -> Buffered:
+    """The sample to be buffered. A large payload is not copied until it is written."""
     length = len(sample.payload)
-    if length < COPIED:
+    if length < COPY_BELOW_BYTES:
         sample = sample._replace(payload=bytes(sample.payload))
-    return Buffered(key, sample, length + OVERHEAD)
+    return Buffered(key, sample, length + OVERHEAD_BYTES)
 
 
 class RingBuffer:
-    """The newest samples, at most `longest_s` seconds and `most` bytes of them."""
+    """The newest samples: at most `longest_s` seconds and `most` bytes."""
 
     def __init__(self, longest_s: float, most: int) -> None:
-        self._longest_s = longest_s
-        self._most = most
-        self._kept: deque[Buffered] = deque()
+        self._max_age_s = longest_s
+        self._max_bytes = most
+        self._samples: deque[Buffered] = deque()
         self.size = 0
 
     def add(self, one: Buffered) -> None:
-        """Takes a sample; one that is larger than the ring is not kept, and what came before is."""
-        if one.size <= self._most and self._longest_s > 0:
-            self._kept.append(one)
+        """Adds a sample. One that is larger than the ring is ignored; the others are kept."""
+        if one.size <= self._max_bytes and self._max_age_s > 0:
+            self._samples.append(one)
             self.size += one.size
-        self._forget(one.sample.at)
+        self._drop_old(one.sample.at)
 
-    def since(self, now: float) -> Iterator[Buffered]:
-        """What is not older than `longest_s` at `now` (monotonic seconds), oldest first."""
-        self._forget(now)
-        yield from self._kept
+    def recent(self, now: float) -> Iterator[Buffered]:
+        """The samples that are not older than `longest_s` at `now` (monotonic seconds), oldest
+        first."""
+        self._drop_old(now)
+        yield from self._samples
 
-    def _forget(self, now: float) -> None:
-        while self._kept and (
-            self.size > self._most or now - self._kept[0].sample.at > self._longest_s
+    def _drop_old(self, now: float) -> None:
+        while self._samples and (
+            self.size > self._max_bytes or now - self._samples[0].sample.at > self._max_age_s
         ):
-            self.size -= self._kept.popleft().size
+            self.size -= self._samples.popleft().size

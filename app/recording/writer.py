@@ -1,4 +1,4 @@
-"""The thread that writes recordings. What it can't write is left out, never waited for."""
+"""The thread that writes recordings. Samples that it can't write in time are dropped."""
 
 import asyncio
 import logging
@@ -12,99 +12,101 @@ from typing import Any, Final
 from app.i18n import TextLike, say
 from app.recording.directory import RecordingDirectory
 from app.recording.mcap_file import Channel, McapFile
-from app.recording.ring_buffer import OVERHEAD, Buffered
+from app.recording.ring_buffer import OVERHEAD_BYTES, Buffered
 
 log = logging.getLogger("kiosk.recording")
 
-WAITING: Final = 128 * 1024 * 1024  # bytes handed over and not written yet, of all robots
-RINGS: Final = 64 * 1024 * 1024  # bytes in the rings of all robots
-ENDING_S: Final = 5.0  # given to a disk when the server ends
+MAX_QUEUED_BYTES: Final = 128 * 1024 * 1024  # not written yet, of all robots
+MAX_RING_BYTES: Final = 64 * 1024 * 1024  # of all robots
+STOP_TIMEOUT_S: Final = 5.0  # for the disk at shutdown
 
 Work = Callable[[], None]
 
 
 class Recordings:
-    """All recordings of one panel; opened by `start`, closed by `stop`.
+    """The recordings of one panel, from `start` to `stop`.
 
-    `fault` is what an operator reads while recordings can't be written, "" if they can.
+    `fault` is the sentence for the operator while recordings can't be written, else "".
     """
 
     def __init__(self, path: Path, max_mb: float, robots: int) -> None:
-        """Each of `robots` may have one file open at a time: together they fill half the folder."""
+        """Each of `robots` may have one open file; together they may fill half the folder."""
         most = int(max_mb * 1_000_000)
         self._folder = RecordingDirectory(path, most)
         self.file_bytes = most // (2 * (robots + 1))
-        self.ring_bytes = min(RINGS // robots, self.file_bytes // 2)  # half is for what comes after
+        self.ring_bytes = min(
+            MAX_RING_BYTES // robots, self.file_bytes // 2
+        )  # half is for samples after the press
         self._queue: queue.SimpleQueue[tuple[int, Work | None]] = queue.SimpleQueue()
-        self._counting = threading.Lock()
-        self._waiting = 0
+        self._count_lock = threading.Lock()
+        self._queued_bytes = 0
         self._open = 0
         self.fault: TextLike = ""
-        self._told: list[Callable[[], None]] = []
+        self._listeners: list[Callable[[], None]] = []
         self._loop = asyncio.get_running_loop()
         self._thread = threading.Thread(target=self._run, name="recordings", daemon=True)
 
     def start(self) -> None:
-        """Begins to write; the folder is made, cleared of halves and bounded on the thread."""
-        self.hand_over(0, self._prepare)
+        """Starts the thread, which first prepares the folder."""
+        self.enqueue(0, self._prepare)
         self._thread.start()
 
     def stop(self) -> None:
-        """Writes what was handed over; blocks, but for `ENDING_S` at most."""
+        """Writes what is queued; blocks for `STOP_TIMEOUT_S` at most."""
         self._queue.put((0, None))
-        self._thread.join(ENDING_S)
+        self._thread.join(STOP_TIMEOUT_S)
         if self._thread.is_alive():
-            log.error("the disk does not take what was recorded: it is left unfinished")
+            log.error("the disk is too slow: a recording is left unfinished")
 
-    def follow(self, told: Callable[[], None]) -> None:
-        """`told` is called on the event loop when `fault` has changed."""
-        self._told.append(told)
+    def add_listener(self, listener: Callable[[], None]) -> None:
+        """`listener` is called on the event loop when `fault` has changed."""
+        self._listeners.append(listener)
 
-    def hand_over(self, size: int, work: Work) -> bool:
-        """Has the thread do something that holds `size` bytes; False where too much waits."""
-        with self._counting:
-            if size and self._waiting + size > WAITING:
+    def enqueue(self, size: int, work: Work) -> bool:
+        """Queues `work`, which holds `size` bytes, for the thread; False if the queue is full."""
+        with self._count_lock:
+            if size and self._queued_bytes + size > MAX_QUEUED_BYTES:
                 return False
-            self._waiting += size
+            self._queued_bytes += size
         self._queue.put((size, work))
         return True
 
     def begin(
         self, name: str, channels: Mapping[str, Channel], about: Mapping[str, str]
     ) -> "Recording":
-        """A new recording; `channels` are by the keys of their topics."""
+        """A new recording; `channels` are by key expression."""
         return Recording(self, name, channels, about)
 
     # Below: on the thread.
 
-    def opened(self, name: str, about: Mapping[str, str]) -> McapFile:
+    def open_file(self, name: str, about: Mapping[str, str]) -> McapFile:
         self._folder.path.mkdir(mode=0o700, parents=True, exist_ok=True)
         self._folder.make_room((self._open + 1) * self.file_bytes)
         file = McapFile(self._folder.path, name, about)
         self._open += 1
         return file
 
-    def closed(self) -> None:
+    def release_file(self) -> None:
         self._open -= 1
         self._folder.make_room(self._open * self.file_bytes)
 
-    def given_up(self) -> None:
+    def release_abandoned(self) -> None:
         self._open -= 1
 
-    def works(self) -> None:
-        self._tell("")
+    def clear_fault(self) -> None:
+        self._set_fault("")
 
-    def failed(self, error: Exception) -> None:
-        """What went wrong with a file; the next press tries again."""
+    def report_failure(self, error: Exception) -> None:
+        """Sets the fault. The next press starts a new file."""
         why = (isinstance(error, OSError) and error.strerror) or str(error)
         log.error("recording stopped, in %s: %s", self._folder.path, why)
-        self._tell(say("not_recorded", why=why))
+        self._set_fault(say("not_recorded", why=why))
 
     def _prepare(self) -> None:
         try:
             self._folder.open()
         except Exception as error:
-            self.failed(error)
+            self.report_failure(error)
 
     def _run(self) -> None:
         while True:
@@ -113,23 +115,23 @@ class Recordings:
                 return
             try:
                 work()
-            except Exception:  # a mistake in one recording must not end all
+            except Exception:  # an error in one recording must not end the thread
                 log.exception("recording failed")
-            del work  # and with it what it held
-            with self._counting:
-                self._waiting -= size
+            del work  # releases its samples
+            with self._count_lock:
+                self._queued_bytes -= size
 
-    def _tell(self, fault: TextLike) -> None:
+    def _set_fault(self, fault: TextLike) -> None:
         if fault != self.fault:
             self.fault = fault
-            with suppress(RuntimeError):  # the loop is closed: nobody looks any more
-                for told in self._told:
-                    self._loop.call_soon_threadsafe(told)
+            with suppress(RuntimeError):  # the loop is closed
+                for listener in self._listeners:
+                    self._loop.call_soon_threadsafe(listener)
 
 
 class Recording:
-    """One file, from the loop's side: everything is handed over. `full`: it takes no more samples, for
-    the next press begins another one."""
+    """One file, as the event loop uses it: all work is queued for the thread. When it `is_full` it
+    takes no more samples, and the next press begins another file."""
 
     def __init__(
         self,
@@ -138,67 +140,71 @@ class Recording:
         channels: Mapping[str, Channel],
         about: Mapping[str, str],
     ) -> None:
-        self._all = all_
+        self._recordings = all_
         self._channels = channels
-        self._room = all_.file_bytes
-        self._left_out = 0
+        self._bytes_left = all_.file_bytes
+        self._dropped = 0
         self._file: McapFile | None = None
-        self._given_up = False
-        self._begun = all_.hand_over(OVERHEAD, lambda: self._do(lambda: self._open(name, about)))
+        self._abandoned = False
+        self._accepted = all_.enqueue(
+            OVERHEAD_BYTES, lambda: self._run_guarded(lambda: self._open_file(name, about))
+        )
 
     @property
-    def full(self) -> bool:
-        return self._room <= 0 or self._given_up or not self._begun
+    def is_full(self) -> bool:
+        return self._bytes_left <= 0 or self._abandoned or not self._accepted
 
     def add(self, one: Buffered) -> None:
-        """A sample of a topic."""
-        self._room -= one.size
-        if self.full or not self._all.hand_over(one.size, lambda: self._do(lambda: self._add(one))):
-            self._left_out += 1
+        """Adds a sample."""
+        self._bytes_left -= one.size
+        if self.is_full or not self._recordings.enqueue(
+            one.size, lambda: self._run_guarded(lambda: self._write_sample(one))
+        ):
+            self._dropped += 1
 
     def add_press(self, press: Mapping[str, Any], at: int) -> None:
-        """A press or its receipt, at nanoseconds since the epoch; also where it is full."""
-        size = OVERHEAD + len(str(press))
-        self._all.hand_over(size, lambda: self._do(lambda: self._add_press(press, at)))
+        """Adds a press or its receipt, also to a full file. `at` is in nanoseconds since the epoch."""
+        size = OVERHEAD_BYTES + len(str(press))
+        self._recordings.enqueue(size, lambda: self._run_guarded(lambda: self._write_press(press, at)))
 
-    def end(self) -> None:
-        self._all.hand_over(0, lambda: self._do(self._finish))
+    def finish(self) -> None:
+        self._recordings.enqueue(0, lambda: self._run_guarded(self._finish_file))
 
     # Below: on the thread.
 
-    def _do(self, work: Work) -> None:
+    def _run_guarded(self, work: Work) -> None:
         try:
             work()
         except Exception as error:
-            self._given_up = True
+            self._abandoned = True
             if self._file is not None:
                 self._file.abandon()
                 self._file = None
-                self._all.given_up()
-            self._all.failed(error)
+                self._recordings.release_abandoned()
+            self._recordings.report_failure(error)
 
-    def _open(self, name: str, about: Mapping[str, str]) -> None:
-        self._file = self._all.opened(name, about)
+    def _open_file(self, name: str, about: Mapping[str, str]) -> None:
+        self._file = self._recordings.open_file(name, about)
 
-    def _add(self, one: Buffered) -> None:
+    def _write_sample(self, one: Buffered) -> None:
         if self._file is not None:
             sample = one.sample
             received = round(sample.wall * 1e9)
             sent = received if sample.sent is None else round(sample.sent * 1e6) * 1000
             self._file.add(self._channels[one.key], bytes(sample.payload), received, sent)
 
-    def _add_press(self, press: Mapping[str, Any], at: int) -> None:
+    def _write_press(self, press: Mapping[str, Any], at: int) -> None:
         if self._file is not None:
             self._file.add_press(press, at)
 
-    def _finish(self) -> None:
+    def _finish_file(self) -> None:
         if self._file is None:
             return
-        if self._left_out:
-            self._file.note("left_out", {"samples": str(self._left_out)})
-            log.warning("%d samples were left out: too many or too large", self._left_out)
+        if self._dropped:
+            self._file.add_metadata("left_out", {"samples": str(self._dropped)})
+            log.warning("%d samples were left out: too many or too large", self._dropped)
         path = self._file.finish()
         self._file = None
         log.info("recorded %s", path)
-        self._all.closed()
-        self._all.works()
+        self._recordings.release_file()
+        self._recordings.clear_fault()

@@ -1,1 +1,1 @@
-"""What is known of one robot now: samples, graph, parameters, command status. No I/O."""
+"""The current state of one robot: samples, graph, parameters, command status. No I/O."""

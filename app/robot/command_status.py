@@ -1,4 +1,4 @@
-"""How far it is with what was asked of the robot: one state per widget that waits for an answer."""
+"""The status of the latest command of each widget."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -22,18 +22,18 @@ OutcomeCode = Literal[
 
 @dataclass(frozen=True, slots=True)
 class CommandStatus:
-    """`busy` while an answer is awaited; then `outcome` and `text` say what came of it.
+    """`busy` while a response is awaited; then `outcome` and `text` are the result.
 
-    `fraction` (0 to 1) is how far an action is, None where it does not say; `stoppable` while a
-    cancel makes sense, and then `press` is the id of the press that the goal came from; `goal` is the
-    goal's state by its name in action_msgs/msg/GoalStatus.
+    `fraction` (0 to 1) is an action's progress, None if unknown. `can_cancel` is true while a goal can
+    be canceled; `press` is then the id of its press. `goal` is the goal's state, named as in
+    action_msgs/msg/GoalStatus.
     """
 
     busy: bool = False
     outcome: OutcomeCode | Literal[""] = ""
     text: TextLike = ""
     fraction: float | None = None
-    stoppable: bool = False
+    can_cancel: bool = False
     goal: str = ""
     press: str = ""
 
@@ -43,15 +43,17 @@ IDLE = CommandStatus()
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What came of a call or a goal; `text` is a sentence for the operator."""
+    """The result of a call or a goal; `text` is a sentence for the operator."""
 
     outcome: OutcomeCode
     text: TextLike
 
 
-OnCorrection = Callable[[str, Outcome], None]  # (press id, what is known of it now)
-LastLook = Callable[[], None]  # right before it is sent; raises PressRefused where it no longer may be
+OnCorrection = Callable[[str, Outcome], None]  # (press id, its new outcome)
+FinalCheck = Callable[
+    [], None
+]  # called right before sending; raises PressRefused if no longer permitted
 
 
-def no_look() -> None:
-    """Of what nobody has to permit."""
+def no_check() -> None:
+    """The check of a message that needs no permission."""

@@ -1,6 +1,6 @@
-"""What the liveliness tokens and the bridges' admin space say: who is there, with which types.
+"""The robot's ROS graph, from the bridges' liveliness tokens and admin space.
 
-Kept by topic key, so that asking costs the same however large the robot's graph is.
+Endpoints are indexed by key expression, so that a query costs the same for any size of graph.
 """
 
 import math
@@ -22,48 +22,54 @@ from app.dialect.endpoint import (
 )
 from app.interfaces.names import Qos
 
-# Whose type must equal the panel's, for what the panel does with a topic. A route of the bridge
-# has one type for all: who created it first has fixed it, be it the robot or another panel.
+# The endpoints whose type must equal the panel's, by the panel's role on a topic. A route of the bridge
+# has one type: that of the endpoint that created it, of the robot or of another panel.
 _COUNTERPARTS: Mapping[TopicRole, tuple[Role, Role, Direction]] = {
-    "MS": ("MP", "MS", "pub"),  # the panel listens: the robot's publisher, other panels' readers
-    "MP": ("MS", "MP", "sub"),  # the panel publishes: the robot's subscriber, other panels' writers
+    "MS": (
+        "MP",
+        "MS",
+        "pub",
+    ),  # the panel subscribes: the robot's publishers, other panels' subscribers
+    "MP": ("MS", "MP", "sub"),  # the panel publishes: the robot's subscribers, other panels' publishers
 }
 
 
 @dataclass(frozen=True, slots=True)
 class Route:
-    """A bridge's route for a topic; `whole` is False where its DDS reader is missing."""
+    """A bridge's route for a topic; `has_reader` is False if its DDS reader is missing."""
 
     zid: str
     direction: Direction
     key: str
     type: str
-    whole: bool = True
+    has_reader: bool = True
 
 
-Of = TypeVarTuple("Of")
-Found = TypeVar("Found")
+Arguments = TypeVarTuple("Arguments")
+Result = TypeVar("Result")
 
 
-def remembered(look: Callable[["Graph", *Of], Found]) -> Callable[["Graph", *Of], Found]:
-    """What is found is kept until the graph changes: it is asked far more often than that."""
+def cached_until_change(
+    query: Callable[["Graph", *Arguments], Result],
+) -> Callable[["Graph", *Arguments], Result]:
+    """Caches the results of a query until the graph changes: queries are far more frequent."""
 
-    def asked(graph: "Graph", *of: *Of) -> Found:
-        question = (look, of)
-        found: Found
+    def cached(graph: "Graph", *arguments: *Arguments) -> Result:
+        key = (query, arguments)
+        result: Result
         try:
-            found = graph.known[question]
+            result = graph.cache[key]
         except KeyError:
-            found = graph.known[question] = look(graph, *of)
-        return found
+            result = graph.cache[key] = query(graph, *arguments)
+        return result
 
-    asked.__doc__ = look.__doc__
-    return asked
+    cached.__doc__ = query.__doc__
+    return cached
 
 
 class Graph:
-    """The ROS graph behind all bridges; changed by `apply`, `learn` and `answered` only, on the
-    event loop."""
+    """The ROS graph behind all bridges. Changed on the event loop only, by `apply_token` and the
+    `update_…` methods."""
 
     def __init__(
         self,
@@ -76,67 +82,67 @@ class Graph:
         other keys than `keys` nothing is kept; None: all are."""
         self._dialect = dialect
         self.own_zid = own_zid  # whose tokens are not the robot's
-        self._names = None if keys is None else frozenset(map(dialect.in_token, keys))
-        self.known: dict[Any, Any] = {}  # see `remembered`
+        self._relevant_names = None if keys is None else frozenset(map(dialect.in_token, keys))
+        self.cache: dict[Any, Any] = {}  # see `remembered`
         self._namespace = namespace
         self._bridges: set[str] = set()
-        self._fits: dict[str, bool] = {}  # whether a bridge's namespace is the robot's
+        self._namespace_matches: dict[str, bool] = {}  # whether a bridge's namespace is the robot's
         self._tokens: defaultdict[str, dict[str, Endpoint]] = defaultdict(dict)
-        self._since: dict[str, float] = {}  # of servers' tokens
+        self._alive_since: dict[str, float] = {}  # of servers' tokens
         self._routes: defaultdict[str, list[Route]] = defaultdict(list)
         self._nodes: defaultdict[str, list[Endpoint]] = defaultdict(list)
-        self._answered: Mapping[str, str] | None = None
+        self._bridge_versions: Mapping[str, str] | None = None
 
-    def concerns(self, token_key: str) -> bool:
+    def is_relevant(self, token_key: str) -> bool:
         """Whether a token is a bridge's own, or about one of the keys that count."""
-        if self._names is None:
+        if self._relevant_names is None:
             return True
         name = self._dialect.name_in(token_key)
-        return not name or name in self._names
+        return not name or name in self._relevant_names
 
-    def has(self, token_key: str) -> bool:
+    def has_token(self, token_key: str) -> bool:
         """Whether a token is there by all that was taken."""
         endpoint = self._dialect.endpoint(token_key)
         return endpoint is not None and token_key in self._tokens.get(endpoint.key, {})
 
-    def apply(self, token_key: str, alive: bool, now: float = -math.inf) -> str | None:
+    def apply_token(self, token_key: str, alive: bool, now: float = -math.inf) -> str | None:
         """Takes one token's appearance (`now`, monotonic seconds) or end; returns the zid of a
         bridge that came or went."""
-        endpoint = self._dialect.endpoint(token_key) if self.concerns(token_key) else None
+        endpoint = self._dialect.endpoint(token_key) if self.is_relevant(token_key) else None
         if endpoint is None or endpoint.zid == self.own_zid:
             return None
-        self.known.clear()
+        self.cache.clear()
         if endpoint.role is None:
-            return self._bridge(endpoint.zid, alive)
+            return self._apply_bridge(endpoint.zid, alive)
         if alive:
             self._tokens[endpoint.key][token_key] = endpoint
             if endpoint.role in ("SS", "AS"):
-                self._since[token_key] = now
+                self._alive_since[token_key] = now
         else:
-            self._end(endpoint.key, token_key)
+            self._remove_token(endpoint.key, token_key)
         return None
 
-    def _end(self, key: str, token_key: str) -> None:
-        """Of a node that went nothing is kept: many come once and never again."""
+    def _remove_token(self, key: str, token_key: str) -> None:
+        """Keeps nothing of an ended node: many nodes appear only once."""
         tokens = self._tokens.get(key, {})
         tokens.pop(token_key, None)
         if not tokens:
             self._tokens.pop(key, None)
-        self._since.pop(token_key, None)
+        self._alive_since.pop(token_key, None)
 
-    def _bridge(self, zid: str, alive: bool) -> str:
+    def _apply_bridge(self, zid: str, alive: bool) -> str:
         if alive:
             self._bridges.add(zid)
-            self._answered = None  # it was not asked yet
+            self._bridge_versions = None  # the new bridge has not been queried yet
         else:
             self._bridges.discard(zid)
-            self._fits.pop(zid, None)
+            self._namespace_matches.pop(zid, None)
         return zid
 
-    def learn(self, routes: Iterable[Route], nodes: Iterable[Endpoint] = ()) -> None:
-        """Takes what the bridges said of their routes, and of the publishers and subscribers of
-        the nodes behind them: a route has one type, whatever they have."""
-        self.known.clear()
+    def update_routes(self, routes: Iterable[Route], nodes: Iterable[Endpoint] = ()) -> None:
+        """Replaces the bridges' routes, and the publishers and subscribers of the nodes behind them,
+        whose types may differ from the route's."""
+        self.cache.clear()
         self._routes.clear()
         self._nodes.clear()
         for route in routes:
@@ -144,83 +150,84 @@ class Graph:
         for node in nodes:
             self._nodes[node.key].append(node)
 
-    def answered(self, versions: Mapping[str, str]) -> None:
-        """Takes which bridges answered when they were asked, and with which version."""
-        self.known.clear()
-        self._answered = versions
+    def update_versions(self, versions: Mapping[str, str]) -> None:
+        """Replaces the versions of the bridges that responded, by zid."""
+        self.cache.clear()
+        self._bridge_versions = versions
 
-    def configured(self, namespaces: Mapping[str, str]) -> None:
-        """Takes the namespace of each bridge that told it ("" for none)."""
-        self.known.clear()
+    def update_namespaces(self, namespaces: Mapping[str, str]) -> None:
+        """Adds the namespaces of bridges, by zid ("" for none)."""
+        self.cache.clear()
         for zid, namespace in namespaces.items():
-            self._fits[zid] = self._namespace is None or within(self._namespace, namespace)
+            self._namespace_matches[zid] = self._namespace is None or within(self._namespace, namespace)
 
     @property
-    @remembered
+    @cached_until_change
     def bridges(self) -> frozenset[str]:
-        """Those of this robot; one that has not told its namespace may be, if no other is."""
-        told = {zid for zid in self._bridges if self._fits.get(zid)}
-        return frozenset(told or self._bridges - self._fits.keys())
+        """The zids of this robot's bridges. If none has its namespace, those with an unknown
+        namespace."""
+        matching = {zid for zid in self._bridges if self._namespace_matches.get(zid)}
+        return frozenset(matching or self._bridges - self._namespace_matches.keys())
 
     @property
-    @remembered
-    def silent(self) -> bool:
-        """A bridge is there by its token, but did not answer when all were asked."""
-        asked = self._answered
-        return asked is not None and bool(self.bridges - asked.keys())
+    @cached_until_change
+    def has_silent_bridge(self) -> bool:
+        """Whether a bridge has a token but did not respond to the last query."""
+        versions = self._bridge_versions
+        return versions is not None and bool(self.bridges - versions.keys())
 
     @property
-    @remembered
-    def simulated(self) -> bool:
-        """A bridge that answered is a demo robot's."""
-        asked = self._answered or {}
-        return any(asked.get(zid) == DEMO_VERSION for zid in self.bridges)
+    @cached_until_change
+    def is_simulated(self) -> bool:
+        """Whether a bridge is that of the simulated robot."""
+        versions = self._bridge_versions or {}
+        return any(versions.get(zid) == DEMO_VERSION for zid in self.bridges)
 
-    @remembered
-    def _on_robot(self, role: Role, key: str) -> list[Endpoint]:
+    @cached_until_change
+    def _endpoints(self, role: Role, key: str) -> list[Endpoint]:
         tokens = self._tokens.get(key, {}).values()
         return [e for e in tokens if e.role == role and e.zid in self._bridges]
 
-    def behind(self, role: Role, key: str) -> frozenset[str]:
-        """The bridges behind which a node publishes, subscribes or serves."""
-        return frozenset(e.zid for e in self._on_robot(role, key))
+    def bridges_with(self, role: Role, key: str) -> frozenset[str]:
+        """The zids of the bridges behind which a node publishes, subscribes or serves."""
+        return frozenset(e.zid for e in self._endpoints(role, key))
 
-    def on_robot(self, role: Role, key: str) -> bool:
+    def has_endpoint(self, role: Role, key: str) -> bool:
         """Whether a node behind a bridge publishes, subscribes or serves."""
-        return bool(self._on_robot(role, key))
+        return bool(self._endpoints(role, key))
 
     def server_type(self, role: ServerRole, key: str) -> str | None:
-        """The type of the robot's service or action; None if it offers none of this name now."""
-        return next((e.type for e in self._on_robot(role, key)), None)
+        """The type of the robot's service or action; None if there is no server now."""
+        return next((e.type for e in self._endpoints(role, key)), None)
 
-    @remembered
+    @cached_until_change
     def served_since(self, role: ServerRole, key: str) -> float:
-        """When (monotonic seconds) the last server of this name came; -inf where there is none."""
+        """When the newest server of this name appeared (monotonic seconds); -inf without one."""
         tokens = self._tokens.get(key, {}).items()
-        here = (self._since[t] for t, e in tokens if e.role == role and e.zid in self._bridges)
-        return max(here, default=-math.inf)
+        times = (self._alive_since[t] for t, e in tokens if e.role == role and e.zid in self._bridges)
+        return max(times, default=-math.inf)
 
-    def latched(self, key: str) -> bool | None:
-        """Whether the robot's publisher is TRANSIENT_LOCAL; None if it has none now."""
-        return next((e.transient_local for e in self._on_robot("MP", key)), None)
+    def is_transient_local(self, key: str) -> bool | None:
+        """Whether the robot's publisher is TRANSIENT_LOCAL; None without a publisher."""
+        return next((e.transient_local for e in self._endpoints("MP", key)), None)
 
     def volatile(self, key: str) -> bool:
         """Whether the robot's publishers are known, and none is TRANSIENT_LOCAL."""
-        known = self._on_robot("MP", key)
+        known = self._endpoints("MP", key)
         return bool(known) and not any(e.transient_local for e in known)
 
-    @remembered
-    def unheard(self, key: str) -> bool:
+    @cached_until_change
+    def is_unrouted(self, key: str) -> bool:
         """Whether the robot publishes a topic that its bridge does not read for the panel."""
-        publishing = {e.zid for e in self._on_robot("MP", key)}
+        publishing = {e.zid for e in self._endpoints("MP", key)}
         return any(
-            r.direction == "pub" and not r.whole and r.zid in publishing
+            r.direction == "pub" and not r.has_reader and r.zid in publishing
             for r in self._routes.get(key, [])
         )
 
-    @remembered
-    def wrong_type(self, role: TopicRole, key: str, type_name: str) -> str | None:
-        """The other type that this topic has, if it is not what the panel needs for `role`."""
+    @cached_until_change
+    def mismatched_type(self, role: TopicRole, key: str, type_name: str) -> str | None:
+        """The type of a counterpart or route that differs from `type_name`; None if all are equal."""
         theirs, others, direction = _COUNTERPARTS[role]
         for endpoint in chain(self._tokens.get(key, {}).values(), self._nodes.get(key, [])):
             counts = endpoint.role == (theirs if endpoint.zid in self._bridges else others)
@@ -232,22 +239,24 @@ class Graph:
                 return route.type
         return None
 
-    @remembered
-    def wrong_qos(self, role: TopicRole, key: str, qos: Qos) -> str | None:
-        """The code of the sentence that says what DDS would not match, for what the panel does.
+    @cached_until_change
+    def mismatched_qos(self, role: TopicRole, key: str, qos: Qos) -> str | None:
+        """The code of the sentence about a QoS that does not match; None if it matches.
 
-        Of several publishers each counts: one that is not heard may say something else. Of several
-        subscribers one that hears is enough.
+        All publishers must match: one that is not received may publish something else. One matching
+        subscriber is enough.
         """
-        theirs = self._on_robot(_COUNTERPARTS[role][0], key)
-        doubts = [_unheard(e, qos) if role == "MS" else _unheard_by(e, qos) for e in theirs]
-        if role == "MP" and None in doubts:
+        theirs = self._endpoints(_COUNTERPARTS[role][0], key)
+        mismatches = [
+            _reader_mismatch(e, qos) if role == "MS" else _writer_mismatch(e, qos) for e in theirs
+        ]
+        if role == "MP" and None in mismatches:
             return None
-        return next(filter(None, doubts), None)
+        return next(filter(None, mismatches), None)
 
 
-def _unheard(publisher: Endpoint, qos: Qos) -> str | None:
-    """Why a reader of this QoS would not hear a publisher."""
+def _reader_mismatch(publisher: Endpoint, qos: Qos) -> str | None:
+    """Why a subscription with this QoS does not match a publisher."""
     if qos.reliable and publisher.reliable is False:
         return "publishes_best_effort"
     if qos.transient_local and not publisher.transient_local:
@@ -255,8 +264,8 @@ def _unheard(publisher: Endpoint, qos: Qos) -> str | None:
     return None
 
 
-def _unheard_by(subscriber: Endpoint, qos: Qos) -> str | None:
-    """Why a subscriber would not hear a writer of this QoS."""
+def _writer_mismatch(subscriber: Endpoint, qos: Qos) -> str | None:
+    """Why a subscriber does not match a publisher with this QoS."""
     if not qos.reliable and subscriber.reliable:
         return "asks_for_reliable"
     if not qos.transient_local and subscriber.transient_local:

@@ -1,4 +1,4 @@
-"""What a node says of a parameter that it declares, and what may be set by it: pure.
+"""The state of a node's parameter and the values that may be set. Pure.
 
 Shapes: rcl_interfaces/msg/ParameterValue and ParameterDescriptor, of ROS 2's parameter services.
 """
@@ -9,16 +9,16 @@ from dataclasses import dataclass
 from typing import Any, Final, Literal
 
 from app.i18n import TextLike, joined, say
-from app.panel.number_range import Range, described
+from app.panel.number_range import Range, range_text
 from app.panel.widgets.parameter import Parameter, Value
 
-# rcl_interfaces/msg/ParameterType: a type is its place here.
-NAMES: Final = (
+# The names of rcl_interfaces/msg/ParameterType, by their numbers.
+TYPE_NAMES: Final = (
     "not set", "bool", "integer", "double", "string", "byte[]", "bool[]", "integer[]", "double[]",
     "string[]",
 )  # fmt: skip
 NOT_SET: Final = 0
-EMPTY: Final[Mapping[str, Any]] = {
+EMPTY_VALUE: Final[Mapping[str, Any]] = {
     "type": NOT_SET,
     "bool_value": False,
     "integer_value": 0,
@@ -30,129 +30,139 @@ EMPTY: Final[Mapping[str, Any]] = {
     "double_array_value": (),
     "string_array_value": (),
 }
-LONGEST_LIST: Final = 1000  # values that can be set; of longer lists so many and one more are known
+MAX_LIST_LENGTH: Final = 1000  # values that can be set; of a longer list one value more is kept
 
 State = Literal["waiting", "live", "cut", "silent", "missing", "undeclared", "mistyped", "unreadable"]
-OPEN: Final = Range()
+UNLIMITED: Final = Range()
 
 
 @dataclass(frozen=True, slots=True)
 class ParameterState:
-    """What is known of a parameter; `found` is the type that it has on the robot.
+    """What is known of a parameter; `robot_type` is its type on the robot.
 
-    `value` is None where there is none; of one that is `cut` or `silent` it is the last known.
-    `wall` (seconds since the epoch) is when the node told it.
+    `value` is None without a value; in the states `cut` and `silent` it is the last known one. `wall`
+    (seconds since the epoch) is when it was received.
     """
 
     state: State
     value: Value | None = None
-    range: Range = OPEN
+    range: Range = UNLIMITED
     read_only: bool = False
     hint: str = ""
-    found: str = ""
+    robot_type: str = ""
     wall: float = 0.0
 
 
 UNKNOWN: Final = ParameterState("waiting")
 
 
-def parameter_states(of: Parameter, descriptor: Any, value: Any, wall: float) -> ParameterState:
-    """From a ParameterDescriptor and a ParameterValue, each None where the node gave none."""
+def read_parameter_state(
+    parameter: Parameter, descriptor: Any, value: Any, wall: float
+) -> ParameterState:
+    """The state from a ParameterDescriptor and a ParameterValue, each None if the node sent none."""
     kind = NOT_SET if value is None else value.type
     described_as = NOT_SET if descriptor is None or descriptor.dynamic_typing else descriptor.type
     if kind == described_as == NOT_SET and not (descriptor is not None and descriptor.dynamic_typing):
         return ParameterState("undeclared", wall=wall)
     for one in (kind, described_as):
-        if one != NOT_SET and one != NAMES.index(of.type):
-            return ParameterState("mistyped", found=name_of(one), wall=wall)
+        if one != NOT_SET and one != TYPE_NAMES.index(parameter.type):
+            return ParameterState("mistyped", robot_type=type_name(one), wall=wall)
     if descriptor is None:
         return ParameterState("unreadable", wall=wall)
     return ParameterState(
         "missing" if kind == NOT_SET else "live",
-        None if kind == NOT_SET else value_in(of, value),
-        range_of(of, descriptor),
+        None if kind == NOT_SET else decode_value(parameter, value),
+        described_range(parameter, descriptor),
         bool(descriptor.read_only),
         " ".join(filter(None, (descriptor.description, descriptor.additional_constraints))),
-        of.type,
+        parameter.type,
         wall,
     )
 
 
-def name_of(kind: int) -> str:
+def type_name(kind: int) -> str:
     """The name of a rcl_interfaces/msg/ParameterType."""
-    return NAMES[kind] if kind < len(NAMES) else f"type {kind}"
+    return TYPE_NAMES[kind] if kind < len(TYPE_NAMES) else f"type {kind}"
 
 
-def value_in(of: Parameter, value: Any) -> Value:
-    """The value of a ParameterValue whose type is the parameter's."""
-    found: Any = getattr(value, _field(of))
-    return tuple(found[: LONGEST_LIST + 1]) if of.many else found
+def decode_value(parameter: Parameter, value: Any) -> Value:
+    """The value in a ParameterValue of the parameter's type."""
+    found: Any = getattr(value, _value_field(parameter))
+    return tuple(found[: MAX_LIST_LENGTH + 1]) if parameter.is_list else found
 
 
-def wire(of: Parameter, value: Value) -> dict[str, Any]:
+def encode_value(parameter: Parameter, value: Value) -> dict[str, Any]:
     """The fields of a ParameterValue."""
-    return {**EMPTY, "type": NAMES.index(of.type), _field(of): value}
+    return {**EMPTY_VALUE, "type": TYPE_NAMES.index(parameter.type), _value_field(parameter): value}
 
 
-def _field(of: Parameter) -> str:
-    return f"{of.element}_array_value" if of.many else f"{of.element}_value"
+def _value_field(parameter: Parameter) -> str:
+    return (
+        f"{parameter.element_type}_array_value"
+        if parameter.is_list
+        else f"{parameter.element_type}_value"
+    )
 
 
-def range_of(of: Parameter, descriptor: Any) -> Range:
-    """The range that a node describes; without a limit where it gives none that is a number."""
-    ranges = descriptor.integer_range if of.element == "integer" else descriptor.floating_point_range
-    if not of.counts or not ranges:
-        return OPEN
+def described_range(parameter: Parameter, descriptor: Any) -> Range:
+    """The range in a ParameterDescriptor; limits that are not finite are left open."""
+    ranges = (
+        descriptor.integer_range
+        if parameter.element_type == "integer"
+        else descriptor.floating_point_range
+    )
+    if not parameter.has_numbers or not ranges:
+        return UNLIMITED
     one = ranges[0]
-    return Range(_limit(one.from_value), _limit(one.to_value), _limit(one.step) or None)
+    return Range(_finite(one.from_value), _finite(one.to_value), _finite(one.step) or None)
 
 
-def _limit(number: float) -> float | None:
+def _finite(number: float) -> float | None:
     return number if math.isfinite(number) else None
 
 
-def own_range(of: Parameter) -> Range:
-    """What the panel itself allows."""
-    limits = (of.min, of.max, of.step)
-    if of.element == "integer":
+def panel_range(parameter: Parameter) -> Range:
+    """The range that the panel file allows."""
+    limits = (parameter.min, parameter.max, parameter.step)
+    if parameter.element_type == "integer":
         return Range(*(None if one is None else int(one) for one in limits))
     return Range(*limits)
 
 
-def allowed(of: Parameter, known: ParameterState) -> Range:
-    """What both the node and the panel allow."""
-    return known.range.within(own_range(of))
+def allowed_range(parameter: Parameter, known: ParameterState) -> Range:
+    """The range that both the node and the panel file allow."""
+    return known.range.narrowed_by(panel_range(parameter))
 
 
-def suits(of: Parameter, known: ParameterState) -> bool:
-    """Whether there is a value that both the node and the panel allow."""
-    if not (of.options and of.counts):
-        return not allowed(of, known).empty
-    values = (one.value if of.many else [one.value] for one in of.options)
-    return any(all(known.range.holds(one) for one in several) for several in values)
+def has_allowed_value(parameter: Parameter, known: ParameterState) -> bool:
+    """Whether both the node and the panel file allow at least one value."""
+    if not (parameter.options and parameter.has_numbers):
+        return not allowed_range(parameter, known).is_empty
+    values = (one.value if parameter.is_list else [one.value] for one in parameter.options)
+    return any(all(known.range.contains(one) for one in several) for several in values)
 
 
-def ours_text(of: Parameter) -> TextLike:
-    """What the panel lets be set, as an operator reads it."""
-    labels = joined((option.label for option in of.options), "between_names")
-    return labels or limits_text(of, own_range(of))
+def panel_limits_text(parameter: Parameter) -> TextLike:
+    """The values that the panel file allows, as text for an operator."""
+    labels = joined((option.label for option in parameter.options), "between_names")
+    return labels or limits_text(parameter, panel_range(parameter))
 
 
-def limits_text(of: Parameter, limits: Range) -> TextLike:
-    """What may be set, as an operator reads it; "" where nothing has to be said."""
-    if of.options:
+def limits_text(parameter: Parameter, limits: Range) -> TextLike:
+    """The allowed values as text for an operator; "" if no text is needed."""
+    if parameter.options:
         return ""
-    if of.many:
-        return say("limits_list", each=each_text(of, limits))
-    return each_text(of, limits) if of.counts else ""
+    if parameter.is_list:
+        return say("limits_list", each=each_text(parameter, limits))
+    return each_text(parameter, limits) if parameter.has_numbers else ""
 
 
-def each_text(of: Parameter, limits: Range) -> TextLike:
-    """What one value may be."""
-    match of.element:
+def each_text(parameter: Parameter, limits: Range) -> TextLike:
+    """The allowed values of one element, as text."""
+    match parameter.element_type:
         case "bool":
-            return say("either", first=of.on, last=of.off)
+            return say("either", first=parameter.on, last=parameter.off)
         case "string":
             return say("any_text")
-    whole = of.element == "integer"
-    return described(limits, of.unit) or say("any_whole" if whole else "any_number")
+    whole = parameter.element_type == "integer"
+    return range_text(limits, parameter.unit) or say("any_whole" if whole else "any_number")

@@ -1,63 +1,63 @@
-"""Which ends of the robot's nodes (publishers, subscribers, servers) a panel needs, and which of them
-went though their bridge stayed."""
+"""The endpoints of the robot (publishers, subscribers, servers) that a panel needs, and which of them
+are missing while their bridge is connected."""
 
 from collections.abc import Iterator, Mapping
 from typing import Final
 
 from app.dialect.endpoint import Role
 from app.panel.model import Panel
-from app.robot.graph import Graph, remembered
+from app.robot.graph import Graph, cached_until_change
 
-End = tuple[Role, str]
-ORDER: Final[Mapping[Role, int]] = {"MP": 0, "MS": 1, "SS": 2, "AS": 2}
+RequiredEndpoint = tuple[Role, str]
+ROLE_ORDER: Final[Mapping[Role, int]] = {"MP": 0, "MS": 1, "SS": 2, "AS": 2}
 
 
-def required_endpoints(panel: Panel) -> Iterator[End]:
-    """What the panel talks with, as (role, ROS name). Every node publishes its parameters' events:
-    they show none of the panel's."""
+def required_endpoints(panel: Panel) -> Iterator[RequiredEndpoint]:
+    """The endpoints that the panel needs, as (role, ROS name). Without the topic of parameter events,
+    which every node publishes."""
     for interlock in panel.interlocks:
         yield "MP", interlock.topic
     of_widgets = (end for widget in panel.widgets() for end in widget.endpoints())
-    yield from sorted(of_widgets, key=lambda end: ORDER[end[0]])
+    yield from sorted(of_widgets, key=lambda end: ROLE_ORDER[end[0]])
 
 
 class EndpointPresence:
-    """Remembers behind which bridges each end was seen last: one entry for each that is needed."""
+    """The bridges behind which each required endpoint was last seen."""
 
-    def __init__(self, needed: Mapping[End, End]) -> None:
+    def __init__(self, needed: Mapping[RequiredEndpoint, RequiredEndpoint]) -> None:
         """`needed`: (role, ROS name) → (role, key expression)."""
-        self.needed = needed
-        self.behind: dict[End, frozenset[str]] = {}
+        self.required = needed
+        self.last_bridges: dict[RequiredEndpoint, frozenset[str]] = {}
 
-    def follow(self, graph: Graph) -> None:
-        """After every change of the graph."""
-        for end, (role, key) in self.needed.items():
-            if bridges := graph.behind(role, key):
-                self.behind[end] = bridges
-        graph.known.clear()  # what was found with what was behind them before
+    def update(self, graph: Graph) -> None:
+        """Updates the presence; call it after every change of the graph."""
+        for end, (role, key) in self.required.items():
+            if bridges := graph.bridges_with(role, key):
+                self.last_bridges[end] = bridges
+        graph.cache.clear()  # results depend on `last_bridges` too
 
-    def forget(self) -> None:
-        """The link was lost: what is seen after it is seen for the first time."""
-        self.behind.clear()
+    def clear(self) -> None:
+        """Forgets all endpoints; call it when the link is lost."""
+        self.last_bridges.clear()
 
-    def any(self, graph: Graph) -> bool:
-        """Whether a node is there that the panel talks with."""
-        return _any(graph, self)
+    def any_present(self, graph: Graph) -> bool:
+        """Whether any required endpoint exists."""
+        return _any_present(graph, self)
 
-    def gone(self, graph: Graph) -> list[str]:
-        """The ROS names of what was there and is not, while its bridge is."""
-        return _gone(graph, self)
-
-
-@remembered
-def _any(graph: Graph, seen: EndpointPresence) -> bool:
-    return any(graph.on_robot(role, key) for role, key in seen.needed.values())
+    def missing(self, graph: Graph) -> list[str]:
+        """The ROS names of endpoints that have disappeared while their bridge is connected."""
+        return _missing(graph, self)
 
 
-@remembered
-def _gone(graph: Graph, seen: EndpointPresence) -> list[str]:
+@cached_until_change
+def _any_present(graph: Graph, seen: EndpointPresence) -> bool:
+    return any(graph.has_endpoint(role, key) for role, key in seen.required.values())
+
+
+@cached_until_change
+def _missing(graph: Graph, seen: EndpointPresence) -> list[str]:
     return [
         end[1]
-        for end, bridges in seen.behind.items()
-        if bridges & graph.bridges and not graph.on_robot(*seen.needed[end])
+        for end, bridges in seen.last_bridges.items()
+        if bridges & graph.bridges and not graph.has_endpoint(*seen.required[end])
     ]

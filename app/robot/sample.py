@@ -1,17 +1,17 @@
-"""What comes of a topic, as it came."""
+"""Received messages, undecoded."""
 
 from typing import NamedTuple, Protocol
 
 
 class Buffer(Protocol):
-    """Bytes, or what becomes bytes when asked (Zenoh's buffers: no copy until then)."""
+    """Bytes, or a Zenoh buffer, which is copied only by `bytes()`."""
 
     def __bytes__(self) -> bytes: ...
     def __len__(self) -> int: ...
 
 
-class PassedOver(NamedTuple):
-    """A payload that came and went before anybody looked, and when: see `Sample`."""
+class SkippedPayload(NamedTuple):
+    """The payload of a skipped sample, with its times as in `Sample`."""
 
     payload: Buffer
     at: float
@@ -19,14 +19,14 @@ class PassedOver(NamedTuple):
 
 
 class Sample(NamedTuple):
-    """One message as it came: `at` monotonic seconds, `wall` seconds since the epoch.
+    """One received message: `at` in monotonic seconds, `wall` in seconds since the epoch.
 
     `source` is the zid of the bridge that sent it (from its timestamp), None if it did not say;
     `seq` orders samples and losses of bridges as this session saw them; `skipped` is how many came
     just before it that nobody looked at; `sent` is the timestamp of its sender's clock, in seconds
-    since the epoch; `between` are other payloads that came and went unseen, for watched topics, and
-    `overrun` says that there were more before these, of which nobody knows what they said. `cached` is
-    one of a cache: it was published before, nobody knows when.
+    since the epoch; `skipped_payloads` are other payloads that came and went unseen, for watched
+    topics, and `overrun` says that there were more before these, with unknown content. `cached` is
+    one of a cache: it was published before, at an unknown time.
     """
 
     payload: Buffer
@@ -36,6 +36,6 @@ class Sample(NamedTuple):
     source: str | None
     skipped: int = 0
     sent: float | None = None
-    between: tuple[PassedOver, ...] = ()
+    skipped_payloads: tuple[SkippedPayload, ...] = ()
     overrun: bool = False
     cached: bool = False

@@ -1,7 +1,7 @@
-"""Reading what is large while all else goes on: some milliseconds in each turn of the event loop.
+"""Decodes large messages in slices: some milliseconds in each turn of the event loop.
 
-What is small is read at once, as it always was. Nothing a robot sends makes a press or a permission
-wait longer than a turn's share.
+Small messages are decoded at once. No message of a robot delays a press or a permission by more than
+one slice.
 """
 
 import asyncio
@@ -12,44 +12,48 @@ from typing import Final
 
 from app.interfaces import FieldReader, Fields, Walk
 
-AT_ONCE_S: Final = 0.01  # of one turn in which something came, for all that is read in it
-LATER_S: Final = 0.003  # of each turn after that
-SMALL: Final = 2_000  # bytes: read at once, however much came in this turn
+FIRST_SHARE_S: Final = 0.01  # of a turn in which messages arrive, for all of them
+LATER_SHARE_S: Final = 0.003  # of each later turn
+SMALL_BYTES: Final = 2_000  # decoded at once, however much has arrived in this turn
 
-GoOn = Callable[[float], bool]  # reads on until then (monotonic seconds); whether it is through
+Resume = Callable[
+    [float], bool
+]  # continues until a time (monotonic seconds); returns whether it is done
 
 
 class Slices:
-    """How much is read in a turn; used on the event loop only. Without one nothing is put off."""
+    """Limits the decoding time of each turn. Used on the event loop; without a running loop there is no
+    limit."""
 
     def __init__(self, monotonic: Callable[[], float] = time.monotonic) -> None:
         self._now = monotonic
-        self._until: float | None = None  # of this turn; None: nothing was read in it yet
-        self._later: deque[GoOn] = deque()
+        self._until: float | None = None  # deadline of this turn; None: nothing was decoded in it yet
+        self._pending: deque[Resume] = deque()
 
     def read(self, walk: Walk, size: int) -> Fields | None:
-        """Reads a message of so many bytes; None where this turn's share is over before it is through.
-        DecodeError where it is none."""
-        until = self._share()
-        if size > SMALL and self._now() >= until:
+        """Decodes a message of `size` bytes; None if this turn's time ends first. DecodeError if the
+        bytes are no such message."""
+        until = self._turn_deadline()
+        if size > SMALL_BYTES and self._now() >= until:
             return None
         return self.read_until(walk, until)
 
     def read_until(self, walk: Walk, until: float) -> Fields | None:
-        """The same, to a moment."""
-        while (fields := walk.go_on()) is None:
+        """The same until a time (monotonic seconds)."""
+        while (fields := walk.advance()) is None:
             if self._now() >= until:
                 return None
         return fields
 
-    def later(self, go_on: GoOn) -> None:
-        """Calls it once a turn from the next one on, until it is through."""
-        self._later.append(go_on)
-        if len(self._later) == 1:
-            asyncio.get_running_loop().call_soon(self._go_on)
+    def schedule(self, go_on: Resume) -> None:
+        """Calls it once a turn, from the next turn on, until it returns true."""
+        self._pending.append(go_on)
+        if len(self._pending) == 1:
+            asyncio.get_running_loop().call_soon(self._resume_next)
 
-    async def whole(self, reader: FieldReader, data: bytes) -> Fields:
-        """Reads a message, however many turns that takes; DecodeError where it is none."""
+    async def read_all(self, reader: FieldReader, data: bytes) -> Fields:
+        """Decodes a message, over as many turns as needed; DecodeError if the bytes are no such
+        message."""
         walk = reader.walk(data)
         if (fields := self.read(walk, len(data))) is not None:
             return fields
@@ -64,31 +68,31 @@ class Slices:
                     done.set_exception(error)
             return done.done()
 
-        self.later(go_on)
+        self.schedule(go_on)
         return await done
 
-    def _share(self) -> float:
-        """Until when what came in this turn may be read."""
+    def _turn_deadline(self) -> float:
+        """When decoding in this turn must stop (monotonic seconds)."""
         if self._until is None:
             try:
-                asyncio.get_running_loop().call_soon(self._turn)
+                asyncio.get_running_loop().call_soon(self._end_turn)
             except RuntimeError:
                 return float("inf")
-            self._until = self._now() + AT_ONCE_S
+            self._until = self._now() + FIRST_SHARE_S
         return self._until
 
-    def _turn(self) -> None:
+    def _end_turn(self) -> None:
         self._until = None
 
-    def _go_on(self) -> None:
-        """One of those that wait, each in its turn."""
-        go_on = self._later[0]
+    def _resume_next(self) -> None:
+        """Continues the next pending message, round robin."""
+        go_on = self._pending[0]
         through = True
         try:
-            through = go_on(self._now() + LATER_S)
+            through = go_on(self._now() + LATER_SHARE_S)
         finally:
-            self._later.popleft()
+            self._pending.popleft()
             if not through:
-                self._later.append(go_on)
-            if self._later:
-                asyncio.get_running_loop().call_soon(self._go_on)
+                self._pending.append(go_on)
+            if self._pending:
+                asyncio.get_running_loop().call_soon(self._resume_next)

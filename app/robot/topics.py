@@ -1,7 +1,7 @@
-"""What a topic said last, read where the panel names a field of it.
+"""The latest message of a topic, with the fields that the panel names.
 
-The newest counts. What takes longer to read than a turn of the event loop allows is read on in the next
-turns, one message after the other; until the newest is read, it is not known what the topic says now.
+The newest message counts. A message that takes longer to decode than a turn of the event loop allows is
+continued in the next turns. Until the newest is decoded, the topic's value is unknown.
 """
 
 import math
@@ -15,13 +15,17 @@ from app.interfaces import FieldReader, Fields, Walk
 from app.robot.sample import Sample
 from app.robot.slices import Slices
 
-UNREAD_MOST: Final = 16  # messages of a watched topic that wait to be read; of other topics the newest
+MAX_UNREAD: Final = 16  # undecoded messages of a watched topic; of other topics only the newest is kept
 
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """The latest of a topic: not seen yet, seen before a cut, not readable, not read to its end yet
-    (with what the one before said), or a message."""
+    """The latest message of a topic.
+
+    `status`: no message yet ("waiting"); received before a cut ("cut"); not decodable ("unreadable");
+    being decoded, with the fields of the one before ("reading"); a valid message ("message"). `at` is
+    in monotonic seconds, `wall` in seconds since the epoch.
+    """
 
     status: Literal["waiting", "cut", "unreadable", "reading", "message"]
     fields: Fields | None = None
@@ -29,12 +33,12 @@ class Reading:
     wall: float = 0.0
 
     def value(self, path: str) -> Any:
-        """The field at a path that the panel names; None where it is not there."""
+        """The field at a path; None if the message has no such element."""
         return None if self.fields is None else self.fields.get(path)
 
-    def several(self, path: str) -> bool:
-        """Whether it is not known because more than one element has the path's key."""
-        return self.fields is not None and self.fields.several(path)
+    def is_ambiguous(self, path: str) -> bool:
+        """Whether the value is unknown because several elements have the path's key."""
+        return self.fields is not None and self.fields.is_ambiguous(path)
 
 
 WAITING: Final = Reading("waiting")
@@ -52,88 +56,89 @@ class Topic:
         unreadable: Callable[[Sample, DecodeError], None],
         read_later: Callable[[Reading], None],
     ) -> None:
-        """Of a `watched` one each message counts; `read_later` gets what took more than one turn."""
+        """Of a `watched` topic each message counts. `on_late_reading` takes a reading that needed more
+        than one turn; `on_unreadable` a sample that can't be decoded."""
         self._reader = reader
         self._slices = slices
         self._unreadable = unreadable
         self._read_later = read_later
         self._watched = watched
-        self._unread: deque[Sample] = deque(maxlen=UNREAD_MOST)
-        self._walk: _Walked | None = None  # before the unread
-        self._put_off = False
-        self._last = WAITING
+        self._unread: deque[Sample] = deque(maxlen=MAX_UNREAD)
+        self._walk: _PendingRead | None = None  # before the unread
+        self._deferred = False
+        self._last_reading = WAITING
         self.sample: Sample | None = None  # the newest
 
-    def take(self, sample: Sample) -> None:
-        """A newer message."""
+    def update(self, sample: Sample) -> None:
+        """Adds a newer message."""
         self.sample = sample
         if self._walk is None or not self._watched:
             self._unread.clear()
         self._unread.append(sample)
 
     def reading(self) -> Reading:
-        """What it says now."""
-        if not self._put_off and not self._read():
-            self._put_off = True
-            self._slices.later(self._go_on)
+        """The current reading."""
+        if not self._deferred and not self._read():
+            self._deferred = True
+            self._slices.schedule(self._resume)
         if self._walk is None and not self._unread:
-            return self._last
-        return replace(self._last, status="reading")
+            return self._last_reading
+        return replace(self._last_reading, status="reading")
 
-    def cut(self) -> None:
-        """What it said no longer says what is so."""
+    def invalidate(self) -> None:
+        """The last value is no longer valid."""
         if self.sample is not None:
-            self._last = replace(self.reading(), status="cut")
+            self._last_reading = replace(self.reading(), status="cut")
             self._unread.clear()
             self._walk = None
 
     def _read(self) -> bool:
-        """Reads what this turn allows; whether that was all."""
-        while (walked := self._next()) is not None:
+        """Decodes as much as this turn allows; returns whether that was all."""
+        while (walked := self._next_read()) is not None:
             reading = self._read_one(walked, lambda: self._slices.read(walked.walk, walked.size))
             if reading is None:
                 return False
         return True
 
-    def _go_on(self, until: float) -> bool:
-        """The same in a later turn; each that is through by then is told."""
-        walked = self._next()
+    def _resume(self, until: float) -> bool:
+        """The same in a later turn; reports the reading if it is complete."""
+        walked = self._next_read()
         if walked is not None:
             reading = self._read_one(walked, lambda: self._slices.read_until(walked.walk, until))
-            self._put_off = self._next() is not None
+            self._deferred = self._next_read() is not None
             if reading is not None:
                 self._read_later(reading)
         else:
-            self._put_off = False
-        return not self._put_off
+            self._deferred = False
+        return not self._deferred
 
-    def _next(self) -> "_Walked | None":
-        """The one that is to be read now."""
+    def _next_read(self) -> "_PendingRead | None":
+        """The message to be decoded now; None without one."""
         if self._walk is None and self._unread:
             sample = self._unread.popleft()
             data = bytes(sample.payload)
-            self._walk = _Walked(sample, self._reader.walk(data), len(data))
+            self._walk = _PendingRead(sample, self._reader.walk(data), len(data))
         return self._walk
 
-    def _read_one(self, walked: "_Walked", read: Callable[[], Fields | None]) -> Reading | None:
-        """Its reading, which is the last then; None where it is not through."""
+    def _read_one(self, walked: "_PendingRead", read: Callable[[], Fields | None]) -> Reading | None:
+        """The message's reading, kept as the last one; None if it is not complete."""
         sample = walked.sample
         try:
             fields = read()
         except DecodeError as error:
             self._unreadable(sample, error)
-            self._last = Reading("unreadable", None, sample.at, sample.wall)
+            self._last_reading = Reading("unreadable", None, sample.at, sample.wall)
         else:
             if fields is None:
                 return None
-            self._last = Reading("message", fields, sample.at, sample.wall)
+            self._last_reading = Reading("message", fields, sample.at, sample.wall)
         self._walk = None
-        return self._last
+        return self._last_reading
 
 
 @dataclass(frozen=True, slots=True)
-class _Walked:
-    """A message that is being read, of so many bytes."""
+class _PendingRead:
+    """A message that is being decoded; `size` in bytes."""
 
     sample: Sample
     walk: Walk

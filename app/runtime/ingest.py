@@ -81,7 +81,7 @@ class Ingest:
         }
         self._events = robot.key(EVENTS)
         # What is judged by them is judged by each value that they had, however short.
-        self.watched = self._interlocks.keys() | {robot.key(one.topic) for one in panel.confirms()}
+        self.watched = self._interlocks.keys() | {robot.key(one.topic) for one in panel.confirmations()}
         self.prompt = self.watched | self._status.keys() | {self._events}
         self.whole = frozenset() if recorder is None else recorder.keys
 
@@ -93,10 +93,10 @@ class Ingest:
         ordered = sorted(changes.samples.items(), key=lambda one: one[0] not in self._interlocks)
         for key, sample in ordered:
             if sample.overrun and key in self._interlocks:
-                self._robot.doubt(key)
+                self._robot.invalidate(key)
                 yield updates.step()
-            for payload, at, wall in sample.between:
-                passed = sample._replace(payload=payload, at=at, wall=wall, between=())
+            for payload, at, wall in sample.skipped_payloads:
+                passed = sample._replace(payload=payload, at=at, wall=wall, skipped_payloads=())
                 if self._take(key, passed, updates) == "now":
                     yield updates.step()
             change = self._take(key, sample, updates)
@@ -130,7 +130,7 @@ class Ingest:
     def _record(self, changes: Changes) -> None:
         if self._recorder is not None:
             for key, sample in changes.kept:
-                self._guarded(key, sample, self._recorder.hear)
+                self._guarded(key, sample, self._recorder.record_sample)
 
     def _guarded(self, key: str, sample: Sample, take: Callable[[str, Sample], None]) -> None:
         try:
@@ -146,43 +146,43 @@ class Ingest:
         else:
             if key == self._events:
                 self._parameters.hear(sample)
-            self._robot.take(key, sample)
+            self._robot.update(key, sample)
             if self._confirmations.awaits(key):
-                updates.readings.append((key, self._robot.reading_of(key)))
+                updates.readings.append((key, self._robot.reading_by_key(key)))
 
     def _tokens(self, tokens: Mapping[str, Token], updates: Updates) -> None:
         """Takes them in."""
         now, graph = time.monotonic(), self._robot.graph
         had_bridge = bool(tokens and graph.bridges)
         for key, token in tokens.items():
-            if not graph.concerns(key):
+            if not graph.is_relevant(key):
                 continue
             if endpoint := self._robot.dialect.endpoint(key):
                 self._publisher(key, token, endpoint)
                 if token.lost_seq:
                     self._parameters.lose(endpoint)
-            if token.lost_seq and (zid := graph.apply(key, False)):
-                self._robot.cut(zid, token.lost_seq)
+            if token.lost_seq and (zid := graph.apply_token(key, False)):
+                self._robot.mark_bridge_lost(zid, token.lost_seq)
                 updates.lost.append(zid)
                 had_bridge = had_bridge and bool(graph.bridges)
             if token.lost_seq and token.alive:
-                self._robot.follow_publishers(token.lost_seq)  # gone, be it for a moment
-            if token.alive and (zid := graph.apply(key, True, now)):
+                self._robot.update_publishers(token.lost_seq)  # gone, be it for a moment
+            if token.alive and (zid := graph.apply_token(key, True, now)):
                 updates.found.append(zid)
         updates.came = bool(updates.found) and not had_bridge
 
     def _publisher(self, key: str, token: Token, endpoint: Endpoint) -> None:
         """Whether a publisher has appeared, be it for a moment: until it says something, nobody knows
         what it permits."""
-        graph, silent = self._robot.graph, self._robot.silent
+        graph, silent_publishers = self._robot.graph, self._robot.silent_publishers
         if endpoint.zid == graph.own_zid:
             return
-        if token.came_seq and (token.lost_before or not graph.has(key)):  # else it is told twice
-            silent.appeared(endpoint, token.came_seq, token.came_at, token.lost_before)
+        if token.came_seq and (token.lost_before or not graph.has_token(key)):  # else it is told twice
+            silent_publishers.add_publisher(endpoint, token.came_seq, token.came_at, token.lost_before)
             if endpoint.role == "MP" and endpoint.transient_local:
                 self._robot.replayed.begin(endpoint.key, token.came_at)
         if token.lost_seq:
-            silent.lost(endpoint, token.lost_seq)
+            silent_publishers.remove_publisher(endpoint, token.lost_seq)
 
 
 def _change(before: Verdict, verdict: Verdict) -> Change:

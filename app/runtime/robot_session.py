@@ -15,7 +15,7 @@ from app.commands.control_acts import ControlActs
 from app.commands.press_context import PressGuard
 from app.errors import LinkError, NotFound
 from app.i18n import TextLike
-from app.interfaces import interfaces_of
+from app.interfaces import load_interfaces
 from app.panel.model import Panel, RobotEntry
 from app.panel.widgets.parameter import Parameter
 from app.permission.control_authority import ControlAuthority
@@ -75,7 +75,7 @@ class RobotSession:
         self.base = f"/robots/{entry.id}" if entry else ""
         self._operators_log = operators_log
         self._following = ExitStack()
-        self.interfaces = interfaces_of(panel.distro, panel.interfaces)
+        self.interfaces = load_interfaces(panel.distro, panel.interfaces)
         self.link = ZenohSession(config, lambda prompt: self._turn.wake(prompt), access.dialect)
         zid = self.link.zid
         self.robot = RobotState(panel, self.interfaces, access.dialect, zid, entry, server.slices)
@@ -118,13 +118,13 @@ class RobotSession:
             self._recorder,
         )
         self._turn = Turn(context, self.peer, self._ingest, self._commands, self.refresher)
-        self.robot.read_later = self._turn.read
+        self.robot.on_late_reading = self._turn.read
         self._rosout = Rosout(self.robot, self.interfaces, self.link, asyncio.get_running_loop())
 
     async def start(self) -> None:
         """Declares everything; whether anybody is there shows later."""
         await self._commands.start()
-        self.interfaces.prepare(
+        self.interfaces.prepare_codecs(
             {*self.panel.subscriptions().values(), *self.panel.publications().values()}
         )
         declared = declarations(self.panel, self.interfaces, self.robot)
@@ -165,7 +165,7 @@ class RobotSession:
             return None
         from app.recording import Recorder
 
-        recordings.follow(self.show)
+        recordings.add_listener(self.show)
         name = self.entry.id if self.entry else ""
         rules = self.panel.record
         return Recorder(self.panel, rules, self.interfaces, self.robot, name, recordings)
@@ -201,7 +201,7 @@ class RobotSession:
 
     def renew(self) -> None:
         """A new Zenoh session: until it is joined, nobody is known to be there."""
-        self.robot.lose()
+        self.robot.mark_link_lost()
         self._turn.follow(came=False)
         self.show()
         self._renewal.begin()

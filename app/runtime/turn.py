@@ -100,7 +100,7 @@ class Turn:
 
     def follow(self, came: bool) -> None:
         """After every change of the graph; `came`: there is a peer where there was none."""
-        self._robot.follow_publishers()
+        self._robot.update_publishers()
         self._commands.follow()
         self._peer.follow(came)
 

@@ -109,19 +109,19 @@ def _value(kind: int, value: Any) -> Fields:
     return {**EMPTY, "type": kind, FIELDS[kind]: value}
 
 
-def _descriptor(name: str, of: Parameter) -> Fields:
+def _descriptor(name: str, parameter: Parameter) -> Fields:
     ranges: list[Fields] = []
-    if of.limits is not None:
-        low, high, step = of.limits
+    if parameter.limits is not None:
+        low, high, step = parameter.limits
         ranges = [{"from_value": low, "to_value": high, "step": step}]
     return {
         "name": name,
-        "type": of.type,
-        "description": of.description,
+        "type": parameter.type,
+        "description": parameter.description,
         "additional_constraints": "",
-        "read_only": of.read_only,
-        "floating_point_range": ranges if of.type == DOUBLE else [],
-        "integer_range": ranges if of.type == INTEGER else [],
+        "read_only": parameter.read_only,
+        "floating_point_range": ranges if parameter.type == DOUBLE else [],
+        "integer_range": ranges if parameter.type == INTEGER else [],
     }
 
 

@@ -19,7 +19,7 @@ from zenoh.handlers import Callback
 from app.dialect import bridge_dialect
 from app.dialect.endpoint import DEMO_VERSION, TopicRole
 from app.errors import DecodeError, LinkError
-from app.interfaces import Interfaces, interfaces_of, names
+from app.interfaces import Interfaces, load_interfaces, names
 from app.interfaces.names import Qos
 from app.simulator.parameters import EVENT_TYPE, EVENTS, SERVICES
 from app.simulator.robot import COUNT, COUNT_TYPE, LISTENS, SERVES, SPEAKS, DemoRobot
@@ -37,7 +37,7 @@ class Simulator:
     """The demo robot on Zenoh, listening at one endpoint; opened and closed as a context."""
 
     def __init__(self, endpoint: str, namespace: str = "", distro: str = "jazzy") -> None:
-        self._interfaces: Interfaces = interfaces_of(distro)
+        self._interfaces: Interfaces = load_interfaces(distro)
         self._namespace = namespace
         self._robot = DemoRobot()
         self._lock = threading.Lock()
@@ -48,7 +48,7 @@ class Simulator:
         self._status = self._publisher(names.status(self._key(COUNT)))
         self._states: list[tuple[bytes, int]] = []
         self._results: list[tuple[bytes, zenoh.Query]] = []
-        self._types = self._interfaces.action(COUNT_TYPE)
+        self._types = self._interfaces.action_types(COUNT_TYPE)
         self._declared = [
             *self._subscribers(),
             *(self._served(self._key(one), kind, self._server(one)) for one, kind in SERVED.items()),
@@ -102,7 +102,7 @@ class Simulator:
 
     def _served(self, key: str, type_name: str, serve: Callable[[Any], Mapping[str, Any]]) -> Any:
         """A queryable that answers as a service server behind a bridge does."""
-        request_type, response_type = self._interfaces.service(type_name)
+        request_type, response_type = self._interfaces.service_types(type_name)
 
         def on_query(query: zenoh.Query) -> None:
             with query:

@@ -8,7 +8,7 @@ from typing import Any, Final, Protocol
 
 from app.dialect import bridge_dialect
 from app.dialect.endpoint import Endpoint
-from app.interfaces.names import type_in
+from app.interfaces.names import valid_type
 from app.robot.graph import Route
 from app.robot.state import RobotState
 
@@ -41,10 +41,10 @@ class BridgeAdmin:
             self._link.ask(bridge_dialect.VERSION), self._namespaces()
         )
         versions = {bridge_dialect.zid_of(key): told.decode(errors="replace") for key, told in answers}
-        graph.configured(namespaces)
+        graph.update_namespaces(namespaces)
         self.missed = 0 if graph.bridges <= versions.keys() else self.missed + 1
         if self.missed == 0 or self.missed > MISSES_ALLOWED:
-            graph.answered(versions)
+            graph.update_versions(versions)
         if self.missed:
             return  # it would answer nothing else either, and each question takes its time
         routes = [
@@ -55,7 +55,7 @@ class BridgeAdmin:
             with suppress(KeyError, TypeError):  # an answer that is no node's
                 namespace = namespaces.get(bridge_dialect.zid_of(key), self._robot.namespace)
                 nodes.update(bridge_dialect.endpoints_of(key, told, namespace))
-        graph.learn(routes, nodes)
+        graph.update_routes(routes, nodes)
 
     async def _namespaces(self) -> dict[str, str]:
         """The namespace of each bridge that says it, "" for none."""
@@ -81,4 +81,4 @@ def _route(key: str, told: Any) -> Route | None:
         return None
     zid, direction, topic_key = place
     whole = direction == "sub" or told.get("dds_reader") != ""
-    return Route(zid, direction, topic_key, type_in(told["ros2_type"]), whole)
+    return Route(zid, direction, topic_key, valid_type(told["ros2_type"]), whole)

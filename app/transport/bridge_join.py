@@ -115,7 +115,9 @@ class GraphMembership:
         """Until the routes carry the first message: whom the graph shows as a listener is heard of."""
         graph = self._robot.graph
         listened = [
-            key for key in map(self._robot.key, self._panel.publications()) if graph.on_robot("MS", key)
+            key
+            for key in map(self._robot.key, self._panel.publications())
+            if graph.has_endpoint("MS", key)
         ]
         end = time.monotonic() + SETTLE_MOST_S
         await asyncio.sleep(SETTLE_S)
@@ -159,7 +161,7 @@ class GraphMembership:
     def _reopen_session(self) -> None:
         """A bridge that does not read a topic for this session does so for a new one."""
         listened = (self._robot.key(topic) for topic in self._panel.subscriptions())
-        lost = [key for key in listened if self._robot.graph.unheard(key)]
+        lost = [key for key in listened if self._robot.graph.is_unrouted(key)]
         self._unheard = self._unheard + 1 if lost else 0
         if self._unheard >= UNHEARD_ALLOWED:
             self._unheard = 0

@@ -136,8 +136,8 @@ class BridgeLiveness:
             self._catch_up(not self._behind)
 
     def _catch_up(self, done: bool) -> None:
-        if done != self._robot.caught_up:
-            self._robot.caught_up = done
+        if done != self._robot.is_caught_up:
+            self._robot.is_caught_up = done
             self._changed()
 
     async def _ask_regularly(self) -> None:
@@ -195,9 +195,9 @@ class BridgeLiveness:
 
     def _tell(self) -> None:
         answers = not self._silence.silent
-        if answers == self._robot.answers:
+        if answers == self._robot.is_responding:
             return
-        self._robot.answers = answers
+        self._robot.is_responding = answers
         if answers:
             self._log.info("the bridge answers")
         else:

@@ -46,7 +46,7 @@ def _subscribed(panel: Panel, interfaces: Interfaces, robot: RobotState) -> Name
     for topic, name in panel.subscriptions().items():
         yield robot.key(topic), name
     for action, name in panel.actions().items():
-        types = interfaces.action(name)
+        types = interfaces.action_types(name)
         yield feedback(robot.key(action)), types.feedback_message
         yield status(robot.key(action)), types.status
 
@@ -61,7 +61,7 @@ def _queried(panel: Panel, interfaces: Interfaces, robot: RobotState) -> Named:
         if isinstance(widget, Call):
             yield robot.key(widget.service), widget.type
     for action, name in panel.actions().items():
-        types, key = interfaces.action(name), robot.key(action)
+        types, key = interfaces.action_types(name), robot.key(action)
         yield of_action(key, "send_goal"), types.send_goal
         yield of_action(key, "cancel_goal"), types.cancel_goal
         yield of_action(key, "get_result"), types.get_result

@@ -12,7 +12,7 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Any, Final, Protocol
 
-from app.robot.state import Buffer, PassedOver, Sample
+from app.robot.state import Buffer, Sample, SkippedPayload
 
 BETWEEN_MOST: Final = 256  # changes of a watched topic that are kept from one drain to the next
 BETWEEN_BYTES: Final = 1_000_000  # and their bytes
@@ -63,12 +63,12 @@ class _Between:
     __slots__ = ("_bytes", "overrun", "values")
 
     def __init__(self) -> None:
-        self.values: deque[PassedOver] = deque()
+        self.values: deque[SkippedPayload] = deque()
         self.overrun = False
         self._bytes = 0
 
     def add(self, one: "_Arrived") -> None:
-        self.values.append(PassedOver(one.payload, one.at, one.wall))
+        self.values.append(SkippedPayload(one.payload, one.at, one.wall))
         self._bytes += len(one.payload)
         while len(self.values) > BETWEEN_MOST or (self._bytes > BETWEEN_BYTES and len(self.values) > 1):
             self._bytes -= len(self.values.popleft().payload)
@@ -97,7 +97,8 @@ class _Arrived:
             sample = sample._replace(cached=True)
         if self.between is None:
             return sample
-        return sample._replace(between=tuple(self.between.values), overrun=self.between.overrun)
+        between = self.between
+        return sample._replace(skipped_payloads=tuple(between.values), overrun=between.overrun)
 
 
 class Inbox:

@@ -53,7 +53,7 @@ class LivelinessTokens:
         own = []
         for role, topic, type_name, qos in wanted:
             key = self._robot.key(topic)
-            if found := self._robot.graph.wrong_type(role, key, type_name):
+            if found := self._robot.graph.mismatched_type(role, key, type_name):
                 if (topic, found) not in self._told:
                     self._told.add((topic, found))
                     self._log.error("%s is %s on the robot, %s in the panel", topic, found, type_name)
@@ -65,7 +65,7 @@ class LivelinessTokens:
         return self._robot.dialect.own_tokens(zid, own)
 
     def _qos(self, topic: str) -> Qos:
-        return self._panel.qos(topic).on_wire
+        return self._panel.qos(topic).wire_qos
 
     def _listening(self, topic: str) -> Qos | None:
         """The QoS of a subscription's token: the panel's, with the publisher's durability where the
@@ -80,7 +80,7 @@ class LivelinessTokens:
             if latched is None:
                 return None
             qos = replace(qos, transient_local=latched)
-        if key not in self._listened and self._robot.graph.wrong_qos("MS", key, qos):
+        if key not in self._listened and self._robot.graph.mismatched_qos("MS", key, qos):
             return None
         self._listened.add(key)
         return qos
@@ -91,7 +91,7 @@ class LivelinessTokens:
         If a publisher came with another one, its route is the wrong one for as long as that
         publisher lives: the token goes with it, and the next publisher decides.
         """
-        now = self._robot.graph.latched(key)
+        now = self._robot.graph.is_transient_local(key)
         if now is None and key in self._wrongly_held:
             self._wrongly_held.discard(key)
             self._held_as.pop(key, None)

@@ -7,7 +7,7 @@ from typing import Any, Final, Literal
 
 from app.clock import format_age, format_time
 from app.i18n import TextLike, say
-from app.panel.values import same
+from app.panel.values import same_value
 from app.panel.widgets.displays import Indicator, Readout
 from app.panel.widgets.families import Display
 from app.permission.interlocks import topic_mismatch
@@ -46,7 +46,7 @@ def field_state(widget: Display, robot: RobotState, now: float) -> FieldState:
     time = format_time(reading.wall)
     value = reading.value(widget.field)
     if value is None:
-        code = "readout_several" if reading.several(widget.field) else "readout_missing"
+        code = "readout_several" if reading.is_ambiguous(widget.field) else "readout_missing"
         return FieldState("missing", say(code, field=widget.field, time=time))
     seen = FieldState("live", say("readout_time", time=time), value)
     if reading.status == "cut":
@@ -93,7 +93,7 @@ def indicator(widget: Indicator, robot: RobotState, now: float) -> tuple[dict[st
 
 def _lamp(widget: Indicator, value: Any) -> tuple[TextLike, str, str]:
     for state in widget.states:
-        if same(state.value, value):
+        if same_value(state.value, value):
             return state.text, state.shape, state.colour
     return say("lamp_unknown", value=written(value)), "unknown", "none"
 
@@ -120,7 +120,7 @@ def _constant(prefix: str, constants: Mapping[str, Any], value: Any) -> str:
     """The name of the constant that a value is, without the prefix where that is whole words
     of it."""
     for name, its in constants.items():
-        if name.startswith(prefix) and same(its, value):
+        if name.startswith(prefix) and same_value(its, value):
             return _without(prefix, name)
     return written(value)
 

@@ -6,12 +6,12 @@ from typing import Any, Final, TypedDict
 
 from app.i18n import TextLike, joined, say
 from app.panel.widgets.displays import Indicator, Readout
-from app.panel.widgets.families import Command, Display, Input, Placed, Pressed
+from app.panel.widgets.families import BaseWidget, Command, Display, Input, PressCommand
 from app.panel.widgets.hold import Hold
-from app.panel.widgets.kinds import row_of
+from app.panel.widgets.kinds import find_row
 from app.panel.widgets.numbers import Numeric
 from app.panel.widgets.parameter import Parameter
-from app.panel.widgets.publish import Publishing
+from app.panel.widgets.publish import SinglePublish
 from app.permission.interlocks import PERMITTED, Verdict
 from app.robot.command_status import IDLE, CommandStatus
 from app.robot.state import RobotState
@@ -28,10 +28,10 @@ class Enabled(TypedDict):
     reason: TextLike | None
 
 
-def show(widget: Placed, robot: RobotState, now: float, verdict: Verdict = PERMITTED) -> Shown:
+def show(widget: BaseWidget, robot: RobotState, now: float, verdict: Verdict = PERMITTED) -> Shown:
     """The attributes of a widget at `now` (monotonic seconds), and when time alone would change them;
     `verdict` is that of a command: a change of it is no change by time alone."""
-    return row_of(SHOWN, widget)(widget, robot, verdict, now)
+    return find_row(SHOWN, widget)(widget, robot, verdict, now)
 
 
 def enabled(verdict: Verdict) -> Enabled:
@@ -59,26 +59,26 @@ def progress(of: CommandStatus) -> Attributes:
         "outcome": of.outcome,
         "result": of.text,
         "progress": of.fraction,
-        "stoppable": of.stoppable,
+        "stoppable": of.can_cancel,
         "goal": of.goal,
         "press": of.press,
     }
 
 
-def _pressed(widget: Pressed, robot: RobotState, verdict: Verdict, _: float) -> Shown:
+def _pressed(widget: PressCommand, robot: RobotState, verdict: Verdict, _: float) -> Shown:
     """The lock, and what came of the last press."""
     came = progress(robot.command_status.get(widget.id, IDLE))
     return {**lock(widget, verdict), **came}, math.inf
 
 
-def _published(widget: Publishing, robot: RobotState, verdict: Verdict, now: float) -> Shown:
+def _published(widget: SinglePublish, robot: RobotState, verdict: Verdict, now: float) -> Shown:
     if widget.confirm is not None:
         return _pressed(widget, robot, verdict, now)
     return lock(widget, verdict), math.inf
 
 
 def _held(widget: Hold, robot: RobotState, verdict: Verdict, _: float) -> Shown:
-    holding = robot.held.get(widget.id, "")
+    holding = robot.held_since.get(widget.id, "")
     return {**lock(widget, verdict), "held": bool(holding), "holding": holding}, math.inf
 
 
@@ -87,11 +87,11 @@ def _parameter(widget: Parameter, robot: RobotState, verdict: Verdict, now: floa
     return pressed | parameter(widget, robot), until
 
 
-SHOWN: Final[Mapping[type[Placed], Callable[[Any, RobotState, Verdict, float], Shown]]] = {
+SHOWN: Final[Mapping[type[BaseWidget], Callable[[Any, RobotState, Verdict, float], Shown]]] = {
     Input: lambda of, robot, verdict, now: ({}, math.inf),
-    Numeric: lambda of, robot, verdict, now: ({"limits": of.limits}, math.inf),
-    Pressed: _pressed,
-    Publishing: _published,
+    Numeric: lambda of, robot, verdict, now: ({"limits": of.limits_text}, math.inf),
+    PressCommand: _pressed,
+    SinglePublish: _published,
     Hold: _held,
     Parameter: _parameter,
     Display: lambda of, robot, verdict, now: value(of, robot, now),

@@ -108,8 +108,8 @@ def _node(
         return "bad", "lost", say("node_unknown")
     if silence:
         return "bad", "node_silent", silence
-    gone = robot.seen.gone(robot.graph)
-    if not robot.seen.any(robot.graph):
+    gone = robot.presence.missing(robot.graph)
+    if not robot.presence.any_present(robot.graph):
         absent = say("node_absent") if passable.permitted else ""
         return "wait", "no_node", _gone(gone) if gone else absent
     if gone and _first(verdicts, GONE).reason:
@@ -126,7 +126,7 @@ def silent(panel: Panel, robot: RobotState, now: float) -> tuple[TextLike, float
         if of.max_age_s is None:
             continue
         key, reading = robot.key(of.topic), robot.reading(of.topic)
-        if reading.status not in ("message", "unreadable") or not robot.graph.on_robot("MP", key):
+        if reading.status not in ("message", "unreadable") or not robot.graph.has_endpoint("MP", key):
             continue
         if topic_mismatch("MS", of, robot):
             continue

@@ -5,11 +5,17 @@ from typing import Any, Final
 
 from app.clock import format_time
 from app.i18n import Text, TextLike, say
-from app.panel.number_range import decimal
-from app.panel.widgets.parameter import EVENT_TYPE, EVENTS, LONGEST_TEXT, One, Parameter, Value
+from app.panel.number_range import decimal_text
+from app.panel.widgets.parameter import EVENT_TYPE, EVENTS, MAX_TEXT, Parameter, Scalar, Value
 from app.permission.interlocks import parameters_offered
 from app.printable import printable
-from app.robot.parameter_state import LONGEST_LIST, UNKNOWN, ParameterState, allowed, limits_text
+from app.robot.parameter_state import (
+    MAX_LIST_LENGTH,
+    UNKNOWN,
+    ParameterState,
+    allowed_range,
+    limits_text,
+)
 from app.robot.state import RobotState
 from app.view.display_values import NOTHING, written
 
@@ -28,32 +34,35 @@ LONGEST_HINT: Final = 200
 ANY_STEP: Final = {False: "any", True: "1"}
 
 
-def parameter(of: Parameter, robot: RobotState) -> dict[str, Any]:
+def parameter(parameter: Parameter, robot: RobotState) -> dict[str, Any]:
     """Attributes: `state`, `text`, `note`, `hint`, `limits`, `settable`, `askable` (whether its node
     can be asked now), and of the input `entry` (the value to start from) and `bounds` (`min`, `max` and
     `step` as HTML has them)."""
-    known = robot.parameters.get(of.id, UNKNOWN)
-    limits = allowed(of, known)
+    known = robot.parameters.get(parameter.id, UNKNOWN)
+    limits = allowed_range(parameter, known)
     return {
         "state": "waiting" if never_told(known) else LOOKS[known.state],
-        "text": NOTHING if known.value is None else _text(of, known.value),
-        "note": _note(of, known, robot),
+        "text": NOTHING if known.value is None else _text(parameter, known.value),
+        "note": _note(parameter, known, robot),
         "hint": printable(known.hint[:LONGEST_HINT])[:LONGEST_HINT],
-        "limits": limits_text(of, limits),
+        "limits": limits_text(parameter, limits),
         "settable": not known.read_only,
-        "askable": of.id not in robot.asking and parameters_offered(of.node, robot) is None,
-        "entry": _entry(of, known.value),
+        "askable": parameter.id not in robot.querying
+        and parameters_offered(parameter.node, robot) is None,
+        "entry": _entry(parameter, known.value),
         "bounds": {
-            "min": "" if limits.low is None else decimal(limits.low),
-            "max": "" if limits.high is None else decimal(limits.high),
-            "step": ANY_STEP[of.element == "integer"] if limits.step is None else decimal(limits.step),
+            "min": "" if limits.low is None else decimal_text(limits.low),
+            "max": "" if limits.high is None else decimal_text(limits.high),
+            "step": ANY_STEP[parameter.element_type == "integer"]
+            if limits.step is None
+            else decimal_text(limits.step),
         },
     }
 
 
-def _text(of: Parameter, value: Value) -> TextLike:
-    option = of.option(value)
-    text = of.unchosen(_beginning(value)) if option is None else option.label
+def _text(parameter: Parameter, value: Value) -> TextLike:
+    option = parameter.find_option(value)
+    text = parameter.unlisted_text(_beginning(value)) if option is None else option.label
     return text if isinstance(text, Text) else written(text)
 
 
@@ -61,15 +70,15 @@ def _beginning(value: Value) -> Value:
     """The whole value, or as much of it as has more characters than are ever shown or entered: it is
     written anew with every change, and a robot's texts may have megabytes."""
     if isinstance(value, str):
-        return value[: LONGEST_TEXT + 1]
+        return value[: MAX_TEXT + 1]
     if not isinstance(value, tuple):
         return value
-    found: list[One] = []
+    found: list[Scalar] = []
     size = 0
     for one in value:
-        found.append(one[: LONGEST_TEXT + 1] if isinstance(one, str) else one)
+        found.append(one[: MAX_TEXT + 1] if isinstance(one, str) else one)
         size += len(one) if isinstance(one, str) else 1
-        if size > LONGEST_TEXT:
+        if size > MAX_TEXT:
             break
     return tuple(found)
 
@@ -78,11 +87,11 @@ def never_told(known: ParameterState) -> bool:
     return known.state in ("waiting", "silent") and known.value is None
 
 
-def _note(of: Parameter, known: ParameterState, robot: RobotState) -> Text:
+def _note(parameter: Parameter, known: ParameterState, robot: RobotState) -> Text:
     time = format_time(known.wall)
     if never_told(known):
-        silent = known.state == "silent" and of.id not in robot.asking
-        return say("parameter_unanswered" if silent else "parameter_asking", node=of.node)
+        silent = known.state == "silent" and parameter.id not in robot.querying
+        return say("parameter_unanswered" if silent else "parameter_asking", node=parameter.node)
     match known.state:
         case "cut":
             return say("parameter_cut", time=time)
@@ -91,32 +100,34 @@ def _note(of: Parameter, known: ParameterState, robot: RobotState) -> Text:
         case "missing":
             return say("parameter_no_value")
         case "undeclared":
-            return say("parameter_not_there", node=of.node)
+            return say("parameter_not_there", node=parameter.node)
         case "mistyped":
-            name, found = of.parameter, known.found
-            return say("parameter_mistyped", name=name, node=of.node, found=found, wanted=of.type)
+            name, found = parameter.parameter, known.robot_type
+            return say(
+                "parameter_mistyped", name=name, node=parameter.node, found=found, wanted=parameter.type
+            )
         case "unreadable":
-            return say("parameter_unreadable", node=of.node, name=of.parameter)
+            return say("parameter_unreadable", node=parameter.node, name=parameter.parameter)
     told = tells(robot)
-    return say("parameter_read" if told else "parameter_told", time=time, node=of.node)
+    return say("parameter_read" if told else "parameter_told", time=time, node=parameter.node)
 
 
 def tells(robot: RobotState) -> bool:
     """Whether changes that others make are heard, by what the graph shows."""
     key, graph = robot.key(EVENTS), robot.graph
-    heard = graph.on_robot("MP", key) and not graph.unheard(key)
-    return heard and graph.wrong_type("MS", key, EVENT_TYPE) is None
+    heard = graph.has_endpoint("MP", key) and not graph.is_unrouted(key)
+    return heard and graph.mismatched_type("MS", key, EVENT_TYPE) is None
 
 
-def _entry(of: Parameter, value: Value | None) -> bool | str:
+def _entry(parameter: Parameter, value: Value | None) -> bool | str:
     """What the input starts from, exactly; "" where it can't hold the value as it is."""
-    if of.options and value is not None:
-        return "" if (option := of.option(value)) is None else option.key
+    if parameter.options and value is not None:
+        return "" if (option := parameter.find_option(value)) is None else option.key
     several = value if isinstance(value, tuple) else (value,)
     unusual = any(isinstance(one, float) and not math.isfinite(one) for one in several)
-    if value is None or unusual or len(several) > LONGEST_LIST:
+    if value is None or unusual or len(several) > MAX_LIST_LENGTH:
         return ""
     if isinstance(value, str | tuple):
-        text = of.entered(_beginning(value))
-        return text if len(text) <= LONGEST_TEXT and text.isprintable() else ""
-    return value if isinstance(value, bool) else decimal(value)
+        text = parameter.entry_text(_beginning(value))
+        return text if len(text) <= MAX_TEXT and text.isprintable() else ""
+    return value if isinstance(value, bool) else decimal_text(value)

@@ -87,7 +87,7 @@ def build_view(
     verdicts = {question.widget.id: permission(question) for question in questions}
     widgets = {w.id: show(w, robot, now, verdicts.get(w.id, PERMITTED)) for w in panel.widgets()}
     link, until = link_statuses(panel, robot, passable, verdicts, now)
-    banner = say("simulated") if simulated or robot.graph.simulated else ""
+    banner = say("simulated") if simulated or robot.graph.is_simulated else ""
     view = View(
         link=link,
         interlocks={i: enabled(verdict) for i, verdict in interlocks.items()},

@@ -36,7 +36,7 @@ async def on_kiosk_error(request: Request, error: Exception) -> Response:
     if isinstance(error, TooSlow):
         answer.headers["connection"] = "close"  # nobody waits for the rest
     if isinstance(error, TooMany):
-        answer.headers["retry-after"] = str(error.again_s)
+        answer.headers["retry-after"] = str(error.retry_after_s)
     return answer
 
 

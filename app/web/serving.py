@@ -12,7 +12,7 @@ from uvicorn import Config
 from uvicorn.middleware.proxy_headers import ProxyHeadersMiddleware
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
-from app.process.listen_sockets import check_free
+from app.process.listen_sockets import check_port_free
 from app.web.connections import Connection, want_files
 from app.web.request_body import LONGEST
 
@@ -67,4 +67,4 @@ def check_port(server: Config | None) -> None:
     A socket that it was given, or that its reloader has opened, is there already.
     """
     if server and not (server.uds or server.fd is not None or server.use_subprocess):
-        check_free(server.host, server.port)
+        check_port_free(server.host, server.port)

@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from app.settings import LOG_LEVELS, NAMES, PREFIX
+from app.settings import LOG_LEVELS, PREFIX, VARIABLES
 
 ABOUT: Final = {
     "PANEL": ("The panel file.", "`app/panel.toml`, the shipped one"),
@@ -32,6 +32,6 @@ ABOUT: Final = {
 
 
 def settings_table() -> str:
-    rows = [(f"`{PREFIX}{name}`", *ABOUT[name]) for name in NAMES]
+    rows = [(f"`{PREFIX}{name}`", *ABOUT[name]) for name in VARIABLES]
     lines = [("Variable", "What it sets", "Default"), ("---",) * 3, *rows]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)

@@ -1,37 +1,37 @@
+// The dialog that confirms a press: the action and its values. Its "yes" is the press.
 import { TAP_AGAIN_MS } from "./press.js";
 
 let closing = 0;
 
-// A press that asks first: what will be done, with which values. Its "yes" is the press.
-export function asked(root, form, yes) {
+export function confirm(root, form, onYes) {
   const dialog = root.querySelector("dialog.ask");
   for (const place of dialog.querySelectorAll("[data-value-of]")) {
-    place.textContent = shown(form.elements[place.dataset.valueOf]) || dialog.dataset.empty;
+    place.textContent = shownText(form.elements[place.dataset.valueOf]) || dialog.dataset.empty;
   }
   const button = dialog.querySelector(".yes");
-  const answer = (event) => {
-    if (event.defaultPrevented) return; // it was not open when the finger came down
-    if (event.target.closest(".yes")) yes(event);
+  const clicked = (event) => {
+    if (event.defaultPrevented) return; // it was not open when the finger went down
+    if (event.target.closest(".yes")) onYes(event);
     if (event.target.closest("button")) dialog.close();
   };
-  // The second tap of the press that asks is no answer.
+  // The second tap of the press that opens the dialog is no answer.
   button.disabled = true;
   const opening = setTimeout(() => (button.disabled = false), TAP_AGAIN_MS);
-  dialog.addEventListener("click", answer);
-  const over = () => {
+  dialog.addEventListener("click", clicked);
+  const closed = () => {
     clearTimeout(opening);
-    dialog.removeEventListener("click", answer);
-    // The second tap of an answer is no press of what is below.
+    dialog.removeEventListener("click", clicked);
+    // The second tap of an answer is no press of the button below.
     closing = setTimeout(() => delete document.body.dataset.asks, TAP_AGAIN_MS);
   };
   clearTimeout(closing);
   document.body.dataset.asks = "";
-  dialog.addEventListener("close", over, { once: true });
+  dialog.addEventListener("close", closed, { once: true });
   dialog.showModal();
 }
 
-// As the operator reads it on the page.
-function shown(input) {
+// The value as the page shows it.
+function shownText(input) {
   const entry = input instanceof RadioNodeList ? [...input].find((one) => one.type !== "hidden") : input;
   if (entry.type === "checkbox") {
     return entry.parentElement.querySelector(entry.checked ? ".on" : ".off").textContent;

@@ -1,11 +1,12 @@
-// Who has control of the robot: the bar that says so, and the holder's sign of life. The server locks the
+// Control of the robot: the bar that shows its holder, and the holder's keep-alive. The server locks the
 // buttons of a client without control. Loaded only where the panel requires control.
 import { newId } from "./press.js";
+import { setText } from "./show.js";
 
-const TAP_AGAIN_MS = 700;
-const ANSWER_WITHIN_MS = 5000;
-const BEATS_PER_SIGN = 3; // the server beats twice a second, and gives up who is silent for 5 s
-const TOUCH_AGAIN_MS = 1000;
+const TAP_AGAIN_MS = 700; // as in press.js
+const RESPONSE_TIMEOUT_MS = 5000;
+const BEATS_PER_KEEP_ALIVE = 3; // two heartbeats a second; the server releases a holder after 5 s of silence
+const TOUCH_INTERVAL_MS = 1000;
 const IN_CONTROL = ["holding", "asked"];
 
 export class Control {
@@ -16,7 +17,7 @@ export class Control {
   #busy = false;
   #timeOf;
 
-  // `timeOf` gives the server's own time of an event.
+  // `timeOf` returns the server's time of an event.
   constructor(bar, timeOf) {
     this.#bar = bar;
     this.#timeOf = timeOf;
@@ -31,8 +32,7 @@ export class Control {
     this.#bar.dataset.role = role;
     this.#bar.elements.to.value = asker;
     this.#bar.querySelector(".refused").textContent = "";
-    const who = this.#bar.querySelector(".who");
-    if (who.textContent !== shown) who.textContent = shown;
+    setText(this.#bar.querySelector(".who"), shown);
     for (const button of this.#bar.querySelectorAll("button")) {
       button.hidden = !button.dataset.roles.split(" ").includes(role);
       button.disabled = false;
@@ -48,18 +48,18 @@ export class Control {
   beat() {
     if (![...IN_CONTROL, "asking"].includes(this.#bar.dataset.role)) return;
     this.#beats += 1;
-    if (this.#beats >= BEATS_PER_SIGN) this.#sign(false);
+    if (this.#beats >= BEATS_PER_KEEP_ALIVE) this.#keepAlive(false);
   }
 
   #touch() {
     this.#to = this.#bar.elements.to.value;
     const now = performance.now();
-    if (!IN_CONTROL.includes(this.#bar.dataset.role) || now - this.#touchedAt < TOUCH_AGAIN_MS) return;
+    if (!IN_CONTROL.includes(this.#bar.dataset.role) || now - this.#touchedAt < TOUCH_INTERVAL_MS) return;
     this.#touchedAt = now;
-    this.#sign(true);
+    this.#keepAlive(true);
   }
 
-  #sign(touched) {
+  #keepAlive(touched) {
     this.#beats = 0;
     this.#post("here", { touched }, true).catch(() => {}); // the next one may get through
   }
@@ -88,7 +88,7 @@ export class Control {
       method: "POST",
       headers: { "Content-Type": "application/json" },
       body: JSON.stringify(body),
-      signal: AbortSignal.timeout(ANSWER_WITHIN_MS),
+      signal: AbortSignal.timeout(RESPONSE_TIMEOUT_MS),
       keepalive,
     });
   }

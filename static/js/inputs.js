@@ -1,24 +1,24 @@
-// Sliders with their values, and buttons for what gloves can't type. Without this file the same
-// inputs are number fields.
+// Sliders with their values, and step buttons for gloves. Without this script the same inputs are number
+// fields.
 
-// How far a slider and its buttons go where any number may be entered: 1, 2 or 5 of a decimal place, and
-// a hundredth of the range at most.
-function fine(input) {
+// The step of a slider and its buttons where the input has none: 1, 2 or 5 of a decimal place, and a hundredth
+// of the range at most.
+function stepSize(input) {
   const most = (input.max - input.min) / 100;
   const place = 10 ** Math.floor(Math.log10(most));
   return place * ([5, 2].find((times) => times * place <= most) ?? 1);
 }
 
-// The nearest of its fine steps, or the limit that is nearer.
-function near(input, value) {
-  const step = fine(input);
-  const rounded = Number((Math.round(value / step) * step).toPrecision(12));
+// The nearest step, or the nearer limit.
+function nearestStep(input, value) {
+  const size = stepSize(input);
+  const rounded = Number((Math.round(value / size) * size).toPrecision(12));
   return Math.min(Math.max(rounded, input.min), input.max);
 }
 
-// As wide as its longest value: nothing moves under a finger.
-function widen(output, input) {
-  const grain = input.step === "any" ? fine(input) : Number(input.step);
+// Makes the output as wide as its longest value, so that nothing moves under a finger.
+function setWidth(output, input) {
+  const grain = input.step === "any" ? stepSize(input) : Number(input.step);
   const places = Math.max(0, -Math.floor(Math.log10(grain)));
   const longest = Math.max(...[input.min, input.max].map((limit) => Number(limit).toFixed(places).length));
   output.style.minWidth = `max(3.2em, ${Math.max(longest, input.value.length)}ch)`;
@@ -27,7 +27,7 @@ function widen(output, input) {
 function step(input, times) {
   if (input.value === "") input.value = input.min;
   else if (input.step !== "any") input.stepUp(times);
-  else if (input.min && input.max) input.value = near(input, Number(input.value) + times * fine(input));
+  else if (input.min && input.max) input.value = nearestStep(input, Number(input.value) + times * stepSize(input));
 }
 
 function equip(input) {
@@ -37,9 +37,9 @@ function equip(input) {
   if (output) {
     input.type = "range";
     output.hidden = false;
-    widen(output, input);
+    setWidth(output, input);
     input.addEventListener("input", () => {
-      if (input.step === "any") input.value = near(input, Number(input.value));
+      if (input.step === "any") input.value = nearestStep(input, Number(input.value));
       show();
     });
   }

@@ -1,77 +1,27 @@
-// Puts what the server says onto the page: texts and attributes, in place. It composes no sentence.
+// Connects the event stream to the page: each event updates its section of the markup.
 import { Source } from "./source.js";
-import { Presser, showBounds, showEntry } from "./press.js";
+import { Presser } from "./press.js";
+import { addShow, setText, showAttribute } from "./show.js";
 
 const body = document.body;
-const clock = document.getElementById("clock"); // shows the last heartbeat's
-let back = false; // the server is there again, and its first heartbeat has not come
+const clock = document.getElementById("clock"); // shows the time of the last heartbeat
+let reconnected = false; // a snapshot has arrived after a loss, and no heartbeat after it yet
 const widgets = new Map(
   [...document.querySelectorAll("[data-widget]")].map((root) => [root.dataset.widget, root]),
 );
 
-function setText(element, text) {
-  if (element && element.textContent !== text) element.textContent = text;
-}
-
-// How each attribute of a widget is shown; what is not here has places of its own: `data-text` for a text,
-// `data-value` for the value of an element such as a meter, and an attribute of the widget's root.
-function showInPlace(root, name, value) {
-  setText(root.querySelector(`[data-text="${name}"]`), value ?? "");
-  const measured = root.querySelector(`[data-value="${name}"]`);
-  if (measured) measured.value = value ?? measured.min;
-  if (root.hasAttribute(`data-${name}`)) root.setAttribute(`data-${name}`, value ?? "");
-}
-
-const SHOW = {
-  enabled: (root, value) => {
-    root.querySelector("button[type=submit], .hold").disabled = !value;
-    if (!value) root.querySelector("dialog.ask")?.close();
-  },
-  stoppable: (root, value) => {
-    const cancel = root.querySelector(".cancel");
-    if (cancel) cancel.disabled = !value;
-  },
-  press: (root, value) => {
-    const cancel = root.querySelector(".cancel");
-    if (cancel) cancel.value = value;
-  },
-  held: (root, value) => root.toggleAttribute("data-held", value),
-  reasons: (root, value) => {
-    const list = root.querySelector(".reasons");
-    setText(list?.querySelector("p"), value);
-    if (!value) list?.hidePopover();
-  },
-  outcome: (root, value) => (root.querySelector(".result").dataset.outcome = value),
-  busy: (root, value) => {
-    const bar = root.querySelector("progress");
-    if (bar) bar.hidden = !value;
-  },
-  askable: (root, value) => (root.querySelector(".read").disabled = !value),
-  entry: showEntry,
-  bounds: showBounds,
-  settable: (root, value) => (root.querySelector(".setting").inert = !value),
-  progress: (root, value) => {
-    const bar = root.querySelector("progress");
-    if (value === null) bar?.removeAttribute("value");
-    else if (bar) bar.value = value;
-  },
-};
-
 function showWidget(id, attributes) {
   const root = widgets.get(id);
   if (!root) return;
-  for (const [name, value] of Object.entries(attributes)) {
-    if (name in SHOW) SHOW[name](root, value);
-    else showInPlace(root, name, value);
-  }
+  for (const [name, value] of Object.entries(attributes)) showAttribute(root, name, value);
 }
 
-// Where there is no bar, nobody needs control.
+// A page without the bar does not require control.
 const bar = document.getElementById("control");
-const nothing = () => {};
+const noop = () => {};
 const control = bar
   ? new (await import("./control.js")).Control(bar, (event) => source.timeOf(event))
-  : { show: nothing, lost: nothing, beat: nothing };
+  : { show: noop, lost: noop, beat: noop };
 
 function showWidgets(changes) {
   for (const [id, attributes] of Object.entries(changes)) showWidget(id, attributes);
@@ -79,7 +29,7 @@ function showWidgets(changes) {
 
 function showLink(lamps) {
   for (const [name, { since, ...lamp }] of Object.entries(lamps)) {
-    showLamp(name, name === "server" ? lamp : { since, ...lamp }); // this page's own link to it
+    showLamp(name, name === "server" ? lamp : { since, ...lamp }); // this page's own link to the server
   }
 }
 
@@ -91,7 +41,7 @@ function showLamp(name, lamp) {
   for (const [key, text] of Object.entries(lamp)) setText(row.querySelector(`[data-text="${key}"]`), text);
 }
 
-// How each of several robots is, on its tab.
+// The link status of each robot, on its tab.
 function showRobots(robots) {
   for (const [id, lamp] of Object.entries(robots)) {
     const tab = document.querySelector(`[data-robot="${id}"]`);
@@ -108,7 +58,7 @@ function showNotice(notice) {
   }
 }
 
-// The server is gone: what was permitted is no longer known to be.
+// The connection to the server is lost: no permission is known any more.
 function lockAll() {
   presser.close();
   body.dataset.cut = "";
@@ -120,27 +70,26 @@ function lockAll() {
   }
   for (const tab of document.querySelectorAll("[data-robot]")) {
     tab.dataset.state = "wait";
-    setText(tab.querySelector("b"), body.dataset.unknown);
+    setText(tab.querySelector("b"), unknown);
   }
-  for (const root of widgets.values()) {
-    if (root.querySelector(".cancel:enabled")) {
-      setText(root.querySelector('[data-text="goal"]'), body.dataset.unknown); // it was under way
-    }
-    const buttons = root.querySelectorAll("button[type=submit], .hold");
-    for (const button of buttons) button.disabled = true;
-    root.querySelector("dialog.ask")?.close();
-    if (buttons.length) showWidget(root.dataset.widget, { reason: body.dataset.lost, reasons: body.dataset.lost, more: "" });
-    if (root.dataset.state) {
-      root.dataset.state = "old"; // its note still says from when it is
-      if (root.dataset.shape) {
-        Object.assign(root.dataset, { shape: "old", colour: "none" });
-        setText(root.querySelector('[data-text="text"]'), body.dataset.unknown);
-      }
-    }
-  }
+  for (const root of widgets.values()) lockWidget(root);
 }
 
-// The sections of a snapshot, in the order in which they are shown; each comes alone when it changes.
+function lockWidget(root) {
+  const { lost, unknown } = body.dataset;
+  if (root.querySelector(".cancel:enabled")) setText(root.querySelector('[data-text="goal"]'), unknown);
+  const buttons = root.querySelectorAll("button[type=submit], .hold");
+  for (const button of buttons) button.disabled = true;
+  root.querySelector("dialog.ask")?.close();
+  if (buttons.length) showWidget(root.dataset.widget, { reason: lost, reasons: lost, more: "" });
+  if (!root.dataset.state) return;
+  root.dataset.state = "old"; // its note keeps the time of the value
+  if (!root.dataset.shape) return;
+  Object.assign(root.dataset, { shape: "old", colour: "none" });
+  setText(root.querySelector('[data-text="text"]'), unknown);
+}
+
+// The sections of a snapshot, in the order in which they are shown. Each is an event by itself when it changes.
 const SECTIONS = {
   control: (state) => control.show(state),
   widgets: showWidgets,
@@ -157,28 +106,28 @@ const source = new Source({
       location.reload();
       return;
     }
-    back = "cut" in body.dataset;
+    reconnected = "cut" in body.dataset;
     delete body.dataset.cut;
     for (const [name, show] of Object.entries(SECTIONS)) show(all[name]);
   },
   update: showWidgets,
   ...SECTIONS,
-  browser: nothing, // this client's id: for programs
+  browser: noop, // this client's id: for programs
   beat(now) {
     setText(clock, now.clock);
-    if (back) setText(document.querySelector('[data-link="server"] [data-text="since"]'), now.clock);
-    back = false;
+    if (reconnected) setText(document.querySelector('[data-link="server"] [data-text="since"]'), now.clock);
+    reconnected = false;
     control.beat();
   },
   lost: lockAll,
 });
 
 if (document.querySelector("[data-step]")) source.load("./inputs.js", () => {});
-// Kinds of widgets with a script of their own: it equips each of them, and may show attributes.
+// Widget kinds with a script: it equips each widget of the kind, and may add functions that show attributes.
 for (const kind of body.dataset.scripts.split(" ").filter(Boolean)) {
   const roots = document.querySelectorAll(`[data-kind="${kind}"]`);
   source.load(`./kinds/${kind}.js`, ({ equip, show }) => {
-    Object.assign(SHOW, show);
+    addShow(show);
     for (const root of roots) equip?.(root, source);
   });
 }

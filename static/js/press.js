@@ -1,8 +1,11 @@
-// A press: on release, once, with an id of its own; its receipt is shown where it was pressed.
-const ANSWER_WITHIN_MS = 5000;
-// Two taps of a finger come within this time: the second one is the same press.
+// A press: sent once on release, with an id. Its receipt is shown at the pressed widget.
+import { enteredValues, forgetRobotValue } from "./entries.js";
+import { showReceipt } from "./show.js";
+
+const RESPONSE_TIMEOUT_MS = 5000;
+// A second tap within this time is the same press.
 export const TAP_AGAIN_MS = 700;
-// A page that nobody touches for so long gives its socket back.
+// The socket of a page that is not touched for so long is closed.
 const UNTOUCHED_MS = 60_000;
 
 export function newId() {
@@ -10,204 +13,138 @@ export function newId() {
   return [...bytes].map((byte) => byte.toString(16).padStart(2, "0")).join("");
 }
 
-// With its type. What is no number (an empty field), or a whole one that is not exact here, goes as it
-// is written: the server says what is wrong.
-function valueOf(input) {
-  if (input.type === "checkbox") return input.checked;
-  const number = input.type === "number" || input.type === "range";
-  if (!number || input.value === "") return input.value;
-  const value = Number(input.value);
-  return Number.isInteger(value) && !Number.isSafeInteger(value) ? input.value : value;
+// A key that is held down is one press.
+function ignoreRepeat(event) {
+  if (event.repeat && event.target.closest?.("button")) event.preventDefault();
 }
 
-// They stay in place: none comes or goes while the page is there.
-const entries = [...document.querySelectorAll("[data-widget] :is(input:not([type=hidden]), select)")];
-
-// All that is entered on the page, by the names of the inputs.
-export function entered() {
-  return Object.fromEntries(entries.map((input) => [input.name, valueOf(input)]));
-}
-
-// The input of a parameter: it shows the robot's value until it is touched, and then what was entered
-// until that is set.
-const touched = new WeakSet();
-const said = new WeakMap(); // what the robot said since the last press
-
-function entryOf(root) {
-  return root.querySelector("[data-entry]");
-}
-
-export function showEntry(root, value) {
-  const input = entryOf(root);
-  said.set(input, value);
-  if (touched.has(input)) return;
-  if (input.type === "checkbox") input.checked = value === true;
-  else if (input.value !== value) input.value = value;
-}
-
-// What was entered is set: the input follows the robot again.
-function settle(root) {
-  const input = entryOf(root);
-  if (input) touched.delete(input);
-  if (said.has(input)) showEntry(root, said.get(input));
-}
-
-export function showBounds(root, bounds) {
-  const input = entryOf(root);
-  if (input.type !== "number") return;
-  Object.assign(input, bounds);
-}
-
-addEventListener("input", ({ target }) => target.matches?.("[data-entry]") && touched.add(target));
-
-async function post(url, press, answerMs) {
-  const answer = await fetch(url, {
+async function post(url, press, timeoutMs) {
+  const response = await fetch(url, {
     method: "POST",
     headers: { "Content-Type": "application/json" },
     body: JSON.stringify(press),
-    signal: AbortSignal.timeout(answerMs),
+    signal: AbortSignal.timeout(timeoutMs),
   });
-  return { ...(await answer.json()), status: answer.status };
+  return { ...(await response.json()), status: response.status };
 }
 
 export class Presser {
   #line = null;
-  #untouched = 0;
+  #untouchedTimer = 0;
   #widgets;
   #sentences;
   #source;
-  #underWay = new Set();
+  #pending = new Set(); // URLs of presses without a response yet
   #goal = "";
-  #down = null; // the button that was open when the pointer went down on it
-  #asked = () => {}; // loaded with the page that asks; until then nothing is pressed
+  #downButton = null; // the enabled button under the pointer when it went down
+  #confirm = () => {}; // of ask.js, which is loaded with the page: nothing is pressed before that
   #seen = null;
   #id = newId(); // of the next press
-  #buttons = new Map(); // those that press, with the widgets that they are of
+  #buttons = new Map(); // submit button → its widget
 
   constructor(widgets, source, sentences) {
     this.#widgets = widgets;
     this.#sentences = sentences;
     this.#source = source;
-    if (document.querySelector("dialog.ask")) source.load("./ask.js", ({ asked }) => (this.#asked = asked));
-    const down = ({ target }) => {
-      this.#down = target.closest?.("button:enabled");
-      this.#goal = this.#down?.value; // of a cancel: which one it is for
-      this.#seen = source.seen; // what was permitted when the finger came down
-      this.#open();
-    };
-    addEventListener("pointerdown", down, true);
-    // A key that is held down is one press.
-    const repeated = (event) => event.repeat && event.target.closest?.("button") && event.preventDefault();
-    addEventListener("keydown", repeated, true);
+    if (document.querySelector("dialog.ask")) source.load("./ask.js", ({ confirm }) => (this.#confirm = confirm));
+    addEventListener("pointerdown", ({ target }) => this.#down(target), true);
+    addEventListener("keydown", ignoreRepeat, true);
     for (const root of widgets.values()) {
       for (const button of root.querySelectorAll("[type=submit]")) this.#buttons.set(button, root);
     }
     for (const form of document.forms) {
       // A click presses at once: a browser takes its time to submit a form.
-      const click = (event) => {
-        const button = event.target.closest("button");
-        // A button that opened under a resting finger was not pressed.
-        if (button && event.detail > 0 && button !== this.#down) event.preventDefault();
-        else if (this.#buttons.has(button)) this.#pressed(event, button);
-      };
-      form.addEventListener("click", click, true);
-      // By a program, which may ask for it without a click.
+      form.addEventListener("click", (event) => this.#clicked(event), true);
+      // A program may submit a form without a click.
       form.addEventListener("submit", (event) => this.#pressed(event, event.submitter));
     }
   }
 
-  // By a pointer, a key or a program: only a pointer has come down before.
+  #down(target) {
+    this.#downButton = target.closest?.("button:enabled");
+    this.#goal = this.#downButton?.value; // of a cancel button: the goal to cancel
+    this.#seen = this.#source.seen; // the view at this moment
+    this.#open();
+  }
+
+  #clicked(event) {
+    const button = event.target.closest("button");
+    // A button that was enabled under a resting finger was not pressed.
+    if (button && event.detail > 0 && button !== this.#downButton) event.preventDefault();
+    else if (this.#buttons.has(button)) this.#pressed(event, button);
+  }
+
+  // By a pointer, a key or a program. Only a pointer has a "down" before.
   #pressed(event, button) {
     event.preventDefault();
     const root = this.#buttons.get(button);
     if (!root || button.disabled) return;
-    // What the robot answers comes with the events.
+    // The robot's response arrives as an event.
     if (button.matches(".read")) return void fetch(button.getAttribute("formaction"), { method: "POST" }).catch(() => {});
-    const touched = event.detail > 0;
-    const click = this.#moment(event, touched ? this.#seen : this.#source.seen);
-    const cancel = button.matches(".cancel");
-    if (cancel) click.press = touched ? this.#goal : button.value;
-    const inputs = entered(); // as they are now: a dialog asks for these, whatever comes meanwhile
-    if (cancel || !root.querySelector("dialog.ask")) this.#press(root, button, inputs, click);
-    else this.#asked(root, button.form, (yes) => this.#press(root, button, inputs, this.#moment(yes)));
+    const byPointer = event.detail > 0;
+    const click = this.#moment(event, byPointer ? this.#seen : this.#source.seen);
+    const isCancel = button.matches(".cancel");
+    if (isCancel) click.press = byPointer ? this.#goal : button.value;
+    const inputs = enteredValues(); // of this moment: a dialog confirms these
+    if (isCancel || !root.querySelector("dialog.ask")) this.#press(root, button, inputs, click);
+    else this.#confirm(root, button.form, (yes) => this.#press(root, button, inputs, this.#moment(yes)));
   }
 
-  // What was seen at an event, and when that was, in the server's time.
+  // The view at an event, and the event's time by the server's clock.
   #moment(event, seen = this.#source.seen) {
     return { seen, at: this.#source.timeOf(event) };
   }
 
-  // From the touch that may become a press, which takes longer than to open it. Without a socket, and
-  // to cancel, a press is posted.
+  // Opens the socket at the first touch, before a press can follow. Without a socket, and to cancel, a
+  // press is posted.
   #open() {
-    clearTimeout(this.#untouched);
-    this.#untouched = setTimeout(() => this.close(), UNTOUCHED_MS);
+    clearTimeout(this.#untouchedTimer);
+    this.#untouchedTimer = setTimeout(() => this.close(), UNTOUCHED_MS);
     if (!this.#line) import("./line.js").then(({ Line }) => this.#connect(Line), () => {});
   }
 
   #connect(Line) {
-    if (this.#source.streams) this.#line ??= new Line((line) => this.#broke(line));
+    if (this.#source.streams) this.#line ??= new Line((line) => line === this.#line && this.close());
   }
 
-  // With the event stream, too: what is under way still gets its answer.
+  // Also when the event stream is lost. Pending presses still get their responses.
   close() {
     this.#line?.leave();
     this.#line = null;
   }
 
-  #broke(line) {
-    if (line === this.#line) this.close();
-  }
-
-  // A second tap while the first is under way is the same press: it sends nothing.
+  // A second tap while the first is pending is the same press: it sends nothing.
   async #press(root, button, inputs, click) {
     const url = button.getAttribute("formaction");
-    if (this.#underWay.has(url)) return;
-    this.#underWay.add(url);
+    if (this.#pending.has(url)) return;
+    this.#pending.add(url);
     try {
-      const answerMs = ANSWER_WITHIN_MS + 1000 * (root.dataset.answerS ?? 0);
+      const timeoutMs = RESPONSE_TIMEOUT_MS + 1000 * (root.dataset.answerS ?? 0);
       const line = this.#line?.free && !button.matches(".cancel") ? this.#line : null;
-      const answer = this.#send(root.dataset.widget, line, url, { inputs, id: this.#id, ...click }, answerMs);
-      // It has left; all that can wait comes after.
+      const receipt = this.#send(root.dataset.widget, line, url, { inputs, id: this.#id, ...click }, timeoutMs);
+      // The press is sent; what can wait follows.
       this.#id = newId();
-      said.delete(entryOf(root));
+      forgetRobotValue(root);
       button.setAttribute("aria-busy", "true");
       const pause = new Promise((resolve) => setTimeout(resolve, TAP_AGAIN_MS));
-      this.#show(root, await answer);
+      showReceipt(this.#widgets.values(), root, await receipt);
       await pause;
     } finally {
-      this.#underWay.delete(url);
+      this.#pending.delete(url);
       button.removeAttribute("aria-busy");
     }
   }
 
-  // Sent once and never again: when no answer comes, it is not known what became of it.
-  async #send(widget, line, url, press, answerMs) {
+  // Sent once, never repeated: without a response the outcome is unknown.
+  async #send(widget, line, url, press, timeoutMs) {
     try {
-      const { status, error, ...receipt } = await (line?.ask({ widget, ...press }, answerMs) ?? post(url, press, answerMs));
+      const response = line?.send({ widget, ...press }, timeoutMs) ?? post(url, press, timeoutMs);
+      const { status, error, ...receipt } = await response;
       if (receipt.outcome) return receipt;
       if (status < 500 && error) return { outcome: "refused", reason: error };
     } catch {
-      if (line) this.#broke(line);
+      if (line && line === this.#line) this.close();
     }
     return { outcome: "unknown", reason: this.#sentences.unsure };
-  }
-
-  #show(root, { id, outcome, reason }) {
-    if (outcome === "succeeded") settle(root);
-    for (const other of this.#widgets.values()) {
-      const old = other.querySelector(".receipt");
-      if (old) {
-        old.textContent = "";
-        delete old.dataset.outcome;
-      }
-    }
-    // What came of a call is shown to every browser, with the widget's other texts, and corrected
-    // there. A cancel's receipt has no id; that it was asked for shows with the goal.
-    const shared = id ? outcome !== "refused" : outcome === "accepted";
-    if (root.querySelector(".result") && shared) return;
-    const receipt = root.querySelector(".receipt");
-    receipt.dataset.outcome = outcome;
-    receipt.textContent = reason;
   }
 }

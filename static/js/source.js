@@ -1,193 +1,113 @@
-// Where the page's state comes from: the event stream, or snapshots one by one when this browser
-// has no connection to spare. Whatever happens, `lost` is called within 2 s of the last sign of life.
+// The source of the page's state. `lost` is called within 2 s of the last event.
+import { Connection } from "./connection.js";
+
 const SILENCE_MS = 1750;
 const CHECK_MS = 125;
-const POLL_MS = 700;
-// A connection that hangs is given up after this time: the next one may find the way.
-const OPEN_AGAIN_MS = 3000;
-// A browser opens six connections to one server; pages and presses need some of them.
-const STREAMS_PER_BROWSER = 3;
-const DRIFT_MS = 0.1; // by which two clocks may go apart from one beat to the next
-const BASE = document.body.dataset.base; // of the robot that this page shows
-
-// Those of an answer that came whole. Only "\n" ends a line: a text may have other separators.
-function eventsIn(text) {
-  const fields = (block) => Object.fromEntries(block.split("\n").map((line) => line.split(/: (.*)/s)));
-  return text.split("\n\n").map(fields).filter(({ event }) => event);
-}
+// A connection that does not respond is replaced after this time.
+const REOPEN_MS = 3000;
+const DRIFT_MS = 0.1; // how much two clocks may differ from one heartbeat to the next
 
 export class Source {
-  #on;
-  #stream = null;
-  #poll = 0;
-  #giveBack = null;
-  // The page is as old as its answer from the server, not as its script.
+  #handlers;
+  #connection;
+  // The page is as old as the server's response, not as its script.
   #aliveAt = performance.getEntriesByType("navigation")[0]?.responseStart ?? 0;
-  #openedAt = 0;
-  #turn = 0; // counts openings and closings: what was asked for before the last one is void
-  #fresh = true; // the page itself is a snapshot, until its time is up
+  #fresh = true; // the page itself is a snapshot, for as long as any other
   #whole = true;
   #seen = document.body.dataset.seen;
-  // The server's own time is at least performance.now() plus this: what comes late makes it smaller,
-  // so that the largest counts.
+  // The server's time is at least performance.now() plus this. A delay makes a measured offset smaller, so
+  // the largest counts.
   #offset = Number(document.body.dataset.now) - this.#aliveAt;
-  #synced = true; // false from a snapshot to the beat behind it, which begins anew
+  #synced = true; // false from a snapshot to the heartbeat after it, which starts again
 
   // `handlers` has a function for each event, and `lost`.
   constructor(handlers) {
-    this.#on = handlers;
+    this.#handlers = handlers;
+    this.#connection = new Connection(Object.keys(handlers), SILENCE_MS, {
+      streamed: (name, data, id) => this.#streamed(name, data, id),
+      polled: (name, data, id, sentAt) => this.#received(name, data, id, sentAt),
+      lost: () => this.#lose(),
+    });
   }
 
-  // Whether all modules that this page needs are there.
+  // Whether all modules of this page are loaded.
   get whole() {
     return this.#whole;
   }
 
-  // Whether there is an event stream, and not one snapshot after the other.
+  // Whether an event stream is open; else snapshots are requested one by one.
   get streams() {
-    return this.#stream !== null;
+    return this.#connection.streams;
   }
 
-  // The id of the last event: what the operator has seen.
+  // The id of the last event: the view that the operator sees.
   get seen() {
     return this.#seen;
   }
 
-  // The server's own time of an event here, in RFC 3339.
+  // The server's time of an event here, in RFC 3339.
   timeOf(event) {
     return new Date(this.#offset + event.timeStamp).toISOString();
   }
 
   start() {
-    document.addEventListener("visibilitychange", () => (document.hidden ? this.#rest() : this.#open()));
-    addEventListener("pagehide", () => this.#rest());
-    addEventListener("pageshow", (event) => event.persisted && this.#open());
+    document.addEventListener("visibilitychange", () => (document.hidden ? this.#suspend() : this.#connection.open()));
+    addEventListener("pagehide", () => this.#suspend());
+    addEventListener("pageshow", (event) => event.persisted && this.#connection.open());
     setTimeout(() => this.#watch(), CHECK_MS);
-    if (document.hidden) this.#rest();
-    else this.#open();
+    if (document.hidden) this.#suspend();
+    else this.#connection.open();
   }
 
-  // A further module. Without it the page is not whole: it is locked, and to be loaded anew.
+  // Loads a further module. If that fails the page is locked and reloads.
   load(name, use) {
     import(name).then(use, () => {
       this.#whole = false;
       this.#lose();
-      this.#again();
+      this.#connection.openLater();
     });
   }
 
-  // For good: the page is about to go.
+  // For good: the page is about to reload.
   stop() {
-    this.#close();
-    this.#on = Object.fromEntries(Object.keys(this.#on).map((name) => [name, () => {}]));
+    this.#connection.close();
+    this.#handlers = Object.fromEntries(Object.keys(this.#handlers).map((name) => [name, () => {}]));
   }
 
-  // A hidden page gives its stream back. It is locked when it shows again, until a fresh snapshot.
-  #rest() {
-    this.#close();
+  // A hidden page releases its stream. When it shows again it is locked until a new snapshot.
+  #suspend() {
+    this.#connection.close();
     this.#lose();
   }
 
-  #open() {
-    this.#close();
-    this.#openedAt = performance.now();
-    const turn = this.#turn;
-    this.#take().then((slot) => {
-      if (turn !== this.#turn) return slot?.();
-      this.#giveBack = slot;
-      if (slot) this.#listen();
-      else this.#ask();
-    });
-  }
-
-  #close() {
-    this.#turn += 1;
-    this.#stream?.close();
-    this.#stream = null;
-    clearTimeout(this.#poll);
-    this.#poll = 0;
-    this.#giveBack?.();
-    this.#giveBack = null;
-  }
-
-  // One of the browser's few places for a stream, as a function that gives it back; null if all are
-  // taken. Browsers keep locks from pages without HTTPS or localhost: those take no turns.
-  async #take() {
-    if (!navigator.locks) return () => {};
-    for (let place = 0; place < STREAMS_PER_BROWSER; place++) {
-      const slot = await new Promise((resolve) => {
-        navigator.locks.request(`stream-${place}`, { ifAvailable: true }, (lock) =>
-          lock ? new Promise((release) => resolve(release)) : resolve(null),
-        );
-      });
-      if (slot) return slot;
-    }
-    return null;
-  }
-
-  #listen() {
-    this.#stream = new EventSource(`${BASE}/events`);
-    for (const name of Object.keys(this.#on)) {
-      this.#stream.addEventListener(name, (event) => this.#streamed(name, event));
-    }
-    // Permissions come under the names of their interlocks too; the widgets' own state is in `update`.
-    this.#stream.onerror = () => {
-      this.#lose();
-      if (this.#stream?.readyState === EventSource.CLOSED) this.#again();
-    };
-  }
-
-  // The browser gave up for good (an answer that is no stream): it is asked to try again.
-  #again() {
-    this.#close();
-    this.#poll = setTimeout(() => this.#open(), POLL_MS);
-  }
-
-  async #ask() {
-    const asked = performance.now();
-    const turn = this.#turn;
-    try {
-      const answer = await fetch(`${BASE}/events?once=1`, { cache: "no-store", signal: AbortSignal.timeout(SILENCE_MS) });
-      const events = eventsIn(await answer.text());
-      if (turn !== this.#turn) return;
-      if (events[0]?.event !== "snapshot") throw new Error("no snapshot");
-      for (const { event, data, id } of events) this.#got(event, JSON.parse(data), id, asked);
-    } catch {
-      if (turn === this.#turn) this.#lose();
-    }
-    if (turn === this.#turn) this.#poll = setTimeout(() => this.#open(), POLL_MS);
-  }
-
-  // What has waited on its way, in a buffer of whoever stood still, is not shown, and nothing after
-  // it: a new stream begins with what is so now.
-  #streamed(name, event) {
-    const data = JSON.parse(event.data);
+  // An event that was delayed in a buffer is not shown, nor any after it: a new stream starts with a snapshot.
+  #streamed(name, data, id) {
     const stamp = name === "beat" ? data.now : Infinity;
-    if (!this.#late(stamp)) return this.#got(name, data, event.lastEventId);
+    if (!this.#isLate(stamp)) return this.#received(name, data, id);
     this.#lose();
-    this.#open();
+    this.#connection.open();
   }
 
-  #late(stamp) {
+  #isLate(stamp) {
     const now = performance.now();
-    const silence = now - Math.max(this.#aliveAt, this.#openedAt);
-    if (silence > (this.#fresh ? SILENCE_MS : OPEN_AGAIN_MS)) return true;
+    const silence = now - Math.max(this.#aliveAt, this.#connection.openedAt);
+    if (silence > (this.#fresh ? SILENCE_MS : REOPEN_MS)) return true;
     return this.#synced && this.#offset + now - stamp > SILENCE_MS;
   }
 
-  #got(name, data, id, at = performance.now()) {
+  #received(name, data, id, at = performance.now()) {
     if (name === "snapshot") {
       this.#fresh = true;
       this.#synced = false;
     }
-    if (!this.#fresh) return; // after a loss only a snapshot says what is so
+    if (!this.#fresh) return; // after a loss only a snapshot is valid
     this.#aliveAt = at;
     if (name === "beat") this.#sync(data.now - performance.now());
     if (id) this.#seen = id;
     try {
-      this.#on[name](data);
+      this.#handlers[name](data);
     } catch (error) {
-      this.#lose(); // what can't be shown whole is not shown as if it were
+      this.#lose(); // a page that is half updated is locked
       throw error;
     }
   }
@@ -197,7 +117,7 @@ export class Source {
     this.#synced = true;
   }
 
-  // After a silence only a new stream brings a new snapshot, even if the old one speaks again.
+  // After a silence only a new stream is valid, even if the old one continues.
   #watch() {
     const now = performance.now();
     const left = this.#aliveAt + SILENCE_MS - now;
@@ -205,12 +125,12 @@ export class Source {
     if (document.hidden || left > 0) return;
     const fresh = this.#fresh;
     this.#lose();
-    if (fresh || now - this.#openedAt > OPEN_AGAIN_MS) this.#open();
+    if (fresh || now - this.#connection.openedAt > REOPEN_MS) this.#connection.open();
   }
 
   #lose() {
     if (!this.#fresh) return;
     this.#fresh = false;
-    this.#on.lost();
+    this.#handlers.lost();
   }
 }

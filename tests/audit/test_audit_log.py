@@ -209,7 +209,7 @@ def test_a_press_that_is_called_away_as_it_was_written_is_closed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     presses: list[asyncio.Task[Entry | None]] = []
-    told = OperatorLog._told
+    told = OperatorLog._deliver_results
 
     def told_too_late(log: OperatorLog, results: Results, changed: bool) -> None:
         told(log, results, changed)
@@ -217,7 +217,7 @@ def test_a_press_that_is_called_away_as_it_was_written_is_closed(
             press.cancel()
 
     async def work(log: OperatorLog) -> None:
-        monkeypatch.setattr(OperatorLog, "_told", told_too_late)
+        monkeypatch.setattr(OperatorLog, "_deliver_results", told_too_late)
         presses.append(asyncio.create_task(log.pressed(pressed(1))))
         (cancelled,) = await asyncio.gather(*presses, return_exceptions=True)
         assert isinstance(cancelled, asyncio.CancelledError)
@@ -292,7 +292,7 @@ def test_it_is_tried_again_ever_more_rarely(tmp_path: Path, disk: Disk) -> None:
         assert 1 <= disk.commits <= 3  # after 0.5 s and 1 s more
 
     run(tmp_path, work)
-    assert writer_thread.TRIED_AGAIN_S[-1] <= 10
+    assert writer_thread.RETRY_DELAYS_S[-1] <= 10
 
 
 def test_where_the_log_is_not_required_presses_go_on(tmp_path: Path, disk: Disk) -> None:

@@ -286,7 +286,7 @@ def test_two_search_at_a_time_and_the_server_itself_waits_for_none(
         await asyncio.sleep(0)
         with pytest.raises(TooMany, match="is being searched") as refused:
             await log.rows(Filter(), None, 10)
-        assert (refused.value.status, refused.value.again_s) == (429, 2)
+        assert (refused.value.status, refused.value.retry_after_s) == (429, 2)
         assert await log.open_presses("", ["say"], 0) == []
         go_on.set()
         assert await asyncio.gather(*searches) == [[], []]

@@ -17,7 +17,7 @@ from app.commands.receipts import Receipt
 from app.errors import LogError
 from app.i18n import say
 from app.panel.model import Panel
-from app.panel.template import needed
+from app.panel.template import needed_inputs
 from app.panel.widgets.hold import Hold
 from app.robot.command_status import IDLE
 from tests.support.builders import (
@@ -117,7 +117,7 @@ class Bench:
             panel, self.robot, self, asker=self, press_log=PressLog(log, "arm", lambda: "board-3")
         )
         for service in ("light",):
-            self.robot.graph.apply(f"@/b1/@ros2_lv/SS/{service}/std_srvs§srv§SetBool", True)
+            self.robot.graph.apply_token(f"@/b1/@ros2_lv/SS/{service}/std_srvs§srv§SetBool", True)
 
     def put(self, key: str, payload: bytes) -> None:
         self.happened.append("sent")
@@ -257,10 +257,12 @@ def test_no_log_keeps_anybody_from_canceling() -> None:
 
 
 def test_a_cancel_does_not_wait_for_the_log() -> None:
-    types = INTERFACES.action("example_interfaces/action/Fibonacci")
+    types = INTERFACES.action_types("example_interfaces/action/Fibonacci")
 
     async def work(log: SlowLog, bench: Bench) -> None:
-        bench.robot.graph.apply("@/b1/@ros2_lv/AS/count/example_interfaces§action§Fibonacci", True)
+        bench.robot.graph.apply_token(
+            "@/b1/@ros2_lv/AS/count/example_interfaces§action§Fibonacci", True
+        )
         log.written.set()
         press = asyncio.create_task(bench.press("count"))
         await asyncio.sleep(0.02)
@@ -341,7 +343,7 @@ def test_an_entry_and_a_receipt_have_the_values_of_their_own_press_only(tmp_path
     values = [json.loads(entry.values) for entry in real(tmp_path, work, panel) if not entry.of]
     assert values == [{"message": "hi"}, {"message": ""}, {"message": "hi"}]
     jog = next(widget for widget in panel.widgets() if isinstance(widget, Hold))
-    assert needed(jog, {"speed": 7, "message": "hi"}) == {"speed": 7}
+    assert needed_inputs(jog, {"speed": 7, "message": "hi"}) == {"speed": 7}
 
 
 def test_an_entry_has_the_defaults_that_a_press_used(tmp_path: Path) -> None:

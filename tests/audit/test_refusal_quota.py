@@ -11,7 +11,14 @@ import pytest
 from app.audit import Entry, Filter, Limits, OperatorLog, Origin, audit_log
 from app.audit.press_record import PressLog
 from app.audit.queries import rows
-from app.audit.refusal_quota import OF_ADDRESS, OF_ALL, OF_BROWSER, REMEMBERED, TOLD_APART, RefusalQuota
+from app.audit.refusal_quota import (
+    MAX_BROWSERS,
+    MAX_QUOTAS,
+    OF_ADDRESS,
+    OF_ALL,
+    OF_BROWSER,
+    RefusalQuota,
+)
 from app.audit.store import Store
 from app.audit.verify import verify
 from app.commands.press_context import PressContext
@@ -27,7 +34,7 @@ from tests.web.test_hold_socket import opened
 
 KIM = Origin(address="10.0.0.7", browser="b1", who="Panel 1")
 LEE = Origin(address="10.0.0.8", browser="b2", who="Panel 2")
-ENOUGH = 2 * int(OF_BROWSER.at_once)
+ENOUGH = 2 * int(OF_BROWSER.burst)
 DRIVE = """
 [[page.widget]]
 id = "drive"
@@ -73,11 +80,11 @@ def counted() -> Counted:
 
 
 def test_a_browser_has_so_many_at_once_and_then_one_from_time_to_time(counted: Counted) -> None:
-    assert counted.come(KIM, ENOUGH) == OF_BROWSER.at_once
+    assert counted.come(KIM, ENOUGH) == OF_BROWSER.burst
     counted.now += 10 * OF_BROWSER.every_s
     assert counted.come(KIM, ENOUGH) == 10
     counted.now += 1e6
-    assert counted.come(KIM, ENOUGH) == OF_BROWSER.at_once
+    assert counted.come(KIM, ENOUGH) == OF_BROWSER.burst
 
 
 def test_one_browser_takes_nothing_from_another(counted: Counted) -> None:
@@ -89,33 +96,33 @@ def test_an_address_that_changes_its_cookies_has_an_allowance_of_its_own(counted
     entries = sum(
         counted.come(Origin(address="10.0.0.7", browser=f"b{number}"), 10) for number in range(1000)
     )
-    assert entries == OF_ADDRESS.at_once
+    assert entries == OF_ADDRESS.burst
     assert counted.come(LEE, 10) == 10
 
 
 def test_all_together_have_a_bound(counted: Counted) -> None:
     entries = sum(counted.come(Origin(address=f"10.0.1.{number}"), 50) for number in range(1000))
-    assert entries == OF_ALL.at_once
+    assert entries == OF_ALL.burst
     day = 86_400
     for _ in range(day // 10):
         counted.now += 10
         entries += sum(counted.come(Origin(address=f"10.0.2.{number}"), 1) for number in range(20))
-    assert entries <= OF_ALL.at_once + day / OF_ALL.every_s
+    assert entries <= OF_ALL.burst + day / OF_ALL.every_s
 
 
 def test_it_remembers_no_more_than_it_must(counted: Counted) -> None:
     for number in range(10_000):
         counted.now += OF_ALL.every_s
         counted.come(Origin(address=f"10.1.{number}", browser="b"), 1)
-    assert len(counted.refusals._left) == REMEMBERED
+    assert len(counted.refusals._left) == MAX_QUOTAS
 
 
 def test_what_is_left_out_is_told_by_browser_and_the_rest_together(counted: Counted) -> None:
     counted.come(KIM, 60 + 7)
-    for number in range(2 * TOLD_APART):
+    for number in range(2 * MAX_BROWSERS):
         counted.come(Origin(address=f"10.0.0.{number}", browser="c"), 61)
     told = counted.refusals.summary_due()
-    assert len(told) == TOLD_APART + 1
+    assert len(told) == MAX_BROWSERS + 1
     assert told[0].reason.startswith("7 more refusals from Panel 1 (10.0.0.7) since ")
     assert (told[0].kind, told[0].outcome, told[0].browser) == ("refused", "refused", "b1")
     assert json.loads(told[0].values) == {"more": 7}
@@ -170,19 +177,19 @@ def test_a_flood_of_refused_presses_leaves_the_log_as_it_was(tmp_path: Path) -> 
             receipt = await cell.press(f"f{number}")
             assert (receipt.outcome, receipt.cause) == ("refused", "interlock")
             assert "does not permit operation" in str(receipt.reason)
-        assert cell.log.left_out == 2000 - OF_BROWSER.at_once
+        assert cell.log.left_out == 2000 - OF_BROWSER.burst
         assert (await cell.press("other", LEE)).outcome == "refused"
 
     entries = written(tmp_path, work)
-    assert len(entries) < 2 * OF_BROWSER.at_once + 10
+    assert len(entries) < 2 * OF_BROWSER.burst + 10
     assert [e.outcome for e in entries if e.press == "first"] == ["", "published"]
     assert [e.outcome for e in entries if e.press == "other"] == ["", "refused"]
     (more,) = [entry for entry in entries if "more refusals" in entry.reason]
-    assert json.loads(more.values) == {"more": 2000 - OF_BROWSER.at_once}
+    assert json.loads(more.values) == {"more": 2000 - OF_BROWSER.burst}
 
 
 def test_they_are_told_while_the_flood_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(audit_log, "SUMMED_UP_S", 0.05)
+    monkeypatch.setattr(audit_log, "SUMMARY_INTERVAL_S", 0.05)
 
     async def work(cell: Cell) -> None:
         permits(cell.robot, False)
@@ -218,7 +225,7 @@ def test_bad_input_is_limited_too_and_says_what_is_wrong(tmp_path: Path, inputs:
             last = await cell.press(f"f{number}", **inputs)
         assert (last.outcome, last.cause) == ("refused", "input")
         assert str(last.reason)[22:] == str(first.reason)[22:]
-        assert cell.log.left_out == ENOUGH + 1 - OF_BROWSER.at_once
+        assert cell.log.left_out == ENOUGH + 1 - OF_BROWSER.burst
 
     written(tmp_path, work)
 
@@ -229,7 +236,7 @@ def test_a_used_id_is_limited_too(tmp_path: Path) -> None:
         for _ in range(ENOUGH):
             receipt = await cell.press("p", message="other")
             assert "already used" in str(receipt.reason)
-        assert cell.log.left_out == ENOUGH - OF_BROWSER.at_once
+        assert cell.log.left_out == ENOUGH - OF_BROWSER.burst
 
     written(tmp_path, work)
 
@@ -256,7 +263,7 @@ def test_cancels_of_nothing_are_limited_too(tmp_path: Path) -> None:
         for _ in range(ENOUGH):
             receipt = await presses.cancel("count", KIM)
             assert english(receipt.reason) == "nothing is in progress"
-        assert cell.log.left_out == ENOUGH - OF_BROWSER.at_once
+        assert cell.log.left_out == ENOUGH - OF_BROWSER.burst
 
     written(tmp_path, work)
 
@@ -264,7 +271,7 @@ def test_cancels_of_nothing_are_limited_too(tmp_path: Path) -> None:
 def test_while_the_log_is_broken_they_are_kept_to_be_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(audit_log, "SUMMED_UP_S", 0.02)
+    monkeypatch.setattr(audit_log, "SUMMARY_INTERVAL_S", 0.02)
     append, broken = Store.append, asyncio.Event()
 
     def appended(store: Store, entries: Sequence[Entry]) -> list[Entry]:
@@ -276,7 +283,7 @@ def test_while_the_log_is_broken_they_are_kept_to_be_told(
 
     async def work(cell: Cell) -> None:
         permits(cell.robot, False)
-        for number in range(int(OF_BROWSER.at_once)):
+        for number in range(int(OF_BROWSER.burst)):
             await cell.press(f"f{number}")
         broken.set()
         assert (await cell.press("p", LEE)).cause == "log"
@@ -305,7 +312,7 @@ def test_a_flood_on_a_server(demo: Server) -> None:
         said = until(lambda: (one := held())["status"] != 429 and one, "there is room for a hold")
         assert (said["state"], said["status"]) == ("refused", 422)
         assert "Speed is 99" in said["reason"]
-    left_out = ENOUGH + 20 - OF_BROWSER.at_once
+    left_out = ENOUGH + 20 - OF_BROWSER.burst
     assert f"kiosk_refusals_left_out_total {left_out}" in demo.http.get("/metrics").text
     entries = demo.http.get("/log.csv?outcome=refused&every=true").text.splitlines()[1:]
-    assert len(entries) == OF_BROWSER.at_once
+    assert len(entries) == OF_BROWSER.burst

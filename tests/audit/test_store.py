@@ -19,7 +19,7 @@ from app.audit.opening import Opening
 from app.audit.queries import Filter, rows
 from app.audit.store import DAY_MS, REMOVED_AT_ONCE, Store
 from app.audit.verify import verify
-from app.audit.writer_thread import HOUR_S, Steady
+from app.audit.writer_thread import HOUR_S, ClockSteadiness
 from app.cli.log import main
 from app.errors import FolderInUse, LogCorrupt, LogError
 from app.i18n import TextLike, say
@@ -352,14 +352,14 @@ def test_what_was_written_before_the_clock_was_set_is_not_old_by_that(store: Sto
 
 
 def test_only_a_clock_that_nobody_set_for_an_hour_makes_anything_old() -> None:
-    clock = Steady()
-    assert not clock.steady(1000.0, 0.0)
-    assert not clock.steady(1000.0 + HOUR_S - 1, HOUR_S - 1)
-    assert clock.steady(1000.0 + HOUR_S + 5, HOUR_S)  # it drifts
+    clock = ClockSteadiness()
+    assert not clock.is_steady(1000.0, 0.0)
+    assert not clock.is_steady(1000.0 + HOUR_S - 1, HOUR_S - 1)
+    assert clock.is_steady(1000.0 + HOUR_S + 5, HOUR_S)  # it drifts
     ahead = 1e9
-    assert not clock.steady(ahead + HOUR_S + 1, HOUR_S + 1)
-    assert not clock.steady(ahead + 2 * HOUR_S, 2 * HOUR_S)
-    assert clock.steady(ahead + 2 * HOUR_S + 2, 2 * HOUR_S + 2)
+    assert not clock.is_steady(ahead + HOUR_S + 1, HOUR_S + 1)
+    assert not clock.is_steady(ahead + 2 * HOUR_S, 2 * HOUR_S)
+    assert clock.is_steady(ahead + 2 * HOUR_S + 2, 2 * HOUR_S + 2)
 
 
 def test_a_large_log_loses_its_oldest_and_its_pages(store: Store, tmp_path: Path) -> None:

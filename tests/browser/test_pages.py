@@ -407,7 +407,7 @@ def test_the_first_page_is_small_and_asks_nobody_else(demo: Server, chromium: Br
     assert len(urls) <= 6, urls
     assert all(url.startswith(demo.url) for url in urls)
     assert len(received) == len(urls)
-    assert received.total() < 16_000
+    assert received.total() < 17_500
     context.close()
 
 

@@ -69,8 +69,8 @@ class Bench:
             {**GOAL, "goal": {"order": 3}, "progress": "sequence[0]", "timeout_s": 0.05},
         )
         self.robot: RobotState = robot_there(self.panel)
-        self.robot.graph.apply(bridge_dialect.server_token(BRIDGE, "SS", "reset", TRIGGER), True)
-        self.robot.graph.apply(bridge_dialect.server_token(BRIDGE, "AS", "count", COUNT), True)
+        self.robot.graph.apply_token(bridge_dialect.server_token(BRIDGE, "SS", "reset", TRIGGER), True)
+        self.robot.graph.apply_token(bridge_dialect.server_token(BRIDGE, "AS", "count", COUNT), True)
         self.line = Line()
         self.corrected: list[tuple[str, Outcome]] = []
         self.calls = ServiceCalls(INTERFACES, self.robot, self.line, lambda: None)
@@ -104,11 +104,11 @@ class Bench:
         return self.robot.command_status["count"]
 
     def answer_goal(self, accepted: bool) -> None:
-        response = INTERFACES.action(COUNT).send_goal_response
+        response = INTERFACES.action_types(COUNT).send_goal_response
         self.line.answer(response, accepted=accepted, stamp={"sec": 0, "nanosec": 0})
 
     def lose_the_bridge(self) -> None:
-        self.robot.graph.apply(bridge_dialect.bridge_token(BRIDGE), False)
+        self.robot.graph.apply_token(bridge_dialect.bridge_token(BRIDGE), False)
         self.calls.follow()
         self.actions.follow()
 
@@ -221,7 +221,7 @@ def test_a_bridge_that_goes_away_ends_the_waiting_at_once(what: str) -> None:
 
 def test_a_goal_cut_off_is_unknown_until_the_robot_tells_its_result() -> None:
     async def test(bench: Bench) -> None:
-        types = INTERFACES.action(COUNT)
+        types = INTERFACES.action_types(COUNT)
         start = bench.send_goal()
         await asked(bench, 1)
         bench.line.answer(types.send_goal_response, accepted=True, stamp={"sec": 0, "nanosec": 0})
@@ -230,10 +230,10 @@ def test_a_goal_cut_off_is_unknown_until_the_robot_tells_its_result() -> None:
         bench.lose_the_bridge()
         await in_doubt(bench)
         outcomes = [bench.shown.outcome]
-        bench.robot.graph.apply(bridge_dialect.bridge_token(BRIDGE), True)
+        bench.robot.graph.apply_token(bridge_dialect.bridge_token(BRIDGE), True)
         assert locked_by(bench) == "perhaps_busy"
         await asked(bench, 3)
-        assert (locked_by(bench), bench.shown.stoppable) == ("perhaps_busy", True)
+        assert (locked_by(bench), bench.shown.can_cancel) == ("perhaps_busy", True)
         bench.line.answer(types.get_result_response, status=4, result={"sequence": [0, 1]})
         while not str(bench.robot.command_status["count"].text).startswith("Succeeded"):
             await asyncio.sleep(0)
@@ -247,7 +247,7 @@ def test_a_goal_cut_off_is_unknown_until_the_robot_tells_its_result() -> None:
 
 def goal_id(bench: Bench, number: int = 0) -> bytes:
     """The id of the goal that was asked for, as the robot got it."""
-    request = INTERFACES.action(COUNT).send_goal_request
+    request = INTERFACES.action_types(COUNT).send_goal_request
     return bytes(INTERFACES.decode(request, bench.line.asked[number][1]).goal_id.uuid)
 
 
@@ -255,7 +255,7 @@ def tell_states(bench: Bench, *states: tuple[bytes, int]) -> None:
     """The action's server publishes the states of its goals."""
     stamp = {"sec": 0, "nanosec": 0}
     told = [{"goal_info": {"goal_id": {"uuid": i}, "stamp": stamp}, "status": s} for i, s in states]
-    payload = INTERFACES.encode(INTERFACES.action(COUNT).status, {"status_list": told})
+    payload = INTERFACES.encode(INTERFACES.action_types(COUNT).status, {"status_list": told})
     bench.actions.hear_status("/count", sample_of(payload))
 
 
@@ -272,7 +272,7 @@ async def cancel_answered(
     bench: Bench, press_id: str, *, return_code: int = 0, listed: bool = True
 ) -> tuple[Outcome, bytes]:
     """Cancels the goal of a press: what came of that, and the goal that was to be canceled."""
-    request, response = INTERFACES.service("action_msgs/srv/CancelGoal")
+    request, response = INTERFACES.service_types("action_msgs/srv/CancelGoal")
     count = len(bench.line.asked)
     cancel = asyncio.create_task(bench.actions.cancel(bench.count, press_id))
     await asked(bench, count + 1)
@@ -298,7 +298,7 @@ def test_a_goal_that_the_robot_does_not_list_is_not_being_canceled() -> None:
         answer, _ = await cancel_answered(bench, "g1", listed=False)
         assert answer.outcome == "rejected"
         assert str(answer.text).startswith("The robot refused to cancel at ")
-        assert (bench.shown.goal, bench.shown.stoppable) == ("EXECUTING", True)
+        assert (bench.shown.goal, bench.shown.can_cancel) == ("EXECUTING", True)
         await canceled(bench, "g1")
         assert bench.shown.goal == "CANCELING"
         again, _ = await cancel_answered(bench, "g1", return_code=3, listed=False)
@@ -328,7 +328,7 @@ def test_a_late_cancel_does_not_hit_the_next_goal() -> None:
     async def test(bench: Bench) -> None:
         await accepted(bench)
         assert bench.shown.press == "g1"
-        result = INTERFACES.action(COUNT).get_result_response
+        result = INTERFACES.action_types(COUNT).get_result_response
         bench.line.answer(result, status=4, result={"sequence": []})
         await settled(bench)
         assert bench.shown.press == ""
@@ -364,10 +364,10 @@ def test_a_goals_state_has_its_ros_name_and_only_goes_on() -> None:
             names.append(bench.shown.goal)
         assert names == ["ACCEPTED", *["EXECUTING"] * 2, *["CANCELING"] * 4]
         assert str(bench.shown.text).startswith("Canceling")
-        assert bench.shown.stoppable
+        assert bench.shown.can_cancel
         tell_states(bench, (goal_id(bench), 5))
         bench.line.answer(
-            INTERFACES.action(COUNT).get_result_response, status=5, result={"sequence": []}
+            INTERFACES.action_types(COUNT).get_result_response, status=5, result={"sequence": []}
         )
         await settled(bench)
         assert (bench.shown.goal, bench.shown.outcome) == ("CANCELED", "canceled")
@@ -417,7 +417,7 @@ def test_a_goal_that_could_not_be_sent_locks_nothing_and_hides_no_other() -> Non
         with pytest.raises(LinkError):
             await bench.send_goal()
         tell_states(bench, (goal_id(bench), 2))
-        assert (bench.shown.goal, bench.shown.stoppable) == ("EXECUTING", True)
+        assert (bench.shown.goal, bench.shown.can_cancel) == ("EXECUTING", True)
         await bench.actions.stop()
 
     run(test)
@@ -442,13 +442,13 @@ def test_a_goal_cut_off_before_its_answer_is_asked_for_when_the_bridge_is_back()
         bench.lose_the_bridge()
         assert (await start).outcome == "unknown"
         assert (bench.shown.goal, bench.shown.busy) == ("UNKNOWN", True)
-        bench.robot.graph.apply(bridge_dialect.bridge_token(BRIDGE), True)
+        bench.robot.graph.apply_token(bridge_dialect.bridge_token(BRIDGE), True)
         await asked(bench, 2)
         assert bench.line.asked[1][0].endswith("get_result")
         tell_states(bench, (goal_id(bench), 2))
-        assert (bench.shown.goal, bench.shown.stoppable) == ("EXECUTING", True)
+        assert (bench.shown.goal, bench.shown.can_cancel) == ("EXECUTING", True)
         bench.line.answer(
-            INTERFACES.action(COUNT).get_result_response, status=4, result={"sequence": [0, 1]}
+            INTERFACES.action_types(COUNT).get_result_response, status=4, result={"sequence": [0, 1]}
         )
         await settled(bench)
         assert str(bench.shown.text).startswith("Succeeded")
@@ -464,9 +464,9 @@ def test_a_goal_shows_no_state_until_its_server_is_offered_again() -> None:
         await asyncio.sleep(0.01)
         tell_states(bench, (goal_id(bench), 2))
         assert (bench.shown.goal, bench.shown.busy) == ("UNKNOWN", False)
-        bench.robot.graph.apply(bridge_dialect.bridge_token(BRIDGE), True)
+        bench.robot.graph.apply_token(bridge_dialect.bridge_token(BRIDGE), True)
         await asked(bench, 3)
-        assert (bench.shown.goal, bench.shown.stoppable) == ("EXECUTING", True)
+        assert (bench.shown.goal, bench.shown.can_cancel) == ("EXECUTING", True)
         assert [answer.outcome for _, answer in bench.corrected] == ["accepted"]
         await bench.actions.stop()
 
@@ -512,11 +512,11 @@ def test_a_result_that_could_not_be_asked_for_is_asked_for_again(
         bench.answer_goal(accepted=True)
         await start
         await asyncio.sleep(0.01)
-        assert (bench.shown.goal, bench.shown.stoppable) == ("ACCEPTED", True)
+        assert (bench.shown.goal, bench.shown.can_cancel) == ("ACCEPTED", True)
         bench.line.refuses = ""
         await asked(bench, 2)
         bench.line.answer(
-            INTERFACES.action(COUNT).get_result_response, status=4, result={"sequence": []}
+            INTERFACES.action_types(COUNT).get_result_response, status=4, result={"sequence": []}
         )
         await settled(bench)
         assert [answer.outcome for _, answer in bench.corrected] == ["succeeded"]
@@ -534,7 +534,7 @@ def test_what_breaks_while_a_goal_is_followed_leaves_it_unknown(
         await accepted(bench)
         monkeypatch.setattr("app.commands.actions.results.with_fields", fails)
         bench.line.answer(
-            INTERFACES.action(COUNT).get_result_response, status=4, result={"sequence": []}
+            INTERFACES.action_types(COUNT).get_result_response, status=4, result={"sequence": []}
         )
         await settled(bench)
         assert (bench.shown.goal, bench.shown.busy) == ("UNKNOWN", False)
@@ -571,16 +571,16 @@ def test_a_goal_whose_server_ends_is_unknown_and_asked_for_when_it_is_back() -> 
     async def test(bench: Bench) -> None:
         await accepted(bench)
         token = bridge_dialect.server_token(BRIDGE, "AS", "count", COUNT)
-        bench.robot.graph.apply(token, False)
+        bench.robot.graph.apply_token(token, False)
         bench.actions.follow()
         await in_doubt(bench)
-        assert (bench.shown.goal, bench.shown.stoppable) == ("UNKNOWN", False)
+        assert (bench.shown.goal, bench.shown.can_cancel) == ("UNKNOWN", False)
         assert "stopped offering /count" in str(bench.shown.text)
-        bench.robot.graph.apply(token, True)
+        bench.robot.graph.apply_token(token, True)
         await asked(bench, 3)
         assert locked_by(bench) == "perhaps_busy"
         bench.line.answer(
-            INTERFACES.action(COUNT).get_result_response, status=0, result={"sequence": []}
+            INTERFACES.action_types(COUNT).get_result_response, status=0, result={"sequence": []}
         )
         await settled(bench)
         assert "no longer knows this goal" in str(bench.shown.text)
@@ -610,7 +610,7 @@ async def settled(bench: Bench) -> None:
 
 def test_feedback_and_results_of_any_length_are_cut() -> None:
     async def test(bench: Bench) -> None:
-        types = INTERFACES.action(COUNT)
+        types = INTERFACES.action_types(COUNT)
         await accepted(bench)
         long = {"sequence": list(range(300_000))}
         one = {"goal_id": {"uuid": goal_id(bench)}, "feedback": long}
@@ -646,7 +646,7 @@ def test_feedback_and_states_that_can_not_be_read_are_counted_and_fill_no_log(
 
 def test_feedback_of_another_programs_goal_is_passed_over() -> None:
     async def test(bench: Bench) -> None:
-        types = INTERFACES.action(COUNT)
+        types = INTERFACES.action_types(COUNT)
         start = bench.send_goal()
         await asked(bench, 1)
         bench.line.answer(types.send_goal_response, accepted=True, stamp={"sec": 0, "nanosec": 0})
@@ -663,7 +663,7 @@ def test_feedback_of_another_programs_goal_is_passed_over() -> None:
 
 def test_feedback_is_taken_in_and_waits_for_the_next_frame() -> None:
     async def test(bench: Bench) -> None:
-        types = INTERFACES.action(COUNT)
+        types = INTERFACES.action_types(COUNT)
         start = bench.send_goal()
         await asked(bench, 1)
         bench.answer_goal(True)

@@ -15,7 +15,7 @@ from app.commands.receipts import Receipt
 from app.errors import PanelError
 from app.panel import load_panel
 from app.panel.model import Panel
-from app.robot.state import PassedOver, RobotState, Sample
+from app.robot.state import RobotState, Sample, SkippedPayload
 from app.runtime.ingest import Ingest
 from app.transport.inbox import Changes
 from tests.commands.test_presses import Way
@@ -104,8 +104,8 @@ def test_what_came_unseen_confirms_by_when_it_came() -> None:
         press = asyncio.create_task(desk.press())
         await asyncio.sleep(0)
         on, off = (INTERFACES.encode(TEXT, {"data": text}) for text in ("on", "off"))
-        between = (PassedOver(on, came_at, came_at),)
-        newest = Sample(off, 9, 100.2, 100.2, BRIDGE, between=between)
+        between = (SkippedPayload(on, came_at, came_at),)
+        newest = Sample(off, 9, 100.2, 100.2, BRIDGE, skipped_payloads=between)
         changes = Changes({desk.robot.key("/heard"): newest}, {}, link_up=True)
         for updates in intake.steps(changes):
             for key, reading in updates.readings:

@@ -333,12 +333,12 @@ def test_a_permission_that_gets_too_old_ends_it_when_it_does() -> None:
 
 def test_without_a_way_nothing_is_said_and_nothing_is_said_later(bench: Bench) -> None:
     bench.begun()
-    bench.robot.graph.apply(bridge_dialect.bridge_token(BRIDGE), False)
+    bench.robot.graph.apply_token(bridge_dialect.bridge_token(BRIDGE), False)
     bench.holds.judge()
     (receipt,) = bench.receipts
     assert receipt.outcome == "unknown"
     assert "The stop message was not sent: No connection to the robot" in str(receipt.reason)
-    bench.robot.graph.apply(bridge_dialect.bridge_token(BRIDGE), True)
+    bench.robot.graph.apply_token(bridge_dialect.bridge_token(BRIDGE), True)
     bench.holds.judge()
     bench.loop.pass_time(10)
     assert bench.points == [MOVES]
@@ -401,7 +401,7 @@ def test_a_lock_bad_input_and_a_lost_way_refuse_as_with_a_press(bench: Bench) ->
     assert bench.refused()[0] == "link"
     with pytest.raises(NotFound, match="speed"):
         bench.asked("speed")
-    assert bench.robot.held == {}
+    assert bench.robot.held_since == {}
 
 
 def test_the_end_of_the_server_ends_all_and_refuses_more(bench: Bench) -> None:

@@ -88,8 +88,8 @@ class Late:
 def robot_permits() -> RobotState:
     robot = robot_there(PANEL)
     permits(robot)
-    robot.graph.apply(server_token(BRIDGE, "SS", "reset", CALL["type"]), True, 0.0)
-    robot.graph.apply(server_token(BRIDGE, "AS", "count", GOAL["type"]), True, 0.0)
+    robot.graph.apply_token(server_token(BRIDGE, "SS", "reset", CALL["type"]), True, 0.0)
+    robot.graph.apply_token(server_token(BRIDGE, "AS", "count", GOAL["type"]), True, 0.0)
     return robot
 
 

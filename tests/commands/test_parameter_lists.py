@@ -12,7 +12,7 @@ from playwright.sync_api import Page, expect
 
 from app.commands.parameters.values import checked
 from app.errors import InputError
-from app.panel.list_text import elements, listed, quoted
+from app.panel.list_text import join_list, quote_element, split_list
 from app.panel.number_range import Range
 from app.panel.widgets.parameter import Parameter
 from app.robot.parameter_state import ParameterState
@@ -57,14 +57,14 @@ def widget(**more: Any) -> Parameter:
     ],
 )
 def test_a_list_is_written_as_it_is_read(values: list[str], text: str) -> None:
-    assert listed(map(quoted, values)) == text
-    assert elements(text) == values
+    assert join_list(map(quote_element, values)) == text
+    assert split_list(text) == values
 
 
 @pytest.mark.parametrize("text", [",", "a,", ",a", "a,,b", '"a', 'a"b', '"a"b', '"a" "b"'])
 def test_what_is_no_list_is_refused(text: str) -> None:
     with pytest.raises(ValueError, match="of them is none"):
-        elements(text)
+        split_list(text)
     with pytest.raises(InputError, match="separate several values with commas, not"):
         checked(widget(type="string[]"), ParameterState("live"), text)
 
@@ -93,7 +93,9 @@ def test_spaces_that_end_in_a_mistake_take_no_time(text: str) -> None:
 )
 def test_a_list_is_typed_value_by_value(kind: str, given: Any, value: tuple[Any, ...]) -> None:
     of = widget(type=kind)
-    found = checked(of, ParameterState("live"), of.typed(given) if isinstance(given, str) else given)
+    found = checked(
+        of, ParameterState("live"), of.parse_text(given) if isinstance(given, str) else given
+    )
     assert found == value
     assert isinstance(found, tuple)
     assert [type(one) for one in found] == [type(one) for one in value]

@@ -14,11 +14,11 @@ from app.commands.service_calls import ServiceCalls
 from app.dialect import bridge_dialect
 from app.errors import InputError
 from app.panel.model import Panel
-from app.panel.number_range import Range, described
+from app.panel.number_range import Range, range_text
 from app.panel.widgets.parameter import DESCRIBE, EVENT_TYPE, GET, SET, Parameter
 from app.permission.press_permission import judged
 from app.robot.command_status import Outcome
-from app.robot.parameter_state import UNKNOWN, ParameterState, allowed, limits_text, wire
+from app.robot.parameter_state import UNKNOWN, ParameterState, allowed_range, encode_value, limits_text
 from app.robot.state import Sample
 from app.view.parameter_values import parameter
 from tests.support.builders import BRIDGE, INTERFACES, NOW, Table, panel_of, robot_there
@@ -38,7 +38,7 @@ def widget(**more: Any) -> Parameter:
 
 def value(kind: int, given: Any) -> dict[str, Any]:
     types = {DOUBLE: "double", INTEGER: "integer", STRING: "string"}
-    return {**wire(widget(type="double"), 0.0), "type": kind, f"{types[kind]}_value": given}
+    return {**encode_value(widget(type="double"), 0.0), "type": kind, f"{types[kind]}_value": given}
 
 
 def descriptor(name: str, kind: int, **more: Any) -> dict[str, Any]:
@@ -81,7 +81,7 @@ class Bench:
             token = bridge_dialect.server_token(BRIDGE, "SS", f"arm/{name}", kind)
             if not alive:
                 self.lose(token)
-            self.robot.graph.apply(token, alive)
+            self.robot.graph.apply_token(token, alive)
         self.parameters.follow()
 
     def lose(self, token: str) -> None:
@@ -363,7 +363,7 @@ def test_a_node_that_was_cut_off_while_it_was_asked_can_be_asked_when_it_is_back
         bench.offer(alive=False)
         bench.offer()
         await bench.asked(2)
-        assert bench.robot.asking == {"speed"}
+        assert bench.robot.querying == {"speed"}
         await bench.tell(2, 0.5)
         await bench.until(lambda: bench.shown["askable"])
 
@@ -541,7 +541,7 @@ def test_a_panel_narrows_what_the_node_describes(
     own: dict[str, Any], theirs: Range, limits: str, good: list[float], bad: list[float]
 ) -> None:
     of, known = widget(**own), ParameterState("live", range=theirs)
-    assert english(limits_text(of, allowed(of, known))) == limits
+    assert english(limits_text(of, allowed_range(of, known))) == limits
     assert [checked(of, known, one) for one in good] == good
     for one in bad:
         with pytest.raises(InputError, match="it must be"):
@@ -582,12 +582,12 @@ def test_integers_are_exact_to_the_last_step() -> None:
     ],
 )
 def test_a_forms_text_is_typed(kind: str, text: str, value: Any) -> None:
-    assert widget(type=kind).typed(text) == value
+    assert widget(type=kind).parse_text(text) == value
 
 
 def test_a_range_that_is_open_has_no_words() -> None:
-    assert described(Range(), "m") == ""
-    assert english(described(Range(step=0.5), "m")) == "in steps of 0.5"
+    assert range_text(Range(), "m") == ""
+    assert english(range_text(Range(step=0.5), "m")) == "in steps of 0.5"
 
 
 @pytest.mark.parametrize(

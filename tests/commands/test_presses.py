@@ -170,11 +170,11 @@ def forbids(bench: Bench) -> None:
 
 
 def cuts(bench: Bench) -> None:
-    bench.robot.cut(BRIDGE, 2)
+    bench.robot.mark_bridge_lost(BRIDGE, 2)
 
 
 def garbles(bench: Bench) -> None:
-    bench.robot.take("operation_enabled", Sample(b"true!", 2, NOW, NOW, BRIDGE))
+    bench.robot.update("operation_enabled", Sample(b"true!", 2, NOW, NOW, BRIDGE))
 
 
 def takes_another_type(bench: Bench) -> None:
@@ -226,11 +226,11 @@ def loses_link(robot: RobotState) -> None:
 
 
 def loses_bridge(robot: RobotState) -> None:
-    robot.graph.apply(f"@/{BRIDGE}/@ros2_lv", False)
+    robot.graph.apply_token(f"@/{BRIDGE}/@ros2_lv", False)
 
 
 def goes_silent(robot: RobotState) -> None:
-    robot.graph.answered({})
+    robot.graph.update_versions({})
 
 
 def joins(robot: RobotState) -> None:

@@ -26,7 +26,7 @@ from tests.support.builders import BRIDGE, INTERFACES
 from tests.support.words import english
 
 FROM = Origin(address="10.0.0.7")
-TYPES = INTERFACES.action(COUNT)
+TYPES = INTERFACES.action_types(COUNT)
 GONE = "The operator's log cannot be read: gone."
 
 
@@ -148,7 +148,7 @@ def test_an_accepted_goal_is_in_doubt_and_asked_for_by_its_entry(tmp_path: Path)
         await rig.started()
         shown = rig.bench.shown
         assert "may still be running" in str(shown.text)
-        assert (shown.busy, shown.stoppable, shown.goal, shown.press) == (True, True, "UNKNOWN", "g1")
+        assert (shown.busy, shown.can_cancel, shown.goal, shown.press) == (True, True, "UNKNOWN", "g1")
         assert rig.lock == "perhaps_busy"
         assert asked_for(rig) == goal_id(entry.hash).bytes
         assert rig.bench.line.timeouts == [LATE_S]
@@ -185,12 +185,12 @@ def test_it_is_asked_for_until_it_is_known(tmp_path: Path, monkeypatch: pytest.M
 def test_it_is_asked_for_and_can_be_canceled_only_when_its_server_is_offered(tmp_path: Path) -> None:
     async def test(rig: Rig, entry: Entry) -> None:
         token = bridge_dialect.server_token(BRIDGE, "AS", "count", COUNT)
-        rig.bench.robot.graph.apply(token, False)
+        rig.bench.robot.graph.apply_token(token, False)
         await rig.started(questions=0)
-        assert (rig.bench.shown.busy, rig.bench.shown.stoppable) == (True, False)
+        assert (rig.bench.shown.busy, rig.bench.shown.can_cancel) == (True, False)
         tell_states(rig.bench, (goal_id(entry.hash).bytes, 2))
         assert rig.bench.shown.goal == "UNKNOWN"
-        rig.bench.robot.graph.apply(token, True)
+        rig.bench.robot.graph.apply_token(token, True)
         await asked(rig.bench, 1)
         assert rig.bench.shown.goal == "EXECUTING"
 
@@ -201,10 +201,10 @@ def test_a_cut_leaves_it_in_doubt(tmp_path: Path) -> None:
     async def test(rig: Rig, entry: Entry) -> None:
         await rig.started()
         rig.bench.lose_the_bridge()
-        assert (rig.bench.shown.busy, rig.bench.shown.stoppable) == (True, False)
-        rig.bench.robot.graph.apply(bridge_dialect.bridge_token(BRIDGE), True)
+        assert (rig.bench.shown.busy, rig.bench.shown.can_cancel) == (True, False)
+        rig.bench.robot.graph.apply_token(bridge_dialect.bridge_token(BRIDGE), True)
         await asked(rig.bench, 2)
-        assert rig.bench.shown.stoppable
+        assert rig.bench.shown.can_cancel
         assert asked_for(rig) == goal_id(entry.hash).bytes
 
     run(tmp_path, test, "accepted")
@@ -294,7 +294,7 @@ def test_a_cancel_that_the_robot_knows_no_goal_for_asks_for_it_anew(tmp_path: Pa
 
 
 async def canceled(rig: Rig, return_code: int) -> str:
-    request, response = INTERFACES.service("action_msgs/srv/CancelGoal")
+    request, response = INTERFACES.service_types("action_msgs/srv/CancelGoal")
     cancel = asyncio.create_task(rig.bench.actions.cancel(rig.bench.count, "g1"))
     await asked(rig.bench, 2)
     info = INTERFACES.decode(request, rig.bench.line.asked[-1][1]).goal_info
@@ -308,7 +308,7 @@ def test_a_press_id_that_was_used_twice_is_of_two_goals(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As in logs of before an id was looked up."""
-    monkeypatch.setattr(Store, "told", lambda *_: [])
+    monkeypatch.setattr(Store, "entries_of_press", lambda *_: [])
 
     async def test(rig: Rig, entry: Entry) -> None:
         again = await pressed(rig.log, "g1", "accepted")
@@ -366,7 +366,7 @@ def test_while_the_log_can_not_be_read_it_is_said_that_nothing_is_known(
         with unreadable(rig, monkeypatch, unneeded=not needed):
             await rig.resuming.start()
             assert str(rig.bench.shown.text).endswith(f"is still running: {GONE}")
-            assert (rig.bench.shown.busy, rig.bench.shown.stoppable) == (needed, False)
+            assert (rig.bench.shown.busy, rig.bench.shown.can_cancel) == (needed, False)
             await asyncio.sleep(0.03)
             assert rig.bench.line.asked == []
         await asked(rig.bench, 1)

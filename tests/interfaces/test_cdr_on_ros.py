@@ -12,7 +12,7 @@ from typing import Any, Final
 
 import pytest
 
-from app.interfaces import interfaces_of, to_plain
+from app.interfaces import load_interfaces, to_plain
 from app.interfaces.cdr import codec
 from app.interfaces.packages import read_folders
 from tests.support.commanded import Commanded
@@ -23,8 +23,8 @@ SHARE: Final = ROS_PYTHON.parent.parent / "share"
 DISTRO: Final = "kilted"  # that of tests/ros/requirements.lock
 EDGES: Final[tuple[Edge, ...]] = ("least", "most", "random", "random", "random")
 
-OF_ROBOT: Final = interfaces_of(DISTRO, [SHARE])
-BUILT_IN: Final = interfaces_of(DISTRO)
+OF_ROBOT: Final = load_interfaces(DISTRO, [SHARE])
+BUILT_IN: Final = load_interfaces(DISTRO)
 TYPES: Final = tuple(read_folders([SHARE]).structures)
 # These have no .msg file, only an .idl one, which is not read.
 ONLY_IDL: Final = {
@@ -123,7 +123,7 @@ def test_ros_reads_and_writes_what_the_codec_does(ros: RosCodec, type_name: str)
 def test_ros_reads_and_writes_long_lists_and_texts_too(
     ros: RosCodec, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(codec, "MOST_ELEMENTS", 10**6)  # of a message that is read whole
+    monkeypatch.setattr(codec, "MAX_ELEMENTS", 10**6)  # of a message that is read whole
     name = "test_msgs/msg/UnboundedSequences"
     fields = Samples(OF_ROBOT.structures).fields(name, "most")
     long = {n: v * 2000 for n, v in fields.items() if isinstance(v, list)}

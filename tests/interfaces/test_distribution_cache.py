@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from app.interfaces import DISTROS, distribution_cache
-from app.interfaces.bundled_messages import messages_of
+from app.interfaces.bundled_messages import load_messages
 from tests.support.parts import ROOT
 
 FILE = "messages-jazzy.json"
@@ -23,7 +23,7 @@ def folder(tmp_path: Path) -> Path:
 
 @pytest.mark.parametrize("distro", DISTROS)
 def test_what_is_kept_is_what_was_read(distro: str, folder: Path) -> None:
-    messages = messages_of(distro)
+    messages = load_messages(distro)
     distribution_cache.write(folder, distro, messages)
     found = distribution_cache.read(folder, distro)
     assert found == messages
@@ -39,7 +39,7 @@ def test_what_is_not_there_is_not_found(folder: Path) -> None:
 
 
 def test_a_file_that_is_damaged_anywhere_is_as_good_as_none(folder: Path) -> None:
-    distribution_cache.write(folder, "jazzy", messages_of("jazzy"))
+    distribution_cache.write(folder, "jazzy", load_messages("jazzy"))
     whole = (folder / FILE).read_bytes()
     for at in (0, 5, 20, 60, 100, len(whole) // 2, len(whole) - 1):
         (folder / FILE).write_bytes(whole[:at] + bytes((whole[at] ^ 1,)) + whole[at + 1 :])
@@ -54,7 +54,7 @@ def test_a_file_that_is_damaged_anywhere_is_as_good_as_none(folder: Path) -> Non
 def test_a_file_of_another_version_is_as_good_as_none(
     changed: str, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    distribution_cache.write(folder, "jazzy", messages_of("jazzy"))
+    distribution_cache.write(folder, "jazzy", load_messages("jazzy"))
     if changed == "format":
         monkeypatch.setattr(distribution_cache, "FORMAT", distribution_cache.FORMAT + 1)
     else:
@@ -63,20 +63,20 @@ def test_a_file_of_another_version_is_as_good_as_none(
 
 
 def test_a_file_of_another_distribution_is_as_good_as_none(folder: Path) -> None:
-    distribution_cache.write(folder, "humble", messages_of("humble"))
+    distribution_cache.write(folder, "humble", load_messages("humble"))
     (folder / "messages-humble.json").rename(folder / FILE)
     assert distribution_cache.read(folder, "jazzy") is None
 
 
 def test_a_folder_that_can_not_be_written_is_no_fault(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
-    distribution_cache.write(tmp_path / "file", "jazzy", messages_of("jazzy"))
-    distribution_cache.write(tmp_path / "file" / "data", "jazzy", messages_of("jazzy"))
+    distribution_cache.write(tmp_path / "file", "jazzy", load_messages("jazzy"))
+    distribution_cache.write(tmp_path / "file" / "data", "jazzy", load_messages("jazzy"))
     assert distribution_cache.read(tmp_path / "file", "jazzy") is None
 
 
 def test_servers_that_write_at_once_leave_a_whole_file_or_none(folder: Path) -> None:
-    messages = messages_of("jazzy")
+    messages = load_messages("jazzy")
     threads = [
         threading.Thread(target=distribution_cache.write, args=(folder, "jazzy", messages))
         for _ in range(8)
@@ -104,8 +104,8 @@ def test_the_second_start_knows_the_same_without_rosbags(folder: Path) -> None:
 STARTED = """
 import json, sys
 from app.main import app
-from app.interfaces import interfaces_of
-known = interfaces_of("jazzy")
+from app.interfaces import load_interfaces
+known = load_interfaces("jazzy")
 hashes = {name: known.type_hash(name) for name in known.structures}
 loaded = {name: name in sys.modules for name in ("rosbags", "numpy")}
 print(json.dumps({"hashes": hashes, **loaded}))

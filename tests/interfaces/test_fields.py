@@ -9,13 +9,13 @@ from typing import Any, Final
 import pytest
 
 from app.errors import DecodeError
-from app.interfaces import Fields, Interfaces, interfaces_of, to_plain
-from app.interfaces.definitions import FLOATS, Structure, Type
+from app.interfaces import Fields, Interfaces, load_interfaces, to_plain
+from app.interfaces.definitions import FLOAT_TYPES, Structure, Type
 from tests.interfaces.test_interfaces import garbage
 from tests.interfaces.test_values import FIELDS
 from tests.support.samples import Samples
 
-JAZZY: Final = interfaces_of("jazzy")
+JAZZY: Final = load_interfaces("jazzy")
 JOINTS: Final = "sensor_msgs/msg/JointState"
 DIAGNOSTICS: Final = "diagnostic_msgs/msg/DiagnosticArray"
 HEADER: Final = {"stamp": {"sec": 1, "nanosec": 2}, "frame_id": "f"}
@@ -95,21 +95,28 @@ class Walker:
             one = self._chance.choice(structure.fields)
             made.append(("name", one.name))
             kind, around, found = one.type, found, found[one.name]
-            if kind.many != "one" and self._chance.random() < 0.8:
+            if kind.container != "one" and self._chance.random() < 0.8:
                 step = self._element(kind, structure, around, found)
                 made.append(step)
                 found = at_path(around, [("name", one.name), step])
                 kind = kind.element
-            if found is UNKNOWN or not kind.nested or kind.many != "one" or self._chance.random() < 0.1:
+            if (
+                found is UNKNOWN
+                or not kind.is_nested
+                or kind.container != "one"
+                or self._chance.random() < 0.1
+            ):
                 break
             structure = self._structures[kind.name]
         return made
 
     def _element(self, kind: Type, around: Structure, there: Any, found: Any) -> tuple[str, Any]:
-        inner = self._structures[kind.name].fields if kind.nested else ()
+        inner = self._structures[kind.name].fields if kind.is_nested else ()
         own = [one.name for one in inner if _is_key(one.type)]
         lists = [
-            one.name for one in around.fields if one.type.many != "one" and _is_key(one.type.element)
+            one.name
+            for one in around.fields
+            if one.type.container != "one" and _is_key(one.type.element)
         ]
         lists = [name for name in lists if name not in {one.name for one in inner}]
         if own and self._chance.random() < 0.5:
@@ -129,7 +136,7 @@ class Walker:
 
 
 def _is_key(kind: Type) -> bool:
-    return kind.many == "one" and not kind.nested and kind.name not in FLOATS
+    return kind.container == "one" and not kind.is_nested and kind.name not in FLOAT_TYPES
 
 
 def plain(value: Any) -> str:
@@ -148,7 +155,7 @@ def test_what_is_read_at_its_place_is_what_was_sent(cell: Interfaces) -> None:
         walker = Walker(cell, seed)
         fields = Samples(cell.structures, seed).fields("cell_msgs/msg/Store")
         ways = [walker.steps("cell_msgs/msg/Store", fields) for _ in range(seed % 7 + 1)]
-        reader = cell.fields("cell_msgs/msg/Store", map(written, ways))
+        reader = cell.field_reader("cell_msgs/msg/Store", map(written, ways))
         found = reader.read(cell.encode("cell_msgs/msg/Store", fields))
         for way in ways:
             wanted, value = at_path(fields, way), found.get(written(way))
@@ -165,7 +172,7 @@ def test_what_is_read_at_its_place_is_what_was_sent(cell: Interfaces) -> None:
 def test_of_every_type_that_is_built_in_each_field_is_read(cell: Interfaces) -> None:
     for seed, name in enumerate(JAZZY.structures):
         fields = Samples(JAZZY.structures, seed).fields(name)
-        reader = JAZZY.fields(name, fields)
+        reader = JAZZY.field_reader(name, fields)
         found = reader.read(JAZZY.encode(name, fields))
         for one, value in fields.items():
             assert plain(found.get(one)) == plain(value), (name, one)
@@ -174,7 +181,7 @@ def test_of_every_type_that_is_built_in_each_field_is_read(cell: Interfaces) -> 
 def test_nothing_is_wanted_of_a_message_that_is_judged_all_the_same(cell: Interfaces) -> None:
     for seed, name in enumerate(cell.structures):
         whole = cell.encode(name, Samples(cell.structures, seed).fields(name))
-        reader = cell.fields(name, ())
+        reader = cell.field_reader(name, ())
         assert isinstance(reader.read(whole), Fields)
         for length in range(len(whole) - 3):
             with pytest.raises(DecodeError):
@@ -188,13 +195,13 @@ def test_damage_raises_nothing_but_a_decode_error(cell: Interfaces) -> None:
     fields = Samples(cell.structures, 5).fields(store, "most")
     whole = cell.encode(store, fields)
     walker = Walker(cell, 1)
-    reader = cell.fields(store, {written(walker.steps(store, fields)) for _ in range(40)})
+    reader = cell.field_reader(store, {written(walker.steps(store, fields)) for _ in range(40)})
     chance = random.Random(2)
     for _ in range(4000):
         at, byte = chance.randrange(len(whole)), chance.choice((0, 1, 0x7F, 0xFF))
         readable(reader, whole[:at] + bytes((byte,)) + whole[at + 1 :])
     for seed, name in enumerate(cell.structures):
-        own = cell.fields(name, [one.name for one in cell.structures[name].fields])
+        own = cell.field_reader(name, [one.name for one in cell.structures[name].fields])
         for data in garbage(seed):
             readable(own, data)
 

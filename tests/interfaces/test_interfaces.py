@@ -10,8 +10,8 @@ from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_typestore
 
 from app.errors import DecodeError, FieldError, InterfaceError
-from app.interfaces import DISTROS, INTEGERS, PLACEHOLDER, interfaces_of
-from app.interfaces.bundled_messages import AS
+from app.interfaces import DISTROS, INTEGER_RANGES, PLACEHOLDER, load_interfaces
+from app.interfaces.bundled_messages import ALIASES
 from app.interfaces.names import MESSAGE_TYPE
 from tests.support.builders import BOOL, INTERFACES, TEXT
 
@@ -24,7 +24,7 @@ class Sample:
     """Fields for any type, each value unlike the last, at the edges of its range."""
 
     def __init__(self, distro: str) -> None:
-        self._definitions = get_typestore(Stores(f"ros2_{AS.get(distro, distro)}")).fielddefs
+        self._definitions = get_typestore(Stores(f"ros2_{ALIASES.get(distro, distro)}")).fielddefs
         self._turn = 0
         self.types = tuple(self._definitions)
 
@@ -46,8 +46,8 @@ class Sample:
         self._turn += 1
         if name == "byte":
             return self._turn % 128
-        if name in INTEGERS:
-            return INTEGERS[name][self._turn % 2]
+        if name in INTEGER_RANGES:
+            return INTEGER_RANGES[name][self._turn % 2]
         if name == "bool":
             return bool(self._turn % 2)
         if name.startswith("float"):
@@ -68,7 +68,7 @@ def fields_of(value: Any, like: Any) -> Any:
 
 @pytest.mark.parametrize("distro", list(DISTROS))
 def test_every_type_comes_back_as_it_went(distro: str) -> None:
-    interfaces, sample = interfaces_of(distro), Sample(distro)
+    interfaces, sample = load_interfaces(distro), Sample(distro)
     assert len(sample.types) >= 150
     for type_name in sample.types:
         fields = sample.fields(type_name)
@@ -91,7 +91,7 @@ def test_every_type_can_be_named_by_a_panel(distro: str) -> None:
     ],
 )
 def test_each_distribution_has_its_own_messages(type_name: str, field: str, distros: list[str]) -> None:
-    has = {d: interfaces_of(d).structures.get(type_name) for d in DISTROS}
+    has = {d: load_interfaces(d).structures.get(type_name) for d in DISTROS}
     assert [d for d, one in has.items() if one and field in [f.name for f in one.fields]] == distros
 
 
@@ -163,10 +163,10 @@ def test_a_value_that_does_not_fit_is_refused(type_name: str, value: Any, why: s
     assert caught.value.field == "data"
 
 
-@pytest.mark.parametrize("name", [n for n in INTEGERS if n not in ("octet", "byte", "char")])
+@pytest.mark.parametrize("name", [n for n in INTEGER_RANGES if n not in ("octet", "byte", "char")])
 def test_an_integer_takes_its_whole_range(name: str) -> None:
     type_name = f"std_msgs/msg/{name.replace('int', 'Int').replace('uI', 'UI')}"
-    for value in INTEGERS[name]:
+    for value in INTEGER_RANGES[name]:
         assert INTERFACES.decode(type_name, INTERFACES.encode(type_name, {"data": value})).data == value
 
 
@@ -455,4 +455,4 @@ def test_garbage_raises_nothing_but_a_decode_error() -> None:
 
 
 def test_a_distribution_is_read_once() -> None:
-    assert interfaces_of("humble") is interfaces_of("humble")
+    assert load_interfaces("humble") is load_interfaces("humble")

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from app.errors import FieldError, InterfaceError
-from app.interfaces import DISTROS, Interfaces, interfaces_of
+from app.interfaces import DISTROS, Interfaces, load_interfaces
 from app.interfaces.definitions import Type
 from app.interfaces.distributions import BUILTIN
 from app.interfaces.packages import read_folders
@@ -62,11 +62,11 @@ def test_a_package_brings_messages_services_and_actions(make: Make) -> None:
         "cell_msgs/msg/Wear[]",
         "geometry_msgs/msg/Pose",
     ]
-    assert cell.service("cell_msgs/srv/Change") == (
+    assert cell.service_types("cell_msgs/srv/Change") == (
         "cell_msgs/srv/Change_Request",
         "cell_msgs/srv/Change_Response",
     )
-    weld = cell.action("cell_msgs/action/Weld")
+    weld = cell.action_types("cell_msgs/action/Weld")
     assert cell.field_type(weld.send_goal_request, "goal_id.uuid[15]") == "uint8"
     assert cell.field_type(weld.send_goal_request, "goal.tool.offset[2]") == "float32"
     assert cell.field_type(weld.send_goal_response, "stamp.nanosec") == "uint32"
@@ -74,8 +74,8 @@ def test_a_package_brings_messages_services_and_actions(make: Make) -> None:
     assert cell.field_type(weld.get_result_response, "status") == "int8"
     assert cell.field_type(weld.get_result_response, "result.spots") == "int32"
     assert cell.field_type(weld.feedback_message, "feedback.progress") == "float32"
-    assert cell.service(weld.send_goal) == (weld.send_goal_request, weld.send_goal_response)
-    assert cell.service(weld.cancel_goal) == (
+    assert cell.service_types(weld.send_goal) == (weld.send_goal_request, weld.send_goal_response)
+    assert cell.service_types(weld.cancel_goal) == (
         f"{weld.cancel_goal}_Request",
         f"{weld.cancel_goal}_Response",
     )
@@ -133,7 +133,7 @@ def test_packages_may_need_each_other_in_any_order(make: Make) -> None:
 def test_what_the_robot_has_goes_before_what_is_built_in(make: Make) -> None:
     folder = make({"std_msgs/msg/Bool.msg": "bool data\nbool sure"})
     assert Interfaces("jazzy", [folder]).field_type("std_msgs/msg/Bool", "sure") == "bool"
-    assert interfaces_of("jazzy").encode("std_msgs/msg/Bool", {"data": True}) == b"\0\1\0\0\1"
+    assert load_interfaces("jazzy").encode("std_msgs/msg/Bool", {"data": True}) == b"\0\1\0\0\1"
 
 
 def test_a_field_may_have_a_name_that_python_keeps_for_itself(make: Make) -> None:
@@ -188,7 +188,7 @@ def test_a_line_that_is_wrong_is_named(make: Make, line: str, why: str) -> None:
     }
     cell = Interfaces("jazzy", [make(files)])
     cell.require("cell_msgs/msg/Wear")
-    assert list(cell.left_out) == ["cell_msgs/msg/Bad"]
+    assert list(cell.unusable) == ["cell_msgs/msg/Bad"]
     with pytest.raises(InterfaceError, match=why) as caught:
         cell.require("cell_msgs/msg/Bad")
     assert str(caught.value).startswith('"cell_msgs/msg/Bad" can\'t be used: /')
@@ -216,13 +216,13 @@ def test_files_that_do_not_fit_together_are_named(
     make: Make, files: Mapping[str, str], why: str
 ) -> None:
     every = Interfaces("jazzy", [make(files)])
-    assert why in str(every.left_out[next(iter(every.left_out))])
+    assert why in str(every.unusable[next(iter(every.unusable))])
     for file in files:
         name = file.rpartition(".")[0]
         with pytest.raises(InterfaceError) as caught:
             every.require(f"{name}_Request" if "/srv/" in name else name)
         assert why in str(caught.value)
-    assert interfaces_of("jazzy").structures.items() <= every.structures.items()
+    assert load_interfaces("jazzy").structures.items() <= every.structures.items()
 
 
 def test_only_what_needs_a_file_with_a_fault_is_left_out_too(make: Make) -> None:
@@ -233,16 +233,16 @@ def test_only_what_needs_a_file_with_a_fault_is_left_out_too(make: Make) -> None
         "cell_msgs/srv/Light.srv": "Lamp lamp\n---\nbool ok\n",
     }
     cell = Interfaces("jazzy", [make(files)])
-    assert set(cell.left_out) == {
+    assert set(cell.unusable) == {
         "cell_msgs/msg/Wear", "cell_msgs/msg/Tool", "cell_msgs/srv/Change", "cell_msgs/action/Weld",
     }  # fmt: skip
     cell.require("cell_msgs/msg/Lamp")
-    cell.service("cell_msgs/srv/Light")
+    cell.service_types("cell_msgs/srv/Light")
     assert cell.type_hash("cell_msgs/srv/Light").startswith("RIHS01_")
     for ask, name in (
         (cell.require, "cell_msgs/msg/Tool"),
-        (cell.service, "cell_msgs/srv/Change"),
-        (cell.action, "cell_msgs/action/Weld"),
+        (cell.service_types, "cell_msgs/srv/Change"),
+        (cell.action_types, "cell_msgs/action/Weld"),
         (cell.require, "cell_msgs/action/Weld_SendGoal_Request"),
         (cell.type_hash, "cell_msgs/action/Weld"),
     ):
@@ -286,8 +286,8 @@ def test_an_interface_that_is_there_as_idl_only_is_named_with_what_would_be_righ
     cell.require("cell_msgs/msg/Lamp")
     for ask, name in (
         (cell.require, "cell_msgs/msg/Doors"),
-        (cell.service, "cell_msgs/srv/Change"),
-        (cell.action, "cell_msgs/action/Weld"),
+        (cell.service_types, "cell_msgs/srv/Change"),
+        (cell.action_types, "cell_msgs/action/Weld"),
     ):
         _, kind, stem = name.split("/")
         why = (
@@ -337,15 +337,15 @@ def test_two_folders_must_not_differ_in_a_type(make: Make, tmp_path: Path) -> No
 
 def test_a_changed_file_is_read_again(make: Make) -> None:
     folder = make(CELL)
-    before = interfaces_of("jazzy", (folder,))
-    assert interfaces_of("jazzy", [folder]) is before
+    before = load_interfaces("jazzy", (folder,))
+    assert load_interfaces("jazzy", [folder]) is before
     (folder / "cell_msgs/msg/Wear.msg").write_text("int64 count 0\nint8 hours")
-    assert interfaces_of("jazzy", (folder,)).field_type("cell_msgs/msg/Wear", "hours") == "int8"
+    assert load_interfaces("jazzy", (folder,)).field_type("cell_msgs/msg/Wear", "hours") == "int8"
 
 
 @pytest.mark.parametrize("distro", list(DISTROS))
 def test_what_robots_are_commanded_with_is_built_in(distro: str) -> None:
-    here = interfaces_of(distro)
+    here = load_interfaces(distro)
     for service in (
         "std_srvs/srv/SetBool",
         "std_srvs/srv/Trigger",
@@ -355,15 +355,15 @@ def test_what_robots_are_commanded_with_is_built_in(distro: str) -> None:
         "example_interfaces/srv/AddTwoInts",
         "example_interfaces/action/Fibonacci_SendGoal",
     ):
-        assert here.service(service) == (f"{service}_Request", f"{service}_Response")
-    assert here.action("example_interfaces/action/Fibonacci").status in here.structures
+        assert here.service_types(service) == (f"{service}_Request", f"{service}_Response")
+    assert here.action_types("example_interfaces/action/Fibonacci").status in here.structures
     assert here.constants("action_msgs/srv/CancelGoal_Response")["ERROR_REJECTED"] == 1
 
 
 def test_each_distribution_has_all_of_the_built_in_that_it_can() -> None:
     """Only what needs messages of a later one is left out, and before iron there are no events."""
     every = set(read_folders([BUILTIN]).structures)
-    missing = {distro: every - set(interfaces_of(distro).structures) for distro in DISTROS}
+    missing = {distro: every - set(load_interfaces(distro).structures) for distro in DISTROS}
     assert {name.rpartition("_")[0] for name in missing["humble"] if "_Event" not in name} == {
         "rcl_interfaces/srv/GetLoggerLevels",
         "rcl_interfaces/srv/SetLoggerLevels",
@@ -373,7 +373,7 @@ def test_each_distribution_has_all_of_the_built_in_that_it_can() -> None:
 
 
 def test_humble_has_services_without_hashes() -> None:
-    humble = interfaces_of("humble")
+    humble = load_interfaces("humble")
     assert humble.type_hash("std_srvs/srv/SetBool_Request").startswith("RIHS01_")
     for name in ("std_srvs/srv/SetBool", "example_interfaces/action/Fibonacci"):
         with pytest.raises(InterfaceError, match=f'"{name}" is not a type with a hash'):
@@ -384,24 +384,24 @@ def test_humble_has_services_without_hashes() -> None:
     ("ask", "name", "why"),
     [
         (
-            "service",
+            "service_types",
             "std_srvs/srv/SetBol",
             "is not a service of ROS 2 jazzy; did you mean std_srvs/srv/SetBool",
         ),
-        ("service", "std_msgs/msg/Bool", "is not a service"),
+        ("service_types", "std_msgs/msg/Bool", "is not a service"),
         (
-            "action",
+            "action_types",
             "example_interfaces/action/Fibonaci",
             "did you mean example_interfaces/action/Fibonacci",
         ),
-        ("action", "std_srvs/srv/SetBool", "is not an action"),
+        ("action_types", "std_srvs/srv/SetBool", "is not an action"),
         ("constants", "std_msgs/msg/Bol", "is not an interface"),
         ("type_hash", "std_msgs/msg/Bol", "is not"),
     ],
 )
 def test_an_unknown_name_is_refused_with_the_nearest(ask: str, name: str, why: str) -> None:
     with pytest.raises(InterfaceError) as caught:
-        getattr(interfaces_of("jazzy"), ask)(name)
+        getattr(load_interfaces("jazzy"), ask)(name)
     assert why in str(caught.value)
 
 
@@ -417,14 +417,14 @@ def test_an_unknown_name_is_refused_with_the_nearest(ask: str, name: str, why: s
     ],
 )
 def test_type_hashes_are_those_of_the_packages_descriptions(name: str, digest: str) -> None:
-    assert interfaces_of("jazzy").type_hash(name) == f"RIHS01_{digest}"
+    assert load_interfaces("jazzy").type_hash(name) == f"RIHS01_{digest}"
 
 
 def test_a_type_is_written_as_in_a_file() -> None:
     kinds: list[tuple[Any, str]] = [
-        (Type("string", bound=8, many="sequence"), "string<=8[]"),
-        (Type("int8", many="sequence", size=3), "int8[<=3]"),
-        (Type("std_msgs/msg/Header", many="array", size=2), "std_msgs/msg/Header[2]"),
+        (Type("string", bound=8, container="sequence"), "string<=8[]"),
+        (Type("int8", container="sequence", size=3), "int8[<=3]"),
+        (Type("std_msgs/msg/Header", container="array", size=2), "std_msgs/msg/Header[2]"),
     ]
     for kind, written in kinds:
         assert str(kind) == written

@@ -13,9 +13,9 @@ import numpy
 import pytest
 
 from app.errors import DecodeError, FieldError, InterfaceError
-from app.interfaces import DISTROS, Interfaces, interfaces_of, text_of, to_plain
+from app.interfaces import DISTROS, Interfaces, load_interfaces, plain_text, to_plain
 from app.interfaces.cdr import codec
-from app.interfaces.validation import shown
+from app.interfaces.validation import format_value
 from tests.interfaces.test_interfaces import garbage
 from tests.support.samples import Samples
 
@@ -46,7 +46,7 @@ std_msgs/Empty nothing
 std_msgs/Empty[] nothings
 builtin_interfaces/Time[2] times
 """
-JAZZY: Final = interfaces_of("jazzy")
+JAZZY: Final = load_interfaces("jazzy")
 ARRAY: Final = "std_msgs/msg/UInt8MultiArray"
 REALS: Final = "std_msgs/msg/Float32MultiArray"
 LAYOUT: Final = {"layout": {"dim": [], "data_offset": 0}}
@@ -78,11 +78,11 @@ def test_a_values_text_is_that_of_its_plain_value(cell: Interfaces) -> None:
         fields = Samples(cell.structures, seed).fields(EVERYTHING)
         message = cell.decode(EVERYTHING, cell.encode(EVERYTHING, fields))
         whole = str(to_plain(message))
-        assert text_of(message, len(whole)) == whole, seed
-        assert text_of(message, 100) == whole[:99] + "…", seed
+        assert plain_text(message, len(whole)) == whole, seed
+        assert plain_text(message, 100) == whole[:99] + "…", seed
         for one in cell.structures[EVERYTHING].fields:
             value = getattr(message, one.attribute)
-            assert text_of(value, 10**9) == str(to_plain(value)), (seed, one.name)
+            assert plain_text(value, 10**9) == str(to_plain(value)), (seed, one.name)
 
 
 class Endless(list[int]):
@@ -94,8 +94,8 @@ class Endless(list[int]):
 
 
 def test_a_long_list_is_written_by_its_head_only() -> None:
-    assert text_of(Endless([1] * 1000), 20) == "[0, 1, 2, 3, 4, 5, …"
-    assert text_of("x" * 21, 20) == "x" * 19 + "…"
+    assert plain_text(Endless([1] * 1000), 20) == "[0, 1, 2, 3, 4, 5, …"
+    assert plain_text("x" * 21, 20) == "x" * 19 + "…"
 
 
 def to_plain_fields(value: Any) -> Any:
@@ -294,14 +294,14 @@ def test_constants_are_no_fields() -> None:
 def test_a_value_is_found_at_its_path(
     cell: Interfaces, good: dict[str, Any], path: str, value: Any
 ) -> None:
-    found = cell.fields(EVERYTHING, [path]).read(cell.encode(EVERYTHING, good)).get(path)
+    found = cell.field_reader(EVERYTHING, [path]).read(cell.encode(EVERYTHING, good)).get(path)
     assert found == value
     assert type(found) is type(value)
 
 
 def test_a_list_that_is_too_short_has_no_value_there(cell: Interfaces, good: dict[str, Any]) -> None:
     payload = cell.encode(EVERYTHING, {**good, "words": ["a"]})
-    found = cell.fields(EVERYTHING, ["words[0]", "words[1]"]).read(payload)
+    found = cell.field_reader(EVERYTHING, ["words[0]", "words[1]"]).read(payload)
     assert (found.get("words[0]"), found.get("words[1]")) == ("a", None)
 
 
@@ -369,8 +369,8 @@ def decoded(interfaces: Interfaces, name: str, data: bytes) -> None:
 def test_all_that_is_built_in_comes_back_as_it_went(
     distro: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(codec, "MOST_ELEMENTS", 10**6)  # of a message that is read whole
-    interfaces = interfaces_of(distro)
+    monkeypatch.setattr(codec, "MAX_ELEMENTS", 10**6)  # of a message that is read whole
+    interfaces = load_interfaces(distro)
     for name in interfaces.structures:
         for edge in ("least", "most"):
             fields = Samples(interfaces.structures).fields(name, edge)
@@ -403,4 +403,4 @@ def test_all_that_is_built_in_comes_back_as_it_went(
     ],
 )
 def test_a_value_is_shown_as_files_and_requests_have_it(given: Any, text: str) -> None:
-    assert shown(given) == text
+    assert format_value(given) == text

@@ -117,7 +117,7 @@ def test_a_note_is_no_fault_and_has_its_place(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     noted = [Note("interlock[0]", "is worth a look"), Note("page[0].widget[4].max_age_s", "is missing")]
-    monkeypatch.setattr("app.panel.checks.notes.notes_in", lambda *_: noted)
+    monkeypatch.setattr("app.panel.checks.notes.find_notes", lambda *_: noted)
     assert main([str(SHIPPED)]) == 0
     said = capsys.readouterr()
     assert said.err == ""

@@ -11,7 +11,7 @@ from app.panel import load_panel
 from app.panel.interlock import Interlock
 from app.permission.conditions import permits
 from app.permission.interlocks import interlock_verdict
-from app.robot.state import PassedOver, RobotState, Sample
+from app.robot.state import RobotState, Sample, SkippedPayload
 from app.runtime.ingest import Ingest
 from app.transport.inbox import Changes
 from tests.support.builders import BRIDGE, ENABLED, INTERFACES, NOW, Table, robot_there
@@ -65,7 +65,7 @@ def robot_of(path: Path) -> tuple[RobotState, Interlock]:
 def said(robot: RobotState, interlock: Interlock, fields: Table) -> str | None:
     """The reason after the robot said this; None where it permits."""
     payload = INTERFACES.encode(interlock.type, fields)
-    robot.take(robot.key(ENABLED), Sample(payload, 1, NOW, NOW, BRIDGE))
+    robot.update(robot.key(ENABLED), Sample(payload, 1, NOW, NOW, BRIDGE))
     verdict = interlock_verdict(interlock, robot, NOW)
     assert verdict.permitted is (verdict.reason is None)
     return None if verdict.reason is None else str(verdict.reason)
@@ -208,8 +208,8 @@ def test_a_value_that_only_changes_the_reason_waits_for_the_next_frame(tmp_path:
         def encoded(one: float) -> bytes:
             return INTERFACES.encode("std_msgs/msg/Float64", {"data": one})
 
-        passed = tuple(PassedOver(encoded(one), NOW, NOW) for one in between)
-        sample = Sample(encoded(value), 1, NOW, NOW, BRIDGE, between=passed)
+        passed = tuple(SkippedPayload(encoded(one), NOW, NOW) for one in between)
+        sample = Sample(encoded(value), 1, NOW, NOW, BRIDGE, skipped_payloads=passed)
         *between_two, last = intake.steps(Changes({robot.key(ENABLED): sample}, {}, True))
         shows.extend(value for _ in between_two)
         return last.urgent, last.more

@@ -10,11 +10,11 @@ from app.clock import format_time
 from app.commands.confirmations import Confirmations
 from app.commands.service_calls import with_fields
 from app.errors import InterfaceError, PanelError
-from app.interfaces import around, interfaces_of, name_of
-from app.interfaces.field_path import Key, steps
+from app.interfaces import field_name, load_interfaces, parent_path
+from app.interfaces.field_path import Key, path_steps
 from app.panel import load_panel
-from app.panel.checks.panel import faults_in
-from app.panel.template import PLACE
+from app.panel.checks.panel import find_faults
+from app.panel.template import RESPONSE_PLACEHOLDER
 from app.permission.interlocks import interlock_verdict
 from app.robot.state import RobotState, Sample
 from app.view.view import build_view
@@ -35,7 +35,7 @@ from tests.support.builders import (
 )
 from tests.support.words import english
 
-JAZZY: Final = interfaces_of("jazzy")
+JAZZY: Final = load_interfaces("jazzy")
 JOINTS: Final = "sensor_msgs/msg/JointState"
 DIAGNOSTICS: Final = "diagnostic_msgs/msg/DiagnosticArray"
 STAMPED: Final[Table] = {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""}
@@ -61,8 +61,8 @@ AT: Final = f"received {format_time(NOW)}"
     ],
 )
 def test_a_path_is_read_as_it_is_written(path: str, found: list[Any], outside: str, last: str) -> None:
-    assert list(steps(path)) == found
-    assert (around(path), name_of(path)) == (outside, last)
+    assert list(path_steps(path)) == found
+    assert (parent_path(path), field_name(path)) == (outside, last)
 
 
 @pytest.mark.parametrize(
@@ -72,7 +72,7 @@ def test_a_path_is_read_as_it_is_written(path: str, found: list[Any], outside: s
 )  # fmt: skip
 def test_what_is_written_otherwise_is_no_path(path: str) -> None:
     with pytest.raises(InterfaceError, match="is not a field: it must be like"):
-        steps(path)
+        path_steps(path)
 
 
 @pytest.mark.parametrize(
@@ -130,15 +130,15 @@ SELF_TEST: Final[Table] = {
 
 def test_an_answer_says_an_element_by_its_key() -> None:
     answer = "{status[name='the drive'].message} {status[name=none].level}"
-    assert list(faults_in(panel_of({**SELF_TEST, "answer": answer}), INTERFACES)) == []
+    assert list(find_faults(panel_of({**SELF_TEST, "answer": answer}), INTERFACES)) == []
     wrong = {**SELF_TEST, "answer": "{status[nmae=x].level}"}
-    (fault,) = faults_in(panel_of(wrong), INTERFACES)
+    (fault,) = find_faults(panel_of(wrong), INTERFACES)
     assert fault.place == "page[0].widget[0].answer"
     name = "diagnostic_msgs/srv/SelfTest_Response"
     status = diagnostics(("x", 0), ("the drive", 2))["status"]
     status[1]["message"] = "too hot"
     payload = INTERFACES.encode(name, {"id": "", "passed": 0, "status": status})
-    fields = INTERFACES.fields(name, PLACE.findall(answer)).read(payload)
+    fields = INTERFACES.field_reader(name, RESPONSE_PLACEHOLDER.findall(answer)).read(payload)
     assert with_fields(answer, fields) == "too hot —"
 
 
@@ -147,7 +147,7 @@ def test_an_element_by_its_key_confirms(level: int, outcome: str) -> None:
     confirm = {"topic": "/heard", "type": DIAGNOSTICS, "field": "status[name=fan].level",
                "equals": 1, "within_s": 0.05}  # fmt: skip
     panel = panel_of(MESSAGE, {**FREE, "confirm": confirm})
-    assert list(faults_in(panel, INTERFACES)) == []
+    assert list(find_faults(panel, INTERFACES)) == []
     robot, way = robot_there(panel), Way()
     confirmations = Confirmations(robot, lambda: None)
     presses = presses_of(panel, robot, way, confirmations=confirmations)
@@ -157,7 +157,7 @@ def test_an_element_by_its_key_confirms(level: int, outcome: str) -> None:
         while not confirmations.awaits("heard"):
             await asyncio.sleep(0)
         payload = INTERFACES.encode(DIAGNOSTICS, diagnostics(("a", 1), ("fan", level)))
-        robot.take("heard", Sample(payload, 1, NOW + 1, NOW + 1, BRIDGE))
+        robot.update("heard", Sample(payload, 1, NOW + 1, NOW + 1, BRIDGE))
         confirmations.hear("heard", robot.reading("/heard"))
         assert (await press).outcome == outcome
 
@@ -178,7 +178,7 @@ def shown(widget: Table, fields: Table) -> dict[str, Any]:
     panel = panel_of({**HEARD, **widget})
     robot = robot_there(panel)
     payload = INTERFACES.encode(widget["type"], fields)
-    robot.take("heard", Sample(payload, 1, NOW, NOW, BRIDGE))
+    robot.update("heard", Sample(payload, 1, NOW, NOW, BRIDGE))
     return build_view(panel, robot, NOW).view["widgets"]["heard"]
 
 
@@ -259,7 +259,7 @@ def test_an_interlock_by_the_state_of_one_device(
     panel = load_panel(path)
     robot: RobotState = robot_there(panel)
     payload = INTERFACES.encode(DIAGNOSTICS, diagnostics(*levels))
-    robot.take(robot.key(ENABLED), Sample(payload, 1, NOW, NOW, BRIDGE))
+    robot.update(robot.key(ENABLED), Sample(payload, 1, NOW, NOW, BRIDGE))
     assert english(interlock_verdict(panel.interlocks[0], robot, NOW).reason) == reason
 
 

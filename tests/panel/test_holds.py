@@ -7,7 +7,7 @@ import pytest
 
 from app.errors import FieldError, PanelError
 from app.panel import Hold, Panel, load_panel
-from app.panel.template import placed
+from app.panel.template import set_field
 from tests.panel.test_panel import toml, without
 from tests.support.builders import INTERLOCK, Table
 
@@ -129,10 +129,10 @@ def test_a_topic_has_one_type_for_buttons_and_holds(tmp_path: Path) -> None:
 )
 def test_a_value_is_placed_in_a_copy(fields: Table, path: str, whole: Table) -> None:
     before = repr(fields)
-    assert placed(fields, path, 7) == whole
+    assert set_field(fields, path, 7) == whole
     assert repr(fields) == before
 
 
 def test_a_place_beyond_the_end_of_a_list_is_none() -> None:
     with pytest.raises(FieldError, match=r"a\[2\]: there is no \[2\]: the message has 2 elements"):
-        placed({"a": [1, 2]}, "a[2]", 7)
+        set_field({"a": [1, 2]}, "a[2]", 7)

@@ -73,7 +73,7 @@ def exactly(value: Any, wanted: Any) -> bool:
 def test_a_value_is_taken_with_the_type_of_its_input(
     table: Mapping[str, Any], given: Any, value: Any
 ) -> None:
-    assert exactly(one(table).checked(given), value)
+    assert exactly(one(table).check_value(given), value)
 
 
 SPEED_LIMITS = "-0.5 to 1.5 m/s, in steps of 0.1"
@@ -114,7 +114,7 @@ def test_what_an_input_does_not_take_is_refused_with_label_and_limits(
     table: Mapping[str, Any], given: Any, sentence: str
 ) -> None:
     with pytest.raises(InputError) as caught:
-        one(table).checked(given)
+        one(table).check_value(given)
     assert str(caught.value).startswith(sentence)
     assert len(str(caught.value)) < 200
 
@@ -143,13 +143,13 @@ def test_what_an_input_does_not_take_is_refused_with_label_and_limits(
 def test_a_forms_text_becomes_what_its_input_is(
     table: Mapping[str, Any], text: str, value: Any
 ) -> None:
-    assert exactly(one(table).typed(text), value)
+    assert exactly(one(table).parse_text(text), value)
 
 
 @pytest.mark.parametrize("text", ["1" * 15_000 + "x", "1" * 7_500 + "." + "1" * 7_500 + "x"])
 def test_digits_that_end_in_a_mistake_take_no_time(text: str) -> None:
     began = time.process_time()
-    assert one(SPEED).typed(text) == text
+    assert one(SPEED).parse_text(text) == text
     assert time.process_time() - began < 1  # it took 10 s, of the whole server
 
 
@@ -182,4 +182,4 @@ def test_limits_that_are_written_as_whole_numbers_have_whole_steps(
 def test_every_value_on_a_step_is_taken() -> None:
     speed = one(SPEED)
     for number in range(-5, 16):
-        assert speed.checked(float(f"{number / 10:.1f}")) == number / 10
+        assert speed.check_value(float(f"{number / 10:.1f}")) == number / 10

@@ -4,10 +4,10 @@ import pytest
 from jinja2 import Environment, FileSystemLoader
 
 from app.commands.dispatch import Dispatcher
-from app.panel.widgets.families import Command, Entered, Placed, Pressed
-from app.panel.widgets.kinds import KINDS, row_of
+from app.panel.widgets.families import BaseWidget, Command, EntryWidget, PressCommand
+from app.panel.widgets.kinds import KINDS, find_row
 from app.permission.interlocks import AGAINST
-from app.settings import shipped
+from app.settings import shipped_path
 from app.view.kinds import SHOWN
 from tests.support.builders import panel_of, robot_there, sending_of
 
@@ -30,38 +30,38 @@ def dispatcher() -> Dispatcher:
     return sending_of(panel, robot_there(panel), Unsent())
 
 
-def widget(of: type[Placed], kind: str) -> Placed:
+def widget(of: type[BaseWidget], kind: str) -> BaseWidget:
     return of.model_construct(id="one", label="One", kind=kind)
 
 
 @EACH
-def test_a_kind_is_the_one_that_its_class_names(kind: str, of: type[Placed]) -> None:
+def test_a_kind_is_the_one_that_its_class_names(kind: str, of: type[BaseWidget]) -> None:
     assert of.model_json_schema()["properties"]["kind"]["const"] == kind
 
 
 @EACH
-def test_a_kind_is_shown(kind: str, of: type[Placed]) -> None:
-    assert callable(row_of(SHOWN, widget(of, kind)))
+def test_a_kind_is_shown(kind: str, of: type[BaseWidget]) -> None:
+    assert callable(find_row(SHOWN, widget(of, kind)))
 
 
 @EACH
-def test_a_kind_has_a_macro_of_its_name(kind: str, of: type[Placed]) -> None:
-    environment = Environment(loader=FileSystemLoader(shipped("templates")))
+def test_a_kind_has_a_macro_of_its_name(kind: str, of: type[BaseWidget]) -> None:
+    environment = Environment(loader=FileSystemLoader(shipped_path("templates")))
     macro = getattr(environment.get_template(f"widgets/{kind}.html").module, kind)
     assert macro.arguments == ("widget", "shown", "inputs", "receipt", "words")
 
 
 @EACH
-def test_a_command_is_judged_and_sent(kind: str, of: type[Placed], dispatcher: Dispatcher) -> None:
+def test_a_command_is_judged_and_sent(kind: str, of: type[BaseWidget], dispatcher: Dispatcher) -> None:
     if issubclass(of, Command):
-        assert callable(row_of(AGAINST, widget(of, kind)))
-    if issubclass(of, Pressed):
-        assert callable(row_of(dispatcher.senders, widget(of, kind)))
-        assert callable(row_of(dispatcher.refusals, widget(of, kind)))
-    if issubclass(of, Entered):
-        assert callable(row_of(dispatcher.checks, widget(of, kind)))
+        assert callable(find_row(AGAINST, widget(of, kind)))
+    if issubclass(of, PressCommand):
+        assert callable(find_row(dispatcher.senders, widget(of, kind)))
+        assert callable(find_row(dispatcher.refusals, widget(of, kind)))
+    if issubclass(of, EntryWidget):
+        assert callable(find_row(dispatcher.checks, widget(of, kind)))
 
 
 def test_a_kind_without_a_row_is_named() -> None:
     with pytest.raises(TypeError, match='no row for a widget of the kind "text"'):
-        row_of(AGAINST, widget(KINDS["text"], "text"))
+        find_row(AGAINST, widget(KINDS["text"], "text"))

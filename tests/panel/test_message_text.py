@@ -7,7 +7,7 @@ import pytest
 
 from app.interfaces import Type
 from app.panel.message_text import message_lines
-from app.panel.preview import whole
+from app.panel.preview import complete_value
 from tests.support.builders import INTERFACES
 
 COVARIANT = "geometry_msgs/msg/PoseWithCovariance"
@@ -35,7 +35,7 @@ def test_a_message_is_written_as_ros_prints_one(fields: dict[str, Any], lines: l
 
 
 def test_a_message_is_whole_with_all_that_it_leaves_out() -> None:
-    made = whole({"pose": {"position": {"x": 1, "y": "{n}"}}}, Type(COVARIANT), INTERFACES)
+    made = complete_value({"pose": {"position": {"x": 1, "y": "{n}"}}}, Type(COVARIANT), INTERFACES)
     assert made == {
         "pose": {
             "position": {"x": 1.0, "y": "{n}", "z": 0.0},
@@ -47,6 +47,6 @@ def test_a_message_is_whole_with_all_that_it_leaves_out() -> None:
 
 
 def test_an_input_may_stand_for_a_whole_table_or_list() -> None:
-    made = whole({"points": ["{p}", {"x": 1}]}, Type("geometry_msgs/msg/Polygon"), INTERFACES)
+    made = complete_value({"points": ["{p}", {"x": 1}]}, Type("geometry_msgs/msg/Polygon"), INTERFACES)
     assert made == {"points": ["{p}", {"x": 1.0, "y": 0.0, "z": 0.0}]}
-    assert whole({"pose": "{p}"}, Type(COVARIANT), INTERFACES)["pose"] == "{p}"
+    assert complete_value({"pose": "{p}"}, Type(COVARIANT), INTERFACES)["pose"] == "{p}"

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from app.errors import Fault, PanelError
 from app.panel import load_panel
-from app.panel.faults.table_keys import inner, known
+from app.panel.faults.table_keys import inner_model, known_keys
 from app.panel.interlock import CONDITIONS
 from app.panel.model import Panel
 from app.panel.widgets.kinds import KINDS
@@ -79,10 +79,10 @@ def id_at(number: int) -> str:
 
 def lacking(table: Mapping[str, Any], model: Any, where: str = "") -> Iterator[str]:
     """Keys of a description that a table lacks; of a list all of its tables together."""
-    for key in known(model):
+    for key in known_keys(model):
         if key not in table:
             yield f"{where}{key}"
-        elif (within := inner(model, key)) and key != "page":
+        elif (within := inner_model(model, key)) and key != "page":
             parts = table[key] if isinstance(table[key], list) else [table[key]]
             yield from lacking({k: v for part in parts for k, v in part.items()}, within, f"{key}.")
 

@@ -14,7 +14,7 @@ from app.errors import PanelError
 from app.interfaces import DISTROS
 from app.panel import Panel, Publish, Readout, TextInput, check_panel, load_panel
 from app.panel.checks.types import ROSOUT
-from app.panel.widgets.service_action import OF_ACTIONS
+from app.panel.widgets.service_action import ACTION_SERVER_TYPES
 from app.settings import PACKAGE
 from app.transport.rosout import LOG_TYPE
 from tests.support.builders import FREE, GUARDED, HEARD, INTERLOCK, MESSAGE, TEXT, Table, small_panel
@@ -754,7 +754,7 @@ def test_what_the_kiosk_itself_needs_must_be_usable(
 
 def test_the_types_that_the_kiosk_needs_are_those_that_it_uses() -> None:
     assert ROSOUT == LOG_TYPE
-    assert (STATUS, f"{CANCEL}_Request") == OF_ACTIONS
+    assert (STATUS, f"{CANCEL}_Request") == ACTION_SERVER_TYPES
 
 
 def test_the_folder_with_the_fault_is_named(load: Load, tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ from typing import Any, Final
 import pytest
 
 from app.errors import Fault, Note
-from app.panel.faults.places import id_at, located, place_of
+from app.panel.faults.places import add_locations, id_at, place_of
 from app.panel.faults.toml_lines import Path
 
 TEXT: Final = """title = "Cell"
@@ -77,13 +77,13 @@ def test_a_path_is_written_as_a_place(path: Path, place: str) -> None:
     ],
 )
 def test_a_place_has_its_id_and_its_line(place: str, where: str) -> None:
-    (fault,) = located([Fault(place, "is wrong")], TEXT, TABLES)
-    assert fault.where == where
+    (fault,) = add_locations([Fault(place, "is wrong")], TEXT, TABLES)
+    assert fault.location == where
     assert str(fault) == (f"{where}: is wrong" if where else "is wrong")
 
 
 def test_what_is_known_already_stays() -> None:
-    (note,) = located([Note("page[0]", "is long", id="mine", line=7)], TEXT, TABLES)
+    (note,) = add_locations([Note("page[0]", "is long", id="mine", line=7)], TEXT, TABLES)
     assert str(note) == 'note: page[0] "mine", line 7: is long'
 
 
@@ -101,5 +101,5 @@ def test_an_id_is_no_longer_than_an_id_may_be() -> None:
 
 def test_what_is_nested_too_deep_is_told_without_lines() -> None:
     text = "a = " + "[" * 3000 + "]" * 3000
-    (fault,) = located([Fault("a", "is wrong")], text, {})
+    (fault,) = add_locations([Fault("a", "is wrong")], text, {})
     assert fault.line == 0

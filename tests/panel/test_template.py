@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from app.errors import FieldError
-from app.panel.template import at, filled, named, names_in, with_now
+from app.panel.template import add_now, fill, placeholder_ids, placeholders, value_at
 
 
 @pytest.mark.parametrize(
@@ -31,29 +31,29 @@ from app.panel.template import at, filled, named, names_in, with_now
     ],
 )
 def test_inputs_are_put_where_their_ids_stand(template: Any, made: Any) -> None:
-    assert filled(template, {"a": "one", "n": 7, "on": True}) == made
+    assert fill(template, {"a": "one", "n": 7, "on": True}) == made
 
 
 @pytest.mark.parametrize("value", ["{b}", "{{", "}", "{0.__class__}", "{a!r}"])
 def test_braces_in_a_value_are_only_text(value: str) -> None:
-    assert filled("<{a}>", {"a": value, "b": "secret"}) == f"<{value}>"
-    assert filled("{a}", {"a": value, "b": "secret"}) == value
+    assert fill("<{a}>", {"a": value, "b": "secret"}) == f"<{value}>"
+    assert fill("{a}", {"a": value, "b": "secret"}) == value
 
 
 def test_keys_are_not_templates() -> None:
-    assert filled({"{a}": 1}, {"a": "x"}) == {"{a}": 1}
-    assert list(named({"{a}": 1})) == []
+    assert fill({"{a}": 1}, {"a": "x"}) == {"{a}": 1}
+    assert list(placeholders({"{a}": 1})) == []
 
 
 def test_the_template_itself_stays_as_it_is() -> None:
     template = {"x": ["{a}"]}
-    filled(template, {"a": "one"})
+    fill(template, {"a": "one"})
     assert template == {"x": ["{a}"]}
 
 
 def test_each_placeholder_is_named_with_its_place() -> None:
     template = {"x": {"y": "{a} and {b}"}, "z": [1, "{a}", {"w": "{{no}}{c}"}]}
-    assert list(named(template)) == [("x.y", "a"), ("x.y", "b"), ("z[1]", "a"), ("z[2].w", "c")]
+    assert list(placeholders(template)) == [("x.y", "a"), ("x.y", "b"), ("z[1]", "a"), ("z[2].w", "c")]
 
 
 @pytest.mark.parametrize(
@@ -76,13 +76,13 @@ def test_each_placeholder_is_named_with_its_place() -> None:
 )
 def test_what_is_no_placeholder_is_refused_with_its_place(text: str) -> None:
     with pytest.raises(FieldError, match="brace") as caught:
-        list(named({"x": ["", text]}))
+        list(placeholders({"x": ["", text]}))
     assert caught.value.field == "x[1]"
 
 
 def test_a_list_can_not_stand_in_a_text() -> None:
     with pytest.raises(FieldError, match="write the input's id alone") as caught:
-        filled({"x": "a {a}"}, {"a": [1]})
+        fill({"x": "a {a}"}, {"a": [1]})
     assert caught.value.field == "x"
 
 
@@ -92,13 +92,13 @@ def test_a_list_can_not_stand_in_a_text() -> None:
 )
 def test_what_stands_at_a_field_is_found(where: str, found: Any) -> None:
     template = {"x": "{a}", "z": [1, {"w": "{b}"}]}
-    assert at(template, where) == (template if found is None else found)
+    assert value_at(template, where) == (template if found is None else found)
 
 
 def test_now_is_the_time_at_which_it_is_asked_for() -> None:
     before = time.time_ns()
-    values = with_now({"a": 1})
-    stamp = filled([{"stamp": "{now}"}], values)[0]["stamp"]
+    values = add_now({"a": 1})
+    stamp = fill([{"stamp": "{now}"}], values)[0]["stamp"]
     assert set(stamp) == {"sec", "nanosec"}
     assert before <= stamp["sec"] * 10**9 + stamp["nanosec"] <= time.time_ns()
     assert stamp["nanosec"] < 10**9
@@ -106,4 +106,4 @@ def test_now_is_the_time_at_which_it_is_asked_for() -> None:
 
 
 def test_now_is_no_input() -> None:
-    assert names_in([{"x": "{now}"}, "{a}", ["{b} {a}"]]) == ["a", "b"]
+    assert placeholder_ids([{"x": "{now}"}, "{a}", ["{b} {a}"]]) == ["a", "b"]

@@ -7,9 +7,9 @@ import pytest
 from pydantic import ValidationError
 
 from app.errors import Fault
-from app.interfaces import DISTROS, interfaces_of
+from app.interfaces import DISTROS, load_interfaces
 from app.panel.base import TopicQos
-from app.panel.checks.panel import faults_in
+from app.panel.checks.panel import find_faults
 from app.panel.widgets.parameter import DESCRIBE, EVENT_TYPE, GET, SET
 from tests.support.builders import ENABLED, FREE, GUARDED, HEARD, INTERFACES, MESSAGE, TEXT, panel_of
 
@@ -33,7 +33,7 @@ IMAGE_FORMATS = "sensor_msgs/msg/PointField"
 
 
 def faults(*widgets: Mapping[str, Any], **more: Any) -> list[str]:
-    return [str(fault) for fault in faults_in(panel_of(*widgets, **more), INTERFACES)]
+    return [str(fault) for fault in find_faults(panel_of(*widgets, **more), INTERFACES)]
 
 
 def sent(type_name: str, message: Any) -> dict[str, Any]:
@@ -303,13 +303,13 @@ def test_a_topics_qos_is_found_by_its_name() -> None:
     panel = panel_of(MESSAGE, FREE, {**HEARD, "qos": {"durability": "transient_local"}})
     assert panel.qos("/free") == TopicQos()
     assert panel.qos(ENABLED) == TopicQos()
-    assert panel.qos("/heard").on_wire.transient_local
+    assert panel.qos("/heard").wire_qos.transient_local
 
 
 def test_what_depends_on_a_fault_that_is_told_already_is_not_judged() -> None:
     panel = panel_of(MESSAGE, std("Float64", "{message}"))
-    assert list(faults_in(panel, INTERFACES, {"message"})) == []
-    assert [type(f) for f in faults_in(panel, INTERFACES, {"other"})] == [Fault]
+    assert list(find_faults(panel, INTERFACES, {"message"})) == []
+    assert [type(f) for f in find_faults(panel, INTERFACES, {"other"})] == [Fault]
 
 
 @pytest.mark.parametrize(
@@ -328,9 +328,9 @@ def test_a_parameter_that_fits_has_no_fault(more: dict[str, Any]) -> None:
 
 @pytest.mark.parametrize("distro", DISTROS)
 def test_every_distribution_has_the_services_of_parameters(distro: str) -> None:
-    interfaces = interfaces_of(distro)
+    interfaces = load_interfaces(distro)
     for _, type_name in (GET, DESCRIBE, SET):
-        interfaces.service(type_name)
+        interfaces.service_types(type_name)
     interfaces.require(EVENT_TYPE)
 
 

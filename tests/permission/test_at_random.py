@@ -49,7 +49,7 @@ ADD: Final = {
     "request": {"a": 1, "b": 2},
     "timeout_s": TIMEOUT_S,
 }
-REQUEST, RESPONSE = INTERFACES.service(SERVICE)
+REQUEST, RESPONSE = INTERFACES.service_types(SERVICE)
 ANSWER: Final = INTERFACES.encode(RESPONSE, {"sum": 3})
 IDS: Final = some.sampled_from(["p1", "p2", "p3", "p4"])
 BUTTONS: Final = some.sampled_from(["guarded", "add"])
@@ -182,8 +182,8 @@ class Panels(RuleBasedStateMachine):
         self.link_comes()
         self.bridge_comes()
         self.publisher_comes()
-        self.robot.graph.learn(())
-        self.robot.graph.answered({BRIDGE: "1"})
+        self.robot.graph.update_routes(())
+        self.robot.graph.update_versions({BRIDGE: "1"})
         self.type_is(wrong=False)
         self.joined()
         self.grounds.silent = self.grounds.unheard = False
@@ -197,15 +197,15 @@ class Panels(RuleBasedStateMachine):
 
     @rule()
     def link_goes(self) -> None:
-        self.robot.lose()
+        self.robot.mark_link_lost()
         self.grounds = Grounds(self.grounds.strict)
         self.calls.follow()
 
     @precondition(lambda self: self.grounds.link and not self.grounds.bridge)
     @rule()
     def bridge_comes(self) -> None:
-        self.robot.graph.apply(bridge_dialect.bridge_token(BRIDGE), True)
-        self.robot.graph.apply(bridge_dialect.server_token(BRIDGE, "SS", "add", SERVICE), True)
+        self.robot.graph.apply_token(bridge_dialect.bridge_token(BRIDGE), True)
+        self.robot.graph.apply_token(bridge_dialect.server_token(BRIDGE, "SS", "add", SERVICE), True)
         self.grounds.bridge, self.grounds.silent = True, False
 
     @precondition(lambda self: self.grounds.bridge)
@@ -213,11 +213,11 @@ class Panels(RuleBasedStateMachine):
     def bridge_goes(self) -> None:
         self.publisher_goes()
         self.type_is(wrong=False)
-        self.robot.graph.apply(bridge_dialect.server_token(BRIDGE, "SS", "add", SERVICE), False)
-        self.robot.graph.apply(bridge_dialect.bridge_token(BRIDGE), False)
+        self.robot.graph.apply_token(bridge_dialect.server_token(BRIDGE, "SS", "add", SERVICE), False)
+        self.robot.graph.apply_token(bridge_dialect.bridge_token(BRIDGE), False)
         self.seq += 1
-        self.robot.cut(BRIDGE, self.seq)
-        self.robot.follow_publishers()
+        self.robot.mark_bridge_lost(BRIDGE, self.seq)
+        self.robot.update_publishers()
         self.robot.settled_at = float("inf")
         self.grounds.bridge, self.grounds.settled_at, self.grounds.value = False, None, None
         self.calls.follow()
@@ -237,27 +237,27 @@ class Panels(RuleBasedStateMachine):
     @precondition(lambda self: self.grounds.bridge)
     @rule(silent=some.booleans())
     def bridge_is_asked(self, silent: bool) -> None:
-        self.robot.graph.answered({} if silent else {BRIDGE: "1"})
+        self.robot.graph.update_versions({} if silent else {BRIDGE: "1"})
         self.grounds.silent = silent
 
     @precondition(lambda self: self.grounds.bridge)
     @rule(deaf=some.booleans())
     def bridge_tells_its_routes(self, deaf: bool) -> None:
-        self.robot.graph.learn([Route(BRIDGE, "pub", self.key, BOOL, whole=not deaf)])
+        self.robot.graph.update_routes([Route(BRIDGE, "pub", self.key, BOOL, has_reader=not deaf)])
         self.grounds.unheard = deaf
 
     @precondition(lambda self: self.grounds.bridge)
     @rule()
     def publisher_comes(self) -> None:
         endpoint(self.robot, "MP", ENABLED, BOOL)
-        self.robot.follow_publishers()
+        self.robot.update_publishers()
         self.grounds.publisher = True
 
     @precondition(lambda self: self.grounds.bridge)
     @rule()
     def publisher_goes(self) -> None:
         endpoint(self.robot, "MP", ENABLED, BOOL, alive=False)
-        self.robot.follow_publishers()
+        self.robot.update_publishers()
         if self.grounds.strict and self.grounds.publisher and not self.grounds.wrong_type:
             self.grounds.value = None
         self.grounds.publisher = False
@@ -266,7 +266,7 @@ class Panels(RuleBasedStateMachine):
     @rule(wrong=some.booleans())
     def type_is(self, wrong: bool) -> None:
         endpoint(self.robot, "MP", ENABLED, TEXT, alive=wrong)
-        self.robot.follow_publishers()
+        self.robot.update_publishers()
         if self.grounds.strict and self.grounds.wrong_type and not wrong and not self.grounds.publisher:
             self.grounds.value = None
         self.grounds.wrong_type = wrong
@@ -283,7 +283,7 @@ class Panels(RuleBasedStateMachine):
 
     def hears(self, payload: bytes) -> None:
         self.seq += 1
-        self.robot.take(self.key, Sample(payload, self.seq, self.now, self.now, BRIDGE))
+        self.robot.update(self.key, Sample(payload, self.seq, self.now, self.now, BRIDGE))
 
     @rule(seconds=some.sampled_from([0.004, 0.5, 1.0, MAX_AGE_S]))
     def time_passes(self, seconds: float) -> None:

@@ -54,15 +54,15 @@ def no_link(robot: RobotState) -> None:
 
 
 def no_bridge(robot: RobotState) -> None:
-    robot.graph.apply(bridge_token(BRIDGE), False)
+    robot.graph.apply_token(bridge_token(BRIDGE), False)
 
 
 def bridge_silent(robot: RobotState) -> None:
-    robot.graph.answered({})
+    robot.graph.update_versions({})
 
 
 def bridge_unheard(robot: RobotState) -> None:
-    robot.answers = False
+    robot.is_responding = False
 
 
 def no_link_at(robot: RobotState) -> None:
@@ -153,7 +153,7 @@ def test_a_robot_that_says_false_forbids(robot: RobotState, label: str | None, n
 
 
 def test_what_was_permitted_before_a_cut_is_locked(robot: RobotState) -> None:
-    robot.cut(BRIDGE, 2)
+    robot.mark_bridge_lost(BRIDGE, 2)
     verdict = verdict_of(robot)
     assert english((verdict.permitted, verdict.code, verdict.reason)) == (
         False,
@@ -164,7 +164,7 @@ def test_what_was_permitted_before_a_cut_is_locked(robot: RobotState) -> None:
 
 @pytest.mark.parametrize("payload", [b"", b"true!", b"\0\1\0\0", b"\0\1\0\0\1\0\0\0\0\0\0\0"])
 def test_what_can_not_be_read_locks(robot: RobotState, payload: bytes) -> None:
-    robot.take(robot.key(ENABLED), Sample(payload, 2, NOW, NOW, BRIDGE))
+    robot.update(robot.key(ENABLED), Sample(payload, 2, NOW, NOW, BRIDGE))
     verdict = verdict_of(robot)
     assert english((verdict.permitted, verdict.code, verdict.reason)) == (
         False,
@@ -254,7 +254,7 @@ def test_a_bool_of_a_larger_message_can_permit(permitted: bool) -> None:
     robot = robot_there(small_panel(interlock))
     sizes = dict.fromkeys(("x_offset", "y_offset", "height", "width"), 1)
     payload = INTERFACES.encode(interlock["type"], {**sizes, "do_rectify": permitted})
-    robot.take(robot.key(ENABLED), Sample(payload, 1, NOW, NOW, BRIDGE))
+    robot.update(robot.key(ENABLED), Sample(payload, 1, NOW, NOW, BRIDGE))
     assert verdict_of(robot, interlock).permitted is permitted
 
 
@@ -288,7 +288,7 @@ def test_a_service_that_has_just_come_is_not_called_yet() -> None:
     robot = robot_there(panel_of(call.model_dump(exclude_none=True, exclude_defaults=True)))
     token = server_token(BRIDGE, "SS", "reset", call.type)
     assert judged(call, (), robot, NOW).code == "no_service"
-    robot.graph.apply(token, True, NOW)
+    robot.graph.apply_token(token, True, NOW)
     verdict = judged(call, (), robot, NOW)
     assert english((verdict.permitted, verdict.code, verdict.reason, verdict.until)) == (
         False,
@@ -297,6 +297,6 @@ def test_a_service_that_has_just_come_is_not_called_yet() -> None:
         NOW + SERVER_SETTLE_S,
     )
     assert judged(call, (), robot, NOW + SERVER_SETTLE_S).permitted
-    robot.graph.apply(token, False)
-    robot.graph.apply(token, True, NOW + 9)  # another node of this name
+    robot.graph.apply_token(token, False)
+    robot.graph.apply_token(token, True, NOW + 9)  # another node of this name
     assert judged(call, (), robot, NOW + 9).code == "getting_ready"

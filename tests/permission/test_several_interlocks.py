@@ -157,11 +157,11 @@ def test_a_link_that_locks_by_the_second_reason_says_so() -> None:
     panel = cell()
     robot = robot_there(panel)
     permits(robot, False)
-    robot.follow_publishers()
+    robot.update_publishers()
     link = build_view(panel, robot, NOW).view["link"]["node"]
     assert english(link["locks"]) == "Locks Free."
     endpoint(robot, "MP", DOORS, BOOL)
-    robot.follow_publishers()
+    robot.update_publishers()
     link = build_view(panel, robot, NOW).view["link"]["node"]
     assert english((link["locks"], link["reason"])) == (
         "Locks Free.",

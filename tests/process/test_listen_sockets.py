@@ -7,7 +7,7 @@ from contextlib import suppress
 import pytest
 
 from app.process import listen_sockets
-from app.process.listen_sockets import GONE_AFTER_MS, SEND_BUFFER
+from app.process.listen_sockets import SEND_BUFFER_BYTES, USER_TIMEOUT_MS
 
 
 def accepted(listening: socket.socket) -> int:
@@ -17,17 +17,17 @@ def accepted(listening: socket.socket) -> int:
 
 
 def test_a_listening_socket_is_found_and_no_other() -> None:
-    before = listen_sockets.names()
+    before = listen_sockets.listener_names()
     with socket.create_server(("127.0.0.1", 0)) as one:
-        (found,) = listen_sockets.names() - before
+        (found,) = listen_sockets.listener_names() - before
         with socket.create_connection(one.getsockname()):
-            assert listen_sockets.names() == before | {found}
-    assert listen_sockets.names() == before
+            assert listen_sockets.listener_names() == before | {found}
+    assert listen_sockets.listener_names() == before
 
 
 def test_who_waits_for_it_is_told_when_it_listens() -> None:
     async def work() -> None:
-        waiting = asyncio.create_task(listen_sockets.listening(listen_sockets.names()))
+        waiting = asyncio.create_task(listen_sockets.wait_for_listener(listen_sockets.listener_names()))
         await asyncio.sleep(0)
         assert not waiting.done()
         with socket.create_server(("127.0.0.1", 0)):
@@ -46,10 +46,10 @@ def test_what_listens_from_now_on_is_narrowed_and_what_listened_before_is_not() 
             with socket.create_server(("127.0.0.1", 0)) as new:
                 assert await asyncio.wait_for(narrowing, 4) == [new.getsockname()]
                 assert ports == {new.getsockname()[1]}
-                assert accepted(new) == 2 * SEND_BUFFER < wide
+                assert accepted(new) == 2 * SEND_BUFFER_BYTES < wide
                 assert accepted(old) == wide
                 gone = (socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT)
-                assert (new.getsockopt(*gone), old.getsockopt(*gone)) == (GONE_AFTER_MS, 0)
+                assert (new.getsockopt(*gone), old.getsockopt(*gone)) == (USER_TIMEOUT_MS, 0)
 
     asyncio.run(work())
 
@@ -68,7 +68,7 @@ def test_who_reads_nothing_is_cut_off_and_who_has_read_all_is_not() -> None:
                 while stuck.send(bytes(65_536)):
                     pass
             listen_sockets.abort_unsent({port + 1})
-            assert listen_sockets.unsent(stuck)
+            assert listen_sockets.unsent_bytes(stuck)
             listen_sockets.abort_unsent({port})
             with pytest.raises(BrokenPipeError):
                 stuck.send(b"more")

@@ -14,7 +14,7 @@ from pathlib import Path
 import httpx
 import pytest
 
-from app.process.sd_notify import ServiceManager, status
+from app.process.sd_notify import ServiceManager, status_line
 from app.process.watchdog import Watchdog
 from tests.support.parts import ROOT, Process, Server, free_port, live, until
 
@@ -188,16 +188,16 @@ def test_a_manager_that_does_not_listen_is_told_of_once(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     manager = ServiceManager({"NOTIFY_SOCKET": str(tmp_path / "nobody")})
-    manager.tell("READY=1")
-    manager.tell("WATCHDOG=1")
+    manager.notify("READY=1")
+    manager.notify("WATCHDOG=1")
     assert len(caplog.records) == 1
-    assert not ServiceManager({"NOTIFY_SOCKET": "vsock:2:1"}).listens
-    assert not ServiceManager({}).listens
+    assert not ServiceManager({"NOTIFY_SOCKET": "vsock:2:1"}).is_enabled
+    assert not ServiceManager({}).is_enabled
 
 
 def test_a_state_is_one_line() -> None:
-    assert status("r1: ready\nr2:  lost") == "STATUS=r1: ready r2: lost"
-    assert len(status("x" * 10_000)) < 4096
+    assert status_line("r1: ready\nr2:  lost") == "STATUS=r1: ready r2: lost"
+    assert len(status_line("x" * 10_000)) < 4096
 
 
 def test_nothing_runs_where_nobody_asked() -> None:

@@ -19,9 +19,9 @@ from app.interfaces import Structure
 from app.panel import load_panel
 from app.panel.rules import RecordRules
 from app.recording import Recorder, Recordings
-from app.recording.directory import RecordingDirectory, name_of
-from app.recording.mcap_file import PRESSES, UNFINISHED, Channel, McapFile
-from app.recording.ring_buffer import COPIED, OVERHEAD, RingBuffer, buffered
+from app.recording.directory import RecordingDirectory, recording_name
+from app.recording.mcap_file import PRESS_TOPIC, UNFINISHED, Channel, McapFile
+from app.recording.ring_buffer import COPY_BELOW_BYTES, OVERHEAD_BYTES, RingBuffer, to_buffered
 from app.robot.state import RobotState, Sample
 from tests.support.builders import DIALECT, HEARD, INTERFACES, KIOSK, TEXT, panel_of
 from tests.support.parts import ROOT
@@ -51,19 +51,19 @@ def messages(folder: Path, topic: str) -> list[Message]:
 def test_a_ring_keeps_what_is_young_enough() -> None:
     ring = RingBuffer(10.0, MB)
     for at in (0.0, 5.0, 9.0, 12.0):
-        ring.add(buffered("heard", sample(at)))
-    assert [one.sample.at for one in ring.since(12.0)] == [5.0, 9.0, 12.0]
-    assert [one.sample.at for one in ring.since(20.0)] == [12.0]
-    assert list(ring.since(99.0)) == []
+        ring.add(to_buffered("heard", sample(at)))
+    assert [one.sample.at for one in ring.recent(12.0)] == [5.0, 9.0, 12.0]
+    assert [one.sample.at for one in ring.recent(20.0)] == [12.0]
+    assert list(ring.recent(99.0)) == []
     assert ring.size == 0
 
 
 def test_a_ring_holds_no_more_bytes_than_it_may_in_a_flood() -> None:
     ring = RingBuffer(10.0, 64 * MB)
     for number in range(20_000):  # ten seconds of 10 MB at 2 kHz
-        ring.add(buffered("heard", sample(number / 2000, FLOOD)))
+        ring.add(to_buffered("heard", sample(number / 2000, FLOOD)))
         assert ring.size <= 64 * MB
-    assert len(list(ring.since(10.0))) == 6
+    assert len(list(ring.recent(10.0))) == 6
 
 
 FLOOD = bytes(10 * MB)
@@ -71,16 +71,16 @@ FLOOD = bytes(10 * MB)
 
 def test_what_is_larger_than_the_ring_does_not_drive_out_the_rest() -> None:
     ring = RingBuffer(10.0, MB)
-    ring.add(buffered("heard", sample(1.0)))
-    ring.add(buffered("heard", sample(2.0, FLOOD)))
-    assert [one.sample.at for one in ring.since(2.0)] == [1.0]
+    ring.add(to_buffered("heard", sample(1.0)))
+    ring.add(to_buffered("heard", sample(2.0, FLOOD)))
+    assert [one.sample.at for one in ring.recent(2.0)] == [1.0]
 
 
 def test_small_samples_count_with_what_they_cost() -> None:
     ring = RingBuffer(10.0, MB)
     for _ in range(10_000):
-        ring.add(buffered("heard", sample(1.0, b"1234")))
-    assert len(list(ring.since(1.0))) == MB // (4 + OVERHEAD)
+        ring.add(to_buffered("heard", sample(1.0, b"1234")))
+    assert len(list(ring.recent(1.0))) == MB // (4 + OVERHEAD_BYTES)
 
 
 class Shared:
@@ -96,11 +96,11 @@ class Shared:
         return self._size
 
 
-@pytest.mark.parametrize(("size", "kind"), [(COPIED - 1, bytes), (COPIED, Shared)])
+@pytest.mark.parametrize(("size", "kind"), [(COPY_BELOW_BYTES - 1, bytes), (COPY_BELOW_BYTES, Shared)])
 def test_a_small_payload_keeps_no_large_buffer(size: int, kind: type) -> None:
-    one = buffered("heard", Sample(Shared(size), 1, 0.0, 0.0, None))
+    one = to_buffered("heard", Sample(Shared(size), 1, 0.0, 0.0, None))
     assert type(one.sample.payload) is kind
-    assert one.size == size + OVERHEAD
+    assert one.size == size + OVERHEAD_BYTES
 
 
 # Definitions as text.
@@ -113,7 +113,7 @@ def test_every_definition_reads_back_as_it_was() -> None:
             assert [field for field, _ in read[name][1]] == [one.name for one in structure.fields]
             constants = {each: value for each, _, value in read[name][0]}
             assert constants == pytest.approx(dict(structure.constants))
-            assert {inner for _, inner in structure.needs()} <= read.keys()
+            assert {inner for _, inner in structure.nested_fields()} <= read.keys()
 
 
 def wide(structure: Structure) -> bool:
@@ -136,8 +136,8 @@ def test_a_definition_is_written_as_ros2msg_asks_for() -> None:
 
 
 def test_names_sort_by_time_and_say_whose_and_what() -> None:
-    assert name_of(1_700_000_000.5, "r1", "drive") == "20231114T221320.500Z-r1-drive"
-    assert name_of(1_700_000_000.5, "", "drive") == "20231114T221320.500Z-drive"
+    assert recording_name(1_700_000_000.5, "r1", "drive") == "20231114T221320.500Z-r1-drive"
+    assert recording_name(1_700_000_000.5, "", "drive") == "20231114T221320.500Z-drive"
 
 
 def test_what_a_killed_process_left_is_finished_at_the_next_start(tmp_path: Path) -> None:
@@ -147,7 +147,7 @@ def test_what_a_killed_process_left_is_finished_at_the_next_start(tmp_path: Path
     (path,) = tmp_path.iterdir()
     assert path.name == "a.recovered.mcap"
     assert texts(tmp_path) == ["said"]
-    assert [json.loads(m.data)["id"] for m in messages(tmp_path, PRESSES)] == ["p1"]
+    assert [json.loads(m.data)["id"] for m in messages(tmp_path, PRESS_TOPIC)] == ["p1"]
 
 
 def left_by_a_killed_process(folder: Path) -> None:
@@ -180,7 +180,7 @@ def test_a_clock_that_was_set_back_does_not_make_the_newest_recording_the_oldest
 ) -> None:
     year = 365 * 86_400.0
     moments = [time.time() + year + number for number in range(3)] + [time.time()]
-    files = [tmp_path / f"{name_of(moment, '', 'drive')}.mcap" for moment in moments]
+    files = [tmp_path / f"{recording_name(moment, '', 'drive')}.mcap" for moment in moments]
     for file in files:
         file.write_bytes(bytes(300))
     RecordingDirectory(tmp_path, 700).make_room(0)
@@ -210,7 +210,7 @@ class Cell:
         robot = RobotState(self.panel, INTERFACES, DIALECT, KIOSK)
         self.recorder = Recorder(self.panel, self.rules, INTERFACES, robot, "", self.recordings)
         self.told = 0
-        self.recordings.follow(self._count)
+        self.recordings.add_listener(self._count)
         self.recordings.start()
 
     def _count(self) -> None:
@@ -219,7 +219,7 @@ class Cell:
     def says(self, text: str, ago: float = 0.0) -> None:
         payload = INTERFACES.encode(TEXT, {"data": text})
         at = time.monotonic() - ago
-        self.recorder.hear("heard", Sample(payload, 1, at, time.time() - ago, "b1", sent=1.5))
+        self.recorder.record_sample("heard", Sample(payload, 1, at, time.time() - ago, "b1", sent=1.5))
 
     def press(self, press_id: str = "p1", outcome: Any = "published") -> None:
         self.recorder.pressed(press_id, "free", "10.0.0.1", {"message": "hello"})
@@ -268,7 +268,7 @@ def test_a_recording_goes_from_before_a_press_to_after_it(run: Callable[..., Non
         received = messages(cell.folder, "/heard")
         assert received[1].log_time - received[0].log_time == pytest.approx(4e9, rel=0.1)
         assert {message.publish_time for message in received} == {1_500_000_000}
-        told = [json.loads(m.data) for m in messages(cell.folder, PRESSES)]
+        told = [json.loads(m.data) for m in messages(cell.folder, PRESS_TOPIC)]
         assert [one["outcome"] for one in told] == [None, "published"]
         assert told[1] == {
             "id": "p1",
@@ -289,7 +289,7 @@ def test_presses_that_come_meanwhile_prolong_the_same_file(run: Callable[..., No
             cell.press(f"p{number}", "refused" if number % 2 else "published")
             await asyncio.sleep(0.05)
         await cell.finished()
-        told = [json.loads(m.data)["id"] for m in messages(cell.folder, PRESSES)]
+        told = [json.loads(m.data)["id"] for m in messages(cell.folder, PRESS_TOPIC)]
         assert told == [f"p{number}" for number in range(8) for _ in range(2)]
 
     run(test)
@@ -302,7 +302,7 @@ def test_a_recording_waits_for_the_receipt(run: Callable[..., None]) -> None:
         assert list(cell.folder.glob("*.mcap")) == []
         cell.press("slow", "timed_out")
         await cell.finished()
-        told = [json.loads(m.data)["outcome"] for m in messages(cell.folder, PRESSES)]
+        told = [json.loads(m.data)["outcome"] for m in messages(cell.folder, PRESS_TOPIC)]
         assert told[-1] == "timed_out"
 
     run(test)
@@ -380,14 +380,14 @@ def test_a_disk_that_stands_still_costs_no_memory_and_no_time(run: Callable[...,
         def hang() -> None:
             os.read(gate[0], 1)
 
-        cell.recordings.hand_over(0, hang)
+        cell.recordings.enqueue(0, hang)
         cell.press()
         flood = sample(time.monotonic(), FLOOD)
         began = time.monotonic()
         for _ in range(200):
-            cell.recorder.hear("heard", flood)
+            cell.recorder.record_sample("heard", flood)
         assert time.monotonic() - began < 5  # the disk would never let go
-        assert cell.recordings._waiting <= 128 * 1024 * 1024
+        assert cell.recordings._queued_bytes <= 128 * 1024 * 1024
         os.write(gate[1], b"1")
         cell.recorder.stop()
         await cell.finished()

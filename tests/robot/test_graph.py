@@ -23,59 +23,59 @@ def topic_token(zid: str, role: TopicRole, key: str, type_name: str, qos: Qos | 
 def graph() -> Graph:
     """A graph with one bridge."""
     made = Graph(DIALECT, KIOSK)
-    made.apply(bridge_token(BRIDGE), True)
+    made.apply_token(bridge_token(BRIDGE), True)
     return made
 
 
 def test_a_bridge_comes_and_goes() -> None:
     graph = Graph(DIALECT, KIOSK)
-    assert graph.apply(bridge_token(BRIDGE), True) == BRIDGE
+    assert graph.apply_token(bridge_token(BRIDGE), True) == BRIDGE
     assert graph.bridges == {BRIDGE}
-    assert graph.apply(bridge_token(BRIDGE), False) == BRIDGE
+    assert graph.apply_token(bridge_token(BRIDGE), False) == BRIDGE
     assert graph.bridges == frozenset()
 
 
 def test_a_topics_token_is_no_bridge(graph: Graph) -> None:
-    assert graph.apply(topic_token("x", "MP", "a", BOOL), True) is None
+    assert graph.apply_token(topic_token("x", "MP", "a", BOOL), True) is None
     assert graph.bridges == {BRIDGE}
 
 
 def test_the_kiosks_own_tokens_do_not_count() -> None:
     graph = Graph(DIALECT, KIOSK)
-    assert graph.apply(bridge_token(KIOSK), True) is None
-    graph.apply(topic_token(KIOSK, "MP", "a", BOOL), True)
+    assert graph.apply_token(bridge_token(KIOSK), True) is None
+    graph.apply_token(topic_token(KIOSK, "MP", "a", BOOL), True)
     assert graph.bridges == frozenset()
-    assert graph.wrong_type("MP", "a", TEXT) is None
+    assert graph.mismatched_type("MP", "a", TEXT) is None
 
 
 def test_what_is_no_token_changes_nothing(graph: Graph) -> None:
-    assert graph.apply("@/b1/@ros2_lv/SS/add/x", True) is None
+    assert graph.apply_token("@/b1/@ros2_lv/SS/add/x", True) is None
     assert graph.bridges == {BRIDGE}
 
 
 @pytest.mark.parametrize("role", ["MP", "MS"])
 def test_a_node_behind_a_bridge_is_on_the_robot(graph: Graph, role: TopicRole) -> None:
-    graph.apply(topic_token(BRIDGE, role, "a", BOOL), True)
-    assert graph.on_robot(role, "a")
-    assert not graph.on_robot(role, "b")
-    assert not graph.on_robot("MS" if role == "MP" else "MP", "a")
+    graph.apply_token(topic_token(BRIDGE, role, "a", BOOL), True)
+    assert graph.has_endpoint(role, "a")
+    assert not graph.has_endpoint(role, "b")
+    assert not graph.has_endpoint("MS" if role == "MP" else "MP", "a")
 
 
 def test_a_node_that_ended_is_not_on_the_robot(graph: Graph) -> None:
-    graph.apply(topic_token(BRIDGE, "MP", "a", BOOL), True)
-    graph.apply(topic_token(BRIDGE, "MP", "a", BOOL), False)
-    assert not graph.on_robot("MP", "a")
+    graph.apply_token(topic_token(BRIDGE, "MP", "a", BOOL), True)
+    graph.apply_token(topic_token(BRIDGE, "MP", "a", BOOL), False)
+    assert not graph.has_endpoint("MP", "a")
 
 
 def test_another_kiosk_is_not_the_robot(graph: Graph) -> None:
-    graph.apply(topic_token(OTHER_KIOSK, "MP", "a", BOOL), True)
-    assert not graph.on_robot("MP", "a")
+    graph.apply_token(topic_token(OTHER_KIOSK, "MP", "a", BOOL), True)
+    assert not graph.has_endpoint("MP", "a")
 
 
 def test_nodes_go_with_their_bridge(graph: Graph) -> None:
-    graph.apply(topic_token(BRIDGE, "MP", "a", BOOL), True)
-    graph.apply(bridge_token(BRIDGE), False)
-    assert not graph.on_robot("MP", "a")
+    graph.apply_token(topic_token(BRIDGE, "MP", "a", BOOL), True)
+    graph.apply_token(bridge_token(BRIDGE), False)
+    assert not graph.has_endpoint("MP", "a")
 
 
 @pytest.mark.parametrize(
@@ -90,10 +90,10 @@ def test_nodes_go_with_their_bridge(graph: Graph) -> None:
 def test_a_counterpart_of_another_type_is_told(
     graph: Graph, panel_role: TopicRole, zid: str, role: TopicRole
 ) -> None:
-    graph.apply(topic_token(zid, role, "a", TEXT), True)
-    assert graph.wrong_type(panel_role, "a", BOOL) == TEXT
-    assert graph.wrong_type(panel_role, "a", TEXT) is None
-    assert graph.wrong_type(panel_role, "b", BOOL) is None
+    graph.apply_token(topic_token(zid, role, "a", TEXT), True)
+    assert graph.mismatched_type(panel_role, "a", BOOL) == TEXT
+    assert graph.mismatched_type(panel_role, "a", TEXT) is None
+    assert graph.mismatched_type(panel_role, "b", BOOL) is None
 
 
 @pytest.mark.parametrize(
@@ -108,111 +108,111 @@ def test_a_counterpart_of_another_type_is_told(
 def test_who_shares_no_route_with_the_panel_may_have_another_type(
     graph: Graph, panel_role: TopicRole, zid: str, role: TopicRole
 ) -> None:
-    graph.apply(topic_token(zid, role, "a", TEXT), True)
-    assert graph.wrong_type(panel_role, "a", BOOL) is None
+    graph.apply_token(topic_token(zid, role, "a", TEXT), True)
+    assert graph.mismatched_type(panel_role, "a", BOOL) is None
 
 
 def test_one_of_several_publishers_with_another_type_is_enough(graph: Graph) -> None:
-    graph.apply(topic_token(BRIDGE, "MP", "a", BOOL), True)
-    graph.apply(topic_token(BRIDGE, "MP", "a", TEXT), True)
-    assert graph.wrong_type("MS", "a", BOOL) == TEXT
+    graph.apply_token(topic_token(BRIDGE, "MP", "a", BOOL), True)
+    graph.apply_token(topic_token(BRIDGE, "MP", "a", TEXT), True)
+    assert graph.mismatched_type("MS", "a", BOOL) == TEXT
 
 
 def test_a_type_is_right_again_when_the_wrong_one_ends(graph: Graph) -> None:
-    graph.apply(topic_token(BRIDGE, "MP", "a", TEXT), True)
-    graph.apply(topic_token(BRIDGE, "MP", "a", TEXT), False)
-    assert graph.wrong_type("MS", "a", BOOL) is None
+    graph.apply_token(topic_token(BRIDGE, "MP", "a", TEXT), True)
+    graph.apply_token(topic_token(BRIDGE, "MP", "a", TEXT), False)
+    assert graph.mismatched_type("MS", "a", BOOL) is None
 
 
 @pytest.mark.parametrize(("role", "direction"), [("MS", "pub"), ("MP", "sub")])
 def test_a_bridges_route_of_another_type_is_told(graph: Graph, role: TopicRole, direction: str) -> None:
-    graph.learn([Route(BRIDGE, "pub" if direction == "pub" else "sub", "a", TEXT)])
-    assert graph.wrong_type(role, "a", BOOL) == TEXT
-    assert graph.wrong_type(role, "a", TEXT) is None
-    assert graph.wrong_type("MP" if role == "MS" else "MS", "a", BOOL) is None
+    graph.update_routes([Route(BRIDGE, "pub" if direction == "pub" else "sub", "a", TEXT)])
+    assert graph.mismatched_type(role, "a", BOOL) == TEXT
+    assert graph.mismatched_type(role, "a", TEXT) is None
+    assert graph.mismatched_type("MP" if role == "MS" else "MS", "a", BOOL) is None
 
 
 def test_routes_of_a_bridge_that_went_do_not_count(graph: Graph) -> None:
-    graph.learn([Route(BRIDGE, "pub", "a", TEXT)])
-    graph.apply(bridge_token(BRIDGE), False)
-    assert graph.wrong_type("MS", "a", BOOL) is None
+    graph.update_routes([Route(BRIDGE, "pub", "a", TEXT)])
+    graph.apply_token(bridge_token(BRIDGE), False)
+    assert graph.mismatched_type("MS", "a", BOOL) is None
 
 
 def test_a_bridge_that_was_not_asked_is_not_silent(graph: Graph) -> None:
-    assert not graph.silent
+    assert not graph.has_silent_bridge
 
 
 def test_a_bridge_that_does_not_answer_is_silent(graph: Graph) -> None:
-    graph.answered({})
-    assert graph.silent
+    graph.update_versions({})
+    assert graph.has_silent_bridge
 
 
 def test_a_bridge_that_answers_is_not_silent(graph: Graph) -> None:
-    graph.answered({BRIDGE: '"1.10.0"', "router": '"1.10.0"'})
-    assert not graph.silent
+    graph.update_versions({BRIDGE: '"1.10.0"', "router": '"1.10.0"'})
+    assert not graph.has_silent_bridge
 
 
 def test_one_of_two_bridges_that_does_not_answer_is_a_doubt(graph: Graph) -> None:
-    graph.apply(bridge_token("b2"), True)
-    graph.answered({"b2": '"v1"'})
-    assert graph.silent
+    graph.apply_token(bridge_token("b2"), True)
+    graph.update_versions({"b2": '"v1"'})
+    assert graph.has_silent_bridge
 
 
 def test_a_route_without_its_reader_is_unheard_while_the_robot_publishes(graph: Graph) -> None:
-    graph.learn([Route(BRIDGE, "pub", "a", TEXT, whole=False)])
-    assert not graph.unheard("a")
-    graph.apply(token(BRIDGE, "MP", "a", TEXT, Qos(), "RIHS01_0"), True)
-    assert graph.unheard("a")
-    graph.learn([Route(BRIDGE, "pub", "a", TEXT)])
-    assert not graph.unheard("a")
+    graph.update_routes([Route(BRIDGE, "pub", "a", TEXT, has_reader=False)])
+    assert not graph.is_unrouted("a")
+    graph.apply_token(token(BRIDGE, "MP", "a", TEXT, Qos(), "RIHS01_0"), True)
+    assert graph.is_unrouted("a")
+    graph.update_routes([Route(BRIDGE, "pub", "a", TEXT)])
+    assert not graph.is_unrouted("a")
 
 
 def test_an_answer_of_who_is_no_bridge_does_not_help(graph: Graph) -> None:
-    graph.answered({"router": '"1.10.0"'})
-    assert graph.silent
+    graph.update_versions({"router": '"1.10.0"'})
+    assert graph.has_silent_bridge
 
 
 def test_without_a_bridge_nothing_is_silent() -> None:
     graph = Graph(DIALECT)
-    graph.answered({})
-    assert not graph.silent
+    graph.update_versions({})
+    assert not graph.has_silent_bridge
 
 
 def test_a_bridge_that_comes_back_is_asked_anew(graph: Graph) -> None:
-    graph.answered({})
-    graph.apply(bridge_token(BRIDGE), False)
-    graph.apply(bridge_token(BRIDGE), True)
-    assert not graph.silent
+    graph.update_versions({})
+    graph.apply_token(bridge_token(BRIDGE), False)
+    graph.apply_token(bridge_token(BRIDGE), True)
+    assert not graph.has_silent_bridge
 
 
 @pytest.mark.parametrize(("version", "simulated"), [(DEMO_VERSION, True), ('"1.10.0"', False)])
 def test_a_demo_robot_is_known_by_its_version(graph: Graph, version: str, simulated: bool) -> None:
-    graph.answered({BRIDGE: version})
-    assert graph.simulated is simulated
+    graph.update_versions({BRIDGE: version})
+    assert graph.is_simulated is simulated
 
 
 def test_a_bridge_that_did_not_answer_is_not_taken_for_a_demo(graph: Graph) -> None:
-    assert not graph.simulated
+    assert not graph.is_simulated
 
 
 def test_a_demo_robot_that_went_leaves_no_banner(graph: Graph) -> None:
-    graph.answered({BRIDGE: DEMO_VERSION})
-    graph.apply(bridge_token(BRIDGE), False)
-    assert not graph.simulated
+    graph.update_versions({BRIDGE: DEMO_VERSION})
+    graph.apply_token(bridge_token(BRIDGE), False)
+    assert not graph.is_simulated
 
 
 @pytest.mark.parametrize("latched", [True, False])
 def test_a_publishers_durability_is_known(graph: Graph, latched: bool) -> None:
-    graph.apply(topic_token(BRIDGE, "MP", "a", BOOL, Qos(transient_local=latched)), True)
-    assert graph.latched("a") is latched
+    graph.apply_token(topic_token(BRIDGE, "MP", "a", BOOL, Qos(transient_local=latched)), True)
+    assert graph.is_transient_local("a") is latched
 
 
 @pytest.mark.parametrize(("zid", "role"), [(BRIDGE, "MS"), (OTHER_KIOSK, "MP")])
 def test_who_is_no_publisher_of_the_robots_has_no_durability(
     graph: Graph, zid: str, role: TopicRole
 ) -> None:
-    graph.apply(topic_token(zid, role, "a", BOOL, Qos(transient_local=True)), True)
-    assert graph.latched("a") is None
+    graph.apply_token(topic_token(zid, role, "a", BOOL, Qos(transient_local=True)), True)
+    assert graph.is_transient_local("a") is None
 
 
 BEST_EFFORT = Qos(reliable=False)
@@ -242,60 +242,60 @@ def test_a_qos_that_dds_would_not_match_is_told(
     graph: Graph, role: TopicRole, robots: Qos, panels: Qos, code: str | None
 ) -> None:
     theirs: TopicRole = "MP" if role == "MS" else "MS"
-    graph.apply(topic_token(BRIDGE, theirs, "a", BOOL, robots), True)
-    assert graph.wrong_qos(role, "a", panels) == code
-    assert graph.wrong_qos(role, "b", panels) is None
-    graph.apply(topic_token(BRIDGE, theirs, "a", BOOL, robots), False)
-    assert graph.wrong_qos(role, "a", panels) is None
+    graph.apply_token(topic_token(BRIDGE, theirs, "a", BOOL, robots), True)
+    assert graph.mismatched_qos(role, "a", panels) == code
+    assert graph.mismatched_qos(role, "b", panels) is None
+    graph.apply_token(topic_token(BRIDGE, theirs, "a", BOOL, robots), False)
+    assert graph.mismatched_qos(role, "a", panels) is None
 
 
 def test_each_publisher_must_be_heard_but_one_hearing_subscriber_is_enough(graph: Graph) -> None:
     for role in ("MP", "MS"):
-        graph.apply(topic_token(BRIDGE, role, "a", BOOL), True)
-    graph.apply(topic_token(BRIDGE, "MP", "a", BOOL, BEST_EFFORT), True)
-    graph.apply(topic_token(BRIDGE, "MS", "a", BOOL, LATCHED), True)
-    assert graph.wrong_qos("MS", "a", Qos()) == "publishes_best_effort"
-    assert graph.wrong_qos("MP", "a", Qos()) is None
+        graph.apply_token(topic_token(BRIDGE, role, "a", BOOL), True)
+    graph.apply_token(topic_token(BRIDGE, "MP", "a", BOOL, BEST_EFFORT), True)
+    graph.apply_token(topic_token(BRIDGE, "MS", "a", BOOL, LATCHED), True)
+    assert graph.mismatched_qos("MS", "a", Qos()) == "publishes_best_effort"
+    assert graph.mismatched_qos("MP", "a", Qos()) is None
 
 
 def test_another_kiosks_qos_does_not_count(graph: Graph) -> None:
-    graph.apply(topic_token(OTHER_KIOSK, "MP", "a", BOOL, BEST_EFFORT), True)
-    assert graph.wrong_qos("MS", "a", Qos()) is None
+    graph.apply_token(topic_token(OTHER_KIOSK, "MP", "a", BOOL, BEST_EFFORT), True)
+    assert graph.mismatched_qos("MS", "a", Qos()) is None
 
 
 def test_a_token_that_does_not_say_is_no_mismatch(graph: Graph) -> None:
-    graph.apply(f"@/{BRIDGE}/@ros2_lv/MP/a/std_msgs§msg§Bool/:::,:", True)
-    assert graph.wrong_qos("MS", "a", Qos()) is None
+    graph.apply_token(f"@/{BRIDGE}/@ros2_lv/MP/a/std_msgs§msg§Bool/:::,:", True)
+    assert graph.mismatched_qos("MS", "a", Qos()) is None
 
 
 def test_a_robots_bridges_are_those_of_its_namespace() -> None:
     graph = Graph(DIALECT, KIOSK, "/robot1")
     for zid in ("b1", "b2", "b3"):
-        graph.apply(bridge_token(zid), True)
+        graph.apply_token(bridge_token(zid), True)
     assert graph.bridges == {"b1", "b2", "b3"}  # nobody has told yet
-    graph.configured({"b1": "/robot1", "b2": "/robot10"})
+    graph.update_namespaces({"b1": "/robot1", "b2": "/robot10"})
     assert graph.bridges == {"b1"}
-    graph.apply(bridge_token("b1"), False)
+    graph.apply_token(bridge_token("b1"), False)
     assert graph.bridges == {"b3"}  # it may be the robot's: it has not told
-    graph.configured({"b3": ""})
+    graph.update_namespaces({"b3": ""})
     assert graph.bridges == {"b3"}  # robots with namespaces of their own are behind it
-    graph.configured({"b3": "/robot2"})
+    graph.update_namespaces({"b3": "/robot2"})
     assert graph.bridges == frozenset()
 
 
 def test_another_robots_silent_bridge_is_not_this_ones_doubt() -> None:
     graph = Graph(DIALECT, KIOSK, "/robot1")
-    graph.apply(bridge_token("b1"), True)
-    graph.configured({"b1": "/robot1"})
-    graph.apply(bridge_token("b2"), True)
-    graph.answered({"b1": "v1"})
-    assert not graph.silent
-    graph.answered({})
-    assert graph.silent
+    graph.apply_token(bridge_token("b1"), True)
+    graph.update_namespaces({"b1": "/robot1"})
+    graph.apply_token(bridge_token("b2"), True)
+    graph.update_versions({"b1": "v1"})
+    assert not graph.has_silent_bridge
+    graph.update_versions({})
+    assert graph.has_silent_bridge
 
 
 def test_without_a_namespace_to_tell_robots_apart_every_bridge_counts(graph: Graph) -> None:
-    graph.configured({BRIDGE: "/robot7"})
+    graph.update_namespaces({BRIDGE: "/robot7"})
     assert graph.bridges == {BRIDGE}
 
 
@@ -306,8 +306,8 @@ def test_of_nodes_that_came_and_went_nothing_is_kept(graph: Graph) -> None:
     before = sizes()
     for number in range(100):
         for alive in (True, False, False):
-            graph.apply(topic_token(BRIDGE, "MP", f"node{number}/rosout", TEXT), alive)
-            graph.apply(server_token(BRIDGE, "SS", f"node{number}/reset", TRIGGER), alive)
+            graph.apply_token(topic_token(BRIDGE, "MP", f"node{number}/rosout", TEXT), alive)
+            graph.apply_token(server_token(BRIDGE, "SS", f"node{number}/reset", TRIGGER), alive)
     assert sizes() == before
 
 
@@ -317,9 +317,9 @@ def test_ten_thousand_nodes_that_the_panel_does_not_name_cost_next_to_nothing() 
     others = [topic_token(BRIDGE, "MP", f"some/topic{number}", TEXT) for number in range(10_000)]
     began = time.thread_time()
     for one in others:
-        graph.apply(one, True)
+        graph.apply_token(one, True)
     assert time.thread_time() - began < 0.05
-    graph.apply(bridge_token(BRIDGE), True)
-    graph.apply(topic_token(BRIDGE, "MP", "a", BOOL), True)
-    assert graph.on_robot("MP", "a")
-    assert not graph.on_robot("MP", "some/topic7")
+    graph.apply_token(bridge_token(BRIDGE), True)
+    graph.apply_token(topic_token(BRIDGE, "MP", "a", BOOL), True)
+    assert graph.has_endpoint("MP", "a")
+    assert not graph.has_endpoint("MP", "some/topic7")

@@ -36,7 +36,7 @@ def robot() -> RobotState:
 
 def says(robot: RobotState, at: float, cached: bool = False) -> bool:
     """The robot permits at this time; whether the panel does, by that."""
-    robot.take(KEY, Sample(TRUE, int(at * 10), at, at, BRIDGE, cached=cached))
+    robot.update(KEY, Sample(TRUE, int(at * 10), at, at, BRIDGE, cached=cached))
     return interlock_verdict(PANEL.interlocks[0], robot, at).permitted
 
 
@@ -94,15 +94,15 @@ def test_after_each_loss_and_each_new_publisher_the_next_is_the_first(event: str
     robot = robot_there(panel)
     robot.settled_at = JOINED
     endpoint(robot, "MP", ENABLED, BOOL, qos=LATCHED)
-    robot.follow_publishers()
+    robot.update_publishers()
     assert [says(robot, JOINED + 3.0), says(robot, JOINED + 5.0)] == [False, True]
     if event == "bridge lost":
-        robot.cut(BRIDGE, 10**6)
+        robot.mark_bridge_lost(BRIDGE, 10**6)
     elif event == "publisher lost":
         endpoint(robot, "MP", ENABLED, BOOL, qos=LATCHED, alive=False)
-        robot.follow_publishers()
+        robot.update_publishers()
     elif event == "session lost":
-        robot.lose()
+        robot.mark_link_lost()
     else:
         robot.replayed.begin(KEY, JOINED + 6.0)
     assert robot.replayed.known_since(KEY) == math.inf

@@ -15,7 +15,7 @@ from app.dialect.bridge_dialect import token
 from app.dialect.endpoint import Endpoint
 from app.interfaces.names import Qos
 from app.permission.interlocks import Verdict, interlock_verdict
-from app.robot.silent_publishers import BEFORE_LATCHED_S, BEFORE_S, SilentPublishers
+from app.robot.silent_publishers import TOKEN_DELAY_LATCHED_S, TOKEN_DELAY_S, SilentPublishers
 from app.robot.state import RobotState
 from app.runtime.ingest import Ingest
 from app.transport.inbox import Inbox
@@ -43,21 +43,21 @@ def known() -> SilentPublishers:
 
 
 def silent(known: SilentPublishers, *bridges: str) -> bool:
-    return known.any(KEY, bridges or [BRIDGE])
+    return known.has_silent(KEY, bridges or [BRIDGE])
 
 
 def test_a_publisher_that_appears_and_says_nothing_is_silent(known: SilentPublishers) -> None:
-    known.message(KEY, BRIDGE, 1, 0.0)
-    known.appeared(PUBLISHER, 2, 10.0)
+    known.record_message(KEY, BRIDGE, 1, 0.0)
+    known.add_publisher(PUBLISHER, 2, 10.0)
     assert silent(known)
-    known.message(KEY, BRIDGE, 3, 10.1)
+    known.record_message(KEY, BRIDGE, 3, 10.1)
     assert not silent(known)
 
 
 def test_one_that_came_and_went_silent_leaves_a_doubt(known: SilentPublishers) -> None:
-    known.message(KEY, BRIDGE, 1, 0.0)
-    known.appeared(PUBLISHER, 2, 10.0)
-    known.lost(PUBLISHER, 3)
+    known.record_message(KEY, BRIDGE, 1, 0.0)
+    known.add_publisher(PUBLISHER, 2, 10.0)
+    known.remove_publisher(PUBLISHER, 3)
     assert silent(known)
 
 
@@ -65,71 +65,71 @@ def test_one_that_came_and_went_silent_leaves_a_doubt(known: SilentPublishers) -
     ("latched", "before_s", "is_silent"),
     [
         (False, 0.0, False),
-        (False, BEFORE_S, False),
-        (False, BEFORE_S + 0.1, True),
-        (True, BEFORE_S + 0.1, False),  # it loses nothing, and says nothing twice
-        (True, BEFORE_LATCHED_S + 0.1, True),
+        (False, TOKEN_DELAY_S, False),
+        (False, TOKEN_DELAY_S + 0.1, True),
+        (True, TOKEN_DELAY_S + 0.1, False),  # it loses nothing, and says nothing twice
+        (True, TOKEN_DELAY_LATCHED_S + 0.1, True),
     ],
 )
 def test_a_message_just_before_its_publisher_appears_is_its_own(
     known: SilentPublishers, latched: bool, before_s: float, is_silent: bool
 ) -> None:
-    known.message(KEY, BRIDGE, 1, 10.0)
-    known.appeared(replace(PUBLISHER, transient_local=latched), 2, 10.0 + before_s)
+    known.record_message(KEY, BRIDGE, 1, 10.0)
+    known.add_publisher(replace(PUBLISHER, transient_local=latched), 2, 10.0 + before_s)
     assert silent(known) is is_silent
 
 
 def test_a_message_is_one_publishers_own(known: SilentPublishers) -> None:
-    known.message(KEY, BRIDGE, 1, 10.0)
-    known.appeared(PUBLISHER, 2, 10.05)
-    known.lost(PUBLISHER, 3)
-    known.appeared(PUBLISHER, 4, 10.1)
+    known.record_message(KEY, BRIDGE, 1, 10.0)
+    known.add_publisher(PUBLISHER, 2, 10.05)
+    known.remove_publisher(PUBLISHER, 3)
+    known.add_publisher(PUBLISHER, 4, 10.1)
     assert silent(known)
 
 
 def test_a_message_of_one_that_was_there_is_not_the_next_ones(known: SilentPublishers) -> None:
-    known.appeared(PUBLISHER, 1, 10.0)
-    known.message(KEY, BRIDGE, 2, 10.1)
-    known.lost(PUBLISHER, 3)
-    known.appeared(PUBLISHER, 4, 10.2)
+    known.add_publisher(PUBLISHER, 1, 10.0)
+    known.record_message(KEY, BRIDGE, 2, 10.1)
+    known.remove_publisher(PUBLISHER, 3)
+    known.add_publisher(PUBLISHER, 4, 10.2)
     assert silent(known)
 
 
 def test_a_message_counts_that_was_taken_in_before_the_token_that_came_before_it(
     known: SilentPublishers,
 ) -> None:
-    known.message(KEY, BRIDGE, 5, 99.0)
-    known.appeared(PUBLISHER, 4, 10.0)
+    known.record_message(KEY, BRIDGE, 5, 99.0)
+    known.add_publisher(PUBLISHER, 4, 10.0)
     assert not silent(known)
 
 
 def test_only_the_bridge_of_the_publisher_can_bring_its_message(known: SilentPublishers) -> None:
-    known.message(KEY, OTHER, 1, 10.0)
-    known.appeared(PUBLISHER, 2, 10.0)
-    known.message(KEY, OTHER, 3, 10.1)
+    known.record_message(KEY, OTHER, 1, 10.0)
+    known.add_publisher(PUBLISHER, 2, 10.0)
+    known.record_message(KEY, OTHER, 3, 10.1)
     assert silent(known)
     assert not silent(known, OTHER)
-    known.message(KEY, None, 4, 10.2)  # a bridge that does not say who it is
+    known.record_message(KEY, None, 4, 10.2)  # a bridge that does not say who it is
     assert not silent(known)
 
 
 def test_a_bridge_that_goes_leaves_its_doubt_to_the_next_message(known: SilentPublishers) -> None:
-    known.message(KEY, OTHER, 1, 0.0)
-    known.appeared(PUBLISHER, 2, 10.0)
-    known.lose_bridge(BRIDGE)
+    known.record_message(KEY, OTHER, 1, 0.0)
+    known.add_publisher(PUBLISHER, 2, 10.0)
+    known.remove_bridge(BRIDGE)
     assert silent(known, OTHER)
-    known.message(KEY, OTHER, 3, 10.1)
+    known.record_message(KEY, OTHER, 3, 10.1)
     assert not silent(known, OTHER)
 
 
 def test_other_topics_and_what_is_no_publisher_are_passed_over(known: SilentPublishers) -> None:
-    known.appeared(Endpoint(BRIDGE, "MP", "heard", BOOL), 1, 10.0)
-    known.appeared(Endpoint(BRIDGE, "MS", KEY, BOOL), 2, 10.0)
-    known.appeared(Endpoint(BRIDGE), 3, 10.0)
-    known.message("heard", BRIDGE, 4, 10.0)
-    known.lost(Endpoint(BRIDGE, "MS", KEY, BOOL), 5)
+    known.add_publisher(Endpoint(BRIDGE, "MP", "heard", BOOL), 1, 10.0)
+    known.add_publisher(Endpoint(BRIDGE, "MS", KEY, BOOL), 2, 10.0)
+    known.add_publisher(Endpoint(BRIDGE), 3, 10.0)
+    known.record_message("heard", BRIDGE, 4, 10.0)
+    known.remove_publisher(Endpoint(BRIDGE, "MS", KEY, BOOL), 5)
     assert not silent(known)
-    assert not known.any("heard", [BRIDGE])
+    assert not known.has_silent("heard", [BRIDGE])
 
 
 @dataclass
@@ -248,8 +248,8 @@ def test_the_reason_names_the_topic(incoming: Incoming) -> None:
 def test_a_new_session_starts_without_the_doubts_of_the_last(incoming: Incoming) -> None:
     for event in (true, appears, goes, appears, looked):
         event(incoming)
-    incoming.robot.lose()
-    assert not incoming.robot.silent.any(KEY, [BRIDGE])
+    incoming.robot.mark_link_lost()
+    assert not incoming.robot.silent_publishers.has_silent(KEY, [BRIDGE])
 
 
 def test_the_panels_own_publisher_is_none_of_the_robots(incoming: Incoming) -> None:

@@ -43,7 +43,7 @@ def robot() -> RobotState:
 
 
 def broken(robot: RobotState, topic: str = "/heard", *, at: float = 1.0, seq: int = 1) -> None:
-    robot.take(robot.key(topic), Sample(b"broken", seq, at, at, BRIDGE))
+    robot.update(robot.key(topic), Sample(b"broken", seq, at, at, BRIDGE))
 
 
 def test_a_topic_that_was_not_heard_is_waited_for(robot: RobotState) -> None:
@@ -78,7 +78,7 @@ def test_a_namespace_stands_before_every_key() -> None:
 
 def test_a_sample_is_decoded_once_and_only_when_it_is_asked_for(robot: RobotState) -> None:
     payload = Counted(INTERFACES.encode(TEXT, {"data": "hello"}))
-    robot.take(robot.key("/heard"), Sample(payload, 1, 0.0, 0.0, BRIDGE))
+    robot.update(robot.key("/heard"), Sample(payload, 1, 0.0, 0.0, BRIDGE))
     assert payload.asked == 0
     robot.reading("/heard")
     robot.reading("/heard")
@@ -116,27 +116,27 @@ def test_unreadable_samples_fill_no_log(robot: RobotState, caplog: pytest.LogCap
 @pytest.mark.parametrize("source", [BRIDGE, None])
 def test_a_sample_from_before_its_bridge_was_lost_is_cut(robot: RobotState, source: str | None) -> None:
     says(robot, "/heard", "old", seq=1, at=3.0, source=source)
-    robot.cut(BRIDGE, 2)
+    robot.mark_bridge_lost(BRIDGE, 2)
     reading = robot.reading("/heard")
     assert (reading.status, reading.value("data"), reading.at) == ("cut", "old", 3.0)
 
 
 def test_a_sample_of_another_bridge_is_not_cut(robot: RobotState) -> None:
-    robot.graph.apply(bridge_dialect.bridge_token("b2"), True)
+    robot.graph.apply_token(bridge_dialect.bridge_token("b2"), True)
     says(robot, "/heard", "fresh", source="b2")
-    robot.cut(BRIDGE, 2)
+    robot.mark_bridge_lost(BRIDGE, 2)
     assert robot.reading("/heard").status == "message"
 
 
 def test_a_sample_from_after_the_loss_is_not_cut(robot: RobotState) -> None:
     says(robot, "/heard", "fresh", seq=3)
-    robot.cut(BRIDGE, 2)
+    robot.mark_bridge_lost(BRIDGE, 2)
     assert robot.reading("/heard").status == "message"
 
 
 def test_a_sample_after_the_cut_is_a_message_again(robot: RobotState) -> None:
     says(robot, "/heard", "old")
-    robot.cut(BRIDGE, 2)
+    robot.mark_bridge_lost(BRIDGE, 2)
     says(robot, "/heard", "new", seq=3)
     assert (robot.reading("/heard").status, robot.reading("/heard").value("data")) == ("message", "new")
 
@@ -144,18 +144,18 @@ def test_a_sample_after_the_cut_is_a_message_again(robot: RobotState) -> None:
 def test_every_topic_of_the_bridge_is_cut(robot: RobotState) -> None:
     says(robot, "/heard", "old")
     says(robot, ENABLED, True, BOOL)
-    robot.cut(BRIDGE, 2)
+    robot.mark_bridge_lost(BRIDGE, 2)
     assert {robot.reading(topic).status for topic in ("/heard", ENABLED)} == {"cut"}
 
 
 def test_a_cut_before_anything_was_heard_leaves_waiting(robot: RobotState) -> None:
-    robot.cut(BRIDGE, 2)
+    robot.mark_bridge_lost(BRIDGE, 2)
     assert robot.reading("/heard").status == "waiting"
 
 
 def test_what_was_unreadable_before_the_cut_has_no_message(robot: RobotState) -> None:
     broken(robot)
-    robot.cut(BRIDGE, 2)
+    robot.mark_bridge_lost(BRIDGE, 2)
     assert (robot.reading("/heard").status, robot.reading("/heard").fields) == ("cut", None)
 
 
@@ -165,7 +165,7 @@ def test_what_is_logged_of_one_of_several_robots_begins_with_its_name(
     panel = small_panel()
     entry = RobotEntry(id="r1", name="Robot 1", namespace="/r1")
     robot = RobotState(panel, INTERFACES, DIALECT, KIOSK, entry)
-    robot.take("r1/heard", Sample(b"broken", 1, NOW, NOW, BRIDGE))
+    robot.update("r1/heard", Sample(b"broken", 1, NOW, NOW, BRIDGE))
     robot.reading("/heard")
     (record,) = caplog.records
     assert record.getMessage().startswith("Robot 1: /r1/heard: ")

@@ -13,7 +13,7 @@ from app.panel.model import Panel
 from app.permission.interlocks import interlock_verdict
 from app.robot.slices import Slices
 from app.robot.state import Reading, RobotState, Sample
-from app.robot.topics import UNREAD_MOST
+from app.robot.topics import MAX_UNREAD
 from app.view.view import build_view
 from tests.support.builders import (
     BRIDGE,
@@ -60,9 +60,9 @@ class Cell:
         self.panel: Panel = panel_of(*(widgets or (MESSAGE, FREE, SHOWN)), interlock=interlock)
         self.robot = RobotState(self.panel, INTERFACES, DIALECT, KIOSK, None, Slices(Clock()))
         self.robot.link_up, self.robot.settled_at = True, 0.0
-        self.robot.graph.apply(f"@/{BRIDGE}/@ros2_lv", True)
+        self.robot.graph.apply_token(f"@/{BRIDGE}/@ros2_lv", True)
         self.read: list[tuple[str, Any]] = []
-        self.robot.read_later = self._read_later
+        self.robot.on_late_reading = self._read_later
         self._seq = 0
 
     def _read_later(self, key: str, reading: Reading) -> None:
@@ -75,7 +75,7 @@ class Cell:
         assert data.count(b"drive\0") == 1
         data = bytes(data) if level is None else _with_level(data, level)
         data += bytes(8) if level is None else b""
-        self.robot.take(self.robot.key(topic), Sample(data, self._seq, NOW, NOW, BRIDGE))
+        self.robot.update(self.robot.key(topic), Sample(data, self._seq, NOW, NOW, BRIDGE))
 
     @property
     def locked_by(self) -> str:
@@ -183,12 +183,12 @@ def test_of_a_watched_topic_each_is_read_in_its_order() -> None:
             cell.robot.reading("/heard")
         await cell.all_read("/heard")
         assert [value for _, value in cell.read] == [0, 1, 2, 3, 4]
-        for level in range(3 * UNREAD_MOST):
+        for level in range(3 * MAX_UNREAD):
             cell.says(level, "/heard")
             cell.robot.reading("/heard")
         await cell.all_read("/heard")
         found = [value for _, value in cell.read][5:]
-        assert found == [0, *range(2 * UNREAD_MOST, 3 * UNREAD_MOST)]
+        assert found == [0, *range(2 * MAX_UNREAD, 3 * MAX_UNREAD)]
 
     run(test)
 
@@ -200,11 +200,11 @@ def test_what_was_being_read_when_it_stopped_to_count_never_counts(how: str) -> 
         cell.says(0)
         assert cell.locked_by == "reading"
         if how == "cut":
-            cell.robot.cut(BRIDGE, 99)
+            cell.robot.mark_bridge_lost(BRIDGE, 99)
         elif how == "doubt":
-            cell.robot.doubt("operation_enabled")
+            cell.robot.invalidate("operation_enabled")
         else:
-            cell.robot.lose()
+            cell.robot.mark_link_lost()
         for _ in range(1000):
             await asyncio.sleep(0)
         assert cell.robot.reading(ENABLED).status == "cut"
@@ -236,7 +236,7 @@ def test_ten_megabytes_of_anything_hold_up_nothing(kind: str) -> None:
     assert len(large.data) > 0.99 * TEN_MB
     panel = panel_of({**HEARD, "type": large.type, "field": large.path})
     robot = RobotState(panel, INTERFACES, DIALECT, KIOSK)
-    robot.take("heard", Sample(large.data, 1, NOW, NOW, None))
+    robot.update("heard", Sample(large.data, 1, NOW, NOW, None))
 
     def is_read() -> bool:
         return robot.reading("/heard").status == "message"
@@ -252,7 +252,7 @@ def test_ten_megabytes_of_garbage_hold_up_nothing() -> None:
     large = garbage(TEN_MB)
     panel = panel_of({**HEARD, "type": large.type, "field": large.path})
     robot = RobotState(panel, INTERFACES, DIALECT, KIOSK)
-    robot.take("heard", Sample(large.data, 1, NOW, NOW, None))
+    robot.update("heard", Sample(large.data, 1, NOW, NOW, None))
 
     async def test() -> None:
         assert (
@@ -265,10 +265,10 @@ def test_ten_megabytes_of_garbage_hold_up_nothing() -> None:
 @pytest.mark.parametrize("kind", ["diagnostics by name", "nested lists", "a text"])
 def test_an_answer_of_any_size_is_read_while_all_else_goes_on(kind: str) -> None:
     large = KINDS[kind](TEN_MB)
-    reader = INTERFACES.fields(large.type, [large.path])
+    reader = INTERFACES.field_reader(large.type, [large.path])
 
     async def test() -> None:
-        reading = asyncio.ensure_future(Slices().whole(reader, large.data))
+        reading = asyncio.ensure_future(Slices().read_all(reader, large.data))
         assert await longest_turn(reading.done) < LONGEST_TURN_S
         assert reading.result().get(large.path) == large.value
 
@@ -277,12 +277,12 @@ def test_an_answer_of_any_size_is_read_while_all_else_goes_on(kind: str) -> None
 
 def test_what_is_no_answer_says_so_and_keeps_no_other_waiting() -> None:
     large = diagnostics(1_000_000)
-    reader = INTERFACES.fields(large.type, [large.path])
+    reader = INTERFACES.field_reader(large.type, [large.path])
 
     async def test() -> None:
         slices = Slices()
-        short = asyncio.ensure_future(slices.whole(reader, large.data[:-40]))
-        whole = asyncio.ensure_future(slices.whole(reader, large.data))
+        short = asyncio.ensure_future(slices.read_all(reader, large.data[:-40]))
+        whole = asyncio.ensure_future(slices.read_all(reader, large.data))
         with pytest.raises(DecodeError):
             await short
         assert (await whole).get(large.path) == large.value

@@ -19,7 +19,7 @@ from app.panel.model import Panel
 from app.permission.clients import anonymous
 from app.permission.interlocks import interlock_verdict
 from app.permission.principal import Principal
-from app.robot.state import PassedOver, RobotState, Sample
+from app.robot.state import RobotState, Sample, SkippedPayload
 from app.runtime import renewal
 from app.runtime.ingest import Ingest, Updates
 from app.runtime.robot_session import RobotSession, ServerParts
@@ -54,8 +54,8 @@ def flag(value: bool) -> bytes:
 
 
 def sample(payload: bytes, *between: bytes) -> Sample:
-    passed = tuple(PassedOver(one, NOW, NOW) for one in between)
-    return Sample(payload, 9, NOW, NOW, BRIDGE, between=passed)
+    passed = tuple(SkippedPayload(one, NOW, NOW) for one in between)
+    return Sample(payload, 9, NOW, NOW, BRIDGE, skipped_payloads=passed)
 
 
 class Broken:
@@ -197,7 +197,7 @@ def test_each_sample_that_is_kept_whole_is_recorded_and_no_other() -> None:
 
 def test_a_list_that_is_too_short_is_shown_as_nothing() -> None:
     type_name = "sensor_msgs/msg/JointState"
-    names = INTERFACES.fields(type_name, ["name[0]", "name[1]"])
+    names = INTERFACES.field_reader(type_name, ["name[0]", "name[1]"])
     payload = INTERFACES.encode(type_name, JOINTS)
     assert with_fields("{name[0]}, {name[1]}", names.read(payload)) == "a, —"
 
@@ -283,7 +283,7 @@ def test_a_publisher_that_was_replaced_between_two_turns_has_to_say_it_again() -
     robot = robot_there(panel)
     interlock = panel.interlocks[0]
     token = endpoint(robot, "MP", ENABLED, BOOL)
-    robot.follow_publishers()
+    robot.update_publishers()
     permits(robot)
     intake = intake_of(panel, robot, Deaf())
     page = Page(panel, robot)
@@ -291,7 +291,7 @@ def test_a_publisher_that_was_replaced_between_two_turns_has_to_say_it_again() -
     old, new = Sample(flag(True), 6, NOW, NOW, BRIDGE), Sample(flag(True), 8, NOW, NOW, BRIDGE)
     for said, permitted in ((old, False), (new, True)):
         taken(intake.steps(Changes({key: said}, {token: Token(True, 7)}, True)), page)
-        robot.follow_publishers()
+        robot.update_publishers()
         assert interlock_verdict(interlock, robot, NOW).permitted is permitted
 
 
@@ -322,7 +322,7 @@ def test_a_kiosk_that_gives_its_session_up_ends_what_is_held_before(
                 hold = one.holds.begin("jog", HALF, time.monotonic(), FROM, ended.append)
                 assert isinstance(hold, ActiveHold)
                 lost = one.robot.key("/last_heard")
-                monkeypatch.setattr(type(one.robot.graph), "unheard", lambda _, key: key == lost)
+                monkeypatch.setattr(type(one.robot.graph), "is_unrouted", lambda _, key: key == lost)
                 for number in itertools.count(1):
                     if ended:
                         break

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from app.robot.parameter_state import EMPTY
+from app.robot.parameter_state import EMPTY_VALUE
 from app.simulator.parameters import EVENTS, NODE
 from app.simulator.robot import (
     COUNT_STEP_S,
@@ -115,7 +115,9 @@ def test_its_parameters_are_set_or_refused_with_words(
     name: str, kind: int, field: str, value: Any, reason: str
 ) -> None:
     robot = DemoRobot()
-    given = SimpleNamespace(name=name, value=SimpleNamespace(**{**EMPTY, "type": kind, field: value}))
+    given = SimpleNamespace(
+        name=name, value=SimpleNamespace(**{**EMPTY_VALUE, "type": kind, field: value})
+    )
     request = SimpleNamespace(parameters=[given])
     (result,) = robot.parameters.serve(f"{NODE}/set_parameters", request)["results"]
     assert result == {"successful": not reason, "reason": reason}

@@ -18,14 +18,14 @@ from app.dialect import bridge_dialect
 from app.dialect.bridge_dialect import BridgeDialect
 from app.dialect.endpoint import TopicRole
 from app.errors import PanelError
-from app.interfaces import interfaces_of
+from app.interfaces import load_interfaces
 from app.interfaces.names import Qos
 from app.panel.model import Panel
 from app.robot.state import RobotState, Sample
 
 Table = Mapping[str, Any]
 
-INTERFACES: Final = interfaces_of("jazzy")
+INTERFACES: Final = load_interfaces("jazzy")
 DIALECT: Final = BridgeDialect()
 BOOL: Final = "std_msgs/msg/Bool"
 TEXT: Final = "std_msgs/msg/String"
@@ -88,7 +88,7 @@ def robot_there(panel: Panel) -> RobotState:
     robot = RobotState(panel, INTERFACES, DIALECT, KIOSK)
     robot.link_up = True
     robot.settled_at = 0.0
-    robot.graph.apply(bridge_dialect.bridge_token(BRIDGE), True)
+    robot.graph.apply_token(bridge_dialect.bridge_token(BRIDGE), True)
     return robot
 
 
@@ -104,7 +104,7 @@ def endpoint(
     """A publisher ("MP") or subscriber ("MS") appears behind a bridge, or ends; its token."""
     type_hash = INTERFACES.type_hash(type_name)
     token = bridge_dialect.token(zid, role, robot.key(topic), type_name, qos or Qos(), type_hash)
-    robot.graph.apply(token, alive)
+    robot.graph.apply_token(token, alive)
     return token
 
 
@@ -120,7 +120,7 @@ def says(
 ) -> None:
     """The robot publishes a message whose only field is `data`."""
     payload = INTERFACES.encode(type_name, {"data": data})
-    robot.take(robot.key(topic), Sample(payload, seq, at, at, source))
+    robot.update(robot.key(topic), Sample(payload, seq, at, at, source))
 
 
 def permits(robot: RobotState, permitted: bool = True, *, at: float = NOW) -> None:

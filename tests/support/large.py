@@ -4,7 +4,7 @@ import struct
 from collections.abc import Callable, Mapping
 from typing import Final, NamedTuple
 
-from app.interfaces.cdr.reader import LONGEST_TEXT
+from app.interfaces.cdr.reader import MAX_TEXT
 
 LITTLE: Final = b"\0\1\0\0"
 TEN_MB: Final = 10_000_000
@@ -79,7 +79,7 @@ def numbers(size: int) -> Large:
 
 def text(size: int) -> Large:
     """Of letters of three bytes each; of a long one the beginning is read."""
-    count, most = size // 3, LONGEST_TEXT // 3
+    count, most = size // 3, MAX_TEXT // 3
     body = struct.pack("<I", 3 * count + 1) + "漢".encode() * count + b"\0"
     value = "漢" * count if count <= most else "漢" * most + "…"
     return Large("std_msgs/msg/String", "data", value, LITTLE + body)

@@ -7,7 +7,7 @@ from typing import Any, Final, Literal
 
 import numpy
 
-from app.interfaces.definitions import INTEGERS, Structure, Type
+from app.interfaces.definitions import INTEGER_RANGES, Structure, Type
 
 Edge = Literal["random", "least", "most"]
 
@@ -35,18 +35,18 @@ class Samples:
         return {one.name: self._value(one.type, edge) for one in fields}
 
     def _value(self, kind: Type, edge: Edge) -> Any:
-        if kind.many != "one":
+        if kind.container != "one":
             return [self._value(kind.element, edge) for _ in range(self._length(kind, edge))]
-        if kind.nested:
+        if kind.is_nested:
             return self.fields(kind.name, edge)
         if kind.name == "bool":
             return edge == "most" or (edge == "random" and self._chance.random() < 0.5)
-        if kind.name in INTEGERS:
-            return self._integer(*INTEGERS[kind.name], edge)
+        if kind.name in INTEGER_RANGES:
+            return self._integer(*INTEGER_RANGES[kind.name], edge)
         return self._float(kind.name, edge) if kind.name in LARGEST else self._text(kind, edge)
 
     def _length(self, kind: Type, edge: Edge) -> int:
-        if kind.many == "array":
+        if kind.container == "array":
             return kind.size
         most = min(kind.size or LONGEST, LONGEST)
         return {"least": 0, "most": most}.get(edge, self._chance.randint(0, min(most, 3)))

@@ -5,7 +5,16 @@ import pytest
 from app.dialect import bridge_dialect
 from app.dialect.bridge_dialect import parsed, token
 from app.dialect.endpoint import Endpoint, ServerRole, TopicRole
-from app.interfaces.names import MESSAGE_TYPE, NAMESPACE, NO_TYPE, ROSOUT, TOPIC, Qos, key_of, type_in
+from app.interfaces.names import (
+    MESSAGE_TYPE,
+    NAMESPACE,
+    NO_TYPE,
+    ROSOUT,
+    TOPIC,
+    Qos,
+    key_of,
+    valid_type,
+)
 from tests.support.builders import BOOL, TEXT
 
 HASH = "RIHS01_0"
@@ -193,7 +202,7 @@ def test_a_server_is_read_from_its_token(role: ServerRole) -> None:
     "told", ["x" * 50_000, "a\u202eb", "std msgs", "", "a//b", "std_msgs/msg/Bool\n"]
 )
 def test_a_type_that_can_not_be_one_is_no_type(told: str) -> None:
-    assert type_in(told) == NO_TYPE
+    assert valid_type(told) == NO_TYPE
     if told:
         seen = parsed(f"@/b1/@ros2_lv/MP/enabled/{told.replace('/', '§')}/:1:0:0,1:")
         assert seen is None or seen.type == NO_TYPE

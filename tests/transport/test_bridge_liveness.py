@@ -130,7 +130,7 @@ def run(
     async def benched() -> None:
         line, robot = Line(), robot_there(small_panel())
         told: list[bool] = []
-        mine = BridgeLiveness(robot, line, lambda: told.append(robot.answers))
+        mine = BridgeLiveness(robot, line, lambda: told.append(robot.is_responding))
         mine.start()
         try:
             await test(line, robot, mine, told)
@@ -157,7 +157,7 @@ def test_each_bridge_is_asked_again_and_again() -> None:
     async def test(line: Line, robot: RobotState, mine: BridgeLiveness, told: list[bool]) -> None:
         await until(lambda: len(line.asked) > 5)
         assert {selector for selector, _ in line.asked} == {bridge_dialect.version(BRIDGE)}
-        assert (robot.answers, told) == (True, [])
+        assert (robot.is_responding, told) == (True, [])
 
     run(test)
 
@@ -165,9 +165,9 @@ def test_each_bridge_is_asked_again_and_again() -> None:
 def test_silence_is_told_and_its_end() -> None:
     async def test(line: Line, robot: RobotState, mine: BridgeLiveness, told: list[bool]) -> None:
         line.answers = False
-        await until(lambda: not robot.answers)
+        await until(lambda: not robot.is_responding)
         line.answers = True
-        await until(lambda: robot.answers)
+        await until(lambda: robot.is_responding)
         assert told == [False, True]
 
     run(test)
@@ -176,9 +176,9 @@ def test_silence_is_told_and_its_end() -> None:
 def test_another_bridge_is_not_the_silent_one() -> None:
     async def test(line: Line, robot: RobotState, mine: BridgeLiveness, told: list[bool]) -> None:
         line.answers = False
-        await until(lambda: not robot.answers)
-        robot.lose()
-        await until(lambda: robot.answers)
+        await until(lambda: not robot.is_responding)
+        robot.mark_link_lost()
+        await until(lambda: robot.is_responding)
 
     run(test)
 
@@ -213,7 +213,7 @@ def test_a_loop_that_stood_still_is_no_silence(monkeypatch: pytest.MonkeyPatch) 
 
         loop.call_soon(stand_still)
         await asyncio.sleep(0.01)
-        assert robot.answers
+        assert robot.is_responding
         await mine.stop()
 
     asyncio.run(benched())
@@ -238,13 +238,13 @@ def test_a_press_is_published_when_the_bridge_has_answered_after_it() -> None:
 
 def test_a_frozen_bridge_stays_silent_when_another_comes_or_goes() -> None:
     async def test(line: Line, robot: RobotState, mine: BridgeLiveness, told: list[bool]) -> None:
-        robot.graph.apply(bridge_dialect.bridge_token("b2"), True)
+        robot.graph.apply_token(bridge_dialect.bridge_token("b2"), True)
         await until(lambda: bridge_dialect.version("b2") in {selector for selector, _ in line.asked})
         line.frozen = BRIDGE
         await until(lambda: told == [False])
-        robot.graph.apply(bridge_dialect.bridge_token("b2"), False)
+        robot.graph.apply_token(bridge_dialect.bridge_token("b2"), False)
         await asyncio.sleep(5 * bridge_liveness.EVERY_S)
-        robot.graph.apply(bridge_dialect.bridge_token("b3"), True)
+        robot.graph.apply_token(bridge_dialect.bridge_token("b3"), True)
         await asyncio.sleep(5 * bridge_liveness.EVERY_S)
         assert told == [False]
         line.frozen = ""
@@ -279,7 +279,7 @@ def test_after_a_standstill_all_that_waited_is_taken_in_first(monkeypatch: pytes
         await asked(1)
         clock += 0.1
         mine.look()
-        assert robot.caught_up
+        assert robot.is_caught_up
         clock += 3.0
         mine.look()  # as it is before each press is judged
         before = len(line.asked)
@@ -288,12 +288,12 @@ def test_after_a_standstill_all_that_waited_is_taken_in_first(monkeypatch: pytes
         await asked(before + 1)
         answer(before + 1)
         await asked(before + 2)
-        assert not robot.caught_up
+        assert not robot.is_caught_up
         clock += 0.01
         later = len(line.asked)
         await asked(later + 1)
         answer(later + 1)
-        await until(lambda: robot.caught_up)
+        await until(lambda: robot.is_caught_up)
         await mine.stop()
 
     asyncio.run(benched())

@@ -38,7 +38,7 @@ def test_of_a_topic_the_newest_is_kept_and_what_was_skipped_counted(inbox: Inbox
     for said in (b"one", b"two", b"three"):
         inbox.put("heard", said, None)
     sample = inbox.drain().samples["heard"]
-    assert (sample.payload, sample.skipped, sample.between) == (b"three", 2, ())
+    assert (sample.payload, sample.skipped, sample.skipped_payloads) == (b"three", 2, ())
     assert inbox.drain().samples == {}
 
 
@@ -128,9 +128,14 @@ def test_of_a_watched_topic_each_change_in_between_is_kept(inbox: Inbox) -> None
     for said in (b"yes", b"no", b"no", b"yes"):
         inbox.put("permit", said, None)
     sample = inbox.drain().samples["permit"]
-    assert ([one.payload for one in sample.between], sample.overrun) == ([b"yes", b"no"], False)
-    assert sorted(one.at for one in sample.between) == [one.at for one in sample.between]
-    assert sample.between[-1].at <= sample.at
+    assert ([one.payload for one in sample.skipped_payloads], sample.overrun) == (
+        [b"yes", b"no"],
+        False,
+    )
+    assert sorted(one.at for one in sample.skipped_payloads) == [
+        one.at for one in sample.skipped_payloads
+    ]
+    assert sample.skipped_payloads[-1].at <= sample.at
 
 
 def test_of_too_many_changes_it_is_said_that_some_are_not_known(inbox: Inbox) -> None:
@@ -140,12 +145,14 @@ def test_of_too_many_changes_it_is_said_that_some_are_not_known(inbox: Inbox) ->
     for number in range(BETWEEN_MOST + 2):
         inbox.put("permit", b"%d" % number, None)
     sample = inbox.drain().samples["permit"]
-    assert [one.payload for one in sample.between] == [b"%d" % n for n in range(1, BETWEEN_MOST + 1)]
+    assert [one.payload for one in sample.skipped_payloads] == [
+        b"%d" % n for n in range(1, BETWEEN_MOST + 1)
+    ]
     assert sample.overrun
     for number in range(5):
         inbox.put("permit", b"%d" % number * (BETWEEN_BYTES // 2), None)
     sample = inbox.drain().samples["permit"]
-    assert (len(sample.between), sample.overrun) == (2, True)
+    assert (len(sample.skipped_payloads), sample.overrun) == (2, True)
 
 
 def test_what_is_kept_whole_has_every_sample_in_order(inbox: Inbox) -> None:

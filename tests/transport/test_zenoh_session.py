@@ -234,12 +234,12 @@ def test_of_a_watched_topic_what_came_and_went_between_two_drains_is_kept(
     watched, other = samples["a"], samples["b"]
     assert bytes(watched.payload) == bytes(other.payload) == b"yes"
     changes = [b"yes", b"no", b"yes", *(b"%d" % n for n in range(100))]
-    assert [bytes(one.payload) for one in watched.between] == changes
-    assert other.between == ()
+    assert [bytes(one.payload) for one in watched.skipped_payloads] == changes
+    assert other.skipped_payloads == ()
     for payload in (b"yes", b"no", b"no", b"yes"):
         session.put("a", payload)
     time.sleep(0.5)
-    assert [bytes(one.payload) for one in link.drain().samples["a"].between] == [b"yes", b"no"]
+    assert [bytes(one.payload) for one in link.drain().samples["a"].skipped_payloads] == [b"yes", b"no"]
     link.close()
 
 
@@ -258,7 +258,7 @@ def test_a_stamp_of_a_clock_that_is_ahead_makes_the_link_deaf_to_nothing(
 
     def all_heard() -> bool:
         if sample := link.drain().samples.get("a"):
-            heard.extend(bytes(one.payload) for one in sample.between)
+            heard.extend(bytes(one.payload) for one in sample.skipped_payloads)
             heard.append(bytes(sample.payload))
         return len(heard) >= 26
 

@@ -29,9 +29,9 @@ def shown(
     panel = panel_of({**widget, "type": type_name, **more})
     robot = robot_there(panel)
     if fields is not None:
-        robot.take("heard", Sample(INTERFACES.encode(type_name, fields), 1, NOW, NOW, BRIDGE))
+        robot.update("heard", Sample(INTERFACES.encode(type_name, fields), 1, NOW, NOW, BRIDGE))
     if cut:
-        robot.cut(BRIDGE, 2)
+        robot.mark_bridge_lost(BRIDGE, 2)
     return build_view(panel, robot, now).view["widgets"]["heard"]
 
 
@@ -170,7 +170,7 @@ def test_a_lamp_of_a_file_shows_the_state_of_a_constant(tmp_path: Path, status: 
     assert panel.displays == tuple(panel.widgets())
     robot = robot_there(panel)
     battery = INTERFACES.encode(BATTERY, BATTERY_FIELDS | {"power_supply_status": status})
-    robot.take("heard", Sample(battery, 1, NOW, NOW, BRIDGE))
+    robot.update("heard", Sample(battery, 1, NOW, NOW, BRIDGE))
     assert english(build_view(panel, robot, NOW).view["widgets"]["supply"]["text"]) == text
 
 
@@ -221,7 +221,7 @@ def test_a_lamp_shows_an_unknown_text_by_its_escapes() -> None:
 def test_a_lamp_that_can_not_be_read_says_so() -> None:
     panel = panel_of({**LAMP, "type": "std_msgs/msg/UInt8"})
     robot = robot_there(panel)
-    robot.take("heard", Sample(b"broken", 1, NOW, NOW, BRIDGE))
+    robot.update("heard", Sample(b"broken", 1, NOW, NOW, BRIDGE))
     view = build_view(panel, robot, NOW).view["widgets"]["heard"]
     assert english((view["state"], view["text"], view["shape"])) == (
         "unreadable",
@@ -233,5 +233,7 @@ def test_a_lamp_that_can_not_be_read_says_so() -> None:
 def test_time_changes_a_lamp() -> None:
     panel = panel_of({**LAMP, "type": "std_msgs/msg/UInt8", "max_age_s": 5.0})
     robot = RobotState(panel, INTERFACES, DIALECT)
-    robot.take("heard", Sample(INTERFACES.encode("std_msgs/msg/UInt8", {"data": 0}), 1, NOW, NOW, None))
+    robot.update(
+        "heard", Sample(INTERFACES.encode("std_msgs/msg/UInt8", {"data": 0}), 1, NOW, NOW, None)
+    )
     assert build_view(panel, robot, NOW).until == NOW + 5

@@ -56,7 +56,7 @@ def cell(interlock: Table = NOTHING) -> Panel:
 
 
 def links_of(panel: Panel, robot: RobotState, now: float = NOW, **more: Any) -> dict[str, LinkStatus]:
-    robot.follow_publishers()
+    robot.update_publishers()
     links: dict[str, LinkStatus] = english(build_view(panel, robot, now, **more).view["link"])
     return links
 
@@ -106,7 +106,7 @@ def test_a_verdict_locks_by_its_link_only(code: str) -> None:
 def test_without_a_bridge_it_locks_all_and_the_node_nothing() -> None:
     panel = cell()
     robot = robot_there(panel)
-    robot.graph.apply(bridge_token(BRIDGE_ZID), False)
+    robot.graph.apply_token(bridge_token(BRIDGE_ZID), False)
     link = links_of(panel, robot)
     assert english(link["bridge"]["locks"]) == "Locks Free, Guarded."
     assert link["bridge"]["reason"] == (
@@ -142,7 +142,7 @@ def test_what_the_robot_forbids_is_no_fault_of_a_link() -> None:
     [
         (ParameterState("live", 1.0, read_only=True), "Read only"),
         (ParameterState("undeclared"), "has no parameter speed"),
-        (ParameterState("mistyped", found="string"), "is string"),
+        (ParameterState("mistyped", robot_type="string"), "is string"),
         (ParameterState("live", 1.0, range=Range(5.0, 6.0)), "No value fits both"),
     ],
 )
@@ -152,7 +152,7 @@ def test_a_parameter_that_can_not_be_set_is_no_fault_of_a_link(
     panel = panel_of(SPEED)
     robot = robot_there(panel)
     for name, type_name in (GET, DESCRIBE, SET):
-        robot.graph.apply(server_token(BRIDGE_ZID, "SS", f"arm/{name}", type_name), True)
+        robot.graph.apply_token(server_token(BRIDGE_ZID, "SS", f"arm/{name}", type_name), True)
     robot.parameters["speed"] = known
     seen = english(build_view(panel, robot, NOW).view)
     assert reason in english(seen["widgets"]["speed"]["reason"])
@@ -256,8 +256,8 @@ def test_a_node_that_went_with_its_bridge_is_not_lost_by_it() -> None:
     endpoint(robot, "MP", "/heard", TEXT)
     links_of(panel, robot)
     endpoint(robot, "MP", "/heard", TEXT, alive=False)
-    robot.graph.apply(bridge_token(BRIDGE_ZID), False)
-    robot.graph.apply(bridge_token("b2"), True)
+    robot.graph.apply_token(bridge_token(BRIDGE_ZID), False)
+    robot.graph.apply_token(bridge_token("b2"), True)
     assert "Start it" in str(links_of(panel, robot)["node"]["reason"])
 
 
@@ -266,9 +266,9 @@ def test_a_lost_link_forgets_which_nodes_were_there() -> None:
     robot = robot_there(panel)
     endpoint(robot, "MP", "/heard", TEXT)
     links_of(panel, robot)
-    robot.lose()
+    robot.mark_link_lost()
     robot.link_up, robot.settled_at = True, 0.0
-    robot.graph.apply(bridge_token(BRIDGE_ZID), True)
+    robot.graph.apply_token(bridge_token(BRIDGE_ZID), True)
     assert "Start it" in str(links_of(panel, robot)["node"]["reason"])
 
 

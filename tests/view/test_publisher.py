@@ -91,7 +91,7 @@ def test_of_a_widget_only_what_changed_is_sent(publisher: ViewPublisher, robot: 
 
 def test_a_changed_light_is_sent_with_all_lights(publisher: ViewPublisher, robot: RobotState) -> None:
     old = publisher.view
-    robot.graph.answered({})
+    robot.graph.update_versions({})
     publisher.post(view_of(robot))
     sent = events(publisher.since(1, old))
     assert sent["link"] == english(publisher.view["link"])

@@ -62,7 +62,7 @@ SAID = some.tuples(
 
 def say(robot: RobotState, topic: str, word: str | None, at: float) -> None:
     if word is None:
-        robot.take(robot.key(topic), Sample(b"broken", 1, at, at, BRIDGE))
+        robot.update(robot.key(topic), Sample(b"broken", 1, at, at, BRIDGE))
     else:
         says(robot, topic, word == "x" if TOPICS[topic] is BOOL else word, TOPICS[topic], at=at)
 

@@ -41,7 +41,7 @@ def test_each_link_has_its_own_time() -> None:
     seen.at(1.0)
     endpoint(seen.robot, "MP", "/heard", TEXT)
     assert seen.at(DAY_S + 2) == ("", "1970-01-01 00:00:01", "1970-01-02 00:00:02")
-    seen.robot.graph.apply(bridge_token(BRIDGE), False)
+    seen.robot.graph.apply_token(bridge_token(BRIDGE), False)
     assert seen.at(DAY_S + 3) == ("", "1970-01-02 00:00:03", "1970-01-02 00:00:03")
 
 

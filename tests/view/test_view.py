@@ -82,7 +82,7 @@ def test_a_demo_shows_its_banner(robot: RobotState, simulated: bool, banner: str
 
 
 def test_a_demo_robot_behind_a_live_panel_shows_the_banner_too(robot: RobotState) -> None:
-    robot.graph.answered({BRIDGE: DEMO_VERSION})
+    robot.graph.update_versions({BRIDGE: DEMO_VERSION})
     assert english(view_of(robot)["notice"]["banner"]) == "SIMULATED ROBOT"
 
 
@@ -102,11 +102,11 @@ def no_link(robot: RobotState) -> None:
 
 
 def no_bridge(robot: RobotState) -> None:
-    robot.graph.apply(bridge_token(BRIDGE), False)
+    robot.graph.apply_token(bridge_token(BRIDGE), False)
 
 
 def silent(robot: RobotState) -> None:
-    robot.graph.answered({})
+    robot.graph.update_versions({})
 
 
 def joining(robot: RobotState) -> None:
@@ -172,7 +172,7 @@ def test_a_node_that_only_serves_is_seen_too(service: str, state: str) -> None:
     reset = {"id": "reset", "kind": "call", "label": "R", "service": "/reset", "type": trigger}
     panel = panel_of(reset)
     robot = robot_there(panel)
-    robot.graph.apply(server_token(BRIDGE, "SS", service, trigger), True)
+    robot.graph.apply_token(server_token(BRIDGE, "SS", service, trigger), True)
     assert build_view(panel, robot, NOW).view["link"]["node"]["state"] == state
 
 
@@ -195,7 +195,7 @@ def test_a_readout_shows_value_and_time_of_reception(robot: RobotState) -> None:
 @pytest.mark.usefixtures("utc")
 def test_a_readout_from_before_a_cut_says_so(robot: RobotState) -> None:
     says(robot, "/heard", "hello", at=3661.0)
-    robot.cut(BRIDGE, 2)
+    robot.mark_bridge_lost(BRIDGE, 2)
     shown, _ = heard(robot)
     assert english(shown) == {
         "state": "old",
@@ -205,7 +205,7 @@ def test_a_readout_from_before_a_cut_says_so(robot: RobotState) -> None:
 
 
 def test_a_readout_that_can_not_be_read_says_so(robot: RobotState) -> None:
-    robot.take("heard", Sample(b"broken", 1, NOW, NOW, BRIDGE))
+    robot.update("heard", Sample(b"broken", 1, NOW, NOW, BRIDGE))
     shown, _ = heard(robot)
     assert (shown["state"], shown["text"]) == ("unreadable", "—")
     assert (
@@ -222,8 +222,8 @@ def test_a_readout_of_a_topic_of_another_type_says_so(robot: RobotState) -> None
 
 
 def test_what_was_unreadable_before_a_cut_is_waited_for(robot: RobotState) -> None:
-    robot.take("heard", Sample(b"broken", 1, NOW, NOW, BRIDGE))
-    robot.cut(BRIDGE, 2)
+    robot.update("heard", Sample(b"broken", 1, NOW, NOW, BRIDGE))
+    robot.mark_bridge_lost(BRIDGE, 2)
     assert heard(robot)[0]["state"] == "waiting"
 
 
@@ -253,7 +253,7 @@ def test_a_readout_shows_a_field_inside() -> None:
     panel = panel_of({**HEARD, "type": header, "field": "stamp.sec"})
     robot = robot_there(panel)
     payload = INTERFACES.encode(header, {"stamp": {"sec": 5, "nanosec": 0}, "frame_id": ""})
-    robot.take("heard", Sample(payload, 1, NOW, NOW, BRIDGE))
+    robot.update("heard", Sample(payload, 1, NOW, NOW, BRIDGE))
     assert build_view(panel, robot, NOW).view["widgets"]["heard"]["text"] == "5"
 
 

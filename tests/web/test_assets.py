@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from app.panel.widgets.kinds import KINDS
-from app.settings import shipped
+from app.settings import shipped_path
 from app.web.assets import LAYERS, OF_KINDS, OWN_PAGE, Assets, load_assets
 from tests.support.parts import ROOT
 
@@ -129,14 +129,14 @@ def test_another_screen_is_a_new_revision(static: Path, templates: Path) -> None
 
 
 def test_the_shipped_files_are_complete() -> None:
-    assets = load_assets(shipped("static"), shipped("templates"), 0.22, ())
+    assets = load_assets(shipped_path("static"), shipped_path("templates"), 0.22, ())
     assert "main.js" in assets.files
     style = assets.files["kiosk.css"].content.decode()
     assert style.index("@layer tokens{") < style.index("@layer base{") < style.index("@layer widgets{")
 
 
 def test_no_shipped_file_loads_anything_from_elsewhere() -> None:
-    assets = load_assets(shipped("static"), shipped("templates"), 0.22, KINDS)
+    assets = load_assets(shipped_path("static"), shipped_path("templates"), 0.22, KINDS)
     for name, asset in assets.files.items():
         assert b"http:" not in asset.content, name
         assert b"https:" not in asset.content, name
@@ -145,7 +145,9 @@ def test_no_shipped_file_loads_anything_from_elsewhere() -> None:
 
 def test_only_a_panel_that_needs_it_gets_the_look_of_several_reasons() -> None:
     several, single = (
-        load_assets(shipped("static"), shipped("templates"), 0.22, kinds).files["kiosk.css"].content
+        load_assets(shipped_path("static"), shipped_path("templates"), 0.22, kinds)
+        .files["kiosk.css"]
+        .content
         for kinds in (("publish", "interlocks"), tuple(KINDS))
     )
     assert b"button.why" in several

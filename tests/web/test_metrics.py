@@ -60,7 +60,7 @@ def test_a_kiosk_that_can_send_is_ready() -> None:
     def connect(session: RobotSession) -> None:
         session.robot.link_up = True
         session.robot.settled_at = 0.0
-        session.robot.graph.apply(bridge_token(BRIDGE), True)
+        session.robot.graph.apply_token(bridge_token(BRIDGE), True)
 
     samples = of_kiosk(connect)
     assert samples["kiosk_link_up", ("",)] == 1
@@ -71,7 +71,7 @@ def test_a_kiosk_that_can_send_is_ready() -> None:
 def test_samples_that_were_not_their_type_are_counted_by_key() -> None:
     def hear(session: RobotSession) -> None:
         for seq in (1, 2):
-            session.robot.take("heard", Sample(b"broken", seq, 0.0, 0.0, BRIDGE))
+            session.robot.update("heard", Sample(b"broken", seq, 0.0, 0.0, BRIDGE))
             session.robot.reading("/heard")
 
     assert of_kiosk(hear)["kiosk_undecodable_total", ("heard", "")] == 2

@@ -7,7 +7,7 @@ from jinja2 import Environment, FileSystemLoader
 from jinja2.meta import find_referenced_templates
 
 from app.panel.widgets.kinds import KINDS
-from app.settings import shipped
+from app.settings import shipped_path
 from app.view.sections import SECTIONS
 from app.web.routes.pages import compiled
 
@@ -23,7 +23,7 @@ def needed(environment: Environment, name: str) -> Iterator[str]:
 
 
 def test_all_that_a_page_is_made_of_is_compiled_at_the_start() -> None:
-    environment = Environment(loader=FileSystemLoader(shipped("templates")))
+    environment = Environment(loader=FileSystemLoader(shipped_path("templates")))
     asyncio.run(compiled(environment))
     assert environment.cache is not None
     names = ["screen.html", *(f"widgets/{kind}.html" for kind in KINDS)]

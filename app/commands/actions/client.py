@@ -16,7 +16,7 @@ from app.errors import DecodeError
 from app.i18n import Text, joined, say
 from app.interfaces import Fields, Interfaces
 from app.interfaces.names import of_action
-from app.panel.template import PLACE
+from app.panel.template import RESPONSE_PLACEHOLDER
 from app.panel.widgets.service_action import Action
 from app.robot.command_status import Outcome
 from app.robot.state import RobotState
@@ -49,20 +49,22 @@ class ActionClient:
     def goal_request(self, widget: Action, goal_id: uuid.UUID, fields: dict[str, Any]) -> bytes:
         """What `send_goal` sends; FieldError for bad fields."""
         wrapped = {"goal_id": {"uuid": list(goal_id.bytes)}, "goal": fields}
-        return self._interfaces.encode(self._interfaces.action(widget.type).send_goal_request, wrapped)
+        return self._interfaces.encode(
+            self._interfaces.action_types(widget.type).send_goal_request, wrapped
+        )
 
     def send_goal(self, widget: Action, request: bytes) -> Query:
         return self._ask(widget, "send_goal", request, widget.timeout_s)
 
     def cancel_goal(self, goal: Goal) -> Query:
-        request, _ = self._interfaces.service(CANCEL)
+        request, _ = self._interfaces.service_types(CANCEL)
         stamp = {"sec": 0, "nanosec": 0}
         info = {"goal_id": {"uuid": list(goal.id.bytes)}, "stamp": stamp}
         payload = self._interfaces.encode(request, {"goal_info": info})
         return self._ask(goal.widget, "cancel_goal", payload, goal.widget.timeout_s)
 
     def get_result(self, goal: Goal, timeout_s: float) -> Query:
-        request = self._interfaces.action(goal.widget.type).get_result_request
+        request = self._interfaces.action_types(goal.widget.type).get_result_request
         payload = self._interfaces.encode(request, {"goal_id": {"uuid": list(goal.id.bytes)}})
         return self._ask(goal.widget, "get_result", payload, timeout_s)
 
@@ -83,7 +85,7 @@ class ActionClient:
         """What `send_goal` answered, or why it did not."""
         widget, now = goal.widget, format_time(time.time())
         if reply is not None:
-            response = self._interfaces.action(widget.type).send_goal_response
+            response = self._interfaces.action_types(widget.type).send_goal_response
             message = self._decoded(widget, response, reply)
             if message is None:
                 return Outcome("unknown", say("answer_unreadable", wanted=widget.type))
@@ -97,7 +99,7 @@ class ActionClient:
 
     def cancel_response(self, widget: Action, reply: bytes) -> Any:
         """What `cancel_goal` answered: a message with `return_code` and `goals_canceling`."""
-        return self._decoded(widget, self._interfaces.service(CANCEL)[1], reply)
+        return self._decoded(widget, self._interfaces.service_types(CANCEL)[1], reply)
 
     def why_silent(self, widget: Action) -> Text:
         """Why `cancel_goal` did not answer."""
@@ -107,10 +109,12 @@ class ActionClient:
 
     async def result(self, widget: Action, reply: bytes) -> Fields | None:
         """What `get_result` answered: its status, and what the widget shows of the result."""
-        paths = (STATUS, *(RESULT + path for path in PLACE.findall(widget.result)))
-        response = self._interfaces.action(widget.type).get_result_response
+        paths = (STATUS, *(RESULT + path for path in RESPONSE_PLACEHOLDER.findall(widget.result)))
+        response = self._interfaces.action_types(widget.type).get_result_response
         try:
-            return await self._robot.slices.whole(self._interfaces.fields(response, paths), reply)
+            return await self._robot.slices.read_all(
+                self._interfaces.field_reader(response, paths), reply
+            )
         except DecodeError as error:
             self._log.error("%s: %s", widget.action, error)
             return None

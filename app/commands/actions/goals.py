@@ -18,9 +18,9 @@ from app.commands.service_calls import MOST_UNANSWERED, Asker
 from app.errors import DecodeError
 from app.i18n import TextLike, say
 from app.interfaces import Fields, Interfaces, names
-from app.panel.template import PLACE
+from app.panel.template import RESPONSE_PLACEHOLDER
 from app.panel.widgets.service_action import Action
-from app.robot.command_status import IDLE, CommandStatus, LastLook, OnCorrection, Outcome, no_look
+from app.robot.command_status import IDLE, CommandStatus, FinalCheck, OnCorrection, Outcome, no_check
 from app.robot.state import Reading, RobotState, Sample
 from app.robot.topics import Topic
 
@@ -69,7 +69,7 @@ class GoalTracker:
         press_id: str,
         corrected: OnCorrection,
         entry: str = "",
-        look: LastLook = no_look,
+        look: FinalCheck = no_check,
     ) -> Outcome:
         """Sends a goal; `corrected` gets what came of it in the end, `entry` is the hash of the press's
         entry in the operator's log. FieldError for bad fields, LinkError where it could not be sent:
@@ -114,7 +114,7 @@ class GoalTracker:
     def _stoppable(self, widget: Action, press_id: str) -> Goal | None:
         latest, shown = self._latest.get(widget.id), self._robot.command_status.get(widget.id, IDLE)
         if not press_id:
-            return latest if shown.stoppable else None
+            return latest if shown.can_cancel else None
         if latest is not None and latest.press_id == press_id and shown.busy:
             return latest
         followed = (goal for goal in self._results.goals if goal.widget.id == widget.id)
@@ -159,9 +159,9 @@ class GoalTracker:
         """The latest feedback of an action; of another program's goal it is passed over. Whoever
         calls this shows it when a frame is due."""
         for goal in self._of(action):
-            if self._robot.command_status[goal.widget.id].stoppable:
+            if self._robot.command_status[goal.widget.id].can_cancel:
                 topic = self._feedback_of(goal.widget)
-                topic.take(sample)
+                topic.update(sample)
                 self._hear(goal, topic.reading())
 
     def _hear(self, goal: Goal, reading: Reading) -> None:
@@ -170,17 +170,17 @@ class GoalTracker:
             self._take_feedback(goal, fields)
 
     def _hear_later(self, widget: str, reading: Reading) -> None:
-        if (goal := self._latest.get(widget)) and self._robot.command_status[widget].stoppable:
+        if (goal := self._latest.get(widget)) and self._robot.command_status[widget].can_cancel:
             self._hear(goal, reading)
             self._changed()
 
     def _feedback_of(self, widget: Action) -> Topic:
         """The feedback of an action, with what its widget shows of it."""
         if widget.id not in self._feedback:
-            message = self._interfaces.action(widget.type).feedback_message
-            shown = [*PLACE.findall(widget.feedback), *filter(None, [widget.progress])]
+            message = self._interfaces.action_types(widget.type).feedback_message
+            shown = [*RESPONSE_PLACEHOLDER.findall(widget.feedback), *filter(None, [widget.progress])]
             self._feedback[widget.id] = Topic(
-                self._interfaces.fields(message, [GOAL_ID, *(FEEDBACK + path for path in shown)]),
+                self._interfaces.field_reader(message, [GOAL_ID, *(FEEDBACK + path for path in shown)]),
                 self._robot.slices,
                 watched=False,
                 unreadable=partial(

@@ -21,7 +21,7 @@ from app.commands.receipts import MOST_LOOKS, Receipt, Witness
 from app.errors import Cause, FieldError, InputError, LinkError, NotFound, PressRefused
 from app.i18n import TextLike, say
 from app.panel.model import Panel
-from app.panel.template import needed
+from app.panel.template import needed_inputs
 from app.panel.widgets.hold import Hold
 from app.permission.interlocks import Verdict
 from app.permission.press_permission import cause_of, judged
@@ -91,9 +91,9 @@ class HoldController:
             return self._receipts.refused(widget, inputs, context, ready, hold_id)
         lease = Lease.begun(hold_id or secrets.token_hex(8), widget.period_s, sent, now)
         since = say("hold_since", time=format_time(time.time()))
-        holding = ActiveHold(widget, lease, context, needed(widget, inputs), ready, told, since)
+        holding = ActiveHold(widget, lease, context, needed_inputs(widget, inputs), ready, told, since)
         self._held[widget_id] = holding
-        self._robot.held[widget_id] = since
+        self._robot.held_since[widget_id] = since
         self._receipts.began(holding)
         self._changed()
         self.step()
@@ -244,7 +244,7 @@ class HoldController:
     def _end(self, holding: ActiveHold, code: str, why: TextLike) -> None:
         widget, now = holding.widget, self._loop.time()
         del self._held[widget.id]
-        del self._robot.held[widget.id]
+        del self._robot.held_since[widget.id]
         unsaid = self._messages.put_last(widget, holding.values, now)
         receipt = self._receipts.ended(holding, now - holding.lease.begun_at, code, why, unsaid)
         holding.told(receipt)

@@ -6,11 +6,11 @@ from typing import Any, Protocol
 
 from app.errors import LinkError
 from app.i18n import TextLike, say
-from app.interfaces import INTEGERS, Interfaces
-from app.panel.template import filled, inputs_of, with_now
-from app.panel.widgets.hold import Hold, with_own_fields
+from app.interfaces import INTEGER_RANGES, Interfaces
+from app.panel.template import add_now, fill, input_ids
+from app.panel.widgets.hold import Hold, fill_own_fields
 from app.permission.interlocks import link_verdict
-from app.robot.command_status import LastLook, no_look
+from app.robot.command_status import FinalCheck, no_check
 from app.robot.state import RobotState
 
 Values = Mapping[str, Any]  # of inputs by their ids, as they were when the hold began
@@ -38,13 +38,13 @@ class HoldMessages:
 
     def values(self, widget: Hold, inputs: Mapping[str, Any]) -> Values:
         """Those that both messages get; FieldError or InputError for bad input."""
-        values = self._checked(inputs_of(widget), inputs)
+        values = self._checked(input_ids(widget), inputs)
         for template in (widget.message, widget.release):
-            fields = filled(template, with_now(values))
-            self._interfaces.encode(widget.type, with_own_fields(widget, fields, 0, 0))
+            fields = fill(template, add_now(values))
+            self._interfaces.encode(widget.type, fill_own_fields(widget, fields, 0, 0))
         return values
 
-    def put(self, widget: Hold, values: Values, look: LastLook) -> None:
+    def put(self, widget: Hold, values: Values, look: FinalCheck) -> None:
         """One message more; LinkError where it could not be sent, PressRefused where the last look
         finds that it may not be."""
         self._put(widget, widget.message, values, widget.deadline_ms, look)
@@ -55,7 +55,7 @@ class HoldMessages:
         if not self._robot.link_up or not self._robot.graph.bridges:
             return link_verdict(self._robot, now).reason or ""
         try:
-            self._put(widget, widget.release, values, 0, no_look)
+            self._put(widget, widget.release, values, 0, no_check)
         except LinkError as error:
             return say("with_stop", said=error.text)
         return ""
@@ -66,14 +66,14 @@ class HoldMessages:
         template: Mapping[str, Any],
         values: Values,
         deadline_ms: int,
-        look: LastLook,
+        look: FinalCheck,
     ) -> None:
         count = self._counts.get(widget.id, 0) + 1
         if widget.counter_field is not None:
             kind = self._interfaces.field_type(widget.type, widget.counter_field)
-            count %= INTEGERS[kind][1] + 1
-        fields = filled(template, with_now(values))
-        whole = with_own_fields(widget, fields, deadline_ms, count)
+            count %= INTEGER_RANGES[kind][1] + 1
+        fields = fill(template, add_now(values))
+        whole = fill_own_fields(widget, fields, deadline_ms, count)
         payload = self._interfaces.encode(widget.type, whole)
         look()
         self._transport.put(self._robot.key(widget.topic), payload)

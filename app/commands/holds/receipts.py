@@ -21,10 +21,10 @@ from app.commands.receipts import (
 )
 from app.errors import Cause
 from app.i18n import Text, TextLike, joined, say
-from app.panel.template import needed
+from app.panel.template import needed_inputs
 from app.panel.widgets.hold import Hold
 from app.robot.command_status import Outcome, OutcomeCode
-from app.ros_logging import RobotLog, on_rosout
+from app.ros_logging import RobotLog, rosout_extra
 
 log = logging.getLogger("kiosk.holds")
 
@@ -55,7 +55,7 @@ class Refusal(NamedTuple):
 def refused(widget: Hold, inputs: Mapping[str, Any], refusal: Refusal, hold_id: str = "") -> Receipt:
     """The receipt of a hold that may not begin; without an id it gets one."""
     text = say("refused", why=refusal.why, time=format_time(time.time()))
-    own = needed(widget, inputs)
+    own = needed_inputs(widget, inputs)
     own_id = hold_id or secrets.token_hex(8)
     return receipt_of(widget, own, own_id, Outcome("refused", text), refusal.cause)
 
@@ -72,7 +72,7 @@ class HoldReceipts:
         if self._witness is not None:
             self._witness.pressed(lease.id, widget.id, named(by.origin), holding.inputs)
         who = named(by.origin)
-        told = on_rosout(f"hold {lease.id} of {widget.id} by {who} begins")
+        told = rosout_extra(f"hold {lease.id} of {widget.id} by {who} begins")
         self._log.info("hold %s of %s by %s with %.*s begins", lease.id, widget.id, who,
                 LONGEST_LOGGED, holding.inputs, extra=told)  # fmt: skip
 
@@ -103,7 +103,7 @@ class HoldReceipts:
         """The same as the function, and told."""
         receipt = refused(widget, inputs, refusal, hold_id)
         who = named(context.origin)
-        told = on_rosout(f"hold of {widget.id} by {who}: {untyped(widget, receipt)}")
+        told = rosout_extra(f"hold of {widget.id} by {who}: {untyped(widget, receipt)}")
         self._log.warning("hold of %s by %s with %.*s: %s", widget.id, who,
                 LONGEST_LOGGED, receipt.inputs, receipt.reason, extra=told)  # fmt: skip
         if self._witness is not None:

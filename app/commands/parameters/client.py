@@ -51,7 +51,7 @@ class ParameterClient:
         part: str,
         names: Sequence[str],
     ) -> list[Any]:
-        request, response = self._interfaces.service(service[1])
+        request, response = self._interfaces.service_types(service[1])
         payload = self._interfaces.encode(request, {"names": list(names)})
         key = self._robot.key(f"{node}/{service[0]}")
         try:

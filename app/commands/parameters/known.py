@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 from app.panel.widgets.parameter import Parameter
-from app.robot.parameter_state import UNKNOWN, ParameterState, name_of, value_in
+from app.robot.parameter_state import UNKNOWN, ParameterState, decode_value, type_name
 from app.robot.state import RobotState
 from app.ros_logging import RobotLog
 
@@ -31,10 +31,12 @@ class KnownParameters:
         known = self.of(widget)
         if known.state not in ("live", "missing"):
             return False
-        if name_of(value.type) != widget.type:
-            self.learn(widget, ParameterState("mistyped", found=name_of(value.type), wall=wall))
+        if type_name(value.type) != widget.type:
+            self.learn(widget, ParameterState("mistyped", robot_type=type_name(value.type), wall=wall))
         else:
-            self.learn(widget, replace(known, state="live", value=value_in(widget, value), wall=wall))
+            self.learn(
+                widget, replace(known, state="live", value=decode_value(widget, value), wall=wall)
+            )
         return True
 
     def unreadable(self, widgets: Iterable[Parameter], wall: float) -> None:

@@ -7,11 +7,11 @@ from typing import Final
 from app.clock import format_time
 from app.commands.service_calls import LONGEST_SAID, Request, with_reply
 from app.i18n import say
-from app.interfaces import Fields, Interfaces, text_of
+from app.interfaces import Fields, Interfaces, plain_text
 from app.panel.widgets.parameter import SET, Parameter, Value
 from app.printable import printable
 from app.robot.command_status import Outcome
-from app.robot.parameter_state import wire
+from app.robot.parameter_state import encode_value
 
 SET_PATHS: Final = ("results[0].successful", "results[0].reason", "results[1].successful")
 
@@ -19,8 +19,8 @@ SET_PATHS: Final = ("results[0].successful", "results[0].reason", "results[1].su
 def set_request(interfaces: Interfaces, widget: Parameter, value: Value) -> Request:
     """The request that sets one parameter, with what reads its response."""
     service, type_name = SET
-    fields = {"parameters": [{"name": widget.parameter, "value": wire(widget, value)}]}
-    payload = interfaces.encode(interfaces.service(type_name)[0], fields)
+    fields = {"parameters": [{"name": widget.parameter, "value": encode_value(widget, value)}]}
+    payload = interfaces.encode(interfaces.service_types(type_name)[0], fields)
     name, read = f"{widget.node}/{service}", partial(_answer, widget, value)
     return Request(widget.id, name, type_name, payload, widget.timeout_s, SET_PATHS, read)
 
@@ -32,6 +32,6 @@ def _answer(widget: Parameter, value: Value, response: Fields) -> Outcome:
     if successful is None or second is not None:
         return Outcome("unknown", say("answer_unreadable", wanted=SET[1]))
     if successful:
-        return Outcome("succeeded", say("parameter_set", value=widget.written(value), time=now))
-    said = printable(text_of(reason, LONGEST_SAID)) if reason else ""
+        return Outcome("succeeded", say("parameter_set", value=widget.value_text(value), time=now))
+    said = printable(plain_text(reason, LONGEST_SAID)) if reason else ""
     return Outcome("rejected", with_reply(say("said_no", time=now), said))

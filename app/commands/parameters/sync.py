@@ -27,8 +27,8 @@ from app.interfaces import Interfaces
 from app.panel.model import Panel
 from app.panel.widgets.parameter import DESCRIBE, EVENT_TYPE, GET, SET, Parameter, Value
 from app.permission.interlocks import SERVER_SETTLE_S, parameters_offered
-from app.robot.command_status import LastLook, OnCorrection, Outcome, no_look
-from app.robot.parameter_state import parameter_states
+from app.robot.command_status import FinalCheck, OnCorrection, Outcome, no_check
+from app.robot.parameter_state import read_parameter_state
 from app.robot.state import RobotState, Sample
 from app.ros_logging import RobotLog
 
@@ -163,7 +163,7 @@ class ParameterSync:
 
     async def _read(self, node: Node) -> Read:
         """Asks for all of a node's parameters: whether it told all, not all, or nothing."""
-        self._robot.asking |= {widget.id for widget in node.widgets}
+        self._robot.querying |= {widget.id for widget in node.widgets}
         self._changed()
         try:
             return await self._answered(node)
@@ -189,14 +189,14 @@ class ParameterSync:
         values |= node.heard  # told after it was asked
         for widget in node.widgets:
             name = widget.parameter
-            found = parameter_states(widget, descriptors.get(name), values.get(name), time.time())
+            found = read_parameter_state(widget, descriptors.get(name), values.get(name), time.time())
             self._known.learn(widget, found)
         self._changed()
         live = all(self._known.of(widget).state == "live" for widget in node.widgets)
         return "whole" if live else "partly"
 
     def _end_asking(self, node: Node) -> None:
-        self._robot.asking -= {widget.id for widget in node.widgets}
+        self._robot.querying -= {widget.id for widget in node.widgets}
 
     def read_again(self, widget: Parameter) -> TextLike:
         """Asks the node of a parameter once more, unless it is being asked or has just answered; why it
@@ -205,7 +205,7 @@ class ParameterSync:
         if node.task is None:
             return say("no_parameters", node=widget.node)
         fresh = time.monotonic() - node.told_at < AGAIN_S
-        if widget.id not in self._robot.asking and not fresh:
+        if widget.id not in self._robot.querying and not fresh:
             node.ask_now()
         return ""
 
@@ -221,7 +221,7 @@ class ParameterSync:
         value: Value,
         press_id: str,
         corrected: OnCorrection,
-        look: LastLook = no_look,
+        look: FinalCheck = no_check,
     ) -> Outcome:
         """Sets a parameter, as a call does; whatever came of it, the node is asked how it is now."""
         request = set_request(self._interfaces, widget, value)

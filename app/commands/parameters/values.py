@@ -6,55 +6,74 @@ from typing import Any, Final
 
 from app.errors import InputError
 from app.i18n import TextLike, render, say
-from app.interfaces import INTEGERS
-from app.interfaces.validation import shown
-from app.panel.list_text import elements
+from app.interfaces import INTEGER_RANGES
+from app.interfaces.validation import format_value
+from app.panel.list_text import split_list
 from app.panel.widgets.numbers import DECIMAL
-from app.panel.widgets.parameter import LONGEST_TEXT, One, Parameter, Value
-from app.robot.parameter_state import LONGEST_LIST, ParameterState, allowed, each_text, limits_text
+from app.panel.widgets.parameter import MAX_TEXT, Parameter, Scalar, Value
+from app.robot.parameter_state import (
+    MAX_LIST_LENGTH,
+    ParameterState,
+    allowed_range,
+    each_text,
+    limits_text,
+)
 
 WHOLE: Final = re.compile(r"\s*[+-]?[0-9]{1,19}\s*", re.ASCII)
 
 
-def checked(of: Parameter, known: ParameterState, given: Any) -> Value:
+def checked(parameter: Parameter, known: ParameterState, given: Any) -> Value:
     """The value to set; InputError names the label and what it may be."""
-    if of.options:
-        given = _chosen(of, given)
-    if not of.many:
-        return _one(of, known, of.label, given)
-    several = _several(of, known, given)
-    if len(several) > LONGEST_LIST:
-        raise InputError(say("list_long", label=of.label, most=LONGEST_LIST, count=len(several)))
-    named = (say("list_value", label=of.label, number=i + 1) for i in range(len(several)))
-    return tuple(_one(of, known, name, one) for name, one in zip(named, several, strict=True))
+    if parameter.options:
+        given = _chosen(parameter, given)
+    if not parameter.is_list:
+        return _one(parameter, known, parameter.label, given)
+    several = _several(parameter, known, given)
+    if len(several) > MAX_LIST_LENGTH:
+        raise InputError(
+            say("list_long", label=parameter.label, most=MAX_LIST_LENGTH, count=len(several))
+        )
+    named = (say("list_value", label=parameter.label, number=i + 1) for i in range(len(several)))
+    return tuple(_one(parameter, known, name, one) for name, one in zip(named, several, strict=True))
 
 
-def _chosen(of: Parameter, given: Any) -> Any:
+def _chosen(parameter: Parameter, given: Any) -> Any:
     """The value of the option that was given by its value or its key."""
-    option = of.option(given) or next((one for one in of.options if one.key == given), None)
+    option = parameter.find_option(given) or next(
+        (one for one in parameter.options if one.key == given), None
+    )
     if option is None:
-        options = tuple(one.label for one in of.options)
-        raise InputError(say("no_option", label=of.label, options=options, given=shown(given)))
+        options = tuple(one.label for one in parameter.options)
+        raise InputError(
+            say("no_option", label=parameter.label, options=options, given=format_value(given))
+        )
     return option.value
 
 
-def _several(of: Parameter, known: ParameterState, given: Any) -> list[Any]:
+def _several(parameter: Parameter, known: ParameterState, given: Any) -> list[Any]:
     """What was entered with commas between; a program gives a list."""
     if isinstance(given, list):
         return given
     try:
-        if not isinstance(given, str) or len(given) > LONGEST_TEXT:
+        if not isinstance(given, str) or len(given) > MAX_TEXT:
             raise ValueError
-        return [_entered(of, text) for text in elements(given)]
+        return [_entered(parameter, text) for text in split_list(given)]
     except ValueError:
-        text = limits_text(of, allowed(of, known))
-        raise InputError(say("no_list", label=of.label, limits=text, given=shown(given))) from None
+        text = limits_text(parameter, allowed_range(parameter, known))
+        raise InputError(
+            say("no_list", label=parameter.label, limits=text, given=format_value(given))
+        ) from None
 
 
-def _entered(of: Parameter, text: str) -> Any:
-    match of.element:
+def _entered(parameter: Parameter, text: str) -> Any:
+    match parameter.element_type:
         case "bool":
-            words = {"true": True, "false": False, _lower(of.on): True, _lower(of.off): False}
+            words = {
+                "true": True,
+                "false": False,
+                _lower(parameter.on): True,
+                _lower(parameter.off): False,
+            }
             return words.get(text.lower(), text)
         case "double":
             return float(text) if DECIMAL.fullmatch(text) else text
@@ -65,32 +84,42 @@ def _lower(text: TextLike) -> str:
     return render(text).lower()
 
 
-def _one(of: Parameter, known: ParameterState, label: TextLike, given: Any) -> One:
-    match of.element:
+def _one(parameter: Parameter, known: ParameterState, label: TextLike, given: Any) -> Scalar:
+    match parameter.element_type:
         case "bool":
             if isinstance(given, bool):
                 return given
-            raise InputError(say("no_toggle", label=label, on=of.on, off=of.off, given=shown(given)))
+            raise InputError(
+                say(
+                    "no_toggle",
+                    label=label,
+                    on=parameter.on,
+                    off=parameter.off,
+                    given=format_value(given),
+                )
+            )
         case "string":
-            if isinstance(given, str) and len(given) <= LONGEST_TEXT:
+            if isinstance(given, str) and len(given) <= MAX_TEXT:
                 return given
-            text = shown(given)
-            raise InputError(say("no_text", label=label, most=LONGEST_TEXT, given=text))
-    return _number(of, known, label, given)
+            text = format_value(given)
+            raise InputError(say("no_text", label=label, most=MAX_TEXT, given=text))
+    return _number(parameter, known, label, given)
 
 
-def _number(of: Parameter, known: ParameterState, label: TextLike, given: Any) -> int | float:
-    limits = allowed(of, known)
-    text = each_text(of, limits)
+def _number(parameter: Parameter, known: ParameterState, label: TextLike, given: Any) -> int | float:
+    limits = allowed_range(parameter, known)
+    text = each_text(parameter, limits)
     if given == "" or given is None:
         raise InputError(say("number_empty", label=label, limits=text))
-    value = _whole(given) if of.element == "integer" else _double(given)
+    value = _whole(given) if parameter.element_type == "integer" else _double(given)
     if value is None:
-        raise InputError(say("no_number", label=label, limits=text, given=shown(given)))
+        raise InputError(say("no_number", label=label, limits=text, given=format_value(given)))
     for one in (limits, known.range):
-        if not one.holds(value):
-            text = each_text(of, one)
-            raise InputError(say("off_limits", label=label, limits=text, given=of.written(value)))
+        if not one.contains(value):
+            text = each_text(parameter, one)
+            raise InputError(
+                say("off_limits", label=label, limits=text, given=parameter.value_text(value))
+            )
     return value
 
 
@@ -102,7 +131,7 @@ def _whole(given: Any) -> int | None:
         given = int(given)
     if isinstance(given, bool) or not isinstance(given, int):
         return None
-    low, high = INTEGERS["int64"]
+    low, high = INTEGER_RANGES["int64"]
     return given if low <= given <= high else None
 
 

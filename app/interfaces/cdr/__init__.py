@@ -1,1 +1,1 @@
-"""CDR bytes to and from values."""
+"""The CDR codec: bytes to and from values."""

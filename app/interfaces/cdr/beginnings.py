@@ -1,6 +1,6 @@
-"""The beginning of a value that has any size: as much of it as is ever shown.
+"""Decodes the beginning of a value of any size: as much as is ever shown.
 
-Of a list or a message so many parts are built; what comes after is not even looked at.
+Of a list or a message, at most `MAX_PARTS` parts are built; the rest is not read.
 """
 
 from collections.abc import Callable, Sequence
@@ -10,49 +10,58 @@ from app.interfaces.cdr.formats import is_number
 from app.interfaces.cdr.reader import Read
 from app.interfaces.definitions import Field, Type
 
-MOST: Final = 1000  # parts: each is two characters at the least when it is shown
+MAX_PARTS: Final = 1000  # each is shown with two characters at least
 
-Make = Callable[[str], tuple[Sequence[Field], Callable[..., Any]]]  # a structure's fields and class
+StructureFactory = Callable[
+    [str], tuple[Sequence[Field], Callable[..., Any]]
+]  # structure name → its fields and class
 
 
-class Beginning:
-    """Builds one value; used once."""
+class TruncatedReader:
+    """Decodes one value; used once."""
 
-    def __init__(self, reader: Callable[[Type], Read], make: Make, body: "memoryview[int]") -> None:
-        """`reader` reads what is no structure, and no list of such."""
-        self._reader = reader
-        self._make = make
+    def __init__(
+        self, reader: Callable[[Type], Read], make: StructureFactory, body: "memoryview[int]"
+    ) -> None:
+        """`reader` returns the reader of a type that is neither a structure nor a list of
+        structures."""
+        self._reader_for = reader
+        self._factory = make
         self._body = body
-        self._left = MOST
+        self._parts_left = MAX_PARTS
 
-    def value(self, kind: Type, at: int) -> Any:
-        """The value that begins at a place."""
-        return self._value(kind, at)[0]
+    def read(self, kind: Type, at: int) -> Any:
+        """The value that begins at the offset `at`."""
+        return self._read_value(kind, at)[0]
 
-    def _value(self, kind: Type, at: int) -> tuple[Any, int]:
-        self._left -= 1
-        if self._left < 0:
+    def _read_value(self, kind: Type, at: int) -> tuple[Any, int]:
+        self._parts_left -= 1
+        if self._parts_left < 0:
             return None, at
         if is_number(kind):
-            return self._reader(kind)(self._body, at)
-        if kind.many != "one":
-            return self._list(kind, at)
-        return self._structure(kind.name, at) if kind.nested else self._reader(kind)(self._body, at)
+            return self._reader_for(kind)(self._body, at)
+        if kind.container != "one":
+            return self._read_list(kind, at)
+        return (
+            self._read_structure(kind.name, at)
+            if kind.is_nested
+            else self._reader_for(kind)(self._body, at)
+        )
 
-    def _structure(self, name: str, at: int) -> tuple[Any, int]:
-        fields, make = self._make(name)
+    def _read_structure(self, name: str, at: int) -> tuple[Any, int]:
+        fields, make = self._factory(name)
         values = []
         for one in fields:
-            value, at = self._value(one.type, at)
+            value, at = self._read_value(one.type, at)
             values.append(value)
         return make(*values), at
 
-    def _list(self, kind: Type, at: int) -> tuple[list[Any], int]:
+    def _read_list(self, kind: Type, at: int) -> tuple[list[Any], int]:
         count = kind.size
-        if kind.many == "sequence":
-            count, at = self._reader(Type("uint32"))(self._body, at)
+        if kind.container == "sequence":
+            count, at = self._reader_for(Type("uint32"))(self._body, at)
         values: list[Any] = []
-        while len(values) < count and self._left > 0:
-            value, at = self._value(kind.element, at)
+        while len(values) < count and self._parts_left > 0:
+            value, at = self._read_value(kind.element, at)
             values.append(value)
         return values, at

@@ -1,62 +1,64 @@
-"""Message objects to and from CDR."""
+"""Message objects to and from CDR bytes."""
 
 from collections.abc import Mapping
 from dataclasses import field, make_dataclass
 from typing import Any, Final
 
-from app.interfaces.cdr.encapsulation import LITTLE_ENDIAN, judge_end, opened
+from app.interfaces.cdr.encapsulation import LITTLE_ENDIAN_HEADER, check_end, split_header
 from app.interfaces.cdr.fields import FieldReader
-from app.interfaces.cdr.reader import Order, Read, message_reader
-from app.interfaces.cdr.scanner import SLICE
+from app.interfaces.cdr.reader import ByteOrder, Read, message_reader
+from app.interfaces.cdr.scanner import SLICE_ELEMENTS
 from app.interfaces.cdr.selection import Selection
 from app.interfaces.cdr.steps import ReadPlans
 from app.interfaces.cdr.writer import Write, message_writer
 from app.interfaces.definitions import PLACEHOLDER, Field, Structure, Type
 
-FEW_BYTES: Final = 20_000  # have few elements
-MOST_ELEMENTS: Final = 2_000  # of a message that is read whole
+SMALL_MESSAGE_BYTES: Final = 20_000  # has few elements
+MAX_ELEMENTS: Final = 2_000  # of a message that is decoded at once
 
 
 class Codec:
-    """Serializes the structures of one set of definitions; each is prepared at its first use."""
+    """Encodes and decodes the structures of one set of definitions. Each codec is compiled at its first
+    use."""
 
     def __init__(self, structures: Mapping[str, Structure]) -> None:
         self._structures = structures
         self._classes: dict[str, type[Any]] = {}
         self._writers: dict[str, Write] = {}
-        self._readers: dict[tuple[Order, str], Read] = {}
-        self._programs = ReadPlans(self._fields)
+        self._readers: dict[tuple[ByteOrder, str], Read] = {}
+        self._plans = ReadPlans(self._fields)
         self._counters: dict[str, FieldReader] = {}
 
     def serialize(self, message: Any, name: str) -> bytes:
-        out = bytearray(LITTLE_ENDIAN)
+        out = bytearray(LITTLE_ENDIAN_HEADER)
         self._writer(name)(out, message)
         return bytes(out)
 
     def deserialize(self, data: bytes, name: str) -> Any:
-        """The message object; ValueError, `struct.error` or UnicodeError where it is none."""
-        if len(data) > FEW_BYTES:
-            self._count(data, name)
-        body, order = opened(data)
+        """The message object; ValueError, `struct.error` or UnicodeError if the bytes are no such
+        message."""
+        if len(data) > SMALL_MESSAGE_BYTES:
+            self._check_element_count(data, name)
+        body, order = split_header(data)
         message, end = self._reader(order, name)(body, 0)
-        judge_end(body, end)
+        check_end(body, end)
         return message
 
-    def _count(self, data: bytes, name: str) -> None:
-        """ValueError for a message of so many elements that building them would take its time."""
+    def _check_element_count(self, data: bytes, name: str) -> None:
+        """ValueError for a message with too many elements to be decoded at once."""
         if name not in self._counters:
-            ops = self._programs.program(name, Selection(), each=True)
-            self._counters[name] = FieldReader(name, ops, self._made_of)
+            ops = self._plans.make_program(name, Selection(), each=True)
+            self._counters[name] = FieldReader(name, ops, self._fields_and_class)
         walk = self._counters[name].walk(data)
-        for _ in range(MOST_ELEMENTS // SLICE):
-            if walk.go_on() is not None:
+        for _ in range(MAX_ELEMENTS // SLICE_ELEMENTS):
+            if walk.advance() is not None:
                 return
-        raise ValueError(f"it has more than {MOST_ELEMENTS} elements, which are not read at once")
+        raise ValueError(f"it has more than {MAX_ELEMENTS} elements, which are not read at once")
 
-    def fields(self, name: str, wanted: Selection) -> FieldReader:
-        """What reads some fields of each message of a type."""
-        ops = self._programs.program(name, wanted)
-        return FieldReader(name, ops, self._made_of)
+    def field_reader(self, name: str, wanted: Selection) -> FieldReader:
+        """A reader of the selected fields of a type."""
+        ops = self._plans.make_program(name, wanted)
+        return FieldReader(name, ops, self._fields_and_class)
 
     def message_class(self, name: str) -> type[Any]:
         """The class of a structure's message objects: fields as attributes, constants on the class."""
@@ -69,7 +71,7 @@ class Codec:
             self._writers[name] = message_writer(self._fields(name), self._writer)
         return self._writers[name]
 
-    def _reader(self, order: Order, name: str) -> Read:
+    def _reader(self, order: ByteOrder, name: str) -> Read:
         known = self._readers.get((order, name))
         if known is None:
             fields, made = self._fields(name), self.message_class(name)
@@ -77,7 +79,7 @@ class Codec:
             self._readers[order, name] = known
         return known
 
-    def _made_of(self, name: str) -> tuple[tuple[Field, ...], type[Any]]:
+    def _fields_and_class(self, name: str) -> tuple[tuple[Field, ...], type[Any]]:
         return self._fields(name), self.message_class(name)
 
     def _fields(self, name: str) -> tuple[Field, ...]:

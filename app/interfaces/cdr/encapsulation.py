@@ -1,25 +1,28 @@
-"""What is around a message's fields: the encapsulation header before them, padding behind them."""
+"""The encapsulation header before a message's fields, and the padding after them."""
 
 from collections.abc import Mapping
 from typing import Final
 
-from app.interfaces.cdr.formats import HEADER
-from app.interfaces.cdr.reader import Order
+from app.interfaces.cdr.formats import HEADER_BYTES
+from app.interfaces.cdr.reader import ByteOrder
 
-LITTLE_ENDIAN: Final = b"\0\1\0\0"
-ORDERS: Final[Mapping[bytes, Order]] = {b"\0\0": ">", b"\0\1": "<"}  # the last two bytes are options
+LITTLE_ENDIAN_HEADER: Final = b"\0\1\0\0"
+ORDERS: Final[Mapping[bytes, ByteOrder]] = {
+    b"\0\0": ">",
+    b"\0\1": "<",
+}  # the last two bytes are options
 ALIGNMENT: Final = 4  # bytes: a message may be padded to a multiple of it (RTPS 2.5, 9.4.2.12)
 
 
-def opened(data: bytes) -> "tuple[memoryview[int], Order]":
-    """The fields of a message, and their byte order; ValueError where it does not begin as one."""
-    order = ORDERS.get(data[:2]) if len(data) >= HEADER else None
+def split_header(data: bytes) -> "tuple[memoryview[int], ByteOrder]":
+    """(bytes of the fields, byte order) of a message; ValueError if the header is not plain CDR."""
+    order = ORDERS.get(data[:2]) if len(data) >= HEADER_BYTES else None
     if order is None:
         raise ValueError("it does not begin as plain CDR does")
-    return memoryview(data)[HEADER:], order
+    return memoryview(data)[HEADER_BYTES:], order
 
 
-def judge_end(body: "memoryview[int]", end: int) -> None:
-    """ValueError where a message whose fields end here is longer or shorter."""
+def check_end(body: "memoryview[int]", end: int) -> None:
+    """ValueError unless the message ends at `end`, or after padding."""
     if len(body) != end and len(body) != end + -end % ALIGNMENT:
-        raise ValueError(f"it ends at {HEADER + end}")
+        raise ValueError(f"it ends at {HEADER_BYTES + end}")

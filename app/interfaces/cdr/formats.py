@@ -1,7 +1,7 @@
-"""How numbers lie in CDR: the form of each base type, and the fields that can be taken at once.
+"""The format of base types in CDR, and runs of fields that are decoded together.
 
-Each number begins at a multiple of its own size, counted from behind the four bytes of the
-encapsulation header; XCDR1, as ROS 2 sends it (OMG DDS-XTypes 1.3, 7.4.1).
+A number is aligned to its size, counted from the end of the four bytes of the encapsulation header:
+XCDR1, as ROS 2 sends it (OMG DDS-XTypes 1.3, 7.4.1).
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -11,7 +11,8 @@ from typing import Any, Final
 
 from app.interfaces.definitions import Field, Type
 
-# As `struct`, `array` and `memoryview` name them; one byte that is no number is one from 0 to 255.
+# Format characters of `struct`, `array` and `memoryview`. `byte`, `char` and `octet` are numbers from 0
+# to 255.
 FORMATS: Final[Mapping[str, str]] = {
     "bool": "?",
     "int8": "b",
@@ -27,15 +28,15 @@ FORMATS: Final[Mapping[str, str]] = {
     **dict.fromkeys(("byte", "char", "octet"), "B"),
 }
 SIZES: Final[Mapping[str, int]] = {name: calcsize(f"<{form}") for name, form in FORMATS.items()}
-HEADER: Final = 4  # bytes
-LENGTH: Final = 4  # bytes of the count before a text or a sequence
+HEADER_BYTES: Final = 4  # bytes
+LENGTH_BYTES: Final = 4  # bytes of the count before a text or a sequence
 
 
-def runs(fields: Iterable[Field]) -> Iterator[list[Field]]:
-    """The fields in their order; neighbours that are single numbers of one size are together."""
+def group_runs(fields: Iterable[Field]) -> Iterator[list[Field]]:
+    """The fields in order; consecutive single numbers of one size are grouped."""
 
     def size(one: Field) -> Any:
-        return SIZES.get(one.type.name) if one.type.many == "one" else None
+        return SIZES.get(one.type.name) if one.type.container == "one" else None
 
     for each, group in groupby(fields, size):
         together = list(group)
@@ -43,5 +44,5 @@ def runs(fields: Iterable[Field]) -> Iterator[list[Field]]:
 
 
 def is_number(kind: Type) -> bool:
-    """A number or a bool, or a list of them."""
+    """Whether a type is a number or a bool, or a list of them."""
     return kind.name in FORMATS

@@ -1,7 +1,7 @@
-"""How much room fields of a fixed size take in CDR, so that they can be passed over by arithmetic.
+"""The sizes of fixed-size fields in CDR, to skip them by arithmetic.
 
-What begins at an offset is padded to its own alignment, so its room depends on the offset modulo eight:
-a `Room` has the bytes, with padding, for each of these.
+A field is padded to its alignment, so its size depends on its offset modulo eight. `PaddedSizes` has
+the bytes, with padding, for each of these.
 """
 
 from collections.abc import Callable, Iterable
@@ -10,46 +10,46 @@ from typing import Final
 from app.interfaces.cdr.formats import SIZES, is_number
 from app.interfaces.definitions import Field, Type
 
-Room = tuple[int, ...]  # eight numbers
-Fields = Callable[[str], Iterable[Field]]  # those of a structure
+PaddedSizes = tuple[int, ...]  # eight numbers
+FieldsOf = Callable[[str], Iterable[Field]]  # those of a structure
 
 PHASES: Final = 8  # the largest alignment
-NONE: Final[Room] = (0,) * PHASES
+NO_SIZE: Final[PaddedSizes] = (0,) * PHASES
 
 
-def room_of(kind: Type, fields: Fields) -> Room | None:
-    """The room of a field; None where it has no fixed size."""
-    if kind.many == "sequence":
+def padded_sizes(kind: Type, fields: FieldsOf) -> PaddedSizes | None:
+    """The padded sizes of a field; None if it has no fixed size."""
+    if kind.container == "sequence":
         return None
     if is_number(kind):
-        size, count = SIZES[kind.name], kind.size if kind.many == "array" else 1
+        size, count = SIZES[kind.name], kind.size if kind.container == "array" else 1
         return tuple(-phase % size + size * count for phase in range(PHASES))
-    one = room_together((part.type for part in fields(kind.name)), fields) if kind.nested else None
-    if one is None or kind.many == "one":
+    one = combined_sizes((part.type for part in fields(kind.name)), fields) if kind.is_nested else None
+    if one is None or kind.container == "one":
         return one
-    return tuple(passed(one, phase, kind.size) - phase for phase in range(PHASES))
+    return tuple(end_offset(one, phase, kind.size) - phase for phase in range(PHASES))
 
 
-def room_together(kinds: Iterable[Type], fields: Fields) -> Room | None:
-    """The room of several fields, one after the other."""
-    whole = NONE
+def combined_sizes(kinds: Iterable[Type], fields: FieldsOf) -> PaddedSizes | None:
+    """The padded sizes of consecutive fields; None if one has no fixed size."""
+    whole = NO_SIZE
     for kind in kinds:
-        room = room_of(kind, fields)
+        room = padded_sizes(kind, fields)
         if room is None:
             return None
-        whole = joined(whole, room)
+        whole = concatenated(whole, room)
     return whole
 
 
-def joined(one: Room, next_one: Room) -> Room:
+def concatenated(one: PaddedSizes, next_one: PaddedSizes) -> PaddedSizes:
     return tuple(
         size + next_one[(phase + size) % PHASES] for phase, size in zip(range(PHASES), one, strict=True)
     )
 
 
-def passed(room: Room, at: int, count: int) -> int:
-    """Where `count` elements end that begin at `at`, one after the other: the padding repeats itself
-    after eight of them at most."""
+def end_offset(room: PaddedSizes, at: int, count: int) -> int:
+    """The end offset of `count` consecutive elements that begin at `at`. The padding repeats after
+    eight elements at most."""
     starts: dict[int, int] = {}  # phase → how many elements were before the one that began with it
     ends: list[int] = []
     for number in range(count):
@@ -57,7 +57,7 @@ def passed(room: Room, at: int, count: int) -> int:
             lap = number - before
             laps, rest = divmod(count - number, lap)
             at += laps * (at - ends[before])
-            return passed(room, at, rest)
+            return end_offset(room, at, rest)
         starts[at % PHASES] = number
         ends.append(at)
         at += room[at % PHASES]

@@ -1,7 +1,7 @@
-"""Going through a message for what is wanted of it, without building the rest.
+"""Scans a message for selected fields, without building the rest.
 
-However long a message is, some hundred elements at a time: between them something else may be done.
-All of the message is passed over, so that what is too short or too long is never taken for one.
+A long message is scanned in slices of some hundred elements. The whole message is scanned, so that one
+that is too short or too long is detected.
 """
 
 from array import array
@@ -9,21 +9,21 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from app.interfaces.cdr.formats import LENGTH
-from app.interfaces.cdr.layout import PHASES, passed
-from app.interfaces.cdr.reader import NATIVE, Order, Read
+from app.interfaces.cdr.formats import LENGTH_BYTES
+from app.interfaces.cdr.layout import PHASES, end_offset
+from app.interfaces.cdr.reader import NATIVE, ByteOrder, Read
 from app.interfaces.cdr.selection import Lookup
 from app.interfaces.cdr.steps import Choice, Mark, Op, Step
 from app.interfaces.definitions import Type
 
-Reader = Callable[[Type], Read]  # what reads a value of a type
-Hits = dict[Any, list[tuple[int, int]]]  # a key's value → (number, place) of the elements that have it
-Next = tuple[int, int]  # the place that is gone to, and the step
+ReaderFor = Callable[[Type], Read]
+Hits = dict[Any, list[tuple[int, int]]]  # a key's value → (index, offset) of the elements that have it
+Position = tuple[int, int]  # (offset, step) to continue at
 
-SLICE: Final = 100  # elements
-ENOUGH: Final = 2  # elements of one key: several
+SLICE_ELEMENTS: Final = 100  # elements
+MAX_HITS: Final = 2  # of one key: two are ambiguous
 
-# The steps that most elements have.
+# The most frequent steps.
 TEXT: Final = Step.TEXT
 PASS: Final = Step.PASS
 NEXT: Final = Step.NEXT
@@ -34,9 +34,9 @@ END: Final = Step.END
 
 
 @dataclass(slots=True)
-class _Looking:
-    """A list whose elements are looked at, `start` is where the one of this index begins. Then those
-    `chosen` are read (places and steps), and it goes on at `resume`."""
+class _ListScan:
+    """A list whose elements are scanned; the element `index` begins at the offset `start`. Then the
+    `chosen` ones are read (offset, step), and the scan continues at `resume`."""
 
     choice: Choice
     indexes: Mapping[int, int]
@@ -44,63 +44,63 @@ class _Looking:
     start: int
     resume: int | None
     index: int = 0
-    chosen: list[Next] = field(default_factory=list)
+    chosen: list[Position] = field(default_factory=list)
 
-    def note(self) -> None:
+    def mark_if_chosen(self) -> None:
         if (step := self.indexes.get(self.index)) is not None:
             self.chosen.append((self.start, step))
 
 
 class Scan:
-    """One time through one message: by `at` it is now, in the end where the message ends. `marks` are
-    the places where what is wanted begins, `several` the paths whose key more than one element has."""
+    """A scan of one message. `at` is the current offset, finally that of the message's end. `marks` are
+    the offsets of the selected fields, `ambiguous` the paths whose key several elements have."""
 
     __slots__ = (
-        "_body", "_counts", "_hits", "_loops", "_ops", "_reader", "_step", "_words", "at", "marks",
-        "several",
+        "_body", "_counts", "_hits", "_loops", "_ops", "_reader", "_step", "_words", "ambiguous", "at",
+        "marks",
     )  # fmt: skip
 
     def __init__(
-        self, ops: Sequence[Op], body: "memoryview[int]", order: Order, reader: Reader
+        self, ops: Sequence[Op], body: "memoryview[int]", order: ByteOrder, reader: ReaderFor
     ) -> None:
         self._ops = ops
         self._body = body
-        self._words = _words(body, order)
+        self._words = _as_words(body, order)
         self._reader = reader
-        self._loops: list[Any] = []  # elements to come, or `_Looking`
+        self._loops: list[Any] = []  # remaining elements, or `_ListScan`
         self._hits: dict[Lookup, Hits] = {}
         self._counts: dict[Lookup, int] = {}
         self._step = 0
         self.at = 0
         self.marks: dict[Mark, int] = {}
-        self.several: set[str] = set()
+        self.ambiguous: set[str] = set()
 
-    def go_on(self) -> bool:
-        """Goes over a slice; whether that was the last. ValueError or IndexError where the bytes are no
-        such message."""
+    def advance(self) -> bool:
+        """Scans a slice; returns whether the message is complete. ValueError or IndexError if the bytes
+        are no such message."""
         ops, body, words, loops = self._ops, self._body, self._words, self._loops
         at, step = self.at, self._step
-        left = SLICE
+        left = SLICE_ELEMENTS
         while left:
             do, one, other = ops[step]
             step += 1
             if do is TEXT:
-                at = (at + 3) & -LENGTH
+                at = (at + 3) & -LENGTH_BYTES
                 size = words[at >> 2]
-                at += LENGTH + size
+                at += LENGTH_BYTES + size
                 if not size or body[at - 1]:
                     raise ValueError(f"a text that ends at {at} is cut off or has no end")
             elif do is PASS:
                 at += one[at % PHASES]
             elif do is NUMBERS:
-                at = (at + 3) & -LENGTH
+                at = (at + 3) & -LENGTH_BYTES
                 if count := words[at >> 2]:
-                    at = (at + LENGTH + one - 1) & -one
+                    at = (at + LENGTH_BYTES + one - 1) & -one
                     at += count * one
                 else:
-                    at += LENGTH
+                    at += LENGTH_BYTES
             elif do is EACH:
-                count, at = self._count(at, other)
+                count, at = self._read_count(at, other)
                 if count:
                     loops.append(count)
                 else:
@@ -119,150 +119,151 @@ class Scan:
                 self.at = at
                 return True
             else:
-                at, step = STEPS[do](self, at, step, one)
+                at, step = HANDLERS[do](self, at, step, one)
         self.at, self._step = at, step
         return False
 
-    def _count(self, at: int, least: int) -> tuple[int, int]:
-        """How many elements come, which must have their bytes, and where the first begins."""
-        at = (at + 3) & -LENGTH
+    def _read_count(self, at: int, least: int) -> tuple[int, int]:
+        """(number of elements, offset of the first); ValueError if there are not enough bytes."""
+        at = (at + 3) & -LENGTH_BYTES
         count = self._words[at >> 2]
-        at += LENGTH
+        at += LENGTH_BYTES
         if count * least > len(self._body) - at:
             raise ValueError(f"{count} elements at {at} are more than there are")
         return count, at
 
-    def _wide_text(self, at: int, step: int, _: None) -> Next:
-        count, at = self._count(at, LENGTH)
-        return at + count * LENGTH, step
+    def _skip_wstring(self, at: int, step: int, _: None) -> Position:
+        count, at = self._read_count(at, LENGTH_BYTES)
+        return at + count * LENGTH_BYTES, step
 
-    def _bool(self, at: int, step: int, _: None) -> Next:
+    def _skip_bool(self, at: int, step: int, _: None) -> Position:
         if self._body[at] > 1:
             raise ValueError(f"a bool is {self._body[at]}, not 0 or 1")
         return at + 1, step
 
-    def _alike(self, at: int, step: int, room: Any) -> Next:
-        count, at = self._count(at, 1)
-        return passed(room, at, count), step
+    def _skip_fixed_size(self, at: int, step: int, room: Any) -> Position:
+        count, at = self._read_count(at, 1)
+        return end_offset(room, at, count), step
 
-    def _times(self, at: int, step: int, count: int) -> Next:
+    def _begin_array(self, at: int, step: int, count: int) -> Position:
         self._loops.append(count)
         return at, step
 
-    def _note(self, at: int, step: int, mark: Mark) -> Next:
+    def _mark(self, at: int, step: int, mark: Mark) -> Position:
         self.marks[mark] = at
         return at, step
 
     # Elements of lists.
 
-    def _compare(self, at: int, step: int, key: Lookup) -> Next:
-        value = self._value(at, key)
+    def _compare(self, at: int, step: int, key: Lookup) -> Position:
+        value = self._key_value(at, key)
         if value in key.values:
             looking = self._loops[-1]
             hits = self._hits.setdefault(key, {}).setdefault(value, [])
-            if len(hits) < ENOUGH:
+            if len(hits) < MAX_HITS:
                 hits.append((looking.index, looking.start))
         return at, step
 
-    def _value(self, at: int, key: Lookup) -> Any:
+    def _key_value(self, at: int, key: Lookup) -> Any:
         if key.type.name != "string":
             return self._reader(key.type)(self._body, at)[0]
-        at = (at + 3) & -LENGTH
-        end = at + LENGTH + self._words[at >> 2]
+        at = (at + 3) & -LENGTH_BYTES
+        end = at + LENGTH_BYTES + self._words[at >> 2]
         if end - at not in key.sizes:
             return None
-        return key.texts.get(bytes(self._body[at + LENGTH : end]))
+        return key.texts.get(bytes(self._body[at + LENGTH_BYTES : end]))
 
-    def _choose(self, at: int, _: int, choice: Choice) -> Next:
-        return self._look(at, choice, choice.indexes)
+    def _choose(self, at: int, _: int, choice: Choice) -> Position:
+        return self._begin_list(at, choice, choice.indexes)
 
-    def _look(
+    def _begin_list(
         self, at: int, choice: Choice, indexes: Mapping[int, int], resume: int | None = None
-    ) -> Next:
+    ) -> Position:
         count = choice.count
         if count is None:
-            count, at = self._count(at, choice.least)
-        if choice.looks_up is not None:
-            self._counts[choice.looks_up] = count
-        looking = _Looking(choice, indexes, count, at, resume)
+            count, at = self._read_count(at, choice.min_size)
+        if choice.lookup is not None:
+            self._counts[choice.lookup] = count
+        looking = _ListScan(choice, indexes, count, at, resume)
         self._loops.append(looking)
-        if (room := choice.room) is not None:
-            looking.chosen = [(passed(room, at, i), s) for i, s in indexes.items() if i < count]
-            return self._looked(passed(room, at, count))
+        if (room := choice.sizes) is not None:
+            looking.chosen = [(end_offset(room, at, i), s) for i, s in indexes.items() if i < count]
+            return self._end_list(end_offset(room, at, count))
         if not count:
-            return self._looked(at)
-        looking.note()
+            return self._end_list(at)
+        looking.mark_if_chosen()
         return at, choice.body
 
-    def _next_element(self, at: int) -> Next:
-        looking: _Looking = self._loops[-1]
+    def _next_element(self, at: int) -> Position:
+        looking: _ListScan = self._loops[-1]
         looking.index += 1
         if looking.index == looking.count:
-            return self._looked(at)
+            return self._end_list(at)
         looking.start = at
-        looking.note()
+        looking.mark_if_chosen()
         return at, looking.choice.body
 
-    def _looked(self, at: int) -> Next:
-        """Each element was looked at: those with the keys are chosen too."""
-        looking: _Looking = self._loops[-1]
+    def _end_list(self, at: int) -> Position:
+        """All elements were scanned: chooses those with the keys."""
+        looking: _ListScan = self._loops[-1]
         if looking.resume is None:
             looking.resume = at
-        if looking.choice.place is None:
-            for key in looking.choice.found:
-                chosen = self._chosen_by(key, looking.choice)
+        if looking.choice.mark is None:
+            for key in looking.choice.by_lookup:
+                chosen = self._elements_by_key(key, looking.choice)
                 looking.chosen += [(place, step) for _, place, step in chosen]
-        return self._done(at, 0, None)
+        return self._next_chosen(at, 0, None)
 
-    def _done(self, _at: int, _step: int, _: None) -> Next:
-        """On to the next one that was chosen, or behind the list."""
-        looking: _Looking = self._loops[-1]
+    def _next_chosen(self, _at: int, _step: int, _: None) -> Position:
+        """The next chosen element, or the end of the list."""
+        looking: _ListScan = self._loops[-1]
         if looking.chosen:
             return looking.chosen.pop()
         self._loops.pop()
         assert looking.resume is not None
         return looking.resume, looking.choice.after
 
-    def _beside(self, at: int, _: int, choice: Choice) -> Next:
-        """Elements of a list by what the one beside it says; both must be equally long."""
+    def _choose_by_sibling(self, at: int, _: int, choice: Choice) -> Position:
+        """Chooses elements of a list by the values of a list beside it, which must have the same
+        length."""
         assert choice.key is not None
-        assert choice.place is not None
-        indexes = {index: step for index, _, step in self._chosen_by(choice.key, choice)}
-        place = self.marks[choice.place]
-        count = self._count(place, choice.least)[0] if choice.count is None else choice.count
+        assert choice.mark is not None
+        indexes = {index: step for index, _, step in self._elements_by_key(choice.key, choice)}
+        place = self.marks[choice.mark]
+        count = self._read_count(place, choice.min_size)[0] if choice.count is None else choice.count
         if not indexes or count != self._counts[choice.key]:
             return at, choice.after
-        return self._look(place, choice, indexes, at)
+        return self._begin_list(place, choice, indexes, at)
 
-    def _chosen_by(self, key: Lookup, choice: Choice) -> list[tuple[int, int, int]]:
-        """(index, place, step) of each element that alone has what it is chosen by."""
+    def _elements_by_key(self, key: Lookup, choice: Choice) -> list[tuple[int, int, int]]:
+        """(index, offset, step) of each element that is the only one with its key."""
         chosen = []
         hits = self._hits.get(key, {})
-        for value, step in choice.found[key].items():
+        for value, step in choice.by_lookup[key].items():
             having = hits.get(value, [])
             if len(having) == 1:
                 chosen.append((*having[0], step))
             elif having:
-                self.several.update(choice.several[key, value])
+                self.ambiguous.update(choice.ambiguous_paths[key, value])
         return chosen
 
 
-STEPS: Final[Mapping[Step, Callable[[Scan, int, int, Any], Next]]] = {
-    Step.WIDE_TEXT: Scan._wide_text,
-    Step.BOOL: Scan._bool,
-    Step.ALIKE: Scan._alike,
-    Step.TIMES: Scan._times,
-    Step.NOTE: Scan._note,
+HANDLERS: Final[Mapping[Step, Callable[[Scan, int, int, Any], Position]]] = {
+    Step.WIDE_TEXT: Scan._skip_wstring,
+    Step.BOOL: Scan._skip_bool,
+    Step.ALIKE: Scan._skip_fixed_size,
+    Step.TIMES: Scan._begin_array,
+    Step.NOTE: Scan._mark,
     Step.COMPARE: Scan._compare,
     Step.CHOOSE: Scan._choose,
-    Step.BESIDE: Scan._beside,
-    Step.DONE: Scan._done,
+    Step.BESIDE: Scan._choose_by_sibling,
+    Step.DONE: Scan._next_chosen,
 }
 
 
-def _words(body: "memoryview[int]", order: Order) -> Sequence[int]:
-    """All that may be the length of something."""
-    whole = body[: len(body) & -LENGTH]
+def _as_words(body: "memoryview[int]", order: ByteOrder) -> Sequence[int]:
+    """The message as 32-bit words: any of them may be a length."""
+    whole = body[: len(body) & -LENGTH_BYTES]
     if order == NATIVE:
         return whole.cast("I")
     turned = array("I", whole.tobytes())

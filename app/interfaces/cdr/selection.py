@@ -1,4 +1,4 @@
-"""Which fields of a message are wanted: their paths resolved against a type, as a tree."""
+"""The selected fields of a message: paths resolved against a type, as a tree."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -6,9 +6,9 @@ from itertools import chain
 from typing import Any
 
 from app.errors import FieldError, InterfaceError
-from app.interfaces.cdr.formats import LENGTH
-from app.interfaces.definitions import FLOATS, TEXTS, Structure, Type
-from app.interfaces.field_path import Key, steps
+from app.interfaces.cdr.formats import LENGTH_BYTES
+from app.interfaces.definitions import FLOAT_TYPES, STRING_TYPES, Structure, Type
+from app.interfaces.field_path import Key, path_steps
 from app.interfaces.parsing import BOOLS
 from app.interfaces.validation import scalar_check
 
@@ -17,40 +17,40 @@ Structures = Mapping[str, Structure]
 
 @dataclass(eq=False, slots=True)
 class Lookup:
-    """What is compared with a key: the field of that type of each element of a list."""
+    """A field of each element of a list, to be compared with the values of keys."""
 
     type: Type
     values: set[Any] = field(default_factory=set)
-    texts: dict[bytes, str] = field(default_factory=dict)  # as they lie in a message
-    sizes: set[int] = field(default_factory=set)  # with their lengths before them
+    texts: dict[bytes, str] = field(default_factory=dict)  # as encoded in a message
+    sizes: set[int] = field(default_factory=set)  # of encoded texts, with their length fields
 
     def prepare(self) -> None:
-        """Texts are compared without being decoded."""
+        """Encodes the texts: they are compared without decoding."""
         if self.type.name == "string":
             self.texts = {f"{value}\0".encode(): value for value in self.values}
-            self.sizes = {LENGTH + len(text) for text in self.texts}
+            self.sizes = {LENGTH_BYTES + len(text) for text in self.texts}
 
 
 @dataclass(eq=False, slots=True)
 class Selection:
-    """A field on the way to what is wanted, or wanted itself: `paths` then says for which.
+    """A node of the tree. `paths` are those that end here.
 
-    Of a list, elements are chosen by their index, by a field of theirs (`keys`: path of that field →
-    value → element) or by the list of this name beside it (`beside`).
+    Elements of a list are selected by index (`by_index`), by a field of theirs (`by_field`: path of
+    that field → value → element) or by the list of this name beside it (`by_sibling`).
     """
 
     paths: list[str] = field(default_factory=list)
     fields: "dict[str, Selection]" = field(default_factory=dict)
-    indexes: "dict[int, Selection]" = field(default_factory=dict)
-    keys: "dict[str, dict[Any, Selection]]" = field(default_factory=dict)
-    beside: "dict[str, dict[Any, Selection]]" = field(default_factory=dict)
-    lookup: Lookup | None = None  # it is a key itself
+    by_index: "dict[int, Selection]" = field(default_factory=dict)
+    by_field: "dict[str, dict[Any, Selection]]" = field(default_factory=dict)
+    by_sibling: "dict[str, dict[Any, Selection]]" = field(default_factory=dict)
+    lookup: Lookup | None = None  # if it is a key itself
 
     def all_paths(self) -> Iterable[str]:
-        """The paths of all that is wanted in it."""
+        """The paths that end here or below."""
         yield from self.paths
-        chosen = (*self.keys.values(), *self.beside.values())
-        inner = chain(self.fields.values(), self.indexes.values(), *(one.values() for one in chosen))
+        chosen = (*self.by_field.values(), *self.by_sibling.values())
+        inner = chain(self.fields.values(), self.by_index.values(), *(one.values() for one in chosen))
         for one in inner:
             yield from one.all_paths()
 
@@ -61,48 +61,50 @@ class Resolver:
     def __init__(self, structures: Structures) -> None:
         self._structures = structures
 
-    def wanted(self, type_name: str, paths: Iterable[str]) -> Selection:
-        """The tree of these paths; InterfaceError where the type has no such field."""
+    def select(self, type_name: str, paths: Iterable[str]) -> Selection:
+        """The tree of these paths; InterfaceError if the type has no such field."""
         root = Selection()
         for path in paths:
-            self._add(root, Type(type_name), path)
+            self._add_path(root, Type(type_name), path)
         return root
 
     def type_at(self, type_name: str, path: str) -> Type:
         """The type of the field at a path."""
-        return self._add(Selection(), Type(type_name), path)
+        return self._add_path(Selection(), Type(type_name), path)
 
-    def _add(self, root: Selection, whole: Type, path: str) -> Type:
+    def _add_path(self, root: Selection, whole: Type, path: str) -> Type:
         node, at, around = root, whole, whole
-        for step in steps(path):
+        for step in path_steps(path):
             match step:
                 case Key():
-                    node = self._keyed(node, at, around, step, path)
+                    node = self._select_by_key(node, at, around, step, path)
                     at = at.element
                 case str():
-                    around, at = at, self._named(at, step, path)
+                    around, at = at, self._field_type(at, step, path)
                     node = node.fields.setdefault(step, Selection())
                 case _:
-                    at = _indexed(at, step, path)
-                    node = node.indexes.setdefault(step, Selection())
+                    at = _element_type(at, step, path)
+                    node = node.by_index.setdefault(step, Selection())
         node.paths.append(path)
         return at
 
-    def _keyed(self, node: Selection, at: Type, around: Type, key: Key, path: str) -> Selection:
-        if at.many == "one":
+    def _select_by_key(self, node: Selection, at: Type, around: Type, key: Key, path: str) -> Selection:
+        if at.container == "one":
             raise InterfaceError(f'there is no [{key.path}=…] (in "{path}"): {at} is not a list')
-        kind = self._own_key(at.element, key.path)
+        kind = self._key_type(at.element, key.path)
         if kind is not None:
-            value = self._value(key, kind, at.name, path)
-            return node.keys.setdefault(key.path, {}).setdefault(value, Selection())
+            value = self._key_value(key, kind, at.name, path)
+            return node.by_field.setdefault(key.path, {}).setdefault(value, Selection())
         kind = next((o.type for o in self._fields(around) if o.name == key.path), None)
-        if kind is None or kind.many == "one":
-            raise InterfaceError(f'there is no "{key.path}" (in "{path}"): {self._has(at, around)}')
-        value = self._value(key, kind.element, around.name, path)
-        return node.beside.setdefault(key.path, {}).setdefault(value, Selection())
+        if kind is None or kind.container == "one":
+            raise InterfaceError(
+                f'there is no "{key.path}" (in "{path}"): {self._known_fields_text(at, around)}'
+            )
+        value = self._key_value(key, kind.element, around.name, path)
+        return node.by_sibling.setdefault(key.path, {}).setdefault(value, Selection())
 
-    def _own_key(self, element: Type, path: str) -> Type | None:
-        """The type of a single field in an element; None where there is none of this name."""
+    def _key_type(self, element: Type, path: str) -> Type | None:
+        """The type of a field of an element; None if it does not exist."""
         at = element
         for name in path.split("."):
             found = next((one.type for one in self._fields(at) if one.name == name), None)
@@ -111,12 +113,12 @@ class Resolver:
             at = found
         return at
 
-    def _value(self, key: Key, kind: Type, holder: str, path: str) -> Any:
-        """The key's value as the field has it; of whole numbers a constant's name too."""
+    def _key_value(self, key: Key, kind: Type, holder: str, path: str) -> Any:
+        """The key's value with the field's type; for an integer field also by a constant's name."""
         what = f'"{key.path}" (in "{path}") is {kind}'
-        if kind.nested or kind.many != "one" or kind.name in FLOATS:
+        if kind.is_nested or kind.container != "one" or kind.name in FLOAT_TYPES:
             raise InterfaceError(f"{what}: a key is a text, a whole number or a bool")
-        if kind.name in TEXTS:
+        if kind.name in STRING_TYPES:
             return key.value
         constants = self._structures[holder].constants
         found = BOOLS.get(key.value) if kind.name == "bool" else constants.get(key.value)
@@ -129,15 +131,15 @@ class Resolver:
             raise InterfaceError(f'{what}, and "{key.value}" is none: {error.message}{has}') from None
 
     def _fields(self, kind: Type) -> Iterable[Any]:
-        return self._structures[kind.name].fields if kind.nested and kind.many == "one" else ()
+        return self._structures[kind.name].fields if kind.is_nested and kind.container == "one" else ()
 
-    def _has(self, at: Type, around: Type) -> str:
+    def _known_fields_text(self, at: Type, around: Type) -> str:
         own = [one.name for one in self._fields(at.element)]
-        lists = [one.name for one in self._fields(around) if one.type.many != "one"]
+        lists = [one.name for one in self._fields(around) if one.type.container != "one"]
         elements = f"its elements have {', '.join(own)}; " if own else ""
         return f"{elements}the lists beside it are {', '.join(lists)}"
 
-    def _named(self, at: Type, name: str, path: str) -> Type:
+    def _field_type(self, at: Type, name: str, path: str) -> Type:
         inner = list(self._fields(at))
         for one in inner:
             if one.name == name:
@@ -147,8 +149,8 @@ class Resolver:
         raise InterfaceError(f'there is no "{name}" (in "{path}"): {at} {has}')
 
 
-def _indexed(at: Type, index: int, path: str) -> Type:
-    if at.many == "one":
+def _element_type(at: Type, index: int, path: str) -> Type:
+    if at.container == "one":
         raise InterfaceError(f'there is no [{index}] (in "{path}"): {at} is not a list')
     if at.size and index >= at.size:
         raise InterfaceError(f'there is no [{index}] (in "{path}"): {at} ends with [{at.size - 1}]')

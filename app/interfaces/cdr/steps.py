@@ -1,7 +1,6 @@
-"""What a reader does with the bytes of a message, step by step: passes over what is not wanted, notes
-where what is wanted begins.
+"""The steps of a scan: skip fields that are not selected, mark those that are.
 
-A program is flat, so that `reading` can stop anywhere and go on later.
+A program is a flat list of steps, so that a scan can stop anywhere and continue later.
 """
 
 from collections.abc import Callable, Mapping
@@ -9,14 +8,14 @@ from dataclasses import dataclass, field
 from enum import IntEnum, auto
 from typing import Any
 
-from app.interfaces.cdr.formats import LENGTH, SIZES, is_number
-from app.interfaces.cdr.layout import NONE, Fields, Room, joined, room_of
+from app.interfaces.cdr.formats import LENGTH_BYTES, SIZES, is_number
+from app.interfaces.cdr.layout import NO_SIZE, FieldsOf, PaddedSizes, concatenated, padded_sizes
 from app.interfaces.cdr.selection import Lookup, Selection
-from app.interfaces.definitions import TEXTS, Type
+from app.interfaces.definitions import STRING_TYPES, Type
 
 
 class Step(IntEnum):
-    """The steps, each with what it is about."""
+    """The kinds of steps, with their operands."""
 
     PASS = auto()  # a Room
     TEXT = auto()
@@ -26,19 +25,19 @@ class Step(IntEnum):
     ALIKE = auto()  # a Room: a sequence of such elements
     EACH = auto()  # a sequence: the step after its elements, and the least bytes of one
     TIMES = auto()  # an array: how many elements
-    NEXT = auto()  # an element is over: the first step of the next one
-    NOTE = auto()  # a Mark: what begins here
+    NEXT = auto()  # the end of an element: the first step of the next one
+    NOTE = auto()  # a Mark of this offset
     CHOOSE = auto()  # a Choice, of elements of the list that begins here
-    COMPARE = auto()  # a Lookup, with the key that is here
-    CHOSEN = auto()  # an element of a Choice was looked at
-    DONE = auto()  # a chosen element was read
-    BESIDE = auto()  # a Choice, of elements of a list that was passed over before
+    COMPARE = auto()  # a Lookup to compare with the value here
+    CHOSEN = auto()  # the end of a scanned element of a Choice
+    DONE = auto()  # the end of a chosen element
+    BESIDE = auto()  # a Choice, of elements of a list that was skipped before
     END = auto()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Mark:
-    """A place: of a field that is wanted (for `paths`), or of a list."""
+    """The place of a selected field (of `paths`), or of a list."""
 
     type: Type
     paths: tuple[str, ...] = ()
@@ -46,23 +45,24 @@ class Mark:
 
 @dataclass(slots=True, eq=False)
 class Choice:
-    """Elements of a list that are wanted: the first step of each one's own, by index or by what a key
-    of theirs says; `body` and `after` are the steps that look at one, and those after the list.
+    """Selected elements of a list: index → step, and lookup → value → step. `body` is the first step of
+    the scan of an element, `after` the first one after the list.
 
-    `count` is that of an array, None of a sequence; `room` of an element where nothing in it is looked
-    at. Of a list beside another one `place` is where it began, and `key` what was found in the other.
+    `count` is that of an array, None for a sequence. `sizes` are those of an element whose content is
+    not scanned. For a list selected by another one, `mark` is where it begins and `key` the lookup in
+    the other.
     """
 
     count: int | None
-    least: int
-    room: Room | None
+    min_size: int
+    sizes: PaddedSizes | None
     body: int = 0
     after: int = 0
     indexes: dict[int, int] = field(default_factory=dict)
-    found: dict[Lookup, dict[Any, int]] = field(default_factory=dict)
-    several: dict[tuple[Lookup, Any], tuple[str, ...]] = field(default_factory=dict)
-    looks_up: Lookup | None = None
-    place: Mark | None = None
+    by_lookup: dict[Lookup, dict[Any, int]] = field(default_factory=dict)
+    ambiguous_paths: dict[tuple[Lookup, Any], tuple[str, ...]] = field(default_factory=dict)
+    lookup: Lookup | None = None
+    mark: Mark | None = None
     key: Lookup | None = None
 
 
@@ -70,70 +70,71 @@ Op = tuple[Step, Any, Any]
 
 
 class ReadPlans:
-    """Makes the programs of one set of definitions."""
+    """Compiles the programs of one set of definitions."""
 
-    def __init__(self, fields: Fields) -> None:
+    def __init__(self, fields: FieldsOf) -> None:
         self._fields = fields
-        self._rooms: dict[Type, Room | None] = {}
+        self._known_sizes: dict[Type, PaddedSizes | None] = {}
 
-    def program(self, type_name: str, wanted: Selection, each: bool = False) -> tuple[Op, ...]:
-        """Of a whole message; `each`: each element of its lists is gone to, but for numbers."""
-        made = _Making(self._fields, self._room if not each else self._room_of_numbers)
-        made.structure(type_name, wanted)
+    def make_program(self, type_name: str, wanted: Selection, each: bool = False) -> tuple[Op, ...]:
+        """The program of a message. `each`: every element of its lists is a step, except numbers."""
+        made = _ProgramBuilder(self._fields, self._sizes if not each else self._sizes_of_numbers)
+        made.add_structure(type_name, wanted)
         made.add(Step.END)
         return tuple(made.steps)
 
-    def _room_of_numbers(self, kind: Type) -> Room | None:
-        return self._room(kind) if is_number(kind) else None
+    def _sizes_of_numbers(self, kind: Type) -> PaddedSizes | None:
+        return self._sizes(kind) if is_number(kind) else None
 
-    def _room(self, kind: Type) -> Room | None:
-        if kind not in self._rooms:
-            self._rooms[kind] = room_of(kind, self._fields)
-        return self._rooms[kind]
+    def _sizes(self, kind: Type) -> PaddedSizes | None:
+        if kind not in self._known_sizes:
+            self._known_sizes[kind] = padded_sizes(kind, self._fields)
+        return self._known_sizes[kind]
 
 
-class _Making:
-    """One program; a run of fields of fixed sizes is one step."""
+class _ProgramBuilder:
+    """Builds one program. Consecutive fields of fixed sizes are one step."""
 
-    def __init__(self, fields: Fields, room: Callable[[Type], Room | None]) -> None:
+    def __init__(self, fields: FieldsOf, room: Callable[[Type], PaddedSizes | None]) -> None:
         self.steps: list[Op] = []
         self._fields = fields
-        self._room = room
-        self._run = NONE
+        self._sizes = room
+        self._pending = NO_SIZE
 
     def add(self, do: Step, one: Any = None, other: Any = None) -> None:
         self._flush()
         self.steps.append((do, one, other))
 
     @property
-    def _here(self) -> int:
-        """The next step."""
+    def _next_step(self) -> int:
+        """The number of the next step."""
         self._flush()
         return len(self.steps)
 
     def _flush(self) -> None:
-        if self._run != NONE:
-            self.steps.append((Step.PASS, self._run, None))
-            self._run = NONE
+        if self._pending != NO_SIZE:
+            self.steps.append((Step.PASS, self._pending, None))
+            self._pending = NO_SIZE
 
-    def structure(self, type_name: str, wanted: Selection | None, in_list: bool = False) -> None:
-        """Its fields, and what is chosen by lists beside others when all have been passed."""
+    def add_structure(self, type_name: str, wanted: Selection | None, in_list: bool = False) -> None:
+        """Adds the fields of a structure, then the elements that are selected by lists beside
+        theirs."""
         inner = {} if wanted is None else wanted.fields
         keys = _keys_beside(inner, {one.name: one.type for one in self._fields(type_name)})
         places: dict[str, Mark] = {}
         for one in self._fields(type_name):
             child = inner.get(one.name)
-            if child is not None and child.beside:
+            if child is not None and child.by_sibling:
                 places[one.name] = Mark(one.type)
                 self.add(Step.NOTE, places[one.name])
-            self._field(one.type, child, keys.get(one.name), in_list)
+            self._add_field(one.type, child, keys.get(one.name), in_list)
         for name, place in places.items():
-            for key, values in inner[name].beside.items():
-                choice = self._choice(place.type)
-                choice.place, choice.key = place, keys[key]
-                self._chosen(Step.BESIDE, choice, place.type, {keys[key]: values}, Selection())
+            for key, values in inner[name].by_sibling.items():
+                choice = self._make_choice(place.type)
+                choice.mark, choice.key = place, keys[key]
+                self._add_choice(Step.BESIDE, choice, place.type, {keys[key]: values}, Selection())
 
-    def _field(
+    def _add_field(
         self, kind: Type, wanted: Selection | None, key: Lookup | None = None, in_list: bool = False
     ) -> None:
         if wanted is not None and wanted.paths:
@@ -142,60 +143,60 @@ class _Making:
             wanted.lookup.type = kind
             wanted.lookup.prepare()
             self.add(Step.COMPARE, wanted.lookup)
-        if key is not None or (wanted is not None and (wanted.indexes or wanted.keys)):
-            self._list(kind, wanted or Selection(), key)
+        if key is not None or (wanted is not None and (wanted.by_index or wanted.by_field)):
+            self._select_elements(kind, wanted or Selection(), key)
         elif wanted is not None and wanted.fields:
-            self.structure(kind.name, wanted, in_list)
+            self.add_structure(kind.name, wanted, in_list)
         else:
-            self._passed(kind, in_list)
+            self._skip(kind, in_list)
 
-    def _passed(self, kind: Type, in_list: bool) -> None:
-        """What nothing is wanted of. A bool that is no bool is seen, but for those in lists."""
+    def _skip(self, kind: Type, in_list: bool) -> None:
+        """Skips a field. A malformed bool is detected, except in lists."""
         if kind == Type("bool") and not in_list:
             self.add(Step.BOOL)
-        elif kind.many == "one" and kind.nested and not in_list:
-            self.structure(kind.name, None)
-        elif room := self._room(kind):
-            self._run = joined(self._run, room)
-        elif kind.many == "sequence" and is_number(kind):
+        elif kind.container == "one" and kind.is_nested and not in_list:
+            self.add_structure(kind.name, None)
+        elif room := self._sizes(kind):
+            self._pending = concatenated(self._pending, room)
+        elif kind.container == "sequence" and is_number(kind):
             self.add(Step.NUMBERS, SIZES[kind.name])
-        elif kind.many == "sequence" and (room := self._room(kind.element)):
+        elif kind.container == "sequence" and (room := self._sizes(kind.element)):
             self.add(Step.ALIKE, room)
-        elif kind.many != "one":
-            self._each(kind)
-        elif kind.nested:
-            self.structure(kind.name, None, in_list)
+        elif kind.container != "one":
+            self._skip_elements(kind)
+        elif kind.is_nested:
+            self.add_structure(kind.name, None, in_list)
         else:
             self.add(Step.TEXT if kind.name == "string" else Step.WIDE_TEXT)
 
-    def _each(self, kind: Type) -> None:
-        at = self._here
-        self.add(Step.EACH if kind.many == "sequence" else Step.TIMES, kind.size)
-        body = self._here
-        self._passed(kind.element, in_list=True)
+    def _skip_elements(self, kind: Type) -> None:
+        at = self._next_step
+        self.add(Step.EACH if kind.container == "sequence" else Step.TIMES, kind.size)
+        body = self._next_step
+        self._skip(kind.element, in_list=True)
         self.add(Step.NEXT, body)
-        if kind.many == "sequence":
-            self.steps[at] = (Step.EACH, self._here, least_of(kind.element))
+        if kind.container == "sequence":
+            self.steps[at] = (Step.EACH, self._next_step, min_size(kind.element))
 
-    def _list(self, kind: Type, wanted: Selection, key: Lookup | None) -> None:
-        """A list of which elements are wanted, by their indexes or keys, or which is a key itself."""
+    def _select_elements(self, kind: Type, wanted: Selection, key: Lookup | None) -> None:
+        """Adds a list with selected elements, or one that is a key itself."""
         looked = Selection(lookup=key)
         found: dict[Lookup, Mapping[Any, Selection]] = {}
-        for path, values in wanted.keys.items():
+        for path, values in wanted.by_field.items():
             lookup = Lookup(Type(""), set(values))
-            _inside(looked, path).lookup = lookup
+            _descend(looked, path).lookup = lookup
             found[lookup] = values
-        choice = self._choice(kind, looked)
-        choice.looks_up = key
-        self._chosen(Step.CHOOSE, choice, kind, found, wanted, looked)
+        choice = self._make_choice(kind, looked)
+        choice.lookup = key
+        self._add_choice(Step.CHOOSE, choice, kind, found, wanted, looked)
 
-    def _choice(self, kind: Type, looked: Selection | None = None) -> Choice:
+    def _make_choice(self, kind: Type, looked: Selection | None = None) -> Choice:
         alone = looked is None or not (looked.lookup or looked.fields)
-        room = self._room(kind.element) if alone else None
-        count = kind.size if kind.many == "array" else None
-        return Choice(count, least_of(kind.element), room)
+        room = self._sizes(kind.element) if alone else None
+        count = kind.size if kind.container == "array" else None
+        return Choice(count, min_size(kind.element), room)
 
-    def _chosen(
+    def _add_choice(
         self,
         do: Step,
         choice: Choice,
@@ -204,41 +205,49 @@ class _Making:
         wanted: Selection,
         looked: Selection | None = None,
     ) -> None:
-        """The steps that look at each element, and those of each one that is chosen."""
+        """Adds the steps that scan each element, and those of each selected one."""
         self.add(do, choice)
-        choice.body = self._here
-        if choice.room is None:
-            self._field(kind.element, looked, in_list=True)
+        choice.body = self._next_step
+        if choice.sizes is None:
+            self._add_field(kind.element, looked, in_list=True)
             self.add(Step.CHOSEN)
-        choice.indexes = {index: self._own(kind, one) for index, one in wanted.indexes.items()}
+        choice.indexes = {index: self._add_element(kind, one) for index, one in wanted.by_index.items()}
         for lookup, values in found.items():
-            choice.found[lookup] = {value: self._own(kind, one) for value, one in values.items()}
+            choice.by_lookup[lookup] = {
+                value: self._add_element(kind, one) for value, one in values.items()
+            }
             for value, one in values.items():
-                choice.several[lookup, value] = tuple(one.all_paths())
-        choice.after = self._here
+                choice.ambiguous_paths[lookup, value] = tuple(one.all_paths())
+        choice.after = self._next_step
 
-    def _own(self, kind: Type, wanted: Selection) -> int:
-        at = self._here
-        self._field(kind.element, wanted)
+    def _add_element(self, kind: Type, wanted: Selection) -> int:
+        at = self._next_step
+        self._add_field(kind.element, wanted)
         self.add(Step.DONE)
         return at
 
 
 def _keys_beside(inner: Mapping[str, Selection], types: Mapping[str, Type]) -> dict[str, Lookup]:
-    """The lists by which elements of others beside them are chosen."""
+    """The lists by which elements of lists beside them are selected."""
     keys: dict[str, Lookup] = {}
     for one in inner.values():
-        for name, values in one.beside.items():
+        for name, values in one.by_sibling.items():
             keys.setdefault(name, Lookup(types[name].element)).values.update(values)
     return keys
 
 
-def _inside(node: Selection, path: str) -> Selection:
+def _descend(node: Selection, path: str) -> Selection:
     for name in path.split("."):
         node = node.fields.setdefault(name, Selection())
     return node
 
 
-def least_of(element: Type) -> int:
-    """The bytes that an element has at the least."""
-    return LENGTH + 1 if element.name == "string" else LENGTH if element.name in TEXTS else 1
+def min_size(element: Type) -> int:
+    """The smallest encoded size of an element, in bytes."""
+    return (
+        LENGTH_BYTES + 1
+        if element.name == "string"
+        else LENGTH_BYTES
+        if element.name in STRING_TYPES
+        else 1
+    )

@@ -1,20 +1,20 @@
-"""From checked values to CDR bytes, little-endian. A writer is made once per structure."""
+"""Encodes checked values as little-endian CDR. A writer is compiled once for each structure."""
 
 from collections.abc import Callable, Sequence
 from struct import Struct, pack, unpack
 from typing import Any, Final
 
-from app.interfaces.cdr.formats import FORMATS, HEADER, LENGTH, SIZES, is_number, runs
+from app.interfaces.cdr.formats import FORMATS, HEADER_BYTES, LENGTH_BYTES, SIZES, group_runs, is_number
 from app.interfaces.definitions import Field, Type
 
-Write = Callable[[bytearray, Any], None]  # what is written so far, and a value that is added to it
+Write = Callable[[bytearray, Any], None]  # (output, value to append)
 
 _COUNT: Final = Struct("<I")
 
 
 def message_writer(fields: Sequence[Field], nested: Callable[[str], Write]) -> Write:
-    """Writes a message object; `nested` finds the writer of another structure."""
-    steps = [_step(run, nested) for run in runs(fields)]
+    """The writer of a message object; `nested` returns the writer of a structure by name."""
+    steps = [_field_step(run, nested) for run in group_runs(fields)]
 
     def write(out: bytearray, message: Any) -> None:
         for step in steps:
@@ -23,15 +23,15 @@ def message_writer(fields: Sequence[Field], nested: Callable[[str], Write]) -> W
     return write
 
 
-def _step(run: Sequence[Field], nested: Callable[[str], Write]) -> Write:
+def _field_step(run: Sequence[Field], nested: Callable[[str], Write]) -> Write:
     kind, names = run[0].type, [one.attribute for one in run]
-    if is_number(kind) and kind.many == "one":
-        return _numbers([one.type for one in run], names)
-    write, name = _field(kind, nested), names[0]
+    if is_number(kind) and kind.container == "one":
+        return _numbers_writer([one.type for one in run], names)
+    write, name = _field_writer(kind, nested), names[0]
     return lambda out, message: write(out, getattr(message, name))
 
 
-def _numbers(kinds: Sequence[Type], names: Sequence[str]) -> Write:
+def _numbers_writer(kinds: Sequence[Type], names: Sequence[str]) -> Write:
     size = SIZES[kinds[0].name]
     form = Struct("<" + "".join(FORMATS[kind.name] for kind in kinds))
 
@@ -42,29 +42,35 @@ def _numbers(kinds: Sequence[Type], names: Sequence[str]) -> Write:
     return numbers
 
 
-def _field(kind: Type, nested: Callable[[str], Write]) -> Write:
+def _field_writer(kind: Type, nested: Callable[[str], Write]) -> Write:
     if is_number(kind):
-        return _many_numbers(kind)
-    one = nested(kind.name) if kind.nested else _text if kind.name == "string" else _wide_text
-    return one if kind.many == "one" else _many(kind, one)
+        return _number_list_writer(kind)
+    one = (
+        nested(kind.name)
+        if kind.is_nested
+        else _write_string
+        if kind.name == "string"
+        else _write_wstring
+    )
+    return one if kind.container == "one" else _sequence_writer(kind, one)
 
 
-def _many(kind: Type, write: Write) -> Write:
+def _sequence_writer(kind: Type, write: Write) -> Write:
     def many(out: bytearray, values: Sequence[Any]) -> None:
-        if kind.many == "sequence":
-            _count(out, len(values))
+        if kind.container == "sequence":
+            _write_count(out, len(values))
         for value in values:
             write(out, value)
 
     return many
 
 
-def _many_numbers(kind: Type) -> Write:
+def _number_list_writer(kind: Type) -> Write:
     form, size = FORMATS[kind.name], SIZES[kind.name]
 
     def many(out: bytearray, values: Sequence[Any]) -> None:
-        if kind.many == "sequence":
-            _count(out, len(values))
+        if kind.container == "sequence":
+            _write_count(out, len(values))
         if values:
             _align(out, size)
             out += values if isinstance(values, bytes) else pack(f"<{len(values)}{form}", *values)
@@ -72,26 +78,26 @@ def _many_numbers(kind: Type) -> Write:
     return many
 
 
-def _text(out: bytearray, text: str) -> None:
+def _write_string(out: bytearray, text: str) -> None:
     content = text.encode()
-    _count(out, len(content) + 1)
+    _write_count(out, len(content) + 1)
     out += content
     out.append(0)
 
 
-def _wide_text(out: bytearray, text: str) -> None:
-    """As `decoding` reads it: four bytes for each UTF-16 unit."""
+def _write_wstring(out: bytearray, text: str) -> None:
+    """Four bytes for each UTF-16 unit, see `reader`."""
     content = text.encode("utf-16-le")
     count = len(content) // 2
-    _count(out, count)
+    _write_count(out, count)
     out += pack(f"<{count}I", *unpack(f"<{count}H", content))
 
 
-def _count(out: bytearray, count: int) -> None:
-    _align(out, LENGTH)
+def _write_count(out: bytearray, count: int) -> None:
+    _align(out, LENGTH_BYTES)
     out += _COUNT.pack(count)
 
 
 def _align(out: bytearray, size: int) -> None:
-    """Up to the next multiple of `size` behind the header, with zeros."""
-    out.extend(bytes((HEADER - len(out)) % size))
+    """Pads with zeros to the next multiple of `size` after the header."""
+    out.extend(bytes((HEADER_BYTES - len(out)) % size))

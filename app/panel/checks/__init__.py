@@ -1,1 +1,1 @@
-"""What can be wrong in a panel file whose shape is right, beside what each widget checks itself."""
+"""Checks of a panel file with valid keys and values, besides those of each widget."""

@@ -1,4 +1,4 @@
-"""What can be wrong in an interlock whose shape is right: its field, and conditions that never hold."""
+"""Checks of interlocks: the field's type, and conditions that can't be met."""
 
 import math
 import re
@@ -6,83 +6,97 @@ from collections.abc import Iterator
 from typing import Any, Final
 
 from app.errors import Fault, FieldError
-from app.interfaces import INTEGERS, Interfaces, Type
-from app.interfaces.validation import scalar_check, shown
+from app.interfaces import INTEGER_RANGES, Interfaces, Type
+from app.interfaces.validation import format_value, scalar_check
 from app.panel.checks.types import field_faults
-from app.panel.constants import NUMBERS, compared, holder, meant, no_constant
+from app.panel.constants import (
+    NUMBERS,
+    comparison_value,
+    parent_type,
+    resolve_constant,
+    unknown_constant,
+)
 from app.panel.interlock import Interlock
-from app.panel.values import same
+from app.panel.values import same_value
 
 BEST_EFFORT: Final = (
     "is missing: of a best-effort topic any message may be lost, the one that forbids too; "
     "give the age in seconds after which it locks"
 )
-ALONE: Final = ("equals", "one_of")  # beside them nothing else has a meaning
+EXCLUSIVE_CONDITIONS: Final = ("equals", "one_of")  # exclude all other conditions
 UNCONDITIONED: Final = (
     "an interlock needs a bool, or conditions: equals, not_equals, min and max, or one_of"
 )
 
 
-def interlock_faults(place: str, of: Interlock, interfaces: Interfaces) -> Iterator[Fault]:
-    if of.qos.reliability == "best_effort" and of.max_age_s is None:
+def interlock_faults(place: str, interlock: Interlock, interfaces: Interfaces) -> Iterator[Fault]:
+    if interlock.qos.reliability == "best_effort" and interlock.max_age_s is None:
         yield Fault(f"{place}.max_age_s", BEST_EFFORT)
-    faults = list(field_faults(place, of.type, of.field, interfaces))
+    faults = list(field_faults(place, interlock.type, interlock.field, interfaces))
     yield from faults
     if faults:
         return
-    kind = interfaces.type_at(of.type, of.field)
+    kind = interfaces.type_at(interlock.type, interlock.field)
     if re.search(r"[/\]]", str(kind)):
-        yield Fault(f"{place}.field", f'"{of.field}" is {kind}: an interlock judges one value of it')
-    elif not of.conditions and kind.name != "bool":
-        yield Fault(f"{place}.field", f'"{of.field}" is {kind}: {UNCONDITIONED}')
+        yield Fault(
+            f"{place}.field", f'"{interlock.field}" is {kind}: an interlock judges one value of it'
+        )
+    elif not interlock.conditions and kind.name != "bool":
+        yield Fault(f"{place}.field", f'"{interlock.field}" is {kind}: {UNCONDITIONED}')
     else:
-        yield from _conditions(place, of, kind, interfaces)
+        yield from _condition_faults(place, interlock, kind, interfaces)
 
 
-def _conditions(place: str, of: Interlock, kind: Type, interfaces: Interfaces) -> Iterator[Fault]:
+def _condition_faults(
+    place: str, interlock: Interlock, kind: Type, interfaces: Interfaces
+) -> Iterator[Fault]:
     numeric = kind.name in NUMBERS
-    if of.unit and not numeric:
-        yield _for_numbers(place, "unit", of, kind)
-    alone = next((key for key in ALONE if key in of.conditions), None)
-    if alone and (others := [key for key in of.conditions if key != alone]):
+    if interlock.unit and not numeric:
+        yield _number_only_fault(place, "unit", interlock, kind)
+    alone = next((key for key in EXCLUSIVE_CONDITIONS if key in interlock.conditions), None)
+    if alone and (others := [key for key in interlock.conditions if key != alone]):
         what = f"has no meaning beside {alone}, which says all: leave it out"
         yield from (Fault(f"{place}.{key}", what, cause=f"alone {place}") for key in others)
         return
-    faults = list(_values(place, of, kind, interfaces))
+    faults = list(_value_faults(place, interlock, kind, interfaces))
     yield from faults
     if numeric and not faults:
-        yield from _never(place, of, kind, interfaces)
+        yield from _unsatisfiable_faults(place, interlock, kind, interfaces)
 
 
-def _values(place: str, of: Interlock, kind: Type, interfaces: Interfaces) -> Iterator[Fault]:
-    """Each value has to be one that the field can have."""
-    type_name = holder(of, interfaces)
+def _value_faults(
+    place: str, interlock: Interlock, kind: Type, interfaces: Interfaces
+) -> Iterator[Fault]:
+    """Faults of values that the field can't have."""
+    type_name = parent_type(interlock, interfaces)
     constants = interfaces.constants(type_name)
-    for key, given in of.conditions.items():
+    for key, given in interlock.conditions.items():
         if key in ("min", "max") and kind.name not in NUMBERS:
-            yield _for_numbers(place, key, of, kind)
+            yield _number_only_fault(place, key, interlock, kind)
             continue
         several = given if key == "one_of" else (given,)
         found: list[Any] = []
         for i, one in enumerate(several):
             at = f"{place}.{key}[{i}]" if key == "one_of" else f"{place}.{key}"
-            value = meant(one, kind, constants)
+            value = resolve_constant(one, kind, constants)
             cause = f"condition {place}"
             if isinstance(value, str) and kind.name in NUMBERS:
-                yield Fault(at, no_constant(value, str(kind), type_name, constants), cause=cause)
-            elif fault := _misfit(value, kind):
+                yield Fault(at, unknown_constant(value, str(kind), type_name, constants), cause=cause)
+            elif fault := _value_mismatch(value, kind):
                 yield Fault(at, fault, cause=cause)
-            elif any(same(value, other) for other in found):
-                yield Fault(at, f"{shown(one)} is there already")
+            elif any(same_value(value, other) for other in found):
+                yield Fault(at, f"{format_value(one)} is there already")
             found.append(value)
 
 
-def _for_numbers(place: str, key: str, of: Interlock, kind: Type) -> Fault:
-    return Fault(f"{place}.{key}", f'is for numbers; "{of.field}" is {kind}', cause=f"number {place}")
+def _number_only_fault(place: str, key: str, interlock: Interlock, kind: Type) -> Fault:
+    return Fault(
+        f"{place}.{key}", f'is for numbers; "{interlock.field}" is {kind}', cause=f"number {place}"
+    )
 
 
-def _misfit(value: Any, kind: Type) -> str | None:
-    """Why the field never has this value."""
+def _value_mismatch(value: Any, kind: Type) -> str | None:
+    """Why the field can't have this value; None if it can."""
     try:
         scalar_check(kind)(value)
     except FieldError as error:
@@ -90,17 +104,22 @@ def _misfit(value: Any, kind: Type) -> str | None:
     return None
 
 
-def _never(place: str, of: Interlock, kind: Type, interfaces: Interfaces) -> Iterator[Fault]:
-    constants = interfaces.constants(holder(of, interfaces))
-    lowest, highest = INTEGERS.get(kind.name, (-math.inf, math.inf))
+def _unsatisfiable_faults(
+    place: str, interlock: Interlock, kind: Type, interfaces: Interfaces
+) -> Iterator[Fault]:
+    constants = interfaces.constants(parent_type(interlock, interfaces))
+    lowest, highest = INTEGER_RANGES.get(kind.name, (-math.inf, math.inf))
     low, high, excluded = (
-        none if one is None else compared(one, kind, constants)
-        for one, none in ((of.min, lowest), (of.max, highest), (of.not_equals, math.nan))
+        none if one is None else comparison_value(one, kind, constants)
+        for one, none in (
+            (interlock.min, lowest),
+            (interlock.max, highest),
+            (interlock.not_equals, math.nan),
+        )
     )
     if low > high:
-        yield Fault(
-            f"{place}.max", f"{shown(of.max)} is less than min ({shown(of.min)}): no value permits"
-        )
+        low_text, high_text = format_value(interlock.min), format_value(interlock.max)
+        yield Fault(f"{place}.max", f"{high_text} is less than min ({low_text}): no value permits")
     elif low == high == excluded:
-        what = f"{shown(of.not_equals)} is all that the limits leave: no value permits"
+        what = f"{format_value(interlock.not_equals)} is all that the limits leave: no value permits"
         yield Fault(f"{place}.not_equals", what)

@@ -1,4 +1,4 @@
-"""What is no fault of a panel and still worth a look: `python -m app.check` prints it."""
+"""Hints about a panel that are no faults; `python -m app.check` prints them."""
 
 from collections.abc import Iterator
 
@@ -7,15 +7,15 @@ from app.interfaces import Interfaces
 from app.panel.model import Panel
 
 
-def notes_in(panel: Panel, interfaces: Interfaces) -> Iterator[Note]:
-    """Notes by their places in the panel file; ids and lines are added by who prints them."""
-    yield from _trusted(panel)
-    yield from _unused(panel)
-    yield from _left_out(panel, interfaces)
+def find_notes(panel: Panel, interfaces: Interfaces) -> Iterator[Note]:
+    """All notes with their places in the panel file, without ids and lines."""
+    yield from _unbounded_trust_notes(panel)
+    yield from _unused_interlock_notes(panel)
+    yield from _unusable_type_notes(panel, interfaces)
 
 
-def _trusted(panel: Panel) -> Iterator[Note]:
-    """Interlocks whose last value is trusted for good: see docs/permissions.md."""
+def _unbounded_trust_notes(panel: Panel) -> Iterator[Note]:
+    """Interlocks whose last value counts without a limit: see docs/permissions.md."""
     for i, interlock in enumerate(panel.interlocks):
         if interlock.max_age_s is None and not interlock.require_publisher:
             yield Note(
@@ -26,8 +26,8 @@ def _trusted(panel: Panel) -> Iterator[Note]:
             )
 
 
-def _unused(panel: Panel) -> Iterator[Note]:
-    """Interlocks that lock nothing."""
+def _unused_interlock_notes(panel: Panel) -> Iterator[Note]:
+    """Interlocks that no control uses."""
     used = {name for widget in panel.commands for name in widget.interlocks}
     for i, interlock in enumerate(panel.interlocks):
         if interlock.id not in used:
@@ -35,10 +35,10 @@ def _unused(panel: Panel) -> Iterator[Note]:
             yield Note(f"interlock[{i}]", what)
 
 
-def _left_out(panel: Panel, interfaces: Interfaces) -> Iterator[Note]:
-    """Types of each folder that can't be used; the panel needs none of them."""
+def _unusable_type_notes(panel: Panel, interfaces: Interfaces) -> Iterator[Note]:
+    """Unusable types of each folder that the panel does not need."""
     for f, folder in enumerate(panel.interfaces):
-        errors = interfaces.left_out.items()
+        errors = interfaces.unusable.items()
         own = [(n, why) for n, why in errors if why.source and why.source.is_relative_to(folder)]
         if own:
             name, why = own[0]

@@ -1,4 +1,4 @@
-"""Templates tried at load, with examples of what their inputs give."""
+"""Checks templates by encoding them with example values of their inputs."""
 
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import suppress
@@ -6,82 +6,82 @@ from typing import Any, Final
 
 from app.errors import Fault, FieldError, InterfaceError
 from app.interfaces import Interfaces
-from app.panel.faults.wording import listing
-from app.panel.template import NOW, TIME, at, filled, named, with_now
-from app.panel.widgets.families import Checking, Input
+from app.panel.faults.wording import list_names
+from app.panel.template import NOW, TIME, add_now, fill, placeholders, value_at
+from app.panel.widgets.families import CheckContext, Input
 
-NOW_IS: Final = f'"{{{NOW}}}", alone, is the time of sending and fills a {TIME}'
-ELSEWHERE: Final = " on this page: an input is read from the page it is on"
+NOW_RULE: Final = f'"{{{NOW}}}", alone, is the time of sending and fills a {TIME}'
+ON_OTHER_PAGE: Final = " on this page: an input is read from the page it is on"
 
 
 def template_faults(
-    place: str, template: Mapping[str, Any], type_name: str, checking: Checking
+    place: str, template: Mapping[str, Any], type_name: str, checking: CheckContext
 ) -> Iterator[Fault]:
-    """The first fault of a template for a type, at `place`. One that names an input that is faulty is
-    not tried: that is told already."""
+    """The faults of a template for a type, at `place`. A template with a faulty input is not tried."""
     interfaces, inputs = checking.interfaces, checking.inputs
     try:
-        names = list(named(template))
-        faults = list(unknown(place, names, inputs, checking.anywhere))
+        names = list(placeholders(template))
+        faults = list(unknown_input_faults(place, names, inputs, checking.all_inputs))
         if not {name for _, name in names} & set(checking.faulty):
-            faults += _misplaced_now(place, template, type_name, names, interfaces)
+            faults += _misplaced_now_faults(place, template, type_name, names, interfaces)
             known = {name: inputs[name] for _, name in names if name in inputs}
-            faults += [] if faults else _tried(place, template, type_name, known, interfaces)
+            faults += [] if faults else _encoding_faults(place, template, type_name, known, interfaces)
         yield from faults
     except FieldError as error:
         yield Fault(f"{place}.{error.field}".rstrip("."), error.message)
 
 
-def tries(inputs: Mapping[str, Input]) -> Iterator[dict[str, Any]]:
-    """Values of inputs by their ids, with each example of each once at least."""
+def example_values(inputs: Mapping[str, Input]) -> Iterator[dict[str, Any]]:
+    """Values of inputs by id; each example of each input appears at least once."""
     tried = {name: one.examples() for name, one in inputs.items()}
     for turn in range(max(map(len, tried.values()), default=1)):
         yield {name: some[min(turn, len(some) - 1)] for name, some in tried.items()}
 
 
-def unknown(
+def unknown_input_faults(
     place: str, names: list[tuple[str, str]], inputs: Collection[str], anywhere: Collection[str]
 ) -> Iterator[Fault]:
     for where, name in names:
         if name not in inputs and name != NOW:
-            what = f"; there is {listing(sorted(inputs))}" if name not in anywhere else ELSEWHERE
+            what = f"; there is {list_names(sorted(inputs))}" if name not in anywhere else ON_OTHER_PAGE
             yield Fault(f"{place}.{where}", f'no input "{name}"{what}', cause=f"input {name}")
 
 
-def _misplaced_now(
+def _misplaced_now_faults(
     place: str,
     template: Mapping[str, Any],
     type_name: str,
     names: list[tuple[str, str]],
     interfaces: Interfaces,
 ) -> Iterator[Fault]:
-    """`"{now}"` alone, where a time is meant. A field that the type does not have is told elsewhere."""
+    """Faults of `"{now}"` that is not alone, or not in a time field. An unknown field is reported
+    elsewhere."""
     for where in (where for where, name in names if name == NOW):
         with suppress(InterfaceError):
             kind = interfaces.field_type(type_name, where)
-            if kind != TIME or at(template, where) != f"{{{NOW}}}":
-                yield Fault(f"{place}.{where}", f"{NOW_IS}; the field is {kind}")
+            if kind != TIME or value_at(template, where) != f"{{{NOW}}}":
+                yield Fault(f"{place}.{where}", f"{NOW_RULE}; the field is {kind}")
 
 
-def _tried(
+def _encoding_faults(
     place: str,
     template: Mapping[str, Any],
     type_name: str,
     inputs: Mapping[str, Input],
     interfaces: Interfaces,
 ) -> Iterator[Fault]:
-    for values in tries(inputs):
+    for values in example_values(inputs):
         try:
-            interfaces.encode(type_name, filled(template, with_now(values)))
+            interfaces.encode(type_name, fill(template, add_now(values)))
         except FieldError as error:
-            message = _message(error, template, type_name, inputs, values, interfaces)
-            # An input that does not fit may be in several messages.
+            message = _fault_message(error, template, type_name, inputs, values, interfaces)
+            # The same input may be in several messages.
             cause = f"value {message}" if message.startswith("input ") else ""
             yield Fault(f"{place}.{error.field}".rstrip("."), message, cause=cause)
             return
 
 
-def _message(
+def _fault_message(
     error: FieldError,
     template: Mapping[str, Any],
     type_name: str,
@@ -89,22 +89,22 @@ def _message(
     values: Mapping[str, Any],
     interfaces: Interfaces,
 ) -> str:
-    """What is wrong, by the input that gave it and the type that the field has."""
-    written = at(template, error.field)
-    names = [name for _, name in named(written)] if isinstance(written, str) else []
+    """The fault's message, with the input that caused it and the field's type."""
+    written = value_at(template, error.field)
+    names = [name for _, name in placeholders(written)] if isinstance(written, str) else []
     if not names:
         return error.message
     try:
         field = interfaces.field_type(type_name, error.field)
-    except InterfaceError:  # what is written there is no field
+    except InterfaceError:  # the template has an unknown field
         return error.message
     if written != f"{{{names[0]}}}":
-        return error.message if _why(error) else f'"{written}" makes text; the field is {field}'
+        return error.message if _detail(error) else f'"{written}" makes text; the field is {field}'
     one = inputs[names[0]]
-    gives = one.gives_for(values[one.id], narrow=bool(_why(error)))
-    return f'input "{one.id}" gives {gives}; the field is {field}{_why(error)}'
+    gives = one.describe_value(values[one.id], narrow=bool(_detail(error)))
+    return f'input "{one.id}" gives {gives}; the field is {field}{_detail(error)}'
 
 
-def _why(error: FieldError) -> str:
-    """What the types alone do not say: a range, a length."""
+def _detail(error: FieldError) -> str:
+    """The details of an error that is not about the type: a range, a length."""
     return "" if error.message.startswith("must be") else f": {error.message}"

@@ -1,4 +1,4 @@
-"""Types that are not there or can't be used, and fields that a type does not have."""
+"""Faults of missing or unusable types, and of fields that a type does not have."""
 
 from collections.abc import Iterator
 from typing import Final
@@ -6,17 +6,18 @@ from typing import Final
 from app.errors import Fault, InterfaceError
 from app.interfaces import Interfaces
 
-# What the kiosk says beside what widgets are for.
+# The type that the server needs for its log.
 ROSOUT: Final = "rcl_interfaces/msg/Log"
 
 
 def type_fault(place: str, error: InterfaceError) -> Fault:
-    """A type that can't be used; one file, package or name that is wrong may be that of several."""
+    """The fault of an unusable type. Its cause is the file, package or name, which several types may
+    share."""
     return Fault(place, str(error), cause=f"type {error.source or error.package or error}")
 
 
 def field_faults(place: str, type_name: str, path: str, interfaces: Interfaces) -> Iterator[Fault]:
-    """A type that is not there, a field that it does not have; `place` has both keys."""
+    """Faults of a missing type, or of a field that it does not have; `place` contains both keys."""
     try:
         interfaces.require(type_name)
     except InterfaceError as error:

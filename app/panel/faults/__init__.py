@@ -1,1 +1,1 @@
-"""Faults of a panel file: found in its text and its shape, told once, each with its line."""
+"""Faults of a panel file's text, keys and values: reported once, each with its line."""

@@ -1,4 +1,4 @@
-"""Faults of a panel file's shape: keys and values that are not as the descriptions have them."""
+"""Faults of a panel file's shape: keys and values that do not match the descriptions."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -7,43 +7,43 @@ from typing import Any
 from pydantic import ValidationError
 
 from app.errors import Fault
-from app.interfaces.validation import shown
+from app.interfaces.validation import format_value
 from app.panel.faults.places import place_of
-from app.panel.faults.table_keys import Keys, Model, inner, key_faults
+from app.panel.faults.table_keys import Model, TableKeys, inner_model, key_faults
 from app.panel.faults.toml_lines import Path
-from app.panel.faults.wording import near, worded
+from app.panel.faults.wording import closest_name, describe_error
 from app.panel.model import Panel
 from app.panel.widgets.kinds import KINDS
 
 
 @dataclass(frozen=True, slots=True)
-class Shape:
-    """Faults; what is in one of the places of `follow` follows from one of them."""
+class ShapeFaults:
+    """`faults`; further faults in `covered_places` are consequences of these."""
 
     faults: list[Fault]
-    follow: tuple[str, ...]
+    covered_places: tuple[str, ...]
 
-    def explains(self, fault: Fault) -> bool:
-        """Whether a fault that was found later is told already."""
-        return any(_is_in(fault.place, place) for place in self.follow)
+    def covers(self, fault: Fault) -> bool:
+        """Whether another fault is a consequence of these."""
+        return any(_is_in(fault.place, place) for place in self.covered_places)
 
 
-def shape_of(error: ValidationError, tables: Mapping[str, Any]) -> Shape:
-    """One fault for each mistake that pydantic found in the tables of a panel file."""
+def find_shape_faults(error: ValidationError, tables: Mapping[str, Any]) -> ShapeFaults:
+    """One fault for each mistake that pydantic found in a panel file's tables."""
     faults: list[Fault] = []
-    keys: dict[Path, Keys] = {}
+    keys: dict[Path, TableKeys] = {}
     for one in error.errors():
-        _, path = _walked(one["loc"])
+        _, path = _resolve_location(one["loc"])
         match one["type"]:
             case "missing" | "extra_forbidden" as kind:
-                model, above = _walked(one["loc"][:-1])
-                table = keys.setdefault(above, Keys(above, model, _at(tables, above)))
+                model, above = _resolve_location(one["loc"][:-1])
+                table = keys.setdefault(above, TableKeys(above, model, _table_at(tables, above)))
                 (table.missing if kind == "missing" else table.unknown).append(str(path[-1]))
             case "union_tag_not_found" | "union_tag_invalid":
-                faults.append(_no_kind(path, one["input"]))
+                faults.append(_kind_fault(path, one["input"]))
             case _:
                 key = next(step for step in reversed(path) if isinstance(step, str))
-                faults.append(Fault(place_of(path), worded(one, key)))
+                faults.append(Fault(place_of(path), describe_error(one, key)))
     of_keys, follow = key_faults(keys)
     faults += of_keys
 
@@ -51,15 +51,15 @@ def shape_of(error: ValidationError, tables: Mapping[str, Any]) -> Shape:
         return any(source is not fault and _is_in(fault.place, place) for place, source in follow)
 
     own = [fault for fault in faults if not follows(fault)]
-    return Shape(own, tuple(place for place, _ in follow))
+    return ShapeFaults(own, tuple(place for place, _ in follow))
 
 
 def _is_in(place: str, around: str) -> bool:
     return place == around or place.startswith((f"{around}.", f"{around}["))
 
 
-def _walked(location: tuple[str | int, ...]) -> tuple[Model, Path]:
-    """The description that a location is in, and the location without pydantic's kind tags."""
+def _resolve_location(location: tuple[str | int, ...]) -> tuple[Model, Path]:
+    """(description, path) of a pydantic location; the path has no kind tags."""
     model: Model = Panel
     path: Path = ()
     before: str | int = ""
@@ -68,25 +68,25 @@ def _walked(location: tuple[str | int, ...]) -> tuple[Model, Path]:
             model = KINDS[str(step)]
         else:
             path = (*path, step)
-            model = inner(model, step) or model
+            model = inner_model(model, step) or model
         before = step
     return model, path
 
 
-def _at(tables: Any, path: Path) -> Any:
+def _table_at(tables: Any, path: Path) -> Any:
     for step in path:
         tables = tables[step]
     return tables
 
 
-def _no_kind(path: Path, table: Any) -> Fault:
+def _kind_fault(path: Path, table: Any) -> Fault:
     if not isinstance(table, Mapping):
-        return Fault(place_of(path), f"must be a table, not {shown(table)}")
+        return Fault(place_of(path), f"must be a table, not {format_value(table)}")
     kinds = ", ".join(KINDS)
     if "kind" not in table:
-        if meant := near("kind", table):
+        if meant := closest_name("kind", table):
             return Fault(place_of((*path, meant)), 'unknown key; did you mean "kind"?')
         return Fault(place_of(path), f'"kind" is missing; one of {kinds}')
-    meant = near(str(table["kind"]).lower(), KINDS)
+    meant = closest_name(str(table["kind"]).lower(), KINDS)
     hint = f'did you mean "{meant}"?' if meant else f"one of {kinds}"
-    return Fault(place_of((*path, "kind")), f"unknown kind {shown(table['kind'])}; {hint}")
+    return Fault(place_of((*path, "kind")), f"unknown kind {format_value(table['kind'])}; {hint}")

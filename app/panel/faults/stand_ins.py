@@ -1,4 +1,4 @@
-"""What else is wrong in a panel file whose shape is wrong: there it is judged with stand-ins."""
+"""Stand-ins for faulty tables, so that the rest of a panel file can be checked."""
 
 import copy
 import re
@@ -10,80 +10,80 @@ from pydantic import ValidationError
 
 from app.errors import Fault
 from app.panel.base import ID
-from app.panel.faults.wording import near
+from app.panel.faults.wording import closest_name
 from app.panel.model import Panel
 
 TABLES: Final = ("interlock", "page")
 
 
 @dataclass(frozen=True, slots=True)
-class Rest:
-    """A panel with stand-ins. `faulty` are the ids of widgets that are told already; `unknown` are the
-    kinds of causes by which nothing can be judged: what "interlock"s and "input"s there are, or to what
-    the panel "listens"."""
+class StandIns:
+    """The tables of a panel with stand-ins. `faulty` are the ids of the replaced widgets. `undecidable`
+    are kinds of causes that can't be checked: the existing "interlock"s or "input"s, or the topics that
+    the panel "listens" to."""
 
     tables: dict[str, Any]
     faulty: set[str] = field(default_factory=set)
-    unknown: set[str] = field(default_factory=set)
+    undecidable: set[str] = field(default_factory=set)
 
-    def panel(self, folder: Path) -> Panel | None:
-        """None where too much is wrong: what was found already comes first."""
+    def validate(self, folder: Path) -> Panel | None:
+        """The panel; None if it still has faults of shape."""
         try:
             return Panel.model_validate(self.tables, context=folder)
         except ValidationError:
             return None
 
-    def judges(self, fault: Fault) -> bool:
-        """Whether a fault of the rest is one of the file, and not of a stand-in."""
-        return fault.cause.partition(" ")[0] not in self.unknown
+    def is_real(self, fault: Fault) -> bool:
+        """Whether a fault is one of the file, and not caused by a stand-in."""
+        return fault.cause.partition(" ")[0] not in self.undecidable
 
 
-def rest_of(tables: dict[str, Any], error: ValidationError) -> Rest | None:
-    """None where nothing can be said of the rest."""
-    rest = Rest(copy.deepcopy(tables))
+def make_stand_ins(tables: dict[str, Any], error: ValidationError) -> StandIns | None:
+    """The stand-ins for the tables in `error`; None if the rest can't be checked."""
+    rest = StandIns(copy.deepcopy(tables))
     for fault in error.errors():
         match fault["loc"]:
             case ("interfaces" | "distro", *_):
-                return None  # there are other types, or none
+                return None  # all types may be different
             case ("page", int(p), "widget", int(w), *_):
                 _widget(rest, tables, p, w)
             case ("page", int(p), str(key)):
                 page = rest.tables["page"][p]
                 page.pop(key, None)
                 rest.tables["page"][p] = {"id": f"faulty_{p}", "title": "?"} | page
-                rest.unknown.update(("input", "listens"))
+                rest.undecidable.update(("input", "listens"))
             case ("interlock", int(i), *_):
                 rest.tables["interlock"][i] = _stand_in(tables["interlock"][i], str(i)) | {
                     "topic": f"/faulty_{i}"
                 }
-                rest.unknown.update(("listens", *_unnamed("interlock", tables["interlock"][i])))
+                rest.undecidable.update(("listens", *_unnamed("interlock", tables["interlock"][i])))
             case ("robot", int(r), *_):
                 names = {"name": f"?{r}", "namespace": f"/faulty_{r}"}
                 rest.tables["robot"][r] = {"id": _stand_in(tables["robot"][r], str(r))["id"], **names}
-            case (str(key),) if near(key, ("interfaces", "distro")):
+            case (str(key),) if closest_name(key, ("interfaces", "distro")):
                 return None
             case (str(key), *_):
                 rest.tables.pop(key, None)
                 rest.tables.setdefault("title", "?")
-                if near(key, TABLES):
-                    rest.unknown.update(("interlock", "listens"))
+                if closest_name(key, TABLES):
+                    rest.undecidable.update(("interlock", "listens"))
     return rest
 
 
-def _widget(rest: Rest, tables: dict[str, Any], p: int, w: int) -> None:
+def _widget(rest: StandIns, tables: dict[str, Any], p: int, w: int) -> None:
     old = tables["page"][p]["widget"][w]
     stand_in = _stand_in(old, f"{p}_{w}")
     rest.tables["page"][p]["widget"][w] = stand_in | {"kind": "text"}
     rest.faulty.add(stand_in["id"])
-    rest.unknown.update(("listens", *_unnamed("input", old)))
+    rest.undecidable.update(("listens", *_unnamed("input", old)))
 
 
 def _stand_in(old: Any, number: str) -> dict[str, Any]:
-    """Has the id of what it stands for, so that nobody misses it."""
+    """A table with the id of the replaced one, so that references to it are valid."""
     return {"id": f"faulty_{number}" if _unnamed("", old) else old["id"], "label": "?"}
 
 
 def _unnamed(kind: str, old: Any) -> list[str]:
-    """The kind, of what has no id that others could name."""
+    """[kind] if the table has no valid id, else []."""
     known = old.get("id") if isinstance(old, dict) else None
     return [] if isinstance(known, str) and re.fullmatch(ID, known) else [kind]

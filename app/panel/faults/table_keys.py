@@ -7,12 +7,12 @@ from typing import Any, Final, get_args
 from pydantic import BaseModel
 
 from app.errors import Fault
-from app.interfaces.validation import shown
+from app.interfaces.validation import format_value
 from app.panel.faults.places import place_of
 from app.panel.faults.toml_lines import Path
-from app.panel.faults.wording import near
+from app.panel.faults.wording import closest_name
 from app.panel.model import Panel
-from app.panel.widgets.families import Placed
+from app.panel.widgets.families import BaseWidget
 from app.panel.widgets.kinds import KINDS
 
 Model = type[BaseModel]
@@ -22,8 +22,8 @@ ITS_HEADER: Final = "is its header missing above?"
 
 
 @dataclass(frozen=True, slots=True)
-class Keys:
-    """What is wrong with the keys of one table."""
+class TableKeys:
+    """The missing and unknown keys of one table."""
 
     path: Path
     model: Model
@@ -32,12 +32,12 @@ class Keys:
     unknown: list[str] = field(default_factory=list)
 
     def fault(self, key: str, what: str) -> Fault:
-        """Of a key or, if that is "", of the table."""
+        """A fault of a key or, if that is "", of the table."""
         return Fault(place_of((*self.path, key) if key else self.path), what)
 
 
-def inner(model: Model, key: str | int) -> Model | None:
-    """The description inside `model` that a table under `key` becomes."""
+def inner_model(model: Model, key: str | int) -> Model | None:
+    """The description of a table under `key`; None if the key is no table."""
     for name, about in model.model_fields.items():
         if (about.alias or name) == key:
             return next((t for t in _types(about.annotation) if issubclass(t, BaseModel)), None)
@@ -51,36 +51,40 @@ def _types(annotation: Any) -> Iterator[type]:
         yield from _types(each)
 
 
-def known(model: Model) -> list[str]:
+def known_keys(model: Model) -> list[str]:
     return [about.alias or name for name, about in model.model_fields.items() if name != "revision"]
 
 
-def _needed(model: Model) -> set[str]:
+def _required_keys(model: Model) -> set[str]:
     return {about.alias or name for name, about in model.model_fields.items() if about.is_required()}
 
 
-Follow = list[tuple[str, Fault]]  # a place, and the fault from which all else in it follows
+Consequences = list[tuple[str, Fault]]  # (place, the fault that causes all others in it)
 
 
-def key_faults(tables: Mapping[Path, Keys]) -> tuple[list[Fault], Follow]:
-    """The faults of tables by their paths, and what follows from them."""
+def key_faults(tables: Mapping[Path, TableKeys]) -> tuple[list[Fault], Consequences]:
+    """The faults of tables (by path), and their consequences."""
     faults: list[Fault] = []
-    follow: Follow = []
+    follow: Consequences = []
     for table in tables.values():
-        faults += _moved(table, tables)
-        faults += _misspelt(table, follow)
+        faults += _misplaced_keys(table, tables)
+        faults += _misspelt_keys(table, follow)
     for table in tables.values():
-        faults += _of_kind(table, follow) or _headless(table, follow) or _left(table)
+        faults += (
+            _wrong_kind(table, follow) or _missing_header(table, follow) or _remaining_faults(table)
+        )
     return faults, follow
 
 
-def _moved(table: Keys, tables: Mapping[Path, Keys]) -> Iterator[Fault]:
-    """Keys that are meant for a table around this one, and stand too far below."""
+def _misplaced_keys(table: TableKeys, tables: Mapping[Path, TableKeys]) -> Iterator[Fault]:
+    """Faults of keys that belong to a table around this one."""
     path = table.path
     for key in list(table.unknown) if path else ():
         around = (tables[path[:n]] for n in range(len(path)) if path[:n] in tables)
         outer = next((one for one in around if key in one.missing), None)
-        if outer is None and (key not in known(Panel) or inner(Panel, key) or len(table.unknown) > 1):
+        if outer is None and (
+            key not in known_keys(Panel) or inner_model(Panel, key) or len(table.unknown) > 1
+        ):
             continue
         table.unknown.remove(key)
         where = "the file itself: write it above the first table"
@@ -92,93 +96,93 @@ def _moved(table: Keys, tables: Mapping[Path, Keys]) -> Iterator[Fault]:
         yield table.fault(key, f"unknown key; it belongs to {where}")
 
 
-def _misspelt(table: Keys, follow: Follow) -> Iterator[Fault]:
-    """Unknown keys that are almost another one; where that is a table, its parts are elsewhere."""
+def _misspelt_keys(table: TableKeys, follow: Consequences) -> Iterator[Fault]:
+    """Faults of unknown keys that are similar to a known one."""
     for key in list(table.unknown):
-        meant = near(key, table.missing) or near(key, known(table.model))
+        meant = closest_name(key, table.missing) or closest_name(key, known_keys(table.model))
         if not meant:
             continue
         table.unknown.remove(key)
         if meant in table.missing:
             table.missing.remove(meant)
         fault = table.fault(key, f'unknown key; did you mean "{meant}"?')
-        if inner(table.model, meant):
+        if inner_model(table.model, meant):
             follow.append((place_of((*table.path, meant)), fault))
         yield fault
 
 
-def _headless(table: Keys, follow: Follow) -> list[Fault]:
-    """Keys of another table, whose header is not there."""
+def _missing_header(table: TableKeys, follow: Consequences) -> list[Fault]:
+    """A fault of keys of another table whose header is missing."""
     keys = set(table.unknown)
-    names = [name for name, model in _others(table) if keys <= set(known(model))]
+    names = [name for name, model in _other_tables(table) if keys <= set(known_keys(model))]
     if len(keys) < 2 or not names:
         return []
     fault = table.fault(
-        table.unknown[0], f"{_listed(table.unknown)} are keys of {names[0]}: {ITS_HEADER}"
+        table.unknown[0], f"{_quote_names(table.unknown)} are keys of {names[0]}: {ITS_HEADER}"
     )
     follow += [(place_of(table.path[:WHOLE_WIDGET]), fault)] if table.path else []
     return [fault]
 
 
-def _others(table: Keys) -> Iterator[tuple[str, Model]]:
-    """Tables whose keys may stand in this one: those in it, and all others of the file."""
+def _other_tables(table: TableKeys) -> Iterator[tuple[str, Model]]:
+    """(name, description) of the tables in this one, then of all others of the file."""
     header = ".".join(step for step in table.path if isinstance(step, str))
-    for key in known(table.model):
-        if model := inner(table.model, key):
+    for key in known_keys(table.model):
+        if model := inner_model(table.model, key):
             yield (f"{header}.{key}" if header else key), model
     for kind in KINDS.values():
         if table.path[-2:-1] != ("widget",):
             yield "[[page.widget]]", kind
-        for key in known(kind):
-            if model := inner(kind, key):
+        for key in known_keys(kind):
+            if model := inner_model(kind, key):
                 yield f"page.widget.{key}", model
-    for key in known(Panel):
-        if model := inner(Panel, key):
+    for key in known_keys(Panel):
+        if model := inner_model(Panel, key):
             yield f'"{key}"', model
 
 
-def _of_kind(table: Keys, follow: Follow) -> list[Fault]:
-    """A widget whose keys are those of another kind."""
+def _wrong_kind(table: TableKeys, follow: Consequences) -> list[Fault]:
+    """A fault of a widget that has the keys of another kind."""
     keys = set(table.table)
     kinds = [
         kind
         for kind, model in KINDS.items()
-        if table.path[-2:-1] == ("widget",) and _needed(model) <= keys <= set(known(model))
+        if table.path[-2:-1] == ("widget",) and _required_keys(model) <= keys <= set(known_keys(model))
     ]
     if not kinds or not table.unknown:
         return []
-    given, listed = shown(table.table["kind"]), _listed(kinds)
+    given, listed = format_value(table.table["kind"]), _quote_names(kinds)
     if len(table.missing) + len(table.unknown) == 1:
         what = f"unknown key of {given}; all the keys are those of {listed}"
         return [table.fault(table.unknown[0], what)]
-    needs = f" and needs {_listed(table.missing)}" if table.missing else ""
-    what = f"{given} has no {_listed(table.unknown)}{needs}; the keys are those of {listed}"
+    needs = f" and needs {_quote_names(table.missing)}" if table.missing else ""
+    what = f"{given} has no {_quote_names(table.unknown)}{needs}; the keys are those of {listed}"
     fault = table.fault("kind", what)
     follow.append((place_of(table.path), fault))
     return [fault]
 
 
-def _left(table: Keys) -> list[Fault]:
-    """What is unknown is told together, and what is missing."""
+def _remaining_faults(table: TableKeys) -> list[Fault]:
+    """One fault for the remaining unknown keys, and one for the missing keys."""
     missing, unknown = table.missing, table.unknown
-    here = f"known here: {', '.join(known(table.model))}"
+    here = f"known here: {', '.join(known_keys(table.model))}"
     if len(missing) == len(unknown) == 1:
         what = f'is it the "{missing[0]}" that is missing? {here}'
         return [table.fault(unknown[0], f"unknown key; {what}")]
     faults = []
     if unknown:
-        more = f", as {_listed(unknown[1:])}" if len(unknown) > 1 else ""
+        more = f", as {_quote_names(unknown[1:])}" if len(unknown) > 1 else ""
         faults.append(table.fault(unknown[0], f"unknown key{more}; {here}"))
     if len(missing) == 1:
         model = table.model
-        why = model.why_needed.get(missing[0]) if issubclass(model, Placed) else None
+        why = model.why_needed.get(missing[0]) if issubclass(model, BaseWidget) else None
         faults.append(table.fault(missing[0], f"is missing: {why}" if why else "is missing"))
     elif missing:
-        faults.append(table.fault("", f"{_listed(missing)} are missing"))
+        faults.append(table.fault("", f"{_quote_names(missing)} are missing"))
     return faults
 
 
-def _listed(names: Sequence[str]) -> str:
-    """Names in quotes, with commas and an "and"."""
+def _quote_names(names: Sequence[str]) -> str:
+    """Quoted names with commas and an "and"."""
     *others, last = (f'"{name}"' for name in names)
     return f"{', '.join(others)} and {last}" if others else last

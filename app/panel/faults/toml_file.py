@@ -1,4 +1,4 @@
-"""A panel file as it stands on the disk: its text and its tables, or why it is no TOML."""
+"""Reads a panel file as TOML."""
 
 import hashlib
 import re
@@ -14,14 +14,14 @@ from app.errors import Fault, PanelError
 AT_LINE: Final = re.compile(r"(.*) \(at (?:line ([0-9]+), column [0-9]+|end of document)\)", re.DOTALL)
 NAMES: Final = re.compile(r"\(((?:'[^']*'(?:, |,)?)+)\)")
 HEADER: Final = re.compile(r"\s*\[\[?\s*([a-zA-Z_.]+)\s*\]\]?\s*(?:#.*)?")
-FREE: Final = ("message", "request", "goal", "release")
+FREE_FORM_TABLES: Final = ("message", "request", "goal", "release")
 TABLES: Final = (
     "log", "control", "record", "robot", "interlock", "page", "widget", "qos", "confirm", "options",
-    "states", *FREE,
+    "states", *FREE_FORM_TABLES,
 )  # fmt: skip
-LIKE_A_TABLE: Final = 0.8
-# What Python's reader says of a key or a table that is there twice, in plainer words.
-PLAINER: Final[Mapping[str, str]] = {
+TABLE_SIMILARITY: Final = 0.8
+# Messages of Python's TOML reader about duplicate keys and tables → plainer ones.
+PLAIN_MESSAGES: Final[Mapping[str, str]] = {
     "Cannot overwrite a value": "this key or table is above already, perhaps as another kind of table",
     "Cannot mutate immutable namespace": "nothing can be added to what is whole already:",
 }
@@ -29,7 +29,7 @@ PLAINER: Final[Mapping[str, str]] = {
 
 @dataclass(frozen=True, slots=True)
 class TomlFile:
-    """`revision` changes with the file's bytes."""
+    """A parsed file; `revision` is a hash of its bytes."""
 
     path: Path
     text: str
@@ -38,13 +38,13 @@ class TomlFile:
 
 
 def read_toml(path: Path) -> TomlFile:
-    """PanelError, `unreadable`, with the line where it is no TOML."""
+    """The parsed file; PanelError (`unreadable`) with the line if it is no TOML."""
     try:
         data = path.read_bytes()
         text = data.decode("utf-8-sig")  # some editors begin a file with a mark
         tables = tomllib.loads(text)
     except (OSError, ValueError, RecursionError) as error:
-        fault = _unreadable(error)
+        fault = _read_fault(error)
         if isinstance(error, tomllib.TOMLDecodeError):
             fault = _misspelt_header(text) or fault
         raise PanelError(str(path), (fault,), unreadable=True) from error
@@ -52,21 +52,21 @@ def read_toml(path: Path) -> TomlFile:
 
 
 def _misspelt_header(text: str) -> Fault | None:
-    """The first header that is almost a known one: what stands below it is taken for another table's,
-    and what is wrong shows far from there."""
+    """A fault of the first header that is similar to a known one. Its keys count as those of another
+    table, so that the parser's error is far from it."""
     for number, line in enumerate(text.splitlines(), 1):
         header = HEADER.fullmatch(line)
         for part in header[1].split(".") if header else ():
-            if part in FREE:
-                break  # what a message has inside, nobody knows here
-            meant = get_close_matches(part, TABLES, n=1, cutoff=LIKE_A_TABLE)
+            if part in FREE_FORM_TABLES:
+                break  # the tables of a message are not known here
+            meant = get_close_matches(part, TABLES, n=1, cutoff=TABLE_SIMILARITY)
             if meant and meant[0] != part:
                 what = f'there is no table "{part}"; did you mean "{meant[0]}"?'
                 return Fault("", what, line=number)
     return None
 
 
-def _unreadable(error: Exception) -> Fault:
+def _read_fault(error: Exception) -> Fault:
     match error:
         case OSError(strerror=str(reason)):
             return Fault("", reason)
@@ -74,17 +74,17 @@ def _unreadable(error: Exception) -> Fault:
             line = data.count(b"\n", 0, at) + 1
             return Fault("", f"byte {data[at]:#04x} is not UTF-8: save the file as UTF-8", line=line)
         case tomllib.TOMLDecodeError():
-            return _no_toml(str(error))
+            return _syntax_fault(str(error))
         case RecursionError():
             return Fault("", "it has too many brackets in brackets")
-    return Fault("", "a number has too many digits")  # the one other ValueError of Python's reader
+    return Fault("", "a number has too many digits")  # the only other ValueError of Python's reader
 
 
-def _no_toml(said: str) -> Fault:
-    """What Python's reader said, with the names of tables as the file has them."""
-    found = AT_LINE.fullmatch(said)
-    what, line = (found[1], found[2]) if found else (said, None)
-    for theirs, plainer in PLAINER.items():
+def _syntax_fault(text: str) -> Fault:
+    """The fault of a syntax error, with the names of tables as in the file."""
+    found = AT_LINE.fullmatch(text)
+    what, line = (found[1], found[2]) if found else (text, None)
+    for theirs, plainer in PLAIN_MESSAGES.items():
         what = what.replace(theirs, plainer)
     what = NAMES.sub(lambda names: ".".join(re.findall("'([^']*)'", names[1])), what)
     return Fault("", what if line else f"{what}, at the end of the file", line=int(line or 0))

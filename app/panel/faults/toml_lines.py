@@ -1,6 +1,6 @@
-"""The line on which each key and table of a TOML text stands: Python's own reader does not tell.
+"""The line numbers of the keys and tables of a TOML text, which Python's reader does not provide.
 
-The text must be good TOML (that reader took it): nothing is checked here. Source: TOML 1.0.0 (toml.io).
+The text must be valid TOML: nothing is checked here. Source: TOML 1.0.0 (toml.io).
 """
 
 import re
@@ -15,7 +15,7 @@ _SPACE: Final = re.compile(r"(?:[ \t\r\n]|#[^\n]*)*")
 _BARE: Final = re.compile(r"[A-Za-z0-9_-]+")
 _QUOTED: Final = re.compile(r'"(?:\\.|[^"\\])*"|\'[^\']*\'')
 _DOT: Final = re.compile(r"[ \t]*\.[ \t]*")
-# The longest first: three quotes are no empty string and the beginning of another one.
+# The longest first: three quotes are not an empty string and a quote.
 _VALUE: Final = re.compile(
     r'"""(?:\\.|[^\\])*?"""{1,3}(?!")'
     r"|'''.*?'''{1,3}(?!')"
@@ -27,7 +27,8 @@ _VALUE: Final = re.compile(
 
 
 def lines_of(text: str) -> dict[Path, int]:
-    """Path → line, from 1, of every key, table and list element; a table's is that of its header."""
+    """Path → line (from 1) of every key, table and list element; a table's line is that of its
+    header."""
     scanner = _Scanner(text)
     scanner.document()
     return scanner.lines
@@ -39,23 +40,23 @@ class _Scanner:
         self._text = text
         self._at = 0
         self._ends = [match.start() for match in re.finditer("\n", text)]
-        self._tables: Counter[Path] = Counter()  # how many [[headers]] of each there were
+        self._tables: Counter[Path] = Counter()  # number of [[headers]] so far
 
     def document(self) -> None:
         table: Path = ()
-        while self._next():
+        while self._peek():
             if self._text[self._at] == "[":
                 table = self._header()
             else:
                 self._pair(table)
 
-    def _next(self) -> str:
-        """The next character that is no space and no comment; "" at the end."""
-        self._take(_SPACE)
+    def _peek(self) -> str:
+        """The next character after spaces and comments; "" at the end."""
+        self._match(_SPACE)
         return self._text[self._at : self._at + 1]
 
-    def _take(self, pattern: re.Pattern[str]) -> str:
-        """What a pattern matches here, which is taken; "" where it does not."""
+    def _match(self, pattern: re.Pattern[str]) -> str:
+        """Consumes and returns what a pattern matches here; "" without a match."""
         match = pattern.match(self._text, self._at)
         if match is None:
             return ""
@@ -66,7 +67,7 @@ class _Scanner:
         return bisect_right(self._ends, self._at - 1) + 1
 
     def _header(self) -> Path:
-        """The table that a header opens: `[a.b]`, or one more of `[[a.b]]`."""
+        """The path of the table that a header opens: `[a.b]`, or the next one of `[[a.b]]`."""
         line, many = self._line(), self._text.startswith("[[", self._at)
         self._at += 2 if many else 1
         *above, last = self._key()
@@ -84,18 +85,18 @@ class _Scanner:
         return path
 
     def _newest(self, path: Path) -> Path:
-        """A table, or the last one of a list of tables."""
+        """The path of a table, or of the last one of an array of tables."""
         return (*path, self._tables[path] - 1) if path in self._tables else path
 
     def _key(self) -> list[str]:
-        """The parts of a key: `a."b.c"` has two. What stands after it, and its spaces, is next."""
+        """The parts of a key: `a."b.c"` has two. Consumes spaces after it."""
         parts = []
         while True:
-            self._take(_SPACE)
-            quoted = self._take(_QUOTED)
-            parts.append(tomllib.loads(f"_ = {quoted}")["_"] if quoted else self._take(_BARE))
-            if not self._take(_DOT):
-                self._take(_SPACE)
+            self._match(_SPACE)
+            quoted = self._match(_QUOTED)
+            parts.append(tomllib.loads(f"_ = {quoted}")["_"] if quoted else self._match(_BARE))
+            if not self._match(_DOT):
+                self._match(_SPACE)
                 return parts
 
     def _pair(self, table: Path) -> None:
@@ -105,7 +106,7 @@ class _Scanner:
             path = (*path, part)
             self.lines.setdefault(path, line)
         self._at += len("=")
-        self._next()
+        self._peek()
         self._value(path)
 
     def _value(self, path: Path) -> None:
@@ -115,12 +116,12 @@ class _Scanner:
             case "{":
                 self._inline_table(path)
             case _:
-                self._take(_VALUE)
+                self._match(_VALUE)
 
     def _list(self, path: Path) -> None:
         self._at += 1
         index = 0
-        while self._next() != "]":
+        while self._peek() != "]":
             self.lines[*path, index] = self._line()
             self._value((*path, index))
             index += 1
@@ -129,11 +130,11 @@ class _Scanner:
 
     def _inline_table(self, path: Path) -> None:
         self._at += 1
-        while self._next() != "}":
+        while self._peek() != "}":
             self._pair(path)
             self._comma()
         self._at += 1
 
     def _comma(self) -> None:
-        if self._next() == ",":
+        if self._peek() == ",":
             self._at += 1

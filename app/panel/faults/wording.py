@@ -1,16 +1,16 @@
-"""What is wrong with one value of a panel file, in the file's own terms, and what would be right."""
+"""Messages about values of a panel file."""
 
 import re
 from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
 from typing import Any, Final
 
-from app.interfaces.validation import shown
-from app.panel.values import digits
+from app.interfaces.validation import format_value
+from app.panel.values import number_text
 
-LIKE_A_NAME: Final = 0.7
-MOST_LISTED: Final = 12
-# What a text must be like, by its key.
+NAME_SIMILARITY: Final = 0.7
+MAX_LISTED: Final = 12
+# The rule of a text, by its key.
 PATTERNS: Final[Mapping[str, str]] = {
     "id": 'is not an id: a-z, 0-9 and "_", a letter first, 64 at most',
     "format": 'is not a format: it must be like ".1f", "+.2e" or ",d"',
@@ -18,8 +18,8 @@ PATTERNS: Final[Mapping[str, str]] = {
     "parameter": "is not the name of a parameter: it has no spaces",
     "default": "has a NUL character, at which a ROS string ends",
 }
-# What a list must be like, by its key.
-LISTS: Final[Mapping[str, str]] = {
+# The elements of a list, by its key.
+LIST_WORDS: Final[Mapping[str, str]] = {
     "interfaces": 'folders: write ["folder"]',
     "connect": 'Zenoh endpoints: write ["tcp/robot1:7447"]',
     "topics": 'topics: write ["/battery"]',
@@ -30,7 +30,7 @@ LISTS: Final[Mapping[str, str]] = {
     "robot": "tables: write [[robot]]",
     "interlock": "tables: write [[interlock]]",
 }
-# Of a number, by the name of its limit.
+# The limits of a number, by pydantic's names.
 LIMITS: Final[Mapping[str, str]] = {
     "ge": "{} or more",
     "gt": "more than {}",
@@ -39,9 +39,9 @@ LIMITS: Final[Mapping[str, str]] = {
 }
 
 
-def worded(error: Mapping[str, Any], key: str) -> str:
-    """One of the errors that pydantic has of a value under a key; never in its own words."""
-    kind, given, about = error["type"], shown(error["input"]), error.get("ctx", {})
+def describe_error(error: Mapping[str, Any], key: str) -> str:
+    """The message about an error of pydantic; never pydantic's own text."""
+    kind, given, about = error["type"], format_value(error["input"]), error.get("ctx", {})
     match kind:
         case "value_error":
             return str(about["error"])
@@ -50,7 +50,7 @@ def worded(error: Mapping[str, Any], key: str) -> str:
         case "literal_error":
             return _one_of(re.findall("'([^']*)'", about["expected"]), error["input"])
         case "tuple_type":
-            return f"must be a list of {LISTS.get(key, 'values')}, not {given}"
+            return f"must be a list of {LIST_WORDS.get(key, 'values')}, not {given}"
         case "dict_type":
             return f'must be a table, like {{ field = "value" }}, not {given}'
         case "string_too_short" | "too_short":
@@ -60,28 +60,28 @@ def worded(error: Mapping[str, Any], key: str) -> str:
             return f"must be {about['max_length']} characters at most; it has {length}"
     for name, words in LIMITS.items():
         if name in about:
-            return f"must be {words.format(digits(float(about[name])))}, not {given}"
+            return f"must be {words.format(number_text(float(about[name])))}, not {given}"
     return f"{_must_be(kind)}, not {given}"
 
 
-def near(name: str, known: Iterable[str]) -> str:
-    """The name that is meant, most likely; "" where none is like it: many keys are short and alike."""
-    return next(iter(get_close_matches(name, list(known), n=1, cutoff=LIKE_A_NAME)), "")
+def closest_name(name: str, known: Iterable[str]) -> str:
+    """The most similar name; "" if none is similar enough: many keys are short and alike."""
+    return next(iter(get_close_matches(name, list(known), n=1, cutoff=NAME_SIMILARITY)), "")
 
 
-def listing(names: Iterable[str]) -> str:
-    """What there is, for a fault: the first names and how many more, "none" where there is none."""
+def list_names(names: Iterable[str]) -> str:
+    """The first names and the number of others, for a fault; "none" without names."""
     every = list(names)
-    more = f" and {len(every) - MOST_LISTED} more" if len(every) > MOST_LISTED else ""
-    return ", ".join(every[:MOST_LISTED]) + more or "none"
+    more = f" and {len(every) - MAX_LISTED} more" if len(every) > MAX_LISTED else ""
+    return ", ".join(every[:MAX_LISTED]) + more or "none"
 
 
 def _one_of(known: list[str], given: Any) -> str:
     *others, last = (f'"{one}"' for one in known)
     listed = f"{', '.join(others)} or {last}" if others else last
-    meant = near(str(given).lower(), known)
+    meant = closest_name(str(given).lower(), known)
     hint = f': did you mean "{meant}"?' if meant else ""
-    return f"must be {listed}, not {shown(given)}{hint}"
+    return f"must be {listed}, not {format_value(given)}{hint}"
 
 
 def _must_be(kind: str) -> str:

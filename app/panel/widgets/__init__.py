@@ -1,1 +1,1 @@
-"""The widgets of a panel file, a module per family."""
+"""The widgets of a panel file, one module for each family."""

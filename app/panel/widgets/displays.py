@@ -1,4 +1,4 @@
-"""Descriptions of what is shown: values and lamps."""
+"""The descriptions of displays: readouts and lamps."""
 
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Final, Literal, Self
@@ -6,15 +6,15 @@ from typing import Annotated, Any, Final, Literal, Self
 from pydantic import AfterValidator, BeforeValidator, Field
 
 from app.errors import Fault
-from app.interfaces import INTEGERS, Interfaces
-from app.interfaces.validation import shown
-from app.panel.base import Description, Label, Span, some
-from app.panel.constants import NUMBERS, holder, misfit, no_constant
-from app.panel.faults.wording import listing
+from app.interfaces import INTEGER_RANGES, Interfaces
+from app.interfaces.validation import format_value
+from app.panel.base import Description, Label, Span, non_empty
+from app.panel.constants import NUMBERS, parent_type, unknown_constant, value_mismatch
+from app.panel.faults.wording import list_names
 from app.panel.widgets.families import Display
 from app.panel.widgets.numbers import Unit
 
-# [+] [,] [.digits] [f, e, g, % or d]: a part of Python's, in which nothing can go wrong.
+# [+] [,] [.digits] [f, e, g, % or d]: the part of Python's format language that can't fail.
 FORMAT: Final = r"^\+?,?(\.[0-9]{1,2}[feg%]|[feg%d])$"
 SHAPE_AND_TEXT: Final = "only the colour would tell them apart"
 
@@ -22,7 +22,7 @@ Factor = Annotated[float, Field(allow_inf_nan=False)]
 
 
 class Readout(Display):
-    """A field's value, as `value * scale + offset` in a format, or by the name of a constant."""
+    """Shows a field as `value * scale + offset` in a format, or as the name of a constant."""
 
     kind: Literal["readout"]
     format: Annotated[str, Field(pattern=FORMAT)] | None = None
@@ -32,77 +32,81 @@ class Readout(Display):
     constants: Annotated[str, Field(pattern=r"^[A-Z][A-Z0-9_]*$")] | None = None
 
     def value_faults(self, place: str, field_type: str, interfaces: Interfaces) -> Iterator[Fault]:
-        yield from _number(place, self, field_type)
-        yield from _constants(place, self, interfaces)
+        yield from _number_faults(place, self, field_type)
+        yield from _constant_faults(place, self, interfaces)
 
 
-def _value(given: Any) -> Any:
+def _check_state_value(given: Any) -> Any:
     if not isinstance(given, bool | int | str):
-        raise ValueError(f"must be a whole number, true or false, or text, not {shown(given)}")
+        raise ValueError(f"must be a whole number, true or false, or text, not {format_value(given)}")
     return given
 
 
 class LampState(Description):
-    """How a lamp shows one value, which may be a constant's name. What is normal is grey, white or
-    black; colour is for the rest."""
+    """How a lamp shows one value, which may be a constant's name. Normal states are grey, white or
+    black; colours are for abnormal ones."""
 
-    value: Annotated[bool | int | str, BeforeValidator(_value)]
+    value: Annotated[bool | int | str, BeforeValidator(_check_state_value)]
     text: Label
     shape: Literal["circle", "square", "triangle", "diamond", "cross", "bar"]
     colour: Literal["grey", "white", "black", "blue", "yellow", "red"] = "grey"
 
 
 class Indicator(Display):
-    """A lamp: one state for each value; a value without one shows as unknown."""
+    """A lamp with a state for each value. A value without a state is shown as unknown."""
 
     kind: Literal["indicator"]
-    states: Annotated[tuple[LampState, ...], Field(strict=False), AfterValidator(some)]
+    states: Annotated[tuple[LampState, ...], Field(strict=False), AfterValidator(non_empty)]
     span: Span = 4
 
     def value_faults(self, place: str, field_type: str, interfaces: Interfaces) -> Iterator[Fault]:
-        yield from _states(place, self, field_type, interfaces)
+        yield from _state_faults(place, self, field_type, interfaces)
 
-    def resolved(self, interfaces: Interfaces) -> Self:
+    def with_constants(self, interfaces: Interfaces) -> Self:
         kind = interfaces.field_type(self.type, self.field)
-        constants = interfaces.constants(holder(self, interfaces))
+        constants = interfaces.constants(parent_type(self, interfaces))
         states = [
-            one.model_copy(update={"value": value_of_state(one.value, kind, constants)})
+            one.model_copy(update={"value": resolve_state_value(one.value, kind, constants)})
             for one in self.states
         ]
         return self.model_copy(update={"states": tuple(states)})
 
 
-def value_of_state(given: bool | int | str, kind: str, constants: Mapping[str, Any]) -> Any:
-    """What a lamp's state is for: a text is a constant's name where the field is a whole number.
-
-    A name that there is no constant of stays what it is.
+def resolve_state_value(given: bool | int | str, kind: str, constants: Mapping[str, Any]) -> Any:
+    """The value of a lamp's state. A text is a constant's name if the field is a whole number; an
+    unknown name is returned as it is.
     """
-    named = isinstance(given, str) and kind in INTEGERS
+    named = isinstance(given, str) and kind in INTEGER_RANGES
     return constants.get(str(given), given) if named else given
 
 
-def _number(place: str, of: Readout, kind: str) -> Iterator[Fault]:
-    scaled = (of.scale, of.offset) != (1.0, 0.0)
-    for key, given in (("format", of.format), ("scale", scaled), ("unit", of.unit)):
+def _number_faults(place: str, readout: Readout, kind: str) -> Iterator[Fault]:
+    scaled = (readout.scale, readout.offset) != (1.0, 0.0)
+    for key, given in (("format", readout.format), ("scale", scaled), ("unit", readout.unit)):
         if given and kind not in NUMBERS:
-            what = f'is for numbers; "{of.field}" is {kind}'
+            what = f'is for numbers; "{readout.field}" is {kind}'
             yield Fault(f"{place}.{key}", what, cause=f"number {place}")
-        elif given and of.constants is not None:
+        elif given and readout.constants is not None:
             what = "is for numbers; constants are shown by their names"
             yield Fault(f"{place}.{key}", what, cause=f"number {place}")
-    if of.format and of.format.endswith("d") and kind in NUMBERS and (scaled or kind not in INTEGERS):
+    if (
+        readout.format
+        and readout.format.endswith("d")
+        and kind in NUMBERS
+        and (scaled or kind not in INTEGER_RANGES)
+    ):
         what = "a scaled number" if scaled else kind
-        yield Fault(f"{place}.format", f'"{of.format}" is for whole numbers; this is {what}')
+        yield Fault(f"{place}.format", f'"{readout.format}" is for whole numbers; this is {what}')
 
 
-def _constants(place: str, of: Readout, interfaces: Interfaces) -> Iterator[Fault]:
-    if of.constants is None:
+def _constant_faults(place: str, readout: Readout, interfaces: Interfaces) -> Iterator[Fault]:
+    if readout.constants is None:
         return
-    type_name = holder(of, interfaces)
+    type_name = parent_type(readout, interfaces)
     names = interfaces.constants(type_name)
-    found = {name: value for name, value in names.items() if name.startswith(of.constants)}
+    found = {name: value for name, value in names.items() if name.startswith(readout.constants)}
     if not found:
-        what = f"no constant of {type_name} starts so; it has {listing(names)}"
+        what = f"no constant of {type_name} starts so; it has {list_names(names)}"
         yield Fault(f"{place}.constants", what)
     for name, value in found.items():
         first = next(other for other, its in found.items() if its == value)
@@ -112,28 +116,32 @@ def _constants(place: str, of: Readout, interfaces: Interfaces) -> Iterator[Faul
             return
 
 
-def _states(place: str, of: Indicator, kind: str, interfaces: Interfaces) -> Iterator[Fault]:
+def _state_faults(
+    place: str, indicator: Indicator, kind: str, interfaces: Interfaces
+) -> Iterator[Fault]:
     if kind in ("float32", "float64"):
         what = "an indicator is for whole numbers, bools and texts"
-        yield Fault(f"{place}.field", f'"{of.field}" is {kind}: {what}')
+        yield Fault(f"{place}.field", f'"{indicator.field}" is {kind}: {what}')
         return
-    looks = [(state.shape, state.text) for state in of.states]
-    type_name = holder(of, interfaces)
+    looks = [(state.shape, state.text) for state in indicator.states]
+    type_name = parent_type(indicator, interfaces)
     constants = interfaces.constants(type_name)
-    given = [value_of_state(state.value, kind, constants) for state in of.states]
+    given = [resolve_state_value(state.value, kind, constants) for state in indicator.states]
     values = [(type(value), value) for value in given]
-    for i, state in enumerate(of.states):
+    for i, state in enumerate(indicator.states):
         at = f"{place}.states[{i}]"
-        if isinstance(given[i], str) and kind in INTEGERS:
-            what = no_constant(given[i], kind, type_name, constants)
+        if isinstance(given[i], str) and kind in INTEGER_RANGES:
+            what = unknown_constant(given[i], kind, type_name, constants)
             yield Fault(f"{at}.value", what, cause=f"state {place}")
             continue
-        if fault := misfit(given[i], kind):
+        if fault := value_mismatch(given[i], kind):
             yield Fault(f"{at}.value", fault, cause=f"state {place}")
             continue
         if values[i] in values[:i]:
             first = values.index(values[i])
-            yield Fault(f"{at}.value", f"{shown(state.value)} is already the value of states[{first}]")
+            yield Fault(
+                f"{at}.value", f"{format_value(state.value)} is already the value of states[{first}]"
+            )
         if looks[i] in looks[:i]:
             first = looks.index(looks[i])
             yield Fault(at, f"has the shape and text of states[{first}]: {SHAPE_AND_TEXT}")

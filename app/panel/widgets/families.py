@@ -1,8 +1,8 @@
-"""The families of widgets, each with what its kinds share. A kind adds its keys and its checks.
+"""The families of widgets: base classes of the kinds, which add keys and checks.
 
-A family's methods are what the rest of the panel needs to know of a kind: its faults, the endpoints of
-the robot that it needs, what it sends. What a kind shows and how it is sent is in tables of the rooms
-that do so (`app/view/kinds.py`, `app/permission/interlocks.py`, `app/commands/dispatch.py`).
+A family's methods are the interface to the rest of the panel: faults, required endpoints, messages to
+send. How a kind is shown, permitted and sent is in tables of other rooms (`app/view/kinds.py`,
+`app/permission/interlocks.py`, `app/commands/dispatch.py`).
 """
 
 from abc import abstractmethod
@@ -15,7 +15,7 @@ from pydantic import Field
 from app.dialect.endpoint import Role
 from app.errors import Fault
 from app.interfaces import Interfaces
-from app.interfaces.validation import shown
+from app.interfaces.validation import format_value
 from app.panel.base import (
     Description,
     FieldPath,
@@ -29,99 +29,99 @@ from app.panel.base import (
     Type,
 )
 from app.panel.checks.types import field_faults
-from app.panel.faults.wording import listing
+from app.panel.faults.wording import list_names
 
 
 @dataclass(frozen=True, slots=True)
-class Checking:
-    """What a widget is checked against: the inputs of its page by their ids, the ids of all inputs
-    (`anywhere`) and of all interlocks, the types of the topics that the panel listens to. Faults of
-    the widgets in `faulty` are reported already: what depends on them is not checked."""
+class CheckContext:
+    """What a widget's check needs: the inputs of its page by id, the ids of all inputs and of all
+    interlocks, and topic → type of the subscriptions (`types`). Faults of the widgets in `faulty` are
+    reported already: checks that depend on them are skipped."""
 
     interfaces: Interfaces
     inputs: Mapping[str, "Input"]
-    anywhere: Collection[str]
+    all_inputs: Collection[str]
     interlocks: Collection[str]
     types: Mapping[str, str]
     faulty: Collection[str] = ()
 
 
-class Placed(Description):
-    """What every widget has; `span` is its width in twelfths of the page."""
+class BaseWidget(Description):
+    """The keys of every widget; `span` is its width in twelfths of the page."""
 
     id: Id
     label: Label
     span: Span = 12
     kind: str
 
-    # Why a key that is missing is needed, where that is not plain.
+    # Why a key is required, if that is not obvious.
     why_needed: ClassVar[Mapping[str, str]] = {}
-    # The types that the server itself needs for this kind.
-    own_types: ClassVar[tuple[str, ...]] = ()
+    # The types that the server needs for this kind.
+    required_types: ClassVar[tuple[str, ...]] = ()
 
-    def faults(self, place: str, checking: Checking) -> Iterator[Fault]:
-        """What is wrong though the shape is right; `place` is the widget's in the panel file."""
+    def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
+        """Faults of a widget whose keys and types are valid; `place` is its place in the panel file."""
         yield from ()
 
     def endpoints(self) -> Iterator[tuple[Role, str]]:
-        """What has to be on the robot, as (role, ROS name)."""
+        """The endpoints that the robot must have, as (role, ROS name)."""
         yield from ()
 
-    def resolved(self, interfaces: Interfaces) -> Self:
-        """The same with values for the names of constants; of a checked widget."""
+    def with_constants(self, interfaces: Interfaces) -> Self:
+        """The widget with values in place of constants' names; call it on a checked widget."""
         return self
 
 
-class Entered(Placed):
-    """A widget in which a value is entered: it comes with a press under the widget's id."""
+class EntryWidget(BaseWidget):
+    """A widget in which a value is entered; a press has it under the widget's id."""
 
     @property
     def default_value(self) -> Any:
-        """The default that the panel file gives, as a press gives it; None where it gives none."""
+        """The default of the panel file, as in a press; None without one."""
         return None
 
-    def typed(self, text: str) -> Any:
-        """A form's text as a value of this widget's type; the text itself where it is none."""
+    def parse_text(self, text: str) -> Any:
+        """A form's text as a value of this widget's type; the text itself if it is no such value."""
         return text
 
 
-class Input(Entered):
-    """A value that messages take by the input's id."""
+class Input(EntryWidget):
+    """A value that messages use by the input's id."""
 
     @property
     @abstractmethod
-    def gives(self) -> str:
-        """What kind of values it gives, for the sentence of a fault."""
+    def value_description(self) -> str:
+        """The kind of its values, for a fault's message: "whole numbers"."""
 
     @property
     @abstractmethod
-    def about(self) -> str:
-        """What it gives and what it starts with, for a comment in a preview."""
+    def comment(self) -> str:
+        """Its values and its initial value, as a comment in a preview."""
 
     @abstractmethod
     def examples(self) -> list[Any]:
-        """The values at which a template would fail first: limits, every option, true and false."""
+        """Values to try a template with: limits, every option, true and false."""
 
     @abstractmethod
-    def checked(self, given: Any) -> Any:
-        """The value that a message takes; InputError with a sentence that names label and limits."""
+    def check_value(self, given: Any) -> Any:
+        """The value to be sent; InputError names label and limits."""
 
-    def gives_for(self, value: Any, *, narrow: bool) -> str:
-        """What it gives where `value` does not fit; `narrow`: its type does, and only the value is
-        out of a range."""
-        return shown(value) if narrow else self.gives
+    def describe_value(self, value: Any, *, narrow: bool) -> str:
+        """The text for a `value` that does not fit its field; `narrow`: only the value is out of range,
+        the type fits."""
+        return format_value(value) if narrow else self.value_description
 
 
-class OnTopic(Placed):
-    """A widget that publishes a topic, or shows it."""
+class TopicWidget(BaseWidget):
+    """A widget that publishes or shows a topic."""
 
     topic: Topic
     type: Type
     qos: TopicQos = TopicQos()
 
 
-class Display(OnTopic):
-    """A field of a topic, shown; older than `max_age_s` it is shown as old."""
+class Display(TopicWidget):
+    """A field of a topic that is shown; a value older than `max_age_s` is marked as old."""
 
     field: FieldPath = "data"
     max_age_s: Seconds | None = None
@@ -129,14 +129,14 @@ class Display(OnTopic):
     def endpoints(self) -> Iterator[tuple[Role, str]]:
         yield "MP", self.topic
 
-    def faults(self, place: str, checking: Checking) -> Iterator[Fault]:
+    def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
         interfaces = checking.interfaces
         faults = list(field_faults(place, self.type, self.field, interfaces))
         yield from faults
         if faults:
             return
         field_type = interfaces.type_at(self.type, self.field)
-        if field_type.nested or field_type.many != "one":
+        if field_type.is_nested or field_type.container != "one":
             who = f"an {self.kind}" if self.kind[0] in "aeiou" else f"a {self.kind}"
             what = f'"{self.field}" is {field_type}: {who} shows one value of it, not all'
             yield Fault(f"{place}.field", what)
@@ -144,13 +144,13 @@ class Display(OnTopic):
             yield from self.value_faults(place, str(field_type), interfaces)
 
     def value_faults(self, place: str, field_type: str, interfaces: Interfaces) -> Iterator[Fault]:
-        """What is wrong for a field of this type, which is one value."""
+        """Faults with a field of this type, which is a single value."""
         yield from ()
 
 
-class Sent(NamedTuple):
-    """A message that a command sends: when, its type ("" where it has none that the panel file names),
-    and its fields with the ids of inputs in them; `comments` are by fields (".seq")."""
+class SentMessage(NamedTuple):
+    """A message that a command sends: when, its type ("" if the panel file names none), and its fields
+    with input ids; `comments` are by field (".seq")."""
 
     when: str
     type_name: str = ""
@@ -158,53 +158,53 @@ class Sent(NamedTuple):
     comments: Mapping[str, str] = {}
 
 
-class Command(Placed):
-    """A widget that acts on the robot, where its interlocks permit."""
+class Command(BaseWidget):
+    """A widget that sends commands to the robot while its interlocks permit."""
 
     interlocks: Interlocks = Field(default=(), alias="interlock")
 
     @abstractmethod
     def templates(self) -> list[Any]:
-        """All that may name inputs."""
+        """All templates, which may contain input ids."""
 
     @abstractmethod
-    def sent(self, interfaces: Interfaces) -> Iterator[Sent]:
-        """What it sends, in its order; of a checked widget."""
+    def sent_messages(self, interfaces: Interfaces) -> Iterator[SentMessage]:
+        """The messages that it sends, in order; call it on a checked widget."""
 
-    def faults(self, place: str, checking: Checking) -> Iterator[Fault]:
+    def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
         for i, name in enumerate(self.interlocks):
             if name not in checking.interlocks:
                 at = f"[{i}]" if len(self.interlocks) > 1 else ""
-                what = f'no interlock "{name}"; there is {listing(checking.interlocks)}'
+                what = f'no interlock "{name}"; there is {list_names(checking.interlocks)}'
                 yield Fault(f"{place}.interlock{at}", what, cause=f"interlock {name}")
 
 
-class Pressed(Command):
-    """A command that is given by one press; with `confirm_press` the page asks first."""
+class PressCommand(Command):
+    """A command that one press sends; with `confirm_press` the page asks before."""
 
     confirm_press: bool = False
 
     @property
     @abstractmethod
     def template(self) -> Mapping[str, Any]:
-        """The fields of what is sent, with the ids of inputs in them."""
+        """The fields of the message, with input ids."""
 
     def templates(self) -> list[Any]:
         return [self.template]
 
 
-class Published(OnTopic, Command):
-    """A command that publishes."""
+class PublishCommand(TopicWidget, Command):
+    """A command that publishes a topic."""
 
     @property
     def one_at_a_time(self) -> bool:
-        """Whether it is locked while the effect of the last one is awaited."""
+        """Whether it is locked until the effect of the last press is confirmed."""
         return False
 
     def endpoints(self) -> Iterator[tuple[Role, str]]:
         yield "MS", self.topic
 
-    def faults(self, place: str, checking: Checking) -> Iterator[Fault]:
+    def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
         if self.topic == "/rosout":
             what = "/rosout is where the kiosk's own log goes: choose another"
             yield Fault(f"{place}.topic", what)

@@ -1,4 +1,4 @@
-"""Commands that act for as long as a button is held, with the fields that the kiosk itself fills in."""
+"""Hold-to-run commands, with the fields that the server fills in."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -11,19 +11,19 @@ from app.interfaces import Interfaces
 from app.panel.base import Interlocks, Span, WrittenField
 from app.panel.checks.templates import template_faults
 from app.panel.checks.types import type_fault
-from app.panel.template import placed
-from app.panel.values import digits
-from app.panel.widgets.families import Checking, Published, Sent
+from app.panel.template import set_field
+from app.panel.values import number_text
+from app.panel.widgets.families import CheckContext, PublishCommand, SentMessage
 
-DEADLINE: Final = (r"uint(16|32|64)|float(32|64)", "uint16, uint32, uint64, float32 or float64")
-COUNTER: Final = (r"uint(8|16|32|64)", "uint8, uint16, uint32 or uint64")
+DEADLINE_TYPES: Final = (r"uint(16|32|64)|float(32|64)", "uint16, uint32, uint64, float32 or float64")
+COUNTER_TYPES: Final = (r"uint(8|16|32|64)", "uint8, uint16, uint32 or uint64")
 
 
-class Hold(Published):
-    """Published `rate_hz` times a second while its button is held, and `release` once after.
+class Hold(PublishCommand):
+    """Publishes `message` `rate_hz` times a second while its button is held, and `release` once after.
 
-    `deadline_field` gets the milliseconds within which the next message must come, 0 in the last
-    one; `counter_field` counts the messages.
+    `deadline_field` gets the milliseconds within which the next message arrives, 0 in the last one;
+    `counter_field` counts the messages.
     """
 
     kind: Literal["hold"]
@@ -46,57 +46,57 @@ class Hold(Published):
 
     @property
     def deadline_ms(self) -> int:
-        """Three periods, 100 ms at least: two messages may be late or lost before the robot stops."""
+        """Three periods, at least 100 ms: two messages may be late or lost before the robot stops."""
         return max(100, round(3000 / self.rate_hz))
 
     def templates(self) -> list[Any]:
         return [self.message, self.release]
 
-    def sent(self, interfaces: Interfaces) -> Iterator[Sent]:
+    def sent_messages(self, interfaces: Interfaces) -> Iterator[SentMessage]:
         own = {
             f".{self.deadline_field}": "ms within which the next one comes",
             f".{self.counter_field}": "counts the messages",
         }
-        often = f"{digits(self.rate_hz)} times a second while it is held"
-        first = with_own_fields(self, self.message, self.deadline_ms, 1)
-        yield Sent(f"publishes {self.topic} ({self.type}) {often}", self.type, first, own)
-        last = with_own_fields(self, self.release, 0, 1)
-        yield Sent("and once when it ends", self.type, last, own)
+        often = f"{number_text(self.rate_hz)} times a second while it is held"
+        first = fill_own_fields(self, self.message, self.deadline_ms, 1)
+        yield SentMessage(f"publishes {self.topic} ({self.type}) {often}", self.type, first, own)
+        last = fill_own_fields(self, self.release, 0, 1)
+        yield SentMessage("and once when it ends", self.type, last, own)
 
-    def faults(self, place: str, checking: Checking) -> Iterator[Fault]:
+    def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
         yield from super().faults(place, checking)
         try:
             checking.interfaces.require(self.type)
         except InterfaceError as error:
             yield type_fault(f"{place}.type", error)
             return
-        fields = list(_own_fields(place, self, checking.interfaces))
+        fields = list(_own_field_faults(place, self, checking.interfaces))
         yield from fields or self._message_faults(place, checking)
 
-    def _message_faults(self, place: str, checking: Checking) -> Iterator[Fault]:
+    def _message_faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
         for part, template in (("message", self.message), ("release", self.release)):
             try:
-                whole = with_own_fields(self, template, 0, 0)
+                whole = fill_own_fields(self, template, 0, 0)
             except FieldError as error:
                 yield Fault(f"{place}.{part}.{error.field}", error.message)
                 continue
             yield from template_faults(f"{place}.{part}", whole, self.type, checking)
 
 
-def with_own_fields(hold: Hold, fields: Mapping[str, Any], deadline_ms: int, count: int) -> Any:
-    """The fields of a message with its deadline and its number, where the hold has places for them."""
+def fill_own_fields(hold: Hold, fields: Mapping[str, Any], deadline_ms: int, count: int) -> Any:
+    """The fields of a message with its deadline and its number, if the hold has fields for them."""
     whole: Any = fields
     if hold.deadline_field is not None:
-        whole = placed(whole, hold.deadline_field, deadline_ms)
+        whole = set_field(whole, hold.deadline_field, deadline_ms)
     if hold.counter_field is not None:
-        whole = placed(whole, hold.counter_field, count)
+        whole = set_field(whole, hold.counter_field, count)
     return whole
 
 
-def _own_fields(place: str, hold: Hold, interfaces: Interfaces) -> Iterator[Fault]:
+def _own_field_faults(place: str, hold: Hold, interfaces: Interfaces) -> Iterator[Fault]:
     own = (
-        ("deadline_field", hold.deadline_field, DEADLINE),
-        ("counter_field", hold.counter_field, COUNTER),
+        ("deadline_field", hold.deadline_field, DEADLINE_TYPES),
+        ("counter_field", hold.counter_field, COUNTER_TYPES),
     )
     for key, path, (kinds, words) in own:
         if path is None:
@@ -110,15 +110,15 @@ def _own_fields(place: str, hold: Hold, interfaces: Interfaces) -> Iterator[Faul
             yield Fault(f"{place}.{key}", f'"{path}" is {found}: it must be {words}')
             continue
         for part, template in (("message", hold.message), ("release", hold.release)):
-            if _gives(template, path):
+            if _has_field(template, path):
                 what = f"is filled in by the kiosk: it is the {key}"
                 yield Fault(f"{place}.{part}.{path}", what, cause=f"own {place} {key}")
     if hold.counter_field is not None and hold.counter_field == hold.deadline_field:
         yield Fault(f"{place}.counter_field", f'"{hold.counter_field}" is the deadline_field already')
 
 
-def _gives(template: Mapping[str, Any], path: str) -> bool:
-    """Whether a template says the field itself; in a list each element must stand there anyway."""
+def _has_field(template: Mapping[str, Any], path: str) -> bool:
+    """Whether a template sets the field. A list must have all its elements in any case."""
     found: Any = template
     for step in path.split("."):
         if "[" in step or not isinstance(found, Mapping) or step not in found:

@@ -1,4 +1,4 @@
-"""Inputs of texts and choices: what an operator enters, and what is checked of it."""
+"""The descriptions of text, select and toggle inputs, and checks of their values."""
 
 import json
 from collections.abc import Iterator, Sequence
@@ -8,12 +8,12 @@ from pydantic import AfterValidator, Field
 
 from app.errors import Fault, InputError
 from app.i18n import say
-from app.interfaces.validation import shown
-from app.panel.base import Description, Label, SaidLabel, Span, said, some
-from app.panel.values import same
-from app.panel.widgets.families import Checking, Input
+from app.interfaces.validation import format_value
+from app.panel.base import Description, Label, SaidLabel, Span, catalogue_default, non_empty
+from app.panel.values import same_value
+from app.panel.widgets.families import CheckContext, Input
 
-SWITCHED: Final = {"true": True, "false": False}
+BOOL_TEXTS: Final = {"true": True, "false": False}
 
 
 class TextInput(Input):
@@ -22,15 +22,15 @@ class TextInput(Input):
     default: Annotated[str, Field(pattern=r"^[^\x00]*$")] = ""
 
     @property
-    def gives(self) -> str:
+    def value_description(self) -> str:
         return "text"
 
-    def gives_for(self, value: Any, *, narrow: bool) -> str:
-        return f"up to {self.max_length} characters" if narrow else self.gives
+    def describe_value(self, value: Any, *, narrow: bool) -> str:
+        return f"up to {self.max_length} characters" if narrow else self.value_description
 
     @property
-    def about(self) -> str:
-        return f"text, {shown(self.default)} at first"
+    def comment(self) -> str:
+        return f"text, {format_value(self.default)} at first"
 
     @property
     def default_value(self) -> str | None:
@@ -39,22 +39,22 @@ class TextInput(Input):
     def examples(self) -> list[Any]:
         return ["x" * self.max_length]
 
-    def checked(self, given: Any) -> str:
-        """Lengths count characters, as an operator does."""
+    def check_value(self, given: Any) -> str:
+        """The text; lengths are in characters."""
         if not isinstance(given, str):
-            raise InputError(f'{self.label} ("{self.id}") must be text, not {shown(given)}')
+            raise InputError(f'{self.label} ("{self.id}") must be text, not {format_value(given)}')
         if len(given) > self.max_length:
             what = f"is {len(given)} characters long; {self.max_length} are allowed"
             raise InputError(f"{self.label} {what}")
         return given
 
-    def faults(self, place: str, checking: Checking) -> Iterator[Fault]:
+    def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
         if len(self.default) > self.max_length:
             yield Fault(f"{place}.default", f"is longer than max_length ({self.max_length})")
 
 
-def _plain(given: Any) -> Any:
-    """An option's value; what it has inside is as TOML has it, but no dates."""
+def _check_json_value(given: Any) -> Any:
+    """An option's value: anything of TOML that JSON has too."""
     try:
         json.dumps(given)
     except TypeError:
@@ -63,9 +63,9 @@ def _plain(given: Any) -> Any:
 
 
 class Option(Description):
-    """What can be chosen; `key` is its value as a form posts it."""
+    """An option of a select; `key` is its value in a form."""
 
-    value: Annotated[Any, AfterValidator(_plain)]
+    value: Annotated[Any, AfterValidator(_check_json_value)]
     label: Label
 
     @property
@@ -76,25 +76,25 @@ class Option(Description):
 class SelectInput(Input):
     kind: Literal["select"]
     span: Span = 6
-    options: Annotated[tuple[Option, ...], Field(strict=False), AfterValidator(some)]
+    options: Annotated[tuple[Option, ...], Field(strict=False), AfterValidator(non_empty)]
     default: Any = None
 
     @property
-    def start(self) -> str:
-        """The key of the option that is chosen at first."""
-        first = (option for option in self.options if same(option.value, self.default))
+    def initial_text(self) -> str:
+        """The key of the option that is selected initially."""
+        first = (option for option in self.options if same_value(option.value, self.default))
         return next(first, self.options[0]).key
 
     @property
-    def gives(self) -> str:
+    def value_description(self) -> str:
         return "the values of its options"
 
-    def gives_for(self, value: Any, *, narrow: bool) -> str:
-        return shown(value)
+    def describe_value(self, value: Any, *, narrow: bool) -> str:
+        return format_value(value)
 
     @property
-    def about(self) -> str:
-        return f"one of {', '.join(shown(option.value) for option in self.options)}"
+    def comment(self) -> str:
+        return f"one of {', '.join(format_value(option.value) for option in self.options)}"
 
     @property
     def default_value(self) -> Any:
@@ -103,35 +103,39 @@ class SelectInput(Input):
     def examples(self) -> list[Any]:
         return [option.value for option in self.options]
 
-    def checked(self, given: Any) -> Any:
-        """The option whose value was given, or whose key: so it comes from a form and a browser."""
+    def check_value(self, given: Any) -> Any:
+        """The value of the option with the given value or key; forms and browsers send keys."""
         for option in self.options:
-            if same(option.value, given) or option.key == given:
+            if same_value(option.value, given) or option.key == given:
                 return option.value
         options = tuple(option.label for option in self.options)
-        raise InputError(say("no_option", label=self.label, options=options, given=shown(given)))
+        raise InputError(say("no_option", label=self.label, options=options, given=format_value(given)))
 
-    def faults(self, place: str, checking: Checking) -> Iterator[Fault]:
+    def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
         yield from option_faults(place, self.options)
-        if self.default is not None and not any(same(o.value, self.default) for o in self.options):
-            there = ", ".join(shown(option.value) for option in self.options)
-            yield Fault(f"{place}.default", f"{shown(self.default)} is no option; there is {there}")
+        if self.default is not None and not any(
+            same_value(o.value, self.default) for o in self.options
+        ):
+            there = ", ".join(format_value(option.value) for option in self.options)
+            yield Fault(
+                f"{place}.default", f"{format_value(self.default)} is no option; there is {there}"
+            )
 
 
 class ToggleInput(Input):
     kind: Literal["toggle"]
     span: Span = 6
-    on: SaidLabel = said("on")
-    off: SaidLabel = said("off")
+    on: SaidLabel = catalogue_default("on")
+    off: SaidLabel = catalogue_default("off")
     default: bool = False
 
     @property
-    def gives(self) -> str:
+    def value_description(self) -> str:
         return "true or false"
 
     @property
-    def about(self) -> str:
-        return f"true or false, {shown(self.default)} at first"
+    def comment(self) -> str:
+        return f"true or false, {format_value(self.default)} at first"
 
     @property
     def default_value(self) -> bool | None:
@@ -140,18 +144,18 @@ class ToggleInput(Input):
     def examples(self) -> list[Any]:
         return [False, True]
 
-    def typed(self, text: str) -> bool | str:
-        return SWITCHED.get(text, text)
+    def parse_text(self, text: str) -> bool | str:
+        return BOOL_TEXTS.get(text, text)
 
-    def checked(self, given: Any) -> bool:
+    def check_value(self, given: Any) -> bool:
         if isinstance(given, bool):
             return given
-        what = say("no_toggle", label=self.label, on=self.on, off=self.off, given=shown(given))
+        what = say("no_toggle", label=self.label, on=self.on, off=self.off, given=format_value(given))
         raise InputError(what)
 
 
 def option_faults(place: str, options: Sequence[Option]) -> Iterator[Fault]:
-    """Options that can't be told apart."""
+    """Faults of options with equal keys or labels."""
     keys = [option.key for option in options]
     labels = [option.label for option in options]
     for i, (key, label) in enumerate(zip(keys, labels, strict=True)):

@@ -1,4 +1,4 @@
-"""The kinds of widgets that a panel file may name: a row for each."""
+"""The table of widget kinds."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, Final, TypeVar, Union
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, TypeVar, Union
 from pydantic import Field
 
 from app.panel.widgets.displays import Indicator, Readout
-from app.panel.widgets.families import Placed
+from app.panel.widgets.families import BaseWidget
 from app.panel.widgets.hold import Hold
 from app.panel.widgets.inputs import SelectInput, TextInput, ToggleInput
 from app.panel.widgets.numbers import NumberInput, SliderInput
@@ -14,7 +14,7 @@ from app.panel.widgets.parameter import Parameter
 from app.panel.widgets.publish import Publish
 from app.panel.widgets.service_action import Action, Call
 
-KINDS: Final[Mapping[str, type[Placed]]] = {
+KINDS: Final[Mapping[str, type[BaseWidget]]] = {
     "text": TextInput,
     "number": NumberInput,
     "slider": SliderInput,
@@ -29,18 +29,18 @@ KINDS: Final[Mapping[str, type[Placed]]] = {
     "indicator": Indicator,
 }
 
-# What a table of a panel file becomes, by its "kind".
+# The description of a widget's table, by its "kind".
 if TYPE_CHECKING:
-    Widget = Placed
+    Widget = BaseWidget
 else:
     Widget = Annotated[Union[tuple(KINDS.values())], Field(discriminator="kind")]  # noqa: UP007
 
 Row = TypeVar("Row")
 
 
-def row_of(rows: Mapping[type[Any], Row], widget: Placed) -> Row:
-    """What a table of rows by kinds or families has for a widget: the row of its kind, else that of
-    the nearest family. TypeError where there is none."""
+def find_row(rows: Mapping[type[Any], Row], widget: BaseWidget) -> Row:
+    """The row of a widget's kind in a table by kinds and families, else that of its nearest family.
+    TypeError without one."""
     for of in type(widget).__mro__:
         if of in rows:
             return rows[of]

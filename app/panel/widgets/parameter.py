@@ -1,4 +1,4 @@
-"""The description of a ROS 2 parameter of a node, shown and set, and what can be wrong in it."""
+"""The description of a ROS 2 parameter that is shown and set, and its checks."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from math import isfinite
@@ -9,53 +9,54 @@ from pydantic import AfterValidator, Field
 from app.dialect.endpoint import Role
 from app.errors import Fault
 from app.i18n import Text, TextLike, render, say
-from app.interfaces import INTEGERS, Interfaces
+from app.interfaces import INTEGER_RANGES, Interfaces
 from app.interfaces.names import TOPIC
-from app.interfaces.validation import shown
-from app.panel.base import SaidLabel, Seconds, Span, said
-from app.panel.list_text import listed, quoted
-from app.panel.number_range import Range, decimal
-from app.panel.values import digits, same
-from app.panel.widgets.families import Checking, Entered, Pressed, Sent
-from app.panel.widgets.inputs import SWITCHED, Option, option_faults
-from app.panel.widgets.numbers import DECIMAL, Number, Stepped, Unit
+from app.interfaces.validation import format_value
+from app.panel.base import SaidLabel, Seconds, Span, catalogue_default
+from app.panel.list_text import join_list, quote_element
+from app.panel.number_range import Range, decimal_text
+from app.panel.values import number_text, same_value
+from app.panel.widgets.families import CheckContext, EntryWidget, PressCommand, SentMessage
+from app.panel.widgets.inputs import BOOL_TEXTS, Option, option_faults
+from app.panel.widgets.numbers import DECIMAL, Number, SteppedWidget, Unit
 
-One = bool | int | float | str
-Value = One | tuple[One, ...]
+Scalar = bool | int | float | str
+Value = Scalar | tuple[Scalar, ...]
 
 EVENTS: Final = "/parameter_events"
 EVENT_TYPE: Final = "rcl_interfaces/msg/ParameterEvent"
 
-# The services of a node that a parameter needs, with their types.
+# The node's parameter services that are used, with their types.
 GET: Final = ("get_parameters", "rcl_interfaces/srv/GetParameters")
 DESCRIBE: Final = ("describe_parameters", "rcl_interfaces/srv/DescribeParameters")
 SET: Final = ("set_parameters", "rcl_interfaces/srv/SetParameters")
 
-LONGEST_TEXT: Final = 1000  # characters that can be set
-KINDS: Final[Mapping[str, str]] = {
+MAX_TEXT: Final = 1000  # characters that can be set
+TYPE_TEXTS: Final[Mapping[str, str]] = {
     "bool": "true or false",
     "integer": "a whole number (int64)",
     "double": "a number",
-    "string": f"text of {LONGEST_TEXT} characters at most",
+    "string": f"text of {MAX_TEXT} characters at most",
 }
 
 
-def _node(given: str) -> str:
+def _check_node(given: str) -> str:
     if not TOPIC.fullmatch(given) or "__" in given:
         raise ValueError(
-            f"{shown(given)} is not the absolute name of a ROS 2 node: it must be like /cell1/arm"
+            f"{format_value(given)} is not the absolute name of a ROS 2 node: "
+            "it must be like /cell1/arm"
         )
     return given
 
 
-class Parameter(Stepped, Entered, Pressed):
-    """A parameter of a node; `min`, `max` and `step` narrow what the node describes.
+class Parameter(SteppedWidget, EntryWidget, PressCommand):
+    """A parameter of a node; `min`, `max` and `step` narrow the range that the node describes.
 
-    It is its own input: a press sets the value that comes under the widget's id.
+    It is an input too: a press sets the value that it has under the widget's id.
     """
 
     kind: Literal["parameter"]
-    node: Annotated[str, AfterValidator(_node), Field(max_length=200)]
+    node: Annotated[str, AfterValidator(_check_node), Field(max_length=200)]
     parameter: Annotated[str, Field(pattern=r"^[^\s\x00-\x1f]+$", max_length=255)]
     type: Literal["bool", "integer", "double", "string", "bool[]", "integer[]", "double[]", "string[]"]
     unit: Unit = ""
@@ -63,162 +64,170 @@ class Parameter(Stepped, Entered, Pressed):
     min: Number | None = None
     max: Number | None = None
     step: Annotated[Number, Field(gt=0)] | None = None
-    on: SaidLabel = said("on")
-    off: SaidLabel = said("off")
+    on: SaidLabel = catalogue_default("on")
+    off: SaidLabel = catalogue_default("off")
     timeout_s: Seconds = 5.0
     span: Span = 6
 
-    own_types: ClassVar[tuple[str, ...]] = (
+    required_types: ClassVar[tuple[str, ...]] = (
         EVENT_TYPE,
         *(f"{name}_Request" for _, name in (GET, DESCRIBE, SET)),
     )
 
     @property
-    def many(self) -> bool:
+    def is_list(self) -> bool:
         """Whether it is a list."""
         return self.type.endswith("[]")
 
     @property
-    def element(self) -> str:
+    def element_type(self) -> str:
         """The type of one value."""
         return self.type.removesuffix("[]")
 
     @property
-    def counts(self) -> bool:
+    def has_numbers(self) -> bool:
         """Whether it is a number, or a list of them."""
-        return self.element in ("integer", "double")
+        return self.element_type in ("integer", "double")
 
     @property
-    def numeric(self) -> bool:
+    def is_number_entry(self) -> bool:
         """Whether it is entered as a number."""
-        return self.counts and not self.many and not self.options
+        return self.has_numbers and not self.is_list and not self.options
 
     @property
     def template(self) -> dict[str, Any]:
         return {"value": f"{{{self.id}}}"}
 
-    def sent(self, interfaces: Interfaces) -> Iterator[Sent]:
-        yield Sent(f'sets {self.parameter} of {self.node} ({self.type}) to "{{{self.id}}}"')
+    def sent_messages(self, interfaces: Interfaces) -> Iterator[SentMessage]:
+        yield SentMessage(f'sets {self.parameter} of {self.node} ({self.type}) to "{{{self.id}}}"')
 
     def endpoints(self) -> Iterator[tuple[Role, str]]:
         for name, _ in (GET, DESCRIBE, SET):
             yield "SS", f"{self.node}/{name}"
 
-    def typed(self, text: str) -> Any:
-        if self.options or self.many:
+    def parse_text(self, text: str) -> Any:
+        if self.options or self.is_list:
             return text
         match self.type:
             case "bool":
-                return SWITCHED.get(text, text)
+                return BOOL_TEXTS.get(text, text)
             case "double":
                 return float(text) if DECIMAL.fullmatch(text) else text
         return text
 
-    def faults(self, place: str, checking: Checking) -> Iterator[Fault]:
+    def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
         yield from super().faults(place, checking)
         keys = ("min", "max", "step")
         given = {key: getattr(self, key) for key in keys if getattr(self, key) is not None}
-        if not self.counts:
+        if not self.has_numbers:
             for key in (*given, *(["unit"] if self.unit else [])):
                 what = f'is for numbers; the type is "{self.type}"'
                 yield Fault(f"{place}.{key}", what, cause=f"number {place}")
         if self.options:
-            yield from _options(place, self)
-            for key in given if self.counts else ():
+            yield from _option_faults(place, self)
+            for key in given if self.has_numbers else ():
                 what = "is for what is entered: with options one of them is chosen"
                 yield Fault(f"{place}.{key}", what, cause=f"number {place}")
-        elif self.counts:
-            yield from _limits(place, self, given)
+        elif self.has_numbers:
+            yield from _limit_faults(place, self, given)
 
     @property
-    def press(self) -> Text:
-        """What the button is called where its place does not tell what it sets."""
+    def press_label(self) -> Text:
+        """The accessible name of the button that sets the value."""
         return say("set_named", label=self.label)
 
     @property
-    def again(self) -> Text:
-        """What the button is called that asks its node once more."""
+    def read_label(self) -> Text:
+        """The accessible name of the button that queries the node again."""
         return say("read_named", label=self.label)
 
-    def option(self, value: Any) -> Option | None:
-        """The option that has this value."""
+    def find_option(self, value: Any) -> Option | None:
+        """The option with this value; None without one."""
         value = list(value) if isinstance(value, tuple) else value
-        return next((one for one in self.options if same(one.value, value)), None)
+        return next((one for one in self.options if same_value(one.value, value)), None)
 
-    def written(self, value: Value) -> TextLike:
-        """A value as an operator reads it, exactly."""
-        option = self.option(value)
-        return self.unchosen(value) if option is None else option.label
+    def value_text(self, value: Value) -> TextLike:
+        """A value as text for an operator: an option's label, or the exact value with its unit."""
+        option = self.find_option(value)
+        return self.unlisted_text(value) if option is None else option.label
 
-    def unchosen(self, value: Value) -> TextLike:
-        """The same of a value that is no option's."""
+    def unlisted_text(self, value: Value) -> TextLike:
+        """The same for a value that no option has."""
         if value == ():
             return say("empty")
         if isinstance(value, bool):
             return self.on if value else self.off
-        text = self.entered(value)
+        text = self.entry_text(value)
         return f"{text} {self.unit}" if self.unit else text
 
-    def entered(self, value: Value) -> str:
-        """A value as it is entered where no option is chosen. True and false are entered in lists only:
+    def entry_text(self, value: Value) -> str:
+        """A value as the text of its entry. True and false are entered in lists only:
         as the panel file calls them, or in English."""
         if isinstance(value, tuple):
-            return listed(quoted(one) if isinstance(one, str) else self._one(one) for one in value)
-        return self._one(value)
+            return join_list(
+                quote_element(one) if isinstance(one, str) else self._element_text(one) for one in value
+            )
+        return self._element_text(value)
 
-    def _one(self, value: bool | float | str) -> str:
+    def _element_text(self, value: bool | float | str) -> str:
         if isinstance(value, bool):
             return render(self.on if value else self.off)
-        return decimal(value) if isinstance(value, float) else f"{value}"
+        return decimal_text(value) if isinstance(value, float) else f"{value}"
 
 
-def _options(place: str, of: Parameter) -> Iterator[Fault]:
-    if of.type == "bool":
+def _option_faults(place: str, parameter: Parameter) -> Iterator[Fault]:
+    if parameter.type == "bool":
         yield Fault(f"{place}.options", 'a bool has none: its switch has the words of "on" and "off"')
         return
-    yield from option_faults(place, of.options)
-    for i, option in enumerate(of.options):
+    yield from option_faults(place, parameter.options)
+    for i, option in enumerate(parameter.options):
         value = option.value
-        several = value if of.many and isinstance(value, list) else [value]
-        right = of.many == isinstance(value, list) and all(fits(of.element, one) for one in several)
+        several = value if parameter.is_list and isinstance(value, list) else [value]
+        right = parameter.is_list == isinstance(value, list) and all(
+            is_valid_value(parameter.element_type, one) for one in several
+        )
         if not right:
-            what = f"must be {KINDS[of.element]}, not {shown(value)}"
-            yield Fault(f"{place}.options[{i}].value", f"a list: each {what}" if of.many else what)
+            what = f"must be {TYPE_TEXTS[parameter.element_type]}, not {format_value(value)}"
+            yield Fault(
+                f"{place}.options[{i}].value", f"a list: each {what}" if parameter.is_list else what
+            )
 
 
-def fits(kind: str, value: Any) -> bool:
-    """Whether a value of TOML or JSON is one of a single parameter's type."""
+def is_valid_value(kind: str, value: Any) -> bool:
+    """Whether a value of TOML or JSON has the type of a single parameter."""
     match kind:
         case "bool":
             return isinstance(value, bool)
         case "string":
-            return isinstance(value, str) and len(value) <= LONGEST_TEXT
+            return isinstance(value, str) and len(value) <= MAX_TEXT
     if isinstance(value, bool) or not isinstance(value, int | float):
         return False
-    low, high = INTEGERS["int64"]
+    low, high = INTEGER_RANGES["int64"]
     return isinstance(value, int) and low <= value <= high if kind == "integer" else isfinite(value)
 
 
-def _limits(place: str, of: Parameter, given: Mapping[str, float]) -> Iterator[Fault]:
-    if of.element == "integer":
+def _limit_faults(place: str, parameter: Parameter, given: Mapping[str, float]) -> Iterator[Fault]:
+    if parameter.element_type == "integer":
         broken = {key: one for key, one in given.items() if not one.is_integer()}
         for key, one in broken.items():
-            what = f"{digits(one)} must be whole: the type is {of.type}"
+            what = f"{number_text(one)} must be whole: the type is {parameter.type}"
             yield Fault(f"{place}.{key}", what, cause=f"number {place}")
         if broken:
             return
-    if of.min is None or of.max is None:
+    if parameter.min is None or parameter.max is None:
         return
-    low, high = digits(of.min), digits(of.max)
-    if of.max <= of.min:
+    low, high = number_text(parameter.min), number_text(parameter.max)
+    if parameter.max <= parameter.min:
         yield Fault(f"{place}.max", f"{high} must be more than min ({low})")
-    elif of.step is not None and not Range(of.min, None, of.step).on_step(of.max):
-        step = digits(of.step)
+    elif parameter.step is not None and not Range(parameter.min, None, parameter.step).is_on_step(
+        parameter.max
+    ):
+        step = number_text(parameter.step)
         yield Fault(f"{place}.step", f"no whole number of steps of {step} leads from {low} to {high}")
 
 
 def type_faults(parameters: Iterable[tuple[str, Parameter]]) -> Iterator[Fault]:
-    """A parameter has one type, wherever the panel names it; each comes with its place."""
+    """Faults of a parameter with several types in the panel; `parameters` are (place, widget)."""
     firsts: dict[tuple[str, str], str] = {}
     for place, widget in parameters:
         first = firsts.setdefault((widget.node, widget.parameter), widget.type)

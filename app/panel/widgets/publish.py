@@ -1,4 +1,4 @@
-"""Commands that publish a message once, and what shows that one took effect."""
+"""Commands that publish a message once, and the confirmation of their effect."""
 
 import re
 from collections.abc import Iterator
@@ -7,18 +7,17 @@ from typing import Any, ClassVar, Literal
 from app.errors import Fault, FieldError
 from app.interfaces import Interfaces
 from app.panel.base import Description, FieldPath, Seconds, Span, Topic, Type
-from app.panel.checks.templates import NOW_IS, tries, unknown
+from app.panel.checks.templates import NOW_RULE, example_values, unknown_input_faults
 from app.panel.checks.types import field_faults
-from app.panel.constants import misfit
-from app.panel.template import NOW, filled, named
-from app.panel.widgets.families import Checking, Published
-from app.panel.widgets.templated import Templated
+from app.panel.constants import value_mismatch
+from app.panel.template import NOW, fill, placeholders
+from app.panel.widgets.families import CheckContext, PublishCommand
+from app.panel.widgets.templated import TemplateCommand
 
 
 class Confirm(Description):
-    """A field of the robot's that shows that a command took effect: it comes to have the value
-    `equals` (or that of an input, `"{id}"`) in time. The type is that which the panel gives for
-    the topic elsewhere, if there is none here."""
+    """A field that confirms the effect of a command: it must have the value `equals` (or that of an
+    input, `"{id}"`) within `within_s`. The default type is that of the topic elsewhere in the panel."""
 
     topic: Topic
     type: Type | None = None
@@ -27,16 +26,16 @@ class Confirm(Description):
     within_s: Seconds = 2.0
 
 
-class Publishing(Templated, Published):
-    """A press that publishes a message; with `one_shot` it is locked until its effect is confirmed, or
-    did not show."""
+class SinglePublish(TemplateCommand, PublishCommand):
+    """A press that publishes a message. With `one_shot` it is locked until its effect is confirmed, or
+    the time for that is over."""
 
     message: dict[str, Any]
     confirm: Confirm | None = None
     one_shot: bool = False
     span: Span = 4
 
-    part: ClassVar[str] = "message"
+    template_key: ClassVar[str] = "message"
 
     @property
     def template(self) -> dict[str, Any]:
@@ -47,17 +46,17 @@ class Publishing(Templated, Published):
         return self.one_shot
 
     @property
-    def does(self) -> str:
+    def action_text(self) -> str:
         return f"publishes {self.topic} ({self.type})"
 
-    def sent_type(self, interfaces: Interfaces) -> str:
+    def template_type(self, interfaces: Interfaces) -> str:
         interfaces.require(self.type)
         return self.type
 
     def templates(self) -> list[Any]:
         return [self.template, *([self.confirm.equals] if self.confirm else [])]
 
-    def answer_faults(self, place: str, checking: Checking) -> Iterator[Fault]:
+    def response_faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
         if self.confirm is not None:
             yield from _confirm_faults(f"{place}.confirm", self.confirm, checking)
         elif self.one_shot:
@@ -65,11 +64,11 @@ class Publishing(Templated, Published):
             yield Fault(f"{place}.one_shot", what)
 
 
-class Publish(Publishing):
+class Publish(SinglePublish):
     kind: Literal["publish"]
 
 
-def _confirm_faults(place: str, confirm: Confirm, checking: Checking) -> Iterator[Fault]:
+def _confirm_faults(place: str, confirm: Confirm, checking: CheckContext) -> Iterator[Fault]:
     known = confirm.type or checking.types.get(confirm.topic)
     if known is None:
         what = f"is missing: nothing else in the panel says what {confirm.topic} is"
@@ -79,25 +78,25 @@ def _confirm_faults(place: str, confirm: Confirm, checking: Checking) -> Iterato
     yield from faults
     if not faults:
         kind = checking.interfaces.field_type(known, confirm.field)
-        yield from _equals(place, confirm, kind, checking)
+        yield from _equals_faults(place, confirm, kind, checking)
 
 
-def _equals(place: str, confirm: Confirm, kind: str, checking: Checking) -> Iterator[Fault]:
+def _equals_faults(place: str, confirm: Confirm, kind: str, checking: CheckContext) -> Iterator[Fault]:
     if re.search(r"[/\]]", kind):
         what = f'"{confirm.field}" is {kind}: one value of it can confirm, not all'
         yield Fault(f"{place}.field", what)
         return
     try:
-        names = list(named(confirm.equals, "equals"))
+        names = list(placeholders(confirm.equals, "equals"))
     except FieldError as error:
         yield Fault(f"{place}.{error.field}", error.message)
         return
-    faults = list(unknown(place, names, checking.inputs, checking.anywhere))
-    faults += [Fault(f"{place}.{where}", NOW_IS) for where, name in names if name == NOW]
+    faults = list(unknown_input_faults(place, names, checking.inputs, checking.all_inputs))
+    faults += [Fault(f"{place}.{where}", NOW_RULE) for where, name in names if name == NOW]
     yield from faults
     if faults or {name for _, name in names} & set(checking.faulty):
         return
-    for values in tries({name: checking.inputs[name] for _, name in names}):
-        if fault := misfit(filled(confirm.equals, values), kind):
+    for values in example_values({name: checking.inputs[name] for _, name in names}):
+        if fault := value_mismatch(fill(confirm.equals, values), kind):
             yield Fault(f"{place}.equals", fault)
             return

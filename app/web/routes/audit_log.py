@@ -19,7 +19,7 @@ from app.commands.control_acts import ACTS
 from app.errors import InputError, LogError, NotFound
 from app.i18n import Param, Text, TextLike, say
 from app.panel.model import Panel
-from app.panel.widgets.families import Command, Entered
+from app.panel.widgets.families import Command, EntryWidget
 from app.printable import printable, printable_texts
 from app.web.app_state import AppState, CurrentState
 from app.web.described import TEXT, errors
@@ -126,7 +126,7 @@ async def page(request: Request, state: CurrentState, wanted: Annotated[Wanted, 
         typed=printable_texts(wanted.model_dump()),
         rows=rows,
         labels={w.id: w.label for w in panel.widgets() if isinstance(w, Command)},
-        inputs={w.id: w.label for w in panel.widgets() if isinstance(w, Entered)},
+        inputs={w.id: w.label for w in panel.widgets() if isinstance(w, EntryWidget)},
         acts={action: _word(action) for action in CONTROL_ACTIONS},
         outcomes=OUTCOMES,
         off="" if state.log.enabled else say("log_off"),

@@ -36,7 +36,7 @@ from app.commands.press_context import SEEN, PressContext
 from app.commands.receipts import Receipt, with_doubt
 from app.errors import InputError, LogError
 from app.i18n import localized, say
-from app.panel.template import needed
+from app.panel.template import needed_inputs
 from app.runtime.robot_session import RobotSession
 from app.web.app_state import AppState, CurrentSession, CurrentState
 from app.web.client_cookie import visitor
@@ -186,7 +186,7 @@ class _HoldSocket:
 
     async def _written(self, widget: str, inputs: Mapping[str, Any], context: PressContext) -> bool:
         """The entry in the log, while the browser is listened to: whether it holds still."""
-        own = needed(self._session.holds.widget(widget), inputs)
+        own = needed_inputs(self._session.holds.widget(widget), inputs)
         writing = asyncio.ensure_future(
             self._session.press_log.pressed(widget, own, self._id, context.origin, "hold")
         )

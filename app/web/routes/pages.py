@@ -17,8 +17,8 @@ from app.commands.receipts import Receipt
 from app.errors import NotFound
 from app.i18n import Text, TextLike, say
 from app.panel.model import Page, Panel
-from app.panel.template import inputs_of
-from app.panel.widgets.families import Entered, Pressed
+from app.panel.template import input_ids
+from app.panel.widgets.families import EntryWidget, PressCommand
 from app.permission.control_authority_view import role
 from app.permission.principal import Principal
 from app.printable import printable_texts
@@ -139,7 +139,7 @@ class Ask(TypedDict):
     """What will be done by a press, and the inputs that it takes."""
 
     sentence: Text
-    inputs: list[Entered]
+    inputs: list[EntryWidget]
 
 
 def _to_a_robot(request: Request, state: AppState, path: str) -> Response | None:
@@ -152,7 +152,7 @@ def _to_a_robot(request: Request, state: AppState, path: str) -> Response | None
 
 def _render(request: Request, state: AppState, page: Page) -> Response:
     session = state.fleet.session(request.path_params.get("robot"))
-    typed = any(isinstance(widget, Entered) for widget in page.widgets)
+    typed = any(isinstance(widget, EntryWidget) for widget in page.widgets)
     refresh_s = REFRESH_WITH_INPUTS_S if typed else REFRESH_S
     who, token = welcomed(request, state)
     if session.control.rules.required:
@@ -218,13 +218,13 @@ def _words(session: RobotSession, page: Page) -> dict[str, Any]:
 
 def asks_of(session: RobotSession, page: Page) -> dict[str, Ask]:
     """What is asked before the presses of a page that ask first."""
-    pressed = (w for w in page.widgets if isinstance(w, Pressed) and w.confirm_press)
+    pressed = (w for w in page.widgets if isinstance(w, PressCommand) and w.confirm_press)
     return {widget.id: ask_of(session, widget) for widget in pressed}
 
 
-def ask_of(session: RobotSession, widget: Pressed) -> Ask:
+def ask_of(session: RobotSession, widget: PressCommand) -> Ask:
     """With the robot's name, where there are several."""
-    inputs = {w.id: w for w in session.panel.widgets() if isinstance(w, Entered)}
+    inputs = {w.id: w for w in session.panel.widgets() if isinstance(w, EntryWidget)}
     robot = session.entry.name if session.entry else ""
     sentence = say("ask_on" if robot else "ask", label=widget.label, robot=robot)
-    return Ask(sentence=sentence, inputs=[inputs[name] for name in inputs_of(widget)])
+    return Ask(sentence=sentence, inputs=[inputs[name] for name in input_ids(widget)])

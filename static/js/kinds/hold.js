@@ -1,13 +1,14 @@
-// A button that acts while it is held. It ends by whatever may mean that nobody holds it any more,
-// and only a new press begins again. What it shows is what the server answered, nothing else.
-import { entered } from "../press.js";
+// Hold-to-run: a button that acts while it is held. Every event that may mean a release ends the hold, and only
+// a new press starts another one. The page shows the server's response, nothing else.
+import { enteredValues } from "../entries.js";
+import { onEnd } from "../hold-end.js";
 
-// From this page's own thread on purpose: a page that stands still must not keep a hold alive.
+// On the page's own thread on purpose: a page that stalls must not keep a hold alive.
 const BEAT_MS = 80;
-// Without an answer for so long the server does not hold any more.
+// Without a response for so long the server has ended the hold.
 const SILENCE_MS = 500;
-// The last answer waits for the disk.
-const LAST_ANSWER_MS = 3000;
+// The last response waits for the disk.
+const LAST_RESPONSE_MS = 3000;
 const KEYS = [" ", "Enter"];
 
 // Called for each widget of this kind.
@@ -17,15 +18,15 @@ class Hold {
   #root;
   #button;
   #source;
-  #socket = null; // of the hold that is going on; null when there is none
+  #socket = null; // of the current hold; null without one
   #lease = "";
-  #stamp = 0; // the server's last one, and when it came
+  #stamp = 0; // the server's last stamp, and when it arrived
   #stampedAt = 0;
   #number = 0;
   #timer = 0;
   #pointer = null;
   #key = null;
-  #waiting = new Map(); // socket → why, of holds that were let go and have no last answer yet
+  #ending = new Map(); // socket → reason, of ended holds without their last response
 
   constructor(root, source) {
     this.#root = root;
@@ -33,34 +34,11 @@ class Hold {
     this.#source = source;
     const button = this.#button;
     button.addEventListener("pointerdown", (event) => this.#down(event));
-    button.addEventListener("pointerleave", (event) => event.pointerId === this.#pointer && this.#end("sliding"));
-    // A long touch is no wish for a menu here; pointer events come all the same.
+    // A long touch must not open a menu; pointer events arrive all the same.
     button.addEventListener("touchstart", (event) => event.preventDefault(), { passive: false });
     button.addEventListener("keydown", (event) => this.#keyDown(event));
-    button.addEventListener("contextmenu", (event) => {
-      event.preventDefault();
-      this.#end("menu");
-    });
-    button.addEventListener("blur", () => this.#end("blur"));
     button.addEventListener("dragstart", (event) => event.preventDefault());
-    this.#watch();
-  }
-
-  // All that ends a hold from elsewhere on the page.
-  #watch() {
-    const on = (target, name, does) => target.addEventListener(name, does, { capture: true });
-    on(window, "pointerdown", (event) => event.pointerId !== this.#pointer && this.#end("second"));
-    on(window, "pointerup", (event) => event.pointerId === this.#pointer && this.#end("released"));
-    on(window, "pointercancel", (event) => event.pointerId === this.#pointer && this.#end("cancel"));
-    on(window, "keyup", (event) => event.key === this.#key && this.#end("released"));
-    on(window, "keydown", (event) => event.key === "Escape" && this.#end("escape"));
-    on(window, "blur", (event) => event.target === window && this.#end("blur"));
-    on(document, "visibilitychange", () => document.hidden && this.#end("hiding"));
-    on(window, "pagehide", () => this.#end("leaving"));
-    // A lock, and the loss of the event stream, which locks all.
-    new MutationObserver(() => this.#button.disabled && this.#end("lock")).observe(this.#button, {
-      attributeFilter: ["disabled"],
-    });
+    onEnd(button, () => this.#pointer, () => this.#key, (why) => this.#end(why));
   }
 
   #down(event) {
@@ -94,64 +72,64 @@ class Hold {
     this.#stampedAt = performance.now();
     let begun = false;
     socket.onmessage = ({ data }) => {
-      const on = socket === this.#socket;
-      if (!on && !this.#waiting.has(socket)) return;
-      const said = JSON.parse(data);
-      this.#stamp = said.stamp;
+      const isCurrent = socket === this.#socket;
+      if (!isCurrent && !this.#ending.has(socket)) return;
+      const message = JSON.parse(data);
+      this.#stamp = message.stamp;
       this.#stampedAt = performance.now();
-      if (!begun && on) this.#say(socket, { do: "begin", inputs: entered(), seen: this.#source.seen });
-      else if (!begun) this.#say(socket, { do: "end", why: this.#waiting.get(socket) });
+      if (!begun && isCurrent) this.#send(socket, { do: "begin", inputs: enteredValues(), seen: this.#source.seen });
+      else if (!begun) this.#send(socket, { do: "end", why: this.#ending.get(socket) });
       begun = true;
-      if (said.state === "held") on && this.#held(socket, said);
-      else if (said.state) this.#over(socket, said);
+      if (message.state === "held") isCurrent && this.#held(socket, message);
+      else if (message.state) this.#ended(socket, message);
     };
     socket.onclose = () => this.#lost(socket);
     this.#timer = setInterval(() => this.#beat(socket), BEAT_MS);
   }
 
-  #say(socket, what) {
+  #send(socket, message) {
     if (socket.readyState !== WebSocket.OPEN) return;
-    socket.send(JSON.stringify({ ...what, stamp: this.#stamp, after: performance.now() - this.#stampedAt }));
+    socket.send(JSON.stringify({ ...message, stamp: this.#stamp, after: performance.now() - this.#stampedAt }));
   }
 
   #beat(socket) {
     if (performance.now() - this.#stampedAt > SILENCE_MS) this.#end("silence");
-    else if (this.#lease) this.#say(socket, { do: "beat", number: ++this.#number, lease: this.#lease });
+    else if (this.#lease) this.#send(socket, { do: "beat", number: ++this.#number, lease: this.#lease });
   }
 
-  #held(socket, said) {
-    if (!said.lease) return;
-    this.#lease = said.lease;
-    this.#beat(socket); // on a slow way the next one may come too late
+  #held(socket, { lease }) {
+    if (!lease) return;
+    this.#lease = lease;
+    this.#beat(socket); // on a slow network the next one may be too late
     this.#root.dataset.hold = "held";
     this.#button.setAttribute("aria-pressed", "true");
   }
 
-  // On this side it ends at once; what is shown then is the server's answer.
+  // Ends the hold on this page at once; the server's response is shown after.
   #end(why) {
     const socket = this.#socket;
     if (!socket) return;
     this.#reset();
-    this.#say(socket, { do: "end", why, lease: this.#lease });
+    this.#send(socket, { do: "end", why, lease: this.#lease });
     if (why === "silence" || why === "leaving") {
       socket.close();
       if (why === "silence") this.#show("unknown", this.#root.dataset.cut);
     } else {
-      this.#waiting.set(socket, why);
-      setTimeout(() => socket.close(), LAST_ANSWER_MS);
+      this.#ending.set(socket, why);
+      setTimeout(() => socket.close(), LAST_RESPONSE_MS);
     }
   }
 
-  #over(socket, said) {
-    this.#waiting.delete(socket);
+  #ended(socket, { outcome, reason }) {
+    this.#ending.delete(socket);
     if (socket === this.#socket) this.#reset();
     else if (this.#socket) return;
-    this.#show(said.outcome, said.reason);
+    this.#show(outcome, reason);
     socket.close();
   }
 
   #lost(socket) {
-    const unanswered = this.#waiting.delete(socket);
+    const unanswered = this.#ending.delete(socket);
     if (socket === this.#socket) this.#reset();
     else if (!unanswered || this.#socket) return;
     this.#show("unknown", this.#root.dataset.cut);

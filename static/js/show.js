@@ -1,0 +1,78 @@
+// Shows the attributes and receipts of widgets: texts and element properties, in place. Composes no sentence.
+import { releaseEntry, showBounds, showEntry } from "./entries.js";
+
+export function setText(element, text) {
+  if (element && element.textContent !== text) element.textContent = text;
+}
+
+// How an attribute is shown. One that is not here has a place in the markup: `data-text` for a text,
+// `data-value` for the value of an element such as a meter, or an attribute of the widget's root.
+const SHOW = {
+  enabled: (root, value) => {
+    root.querySelector("button[type=submit], .hold").disabled = !value;
+    if (!value) root.querySelector("dialog.ask")?.close();
+  },
+  stoppable: (root, value) => {
+    const cancel = root.querySelector(".cancel");
+    if (cancel) cancel.disabled = !value;
+  },
+  press: (root, value) => {
+    const cancel = root.querySelector(".cancel");
+    if (cancel) cancel.value = value;
+  },
+  held: (root, value) => root.toggleAttribute("data-held", value),
+  reasons: (root, value) => {
+    const list = root.querySelector(".reasons");
+    setText(list?.querySelector("p"), value);
+    if (!value) list?.hidePopover();
+  },
+  outcome: (root, value) => (root.querySelector(".result").dataset.outcome = value),
+  busy: (root, value) => {
+    const bar = root.querySelector("progress");
+    if (bar) bar.hidden = !value;
+  },
+  askable: (root, value) => (root.querySelector(".read").disabled = !value),
+  entry: showEntry,
+  bounds: showBounds,
+  settable: (root, value) => (root.querySelector(".setting").inert = !value),
+  progress: (root, value) => {
+    const bar = root.querySelector("progress");
+    if (value === null) bar?.removeAttribute("value");
+    else if (bar) bar.value = value;
+  },
+};
+
+// Adds the functions of a widget kind's own script.
+export function addShow(functions) {
+  Object.assign(SHOW, functions);
+}
+
+export function showAttribute(root, name, value) {
+  if (name in SHOW) SHOW[name](root, value);
+  else showInPlace(root, name, value);
+}
+
+function showInPlace(root, name, value) {
+  setText(root.querySelector(`[data-text="${name}"]`), value ?? "");
+  const meter = root.querySelector(`[data-value="${name}"]`);
+  if (meter) meter.value = value ?? meter.min;
+  if (root.hasAttribute(`data-${name}`)) root.setAttribute(`data-${name}`, value ?? "");
+}
+
+// Shows the receipt of a press at its widget, and none at the others.
+export function showReceipt(widgets, root, { id, outcome, reason }) {
+  if (outcome === "succeeded") releaseEntry(root);
+  for (const widget of widgets) {
+    const old = widget.querySelector(".receipt");
+    if (!old) continue;
+    old.textContent = "";
+    delete old.dataset.outcome;
+  }
+  // The result of a call is an attribute of the widget, shown in every browser. The receipt of a cancel has
+  // no id: the goal's state shows that the cancel was requested.
+  const shared = id ? outcome !== "refused" : outcome === "accepted";
+  if (root.querySelector(".result") && shared) return;
+  const receipt = root.querySelector(".receipt");
+  receipt.dataset.outcome = outcome;
+  receipt.textContent = reason;
+}
