@@ -241,7 +241,7 @@ def test_a_server_sends_nothing_that_its_log_does_not_have(
     assert (refused.status_code, refused.json()["outcome"]) == (503, "refused")
     assert f"{NAME} was removed or renamed" in refused.json()["reason"]
     until(lambda: kiosk.press("operation", "new").status_code == 200, "it opens again")
-    assert "was removed or renamed while the server ran" in kiosk.http.get("/log").text
+    assert "was removed or renamed while the server was running" in kiosk.http.get("/log").text
     logged = [json.loads(e.values).get("message") for e in entries(tmp_path) if e.kind == "pressed"]
     assert logged == ["new"]
     until(lambda: "new" in kiosk.widget("last_heard")["text"], "the robot has it")

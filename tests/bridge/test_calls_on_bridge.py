@@ -284,7 +284,7 @@ def test_a_robot_that_has_just_come_gets_the_first_call(
         receipt = press(own_kiosk, "add", id=f"first-{number}")
         assert receipt.json()["outcome"] == "succeeded", receipt.json()
         assert len(reasons) == 1
-        assert "getting ready" in reasons[0]
+        assert "has just started" in reasons[0]
         assert len(robot.requests("/add_two_ints")) == 1
         robot.end()
         until(lambda: not own_kiosk.widget("add")["enabled"], "the robot is gone")
@@ -361,7 +361,7 @@ def test_a_cancel_of_a_goal_that_is_over_stops_no_other(kiosk: Server, robot: Cy
     assert kiosk.widget("count")["press"] == "goal-2"
     late = cancel(kiosk, press="goal-1", seen="0-1", at="2020-01-01T00:00:00Z", inputs={})
     assert (late.status_code, late.json()["outcome"]) == (409, "refused")
-    assert late.json()["reason"].startswith("That goal is over, or of before this server")
+    assert late.json()["reason"].startswith("Nothing was canceled: that goal is over")
     assert cancel(kiosk, press=2).status_code == 422
     assert robot.requests("/fibonacci/_action/cancel_goal") == []
     assert cancel(kiosk, press="goal-2", seen="0-1", at="2020-01-01T00:00:00Z").status_code == 200

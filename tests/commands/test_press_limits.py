@@ -200,6 +200,6 @@ def test_the_operators_log_sums_them_up(tmp_path: Path, servers: Callable[[Serve
     again = servers(serving(tmp_path, KIOSK_DATA=str(tmp_path)))
     text = again.http.get("/log.csv?outcome=refused&every=true").text
     entries = list(csv.DictReader(io.StringIO(text.removeprefix("\ufeff"))))
-    (summed,) = [entry for entry in entries if "were over the limit" in entry["reason"]]
+    (summed,) = [entry for entry in entries if "exceeded the limit" in entry["reason"]]
     assert summed["reason"].partition(" ")[2].startswith("presses from a program (127.0.0.1) since ")
     assert json.loads(summed["values"])["more"] >= 15

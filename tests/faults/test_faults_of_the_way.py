@@ -77,7 +77,7 @@ def test_a_bridge_that_comes_back_on_another_domain(rig: Rig, server: Server) ->
 
     def moved_back() -> None:
         until(server.ready, "the bridge of the other domain is joined")
-        assert "waiting for a new /kept" in server.widget("guarded")["reason"]
+        assert "Waiting for a new /kept" in server.widget("guarded")["reason"]
         assert server.press("free", "is anybody there?").json()["outcome"] == "unknown"
         moved(right)
 

@@ -84,7 +84,7 @@ def test_after_a_return_an_old_permission_does_not_count(
     until(lambda: not permitted(kiosk), "locked")
     own_bridge.start()
     until(kiosk.ready, "the bridge is back")
-    assert "waiting for a new /operation_enabled" in kiosk.widget("operation1")["reason"]
+    assert "Waiting for a new /operation_enabled" in kiosk.widget("operation1")["reason"]
     # Said until it is heard: to the node the killed bridge is a subscriber for some more seconds.
     own_node.advertise("/operation_enabled", "std_msgs/msg/Bool")
     own_node.every("/operation_enabled", {"data": True}, 0.1)
@@ -231,7 +231,7 @@ def test_a_successor_that_came_while_the_server_stood_still_has_to_say_it_again(
     kiosk.process.send(signal.SIGCONT)
     until(lambda: not permitted(kiosk), "the permission went with its publisher")
     time.sleep(1.0)
-    assert "waiting for a new /operation_enabled" in kiosk.widget("operation1")["reason"]
+    assert "Waiting for a new /operation_enabled" in kiosk.widget("operation1")["reason"]
     until(says_so, "permitted by the successor", every_s=0.2)
 
 

@@ -183,7 +183,7 @@ def shown(widget: Table, fields: Table) -> dict[str, Any]:
 
 
 J2: Final[Table] = {"type": JOINTS, "field": "position[name=joint_2]", "unit": "rad"}
-MISSING: Final = f"there is no position[name=joint_2] in what was {AT}"
+MISSING: Final = f"no position[name=joint_2] in the message {AT}"
 
 
 @pytest.mark.parametrize(
@@ -197,7 +197,7 @@ MISSING: Final = f"there is no position[name=joint_2] in what was {AT}"
         (["joint_2"], [1.0, 2.0], "missing", "—", MISSING),
         (["joint_2"], [], "missing", "—", MISSING),
         (["joint_2", "joint_2"], [1.0, 2.0], "missing", "—",
-         f"position[name=joint_2] is more than once in what was {AT}"),
+         f"position[name=joint_2] is more than once in the message {AT}"),
     ],
 )  # fmt: skip
 def test_a_readout_of_a_joint_by_its_name(
@@ -246,8 +246,7 @@ states = [{ value = "OK", text = "Good", shape = "circle" }]
         ([], "Locked: the last /operation_enabled has no status[name='drive: motor'].level."),
         (
             [("drive: motor", 0), ("drive: motor", 2)],
-            "Locked: status[name='drive: motor'].level is in the last /operation_enabled"
-            " more than once.",
+            "Locked: the last /operation_enabled has status[name='drive: motor'].level more than once.",
         ),
     ],
 )

@@ -132,11 +132,11 @@ def test_no_ping_while_a_callback_holds_the_links_lock(
 ) -> None:
     process, http = wounded
     process.send(signal.SIGUSR1)
-    until(lambda: "stands still" in listener.next()["STATUS"], "it is told")
+    until(lambda: "does not respond" in listener.next()["STATUS"], "it is told")
     assert listener.silent_for("WATCHDOG", 2 * INTERVAL_S)
     assert http.get("/healthz").status_code == 200
     assert process.count("[FATAL]") == 1
-    assert process.count("The Zenoh link of Robot stands still")
+    assert process.count("The Zenoh session of Robot does not respond")
 
 
 def test_no_ping_while_the_event_loop_stands_still(
