@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Final, Protocol
 
 from app.audit.press_record import Log
-from app.i18n import TextLike, joined
+from app.i18n import TextLike, joined, say
 from app.panel.model import Panel
 from app.panel.widgets.families import Display
 from app.permission.control_authority import ControlAuthority
@@ -20,7 +20,7 @@ from app.robot.state import RobotState
 from app.ros_logging import RobotLog
 from app.view.link_status import Lamp, Since
 from app.view.publisher import ViewPublisher
-from app.view.view import ViewWithDeadlines, build_view, update_displays
+from app.view.view import ViewWithDeadlines, build_view, lock_all, update_displays
 
 log = logging.getLogger("kiosk.view")
 
@@ -135,6 +135,8 @@ class ViewRefresher:
                 self._log.exception("the view could not be refreshed; it is tried again")
             self._failed = self._whole = True
             self._at(self._shown_at + AGAIN_S)
+            locked = lock_all(self._seen, say("view_failed"))
+            self.publisher.post(locked.view, locked.without_control)
         else:
             self._failed = self._whole = False
             self._spoke = set()

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any, Final, NamedTuple, TypedDict
 
-from app.i18n import TextLike, say
+from app.i18n import Text, TextLike, say
 from app.panel.model import Panel
 from app.panel.widgets.families import Display
 from app.permission.control_authority_view import IN_CONTROL, NO_CONTROL, ControlView, Role
@@ -108,6 +108,22 @@ def _without_control(questions: Iterable[Question], lock: Verdict) -> dict[str, 
     """The same commands, asked for a client that has no control."""
     asked = (one._replace(grounds=replace(one.grounds, control=lock)) for one in questions)
     return {one.widget.id: show(one.widget, one.robot, one.now, permission(one))[0] for one in asked}
+
+
+def lock_all(seen: ViewWithDeadlines, reason: Text) -> ViewWithDeadlines:
+    """The same with every interlock and command locked for one reason."""
+    overlay = {"enabled": False, "reason": reason, "reasons": reason, "more": ""}
+
+    def locked(attributes: Mapping[str, Any]) -> Any:
+        if "enabled" not in attributes:
+            return attributes
+        return {name: overlay.get(name, value) for name, value in attributes.items()}
+
+    view = seen.view.copy()
+    view["interlocks"] = {name: locked(one) for name, one in view["interlocks"].items()}
+    view["widgets"] = {name: locked(one) for name, one in view["widgets"].items()}
+    without = {name: locked(one) for name, one in seen.without_control.items()}
+    return seen._replace(view=view, without_control=without)
 
 
 def update_displays(

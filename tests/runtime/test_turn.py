@@ -106,14 +106,24 @@ def test_a_view_that_can_not_be_built_keeps_no_hold_from_its_end(
             cell.permit(False)
             cell.take()
             assert [receipt.widget for receipt in cell.ended] == ["jog", "arm"]
+            shown = cell.session.publisher.view
+            assert (
+                codes(shown["widgets"]["jog"])
+                == codes(shown["widgets"]["free"])
+                == (False, "view_failed")
+            )
             assert (await cell.session.presses.press("free", {"message": "x"}, "p", FROM)).outcome
         async with asyncio.timeout(20):  # and it is built again
-            while cell.session.publisher.view["widgets"]["jog"]["enabled"]:
+            while codes(cell.session.publisher.view["widgets"]["jog"]) == (False, "view_failed"):
                 await asyncio.sleep(0.01)
         await cell.session.stop()
 
     run(scene())
     assert caplog.text.count("the view could not be refreshed") == 1
+
+
+def codes(attributes: Any) -> tuple[bool, str]:
+    return attributes["enabled"], attributes["reason"].code
 
 
 class Broken:
