@@ -214,7 +214,7 @@ def test_one_export_at_a_time_and_it_is_whole(kiosk: Server) -> None:
         assert whole() is None
     answer = until(whole, "the place is free when who had it is gone")
     assert (refused[0].status_code, refused[0].headers["retry-after"]) == (429, "10")
-    assert "is being exported already" in refused[0].json()["error"]
+    assert "is already being exported" in refused[0].json()["error"]
     assert answer.headers["content-encoding"] == "gzip"
     rows = list(csv.DictReader(io.StringIO(answer.text.removeprefix("\ufeff"), newline="")))
     assert [int(row["seq"]) for row in rows] == list(range(19_999, 0, -1))

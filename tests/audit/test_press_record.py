@@ -367,7 +367,7 @@ def test_every_refusal_is_in_the_log(tmp_path: Path) -> None:
     entries = [entry for entry in real(tmp_path, work) if entry.kind != "pressed"]
     assert [entry.outcome for entry in entries] == ["refused"] * 4
     assert [entry.kind for entry in entries] == ["closed", "closed", "refused", "closed"]
-    words = ("characters long", "does not permit", "already used", "started anew")
+    words = ("characters long", "does not permit", "already used", "panel server restarted")
     assert all(word in entry.reason for word, entry in zip(words, entries, strict=True))
 
 

@@ -69,7 +69,7 @@ def test_a_killed_bridge_is_named_with_what_it_locks(
     own_bridge.kill()
     expect(said(page, "bridge", "locks")).to_have_text("Locks Publish, Publish1, Publish2.")
     expect(said(page, "bridge", "reason")).to_contain_text(
-        f"bridge can't be reached at {own_bridge.endpoint}."
+        f"bridge cannot be reached at {own_bridge.endpoint}."
     )
     expect(said(page, "bridge", "since")).not_to_have_text(joined_at)
     expect(said(page, "bridge", "since")).to_have_text(MOMENT)

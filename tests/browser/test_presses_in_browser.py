@@ -321,7 +321,7 @@ def test_without_scripts_a_double_tap_is_one_press_and_its_receipt_stays(
     box = start(page, 1).bounding_box()
     assert box is not None
     double_tap(page, box["x"] + 20, box["y"] + 20)
-    both = re.compile(r"Start 1: Sent on /operation at \S+ Not sent: so soon after the page came")
+    both = re.compile(r"Start 1: Sent on /operation at \S+ Not sent: this came so soon after the page")
     expect(page.locator("#receipt-go1")).to_have_text(both)
     assert pressed(mine) == 1
     page.mouse.click(box["x"] + 20, box["y"] + 20)
@@ -331,11 +331,11 @@ def test_without_scripts_a_double_tap_is_one_press_and_its_receipt_stays(
 def test_a_form_that_comes_as_soon_as_its_page_says_so_and_loses_nothing(demo: Server) -> None:
     soon = {"_since": str(time.time() + 60), "message": "typed"}
     page = demo.http.post("/widgets/operation", data=soon, follow_redirects=True)
-    assert "Not sent: so soon after the page came" in page.text
+    assert "Not sent: this came so soon after the page" in page.text
     assert 'value="typed"' in page.text
     before = page.url.params["receipt"]
     again = demo.http.post("/widgets/operation", data={**soon, "_last": before}, follow_redirects=True)
-    assert again.text.count("Not sent: so soon after the page came") == 1
+    assert again.text.count("Not sent: this came so soon after the page") == 1
     told = [entry for entry in logged(demo) if entry["press"] == before]
     assert [(entry["kind"], entry["outcome"]) for entry in told] == [("refused", "refused")]
 

@@ -94,7 +94,7 @@ def test_a_lock_that_blinks_under_a_resting_finger_refuses_the_press(
 
 @pytest.mark.parametrize(
     ("later_s", "status", "words"),
-    [(0.0, 200, "Sent"), (-1.5, 200, "Sent"), (-2.5, 409, "to get here"), (3.0, 409, "ahead of")],
+    [(0.0, 200, "Sent"), (-1.5, 200, "Sent"), (-2.5, 409, "to arrive"), (3.0, 409, "ahead of")],
 )
 def test_a_press_has_its_time(kiosk: Server, later_s: float, status: int, words: str, way: str) -> None:
     answer = kiosk.by(way).press("operation", "timed", at=server_time(kiosk, later_s))
@@ -224,5 +224,5 @@ def test_without_scripts_a_page_that_is_too_old_presses_nothing(
     assert set(fields) == {"_seen", "_until"}
     old = {**fields, "_until": str(float(fields["_until"]) - 120), "message": "old page"}
     answer = kiosk.http.post("/widgets/operation", data=old, follow_redirects=True)
-    assert "to get here: press again" in answer.text
+    assert "to arrive. Press again" in answer.text
     assert "old page" not in node.heard_data("/operation")

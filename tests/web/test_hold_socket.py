@@ -180,10 +180,14 @@ def test_a_second_holder_is_refused(demo: Server) -> None:
 @pytest.mark.parametrize(
     ("more", "status", "reason"),
     [
-        ({"stamp": 0, "after": 0, "do": "beat", "lease": "x", "number": 1}, 409, "can't be understood"),
-        ({"seen": "abc-1"}, 409, "started anew"),
+        (
+            {"stamp": 0, "after": 0, "do": "beat", "lease": "x", "number": 1},
+            409,
+            "sent an invalid message",
+        ),
+        ({"seen": "abc-1"}, 409, "panel server restarted"),
         ({"inputs": {"speed": 7}}, 422, "Speed is 7"),
-        ({"inputs": []}, 409, "can't be understood"),
+        ({"inputs": []}, 409, "sent an invalid message"),
         ({"stamp": 1e9}, 409, "too late"),
     ],
 )
@@ -220,7 +224,7 @@ def test_each_refused_hold_is_in_the_log(demo: Server) -> None:
         ("closed", "hold", "refused"),
     ]
     nonsense, judged = new
-    assert "can't be understood" in nonsense["reason"]
+    assert "sent an invalid message" in nonsense["reason"]
     assert "Speed is 7" in judged["reason"]
     assert (judged["values"], judged["verdict"]) == ('{"speed": 7}', "input")
     assert judged["of"] != ""
