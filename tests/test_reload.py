@@ -14,7 +14,7 @@ from playwright.sync_api import Page, expect
 from tests.support.parts import ROOT, Server
 
 FOLDERS = ("app", "templates", "static")
-PATTERNS = ("*.toml", "*.json5", "*.html", "*.css", "*.js", "*.msg", "*.srv", "*.action")
+PATTERNS = ("*.toml", "*.json5", "*.html", "*.css", "*.js", "*.po", "*.msg", "*.srv", "*.action")
 RELOAD = ["--reload", *(f"--reload-dir={name}" for name in FOLDERS)]
 RELOAD += [f"--reload-include={pattern}" for pattern in PATTERNS]
 STARTED_MS = 30_000  # on a busy machine

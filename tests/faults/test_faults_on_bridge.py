@@ -283,5 +283,9 @@ def test_an_old_latched_value_is_no_fresh_one(
         for _ in range(4):  # two seconds of beats: the latched value has come, and does not count
             stream.next("beat")
     assert "waiting for /operation_enabled" in kiosk.widget("operation1")["reason"]
-    own_node.publish("/operation_enabled", {"data": True})
-    opened(kiosk)
+
+    def said_again() -> bool:
+        own_node.publish("/operation_enabled", {"data": True})
+        return permitted(kiosk)
+
+    until(said_again, "what is published from then on counts", every_s=0.5)

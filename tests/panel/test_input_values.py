@@ -156,7 +156,7 @@ def test_digits_that_end_in_a_mistake_take_no_time(text: str) -> None:
 def test_limits_read_as_an_operator_says_them() -> None:
     for table, text in ((COUNT, "1 to 99, in steps of 1"), (FREE, "-1 to 1 rad")):
         widget: Any = one(table)
-        assert english(widget.limits) == text
+        assert english(widget.limits_text) == text
 
 
 @pytest.mark.parametrize(
@@ -176,7 +176,7 @@ def test_limits_that_are_written_as_whole_numbers_have_whole_steps(
     more: Mapping[str, Any], step: str, whole: bool
 ) -> None:
     widget: Any = one({"id": "n", "kind": "number", "label": "N", **more})
-    assert (widget.attributes["step"], widget.whole) == (step, whole)
+    assert (widget.html_attributes["step"], widget.whole) == (step, whole)
 
 
 def test_every_value_on_a_step_is_taken() -> None:
