@@ -88,7 +88,7 @@ def test_no_press_is_sent_when_the_log_is_gone_and_a_new_one_says_so(
         assert log.head is not None
         heads.append(log.head)
         take(folder)
-        with pytest.raises(LogError, match=r"can't be written: .* was removed or renamed"):
+        with pytest.raises(LogError, match=r"cannot be written: .* was removed or renamed"):
             await log.pressed(pressed(2))
         assert "was removed or renamed" in str(log.lock)
         log.add(sent(first))

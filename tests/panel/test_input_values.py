@@ -176,7 +176,7 @@ def test_limits_that_are_written_as_whole_numbers_have_whole_steps(
     more: Mapping[str, Any], step: str, whole: bool
 ) -> None:
     widget: Any = one({"id": "n", "kind": "number", "label": "N", **more})
-    assert (widget.html_attributes["step"], widget.whole) == (step, whole)
+    assert (widget.html_attributes["step"], widget.is_whole) == (step, whole)
 
 
 def test_every_value_on_a_step_is_taken() -> None:

@@ -68,6 +68,8 @@ class Broken:
 class Deaf:
     def hear(self, *_: object) -> None: ...
     def lose(self, *_: object) -> None: ...
+    def awaits(self, *_: object) -> bool:
+        return False
 
 
 def intake_of(panel: Panel, robot: RobotState, actions: Any) -> Ingest:
@@ -180,7 +182,7 @@ def test_each_sample_that_is_kept_whole_is_recorded_and_no_other() -> None:
         keys = frozenset({"heard"})
         heard: ClassVar[list[bytes]] = []
 
-        def hear(self, *about: Any) -> None:
+        def record_sample(self, *about: Any) -> None:
             self.heard.append(about[1].payload)
 
     panel = small_panel()

@@ -92,8 +92,8 @@ JOINTS = "sensor_msgs/msg/JointState"
     ("positions", "state", "text", "note"),
     [
         ([1.0, 2.0, 3.5], "live", "3.50 rad", AT),
-        ([1.0], "missing", "—", f"no position[2] in the message was {AT}"),
-        ([], "missing", "—", f"no position[2] in the message was {AT}"),
+        ([1.0], "missing", "—", f"no position[2] in the message {AT}"),
+        ([], "missing", "—", f"no position[2] in the message {AT}"),
     ],
 )
 def test_an_element_that_is_not_there_is_not_guessed(
