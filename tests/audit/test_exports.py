@@ -366,7 +366,7 @@ def test_a_search_that_takes_long_is_done_by_another_process(
         assert [row.entry.seq for row in found] == [79, 77, 75]
         assert found == queries.rows(tmp_path, Filter(text="number 3"), 90, 3)
         log.close()
-        with pytest.raises(LogError, match="ending"):
+        with pytest.raises(LogError, match="shutting down"):
             await log.rows(Filter(), None, 3)
 
     run(tmp_path, work)
