@@ -1,6 +1,6 @@
 """Who presses: one identity per browser, by a random token that it keeps, with a short name.
 
-It tells browsers apart, it does not say who the operator is: there are no users here.
+It distinguishes browsers, not operators: there are no users here.
 """
 
 import hashlib
@@ -28,7 +28,7 @@ TITLES: Final = {
 @dataclass(frozen=True, slots=True)
 class Client:
     """`id` may be shown to all, the token that it comes from is the browser's own; "" is one that
-    keeps no token. `local`: it runs on the kiosk's own machine. `number` tells it from others."""
+    keeps no token. `local`: it runs on the kiosk's own machine. `number` is no other's."""
 
     id: str
     address: str

@@ -154,7 +154,8 @@ class ControlAuthority:
         return ""
 
     def release(self, who: Principal) -> Refusal:
-        """The holder gives it up: to who asks, else to nobody; who asks, asks no more."""
+        """The holder gives it up: to the client that requests it, else to no one. A requester withdraws
+        its request."""
         if _is(who, self.holder):
             self._given_up = True
             self._pass_on(f"given up by {who}")
@@ -240,12 +241,12 @@ class ControlAuthority:
                 self._asker = None
 
     def _pass_on(self, how: str) -> None:
-        """To who asks, else to nobody."""
+        """To the client that requests it, else to no one."""
         heir, self._asker = self._asker, None
         if heir:
             heir.since = self._now()
         self._install(heir)
-        self._tell(f"control {how}, now of {heir.who if heir else 'nobody'}")
+        self._tell(f"control {how}, now of {heir.who if heir else 'no one'}")
 
     def _pass_by_time(self, code: str, how: str) -> None:
         before = self._holder

@@ -45,9 +45,9 @@ class Verdict:
 
     @property
     def reasons(self) -> list[TextLike]:
-        """All that is told of a lock, each sentence once."""
-        told = (one.reason for one in (self, *self.others))
-        return list(dict.fromkeys(reason for reason in told if reason))
+        """All reasons of a lock, each sentence once."""
+        reasons = (one.reason for one in (self, *self.others))
+        return list(dict.fromkeys(reason for reason in reasons if reason))
 
 
 PERMITTED: Final = Verdict(True)
@@ -56,7 +56,7 @@ NO_WAY: Final = frozenset(
     {"no_link", "no_bridge", "no_bridge_of", "bridge_silent", "joining", "catching_up"}
 )
 
-ENDPOINTS_TOLD: Final = 3
+MAX_ENDPOINTS: Final = 3
 
 # What comes so soon after joining may be a value of any age, sent again.
 HISTORY_S: Final = 1.0
@@ -88,8 +88,8 @@ def _no_link(endpoints: tuple[str, ...]) -> Verdict:
     """With where the bridge was looked for, if that is known."""
     if not endpoints:
         return locked("no_link")
-    told, more = endpoints[:ENDPOINTS_TOLD], len(endpoints) - ENDPOINTS_TOLD
-    where = say("and_more", names=told, number=more) if more > 0 else told
+    named, more = endpoints[:MAX_ENDPOINTS], len(endpoints) - MAX_ENDPOINTS
+    where = say("and_more", names=named, number=more) if more > 0 else named
     return Verdict(False, "no_link", say("no_link_at", where=where))
 
 
@@ -173,8 +173,8 @@ def call_blocked(call: ServerCommand, robot: RobotState, now: float) -> Verdict 
 
 
 def set_blocked(parameter: Parameter, robot: RobotState) -> Verdict | None:
-    """Why a parameter may not be set: its node is not there or has not told what may be set, or an
-    answer is awaited."""
+    """Why a parameter may not be set: its node is not running or has not reported what may be set, or
+    a response is awaited."""
     if doubt := parameters_offered(parameter.node, robot) or unsettable(
         parameter, robot.parameters.get(parameter.id, UNKNOWN)
     ):

@@ -1,4 +1,4 @@
-"""May this client press this command now? An ordered table of checks: the first that locks is told.
+"""May this client press this command now? An ordered table of checks; the first that locks decides.
 
 Everything that can be pressed is judged here: what the view shows as locked, presses, holds, calls,
 actions and parameters. A check is a row of `CHECKS`: a pure function from a question to a verdict, or
@@ -58,7 +58,7 @@ class Question(NamedTuple):
 
 class Check(NamedTuple):
     """`judge` gives a verdict, or None. Where a check locks `alone`, no later one is asked; else what
-    they lock is told beside it."""
+    they lock is listed beside it."""
 
     name: str
     judge: Callable[[Question], Verdict | None]
@@ -116,7 +116,7 @@ def judged(
 
 
 def combined(verdicts: Sequence[Verdict]) -> Verdict:
-    """The verdict of what all have to permit: the first that does not is told first."""
+    """The verdict of what all have to permit: the first that does not comes first."""
     if not verdicts:
         return PERMITTED
     if len(verdicts) == 1:

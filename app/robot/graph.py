@@ -78,7 +78,7 @@ class Graph:
         namespace: str | None = None,
         keys: Collection[str] | None = None,
     ) -> None:
-        """`namespace` tells this robot's bridges from those of others; None: all are its. Of tokens for
+        """`namespace` distinguishes this robot's bridges from others; None: all are its. Of tokens for
         other keys than `keys` nothing is kept; None: all are."""
         self._dialect = dialect
         self.own_zid = own_zid  # whose tokens are not the robot's

@@ -1,12 +1,12 @@
-"""Messages that may be latched ones, sent again: nobody knows how old they are.
+"""Messages that may be latched ones, sent again: their age is unknown.
 
 A publisher that is TRANSIENT_LOCAL keeps its last messages, and DDS sends them to every reader that is
 new to it: when the bridge makes its reader, or discovers the publisher, which may take seconds. The
 bridge stamps them with the time at which it passes them on, as it does any other message, so that
-nothing in a message tells that it is sent again. Only what comes from a cache of the bridge's own is
+nothing in a message shows that it is sent again. Only what comes from a cache of the bridge's own is
 known to be.
 
-So the first message since a reader or a publisher was new, whenever it comes, tells what is so, but not
+So the first message since a reader or a publisher was new, whenever it comes, shows the value, but not
 since when; and so do all that come within `REPLAY_S` of it, as a publisher may keep several and DDS
 sends them one after the other. The next message of a periodic publisher is believed.
 """

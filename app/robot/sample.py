@@ -23,7 +23,7 @@ class Sample(NamedTuple):
 
     `source` is the zid of the bridge that sent it (from its timestamp), None if it did not say;
     `seq` orders samples and losses of bridges as this session saw them; `skipped` is how many came
-    just before it that nobody looked at; `sent` is the timestamp of its sender's clock, in seconds
+    just before it that were not read; `sent` is the timestamp of its sender's clock, in seconds
     since the epoch; `skipped_payloads` are other payloads that came and went unseen, for watched
     topics, and `overrun` says that there were more before these, with unknown content. `cached` is
     one of a cache: it was published before, at an unknown time.

@@ -172,12 +172,12 @@ class Ingest:
         updates.came = bool(updates.found) and not had_bridge
 
     def _publisher(self, key: str, token: Token, endpoint: Endpoint) -> None:
-        """Whether a publisher has appeared, be it for a moment: until it says something, nobody knows
-        what it permits."""
+        """Whether a publisher has appeared, be it for a moment: until it publishes, what it permits is
+        unknown."""
         graph, silent_publishers = self._robot.graph, self._robot.silent_publishers
         if endpoint.zid == graph.own_zid:
             return
-        if token.came_seq and (token.lost_before or not graph.has_token(key)):  # else it is told twice
+        if token.came_seq and (token.lost_before or not graph.has_token(key)):  # else it came twice
             silent_publishers.add_publisher(endpoint, token.came_seq, token.came_at, token.lost_before)
             if endpoint.role == "MP" and endpoint.transient_local:
                 self._robot.replayed.begin(endpoint.key, token.came_at)

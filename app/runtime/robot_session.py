@@ -200,7 +200,7 @@ class RobotSession:
         self.renew()
 
     def renew(self) -> None:
-        """A new Zenoh session: until it is joined, nobody is known to be there."""
+        """A new Zenoh session: until it has joined, no endpoint is known."""
         self.robot.mark_link_lost()
         self._turn.follow(came=False)
         self.show()

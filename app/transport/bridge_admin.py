@@ -1,5 +1,5 @@
 """What a robot's bridges say of themselves in their admin space: that they run, their routes and
-nodes, the namespace that tells whose they are."""
+nodes, the namespace of the robot they belong to."""
 
 import asyncio
 import json

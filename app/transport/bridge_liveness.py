@@ -1,9 +1,9 @@
 """Whether a robot's bridges answer, asked again and again: a cut cable and a frozen bridge are seen by
 their silence, long before Zenoh's lease is over, and whatever lease the bridge is configured with.
 
-A question goes the way of a command, behind all that was sent before: its answer tells that this
+A question goes the way of a command, behind all that was sent before: its answer shows that this
 reached the bridge. And it comes behind all that the bridge had sent: after a standstill of the event
-loop it tells that what the robot said meanwhile is taken in.
+loop it shows that what the robot published in the meantime is taken in.
 """
 
 import asyncio
@@ -26,7 +26,7 @@ log = logging.getLogger("kiosk.pulse")
 EVERY_S: Final = 0.2
 SILENT_S: Final = 0.4  # without an answer, beside the time that the network takes
 TURN_S: Final = 0.02  # given to an answer that came while the loop stood still
-STOOD_STILL_S: Final = 0.4  # so late to ask: what has come meanwhile is still on its way through
+STOOD_STILL_S: Final = 0.4  # a query so late: messages from the meantime are still on their way
 GOOD: Final = 2  # answers in time to what was asked after a silence: the bridge's news came before
 LOOKED_AT: Final = 10  # answers
 LONGEST_S: Final = 2.5  # a question is not waited for any longer
@@ -120,7 +120,7 @@ class BridgeLiveness:
 
     def look(self) -> None:
         """Before anything is judged: whether the event loop stood still, and so may know nothing of
-        what the robot has said meanwhile."""
+        what the robot has published in the meantime."""
         now = self._monotonic()
         if now - self._asked_at < EVERY_S + STOOD_STILL_S:
             return

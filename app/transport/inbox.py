@@ -57,7 +57,7 @@ class Changes:
 
 
 class _Between:
-    """What came of a topic before the newest and was not looked at, each change once; of too many the
+    """The messages of a topic before the newest that were not read, each change once; of too many the
     newest."""
 
     __slots__ = ("_bytes", "overrun", "values")

@@ -25,7 +25,7 @@ class CoalescedQuery:
         self._asking: asyncio.Task[bool] | None = None
 
     async def answers(self) -> bool:
-        """What came of a question that is `EVERY_S` old at most when this is called."""
+        """The result of a query that is `EVERY_S` old at most when this is called."""
         loop = asyncio.get_running_loop()
         if self._asking is None or (self._asking.done() and loop.time() - self._asked_at >= EVERY_S):
             self._asked_at = loop.time()

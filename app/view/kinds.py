@@ -39,12 +39,12 @@ def enabled(verdict: Verdict) -> Enabled:
 
 
 def lock(widget: Command, verdict: Verdict) -> Attributes:
-    """Attributes of a control; one with several interlocks tells all reasons."""
-    several = told(verdict.reasons) if len(widget.interlocks) > 1 else {}
+    """Attributes of a control; one with several interlocks has all reasons."""
+    several = all_reasons(verdict.reasons) if len(widget.interlocks) > 1 else {}
     return {**enabled(verdict), **several}
 
 
-def told(reasons: Sequence[TextLike]) -> dict[str, TextLike]:
+def all_reasons(reasons: Sequence[TextLike]) -> dict[str, TextLike]:
     """`reasons` are all, a line each, and `more` says how many there are beside the first."""
     more: TextLike = say("more_reasons", number=len(reasons) - 1) if len(reasons) > 1 else ""
     return {"reasons": joined(reasons, "between_lines"), "more": more}
@@ -66,7 +66,7 @@ def progress(of: CommandStatus) -> Attributes:
 
 
 def _pressed(widget: PressCommand, robot: RobotState, verdict: Verdict, _: float) -> Shown:
-    """The lock, and what came of the last press."""
+    """The lock, and the result of the last press."""
     came = progress(robot.command_status.get(widget.id, IDLE))
     return {**lock(widget, verdict), **came}, math.inf
 

@@ -1,6 +1,6 @@
 """The three links of the way to the robot, each with what it locks: pure, from (panel, robot, time).
 
-Browser to server, server to bridge, bridge to the robot's nodes. What a control is locked by is told
+Browser to server, server to bridge, bridge to the robot's nodes. What a control is locked by is shown
 by its verdict's code.
 """
 
@@ -49,7 +49,7 @@ BRIDGE_LAMPS: Final[Mapping[str, tuple[State, str]]] = {
     "permitted": ("ok", "ok"),
 }
 
-LONGEST_LIST: Final = 120  # characters of labels that are told; the rest is counted
+LONGEST_LIST: Final = 120  # characters of labels that are listed; the rest is counted
 
 
 class Lamp(TypedDict):
@@ -94,7 +94,7 @@ def summary(name: str, link: Mapping[str, Lamp]) -> Lamp:
 
 @lru_cache(maxsize=64)
 def _link(name: str, state: State, text: str, reason: TextLike, *locked: str) -> LinkStatus:
-    """The same lamp, which nobody changes, until it is another one."""
+    """The same object for the same lamp. It must not be changed."""
     return LinkStatus(
         name=say(name), state=state, text=say(text), since="", locks=locks(locked), reason=reason
     )
@@ -149,13 +149,13 @@ def locks(names: Sequence[str]) -> Text:
     """Which controls a link locks, in words; of a long list the rest is counted."""
     if not names:
         return say("locks_nothing")
-    told = 1
-    while told < len(names) and len(", ".join(names[: told + 1])) <= LONGEST_LIST:
-        told += 1
-    shown = tuple(names[:told])
-    if told == len(names):
+    count = 1
+    while count < len(names) and len(", ".join(names[: count + 1])) <= LONGEST_LIST:
+        count += 1
+    shown = tuple(names[:count])
+    if count == len(names):
         return say("locks", names=shown)
-    return say("locks_more", names=shown, number=len(names) - told)
+    return say("locks_more", names=shown, number=len(names) - count)
 
 
 def _first(verdicts: Mapping[str, Verdict], codes: frozenset[str]) -> Verdict:

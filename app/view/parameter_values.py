@@ -68,7 +68,7 @@ def _text(parameter: Parameter, value: Value) -> TextLike:
 
 def _beginning(value: Value) -> Value:
     """The whole value, or as much of it as has more characters than are ever shown or entered: it is
-    written anew with every change, and a robot's texts may have megabytes."""
+    written again with every change, and a robot's texts may have megabytes."""
     if isinstance(value, str):
         return value[: MAX_TEXT + 1]
     if not isinstance(value, tuple):
@@ -108,11 +108,11 @@ def _note(parameter: Parameter, known: ParameterState, robot: RobotState) -> Tex
             )
         case "unreadable":
             return say("parameter_unreadable", node=parameter.node, name=parameter.parameter)
-    told = tells(robot)
-    return say("parameter_read" if told else "parameter_told", time=time, node=parameter.node)
+    reports = reports_changes(robot)
+    return say("parameter_read" if reports else "parameter_told", time=time, node=parameter.node)
 
 
-def tells(robot: RobotState) -> bool:
+def reports_changes(robot: RobotState) -> bool:
     """Whether changes that others make are heard, by what the graph shows."""
     key, graph = robot.key(EVENTS), robot.graph
     heard = graph.has_endpoint("MP", key) and not graph.is_unrouted(key)

@@ -26,7 +26,7 @@ SEPARATORS: Final = {c.encode(): b"\\u%04x" % ord(c) for c in "\x85\u2028\u2029"
 
 
 def encoded(data: Mapping[str, Any], language: str = ENGLISH) -> bytes:
-    """JSON in one line, for whoever reads lines; what is no number is null, a text is rendered."""
+    """JSON in one line, for clients that read lines. NaN and infinity are null; a Text is rendered."""
     text = to_json(data, inf_nan_mode="null", fallback=lambda one: render(one, language))
     for separator, escaped in SEPARATORS.items():
         text = text.replace(separator, escaped)
@@ -143,5 +143,5 @@ class ViewPublisher:
 
 
 def client_id_event(browser: str) -> bytes:
-    """Tells a page the id of its browser: it knows by it what `control` means for it."""
+    """The event with the id of a client's browser, by which it reads `control`."""
     return b"event: browser\ndata: %b\n\n" % encoded({"id": browser})

@@ -31,7 +31,7 @@ class Application(FastAPI):
 class Heads:
     """Answers HEAD as GET without the body (RFC 9110, 9.3.2), whatever route it is.
 
-    The route is told that the client is gone once its head is sent: an event stream ends there.
+    The route gets a disconnect once its head is sent: an event stream ends there.
     """
 
     def __init__(self, app: ASGIApp) -> None:

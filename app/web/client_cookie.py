@@ -46,7 +46,7 @@ def welcomed(request: Request, state: AppState) -> tuple[Principal, str]:
     """Who asks, and the token that their browser gets with the answer, "" where it has one.
 
     With a link on another site's page a browser does not send the cookie that it may have: it
-    gets no second one, and tells with its next request who it is.
+    gets no second one: its next request has the first.
     """
     who = visitor(request, state)
     if who.client.id or request.headers.get("sec-fetch-site") in OTHER_SITES:

@@ -43,7 +43,7 @@ class Connection(HttpToolsProtocol):
     def data_received(self, data: bytes) -> None:
         before = self._due
         if before is None and (self.cycle is None or self.cycle.response_complete):
-            self._begin()  # the next request, or what nobody waits for
+            self._begin()  # the next request, or a response that no client waits for
         super().data_received(data)
         if before is not None and before is self._due:
             self._head += len(data)

@@ -34,7 +34,7 @@ async def on_kiosk_error(request: Request, error: Exception) -> Response:
     message = error.text if isinstance(error, KioskError) else str(error)
     answer = error_answer(request, status, message)
     if isinstance(error, TooSlow):
-        answer.headers["connection"] = "close"  # nobody waits for the rest
+        answer.headers["connection"] = "close"  # no client waits for the rest
     if isinstance(error, TooMany):
         answer.headers["retry-after"] = str(error.retry_after_s)
     return answer
@@ -50,7 +50,7 @@ async def on_invalid(request: Request, error: Exception) -> Response:
 
 
 async def on_gone(request: Request, error: Exception) -> Response:
-    """Of who dropped the connection before the request was whole: nobody reads this."""
+    """For a client that dropped the connection before its request was complete: no one reads this."""
     return Response(status_code=400)
 
 

@@ -1,4 +1,4 @@
-"""What is counted from the start on. app/web/prometheus.py tells it to Prometheus."""
+"""Counters since the start. app/web/prometheus.py exports them."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -32,7 +32,7 @@ class Open:
 
 
 class Metrics:
-    """Counts of one application, however often its panel is loaded anew."""
+    """Counts of one application, however often its panel is reloaded."""
 
     def __init__(
         self, left_out: Callable[[], int] = lambda: 0, limited: Callable[[], int] = lambda: 0
@@ -50,5 +50,5 @@ class Metrics:
         self.fleet = fleet
 
     def pressed(self, outcome: str) -> None:
-        """What came of a press or a hold."""
+        """The outcome of a press or a hold."""
         self.presses.setdefault(outcome, Count(time.time())).value += 1

@@ -11,7 +11,7 @@ from app.web.metrics import Metrics
 
 
 def exposition(metrics: Metrics) -> tuple[bytes, str]:
-    """What is told, and its media type."""
+    """The exposition and its media type."""
     registry = CollectorRegistry()
     registry.register(_Of(metrics))
     return generate_latest(registry), CONTENT_TYPE_LATEST

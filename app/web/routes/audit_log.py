@@ -161,8 +161,8 @@ async def as_csv(request: Request, state: CurrentState, wanted: Annotated[Wanted
 
 
 class Exported(Response):
-    """An export, handed on piece by piece. One that breaks off, or that nobody takes, is not brought to
-    its end, so that no client takes it for whole."""
+    """An export, handed on piece by piece. One that breaks off, or that no client reads, is not
+    terminated, so that no client takes it for whole."""
 
     media_type = "text/csv"
 
@@ -208,7 +208,7 @@ class Exported(Response):
 
 
 async def _taken(send: Send, message: Message) -> None:
-    """TimeoutError where nobody takes it."""
+    """TimeoutError where no client takes it."""
     async with asyncio.timeout(TAKEN_WITHIN_S):
         await send(message)
 

@@ -29,7 +29,7 @@ router = APIRouter()
 Act = Annotated[str, Path(json_schema_extra={"enum": list(ACTS)})]
 ASKER: Final = r"^[0-9a-f]{0,12}$"
 
-# A form's browser shows that it is there by loading its page anew, at the latest after this time.
+# A form's browser shows that it is there by reloading its page, at the latest after this time.
 FORM_LIFE_S: Final = 35.0
 FORM_FIELDS_MOST: Final = 8
 

@@ -46,7 +46,7 @@ from app.web.request_body import json_of, received
 router = APIRouter()
 
 BEGIN_WITHIN_S: Final = 2.0  # from the opening of the socket
-SILENCE_S: Final = 2.0  # a hold is over long before: nobody is there
+SILENCE_S: Final = 2.0  # a hold is over long before: the client is gone
 # 4000 + HTTP's
 CLOSE: Final[Mapping[str, int]] = {
     "interlock": 4409,
@@ -211,7 +211,7 @@ class _HoldSocket:
         return with_doubt(receipt, why)
 
     async def _closed(self, receipt: Receipt) -> Receipt:
-        """Its end in the operator's log, on the disk before it is told."""
+        """Its end in the operator's log, on the disk before it is answered."""
         why = await self._pending.closed(receipt.outcome, receipt.reason) if self._pending else ""
         return with_doubt(receipt, why)
 

@@ -41,7 +41,7 @@ PAGES: Described = errors(403, 404, 422) | {
 # input, rarely enough to type in.
 REFRESH_S = 5
 REFRESH_WITH_INPUTS_S = 30
-RELOADED = "reloaded"  # by itself: nobody tapped for it
+RELOADED = "reloaded"  # by itself, without a tap
 RELOADED_S = 2.0  # a press on a page that should have reloaded before is one on an old page
 # How long after a page without scripts was due it is still thought to be there.
 GRACE_S = 5

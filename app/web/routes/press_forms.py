@@ -90,7 +90,7 @@ def _page_of(session: RobotSession, widget: str) -> Page:
 
 
 def _until(inputs: dict[str, str]) -> float | None:
-    """When a page without scripts should have loaded anew, if that is over, else now.
+    """When a page without scripts should have reloaded, if that is over, else now.
 
     It can't say when it was pressed, but a page that does not reload itself is none to press on.
     """

@@ -121,7 +121,7 @@ class _PressSocket:
     async def _answer(self, press_id: str | None, status: int, **what: TextLike) -> None:
         said = localized({"press": press_id, "status": status, **what}, self._language)
         text = json.dumps(said, ensure_ascii=False)
-        with suppress(WebSocketDisconnect, RuntimeError):  # nobody is there any more
+        with suppress(WebSocketDisconnect, RuntimeError):  # the client is gone
             await self._socket.send_text(text)
 
 

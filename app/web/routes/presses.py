@@ -69,7 +69,7 @@ class Cancel(BaseModel):
 
 
 class ReceiptAnswer(BaseModel):
-    """What came of a press."""
+    """The receipt of a press."""
 
     id: str
     widget: str
