@@ -47,7 +47,7 @@ def frame(said: str | bytes) -> bytes:
 
 
 def found_in_page(port: int, pattern: str) -> str:
-    """What is found in a page that nobody else gets."""
+    """What is found in a page that no one else gets."""
     with contextlib.closing(http.client.HTTPConnection("127.0.0.1", port, timeout=CONNECT_S)) as server:
         server.request("GET", "/")
         page = server.getresponse().read().decode()
@@ -129,7 +129,7 @@ class Crowd:
                 self._came.append((number, at))
 
     def forget(self) -> None:
-        """Begins anew with what has come and its numbers."""
+        """Begins again with what has come and its numbers."""
         with self._lock:
             for key in self._selector.get_map().values():
                 key.data[0] = -1

@@ -137,7 +137,7 @@ class Rig:
         self, peer: Peer, server: Running, topics: Sequence[str] = (), way: str = ""
     ) -> Iterator[Unattended]:
         """A browser of its own with its page, permitted by the robot, which speaks `way` if that is not
-        the peer's own. What it says of `topics` meanwhile, the page has to show in the end."""
+        the peer's own. What it says of `topics` in the meantime, the page has to show in the end."""
         with tempfile.TemporaryDirectory(
             prefix="bench-chromium-", ignore_cleanup_errors=True
         ) as profile:

@@ -63,7 +63,7 @@ def stalled(rig: Rig, peer: Peer) -> dict[str, Any]:
 def _others(
     rig: Rig, peer: Peer, page: Watched, for_s: float, pids: tuple[int, ...]
 ) -> tuple[list[float], float]:
-    """(latencies in ms, the most memory meanwhile) of another page."""
+    """(latencies in ms, the most memory in the meantime) of another page."""
     clock = page.clock()
     page.take("toggles")
     said: list[tuple[float, bool]] = []

@@ -21,7 +21,7 @@ Results = dict[str, Any]
 
 class Store:
     """`results` is {"machine": …, "faults": {…}, "<phase>": {"at": …, "commit": …, "rounds":
-    [{"<peer>": {"<figure>": number}}]}}; phases that were not measured anew stay as they were."""
+    [{"<peer>": {"<figure>": number}}]}}; phases that were not measured again stay as they were."""
 
     def __init__(self, path: Path) -> None:
         self._path = path

@@ -17,7 +17,7 @@ STARTS_WITHIN_S: Final = 15.0
 
 
 class Unattended:
-    """One page of one browser, in front; it is spoken to before and after, never meanwhile."""
+    """One page of one browser, in front; it is spoken to before and after, never in the meantime."""
 
     def __init__(self, playwright: Playwright, profile: Path) -> None:
         """`profile` is a folder of its own."""

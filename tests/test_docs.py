@@ -114,7 +114,7 @@ def test_a_press_is_answered_as_its_example_shows(kiosk: Server) -> None:
     assert answer.status_code == 200
     example = json.loads(shown("reference/http.md", "json")[0])
     assert set(answer.json()) == set(example)
-    assert answer.json()["outcome"] in ("published", "unknown")  # nobody may listen in the demo
+    assert answer.json()["outcome"] in ("published", "unknown")  # no one may listen in the demo
     assert example["widget"] == answer.json()["widget"]
 
 

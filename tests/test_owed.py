@@ -16,7 +16,7 @@ def test_it_waits_until_all_are_told() -> None:
 
 async def _until_all_are_told() -> None:
     owed = InFlight()
-    await owed.drained(0)  # nobody waits
+    await owed.drained(0)  # no one waits
     with owed.track():
         with owed.track():
             pass

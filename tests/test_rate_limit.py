@@ -1,4 +1,4 @@
-"""How often somebody may do something, by a clock that the test sets."""
+"""How often someone may do something, by a clock that the test sets."""
 
 import pytest
 
@@ -107,7 +107,7 @@ def test_each_that_is_too_many_is_counted_and_told_to_the_log(pressing: Pressing
 
 
 def test_a_cancel_is_one_too_many_only_if_this_goals_was_asked_for_just_now(pressing: Pressing) -> None:
-    """No press, no other goal and nobody else's cancels keep anybody from stopping a robot."""
+    """No press, no other goal and no one else's cancels keep anyone from stopping a robot."""
     pressing.admitted(browser(1), 1000)
     sum(pressing.admitted(program(f"10.0.1.{n}"), 50) for n in range(250))
     assert pressing.canceled(browser(1), 1000, "/robots/r1", "count", "p1") == OF_CANCELS.burst

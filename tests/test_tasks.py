@@ -1,4 +1,4 @@
-"""A task that nobody waits for: its failure is logged, its end by the server is none."""
+"""A task that no one waits for: its failure is logged, its end by the server is none."""
 
 import asyncio
 import logging

@@ -1,4 +1,4 @@
-"""The operator's log: who pressed what, and what came of it."""
+"""The operator's log: who pressed what, and the result."""
 
 from app.audit.audit_log import OperatorLog
 from app.audit.entry import Entry, Origin, entered, same_values

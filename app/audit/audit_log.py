@@ -134,7 +134,7 @@ class OperatorLog:
             return None
 
     async def closed(self, entry: Entry) -> TextLike:
-        """Writes what came of a press; returns when that is on the disk, or why it is not."""
+        """Writes the result of a press; returns when that is on the disk, or why it is not."""
         if entry.outcome == "refused":
             self._refusals.take(entry)
         try:
@@ -144,7 +144,7 @@ class OperatorLog:
         return ""
 
     def add(self, entry: Entry) -> None:
-        """Writes what came of a press, when nobody waits for it."""
+        """Writes the result of a press, when no one waits for it."""
         self._add(entry)
 
     def allowed(self, origin: Origin) -> bool:
@@ -189,7 +189,7 @@ class OperatorLog:
         return self._readers.export(wanted, before, gzip, language)
 
     def close(self) -> None:
-        """The server is about to end: it waits for nobody who reads."""
+        """The server is about to end: it waits for no one who reads."""
         self._readers.close()
 
     async def open_presses(self, robot: str, widgets: Collection[str], since: int) -> list[OpenPress]:
@@ -225,7 +225,7 @@ class OperatorLog:
         raise ticket.result
 
     def _close_abandoned(self, ticket: Ticket) -> None:
-        """A press that nobody waits for any more may have been written all the same."""
+        """A press that no one waits for any more may have been written all the same."""
         if isinstance(ticket.result, Entry):
             self._add(ticket.result.follow_up("closed", "refused", say("log_abandoned")))
 

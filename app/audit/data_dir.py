@@ -18,7 +18,7 @@ from app.errors import FolderInUse
 from app.i18n import say
 
 LOCK: Final = "server.lock"
-HELD_BY_OTHER_S: Final = 5.0  # a server that is started anew waits so long for the old one's lock
+HELD_BY_OTHER_S: Final = 5.0  # a server that is started again waits so long for the old one's lock
 RETRY_S: Final = 0.1
 
 

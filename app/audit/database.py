@@ -17,9 +17,9 @@ NAME: Final = "operators-log.sqlite3"
 SUFFIXES: Final = ("", "-wal", "-shm")
 APPLICATION: Final = 0x4F504C47  # "OPLG"
 VERSION: Final = 2
-BUSY_TIMEOUT_S: Final = 1.0  # with a program of somebody's that has the file locked
+BUSY_TIMEOUT_S: Final = 1.0  # with a program of someone's that has the file locked
 
-# `undone` has the presses of which the end is not known; it can be made from `entry` anew.
+# `undone` has the presses of which the end is not known; it can be made from `entry` again.
 SCHEMA: Final = """
 CREATE TABLE entry (
   seq INTEGER PRIMARY KEY, at INTEGER NOT NULL, boot TEXT NOT NULL, monotonic INTEGER NOT NULL,

@@ -33,7 +33,7 @@ class Origin:
 
 
 class Entry(NamedTuple):
-    """`at` is milliseconds since 1970 (UTC); `monotonic` microseconds on a clock that nobody sets,
+    """`at` is milliseconds since 1970 (UTC); `monotonic` microseconds on a clock that no one sets,
     which counts within one `boot` of the server; `of` the number of the press that it tells of.
 
     `values` is JSON, `verdict` the code of what permitted or locked, `board` the version of the
@@ -97,7 +97,7 @@ class Entry(NamedTuple):
             return self.reason
 
     def follow_up(self, kind: Kind, outcome: str, reason: TextLike, **more: str) -> Self:
-        """The entry that tells, now, what came of this press."""
+        """The entry that tells, now, the result of this press."""
         at, monotonic = _now()
         return self._replace(
             seq=0,

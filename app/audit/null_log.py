@@ -55,7 +55,7 @@ class NullLog:
         return []
 
     async def pressed(self, entry: Entry) -> Entry | None:
-        """LogError where another server took the folder meanwhile."""
+        """LogError where another server took the folder in the meantime."""
         if self._folder is not None:
             try:
                 self._folder.hold()
@@ -69,7 +69,7 @@ class NullLog:
         return ""
 
     def close(self) -> None:
-        """Nobody reads it."""
+        """No one reads it."""
 
     def add(self, entry: Entry) -> None:
         """It is not kept."""

@@ -78,7 +78,7 @@ class Opening:
 
 
 def cut_off(store: Store) -> Sequence[Entry]:
-    """What is to be said of presses of servers that ended before they knew what came of them."""
+    """What is to be said of presses of servers that ended before they knew their results."""
     return [
         entry.follow_up(
             "corrected" if store.answered(entry.seq) else "closed", "unknown", say("log_ended")

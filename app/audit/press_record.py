@@ -30,7 +30,7 @@ class Log(Protocol):
         """Returns when the entry is on the disk, or why it is not."""
 
     def add(self, entry: Entry) -> None:
-        """Writes it, and nobody waits."""
+        """Writes it, and no one waits."""
 
     def allowed(self, origin: Origin) -> bool:
         """Whether a refusal may be an entry; where not, it is left out."""
@@ -66,13 +66,13 @@ class PendingEntry:
         self._verdict = {"verdict": verdict, "board": self._board()}
 
     async def closed(self, outcome: str, reason: TextLike) -> TextLike:
-        """Writes what came of it; returns when that is on the disk, or why it is not."""
+        """Writes the result; returns when that is on the disk, or why it is not."""
         if self._entry is None:
             return self._fault
         return await self._log.closed(self._entry.follow_up("closed", outcome, reason, **self._verdict))
 
     def broke_off(self, sentence: str) -> None:
-        """Nobody will know what came of it."""
+        """No one will know the result."""
         if self._entry is not None:
             self._log.add(self._entry.follow_up("closed", "unknown", say(sentence), **self._verdict))
 
@@ -114,7 +114,7 @@ class PressLog:
         return PendingEntry(self._log, written, self._board, self._log.fault)
 
     async def canceled(self, widget: str, origin: Origin) -> PendingEntry:
-        """A cancel is written if it can be: no log that fails keeps anybody from stopping a robot."""
+        """A cancel is written if it can be: no log that fails keeps anyone from stopping a robot."""
         entry = entered("pressed", origin, {}, **self._columns(widget, "", "cancel"))
         try:
             written = await self._log.pressed(entry)

@@ -38,7 +38,7 @@ CONDITIONS: Final = {
 class Filter:
     """Which entries; times in ms since 1970 (UTC), `since` included and `until` not.
 
-    `every`: presses too of which a later entry tells what came of them.
+    `every`: presses too of which a later entry tells their results.
     """
 
     since: int | None = None

@@ -8,7 +8,7 @@ from app.i18n import TextLike
 
 
 class ReaderSlots:
-    """On the event loop; nobody waits."""
+    """On the event loop; no one waits."""
 
     def __init__(self, most: int, again_s: int, message: TextLike) -> None:
         """`again_s`: when it makes sense to come again; `message` says that all places are taken."""

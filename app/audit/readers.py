@@ -64,7 +64,7 @@ class Readers:
                 yield process
 
     def close(self) -> None:
-        """The server is about to end: it waits for nobody who reads."""
+        """The server is about to end: it waits for no one who reads."""
         self._closed = True
         for process in self._processes:
             process.cut()

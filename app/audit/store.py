@@ -198,7 +198,7 @@ class Store:
             return os.fstat(self._wal).st_size
 
     def checkpoint(self) -> None:
-        """Takes the log that is beside the file into it, and begins that one anew; synced.
+        """Takes the log that is beside the file into it, and begins that one again; synced.
 
         What a reader still needs stays for the next time. The first commit after it waits for the
         disk, so that is done here.

@@ -40,7 +40,7 @@ class Ticket:
     abandoned: bool = False
 
     def wake(self) -> None:
-        """Whoever waits waits no longer."""
+        """Nothing waits for it any longer."""
         if not self.waiter.done():
             self.waiter.set_result(None)
 

@@ -1,6 +1,6 @@
 """Whether the operator's log is as it was written: each entry's hash, and how they follow.
 
-What this can't see is the removal of the newest entries, and a log that somebody wrote anew as a
+What this can't see is the removal of the newest entries, and a log that someone wrote again as a
 whole: for that the head is compared with one that was noted elsewhere.
 """
 

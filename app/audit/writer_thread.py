@@ -37,10 +37,10 @@ MAX_UNWRITTEN: Final = 1000
 
 
 class ClockSteadiness:
-    """Whether the wall's clock can be trusted to tell what is old: nobody set it for an hour."""
+    """Whether the wall's clock can be trusted to tell what is old: no one set it for an hour."""
 
     def __init__(self) -> None:
-        self._ahead: float | None = None  # of the clock that nobody sets
+        self._ahead: float | None = None  # of the clock that no one sets
         self._since = 0.0
 
     def is_steady(self, wall: float, now: float) -> bool:

@@ -1,4 +1,4 @@
-"""Cancelling a goal: anyone may, whoever has control, and however late."""
+"""Cancelling a goal: anyone may, with or without control, and however late."""
 
 import asyncio
 import time

@@ -58,7 +58,7 @@ class Confirmations:
         sent: TextLike,
         corrected: OnCorrection,
     ) -> Outcome:
-        """What came of a command that went out at `since` (monotonic seconds), as `sent` says."""
+        """The result of a command that went out at `since` (monotonic seconds), as `sent` says."""
         confirm = widget.confirm
         assert confirm is not None
         future: asyncio.Future[float] = asyncio.get_running_loop().create_future()

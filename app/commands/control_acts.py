@@ -113,7 +113,7 @@ class ControlActs:
         return _receipt(asked, act_id, "control_too_often", say("control_too_often"), "limit")
 
     def passed(self, passing: Passing) -> None:
-        """Control changed by no act: an entry of the log, for which nobody waits."""
+        """Control changed by no act: an entry of the log, for which no one waits."""
         who, other = passing.who, passing.other.title if passing.other else say("no_client")
         reason = say(f"log_{passing.code}", name=who.title, other=other)
         self._press_log.note(passing.code, origin_of(who), reason)

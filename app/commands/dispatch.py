@@ -31,7 +31,7 @@ class Transport(Protocol):
 
 
 async def taken_for_reached() -> bool:
-    """Where nobody asks whether something arrives."""
+    """Where no one asks whether something arrives."""
     return True
 
 

@@ -2,7 +2,7 @@
 
 A client is a browser by its cookie; programs without one are one client for each address. An address
 has a limit of its own, for a cookie is made up easily, and all addresses together have one. The kiosk's
-own machine does not count among these: nobody in the network keeps the panel at the cell from pressing.
+own machine does not count among these: no one in the network keeps the panel at the cell from pressing.
 """
 
 import time
@@ -52,7 +52,7 @@ class PressLimits:
 
     def admit_cancel(self, who: Principal, *goal: str) -> bool:
         """The same for a cancel: it is one too many only if this very goal's was asked for that often
-        just now, so that nobody is kept from stopping a robot."""
+        just now, so that no one is kept from stopping a robot."""
         if not self._cancels.has_token(goal):
             return self._refuse(who)
         self._cancels.take_token(goal)

@@ -121,7 +121,7 @@ class Presses:
 
     async def cancel(self, widget_id: str, origin: Origin, press_id: str = "") -> Receipt:
         """Asks the robot to cancel the goal of one press or, without its id, the one under way: anyone
-        may, whoever has control, and however late."""
+        may, with or without control, and however late."""
         return await self._cancels.cancel(widget_id, origin, press_id)
 
     def cancel_all(self) -> None:
@@ -143,7 +143,7 @@ class Presses:
             receipt = await work
         except BaseException as error:
             under_way.receipt.set_exception(error)
-            under_way.receipt.exception()  # who else waited is told; nobody needs to have
+            under_way.receipt.exception()  # who else waited is told; no one needs to have
             raise
         finally:
             del self._under_way[press_id]

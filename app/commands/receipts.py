@@ -1,4 +1,4 @@
-"""Who presses and what came of it: what presses and holds have in common."""
+"""Who presses and the result: what presses and holds have in common."""
 
 import hashlib
 import json
@@ -27,7 +27,7 @@ _sorted: Final = json.JSONEncoder(sort_keys=True).encode
 
 @dataclass(frozen=True, slots=True)
 class Receipt:
-    """What came of a press; `reason` is a sentence for the operator, `cause` why it was refused.
+    """The result of a press; `reason` is a sentence for the operator, `cause` why it was refused.
 
     `inputs` are those that the widget needs, `entered` all that the press came with, if they are few
     and short: a page without scripts shows them again. `fingerprint` tells these from any others.
@@ -118,7 +118,7 @@ def receipt_of(
     answer: Outcome,
     cause: Cause = "",
 ) -> Receipt:
-    """What came of a press just now."""
+    """The result of a press just now."""
     at = datetime.now(UTC).isoformat(timespec="milliseconds")
     own, entered = ({**of} if _short(of) else {} for of in (needed_inputs(widget, inputs), inputs))
     told = answer.outcome, answer.text, at, cause
@@ -128,7 +128,7 @@ def receipt_of(
 def recalled(
     widget: PressCommand, inputs: Mapping[str, Any], press: Entry, told: Entry | None, cause: Cause
 ) -> Receipt:
-    """What the operator's log knows of a press: where it was told nothing, nobody will know."""
+    """What the operator's log knows of a press: where it was told nothing, no one will know."""
     if told is None:
         answer, at = Outcome("unknown", say("log_ended")), press.at
     else:

@@ -56,7 +56,7 @@ class Request:
 
 @dataclass(slots=True)
 class _Waiting:
-    """A call whose query is not over; `cut` is done when the bridge went away meanwhile."""
+    """A call whose query is not over; `cut` is done when the bridge went away in the meantime."""
 
     request: Request
     press_id: str

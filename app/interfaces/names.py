@@ -55,7 +55,7 @@ def status(action_key: str) -> str:
 
 
 def valid_type(told: str) -> str:
-    """The type that somebody names; `NO_TYPE`, which no panel is made for, where that can't be one."""
+    """The type that someone names; `NO_TYPE`, which no panel is made for, where that can't be one."""
     return told if len(told) <= MAX_NAME and _ANY_TYPE.fullmatch(told) else NO_TYPE
 
 

@@ -47,7 +47,7 @@ class Fleet:
             )
 
     async def start(self) -> None:
-        """Opens every link; whether anybody is there shows later."""
+        """Opens every link; whether anyone is there shows later."""
         for session in self.sessions:
             await session.start()
 

@@ -122,7 +122,7 @@ class RobotSession:
         self._rosout = Rosout(self.robot, self.interfaces, self.link, asyncio.get_running_loop())
 
     async def start(self) -> None:
-        """Declares everything; whether anybody is there shows later."""
+        """Declares everything; whether anyone is there shows later."""
         await self._commands.start()
         self.interfaces.prepare_codecs(
             {*self.panel.subscriptions().values(), *self.panel.publications().values()}

@@ -50,7 +50,7 @@ class ZenohSession:
     """A session with its subscribers, publishers and tokens."""
 
     def __init__(self, config: zenoh.Config, wake: Callable[[bool], None], dialect: Dialect) -> None:
-        """Opens at once, whether or not anybody is there; `wake` is the inbox's."""
+        """Opens at once, whether or not anyone is there; `wake` is the inbox's."""
         self._config = config
         self._dialect = dialect
         self._inbox = Inbox(wake)
@@ -186,7 +186,7 @@ class ZenohSession:
         return self._dialect.attachment(self.zid, expression, self._sent[expression], time.time_ns())
 
     def heard(self, key: str) -> bool:
-        """Whether somebody is known to listen; not whether they act on it."""
+        """Whether someone is known to listen; not whether they act on it."""
         with _translated(f"can't ask who listens on {key}"):
             status: Any = self._publishers[key].matching_status  # an object, whatever the stub says
             return bool(status.matching)

@@ -17,7 +17,7 @@ EARLY_S: Final = 0.15
 
 
 class Heartbeat:
-    """Beats while somebody hears it; on the event loop only."""
+    """Beats while someone hears it; on the event loop only."""
 
     def __init__(self, wake: Callable[[], None]) -> None:
         """`wake` is called when a beat is due, and is to be sent."""

@@ -1,5 +1,5 @@
 """Who is behind a proxy: `X-Forwarded-For` and `X-Forwarded-Proto` count from proxies that are named,
-and from nobody else."""
+and from no one else."""
 
 from collections.abc import Sequence
 from typing import Any, Final

@@ -49,7 +49,7 @@ topic = "/operation"
 type = "std_msgs/msg/String"
 message = { data = "x" }
 """
-# Rows as a server would have written them, but for their hashes: nobody verifies these.
+# Rows as a server would have written them, but for their hashes: no one verifies these.
 FILL = """
 WITH RECURSIVE number(n) AS (SELECT 2 UNION ALL SELECT n + 1 FROM number WHERE n < :last)
 INSERT INTO entry SELECT n, 1763700000000 + n, 'boot0000', n * 1000, iif(n % 2, 'closed', 'pressed'),

@@ -198,7 +198,7 @@ def test_a_logged_press_shows_on_the_page_with_its_outcome(demo: Server) -> None
     number = itertools.count(1)
 
     def published() -> dict[str, Any] | None:
-        """A server that stood still for a moment refuses what came meanwhile."""
+        """A server that stood still for a moment refuses what came in the meantime."""
         name = f"shown-{next(number)}"
         receipt = demo.press("operation", "for <b>the</b> log", id=name).json()
         return {**receipt, "name": name} if receipt["outcome"] == "published" else None

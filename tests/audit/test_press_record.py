@@ -1,4 +1,4 @@
-"""What a press writes into the operator's log, and when: before it is sent, and what came of it."""
+"""What a press writes into the operator's log, and when: before it is sent, and the result."""
 
 import asyncio
 import json

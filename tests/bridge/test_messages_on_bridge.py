@@ -124,7 +124,7 @@ def test_a_slider_without_a_step_goes_in_fine_ones(cell: Server, robot: RosNode,
     speed, output = entry(page, "speed"), page.locator('[data-widget="speed"] output')
     expect(speed).to_have_attribute("type", "range")
     expect(speed).to_have_attribute("step", "any")
-    expect(output).to_have_text("0.333")  # what nobody touched stays as it is
+    expect(output).to_have_text("0.333")  # what no one touched stays as it is
     expect(page.locator("#limits-speed")).to_have_text("-1 to 1")
     page.get_by_label("Speed: more").click()
     expect(output).to_have_text("0.36")

@@ -1,4 +1,4 @@
-"""`/readyz` asks the bridge itself; `/healthz` needs nobody."""
+"""`/readyz` asks the bridge itself; `/healthz` needs no one."""
 
 import ctypes
 import os

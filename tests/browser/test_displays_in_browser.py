@@ -237,7 +237,7 @@ def test_without_scripts_the_same_values_arrive(
         page.get_by_label("Mode").select_option(label="Until stopped")
         page.wait_for_timeout(TAP_AGAIN_MS)
         if page.get_by_label("Speed (m/s)").input_value() != "0.7":
-            return False  # it loaded itself anew meanwhile, as pages without scripts do
+            return False  # it loaded itself again in the meantime, as pages without scripts do
         press(page, "Drive")
         receipt = page.locator("#receipt-drive")
         expect(receipt).not_to_be_empty()

@@ -149,7 +149,7 @@ class Finger:
         self.opens()
 
     def opens(self) -> None:
-        """The page anew: a cause that was tried before, like a hidden page, is over."""
+        """The page again: a cause that was tried before, like a hidden page, is over."""
         self.up()
         self.page.goto(self.server.url)
         expect(self.button).to_be_enabled()
@@ -381,7 +381,7 @@ def test_the_servers_end_stops_the_robot_first(touched: Finger, jogger: RosNode)
 
 
 def test_from_a_killed_server_nothing_more_comes(touched: Finger, jogger: RosNode) -> None:
-    """The robot's own deadline has to act: nobody is left to say stop."""
+    """The robot's own deadline has to act: no one is left to say stop."""
     before, _ = begun(touched, jogger)
     began = time.monotonic()
     touched.server.process.kill()

@@ -175,7 +175,7 @@ def test_without_scripts_a_press_is_a_form(server: Server, node: RosNode, chromi
     until(server.ready, "ready")
     context = chromium.new_context(java_script_enabled=False)
     page = context.new_page()
-    # One that was locked for a moment, as by a stall of the server, loads itself anew only later.
+    # One that was locked for a moment, as by a stall of the server, loads itself again only later.
     until(lambda: page.goto(server.url) and button(page, "Publish").is_enabled(), "it is open")
     before = len(node.heard("/operation"))
     page.wait_for_timeout(TAP_AGAIN_MS)

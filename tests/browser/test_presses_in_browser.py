@@ -307,7 +307,7 @@ def test_without_scripts_too(opens: Opens, without_scripts: Page) -> None:
     yes = page.locator(".yes").bounding_box()
     assert yes is not None
     x, y = yes["x"] + 5, yes["y"] + 5
-    double_tap(page, x, y)  # the first one comes before anybody can have read the question
+    double_tap(page, x, y)  # the first one comes before anyone can have read the question
     expect(page.locator(".yes")).to_be_visible()
     assert pressed(mine) == 0
     page.mouse.click(x, y)

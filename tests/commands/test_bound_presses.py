@@ -183,7 +183,7 @@ def test_a_tablets_wrong_clock_does_not_matter(kiosk: Server, chromium: Browser)
 def test_a_press_in_a_page_that_stood_still_is_not_sent(
     kiosk: Server, node: RosNode, page: Page
 ) -> None:
-    """The page's script is busy for 3 s; the tap that came meanwhile has its own time."""
+    """The page's script is busy for 3 s; the tap that came in the meantime has its own time."""
     page.goto(kiosk.url)
     publish = page.get_by_role("button", name="Publish", exact=True)
     expect(publish).to_be_enabled()

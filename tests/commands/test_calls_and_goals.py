@@ -47,7 +47,7 @@ class Line:
         future: asyncio.Future[bytes | None] = asyncio.get_running_loop().create_future()
         self.asked.append((key, payload, future))
         self.timeouts.append(timeout_s)
-        if key.endswith("send_goal"):  # as Zenoh, where nobody is waited for any longer
+        if key.endswith("send_goal"):  # as Zenoh, where no one is waited for any longer
             asyncio.get_running_loop().call_later(timeout_s, give_up, future)
         return future
 

@@ -164,7 +164,7 @@ async def pressing(endpoint: str, over: Callable[[], bool]) -> None:
 def test_nothing_is_sent_after_a_false_that_is_in_the_inbox(
     own_bridge: Bridge, own_node: RosNode, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A node permits and forbids 400 times a second, while somebody presses all the time."""
+    """A node permits and forbids 400 times a second, while someone presses all the time."""
     recorded = Recorded(monkeypatch)
     own_node.subscribe("/guarded", "std_msgs/msg/String")
     own_node.advertise("/operation_enabled", "std_msgs/msg/Bool")

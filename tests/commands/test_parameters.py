@@ -612,4 +612,4 @@ def test_a_value_shows_and_its_input_starts_from_it(
     (of,) = panel.parameters()
     shown = parameter(of, robot)
     assert english((shown["text"], shown["entry"])) == (text, entry)
-    assert "does not report changes" in english(shown["note"])  # nobody publishes /parameter_events
+    assert "does not report changes" in english(shown["note"])  # no one publishes /parameter_events

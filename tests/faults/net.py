@@ -61,7 +61,7 @@ class Namespace:
 
     @contextmanager
     def inside(self) -> Iterator[None]:
-        """This thread, and all that it starts meanwhile, is in the namespace."""
+        """This thread, and all that it starts in the meantime, is in the namespace."""
         with open("/proc/thread-self/ns/net") as before, open(f"/proc/{self.pid}/ns/net") as here:
             _set(here.fileno())
             try:

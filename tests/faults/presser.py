@@ -85,7 +85,7 @@ class Presser:
 
 @dataclass(frozen=True, slots=True)
 class Account:
-    """What came of a number of presses."""
+    """The result of a number of presses."""
 
     pressed: int
     received: int

@@ -130,7 +130,7 @@ class Trial:
 
 
 class Publishers:
-    """A bridge, a panel on it that nobody permits anything, and publishers that come and go, all with
+    """A bridge, a panel on it that no one permits anything, and publishers that come and go, all with
     one durability: the panel listens as the first one it saw."""
 
     def __init__(self, domain: int, folder: Path, durability: str = "volatile") -> None:
@@ -200,7 +200,7 @@ class Publishers:
             time.sleep(0.02)
 
     def _alone(self) -> None:
-        """Until nobody publishes the topic."""
+        """Until no one publishes the topic."""
         until(lambda: not self._observer.there, "its publisher is gone", within_s=GONE_WITHIN_S)
 
     def close(self) -> None:

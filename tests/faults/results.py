@@ -24,7 +24,7 @@ END: Final = "<!-- /faults -->"
 def record(
     fault: str, *, locked: str = "", presses: object = "", latest: str = "", after: str = ""
 ) -> None:
-    """Keeps one row, if anybody collects them."""
+    """Keeps one row, if anyone collects them."""
     if path := os.environ.get("FAULTS_RESULTS"):
         row = {
             "fault": fault,

@@ -1,4 +1,4 @@
-"""Browsers that do not read, come in hundreds, or come and go: nobody else is held up."""
+"""Browsers that do not read, come in hundreds, or come and go: no one else is held up."""
 
 import time
 from concurrent.futures import ThreadPoolExecutor

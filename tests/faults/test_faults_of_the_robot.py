@@ -1,4 +1,4 @@
-"""The robot's own parts break, lie or shout while somebody goes on pressing."""
+"""The robot's own parts break, lie or shout while someone goes on pressing."""
 
 import json
 import random

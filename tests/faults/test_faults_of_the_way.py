@@ -1,4 +1,4 @@
-"""The way to the robot breaks while somebody goes on pressing: what is shown, and what arrives."""
+"""The way to the robot breaks while someone goes on pressing: what is shown, and what arrives."""
 
 import subprocess
 import sys
@@ -67,7 +67,7 @@ def test_a_frozen_bridge(rig: Rig, server: Server) -> None:
 
 
 def test_a_bridge_that_comes_back_on_another_domain(rig: Rig, server: Server) -> None:
-    """Nobody of the robot is there any more: what is sent is sent to nobody, and told so."""
+    """No one of the robot is there any more: what is sent is sent to no one, and told so."""
     right = rig.bridge.domain
 
     def moved(domain: int) -> None:

@@ -121,7 +121,7 @@ def answering(server: Server) -> Iterator[None]:
                     stood.append(stacks(server))
                     return
                 except httpx.TransportError:
-                    continue  # it was ended: whoever did that has to know
+                    continue  # it was ended, by a client that knows it
 
     thread = threading.Thread(target=ask, daemon=True)
     thread.start()

@@ -259,7 +259,7 @@ def test_only_what_needs_a_file_with_a_fault_is_left_out_too(make: Make) -> None
 
 
 def test_a_file_with_a_fault_hides_the_built_in_type_of_its_name(make: Make) -> None:
-    """The robot has another one than the distribution: nobody knows which."""
+    """The robot has another one than the distribution: no one knows which."""
     cell = Interfaces("jazzy", [make({"std_msgs/msg/Header.msg": "int33 x"})])
     for name in ("std_msgs/msg/Header", "sensor_msgs/msg/Imu", "nav_msgs/srv/GetPlan_Request"):
         with pytest.raises(InterfaceError, match=r"Header\.msg:1: "):

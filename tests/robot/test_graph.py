@@ -272,7 +272,7 @@ def test_a_robots_bridges_are_those_of_its_namespace() -> None:
     graph = Graph(DIALECT, KIOSK, "/robot1")
     for zid in ("b1", "b2", "b3"):
         graph.apply_token(bridge_token(zid), True)
-    assert graph.bridges == {"b1", "b2", "b3"}  # nobody has told yet
+    assert graph.bridges == {"b1", "b2", "b3"}  # no one has told yet
     graph.update_namespaces({"b1": "/robot1", "b2": "/robot10"})
     assert graph.bridges == {"b1"}
     graph.apply_token(bridge_token("b1"), False)

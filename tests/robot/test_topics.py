@@ -291,7 +291,7 @@ def test_what_is_no_answer_says_so_and_keeps_no_other_waiting() -> None:
 
 
 def test_a_whole_message_of_many_elements_is_not_built() -> None:
-    """Such as a status of goals: what lists them may be anybody's."""
+    """Such as a status of goals: what lists them may be anyone's."""
     many = "action_msgs/msg/GoalStatusArray"
     status = bytes(28)
     few = LITTLE + (1000).to_bytes(4, "little") + status * 999 + status[:25]

@@ -147,7 +147,7 @@ class Node:
         self._thread.start()
 
     def tell(self) -> None:
-        """Tells which readers and writers are this node's; anew whenever they have changed."""
+        """Tells which readers and writers are this node's; again whenever they have changed."""
         node = NodeEntitiesInfo("/", self.name, list(self._readers), list(self._writers))
         self._info.write(ParticipantEntitiesInfo(_gid(self._participant), [node]))
 

@@ -148,7 +148,7 @@ class Parameters:
         self._silent[service] = seconds
 
     def declare(self, name: str, value: Any, **more: Any) -> None:
-        """Declares a parameter, or declares it anew, and tells of it."""
+        """Declares a parameter, or declares it again, and tells of it."""
         type_ = kind_of(value)
         self._declared[name] = Declared(ParameterDescriptor(name, type_, **more), value)
         self._tell([], new=[self._declared[name]])
@@ -180,7 +180,7 @@ class Parameters:
         answer(DescribeParameters_Response(found))
 
     def _list(self, request: ListParameters_Request, answer: Answer) -> None:
-        """None of the names has a prefix, so whoever asks for one gets nothing."""
+        """None of the names has a prefix, so the client that asks for one gets nothing."""
         names = [n for n in self._declared if not request.prefixes or n in request.prefixes]
         answer(ListParameters_Response(ListParametersResult(names, [])))
 

@@ -208,7 +208,7 @@ def test_one_bridge_may_carry_robots_with_namespaces_of_their_own(
     kiosk = servers(live(bridge.endpoint, tmp_path, KIOSK_PANEL=str(path)))
     until(kiosk.ready, "ready")
     second = kiosk.robot("r2")
-    # The node listens since a moment ago: until the bridge knows, a press says that nobody hears it.
+    # The node listens since a moment ago: until the bridge knows, a press says that no one hears it.
     until(
         lambda: second.press("operation", "second").json()["outcome"] == "published", "heard", 10, 0.2
     )

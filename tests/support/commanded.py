@@ -25,7 +25,7 @@ class Commanded:
         self.start()
 
     def start(self) -> None:
-        """The program, and after its end the program anew."""
+        """The program, and after its end the program again."""
         self._process: subprocess.Popen[str] = subprocess.Popen(
             self._command,
             stdin=subprocess.PIPE,

@@ -1,4 +1,4 @@
-"""A process that has read the server's libraries once, and begins kiosks by forking: reading them anew
+"""A process that has read the server's libraries once, and begins kiosks by forking: reading them again
 takes a second of work for each. Message types, the panel's models and templates are prepared once, too.
 
 It is `python -m tests.support.kiosk_parent FD` in the project's folder. FD is a socket: each message is

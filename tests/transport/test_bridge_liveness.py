@@ -55,7 +55,7 @@ def test_no_answer_is_silence_after_its_limit() -> None:
 
 
 def test_nothing_was_asked_is_no_silence() -> None:
-    """A server that stood still has not asked meanwhile."""
+    """A server that stood still has not asked in the meantime."""
     silence = LivenessDetector()
     end = network(silence, LAN_S, 0.0, 10)
     silence.judge(end + 60)
@@ -94,7 +94,7 @@ def test_a_loop_that_stood_still_is_no_slow_network() -> None:
     silence = LivenessDetector()
     end = network(silence, LAN_S, 0.0, LOOKED_AT)
     silence.ask(end)
-    silence.hear(end, end + 2.0)  # nobody judged meanwhile
+    silence.hear(end, end + 2.0)  # no one judged in the meantime
     assert not silence.silent
     assert silence.limit < bridge_liveness.SILENT_S + 0.01
 
@@ -205,7 +205,7 @@ def test_a_loop_that_stood_still_is_no_silence(monkeypatch: pytest.MonkeyPatch) 
         await until(lambda: line.asked)
 
         def stand_still() -> None:
-            """Its time is up before anybody looks at the answer."""
+            """Its time is up before anyone looks at the answer."""
             nonlocal clock
             time.sleep(0.15)
             clock = 3.0

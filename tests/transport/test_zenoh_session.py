@@ -32,7 +32,7 @@ BURST = 500
 
 
 def matched(publisher: zenoh.Publisher) -> bool:
-    """Whether somebody is known to listen: an object of Zenoh's, whatever its stub says."""
+    """Whether someone is known to listen: an object of Zenoh's, whatever its stub says."""
     status: Any = publisher.matching_status
     return bool(status.matching)
 
@@ -121,7 +121,7 @@ def test_a_session_is_renewed_in_the_middle_of_what_comes_in(
 
 
 def test_a_burst_is_not_dropped(peer: tuple[str, zenoh.Session]) -> None:
-    """With Zenoh's own queue some of these were lost, more on a busy machine, and nobody was told."""
+    """With Zenoh's own queue some of these were lost, more on a busy machine, and no one was told."""
     endpoint, session = peer
     heard: list[bytes] = []
 

@@ -1,4 +1,4 @@
-"""The newest view for everybody: snapshots, differences, shared bytes, no queue."""
+"""The newest view for everyone: snapshots, differences, shared bytes, no queue."""
 
 import asyncio
 import json

@@ -150,7 +150,7 @@ def test_a_form_is_read_as_that_of_a_press_is(client: Callable[..., Client], bod
 
 
 def test_what_was_touched_long_ago_is_not_done_any_more(client: Callable[..., Client]) -> None:
-    """A server that stood still takes in later what was touched meanwhile."""
+    """A server that stood still takes in later what was touched in the meantime."""
     late = client()
     long_ago = (datetime.now(UTC) - timedelta(seconds=4)).isoformat()
     answer = late.control("take", at=long_ago)

@@ -132,7 +132,7 @@ def test_who_does_not_read_costs_one_event_and_then_gets_the_newest() -> None:
                 await asyncio.sleep(0)
             await turns()
             assert client.sending == sending
-            assert len(other.got) > seen  # nobody else waits for it
+            assert len(other.got) > seen  # no one else waits for it
             assert len(bench.board._prepared) <= 2
             client.read(True)
             await turns()

@@ -56,7 +56,7 @@ def press(name: str, press_id: str = "", **more: Any) -> str:
 
 
 def logged(kiosk: Server, press_id: str) -> str:
-    """The line in the server's log that tells what came of a press."""
+    """The line in the server's log that tells the result of a press."""
     return next((line for line in kiosk.process.lines if f"press {press_id} of" in line), "")
 
 

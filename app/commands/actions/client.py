@@ -73,7 +73,7 @@ class ActionClient:
         return self._link.query(key, payload, timeout_s)
 
     async def reply(self, goal: Goal, query: Query) -> bytes | None:
-        """The reply; None when there is none in time, or the bridge went away meanwhile."""
+        """The reply; None when there is none in time, or the bridge went away in the meantime."""
         ends: set[asyncio.Future[Any]] = {query} if goal.cut.done() else {query, goal.cut}
         await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
         reply = query.result() if query.done() else None

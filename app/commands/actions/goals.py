@@ -71,7 +71,7 @@ class GoalTracker:
         entry: str = "",
         look: FinalCheck = no_check,
     ) -> Outcome:
-        """Sends a goal; `corrected` gets what came of it in the end, `entry` is the hash of the press's
+        """Sends a goal; `corrected` gets the result in the end, `entry` is the hash of the press's
         entry in the operator's log. FieldError for bad fields, LinkError where it could not be sent:
         then nothing is under way."""
         own_id = goal_id(entry)
@@ -152,7 +152,7 @@ class GoalTracker:
         if goal.state == CANCELING:  # by an earlier cancel
             return Outcome("accepted", say("goal_canceling"))
         if response.return_code in NO_SUCH_GOAL and goal.doubt and not goal.cut.done():
-            goal.cut.set_result("")  # its end is asked for anew
+            goal.cut.set_result("")  # its end is asked for again
         return Outcome("rejected", say("cancel_refused", time=now))
 
     def hear_feedback(self, action: str, sample: Sample) -> None:
@@ -249,7 +249,7 @@ class GoalTracker:
         self._show(goal, goal.in_doubt)
 
     def _tell(self, goal: Goal, answer: Outcome) -> None:
-        """What came of it, or that it is not known any more: to the widget and the receipt."""
+        """The result, or that it is not known any more: to the widget and the receipt."""
         goal.doubt = ""
         self._show(goal, goal.came_to(answer))
         goal.corrected(goal.press_id, answer)

@@ -1,5 +1,5 @@
 """Goals of before this server's start: those whose end the operator's log does not know are followed
-anew.
+again.
 
 A goal's id is made of the hash of its press's entry (`goals.goal_id`), so the log is enough to ask the
 robot for it. Nothing is sent by itself but that question.
@@ -66,7 +66,7 @@ class GoalRecovery:
 
     async def start(self) -> None:
         """Returns when the goals are known; where the log can't be read, that is tried again and again,
-        and meanwhile no goal is sent, unless the panel goes on without its log."""
+        and in the meantime no goal is sent, unless the panel goes on without its log."""
         if self._widgets and not await self._read():
             self._reading = spawn_logged(self._read_later(), self._log, "goals were not followed anew")
 

@@ -36,7 +36,7 @@ class ResultWaiter:
         back: Callable[[Goal], None],
         tell: Callable[[Goal, Outcome], None],
     ) -> None:
-        """`tell` gets what came of a goal, or that it is not known any more; `cut` is called with the
+        """`tell` gets the result of a goal, or that it is not known any more; `cut` is called with the
         sentence when one is cut off, and `back` when its server is offered again."""
         self._services = services
         self._robot = robot
@@ -98,7 +98,7 @@ class ResultWaiter:
             await asyncio.sleep(ASK_AGAIN_S)
 
     async def _end(self, goal: Goal) -> Outcome | None:
-        """What came of it; None where nothing more is heard, or nobody answered."""
+        """The result; None where nothing more is heard, or no one answered."""
         reply = await self._result(goal)
         if reply is None:
             return None

@@ -185,7 +185,7 @@ class HoldController:
         for holding in list(self._held.values()):
             now = self._loop.time()
             if not self._on(holding):
-                continue  # ended meanwhile, by what the end of another one showed
+                continue  # ended in the meantime, by what the end of another one showed
             if code := holding.lease.over(now):
                 self._end(holding, code, say(code))
             elif not (verdict := self._verdict(holding.widget, holding.by, now)).permitted:

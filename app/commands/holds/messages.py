@@ -51,7 +51,7 @@ class HoldMessages:
 
     def put_last(self, widget: Hold, values: Values, now: float) -> TextLike:
         """The message that ends it, if there is any way now, be it in doubt: one stop too many harms
-        nobody. Why it was not sent, or ""."""
+        no one. Why it was not sent, or ""."""
         if not self._robot.link_up or not self._robot.graph.bridges:
             return link_verdict(self._robot, now).reason or ""
         try:

@@ -2,8 +2,8 @@
 
 A node is asked when its services appear in the graph, once more when events must have been flowing
 for a while, after a set, and where an event may have been missed; never twice at a time. One that did
-not answer is asked again only when somebody wants it: each question makes a node on Fast DDS print an
-error. What was asked of a bridge or a node that went away meanwhile no longer counts.
+not answer is asked again only when someone wants it: each question makes a node on Fast DDS print an
+error. What was asked of a bridge or a node that went away in the meantime no longer counts.
 """
 
 import asyncio
@@ -126,7 +126,7 @@ class ParameterSync:
             self._take_event(teller, event, sample.wall)
 
     def _missed(self) -> None:
-        """Whatever an event said that nobody read: its node may be any."""
+        """Whatever an event said that no one read: its node may be any."""
         for node in self._nodes.values():
             node.wanted.set()
 
@@ -168,7 +168,7 @@ class ParameterSync:
         try:
             return await self._answered(node)
         finally:
-            if node.task is asyncio.current_task():  # else it was cut off, and may be asked anew
+            if node.task is asyncio.current_task():  # else it was cut off, and may be asked again
                 self._end_asking(node)
                 self._changed()
 
@@ -200,7 +200,7 @@ class ParameterSync:
 
     def read_again(self, widget: Parameter) -> TextLike:
         """Asks the node of a parameter once more, unless it is being asked or has just answered; why it
-        can't be, or "". However often anybody wants it, a node has no more than `AGAIN_S` allows."""
+        can't be, or "". However often anyone wants it, a node has no more than `AGAIN_S` allows."""
         node = self._nodes[widget.node]
         if node.task is None:
             return say("no_parameters", node=widget.node)

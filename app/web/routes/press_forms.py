@@ -99,7 +99,7 @@ def _until(inputs: dict[str, str]) -> float | None:
 
 
 def _is_second_tap(inputs: dict[str, str]) -> bool:
-    """Whether a page without scripts is pressed sooner than anybody reads it: by the second tap of what
+    """Whether a page without scripts is pressed sooner than anyone reads it: by the second tap of what
     brought it. Scripts tell by themselves; a page that loaded itself was not tapped for."""
     since = _moment(inputs, "_since")
     return since is not None and clock.server_now() - since < TAP_AGAIN_S

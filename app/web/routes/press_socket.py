@@ -1,4 +1,4 @@
-"""Presses by WebSocket: one for each page that somebody touches, for all that is pressed there.
+"""Presses by WebSocket: one for each page that someone touches, for all that is pressed there.
 
 A press is what a post has in its body, with its `widget`; its `id` is needed, for answers come when
 they are there, in any order. `status` is that of the answer to a post, with a receipt or an `error`:

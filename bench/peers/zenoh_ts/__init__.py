@@ -38,7 +38,7 @@ def asked(topics: Sequence[str]) -> Iterator[bytes]:
 
 
 def configuration(robot: str, port: int) -> dict[str, object]:
-    """A router between a robot and browsers, and nobody else."""
+    """A router between a robot and browsers, and no one else."""
     return {
         "mode": "router",
         "connect": {"endpoints": [robot]},
