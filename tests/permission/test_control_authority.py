@@ -415,7 +415,7 @@ def test_the_log_tells_every_change_with_who_it_was(asked: Room) -> None:
         "Panel 2 (192.0.2.2) asks for control",
         "control given by Panel 1 (192.0.2.1), now of Panel 2 (192.0.2.2)",
         "control taken over by the panel at the cell (127.0.0.1)",
-        "control lost by the panel at the cell (127.0.0.1), now of nobody",
+        "control lost by the panel at the cell (127.0.0.1), now of no one",
     ]
 
 
