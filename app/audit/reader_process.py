@@ -45,7 +45,7 @@ class ReaderProcess:
         return b"".join(pieces)
 
     def cut(self) -> None:
-        """It ends now: the client that reads is told that it broke off."""
+        """It ends now: the client that reads gets an error."""
         self._cut = True
         if self._process is not None:
             self._process.kill()

@@ -122,13 +122,13 @@ class ControlActs:
         self, asked: Asked, act_id: str, at: float | None, life_s: float
     ) -> "asyncio.Task[ActReceipt]":
         """The act itself, at once; its entry takes time."""
-        told: TextLike = ""
+        entry: TextLike = ""
         refusal = self._refusal(asked, at)
         if refusal is None:
             before = self._control.holder, self._control.requester
             code = self._do(asked, life_s)
             refusal = (code, say(code)) if code else None
-            told = "" if refusal else self._told(asked, *before)
+            entry = "" if refusal else self._entry(asked, *before)
             self._show()
         if refusal is None:
             waits = asked.act == "ask" and not _same(asked.who, self._control.holder)
@@ -136,7 +136,7 @@ class ControlActs:
         else:
             receipt = _receipt(asked, act_id, *refusal)
             self._log.warning("control: %s by %s: refused: %s", asked.act, asked.who, receipt.reason)
-        task = asyncio.ensure_future(self._logged(asked, receipt, told or receipt.reason))
+        task = asyncio.ensure_future(self._logged(asked, receipt, entry or receipt.reason))
         self._made[act_id] = asked, task
         while len(self._made) > RECEIPTS_KEPT:
             self._made.popitem(last=False)
@@ -163,7 +163,7 @@ class ControlActs:
                 return control.keep(who, asked.to)
         return control.release(who)
 
-    def _told(self, asked: Asked, holder: Principal | None, requester: Principal | None) -> TextLike:
+    def _entry(self, asked: Asked, holder: Principal | None, requester: Principal | None) -> TextLike:
         """What was done, in the log's words: `holder` and `requester` are those before it."""
         names = {"holder": holder, "requester": requester}
         code = f"log_done_{asked.act}"
@@ -174,16 +174,16 @@ class ControlActs:
             code = "log_done_withdraw"
         return say(code, **{name: who.title if who else "" for name, who in names.items()})
 
-    async def _logged(self, asked: Asked, receipt: ActReceipt, told: TextLike) -> ActReceipt:
+    async def _logged(self, asked: Asked, receipt: ActReceipt, entry: TextLike) -> ActReceipt:
         origin = origin_of(asked.who)
         if not receipt.done and not self._press_log.room(origin):
             self._press_log.leave_out(origin)
             return receipt
         action = f"control_{asked.act}"
-        doubt = await self._press_log.acted(action, receipt.id, origin, receipt.outcome, told)
+        doubt = await self._press_log.acted(action, receipt.id, origin, receipt.outcome, entry)
         if not doubt:
             return receipt
-        return replace(receipt, reason=say("log_not_on_disk", said=told, why=doubt))
+        return replace(receipt, reason=say("log_not_on_disk", said=entry, why=doubt))
 
 
 def _same(who: Principal, other: Principal | None) -> bool:

@@ -171,9 +171,9 @@ class Presses:
             receipt = await closed(pending, receipt)
         level = logging.INFO if receipt.outcome in FINE else logging.WARNING
         who = named(context.origin)
-        told = rosout_extra(f"press {press_id} of {widget.id} by {who}: {untyped(widget, receipt)}")
+        extra = rosout_extra(f"press {press_id} of {widget.id} by {who}: {untyped(widget, receipt)}")
         self._log.log(level, "press %s of %s by %s with %.*s: %s: %s", press_id, widget.id, who,
-                LONGEST_LOGGED, own, receipt.outcome, receipt.reason, extra=told)  # fmt: skip
+                LONGEST_LOGGED, own, receipt.outcome, receipt.reason, extra=extra)  # fmt: skip
         return receipt
 
     def _correct(self, pending: PendingEntry, press_id: str, answer: Outcome) -> None:

@@ -112,8 +112,8 @@ class EarlyRefusals:
         own = self._dispatcher.needed(widget, inputs)
         self._receipts.begin(own_id, widget.id, origin, own)
         who = named(origin)
-        told = rosout_extra(f"press {own_id} of {widget.id} by {who}: {untyped(widget, receipt)}")
-        self._log.warning("press %s of %s by %s: %s", own_id, widget.id, who, why, extra=told)
+        extra = rosout_extra(f"press {own_id} of {widget.id} by {who}: {untyped(widget, receipt)}")
+        self._log.warning("press %s of %s by %s: %s", own_id, widget.id, who, why, extra=extra)
         receipt = with_doubt(
             receipt, await self._press_log.refused(widget.id, own, own_id, origin, why)
         )

@@ -90,8 +90,9 @@ def _filled(text: Text, catalogue: Mapping[str, str]) -> str:
     """A KeyError is a mistake of the programmer's: a test finds each code that the catalogue lacks."""
     sentence = catalogue[text.code]
     if text.code in BETWEEN:
-        (_, parts) = text.params[0]
-        return sentence.join(_written(part, catalogue) for part in parts)  # type: ignore[union-attr]
+        parts = text.params[0][1]
+        assert isinstance(parts, tuple)  # as `joined` makes it
+        return sentence.join(_written(part, catalogue) for part in parts)
     return sentence.format_map({name: _written(value, catalogue) for name, value in text.params})
 
 

@@ -54,9 +54,9 @@ def status(action_key: str) -> str:
     return of_action(action_key, "status")
 
 
-def valid_type(told: str) -> str:
+def valid_type(name: str) -> str:
     """The type that someone names; `NO_TYPE`, which no panel is made for, where that can't be one."""
-    return told if len(told) <= MAX_NAME and _ANY_TYPE.fullmatch(told) else NO_TYPE
+    return name if len(name) <= MAX_NAME and _ANY_TYPE.fullmatch(name) else NO_TYPE
 
 
 def is_valid_name(name: str) -> bool:

@@ -37,14 +37,14 @@ def unmet(interlock: Interlock, value: Any) -> Text:
 
 def _wanted(interlock: Interlock) -> Iterator[TextLike]:
     if interlock.equals is not None:
-        yield _told(interlock, interlock.equals)
+        yield _value_text(interlock, interlock.equals)
     if interlock.one_of is not None:
-        *all_but_last, last = (_told(interlock, one) for one in interlock.one_of)
+        *all_but_last, last = (_value_text(interlock, one) for one in interlock.one_of)
         yield say("either", first=tuple(all_but_last), last=last) if all_but_last else last
     if interlock.min is not None or interlock.max is not None:
         yield _limits(interlock)
     if interlock.not_equals is not None:
-        yield say("not_value", value=_told(interlock, interlock.not_equals))
+        yield say("not_value", value=_value_text(interlock, interlock.not_equals))
 
 
 def _limits(interlock: Interlock) -> Text:
@@ -58,13 +58,13 @@ def _limits(interlock: Interlock) -> Text:
 def _now(interlock: Interlock, value: Any, must: TextLike) -> str:
     """What the robot said: in as few digits as tell it from what it must be."""
     if not isinstance(value, float):
-        return _told(interlock, value)
-    told = (_told(interlock, float(f"{value:.{digits}g}")) for digits in DIGITS)
+        return _value_text(interlock, value)
+    candidates = (_value_text(interlock, float(f"{value:.{digits}g}")) for digits in DIGITS)
     written = render(must)  # its numbers are the same in every language
-    return next((text for text in told if text not in written), _told(interlock, value))
+    return next((text for text in candidates if text not in written), _value_text(interlock, value))
 
 
-def _told(interlock: Interlock, value: Any) -> str:
+def _value_text(interlock: Interlock, value: Any) -> str:
     return _written(interlock, value) + _unit(interlock)
 
 

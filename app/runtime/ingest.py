@@ -49,7 +49,7 @@ class Updates:
     lost: list[str] = field(default_factory=list)
 
     def step(self) -> "Updates":
-        """What has changed a permission in between; what is told by it is not told again."""
+        """What has changed a permission in between; each change is given once."""
         readings, self.readings = self.readings, []
         return Updates(urgent=True, readings=readings)
 

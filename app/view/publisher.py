@@ -20,8 +20,8 @@ from app.view.kinds import Attributes
 from app.view.sections import Events, difference
 from app.view.view import View, seen_as
 
-# What some readers take for the end of a line, and JSON leaves as it is.
 NOTHING: Final[Mapping[str, Attributes]] = {}
+# What some readers take for the end of a line, and JSON leaves as it is.
 SEPARATORS: Final = {c.encode(): b"\\u%04x" % ord(c) for c in "\x85\u2028\u2029"}
 
 

@@ -72,9 +72,9 @@ class HoldReceipts:
         if self._witness is not None:
             self._witness.pressed(lease.id, widget.id, named(by.origin), holding.inputs)
         who = named(by.origin)
-        told = rosout_extra(f"hold {lease.id} of {widget.id} by {who} begins")
+        extra = rosout_extra(f"hold {lease.id} of {widget.id} by {who} begins")
         self._log.info("hold %s of %s by %s with %.*s begins", lease.id, widget.id, who,
-                LONGEST_LOGGED, holding.inputs, extra=told)  # fmt: skip
+                LONGEST_LOGGED, holding.inputs, extra=extra)  # fmt: skip
 
     def ended(
         self, holding: ActiveHold, seconds: float, code: str, why: TextLike, unsaid: TextLike
@@ -103,9 +103,9 @@ class HoldReceipts:
         """The same as the function, and told."""
         receipt = refused(widget, inputs, refusal, hold_id)
         who = named(context.origin)
-        told = rosout_extra(f"hold of {widget.id} by {who}: {untyped(widget, receipt)}")
+        extra = rosout_extra(f"hold of {widget.id} by {who}: {untyped(widget, receipt)}")
         self._log.warning("hold of %s by %s with %.*s: %s", widget.id, who,
-                LONGEST_LOGGED, receipt.inputs, receipt.reason, extra=told)  # fmt: skip
+                LONGEST_LOGGED, receipt.inputs, receipt.reason, extra=extra)  # fmt: skip
         if self._witness is not None:
             self._witness.pressed(receipt.id, widget.id, named(context.origin), receipt.inputs)
         return self._answered(receipt)
