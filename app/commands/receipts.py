@@ -10,6 +10,7 @@ from typing import Any, Final, Protocol, cast
 
 from app.audit import Entry, Origin
 from app.audit.press_record import PendingEntry
+from app.commands.reason_codes import reason_code
 from app.errors import Cause
 from app.i18n import TextLike, render, say
 from app.panel.template import needed_inputs
@@ -27,7 +28,8 @@ _sorted: Final = json.JSONEncoder(sort_keys=True).encode
 
 @dataclass(frozen=True, slots=True)
 class Receipt:
-    """The result of a press; `reason` is a sentence for the operator, `cause` why it was refused.
+    """The result of a press. `reason` is a sentence for the operator, `code` its stable name (None
+    without a reason), and `cause` why the press was refused.
 
     `inputs` are those that the widget needs, `entered` all that the press came with, if they are few
     and short: a page without scripts shows them again. `fingerprint` tells these from any others.
@@ -45,11 +47,16 @@ class Receipt:
     entered: Mapping[str, Any] = field(default_factory=dict)
     recalled: bool = False
 
-    def as_json(self) -> dict[str, TextLike]:
+    @property
+    def code(self) -> str | None:
+        return reason_code(self.reason)
+
+    def as_json(self) -> dict[str, TextLike | None]:
         return {
             "id": self.id,
             "widget": self.widget,
             "outcome": self.outcome,
+            "code": self.code,
             "reason": self.reason,
             "at": self.at,
         }

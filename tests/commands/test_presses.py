@@ -140,8 +140,9 @@ def test_now_is_the_time_of_sending_and_no_input() -> None:
 
 def test_a_receipt_has_what_the_contract_says(bench: Bench) -> None:
     answer = bench.press(press_id="p7").as_json()
-    assert list(answer) == ["id", "widget", "outcome", "reason", "at"]
+    assert list(answer) == ["id", "widget", "outcome", "code", "reason", "at"]
     assert (answer["id"], answer["widget"], answer["outcome"]) == ("p7", "free", "published")
+    assert answer["code"] == "published"
     assert str(answer["reason"]).startswith("Sent on /free at ")
     assert datetime.fromisoformat(str(answer["at"])).utcoffset() == timedelta(0)
 

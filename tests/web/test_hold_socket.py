@@ -144,6 +144,7 @@ def test_a_hold_is_let_go_by_who_has_no_answer_yet(demo: Server) -> None:
         said = socket.hear()
         assert (said["state"], said["outcome"]) == ("ended", "published")
         assert said["reason"].startswith("Released at")
+        assert said["code"] == "hold_released"
 
 
 def test_who_lets_go_before_a_hold_begins_is_told_that_it_did_not(demo: Server) -> None:
@@ -152,6 +153,7 @@ def test_who_lets_go_before_a_hold_begins_is_told_that_it_did_not(demo: Server) 
         said = socket.hear()
         assert (said["state"], said["status"], said["outcome"]) == ("refused", 409, "refused")
         assert said["reason"].endswith("released before the hold began. Hold it longer.")
+        assert said["code"] == "hold_let_go"
         assert socket.closed() == 4409
 
 

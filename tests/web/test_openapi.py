@@ -76,6 +76,14 @@ def test_every_status_is_described(
     assert "HTTPValidationError" not in str(found)
 
 
+def test_a_receipts_code_is_described(described: dict[str, Any]) -> None:
+    receipt = described["components"]["schemas"]["ReceiptAnswer"]
+    assert receipt["required"] == ["id", "widget", "outcome", "code", "reason", "at"]
+    code = receipt["properties"]["code"]
+    assert code["anyOf"] == [{"type": "string"}, {"type": "null"}]
+    assert "stable name" in code["description"]
+
+
 def test_metrics_are_text_and_too_many_presses_say_when_to_come_again(
     described: dict[str, Any],
 ) -> None:

@@ -105,7 +105,7 @@ def test_a_change_comes_as_an_update(demo: Server) -> None:
 
 def test_a_press_without_an_id_gets_one(demo: Server) -> None:
     receipt = demo.press("operation", "x").json()
-    assert set(receipt) == {"id", "widget", "outcome", "reason", "at"}
+    assert set(receipt) == {"id", "widget", "outcome", "code", "reason", "at"}
     assert receipt["id"]
     assert receipt["widget"] == "operation"
 
@@ -124,6 +124,7 @@ def test_what_was_seen_before_a_restart_does_not_count(demo: Server, way: str) -
     assert again.json() == refused.json()
     assert (refused.status_code, refused.json()["outcome"]) == (409, "refused")
     assert "panel server restarted" in refused.json()["reason"]
+    assert refused.json()["code"] == "seen_before_restart"
     assert demo.press("operation", "x", seen=demo.snapshot()["id"]).status_code == 200
 
 

@@ -10,7 +10,7 @@ had it: so each one's age is known. Without an answer no browser shows that some
     browser  {"do": "beat", "number": 1, "lease": "…", "stamp": 2.1, "after": 80}
     server   {"stamp": 83.0, "state": "held"}
     browser  {"do": "end", "why": "released", "lease": "…", "stamp": 83.0, "after": 12}
-    server   {"stamp": 96.4, "state": "ended", "outcome": "published", "reason": "…"}
+    server   {"stamp": 96.4, "state": "ended", "outcome": "published", "code": "hold_released", …}
 
 An end without a lease is that of a browser which has no answer to its begin yet; it may come instead of
 a begin, too, and is answered as any other.

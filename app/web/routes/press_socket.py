@@ -4,7 +4,7 @@ A press is what a post has in its body, with its `widget`; its `id` is needed, f
 they are there, in any order. `status` is that of the answer to a post, with a receipt or an `error`:
 
     browser  {"widget": "operation", "inputs": {…}, "id": "5f…", "seen": "<boot>-<version>", "at": "…"}
-    server   {"press": "5f…", "status": 200, "id": "5f…", "outcome": "published", "reason": "…", …}
+    server   {"press": "5f…", "status": 200, "id": "5f…", "outcome": "published", "code": "…", …}
     server   {"press": "5f…", "status": 404, "error": "…"}
 
 Who closes it loses the answers and nothing else: what was begun is brought to its end, and logged.
@@ -118,7 +118,7 @@ class _PressSocket:
         await self._answer(press_id, status, error=error)
         await asyncio.sleep(0)  # much may come in one piece: others have their turn
 
-    async def _answer(self, press_id: str | None, status: int, **what: TextLike) -> None:
+    async def _answer(self, press_id: str | None, status: int, **what: TextLike | None) -> None:
         said = localized({"press": press_id, "status": status, **what}, self._language)
         text = json.dumps(said, ensure_ascii=False)
         with suppress(WebSocketDisconnect, RuntimeError):  # the client is gone

@@ -74,7 +74,8 @@ class ReceiptAnswer(BaseModel):
     id: str
     widget: str
     outcome: str
-    reason: str
+    code: Annotated[str | None, Field(description="the stable name of the reason, null without one")]
+    reason: Annotated[str, Field(description="a sentence for the operator, in the request's language")]
     at: AwareDatetime
 
 

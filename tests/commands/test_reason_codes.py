@@ -1,0 +1,40 @@
+"""A receipt's `code`: the stable name of its reason, whatever frames the sentence."""
+
+import pytest
+
+from app.commands.reason_codes import ADVICE, FRAMES, reason_code
+from app.i18n import ENGLISH, TextLike, joined, say, sentences
+
+LOCKED = say("waiting", topic="/operation_enabled")
+
+
+@pytest.mark.parametrize(
+    ("reason", "code"),
+    [
+        ("", None),
+        ("the robot's own words", None),
+        (say("published", topic="/go", time="10:00:00"), "published"),
+        (say("refused", why=LOCKED, time="10:00:00"), "waiting"),
+        (say("not_encoded", why='the input "speed" is missing', time="10:00:00"), "not_encoded"),
+        (say("with_reply", said=say("said_no", time="10:00:00"), reply="the arm moves"), "said_no"),
+        (say("hold_ended", time="10:00:00", seconds="1.2", why=LOCKED), "waiting"),
+        (joined([say("timed_out", seconds="2"), say("cyclone_hint")]), "timed_out"),
+        (
+            joined([say("published", topic="/go", time="10:00:00"), say("no_effect", topic="/on")]),
+            "no_effect",
+        ),
+        (
+            say("log_not_on_disk", said=say("refused", why=LOCKED, time="10:00:00"), why="full"),
+            "waiting",
+        ),
+    ],
+)
+def test_the_code_is_that_of_the_sentence_that_says_why(reason: TextLike, code: str | None) -> None:
+    assert reason_code(reason) == code
+
+
+def test_frames_and_advice_are_sentences_of_the_catalogue_with_that_parameter() -> None:
+    known = sentences(ENGLISH)
+    assert set(known) >= ADVICE
+    for code, parameter in FRAMES.items():
+        assert f"{{{parameter}}}" in known[code]
