@@ -3,7 +3,13 @@
 import pytest
 
 from app.audit import Origin
-from app.commands.press_limits import OF_ADDRESS, OF_ALL, OF_CANCELS, OF_CLIENT, PressLimits
+from app.commands.press_limits import (
+    ADDRESS_QUOTA,
+    CANCEL_QUOTA,
+    CLIENT_QUOTA,
+    TOTAL_QUOTA,
+    PressLimits,
+)
 from app.permission.clients import Client, anonymous
 from app.permission.principal import Principal
 from app.rate_limit import MAX_BUCKETS, Quota, TokenBuckets
@@ -69,12 +75,12 @@ def test_only_those_are_remembered_that_did_it_last() -> None:
 
 
 def test_a_client_has_its_limit_and_takes_nothing_from_another(pressing: Pressing) -> None:
-    assert pressing.admitted(browser(1), 1000) == OF_CLIENT.burst
+    assert pressing.admitted(browser(1), 1000) == CLIENT_QUOTA.burst
     assert pressing.admitted(browser(2), 10) == 10
     pressing.now += 10
-    assert pressing.admitted(browser(1), 1000) == OF_CLIENT.burst
+    assert pressing.admitted(browser(1), 1000) == CLIENT_QUOTA.burst
     pressing.now += 0.5
-    assert pressing.admitted(browser(1), 1000) == OF_CLIENT.per_s / 2
+    assert pressing.admitted(browser(1), 1000) == CLIENT_QUOTA.per_s / 2
 
 
 def test_in_the_long_run_no_more_than_its_rate_is_admitted(pressing: Pressing) -> None:
@@ -82,21 +88,21 @@ def test_in_the_long_run_no_more_than_its_rate_is_admitted(pressing: Pressing) -
     for _ in range(9240):  # a press each millisecond or so
         pressing.now += 1 / 924
         admitted += pressing.limits.admit(browser(1))
-    assert admitted <= OF_CLIENT.burst + 10 * OF_CLIENT.per_s
+    assert admitted <= CLIENT_QUOTA.burst + 10 * CLIENT_QUOTA.per_s
 
 
 def test_who_makes_up_cookies_has_the_limit_of_an_address(pressing: Pressing) -> None:
-    assert sum(pressing.admitted(browser(n), 10) for n in range(1000)) == OF_ADDRESS.burst
+    assert sum(pressing.admitted(browser(n), 10) for n in range(1000)) == ADDRESS_QUOTA.burst
     assert pressing.admitted(browser(1, "10.0.0.8"), 10) == 10
 
 
 def test_programs_without_a_cookie_are_one_client(pressing: Pressing) -> None:
-    assert pressing.admitted(program("10.0.0.7"), 1000) == OF_CLIENT.burst
+    assert pressing.admitted(program("10.0.0.7"), 1000) == CLIENT_QUOTA.burst
     assert pressing.admitted(browser(1), 10) == 10
 
 
 def test_a_whole_network_has_a_limit_and_leaves_the_cell_its_own(pressing: Pressing) -> None:
-    assert sum(pressing.admitted(program(f"10.0.1.{n}"), 50) for n in range(250)) == OF_ALL.burst
+    assert sum(pressing.admitted(program(f"10.0.1.{n}"), 50) for n in range(250)) == TOTAL_QUOTA.burst
     assert pressing.admitted(browser(1, AT_THE_CELL), 10) == 10
 
 
@@ -110,8 +116,8 @@ def test_a_cancel_is_one_too_many_only_if_this_goals_was_asked_for_just_now(pres
     """No press, no other goal and no one else's cancels keep anyone from stopping a robot."""
     pressing.admitted(browser(1), 1000)
     sum(pressing.admitted(program(f"10.0.1.{n}"), 50) for n in range(250))
-    assert pressing.canceled(browser(1), 1000, "/robots/r1", "count", "p1") == OF_CANCELS.burst
+    assert pressing.canceled(browser(1), 1000, "/robots/r1", "count", "p1") == CANCEL_QUOTA.burst
     assert pressing.canceled(browser(1), 3, "/robots/r1", "count", "p2") == 3
     assert pressing.canceled(browser(1), 3, "/robots/r2", "count", "p1") == 3
     pressing.now += 1
-    assert pressing.canceled(browser(2), 1000, "/robots/r1", "count", "p1") == OF_CANCELS.per_s
+    assert pressing.canceled(browser(2), 1000, "/robots/r1", "count", "p1") == CANCEL_QUOTA.per_s

@@ -1,7 +1,7 @@
 """The operator's log: who pressed what, and the result."""
 
 from app.audit.audit_log import OperatorLog
-from app.audit.entry import Entry, Origin, entered, same_values
+from app.audit.entry import Entry, Origin, new_entry, same_values
 from app.audit.null_log import NullLog
 from app.audit.queries import Filter, OpenPress, Row
 from app.audit.reader_process import ReaderProcess
@@ -18,6 +18,6 @@ __all__ = [
     "ReaderProcess",
     "Repeated",
     "Row",
-    "entered",
+    "new_entry",
     "same_values",
 ]

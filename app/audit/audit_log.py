@@ -136,7 +136,7 @@ class OperatorLog:
     async def closed(self, entry: Entry) -> TextLike:
         """Writes the result of a press; returns when that is on the disk, or why it is not."""
         if entry.outcome == "refused":
-            self._refusals.take(entry)
+            self._refusals.count(entry)
         try:
             await self._wait_for_result(self._add(entry), CLOSED_WITHIN_S)
         except LogError as error:

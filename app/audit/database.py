@@ -182,7 +182,7 @@ def _inode(path: str) -> tuple[int, int]:
     return found.st_dev, found.st_ino
 
 
-def clear_remains(folder: Path) -> str:
+def make_room(folder: Path) -> str:
     """Makes room for a new log where one was taken away: what another program put there is put aside
     under the name that is returned, "" where nothing was."""
     main, wal, shm = _paths(folder)

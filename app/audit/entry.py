@@ -80,7 +80,7 @@ class Entry(NamedTuple):
         return _hash(self[:-1])
 
     @property
-    def said(self) -> TextLike:
+    def reason_text(self) -> TextLike:
         """Its reason, for a reader's language where that is known."""
         try:
             return text_in(self.text) if self.text else self.reason
@@ -89,10 +89,10 @@ class Entry(NamedTuple):
 
     def reason_in(self, language: str) -> str:
         """Its reason as a reader of this language reads it; English as it was written."""
-        if language == ENGLISH or isinstance(said := self.said, str):
+        if language == ENGLISH or isinstance(said := self.reason_text, str):
             return self.reason
         try:
-            return plain(render(said, language))
+            return clean_text(render(said, language))
         except (KeyError, IndexError, ValueError):  # of another version's catalogue
             return self.reason
 
@@ -106,9 +106,9 @@ class Entry(NamedTuple):
             kind=kind,
             of=self.seq,
             outcome=outcome,
-            reason=plain(render(reason)),
-            text=code_of(reason),
-            **{name: plain(text) for name, text in more.items()},
+            reason=clean_text(render(reason)),
+            text=reason_as_json(reason),
+            **{name: clean_text(text) for name, text in more.items()},
         )
 
 
@@ -122,7 +122,7 @@ _in_order: Final = json.JSONEncoder(sort_keys=True).encode
 _as_json: Final = json.JSONEncoder(ensure_ascii=False, allow_nan=False).encode
 
 
-def entered(
+def new_entry(
     kind: Kind,
     origin: Origin | None = None,
     values: Mapping[str, Any] | None = None,
@@ -134,20 +134,20 @@ def entered(
     if origin is not None:
         texts |= {name: getattr(origin, name) for name in ORIGIN}
     texts |= {"reason": render(reason)}
-    cleaned: dict[str, Any] = {name: plain(text) for name, text in texts.items()}
-    cleaned["text"] = code_of(reason)
+    cleaned: dict[str, Any] = {name: clean_text(text) for name, text in texts.items()}
+    cleaned["text"] = reason_as_json(reason)
     return Entry(0, at, "", monotonic, kind, values=as_json(values or {}), **cleaned)
 
 
-def code_of(reason: TextLike) -> str:
+def reason_as_json(reason: TextLike) -> str:
     """A reason as JSON; "" for one that is no sentence, or has parameters that are too long."""
     if isinstance(reason, str):
         return ""
     text = _as_text(reason.as_json())
-    return plain(text, len(text)) if len(text) <= LONGEST_VALUES else ""
+    return clean_text(text, len(text)) if len(text) <= LONGEST_VALUES else ""
 
 
-def plain(text: str, longest: int = LONGEST_TEXT) -> str:
+def clean_text(text: str, longest: int = LONGEST_TEXT) -> str:
     """A text that is Unicode, without NUL, and not too long; what was cut ends in "…"."""
     if len(text) <= longest and text.isprintable():
         return text
@@ -164,7 +164,7 @@ def as_json(values: Mapping[str, Any]) -> str:
     if len(text) > LONGEST_VALUES:
         cut = {"…": text[:LONGEST_VALUES], "… of": len(text)}
         text = json.dumps(cut, ensure_ascii=False)
-    return plain(text, len(text))
+    return clean_text(text, len(text))
 
 
 def same_values(text: str, values: Mapping[str, Any]) -> bool:

@@ -27,7 +27,9 @@ FIELDS: Final = (*entry.FIELDS[:TEXTS], "pressed_at", *LATER, "text")
 FORMULA: Final = ("=", "+", "-", "@", "\t", "\r")
 
 
-def lines(folder: Path, wanted: Filter, before: int | None, language: str = ENGLISH) -> Iterator[bytes]:
+def csv_chunks(
+    folder: Path, wanted: Filter, before: int | None, language: str = ENGLISH
+) -> Iterator[bytes]:
     """All that is wanted before a number, with reasons in a language; LogError."""
     cells = partial(_cells, language)
     found = rows(folder, wanted, before, ROWS_AT_ONCE)
@@ -37,7 +39,7 @@ def lines(folder: Path, wanted: Filter, before: int | None, language: str = ENGL
         yield _csv(map(cells, found))
 
 
-def packed(pieces: Iterable[bytes]) -> Iterator[bytes]:
+def gzipped(pieces: Iterable[bytes]) -> Iterator[bytes]:
     """The same by gzip."""
     packer = zlib.compressobj(wbits=GZIP)
     for piece in pieces:

@@ -4,8 +4,8 @@ import logging
 from collections.abc import Sequence
 from pathlib import Path
 
-from app.audit.database import NAME, Head, as_log_error, clear_remains, set_aside
-from app.audit.entry import Entry, entered
+from app.audit.database import NAME, Head, as_log_error, make_room, set_aside
+from app.audit.entry import Entry, new_entry
 from app.audit.store import Store
 from app.errors import LogCorrupt, LogError, LogGone
 from app.i18n import TextLike, joined, say
@@ -22,7 +22,7 @@ class Opening:
         self._cause: LogError | None = None
         self._new_file_reason: TextLike = ""
 
-    def lost(self, error: LogError) -> None:
+    def mark_lost(self, error: LogError) -> None:
         """The file was closed for this; what needs a new one stays known until there is one."""
         if not isinstance(self._cause, LogCorrupt | LogGone):
             self._cause = error
@@ -51,7 +51,7 @@ class Opening:
 
     def _clear_and_explain(self, head: Head | None) -> TextLike:
         with as_log_error():
-            found = clear_remains(self._folder)
+            found = make_room(self._folder)
         gone = say("log_began_for_gone", last=head.seq if head else 0)
         why = joined([gone, say("log_found", name=found) if found else ""])
         log.error("%s", why)
@@ -65,23 +65,23 @@ class Opening:
         found = store.head
         if not found.count and (self._new_file_reason or found.seq or store.opened_before):
             why = self._new_file_reason or say("log_began_empty", last=found.seq)
-            return [entered("began", values={"first": found.seq + 1}, reason=why)]
+            return [new_entry("began", values={"first": found.seq + 1}, reason=why)]
         if head is None or head.seq <= found.seq:
             return []
         gone = say("log_lost", first=found.seq + 1, last=head.seq)
         log.error("%s", gone)
-        return [entered("resumed", reason=gone)]
+        return [new_entry("resumed", reason=gone)]
 
-    def written(self) -> None:
+    def mark_written(self) -> None:
         """What was to be told first stands in the file."""
         self._new_file_reason = ""
 
 
-def cut_off(store: Store) -> Sequence[Entry]:
+def unfinished_entries(store: Store) -> Sequence[Entry]:
     """What is to be said of presses of servers that ended before they knew their results."""
     return [
         entry.follow_up(
-            "corrected" if store.answered(entry.seq) else "closed", "unknown", say("log_ended")
+            "corrected" if store.has_outcome(entry.seq) else "closed", "unknown", say("log_ended")
         )
         for entry in store.undone()
     ]

@@ -4,7 +4,7 @@ from collections.abc import Callable, Collection, Mapping
 from contextlib import AbstractContextManager
 from typing import Any, Protocol
 
-from app.audit.entry import Entry, Origin, entered
+from app.audit.entry import Entry, Origin, new_entry
 from app.audit.queries import OpenPress
 from app.errors import LogError
 from app.i18n import TextLike, render, say
@@ -61,22 +61,22 @@ class PendingEntry:
         """That of the press's entry: no other has it; "" where there is none."""
         return self._entry.hash if self._entry else ""
 
-    def judged(self, verdict: str) -> None:
+    def set_verdict(self, verdict: str) -> None:
         """By which verdict, and by which version of the board: the one that there is now."""
         self._verdict = {"verdict": verdict, "board": self._board()}
 
-    async def closed(self, outcome: str, reason: TextLike) -> TextLike:
+    async def close(self, outcome: str, reason: TextLike) -> TextLike:
         """Writes the result; returns when that is on the disk, or why it is not."""
         if self._entry is None:
             return self._fault
         return await self._log.closed(self._entry.follow_up("closed", outcome, reason, **self._verdict))
 
-    def broke_off(self, sentence: str) -> None:
+    def close_unknown(self, sentence: str) -> None:
         """No one will know the result."""
         if self._entry is not None:
             self._log.add(self._entry.follow_up("closed", "unknown", say(sentence), **self._verdict))
 
-    def corrected(self, answer: Outcome) -> None:
+    def correct(self, answer: Outcome) -> None:
         """More is known now than when it was closed."""
         self.corrected_to = answer
         if self._entry is not None:
@@ -92,11 +92,11 @@ class PressLog:
         self._robot = robot
         self._board = board
 
-    def room(self, origin: Origin) -> bool:
+    def has_room(self, origin: Origin) -> bool:
         """Whether a refusal may be an entry."""
         return self._log.allowed(origin)
 
-    def leave_out(self, origin: Origin) -> None:
+    def count_unlogged(self, origin: Origin) -> None:
         """Counts a refusal that is no entry."""
         self._log.suppress(origin)
 
@@ -109,13 +109,13 @@ class PressLog:
         action: str = "press",
     ) -> PendingEntry:
         """Written before anything is sent; LogError and Repeated as `Log` has them."""
-        entry = entered("pressed", origin, inputs, **self._columns(widget, press_id, action))
+        entry = new_entry("pressed", origin, inputs, **self._columns(widget, press_id, action))
         written = await self._log.pressed(entry)
         return PendingEntry(self._log, written, self._board, self._log.fault)
 
     async def canceled(self, widget: str, origin: Origin) -> PendingEntry:
         """A cancel is written if it can be: no log that fails keeps anyone from stopping a robot."""
-        entry = entered("pressed", origin, {}, **self._columns(widget, "", "cancel"))
+        entry = new_entry("pressed", origin, {}, **self._columns(widget, "", "cancel"))
         try:
             written = await self._log.pressed(entry)
         except LogError as error:
@@ -123,7 +123,7 @@ class PressLog:
         return PendingEntry(self._log, written, self._board, self._log.fault)
 
     @property
-    def unneeded(self) -> bool:
+    def is_optional_and_down(self) -> bool:
         """Whether presses go on though the log can't be written."""
         return bool(self._log.fault) and not self._log.lock
 
@@ -145,7 +145,7 @@ class PressLog:
     ) -> TextLike:
         """A press that was not even judged; returns when it is on the disk, or why it is not."""
         about = self._columns(widget, press_id, action)
-        entry = entered("refused", origin, inputs, outcome="refused", reason=reason, **about)
+        entry = new_entry("refused", origin, inputs, outcome="refused", reason=reason, **about)
         return await self._log.closed(entry)
 
     async def acted(
@@ -154,12 +154,12 @@ class PressLog:
         """An act that is no press; returns when it is on the disk, or why it is not."""
         about = self._columns("", act_id, action)
         return await self._log.closed(
-            entered("control", origin, {}, outcome=outcome, reason=reason, **about)
+            new_entry("control", origin, {}, outcome=outcome, reason=reason, **about)
         )
 
     def note(self, action: str, origin: Origin, reason: TextLike) -> None:
         """Control changed by no act."""
-        self._log.add(entered("control", origin, {}, reason=reason, **self._columns("", "", action)))
+        self._log.add(new_entry("control", origin, {}, reason=reason, **self._columns("", "", action)))
 
     def _columns(self, widget: str, press_id: str, action: str) -> dict[str, str]:
         return {"widget": widget, "press": press_id, "action": action, "robot": self._robot}

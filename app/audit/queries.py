@@ -15,8 +15,8 @@ from app.audit.entry import FIELDS, Entry
 from app.errors import LogError, SearchTooLong
 
 LONGEST_SEARCH_S: Final = 5.0
-STEPS_BETWEEN_LOOKS: Final = 10_000
-MOST_LOOKED_AT: Final = 20_000  # entries, from the newest back
+STEPS_BETWEEN_CHECKS: Final = 10_000
+MAX_SCANNED: Final = 20_000  # entries, from the newest back
 
 # What has become more by now is told by a later entry.
 CLOSED_CONDITION: Final = "(e.kind <> 'pressed' OR e.seq IN (SELECT seq FROM undone))"
@@ -96,7 +96,7 @@ def open_presses(folder: Path, robot: str, widgets: Collection[str], since: int)
     query = f"""
         WITH recent AS (
           SELECT * FROM entry
-          WHERE seq > (SELECT max(seq) FROM entry) - {MOST_LOOKED_AT} AND action = 'press'
+          WHERE seq > (SELECT max(seq) FROM entry) - {MAX_SCANNED} AND action = 'press'
             AND robot = :robot AND widget IN ({", ".join(f":{name}" for name in names)})
         ), told AS (
           SELECT of, max(seq) AS last, max(outcome = 'accepted') AS accepted FROM recent GROUP BY of
@@ -121,7 +121,7 @@ def _fetch(
 ) -> list[Any]:
     db = open_read_only(folder)
     end = time.monotonic() + longest_s
-    db.set_progress_handler(lambda: time.monotonic() > end, STEPS_BETWEEN_LOOKS)
+    db.set_progress_handler(lambda: time.monotonic() > end, STEPS_BETWEEN_CHECKS)
     try:
         with as_log_error():
             return db.execute(query, values).fetchall()

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import BinaryIO, Final, NoReturn
 
 from app.audit.entry import Entry
-from app.audit.export import lines, packed
+from app.audit.export import csv_chunks, gzipped
 from app.audit.queries import Filter, Row, rows
 from app.errors import LogError
 from app.i18n import ENGLISH
@@ -55,8 +55,8 @@ def read(wish: ReadRequest) -> Iterator[bytes]:
         found = rows(wish.folder, wish.wanted, wish.before, wish.count)
         yield json.dumps([(row.entry, row.pressed_at) for row in found]).encode()
         return
-    pieces = lines(wish.folder, wish.wanted, wish.before, wish.language)
-    yield from packed(pieces) if wish.gzip else pieces
+    pieces = csv_chunks(wish.folder, wish.wanted, wish.before, wish.language)
+    yield from gzipped(pieces) if wish.gzip else pieces
 
 
 def main(given: BinaryIO, out: BinaryIO) -> int:

@@ -27,32 +27,32 @@ class ReaderProcess:
         self._loop = asyncio.get_running_loop()
         self._thread = ThreadPoolExecutor(1, "operators-log-process")
         self._process: subprocess.Popen[bytes] | None = None
-        self._cut = False
+        self._killed = False
 
     async def start(self) -> bytes:
         """Its first piece; LogError where the log can't be read."""
         return await self._on_thread(self._start_process)
 
-    async def more(self) -> bytes:
+    async def read_next(self) -> bytes:
         """Its next piece, b"" after the last; LogError where it breaks off."""
         return await self._on_thread(self._read_piece)
 
-    async def whole(self) -> bytes:
+    async def read_all(self) -> bytes:
         """All of it, of what is not much; LogError."""
         pieces = [await self.start()]
         while pieces[-1]:
-            pieces.append(await self.more())
+            pieces.append(await self.read_next())
         return b"".join(pieces)
 
-    def cut(self) -> None:
+    def kill(self) -> None:
         """It ends now: the client that reads gets an error."""
-        self._cut = True
+        self._killed = True
         if self._process is not None:
             self._process.kill()
 
-    async def end(self) -> None:
+    async def close(self) -> None:
         """Leaves neither process nor thread."""
-        self.cut()
+        self.kill()
         await asyncio.shield(self._on_thread(self._close))
         self._thread.shutdown(wait=False)
 
@@ -64,7 +64,7 @@ class ReaderProcess:
             self._process = process = _popen()
         except OSError as error:  # such as memory or open files that are used up
             raise LogError(say("log_unreadable", why=error.strerror or str(error))) from error
-        if self._cut:
+        if self._killed:
             process.kill()
         assert process.stdin is not None
         try:

@@ -17,7 +17,7 @@ class ReaderSlots:
         self._message = message
 
     @contextmanager
-    def one(self) -> Iterator[None]:
+    def slot(self) -> Iterator[None]:
         """One place, while it lasts; TooMany where there is none."""
         if not self._free:
             raise TooMany(self._message, self._again_s)

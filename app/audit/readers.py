@@ -39,14 +39,14 @@ class Readers:
     async def rows(self, wanted: Filter, before: int | None, count: int) -> list[Row]:
         """The newest entries that are wanted before a number; LogError when they can't be read, TooMany
         when others search."""
-        with self._searching.one():
+        with self._searching.slot():
             try:
                 return await self._read(partial(rows, self._folder, wanted, before, count, QUICK_S))
             except SearchTooLong:
                 async with self._reader_process(
                     ReadRequest(self._folder, wanted, before, count)
                 ) as process:
-                    return parse_rows(await process.whole())
+                    return parse_rows(await process.read_all())
 
     async def open_presses(self, robot: str, widgets: Collection[str], since: int) -> list[OpenPress]:
         """See `unended` of app/audit/queries.py."""
@@ -59,7 +59,7 @@ class Readers:
         """All that is wanted before a number, as CSV in a language, while this lasts; TooMany beside
         another one, LogError when the server ends."""
         wish = ReadRequest(self._folder, wanted, before, gzip=gzip, language=language)
-        with self._exporting.one():
+        with self._exporting.slot():
             async with self._reader_process(wish) as process:
                 yield process
 
@@ -67,7 +67,7 @@ class Readers:
         """The server is about to end: it waits for no one who reads."""
         self._closed = True
         for process in self._processes:
-            process.cut()
+            process.kill()
 
     def stop(self) -> None:
         """Leaves no thread behind."""
@@ -91,4 +91,4 @@ class Readers:
             yield process
         finally:
             self._processes.discard(process)
-            await process.end()
+            await process.close()

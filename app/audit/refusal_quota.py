@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final, Protocol
 
-from app.audit.entry import Entry, Origin, entered
+from app.audit.entry import Entry, Origin, new_entry
 from app.clock import format_time
 from app.i18n import render, say
 
@@ -80,40 +80,40 @@ class RefusalQuota:
         self._monotonic = monotonic
         self._wall = wall
         self._all = _Balance(OF_ALL, monotonic())
-        self._left: OrderedDict[tuple[str, ...], _Balance] = OrderedDict()
-        self._more: dict[tuple[str, str, bool], _Suppressed] = {}
+        self._balances: OrderedDict[tuple[str, ...], _Balance] = OrderedDict()
+        self._suppressed: dict[tuple[str, str, bool], _Suppressed] = {}
         self.left_out = 0
 
     def allowed(self, whose: HasOrigin) -> bool:
         """Whether a refusal may be an entry."""
         now = self._monotonic()
-        known = (self._left.get(key) for key in _keys(whose))
+        known = (self._balances.get(key) for key in _keys(whose))
         return all(left is None or left.refill(now) >= 1 for left in (self._all, *known))
 
-    def take(self, whose: HasOrigin) -> None:
+    def count(self, whose: HasOrigin) -> None:
         """A refusal became an entry."""
         now = self._monotonic()
         self._all.take(now)
         for key, of in zip(_keys(whose), (OF_BROWSER, OF_ADDRESS), strict=True):
-            self._left.setdefault(key, _Balance(of, now)).take(now)
-            self._left.move_to_end(key)
-        while len(self._left) > MAX_QUOTAS:
-            self._left.popitem(last=False)
+            self._balances.setdefault(key, _Balance(of, now)).take(now)
+            self._balances.move_to_end(key)
+        while len(self._balances) > MAX_QUOTAS:
+            self._balances.popitem(last=False)
 
     def suppress(self, origin: Origin, limited: bool = False) -> bool:
         """A refusal is only counted, `limited` where there were too many presses to judge it; whether
         it is the first since all were told."""
-        first = not self._more
+        first = not self._suppressed
         key = (origin.address, origin.browser, limited)
-        if key not in self._more and len(self._more) >= MAX_BROWSERS:
+        if key not in self._suppressed and len(self._suppressed) >= MAX_BROWSERS:
             key, origin = ("", "", limited), Origin(address="", who=render(say("others")))
-        self._more.setdefault(key, _Suppressed(origin, limited, self._wall())).count += 1
+        self._suppressed.setdefault(key, _Suppressed(origin, limited, self._wall())).count += 1
         self.left_out += not limited
         return first
 
     def summary_due(self) -> list[Entry]:
         """An entry for each browser of which some were left out, and none of these any more."""
-        more, self._more = self._more, {}
+        more, self._suppressed = self._suppressed, {}
         return [_entry(one) for one in more.values()]
 
 
@@ -126,4 +126,4 @@ def _entry(more: _Suppressed) -> Entry:
     name = " ".join(filter(None, (origin.who, f"({origin.address})" if origin.address else "")))
     sentence = "log_more_limited" if more.limited else "log_more_refused"
     reason = say(sentence, count=more.count, name=name, since=format_time(more.since))
-    return entered("refused", origin, {"more": more.count}, outcome="refused", reason=reason)
+    return new_entry("refused", origin, {"more": more.count}, outcome="refused", reason=reason)

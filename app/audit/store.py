@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Final, Literal
 
 from app.audit.database import BUSY_TIMEOUT_S, NAME, Files, Head, as_log_error, open_database
-from app.audit.entry import FIELDS, Entry, entered
+from app.audit.entry import FIELDS, Entry, new_entry
 from app.errors import LogError
 from app.i18n import TextLike, say
 
@@ -92,7 +92,7 @@ class Store:
             ).fetchall()
         return [Entry(*row) for row in rows]
 
-    def answered(self, seq: int) -> bool:
+    def has_outcome(self, seq: int) -> bool:
         """Whether a press that is not done has an outcome already."""
         with as_log_error():
             found = self._db.execute("SELECT outcome FROM undone WHERE seq = ?", (seq,)).fetchone()
@@ -145,7 +145,7 @@ class Store:
             self._db.execute("SELECT hash FROM entry WHERE seq = ?", (last,)).fetchone(),
         )
         values = {"first": first, "last": last, "hash": anchor, "why": why}
-        entry = entered("removed", values=values, reason=reason)
+        entry = new_entry("removed", values=values, reason=reason)
         self._commit([entry], removed=last)
         self._db.execute("PRAGMA incremental_vacuum(200)").fetchall()
         return True

@@ -25,7 +25,7 @@ class Syncer:
     def start(self) -> None:
         self._thread.start()
 
-    def use(self, store: Store | None) -> None:
+    def set_store(self, store: Store | None) -> None:
         """Waits for a sync that is under way: a file must stay open while it is synced."""
         with self._syncing:
             self._store = store

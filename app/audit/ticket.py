@@ -1,4 +1,4 @@
-"""What is handed to the operator's log, and the rules that it follows."""
+"""Entries waiting to be written to the operator's log, and the log's limits."""
 
 import asyncio
 from dataclasses import dataclass
@@ -17,21 +17,21 @@ class Limits:
 
 
 class Repeated(Exception):
-    """A press whose id the log has already: its entry `press`, and `told`, what was said of it last;
-    None where nothing was."""
+    """The log already has a press with this id: `press` is its entry, `last_entry` the newest entry
+    about it, None without one."""
 
-    def __init__(self, press: Entry, told: Entry | None) -> None:
+    def __init__(self, press: Entry, last_entry: Entry | None) -> None:
         super().__init__(f"press {press.press} is entry {press.seq}")
         self.press = press
-        self.told = told
+        self.last_entry = last_entry
 
 
 @dataclass(slots=True, eq=False)
 class Ticket:
-    """An entry to be written; `result` is the one that stands in the file, or why there is none.
+    """An entry to be written; `result` is the entry as written, or the reason why it was not.
 
-    That of a press is there when it is committed, any other when it is on the disk. `waiter` is for who
-    waits for that, and may be called away.
+    A press has its result when it is committed, any other entry when it is on the disk. `waiter` is
+    done then, or at a timeout.
     """
 
     entry: Entry
@@ -40,7 +40,7 @@ class Ticket:
     abandoned: bool = False
 
     def wake(self) -> None:
-        """Nothing waits for it any longer."""
+        """Ends the waiting for this entry."""
         if not self.waiter.done():
             self.waiter.set_result(None)
 

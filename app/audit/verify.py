@@ -34,7 +34,7 @@ def verify(folder: Path, noted: str = "") -> Verified:
         with as_log_error():
             db.execute("BEGIN")
             (genesis,) = db.execute("SELECT value FROM about WHERE key = 'genesis'").fetchone() or ("",)
-            return _Chain(genesis, noted).follow(_entries(db))
+            return _Chain(genesis, noted).check(_entries(db))
     finally:
         db.close()
 
@@ -52,7 +52,7 @@ class _Chain:
 
     def __init__(self, genesis: str, noted: str) -> None:
         self._genesis = genesis
-        self._noted = noted
+        self._known_head = noted
         self._first: Entry | None = None
         self._begins = False
         self._kinds: set[str] = set()
@@ -60,13 +60,13 @@ class _Chain:
         self._seq = 0
         self._count = 0
 
-    def follow(self, entries: Iterator[Entry]) -> Verified:
+    def check(self, entries: Iterator[Entry]) -> Verified:
         for entry in entries:
             if fault := self._fault(entry):
                 return self._verified(fault)
             self._first = self._first or entry
-            if self._noted in (entry.hash, entry.prev):
-                self._noted = ""
+            if self._known_head in (entry.hash, entry.prev):
+                self._known_head = ""
             self._begins = self._begins or self._explains_begin(self._first, entry)
             self._kinds.add(entry.kind)
             self._last, self._seq = (entry.prev, entry.hash), entry.seq
@@ -77,8 +77,8 @@ class _Chain:
             return self._verified(
                 f"what stood before entry {self._first.seq} was removed, by none of the log's own rules"
             )
-        if self._noted:
-            return self._verified(f"no entry has the head {self._noted}: the newest were removed")
+        if self._known_head:
+            return self._verified(f"no entry has the head {self._known_head}: the newest were removed")
         return self._verified("")
 
     def _verified(self, fault: str) -> Verified:

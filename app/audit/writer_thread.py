@@ -12,8 +12,8 @@ from typing import Final
 
 from app.audit.data_dir import DataDir
 from app.audit.database import Head, as_log_error
-from app.audit.entry import Entry, entered
-from app.audit.opening import Opening, cut_off
+from app.audit.entry import Entry, new_entry
+from app.audit.opening import Opening, unfinished_entries
 from app.audit.store import Store
 from app.audit.syncer import Syncer
 from app.audit.ticket import Limits, Repeated, Results, Ticket
@@ -195,7 +195,7 @@ class WriterThread:
         self._sync_error = None
         self._close(complete=isinstance(error, LogGone))
         self.displaced = isinstance(error, FolderInUse)
-        self._opening.lost(error)
+        self._opening.mark_lost(error)
         wait = RETRY_DELAYS_S[min(self._failures, len(RETRY_DELAYS_S) - 1)]
         self._failures += 1
         self._try_at = time.monotonic() + wait
@@ -210,7 +210,7 @@ class WriterThread:
             with as_log_error():
                 self._folder.hold()
             self._store = store = self._opening.store(self.head)
-            self._syncer.use(store)
+            self._syncer.set_store(store)
             store.probe()
             self._write_first_entries(store)
             self._check(store)
@@ -228,14 +228,14 @@ class WriterThread:
         """What the file has to be told before anything new."""
         entries = [*self._opening.first_entries(store, self.head), *self._unwritten]
         if not self._start_logged:
-            entries += cut_off(store)
+            entries += unfinished_entries(store)
             values = {"mode": self._mode}
-            entries.append(entered("began", values=values, reason=say("log_began")))
+            entries.append(new_entry("began", values=values, reason=say("log_began")))
         if self.fault:
             text = say("log_resumed", since=self._fault_since, why=self.fault)
-            entries.append(entered("resumed", reason=text))
+            entries.append(new_entry("resumed", reason=text))
         store.append(entries)
-        self._opening.written()
+        self._opening.mark_written()
         self._unwritten.clear()
         self._start_logged = True
         self.head = store.head
@@ -272,7 +272,7 @@ class WriterThread:
             self._fresh_wal, self._checkpoint_at = True, now + CHECKPOINT_S
 
     def _close(self, complete: bool = False) -> None:
-        self._syncer.use(None)
+        self._syncer.set_store(None)
         if self._store is not None:
             store, self._store = self._store, None
             try:

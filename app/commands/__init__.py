@@ -1,1 +1,2 @@
-"""From a press to its receipt: topics, services, actions, parameters, holds. No HTTP, no Zenoh."""
+"""Commands, from a press to its receipt: topics, services, actions, parameters, holds. No HTTP, no
+Zenoh."""

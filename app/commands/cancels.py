@@ -1,4 +1,4 @@
-"""Cancelling a goal: anyone may, with or without control, and however late."""
+"""Cancelling a goal. Every client may, with or without control, at any time."""
 
 import asyncio
 import time
@@ -7,7 +7,7 @@ from app.audit import Origin
 from app.audit.press_record import PressLog
 from app.clock import format_time
 from app.commands.dispatch import Dispatcher
-from app.commands.receipts import Receipt, closed, named, receipt_of
+from app.commands.receipts import Receipt, close_entry, origin_text, receipt_of
 from app.commands.refusals import EarlyRefusals
 from app.concurrency import CancellableWaits
 from app.errors import Cause, LinkError, NotFound
@@ -18,7 +18,7 @@ from app.ros_logging import RobotLog
 
 
 class Cancels:
-    """Of one panel; used on the event loop only."""
+    """The cancel requests of one robot's goals. Used on the event loop only."""
 
     def __init__(
         self,
@@ -35,26 +35,30 @@ class Cancels:
         self._log = log
 
     async def cancel(self, widget_id: str, origin: Origin, press_id: str = "") -> Receipt:
-        """Asks the robot to cancel the goal of one press or, without its id, the one under way."""
+        """Asks the robot to cancel the goal of a press; without a press id, the running goal."""
         widget = self._dispatcher.widget(widget_id)
         if not isinstance(widget, Action):
             raise NotFound(f'"{widget_id}" is not an action: there is nothing to cancel')
-        if (why := self._dispatcher.over(widget, press_id)) and not self._press_log.room(origin):
+        if (why := self._dispatcher.no_goal_reason(widget, press_id)) and not self._press_log.has_room(
+            origin
+        ):
             answer = Outcome("refused", why)
-            return self._early_refusals.counted(receipt_of(widget, {}, "", answer, "interlock"), origin)
-        noting = asyncio.ensure_future(self._press_log.canceled(widget_id, origin))
+            return self._early_refusals.count_only(
+                receipt_of(widget, {}, "", answer, "interlock"), origin
+            )
+        writing = asyncio.ensure_future(self._press_log.canceled(widget_id, origin))
         try:
-            # No disk keeps anyone from stopping a robot.
+            # A slow or failing disk must not delay a cancel.
             answer, cause = await self._canceled(widget, press_id)
         except BaseException:
-            (await noting).broke_off("log_broke_off")
+            (await writing).close_unknown("log_broke_off")
             raise
-        pending = await noting
+        pending = await writing
         self._log.info(
-            "cancel of %s by %s: %s: %s", widget_id, named(origin), answer.outcome, answer.text
+            "cancel of %s by %s: %s: %s", widget_id, origin_text(origin), answer.outcome, answer.text
         )
         receipt = receipt_of(widget, {}, "", answer, cause)
-        return await closed(pending, receipt)
+        return await close_entry(pending, receipt)
 
     async def _canceled(self, widget: Action, press_id: str) -> tuple[Outcome, Cause]:
         try:

@@ -1,7 +1,7 @@
-"""What shows that a command took effect: a field of the robot's that comes to have a value.
+"""Confirmations: a field of a robot's topic has the expected value after a command.
 
-Only what arrives after the command counts. A confirmation that comes after its time corrects the
-receipt, as a late answer of a service does.
+Only messages that arrive after the command count. A confirmation after the time limit corrects the
+receipt, as a late service response does.
 """
 
 import asyncio
@@ -21,13 +21,14 @@ from app.ros_logging import RobotLog
 
 log = logging.getLogger("kiosk.confirmations")
 
-LATE_S: Final = 60.0  # how long after its time a confirmation is still looked for
-CLOSE: Final = 1e-6  # a float32 comes back as the nearest one
+LATE_S: Final = 60.0  # after the time limit, a confirmation still corrects the receipt
+FLOAT_TOLERANCE: Final = 1e-6  # relative: a float32 field holds the nearest float32
 
 
 @dataclass(eq=False, slots=True)
 class _Waiting:
-    """A command that was sent at `since` (monotonic seconds) and is not confirmed yet."""
+    """An unconfirmed command, sent at `since` (monotonic seconds). `confirmed` is done with the wall
+    time of the confirmation; `late` is true after the time limit."""
 
     widget: SinglePublish
     confirm: Confirm
@@ -39,17 +40,17 @@ class _Waiting:
 
 
 class Confirmations:
-    """The commands of one robot that wait for their effect; used on the event loop only."""
+    """The unconfirmed commands of one robot. Used on the event loop only."""
 
     def __init__(self, robot: RobotState, changed: Callable[[], None]) -> None:
-        """`changed` is called when what the widgets show has changed."""
+        """`changed` is called when the status of a command has changed."""
         self._robot = robot
         self._changed = changed
         self._log = RobotLog(log, robot.name)
         self._waiting: dict[str, list[_Waiting]] = {}
         self._latest: dict[str, str] = {}
 
-    async def awaited(
+    async def wait(
         self,
         widget: SinglePublish,
         equals: Any,
@@ -58,13 +59,14 @@ class Confirmations:
         sent: TextLike,
         corrected: OnCorrection,
     ) -> Outcome:
-        """The result of a command that went out at `since` (monotonic seconds), as `sent` says."""
+        """Waits for the confirmation of a command that was sent at `since` (monotonic seconds); `sent`
+        is the sentence about the sending. `corrected` is called for a late confirmation."""
         confirm = widget.confirm
         assert confirm is not None
         future: asyncio.Future[float] = asyncio.get_running_loop().create_future()
         waiting = _Waiting(widget, confirm, equals, press_id, since, future)
         for older in [w for w in self._waiting.get(self._robot.key(confirm.topic), []) if w.late]:
-            self._forget(older)  # what comes now may be of this one
+            self._forget(older)  # a message from now on may be the effect of the new command
         self._waiting.setdefault(self._robot.key(confirm.topic), []).append(waiting)
         self._latest[widget.id] = press_id
         self._show(
@@ -75,26 +77,26 @@ class Confirmations:
         except asyncio.CancelledError:
             self._forget(waiting)
             raise
-        answer = self._confirmed(waiting) if future.done() else self._missed(waiting, sent, corrected)
+        answer = self._confirmed(waiting) if future.done() else self._time_out(waiting, sent, corrected)
         self._show_last(waiting, answer)
         return answer
 
-    def _missed(self, waiting: _Waiting, sent: TextLike, corrected: OnCorrection) -> Outcome:
+    def _time_out(self, waiting: _Waiting, sent: TextLike, corrected: OnCorrection) -> Outcome:
         confirm = waiting.confirm
         waiting.late = True
-        waiting.confirmed.add_done_callback(lambda _: self._too_late(waiting, corrected))
+        waiting.confirmed.add_done_callback(lambda _: self._confirm_late(waiting, corrected))
         asyncio.get_running_loop().call_later(LATE_S, self._forget, waiting)
         limit = f"{confirm.within_s:g}"
         missed = say("no_effect", topic=confirm.topic, seconds=limit)
         return Outcome("unknown", joined([sent, missed]))
 
-    def awaits(self, key: str) -> bool:
-        """Whether what this topic says next may confirm something."""
+    def is_awaited(self, key: str) -> bool:
+        """Whether the next message of this topic may confirm a command."""
         return any(not waiting.confirmed.done() for waiting in self._waiting.get(key, ()))
 
-    def hear(self, key: str, reading: Reading) -> None:
-        """After each message of a topic: of several presses of a widget it confirms the oldest, for
-        one effect is no proof of two commands."""
+    def update(self, key: str, reading: Reading) -> None:
+        """Checks a new message of a topic. Of several presses of a widget it confirms only the oldest:
+        one effect does not prove two commands."""
         done: set[str] = set()
         for waiting in [w for w in self._waiting.get(key, []) if not w.confirmed.done()]:
             if waiting.widget.id in done or reading.status != "message" or reading.at < waiting.since:
@@ -108,11 +110,11 @@ class Confirmations:
         at = format_time(waiting.confirmed.result())
         return Outcome("confirmed", say("confirmed", topic=waiting.confirm.topic, time=at))
 
-    def _too_late(self, waiting: _Waiting, corrected: OnCorrection) -> None:
+    def _confirm_late(self, waiting: _Waiting, corrected: OnCorrection) -> None:
         if waiting.confirmed.cancelled():
             return
         answer = self._confirmed(waiting)
-        self._log.warning("press %s: a late confirmation: %s", waiting.press_id, answer.text)
+        self._log.warning("press %s: late confirmation: %s", waiting.press_id, answer.text)
         corrected(waiting.press_id, answer)
         self._show_last(waiting, answer)
 
@@ -132,7 +134,7 @@ class Confirmations:
 
 
 def equal(value: Any, wanted: Any) -> bool:
-    """Whether a field has the value; floats as near as the type has them."""
+    """Whether a field has the value; floats are compared with `FLOAT_TOLERANCE`."""
     if isinstance(value, float) and isinstance(wanted, int | float):
-        return math.isclose(value, wanted, rel_tol=CLOSE, abs_tol=0.0)
+        return math.isclose(value, wanted, rel_tol=FLOAT_TOLERANCE, abs_tol=0.0)
     return same_value(value, wanted)

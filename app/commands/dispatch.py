@@ -1,4 +1,4 @@
-"""What a press is for: its inputs checked, its message, request or goal encoded, and sent."""
+"""Dispatches a press: checks its inputs, encodes the message, request or goal, and sends it."""
 
 import time
 from collections.abc import Awaitable, Callable, Iterable, Mapping
@@ -24,31 +24,31 @@ from app.robot.state import RobotState
 
 
 class Transport(Protocol):
-    """What a press needs of the link."""
+    """The part of the Zenoh session that publishing needs."""
 
     def put(self, key: str, payload: bytes) -> None: ...
-    def heard(self, key: str) -> bool: ...
+    def has_reader(self, key: str) -> bool: ...
 
 
-async def taken_for_reached() -> bool:
-    """Where no one asks whether something arrives."""
+async def assume_reached() -> bool:
+    """For transports that cannot tell whether the bridge received a message."""
     return True
 
 
 class Outgoing(NamedTuple):
-    """What is sent by a press: the checked `values` of its inputs and the `fields` that they fill in,
-    and what `Dispatcher.send` gets beside them."""
+    """A press to be sent: the checked `values` of its inputs, the `fields` of the filled-in template,
+    and the other arguments of `Dispatcher.send`."""
 
     values: dict[str, Any]
     fields: dict[str, Any]
     press_id: str
     correct: OnCorrection
     entry: str
-    look: FinalCheck
+    final_check: FinalCheck
 
 
 class Trackers(NamedTuple):
-    """What sends commands that the robot answers later, and knows each that has no answer yet."""
+    """The trackers of commands that the robot answers later."""
 
     calls: ServiceCalls
     actions: GoalTracker
@@ -57,7 +57,7 @@ class Trackers(NamedTuple):
 
 
 class Dispatcher:
-    """What the widgets of one panel send to one robot; judges nothing."""
+    """Sends the commands of one panel's widgets to one robot. Does not check permission."""
 
     def __init__(
         self,
@@ -67,12 +67,12 @@ class Dispatcher:
         transport: Transport,
         trackers: Trackers,
         monotonic: Callable[[], float] = time.monotonic,
-        reached: Callable[[], Awaitable[bool]] = taken_for_reached,
+        reached: Callable[[], Awaitable[bool]] = assume_reached,
     ) -> None:
-        """`reached` tells, later, whether what was sent until now has reached the bridge."""
+        """`reached` returns whether everything sent so far has reached the bridge."""
         self._reached = reached
         self._widgets = {w.id: w for w in panel.widgets()}
-        self._needs = {
+        self._input_ids = {
             id: input_ids(w) for id, w in self._widgets.items() if isinstance(w, PressCommand)
         }
         self._interfaces = interfaces
@@ -83,7 +83,7 @@ class Dispatcher:
         self._confirmations = trackers.confirmations
         self._parameters = trackers.parameters
         self._monotonic = monotonic
-        # How each kind, or family, is sent; why it would not be; and how what is entered is checked.
+        # By kind or family of widgets: how to send it, why it would be refused, how to check an entry.
         self.senders: Mapping[type[PressCommand], Callable[[Any, Outgoing], Awaitable[Outcome]]] = {
             SinglePublish: self._publish,
             Call: self._call,
@@ -91,38 +91,37 @@ class Dispatcher:
             Parameter: self._set,
         }
         self.refusals: Mapping[type[PressCommand], Callable[[Any, dict[str, Any]], TextLike]] = {
-            SinglePublish: self._unpublished,
-            Call: self._uncalled,
+            SinglePublish: self._check_message,
+            Call: self._check_call,
             Action: lambda widget, _: self._actions.full(widget.action),
             Parameter: lambda widget, _: self._calls.full(f"{widget.node}/{SET[0]}"),
         }
         self.checks: Mapping[type[EntryWidget], Callable[[Any, Any], Any]] = {
             Input: lambda widget, given: widget.check_value(given),
-            Parameter: self._parameters.checked,
+            Parameter: self._parameters.check_value,
         }
 
     def widget(self, widget_id: str) -> PressCommand:
-        """What can be pressed; NotFound for everything else."""
+        """The command widget with this id; NotFound for every other id."""
         widget = self._widgets.get(widget_id)
         if not isinstance(widget, PressCommand):
             raise NotFound(f'there is no widget "{widget_id}" that can be pressed')
         return widget
 
-    def typed(self, form: Mapping[str, str]) -> dict[str, Any]:
-        """A form's texts as values of the inputs that they are named by."""
-        return {name: self._typed(name, text) for name, text in form.items()}
+    def parse_form(self, form: Mapping[str, str]) -> dict[str, Any]:
+        """The texts of a form as input values, by input id."""
+        return {name: self._parse_field(name, text) for name, text in form.items()}
 
-    def _typed(self, name: str, text: str) -> Any:
+    def _parse_field(self, name: str, text: str) -> Any:
         field = self._widgets.get(name)
         return field.parse_text(text) if isinstance(field, EntryWidget) else text
 
-    def needed(self, widget: PressCommand, inputs: Mapping[str, Any]) -> dict[str, Any]:
-        """Of all that came with a press, the inputs that it needs."""
-        return {name: inputs[name] for name in self._needs[widget.id] if name in inputs}
+    def needed_inputs(self, widget: PressCommand, inputs: Mapping[str, Any]) -> dict[str, Any]:
+        """The inputs of a press that its widget uses."""
+        return {name: inputs[name] for name in self._input_ids[widget.id] if name in inputs}
 
     def with_defaults(self, widget: Command, inputs: Mapping[str, Any]) -> dict[str, Any]:
-        """What came with a press, and the defaults of other inputs that it needs, where the panel file
-        gives one."""
+        """The inputs of a press, with the panel file's defaults for those left out."""
         fields = ((name, self._widgets[name]) for name in input_ids(widget) if name not in inputs)
         missing = {
             name: field.default_value for name, field in fields if isinstance(field, EntryWidget)
@@ -136,75 +135,78 @@ class Dispatcher:
         press_id: str,
         correct: OnCorrection,
         entry: str = "",
-        look: FinalCheck = no_check,
+        final_check: FinalCheck = no_check,
     ) -> Outcome:
-        """Sends, and waits for what comes of it; `correct` gets what is known later. `entry` is the
-        hash of the press's entry in the operator's log, `look` the last one at what permits it.
+        """Sends a press and waits for its outcome; `correct` is called if the outcome changes later.
+        `entry` is the hash of the press's entry in the operator's log. `final_check` checks permission
+        right before sending.
 
-        Until it is sent nothing here waits. FieldError or InputError for bad input, LinkError where
-        it could not be sent, PressRefused where `look` finds that it may not be.
+        Does not await before sending. FieldError or InputError for bad input, LinkError if it could not
+        be sent, PressRefused from `final_check`.
         """
-        values = self.checked(self._needs[widget.id], inputs)
+        values = self.check_inputs(self._input_ids[widget.id], inputs)
         fields = fill(widget.template, add_now(values))
         send = find_row(self.senders, widget)
-        return await send(widget, Outgoing(values, fields, press_id, correct, entry, look))
+        return await send(widget, Outgoing(values, fields, press_id, correct, entry, final_check))
 
     def refusal(self, widget: PressCommand, inputs: Mapping[str, Any]) -> TextLike:
-        """Why `send` would refuse it now, "" if it would not; FieldError or InputError as there."""
-        values = self.checked(self._needs[widget.id], inputs)
+        """Why `send` would refuse the press now, else ""; FieldError or InputError for bad input."""
+        values = self.check_inputs(self._input_ids[widget.id], inputs)
         return find_row(self.refusals, widget)(widget, fill(widget.template, add_now(values)))
 
     async def _publish(self, widget: SinglePublish, going: Outgoing) -> Outcome:
         if widget.confirm is None:
-            return await self._arrived(widget, self._published(widget, going.fields, going.look))
+            return await self._until_reached(widget, self._put(widget, going.fields, going.final_check))
         equals = fill(widget.confirm.equals, going.values)
         since = self._monotonic()
-        answer = self._published(widget, going.fields, going.look)
-        return await self._confirmations.awaited(
+        answer = self._put(widget, going.fields, going.final_check)
+        return await self._confirmations.wait(
             widget, equals, going.press_id, since, answer.text, going.correct
         )
 
-    def _unpublished(self, widget: SinglePublish, fields: dict[str, Any]) -> str:
+    def _check_message(self, widget: SinglePublish, fields: dict[str, Any]) -> str:
         self._interfaces.encode(widget.type, fields)
         return ""
 
     async def _call(self, widget: Call, going: Outgoing) -> Outcome:
         request, _ = self._interfaces.service_types(widget.type)
         payload = self._interfaces.encode(request, going.fields)
-        return await self._calls.call(widget, payload, going.press_id, going.correct, going.look)
+        return await self._calls.call(widget, payload, going.press_id, going.correct, going.final_check)
 
-    def _uncalled(self, widget: Call, fields: dict[str, Any]) -> TextLike:
+    def _check_call(self, widget: Call, fields: dict[str, Any]) -> TextLike:
         self._interfaces.encode(self._interfaces.service_types(widget.type)[0], fields)
         return self._calls.full(widget.service)
 
     async def _start(self, widget: Action, going: Outgoing) -> Outcome:
         return await self._actions.start(
-            widget, going.fields, going.press_id, going.correct, going.entry, going.look
+            widget, going.fields, going.press_id, going.correct, going.entry, going.final_check
         )
 
     async def _set(self, widget: Parameter, going: Outgoing) -> Outcome:
         value = going.fields["value"]
-        return await self._parameters.set(widget, value, going.press_id, going.correct, going.look)
+        return await self._parameters.set(
+            widget, value, going.press_id, going.correct, going.final_check
+        )
 
-    def _published(self, widget: SinglePublish, fields: dict[str, Any], look: FinalCheck) -> Outcome:
+    def _put(self, widget: SinglePublish, fields: dict[str, Any], final_check: FinalCheck) -> Outcome:
         payload = self._interfaces.encode(widget.type, fields)
         key = self._robot.key(widget.topic)
-        heard = self._transport.heard(key)
-        look()
+        heard = self._transport.has_reader(key)
+        final_check()
         self._transport.put(key, payload)
         sentence = "published" if heard else "sent_to_nobody"
         text = say(sentence, topic=widget.topic, time=format_time(time.time()))
         return Outcome("published" if heard else "unknown", text)
 
-    async def _arrived(self, widget: SinglePublish, answer: Outcome) -> Outcome:
-        """What was `published` is on its way until the bridge has answered."""
+    async def _until_reached(self, widget: SinglePublish, answer: Outcome) -> Outcome:
+        """Waits for the bridge's response: until then a published message may still be lost."""
         at = format_time(time.time())
         if answer.outcome != "published" or await self._reached():
             return answer
         return Outcome("unknown", say("sent_unanswered", topic=widget.topic, time=at))
 
-    def checked(self, names: Iterable[str], inputs: Mapping[str, Any]) -> dict[str, Any]:
-        """The values of the inputs with these ids."""
+    def check_inputs(self, names: Iterable[str], inputs: Mapping[str, Any]) -> dict[str, Any]:
+        """The checked values of the inputs with these ids; InputError for bad or missing ones."""
         for name in inputs:
             if not isinstance(self._widgets.get(name), EntryWidget):
                 raise InputError(f'there is no input "{name:.60}" on this panel')
@@ -216,10 +218,10 @@ class Dispatcher:
             values[name] = find_row(self.checks, field)(field, inputs[name])
         return values
 
-    def over(self, widget: Action, press_id: str) -> TextLike:
-        """Why there is no goal to cancel; "" where there is one."""
-        return self._actions.over(widget, press_id)
+    def no_goal_reason(self, widget: Action, press_id: str) -> TextLike:
+        """Why there is no goal to cancel, "" if there is one."""
+        return self._actions.no_goal_reason(widget, press_id)
 
     async def cancel(self, widget: Action, press_id: str) -> Outcome:
-        """Asks the robot to cancel the goal of a press or, without its id, the one under way."""
+        """Asks the robot to cancel the goal of a press; without a press id, the running goal."""
         return await self._actions.cancel(widget, press_id)

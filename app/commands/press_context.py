@@ -1,6 +1,6 @@
-"""Who presses, and why what he saw may no longer be what he means: judged in the moment of sending.
+"""The context of a press: its client, and whether the view that the operator saw is stale.
 
-The one place for this, whether a press comes as JSON, as a form or as a hold.
+Presses as JSON, as forms and holds all use it. It is evaluated at the moment of sending.
 """
 
 import re
@@ -19,32 +19,32 @@ from app.permission.press_permission import NO_GROUNDS, Grounds
 from app.permission.principal import Principal
 from app.view.publisher import ViewPublisher
 
-AHEAD_S: Final = 1.0  # a press can't be from later than now, but for rounding and drift
-SEEN: Final = r"^[0-9a-f]{1,32}-[0-9]{1,18}$"  # <boot>-<version>, an event's id
-LONGEST_ID: Final = 64
-PRESS_ID: Final = rf"^[A-Za-z0-9_.:-]{{1,{LONGEST_ID}}}$"
-_is_seen: Final = re.compile(SEEN).fullmatch
+MAX_AHEAD_S: Final = 1.0  # tolerance for a press time in the future: rounding and drift
+EVENT_ID: Final = r"^[0-9a-f]{1,32}-[0-9]{1,18}$"  # <boot>-<version>
+MAX_ID_LENGTH: Final = 64
+PRESS_ID: Final = rf"^[A-Za-z0-9_.:-]{{1,{MAX_ID_LENGTH}}}$"
+_is_event_id: Final = re.compile(EVENT_ID).fullmatch
 
 
-def not_stale() -> TextLike:
-    """Of a client that does not say what was seen, and when it was pressed."""
+def never_stale() -> TextLike:
+    """For clients that send neither `seen` nor `at`: their presses are never stale."""
     return ""
 
 
 @dataclass(frozen=True, slots=True)
 class PressContext:
-    """Who presses, and what has to hold beside the robot's permission when it is sent.
+    """The client of a press, and the conditions besides the robot's permission.
 
-    `grounds` is what the server has against it, `stale_reason` why what the operator saw is no longer
-    so, "" if it still is."""
+    `grounds` returns the server's own locks (shutdown, log, control). `stale_reason` returns why the
+    view that the operator saw is stale, "" if it is not."""
 
     origin: Origin
     grounds: Callable[[], Grounds] = lambda: NO_GROUNDS
-    stale_reason: Callable[[], TextLike] = not_stale
+    stale_reason: Callable[[], TextLike] = never_stale
 
 
 class PressGuard:
-    """Of one robot's controls."""
+    """Makes the contexts of presses, holds and acts on one robot."""
 
     def __init__(
         self,
@@ -54,7 +54,8 @@ class PressGuard:
         expires_s: float,
         boots: Callable[[], Collection[str]],
     ) -> None:
-        """`boots` are those of all robots' boards, by which a page of another one is told."""
+        """`boots` returns the boot ids of all robots' views: a press with another robot's id is
+        refused."""
         self._publisher = publisher
         self._control = control
         self._log = operators_log
@@ -62,15 +63,17 @@ class PressGuard:
         self._boots = boots
         self._ended = False
 
-    def end(self) -> None:
-        """From now on nothing is sent any more."""
+    def close(self) -> None:
+        """Refuses every command from now on."""
         self._ended = True
 
-    def by(self, widget: str, who: Principal, seen: str = "", at: float | None = None) -> PressContext:
-        """Who presses or holds a widget, and what has to hold for that at every moment.
+    def context_for(
+        self, widget: str, who: Principal, seen: str = "", at: float | None = None
+    ) -> PressContext:
+        """The context of a press or hold of a widget.
 
-        `seen` is the id of the last event that the operator saw, "" where that is not known; `at`
-        is when it was pressed, in the server's own time. InputError for what can't have been seen.
+        `seen` is the id of the last event that the operator saw, "" if unknown. `at` is the time of the
+        press in the server's time. InputError for an invalid `seen`.
         """
         if seen:
             self._check(seen)
@@ -78,12 +81,11 @@ class PressGuard:
         return PressContext(
             origin_of(who, seen),
             lambda: self._grounds(who),
-            lambda: self._doubt(widget, seen, at),
+            lambda: self._stale_reason(widget, seen, at),
         )
 
     def act_verdict(self, at: float | None) -> Verdict:
-        """What the server has against an act that is no press, touched at this moment (the server's own
-        time, None where it is not known)."""
+        """Whether the server permits an act on control authority; `at` as in `context_for`."""
         if self._ended:
             return locked("ending")
         if self._log.lock:
@@ -92,15 +94,15 @@ class PressGuard:
         return Verdict(False, "late", why) if why else PERMITTED
 
     def late(self, at: float) -> TextLike:
-        """Why what was touched at this moment (the server's own time) is not done now; "" if it is."""
+        """Why a touch at this time (in the server's time) is too old or in the future, else ""."""
         age = clock.server_now() - at
         if age > self._expires_s:
             return say("expired", seconds=f"{age:.1f}")
-        return say("ahead") if age < -AHEAD_S else ""
+        return say("ahead") if age < -MAX_AHEAD_S else ""
 
     def _check(self, seen: str) -> None:
         boot, _, version = seen.partition("-")
-        if not _is_seen(seen):
+        if not _is_event_id(seen):
             raise InputError(f'seen: "{seen:.60}" is not the id of an event')
         if boot == self._publisher.boot and int(version) > self._publisher.version:
             newest = self._publisher.id
@@ -109,8 +111,8 @@ class PressGuard:
     def _grounds(self, who: Principal) -> Grounds:
         return Grounds(self._control.verdict(who), self._log.lock, self._ended, who)
 
-    def _doubt(self, widget: str, seen: str, at: float | None) -> TextLike:
-        """Why a press is no longer what was meant; "" if it is."""
+    def _stale_reason(self, widget: str, seen: str, at: float | None) -> TextLike:
+        """Why the view that the operator saw is stale, "" if it is not."""
         boot, _, version = seen.partition("-")
         if boot and boot != self._publisher.boot:
             return say("seen_on_another" if boot in self._boots() else "seen_before_restart")

@@ -1,8 +1,9 @@
-"""How often a client may press, on all robots together: what is more is not judged, sent or recorded.
+"""Rate limits of presses, for all robots together. A press over a limit is not checked, sent or
+recorded.
 
-A client is a browser by its cookie; programs without one are one client for each address. An address
-has a limit of its own, for a cookie is made up easily, and all addresses together have one. The kiosk's
-own machine does not count among these: no one in the network keeps the panel at the cell from pressing.
+A client is a browser with a cookie; programs without one are one client per address. Addresses have
+their own limit, because cookies are easily invented, and all addresses share a total limit. The kiosk's
+own machine is exempt from the total: a flood from the network must not block the panel at the cell.
 """
 
 import time
@@ -15,44 +16,44 @@ from app.permission.principal import Principal
 from app.rate_limit import Quota, TokenBuckets
 
 # A finger taps ten times a second at most; a program that follows a control loop presses 50 times.
-OF_CLIENT: Final = Quota(100, 50)
-OF_ADDRESS: Final = Quota(200, 100)
-OF_ALL: Final = Quota(400, 200)
-OF_CANCELS: Final = Quota(20, 5)  # of one goal, by whomever: each of them has asked the robot
-RETRY_AFTER_S: Final = 1  # each has room again much sooner; HTTP knows whole seconds
+CLIENT_QUOTA: Final = Quota(100, 50)
+ADDRESS_QUOTA: Final = Quota(200, 100)
+TOTAL_QUOTA: Final = Quota(400, 200)
+CANCEL_QUOTA: Final = Quota(20, 5)  # of one goal, by all clients together
+RETRY_AFTER_S: Final = 1  # every bucket refills sooner; Retry-After is in whole seconds
 
 
 class PressLimits:
-    """Used on the event loop only."""
+    """The rate limits of one server. Used on the event loop only."""
 
     def __init__(
         self, leave_out: Callable[[Origin], None], monotonic: Callable[[], float] = time.monotonic
     ) -> None:
-        """`leave_out` tells the operator's log of a press that is not one of its entries."""
-        self._leave_out = leave_out
-        self._clients = TokenBuckets(OF_CLIENT, monotonic)
-        self._addresses = TokenBuckets(OF_ADDRESS, monotonic)
-        self._all = TokenBuckets(OF_ALL, monotonic)
-        self._cancels = TokenBuckets(OF_CANCELS, monotonic)
+        """`leave_out` counts a refused press for the operator's log, which has no entry of it."""
+        self._count_unlogged = leave_out
+        self._clients = TokenBuckets(CLIENT_QUOTA, monotonic)
+        self._addresses = TokenBuckets(ADDRESS_QUOTA, monotonic)
+        self._all = TokenBuckets(TOTAL_QUOTA, monotonic)
+        self._cancels = TokenBuckets(CANCEL_QUOTA, monotonic)
         self.refused = 0
 
     def admit(self, who: Principal) -> bool:
-        """Whether it may press once more now; what may not is counted, here and for the log."""
-        asked: list[tuple[TokenBuckets, Hashable]] = [
+        """Whether a client may press now. Counts refused presses, here and for the log."""
+        needed: list[tuple[TokenBuckets, Hashable]] = [
             (self._clients, (who.client.address, who.client.id)),
             (self._addresses, who.client.address),
         ]
         if not who.client.local:
-            asked.append((self._all, ""))
-        if not all(buckets.has_token(key) for buckets, key in asked):
+            needed.append((self._all, ""))
+        if not all(buckets.has_token(key) for buckets, key in needed):
             return self._refuse(who)
-        for buckets, key in asked:
+        for buckets, key in needed:
             buckets.take_token(key)
         return True
 
     def admit_cancel(self, who: Principal, *goal: str) -> bool:
-        """The same for a cancel: it is one too many only if this very goal's was asked for that often
-        just now, so that no one is kept from stopping a robot."""
+        """Whether a goal may be canceled now. The limit is per goal, so that presses and other goals
+        never block a cancel."""
         if not self._cancels.has_token(goal):
             return self._refuse(who)
         self._cancels.take_token(goal)
@@ -60,5 +61,5 @@ class PressLimits:
 
     def _refuse(self, who: Principal) -> bool:
         self.refused += 1
-        self._leave_out(origin_of(who))
+        self._count_unlogged(origin_of(who))
         return False

@@ -1,4 +1,4 @@
-"""Who presses and the result: what presses and holds have in common."""
+"""Receipts of presses and holds."""
 
 import hashlib
 import json
@@ -18,11 +18,11 @@ from app.panel.widgets.families import Command, EntryWidget, PressCommand
 from app.robot.command_status import Outcome, OutcomeCode
 
 RECEIPTS_KEPT: Final = 1000
-MOST_LOOKS: Final = 20  # at news that come faster than they are taken in: then nothing is sent
-PAST_KEPT: Final = 20_000  # ids of presses whose receipts are not kept any more
-LONGEST_LOGGED: Final = 300
-LONGEST_KEPT: Final = 4000  # characters of all inputs of a press
-FINE: Final = frozenset({"published", "confirmed", "accepted", "succeeded"})
+MAX_FINAL_CHECKS: Final = 20  # if data keeps arriving faster than it is ingested, nothing is sent
+PAST_IDS_KEPT: Final = 20_000  # ids of presses whose receipts are no longer kept
+MAX_LOGGED_CHARS: Final = 300
+MAX_KEPT_CHARS: Final = 4000  # characters of all inputs of a press
+GOOD_OUTCOMES: Final = frozenset({"published", "confirmed", "accepted", "succeeded"})
 _sorted: Final = json.JSONEncoder(sort_keys=True).encode
 
 
@@ -31,9 +31,9 @@ class Receipt:
     """The result of a press. `reason` is a sentence for the operator, `code` its stable name (None
     without a reason), and `cause` why the press was refused.
 
-    `inputs` are those that the widget needs, `entered` all that the press came with, if they are few
-    and short: a page without scripts shows them again. `fingerprint` tells these from any others.
-    `recalled`: it is what the operator's log knew of a press that this server did not make.
+    `inputs` are those that the widget uses. `entered` are all inputs of the press, if they are few and
+    short: a page without scripts shows them again. `fingerprint` is a hash of all inputs. `from_log` is
+    true for a receipt restored from the operator's log after a restart.
     """
 
     id: str
@@ -45,7 +45,7 @@ class Receipt:
     inputs: Mapping[str, Any]
     fingerprint: str
     entered: Mapping[str, Any] = field(default_factory=dict)
-    recalled: bool = False
+    from_log: bool = False
 
     @property
     def code(self) -> str | None:
@@ -62,58 +62,61 @@ class Receipt:
         }
 
 
-class Witness(Protocol):
-    """Who is told of each press when it is made, and of each receipt, also of a corrected one."""
+class PressRecorder(Protocol):
+    """Records each press when it is made, and each receipt, corrected ones included."""
 
-    def pressed(self, press_id: str, widget: str, who: str, inputs: Mapping[str, Any]) -> None: ...
-    def answered(self, receipt: Receipt) -> None: ...
+    def record_press(self, press_id: str, widget: str, who: str, inputs: Mapping[str, Any]) -> None: ...
+    def record_receipt(self, receipt: Receipt) -> None: ...
 
 
 class Receipts:
     """The last receipts, by the ids of their presses."""
 
-    def __init__(self, witness: Witness | None = None) -> None:
-        self._witness = witness
+    def __init__(self, recorder: PressRecorder | None = None) -> None:
+        self._recorder = recorder
         self._receipts: OrderedDict[str, Receipt] = OrderedDict()
-        self._left_out: OrderedDict[str, Receipt] = OrderedDict()
-        self._recalled: OrderedDict[str, Receipt] = OrderedDict()
-        self._past: OrderedDict[str, None] = OrderedDict()
+        self._unlogged: OrderedDict[str, Receipt] = OrderedDict()
+        self._from_log: OrderedDict[str, Receipt] = OrderedDict()
+        self._past_ids: OrderedDict[str, None] = OrderedDict()
 
     def get(self, press_id: str) -> Receipt | None:
-        """The receipt of a press, as it is known now."""
-        return self.made(press_id) or self._recalled.get(press_id)
+        """The current receipt of a press; None for unknown ids."""
+        return self.get_own(press_id) or self._from_log.get(press_id)
 
-    def made(self, press_id: str) -> Receipt | None:
-        """The same, of a press of this server's own: what the log knows of others may change."""
-        return self._receipts.get(press_id) or self._left_out.get(press_id)
+    def get_own(self, press_id: str) -> Receipt | None:
+        """The receipt of a press of this server's run. Receipts from the log are read again each time,
+        as their entries may change."""
+        return self._receipts.get(press_id) or self._unlogged.get(press_id)
 
     def is_past(self, press_id: str) -> bool:
-        """Whether this press was made, though its receipt is not kept any more."""
-        return press_id in self._past
+        """Whether this press was made, but its receipt is no longer kept."""
+        return press_id in self._past_ids
 
-    def begin(self, press_id: str, widget: str, origin: Origin, inputs: Mapping[str, Any]) -> None:
-        """A press was made."""
-        if self._witness is not None:
-            self._witness.pressed(press_id, widget, named(origin), inputs)
+    def record_press(
+        self, press_id: str, widget: str, origin: Origin, inputs: Mapping[str, Any]
+    ) -> None:
+        """Records a new press."""
+        if self._recorder is not None:
+            self._recorder.record_press(press_id, widget, origin_text(origin), inputs)
 
     def keep(self, receipt: Receipt) -> None:
-        if receipt.recalled:
-            _keep(self._recalled, receipt)
+        if receipt.from_log:
+            _keep(self._from_log, receipt)
             return
-        if self._witness is not None:
-            self._witness.answered(receipt)
+        if self._recorder is not None:
+            self._recorder.record_receipt(receipt)
         for press_id in _keep(self._receipts, receipt):
-            self._past[press_id] = None
-        while len(self._past) > PAST_KEPT:
-            self._past.popitem(last=False)
+            self._past_ids[press_id] = None
+        while len(self._past_ids) > PAST_IDS_KEPT:
+            self._past_ids.popitem(last=False)
 
-    def keep_left_out(self, receipt: Receipt) -> None:
-        """A refusal that the log only counts: however many these are, they displace no other."""
-        _keep(self._left_out, receipt)
+    def keep_unlogged(self, receipt: Receipt) -> None:
+        """Keeps a refusal that the log only counts, apart from others: these never displace them."""
+        _keep(self._unlogged, receipt)
 
 
 def _keep(receipts: OrderedDict[str, Receipt], receipt: Receipt) -> list[str]:
-    """Keeps it, and as many as there is room for; the ids of those that are not kept any more."""
+    """Keeps a receipt, and drops the oldest beyond `RECEIPTS_KEPT`; returns the ids dropped."""
     receipts[receipt.id] = receipt
     return [receipts.popitem(last=False)[0] for _ in range(len(receipts) - RECEIPTS_KEPT)]
 
@@ -125,60 +128,61 @@ def receipt_of(
     answer: Outcome,
     cause: Cause = "",
 ) -> Receipt:
-    """The result of a press just now."""
+    """A receipt for an outcome, dated now."""
     at = datetime.now(UTC).isoformat(timespec="milliseconds")
     own, entered = ({**of} if _short(of) else {} for of in (needed_inputs(widget, inputs), inputs))
-    told = answer.outcome, answer.text, at, cause
-    return Receipt(press_id, widget.id, *told, own, fingerprint(inputs), entered)
+    outcome = answer.outcome, answer.text, at, cause
+    return Receipt(press_id, widget.id, *outcome, own, fingerprint(inputs), entered)
 
 
-def recalled(
-    widget: PressCommand, inputs: Mapping[str, Any], press: Entry, told: Entry | None, cause: Cause
+def recalled_receipt(
+    widget: PressCommand, inputs: Mapping[str, Any], press: Entry, last: Entry | None, cause: Cause
 ) -> Receipt:
-    """What the operator's log knows of a press: where it was told nothing, no one will know."""
-    if told is None:
+    """The receipt of a press from the operator's log; without a `last` entry the result is unknown."""
+    if last is None:
         answer, at = Outcome("unknown", say("log_ended")), press.at
     else:
-        answer, at = Outcome(cast(OutcomeCode, told.outcome), told.said), told.at
+        answer, at = Outcome(cast(OutcomeCode, last.outcome), last.reason_text), last.at
     receipt = receipt_of(widget, inputs, press.press, answer, cause)
     wall = datetime.fromtimestamp(at / 1000, UTC).isoformat(timespec="milliseconds")
-    return replace(receipt, at=wall, recalled=True)
+    return replace(receipt, at=wall, from_log=True)
 
 
 def fingerprint(inputs: Mapping[str, Any]) -> str:
-    """The same for the same inputs only, which are what JSON has."""
+    """A hash of the inputs, which are JSON values."""
     return hashlib.sha256(_sorted(inputs).encode()).hexdigest()
 
 
 def _short(inputs: Mapping[str, Any]) -> bool:
     plain = all(isinstance(value, str | int | float) for value in inputs.values())
-    return plain and sum(len(str(v)) + len(k) for k, v in inputs.items()) <= LONGEST_KEPT
+    return plain and sum(len(str(v)) + len(k) for k, v in inputs.items()) <= MAX_KEPT_CHARS
 
 
 def corrected(receipt: Receipt, answer: Outcome) -> Receipt:
     return replace(receipt, outcome=answer.outcome, reason=answer.text, cause="")
 
 
-def untyped(widget: Command, receipt: Receipt) -> str:
-    """The outcome, with its reason where that repeats nothing of what was typed in."""
+def outcome_text(widget: Command, receipt: Receipt) -> str:
+    """The outcome and its reason, without reasons that may repeat what the operator typed."""
     if receipt.cause == "input" or isinstance(widget, EntryWidget):
         return receipt.outcome
     return f"{receipt.outcome}: {render(receipt.reason)}"
 
 
-def with_doubt(receipt: Receipt, doubt: TextLike) -> Receipt:
-    if not doubt:
+def with_log_fault(receipt: Receipt, fault: TextLike) -> Receipt:
+    """The receipt, with a note if its log entry is not on the disk."""
+    if not fault:
         return receipt
-    return replace(receipt, reason=say("log_not_on_disk", said=receipt.reason, why=doubt))
+    return replace(receipt, reason=say("log_not_on_disk", said=receipt.reason, why=fault))
 
 
-async def closed(pending: PendingEntry, receipt: Receipt) -> Receipt:
-    """The receipt, when what it says is on the disk; where it is not, it says so."""
-    doubt = await pending.closed(receipt.outcome, receipt.reason)
+async def close_entry(pending: PendingEntry, receipt: Receipt) -> Receipt:
+    """Closes a press's log entry; returns the receipt when that is on the disk, or with a note."""
+    fault = await pending.close(receipt.outcome, receipt.reason)
     if pending.corrected_to is not None:  # in the meantime
         receipt = corrected(receipt, pending.corrected_to)
-    return with_doubt(receipt, doubt)
+    return with_log_fault(receipt, fault)
 
 
-def named(origin: Origin) -> str:
+def origin_text(origin: Origin) -> str:
     return f"{origin.who} ({origin.address})" if origin.who else origin.address

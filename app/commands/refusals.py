@@ -1,5 +1,5 @@
-"""Presses that are refused before they are an entry of the log: their id was used before, they came too
-soon, they are more than their client may, or their refusal is only counted."""
+"""Presses that are refused before they have a log entry: a reused id, a second tap, a rate limit, or a
+client whose refusals the log only counts."""
 
 import secrets
 import time
@@ -13,7 +13,14 @@ from app.clock import format_time
 from app.commands.dispatch import Dispatcher
 from app.commands.press_context import PressContext
 from app.commands.press_judge import PressJudge
-from app.commands.receipts import Receipt, Receipts, named, receipt_of, untyped, with_doubt
+from app.commands.receipts import (
+    Receipt,
+    Receipts,
+    origin_text,
+    outcome_text,
+    receipt_of,
+    with_log_fault,
+)
 from app.errors import FieldError, InputError
 from app.i18n import BETWEEN, Text, TextLike, joined, say
 from app.panel.widgets.families import PressCommand
@@ -22,7 +29,7 @@ from app.ros_logging import RobotLog, rosout_extra
 
 
 class EarlyRefusals:
-    """Of one panel; used on the event loop only."""
+    """Makes the receipts of early refusals for one robot. Used on the event loop only."""
 
     def __init__(
         self,
@@ -41,8 +48,8 @@ class EarlyRefusals:
     async def too_soon(
         self, widget_id: str, inputs: Mapping[str, Any], press_id: str, before: str, origin: Origin
     ) -> Receipt:
-        """What may be the second tap of another press, of which it says what came too: `before` is its
-        id, "" where there is none."""
+        """Refuses a press that may be the second tap of an earlier one. `before` is the id of that
+        press, "" without one; the reason includes its result."""
         why: TextLike = say("press_too_soon")
         if (last := self._receipts.get(before)) is not None:
             label = self._dispatcher.widget(last.widget).label
@@ -59,32 +66,33 @@ class EarlyRefusals:
         *,
         shown: bool = False,
     ) -> Receipt:
-        """Of one that its client may make later, by the same id; `shown`: on a page without scripts."""
+        """Refuses a press over the rate limit. The client may repeat it later with the same id.
+        `shown`: the receipt is kept for a page without scripts."""
         now = format_time(time.time())
         answer = Outcome("refused", say("refused", why=say(sentence), time=now))
         receipt = receipt_of(self._dispatcher.widget(widget_id), inputs, press_id, answer, "limit")
         if shown:
             receipt = replace(receipt, id=_own_id(press_id))
-            self._receipts.keep_left_out(receipt)
+            self._receipts.keep_unlogged(receipt)
         return receipt
 
-    def counted(self, receipt: Receipt, origin: Origin) -> Receipt:
-        """A refusal that is no entry of the log's."""
-        self._press_log.leave_out(origin)
-        self._receipts.keep_left_out(receipt)
+    def count_only(self, receipt: Receipt, origin: Origin) -> Receipt:
+        """Counts a refusal without writing a log entry."""
+        self._press_log.count_unlogged(origin)
+        self._receipts.keep_unlogged(receipt)
         return receipt
 
-    def left_out(
+    def unlogged_refusal(
         self, widget: PressCommand, inputs: Mapping[str, Any], press_id: str, context: PressContext
     ) -> Receipt | None:
         """The receipt of a refusal that the log only counts; None for every other press.
 
-        Only a client that has used up the log's quota of refusals is judged here, before its entry is
-        written: what it may do still goes out, and its refusals push no other entry out of the log.
+        Applies only to a client that has used up the log's quota of refusals. Its permitted presses are
+        still sent; its refusals push no other entry out of the log.
         """
-        if self._press_log.room(context.origin):
+        if self._press_log.has_room(context.origin):
             return None
-        _, why, cause = self._judge.ground(widget, context)
+        _, why, cause = self._judge.judge(widget, context)
         sentence = "refused" if why else "not_encoded"
         if not why:
             try:
@@ -94,7 +102,7 @@ class EarlyRefusals:
         if not why:
             return None
         answer = Outcome("refused", say(sentence, why=why, time=format_time(time.time())))
-        return self.counted(receipt_of(widget, inputs, press_id, answer, cause), context.origin)
+        return self.count_only(receipt_of(widget, inputs, press_id, answer, cause), context.origin)
 
     async def refuse(
         self,
@@ -104,17 +112,18 @@ class EarlyRefusals:
         why: TextLike,
         origin: Origin,
     ) -> Receipt:
-        """The receipt has an id of its own: that of the press is another's, or may still be one's."""
+        """Refuses a press. The receipt has an id of its own, because the press's id belongs to another
+        press or may still be used for one."""
         own_id = _own_id(press_id)
         receipt = receipt_of(widget, inputs, own_id, Outcome("refused", why), "input")
-        if not self._press_log.room(origin):
-            return self.counted(receipt, origin)
-        own = self._dispatcher.needed(widget, inputs)
-        self._receipts.begin(own_id, widget.id, origin, own)
-        who = named(origin)
-        extra = rosout_extra(f"press {own_id} of {widget.id} by {who}: {untyped(widget, receipt)}")
+        if not self._press_log.has_room(origin):
+            return self.count_only(receipt, origin)
+        own = self._dispatcher.needed_inputs(widget, inputs)
+        self._receipts.record_press(own_id, widget.id, origin, own)
+        who = origin_text(origin)
+        extra = rosout_extra(f"press {own_id} of {widget.id} by {who}: {outcome_text(widget, receipt)}")
         self._log.warning("press %s of %s by %s: %s", own_id, widget.id, who, why, extra=extra)
-        receipt = with_doubt(
+        receipt = with_log_fault(
             receipt, await self._press_log.refused(widget.id, own, own_id, origin, why)
         )
         self._receipts.keep(receipt)
@@ -122,7 +131,7 @@ class EarlyRefusals:
 
 
 def ends_with(text: TextLike, last: TextLike) -> bool:
-    """Whether a text is another, or ends in it."""
+    """Whether a text equals another one, or its last sentence does."""
     if text == last or not isinstance(text, Text) or text.code not in BETWEEN:
         return text == last
     (_, parts) = text.params[0]
@@ -130,5 +139,5 @@ def ends_with(text: TextLike, last: TextLike) -> bool:
 
 
 def _own_id(press_id: str) -> str:
-    """That of a refusal, by which its press is known."""
+    """An id for a refusal, beginning with its press's id."""
     return f"{press_id:.40}.{secrets.token_hex(4)}"

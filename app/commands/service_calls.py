@@ -1,7 +1,7 @@
-"""Service calls: each gets one answer within its time, and each way of getting none has its words.
+"""Service calls: one response within the timeout, or a reason why there is none.
 
-A call that timed out is not over: the robot may still do it. Its answer, when it comes late, is
-logged and corrects the receipt.
+After a timeout the robot may still execute the request. A late response is logged and corrects the
+receipt.
 """
 
 import asyncio
@@ -26,24 +26,25 @@ from app.ros_logging import RobotLog, rosout_extra
 
 log = logging.getLogger("kiosk.calls")
 
-LATE_FAILED: Final = "taking in a late answer failed"
-CUT_NEWS_S: Final = 0.3
-NOTHING: Final = "—"
-LONGEST_SAID: Final = 500  # characters of one value: every browser gets it, and logs keep it
-LATE_S: Final = 60.0  # how long after its time an answer is still waited for
-MOST_UNANSWERED: Final = 8  # the bridge keeps ten requests of a service
+LATE_FAILED: Final = "processing a late response failed"
+BRIDGE_LOSS_DELAY_S: Final = 0.3  # from the end of a query to the end of the lost bridge's token
+NO_VALUE: Final = "—"
+MAX_VALUE_CHARS: Final = 500  # of one value: every browser gets it, and logs keep it
+LATE_S: Final = 60.0  # after the timeout, a response still corrects the receipt
+MAX_UNANSWERED: Final = 8  # the bridge keeps ten requests of a service
 
 
-class Asker(Protocol):
-    """What a call needs of the link: one query, answered with bytes or with None."""
+class QueryClient(Protocol):
+    """The part of the Zenoh session that calls need: a query, answered with bytes, or None without a
+    reply."""
 
     def query(self, key: str, payload: bytes, timeout_s: float) -> "asyncio.Future[bytes | None]": ...
 
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """What a widget asks of a service; `read` makes an answer of the fields at these `paths` of the
-    response."""
+    """A widget's service request; `read` converts the fields at `paths` of the response to an
+    outcome."""
 
     widget: str
     service: str
@@ -56,7 +57,7 @@ class Request:
 
 @dataclass(slots=True)
 class _Waiting:
-    """A call whose query is not over; `cut` is done when the bridge went away in the meantime."""
+    """A call whose query is open; `cut` is done when the bridge was lost in the meantime."""
 
     request: Request
     press_id: str
@@ -65,19 +66,19 @@ class _Waiting:
 
 
 class ServiceCalls:
-    """The calls of one robot; used on the event loop only."""
+    """The service calls of one robot. Used on the event loop only."""
 
     def __init__(
-        self, interfaces: Interfaces, robot: RobotState, link: Asker, changed: Callable[[], None]
+        self, interfaces: Interfaces, robot: RobotState, link: QueryClient, changed: Callable[[], None]
     ) -> None:
-        """`changed` is called when what the widgets show has changed."""
+        """`changed` is called when the status of a command has changed."""
         self._interfaces = interfaces
         self._robot = robot
         self._log = RobotLog(log, robot.name)
         self._link = link
         self._changed = changed
         self._open: dict[int, _Waiting] = {}
-        self._ever_answered: set[str] = set()
+        self._answering: set[str] = set()
         self._latest: dict[str, str] = {}
         self._correcting: set[asyncio.Task[None]] = set()
 
@@ -86,20 +87,20 @@ class ServiceCalls:
         return sum(self._robot.key(w.request.service) == key for w in self._open.values())
 
     def full(self, service: str) -> TextLike:
-        """Why no further request of a service is sent; "" while one may be."""
-        full = self.unanswered(self._robot.key(service)) >= MOST_UNANSWERED
+        """Why no further request of a service may be sent, "" if it may."""
+        full = self.unanswered(self._robot.key(service)) >= MAX_UNANSWERED
         return say("too_many", service=service) if full else ""
 
-    def follow(self) -> None:
-        """After every change of the graph: without a bridge no answer will come."""
+    def on_graph_change(self) -> None:
+        """Ends the waiting calls if no bridge is left. Call it after every change of the graph."""
         if not self._robot.graph.bridges:
             for waiting in self._open.values():
                 if not waiting.cut.done():
                     waiting.cut.set_result(None)
 
     def mark_answered(self, service: str) -> None:
-        """This service can answer: another one of its node has."""
-        self._ever_answered.add(service)
+        """Marks a service as able to respond, because another service of its node did."""
+        self._answering.add(service)
 
     async def call(
         self,
@@ -107,9 +108,9 @@ class ServiceCalls:
         payload: bytes,
         press_id: str,
         corrected: OnCorrection,
-        look: FinalCheck = no_check,
+        final_check: FinalCheck = no_check,
     ) -> Outcome:
-        """Calls the service of a widget; see `ask`."""
+        """Calls the service of a widget; see `send_request`."""
         _, response_type = self._interfaces.service_types(widget.type)
         success = field_of(self._interfaces, response_type, widget.success, "success", "bool")
         message = field_of(self._interfaces, response_type, widget.message, "message", "string")
@@ -117,17 +118,21 @@ class ServiceCalls:
         read = partial(_read_call, widget, success, message)
         to = (widget.id, widget.service, widget.type)
         request = Request(*to, payload, widget.timeout_s, paths, read)
-        return await self.ask(request, press_id, corrected, look)
+        return await self.send_request(request, press_id, corrected, final_check)
 
-    async def ask(
-        self, request: Request, press_id: str, corrected: OnCorrection, look: FinalCheck = no_check
+    async def send_request(
+        self,
+        request: Request,
+        press_id: str,
+        corrected: OnCorrection,
+        final_check: FinalCheck = no_check,
     ) -> Outcome:
-        """Sends a request and waits; `corrected` gets the answer that comes after the time."""
+        """Sends a request and waits for its outcome; `corrected` is called with a late one."""
         key = self._robot.key(request.service)
         if why := self.full(request.service):
             return Outcome("refused", why)
         loop = asyncio.get_running_loop()
-        look()
+        final_check()
         query = self._link.query(key, request.payload, request.timeout_s + LATE_S)
         waiting = _Waiting(request, press_id, query, loop.create_future())
         number = id(waiting)
@@ -135,29 +140,31 @@ class ServiceCalls:
         query.add_done_callback(lambda _: self._open.pop(number, None))
         self._latest[request.widget] = press_id
         self._show(request, CommandStatus(busy=True, text=say("waiting_for_answer")))
-        answer = await self._awaited(waiting, corrected)
+        answer = await self._response(waiting, corrected)
         self._show(request, CommandStatus(outcome=answer.outcome, text=answer.text))
         return answer
 
-    async def _awaited(self, waiting: _Waiting, corrected: OnCorrection) -> Outcome:
-        asked = waiting.request
+    async def _response(self, waiting: _Waiting, corrected: OnCorrection) -> Outcome:
+        request = waiting.request
         ends: set[asyncio.Future[Any]] = {waiting.answered, waiting.cut}
-        await asyncio.wait(ends, timeout=asked.timeout_s, return_when=asyncio.FIRST_COMPLETED)
+        await asyncio.wait(ends, timeout=request.timeout_s, return_when=asyncio.FIRST_COMPLETED)
         if waiting.answered.done() and (reply := waiting.answered.result()) is not None:
-            return await self._read(asked, reply)
-        if waiting.answered.done():  # without an answer: the news that the bridge is gone may follow
-            await asyncio.wait({waiting.cut}, timeout=CUT_NEWS_S)
+            return await self._read(request, reply)
+        if waiting.answered.done():  # without a reply: the bridge's token may end a little later
+            await asyncio.wait({waiting.cut}, timeout=BRIDGE_LOSS_DELAY_S)
         else:
-            waiting.answered.add_done_callback(lambda done: self._late(waiting, done, corrected))
+            waiting.answered.add_done_callback(
+                lambda done: self._on_late_response(waiting, done, corrected)
+            )
         if waiting.cut.done() or not self._robot.graph.bridges:
             return Outcome("unknown", say("call_cut"))
         if waiting.answered.done():
-            return Outcome("unknown", say("call_dropped", service=asked.service))
-        hint = "" if asked.service in self._ever_answered else say("cyclone_hint")
-        sentence = say("timed_out", seconds=f"{asked.timeout_s:g}")
+            return Outcome("unknown", say("call_dropped", service=request.service))
+        hint = "" if request.service in self._answering else say("cyclone_hint")
+        sentence = say("timed_out", seconds=f"{request.timeout_s:g}")
         return Outcome("timed_out", joined([sentence, hint]))
 
-    def _late(
+    def _on_late_response(
         self, waiting: _Waiting, done: "asyncio.Future[bytes | None]", corrected: OnCorrection
     ) -> None:
         if done.cancelled() or (reply := done.result()) is None:
@@ -167,34 +174,34 @@ class ServiceCalls:
         task.add_done_callback(self._correcting.discard)
 
     async def _correct(self, waiting: _Waiting, reply: bytes, corrected: OnCorrection) -> None:
-        asked = waiting.request
-        answer = await self._read(asked, reply)
-        said = f"press {waiting.press_id}: a late answer: {answer.outcome}"
+        request = waiting.request
+        answer = await self._read(request, reply)
+        said = f"press {waiting.press_id}: late response: {answer.outcome}"
         self._log.warning("%s: %s", said, answer.text, extra=rosout_extra(said))
         corrected(waiting.press_id, answer)
-        if self._latest.get(asked.widget) == waiting.press_id:
-            self._show(asked, CommandStatus(outcome=answer.outcome, text=answer.text))
+        if self._latest.get(request.widget) == waiting.press_id:
+            self._show(request, CommandStatus(outcome=answer.outcome, text=answer.text))
 
-    async def _read(self, asked: Request, reply: bytes) -> Outcome:
-        self._ever_answered.add(asked.service)
-        _, response_type = self._interfaces.service_types(asked.type)
-        reader = self._interfaces.field_reader(response_type, asked.paths)
+    async def _read(self, request: Request, reply: bytes) -> Outcome:
+        self._answering.add(request.service)
+        _, response_type = self._interfaces.service_types(request.type)
+        reader = self._interfaces.field_reader(response_type, request.paths)
         try:
             fields = await self._robot.slices.read_all(reader, reply)
         except DecodeError as error:
-            self._log.error("%s: %s", asked.service, error)
-            return Outcome("unknown", say("answer_unreadable", wanted=asked.type))
-        return asked.read(fields)
+            self._log.error("%s: %s", request.service, error)
+            return Outcome("unknown", say("answer_unreadable", wanted=request.type))
+        return request.read(fields)
 
-    def _show(self, asked: Request, progress: CommandStatus) -> None:
-        self._robot.command_status[asked.widget] = progress
+    def _show(self, request: Request, progress: CommandStatus) -> None:
+        self._robot.command_status[request.widget] = progress
         self._changed()
 
 
 def field_of(
     interfaces: Interfaces, type_name: str, given: str | None, usual: str, kind: str
 ) -> str | None:
-    """The field that the panel names, or the usual one where the type has it with the right kind."""
+    """The field named in the panel file, else the `usual` one if the type has it with this type."""
     if given is not None:
         return given
     own = {field.name: str(field.type) for field in interfaces.structures[type_name].fields}
@@ -202,7 +209,8 @@ def field_of(
 
 
 def _read_call(widget: Call, success: str | None, message: str | None, fields: Fields) -> Outcome:
-    """What a response says; `success` and `message` are its fields that mean this, if there are any."""
+    """The outcome in a response; `success` and `message` are the names of these fields, None
+    without."""
     words = [with_fields(f"{{{message}}}", fields)] if message else []
     words += [with_fields(widget.answer, fields)] if widget.answer else []
     said = " – ".join(word for word in words if word)
@@ -213,16 +221,16 @@ def _read_call(widget: Call, success: str | None, message: str | None, fields: F
 
 
 def with_reply(said: Text, reply: str) -> Text:
-    """A sentence and what the robot said, which may be ""."""
+    """A sentence, followed by the robot's own text if there is one."""
     return say("with_reply", said=said, reply=reply) if reply else say("with_stop", said=said)
 
 
 def with_fields(template: str, fields: Fields, within: str = "") -> str:
-    """The template with each `{path}` (behind `within`) replaced by that field's value: cut where it is
-    long, "—" where it is not there."""
+    """The template with each `{path}` (relative to `within`) replaced by the field's value, shortened
+    if it is long, "—" if the message has no such element."""
 
     def shown(path: str) -> str:
         value = fields.get(within + path)
-        return NOTHING if value is None else printable(plain_text(value, LONGEST_SAID))
+        return NO_VALUE if value is None else printable(plain_text(value, MAX_VALUE_CHARS))
 
     return RESPONSE_PLACEHOLDER.sub(lambda found: shown(found[1]), template)

@@ -124,7 +124,7 @@ def _fresh_since(robot: RobotState, key: str) -> float:
     """From when on a message was published when it came, and not sent again. Where a publisher is
     latched, or may be, that is known some time after its first message only."""
     joined = robot.settled_at + HISTORY_S
-    return joined if robot.graph.volatile(key) else max(joined, robot.replayed.known_since(key))
+    return joined if robot.graph.is_volatile(key) else max(joined, robot.replayed.known_since(key))
 
 
 def _forbidden(interlock: Interlock, reading: Reading) -> Verdict:

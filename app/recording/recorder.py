@@ -65,7 +65,7 @@ class Recorder:
             if self._recording is not None:
                 self._recording.add(one)
 
-    def pressed(self, press_id: str, widget: str, who: str, inputs: Mapping[str, Any]) -> None:
+    def record_press(self, press_id: str, widget: str, who: str, inputs: Mapping[str, Any]) -> None:
         """A press was made; it is not checked yet."""
         if self._recording is None or self._recording.is_full:
             self._begin_recording(widget)
@@ -74,7 +74,7 @@ class Recorder:
         self._write_press(id=press_id, widget=widget, who=who, values=dict(inputs), outcome=None,
                    reason=None, at=at)  # fmt: skip
 
-    def answered(self, receipt: Receipt) -> None:
+    def record_receipt(self, receipt: Receipt) -> None:
         """A press got its receipt, or a correction of it."""
         who = self._pending_presses.pop(receipt.id, "")
         self._write_press(id=receipt.id, widget=receipt.widget, who=who, values=dict(receipt.inputs),

@@ -211,7 +211,7 @@ class Graph:
         """Whether the robot's publisher is TRANSIENT_LOCAL; None without a publisher."""
         return next((e.transient_local for e in self._endpoints("MP", key)), None)
 
-    def volatile(self, key: str) -> bool:
+    def is_volatile(self, key: str) -> bool:
         """Whether the robot's publishers are known, and none is TRANSIENT_LOCAL."""
         known = self._endpoints("MP", key)
         return bool(known) and not any(e.transient_local for e in known)

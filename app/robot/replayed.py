@@ -24,7 +24,7 @@ class ReplayedMessages:
         self._first: dict[str, float] = {}  # by topic's key: when the first message came since
         self._last: dict[str, float] = {}
 
-    def message(self, key: str, at: float, joined_at: float, cached: bool) -> None:
+    def record_message(self, key: str, at: float, joined_at: float, cached: bool) -> None:
         """A message came at `at`; the graph was joined at `joined_at`."""
         first = self._first.get(key)
         if cached or first is None or first < joined_at <= at:

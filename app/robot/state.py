@@ -99,8 +99,8 @@ class RobotState:
                 self._interfaces.field_reader(type_name, fields.get(topic, ())),
                 self.slices,
                 watched=topic in watched,
-                unreadable=partial(self.count_unreadable, key),
-                read_later=partial(self._notify_late_reading, key),
+                on_unreadable=partial(self.count_unreadable, key),
+                on_late_reading=partial(self._notify_late_reading, key),
             )
             yield key, made
 
@@ -118,7 +118,7 @@ class RobotState:
         """A newer sample of a topic."""
         if key in self._interlock_keys:
             self.silent_publishers.record_message(key, sample.source, sample.seq, sample.at)
-            self.replayed.message(key, sample.at, self.settled_at, sample.cached)
+            self.replayed.record_message(key, sample.at, self.settled_at, sample.cached)
         if (topic := self._topics.get(key)) is not None:
             topic.update(sample)
 

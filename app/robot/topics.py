@@ -53,15 +53,15 @@ class Topic:
         slices: Slices,
         *,
         watched: bool,
-        unreadable: Callable[[Sample, DecodeError], None],
-        read_later: Callable[[Reading], None],
+        on_unreadable: Callable[[Sample, DecodeError], None],
+        on_late_reading: Callable[[Reading], None],
     ) -> None:
         """Of a `watched` topic each message counts. `on_late_reading` takes a reading that needed more
         than one turn; `on_unreadable` a sample that can't be decoded."""
         self._reader = reader
         self._slices = slices
-        self._unreadable = unreadable
-        self._read_later = read_later
+        self._on_unreadable = on_unreadable
+        self._on_late_reading = on_late_reading
         self._watched = watched
         self._unread: deque[Sample] = deque(maxlen=MAX_UNREAD)
         self._walk: _PendingRead | None = None  # before the unread
@@ -107,7 +107,7 @@ class Topic:
             reading = self._read_one(walked, lambda: self._slices.read_until(walked.walk, until))
             self._deferred = self._next_read() is not None
             if reading is not None:
-                self._read_later(reading)
+                self._on_late_reading(reading)
         else:
             self._deferred = False
         return not self._deferred
@@ -126,7 +126,7 @@ class Topic:
         try:
             fields = read()
         except DecodeError as error:
-            self._unreadable(sample, error)
+            self._on_unreadable(sample, error)
             self._last_reading = Reading("unreadable", None, sample.at, sample.wall)
         else:
             if fields is None:

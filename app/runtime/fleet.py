@@ -39,10 +39,10 @@ class Fleet:
     ) -> None:
         """One robot without a name, or the panel's `[[robot]]` entries."""
         self.panel = panel
-        self._kiosks: dict[str | None, RobotSession] = {}
+        self._sessions: dict[str | None, RobotSession] = {}
         server = ServerParts(panel, revision, operators_log, recordings, Slices(), simulated)
         for entry in panel.robots or (None,):
-            self._kiosks[entry.id if entry else None] = RobotSession(
+            self._sessions[entry.id if entry else None] = RobotSession(
                 server, config_of(entry), entry=entry, others=self
             )
 
@@ -68,7 +68,7 @@ class Fleet:
 
     @property
     def sessions(self) -> list[RobotSession]:
-        return list(self._kiosks.values())
+        return list(self._sessions.values())
 
     @property
     def state(self) -> TextLike:
@@ -85,17 +85,17 @@ class Fleet:
 
     def session(self, robot: str | None) -> RobotSession:
         """The session of a robot; None is the one without a name. NotFound says which there are."""
-        if robot in self._kiosks:
-            return self._kiosks[robot]
+        if robot in self._sessions:
+            return self._sessions[robot]
         if robot is None:
             raise NotFound(f"this panel has several robots: begin with {self.first.base}/")
-        known = ", ".join(str(name) for name in self._kiosks if name) or "one robot without a name"
+        known = ", ".join(str(name) for name in self._sessions if name) or "one robot without a name"
         raise NotFound(f'there is no robot "{robot:.64}" on this panel; there is {known}')
 
     # What each robot's session needs of the others (`refresh.OtherRobots`).
 
     def link_statuses(self) -> Mapping[str, Lamp]:
-        return {entry: k.refresher.lamp for entry, k in self._kiosks.items() if entry is not None}
+        return {entry: k.refresher.lamp for entry, k in self._sessions.items() if entry is not None}
 
     def boots(self) -> Collection[str]:
         return {session.publisher.boot for session in self.sessions}

@@ -40,13 +40,13 @@ class Updates:
     """
 
     urgent: bool = False
-    more: bool = False
+    other: bool = False
     values: set[str] = field(default_factory=set)
     readings: list[tuple[str, Reading]] = field(default_factory=list)
     graph: bool = False
-    came: bool = False
-    found: list[str] = field(default_factory=list)
-    lost: list[str] = field(default_factory=list)
+    bridge_appeared: bool = False
+    bridges_found: list[str] = field(default_factory=list)
+    bridges_lost: list[str] = field(default_factory=list)
 
     def step(self) -> "Updates":
         """What has changed a permission in between; each change is given once."""
@@ -97,28 +97,28 @@ class Ingest:
                 yield updates.step()
             for payload, at, wall in sample.skipped_payloads:
                 passed = sample._replace(payload=payload, at=at, wall=wall, skipped_payloads=())
-                if self._take(key, passed, updates) == "now":
+                if self._ingest(key, passed, updates) == "now":
                     yield updates.step()
-            change = self._take(key, sample, updates)
+            change = self._ingest(key, sample, updates)
             updates.urgent |= change == "now"
-            updates.more |= change == "soon"
+            updates.other |= change == "soon"
             if key in self._feedback or key in self._status or key == self._events:
-                updates.more = True
+                updates.other = True
             else:
                 updates.values.add(key)
         self._record(changes)
-        self._tokens(changes.tokens, updates)
+        self._apply_tokens(changes.tokens, updates)
         yield updates
 
-    def read(self, key: str, reading: Reading) -> Updates:
+    def late_reading(self, key: str, reading: Reading) -> Updates:
         """A message that took more than one turn is read."""
         return Updates(urgent=key in self._interlocks, values={key}, readings=[(key, reading)])
 
-    def _take(self, key: str, sample: Sample, updates: Updates) -> Change:
+    def _ingest(self, key: str, sample: Sample, updates: Updates) -> Change:
         """Takes a sample in; whether a permission is another one by it."""
         now = time.monotonic()
         before = self._verdicts(key, now)
-        self._guarded(key, sample, lambda key, sample: self._sample(key, sample, updates))
+        self._guarded(key, sample, lambda key, sample: self._apply(key, sample, updates))
         pairs = zip(before, self._verdicts(key, now), strict=True)
         changes = [_change(was, verdict) for was, verdict in pairs]
         return "now" if "now" in changes else "soon" if "soon" in changes else ""
@@ -138,19 +138,19 @@ class Ingest:
         except Exception:
             self._log.exception("a sample of %s was not taken in whole", key)
 
-    def _sample(self, key: str, sample: Sample, updates: Updates) -> None:
+    def _apply(self, key: str, sample: Sample, updates: Updates) -> None:
         if key in self._feedback:
-            self._actions.hear_feedback(self._feedback[key], sample)
+            self._actions.on_feedback(self._feedback[key], sample)
         elif key in self._status:
-            self._actions.hear_status(self._status[key], sample)
+            self._actions.on_status(self._status[key], sample)
         else:
             if key == self._events:
-                self._parameters.hear(sample)
+                self._parameters.on_event(sample)
             self._robot.update(key, sample)
-            if self._confirmations.awaits(key):
+            if self._confirmations.is_awaited(key):
                 updates.readings.append((key, self._robot.reading_by_key(key)))
 
-    def _tokens(self, tokens: Mapping[str, Token], updates: Updates) -> None:
+    def _apply_tokens(self, tokens: Mapping[str, Token], updates: Updates) -> None:
         """Takes them in."""
         now, graph = time.monotonic(), self._robot.graph
         had_bridge = bool(tokens and graph.bridges)
@@ -158,20 +158,20 @@ class Ingest:
             if not graph.is_relevant(key):
                 continue
             if endpoint := self._robot.dialect.endpoint(key):
-                self._publisher(key, token, endpoint)
+                self._track_publisher(key, token, endpoint)
                 if token.lost_seq:
-                    self._parameters.lose(endpoint)
+                    self._parameters.on_token_lost(endpoint)
             if token.lost_seq and (zid := graph.apply_token(key, False)):
                 self._robot.mark_bridge_lost(zid, token.lost_seq)
-                updates.lost.append(zid)
+                updates.bridges_lost.append(zid)
                 had_bridge = had_bridge and bool(graph.bridges)
             if token.lost_seq and token.alive:
                 self._robot.update_publishers(token.lost_seq)  # gone, be it for a moment
             if token.alive and (zid := graph.apply_token(key, True, now)):
-                updates.found.append(zid)
-        updates.came = bool(updates.found) and not had_bridge
+                updates.bridges_found.append(zid)
+        updates.bridge_appeared = bool(updates.bridges_found) and not had_bridge
 
-    def _publisher(self, key: str, token: Token, endpoint: Endpoint) -> None:
+    def _track_publisher(self, key: str, token: Token, endpoint: Endpoint) -> None:
         """Whether a publisher has appeared, be it for a moment: until it publishes, what it permits is
         unknown."""
         graph, silent_publishers = self._robot.graph, self._robot.silent_publishers

@@ -12,7 +12,7 @@ from app.commands.dispatch import Dispatcher, Trackers
 from app.commands.holds.controller import HoldController
 from app.commands.holds.messages import HoldMessages
 from app.commands.parameters.sync import ParameterSync
-from app.commands.press_judge import Latest, PressJudge
+from app.commands.press_judge import Arrivals, PressJudge
 from app.commands.presses import Presses
 from app.commands.service_calls import ServiceCalls
 from app.transport.peer import Peer, RobotContext
@@ -48,28 +48,28 @@ class RobotCommands:
             Trackers(self.calls, self.actions, self.confirmations, self.parameters),
             reached=peer.flushed,
         )
-        latest = Latest(take, lambda: link.hurried)
+        latest = Arrivals(take, lambda: link.hurried)
         judge = PressJudge(panel, robot, latest)
         self.presses = Presses(judge, self.dispatcher, press_log, robot.name, recorder)
         self.holds = HoldController(
             panel,
             robot,
-            HoldMessages(interfaces, robot, link, self.dispatcher.checked),
+            HoldMessages(interfaces, robot, link, self.dispatcher.check_inputs),
             asyncio.get_running_loop(),
             latest,
             changed=changed,
-            witness=recorder,
+            recorder=recorder,
         )
 
     async def start(self) -> None:
         """Before anything arrives: finds the goals that ran before the server's start."""
         await self._recovery.start()
 
-    def follow(self) -> None:
+    def on_graph_change(self) -> None:
         """After every change of the graph."""
-        self.calls.follow()
-        self.actions.follow()
-        self.parameters.follow()
+        self.calls.on_graph_change()
+        self.actions.on_graph_change()
+        self.parameters.on_graph_change()
 
     def close(self) -> None:
         """Ends holds, while there is a way to say so to the robot, and presses."""

@@ -74,7 +74,7 @@ class RobotSession:
         self.entry = entry
         self.base = f"/robots/{entry.id}" if entry else ""
         self._operators_log = operators_log
-        self._following = ExitStack()
+        self._listeners = ExitStack()
         self.interfaces = load_interfaces(panel.distro, panel.interfaces)
         self.link = ZenohSession(config, lambda prompt: self._turn.wake(prompt), access.dialect)
         zid = self.link.zid
@@ -89,7 +89,7 @@ class RobotSession:
             panel.control,
             self.robot.name,
             tell=self._log.info,
-            passed=lambda passing: self.control_acts.passed(passing),
+            passed=lambda passing: self.control_acts.log_passing(passing),
         )
         sources = ViewSources(self.control, operators_log, others, server.recordings, server.simulated)
         self.refresher = ViewRefresher(panel, self.robot, server.revision, sources)
@@ -104,7 +104,7 @@ class RobotSession:
         )
         self.peer = access.peer(context)
         self._commands = RobotCommands(
-            context, self.peer, self.press_log, self._recorder, lambda: self._turn.take()
+            context, self.peer, self.press_log, self._recorder, lambda: self._turn.run()
         )
         self.dispatcher = self._commands.dispatcher
         self.presses = self._commands.presses
@@ -118,7 +118,7 @@ class RobotSession:
             self._recorder,
         )
         self._turn = Turn(context, self.peer, self._ingest, self._commands, self.refresher)
-        self.robot.on_late_reading = self._turn.read
+        self.robot.on_late_reading = self._turn.run_late_reading
         self._rosout = Rosout(self.robot, self.interfaces, self.link, asyncio.get_running_loop())
 
     async def start(self) -> None:
@@ -134,16 +134,16 @@ class RobotSession:
         )
         self._rosout.start()
         self.peer.start()
-        self._following.enter_context(self._operators_log.notifying(self.show))
+        self._listeners.enter_context(self._operators_log.notifying(self.show))
 
     async def stop(self) -> None:
         """Ends the streams, takes the session down; leaves no task behind."""
         self.close()
         self._turn.stop()
-        self._following.close()
+        self._listeners.close()
         self._rosout.stop()
         self.refresher.stop()
-        self.press_guard.end()
+        self.press_guard.close()
         await self._renewal.stop()
         await self.peer.stop()
         await self._commands.stop()
@@ -181,7 +181,7 @@ class RobotSession:
             return Verdict(False, "log", self._operators_log.lock)
         return link_verdict(self.robot, time.monotonic())
 
-    async def way_asked(self) -> Verdict:
+    async def check_readiness(self) -> Verdict:
         """The same, when the bridges have been asked whether they run: a second at most."""
         if not self.link_verdict.permitted or await self.peer.answers():
             return self.link_verdict
@@ -202,6 +202,6 @@ class RobotSession:
     def renew(self) -> None:
         """A new Zenoh session: until it has joined, no endpoint is known."""
         self.robot.mark_link_lost()
-        self._turn.follow(came=False)
+        self._turn.on_graph_change(came=False)
         self.show()
         self._renewal.begin()

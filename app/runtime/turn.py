@@ -52,15 +52,15 @@ class Turn:
     def wake(self, prompt: bool) -> None:
         """On a thread of Zenoh's; what is not prompt waits for the next frame."""
         with suppress(RuntimeError):  # the loop is closed: the process ends
-            self._loop.call_soon_threadsafe(self.take if prompt else self._take_in_time)
+            self._loop.call_soon_threadsafe(self.run if prompt else self._run_by_frame)
 
-    def _take_in_time(self) -> None:
+    def _run_by_frame(self) -> None:
         if self._refresher.due <= self._loop.time():
-            self.take()
+            self.run()
         elif self._frame is None:
-            self._frame = self._loop.call_at(self._refresher.due, self.take)
+            self._frame = self._loop.call_at(self._refresher.due, self.run)
 
-    def take(self) -> None:
+    def run(self) -> None:
         """One turn, with all that has arrived until now."""
         self._cancel_frame()
         if self._stopped:
@@ -79,16 +79,16 @@ class Turn:
             for updates in self._ingest.steps(changes):
                 updates.urgent |= came_up
                 if updates.graph:
-                    self._peer.lost(updates.lost)
-                    self._peer.found(updates.found)
-                    self.follow(updates.came)
-                self._act(updates)
+                    self._peer.lost(updates.bridges_lost)
+                    self._peer.found(updates.bridges_found)
+                    self.on_graph_change(updates.bridge_appeared)
+                self._apply(updates)
 
-    def read(self, key: str, reading: Reading) -> None:
+    def run_late_reading(self, key: str, reading: Reading) -> None:
         """The same for a message of a topic that took more than one turn to read."""
         if not self._stopped:
             with self._turn():
-                self._act(self._ingest.read(key, reading))
+                self._apply(self._ingest.late_reading(key, reading))
 
     def changed(self) -> None:
         """The same for what has changed by itself: of the peer, a command, or who has control."""
@@ -96,15 +96,15 @@ class Turn:
             self._again = True
             return
         with self._turn():
-            self._act(Updates(urgent=True))
+            self._apply(Updates(urgent=True))
 
-    def follow(self, came: bool) -> None:
+    def on_graph_change(self, came: bool) -> None:
         """After every change of the graph; `came`: there is a peer where there was none."""
         self._robot.update_publishers()
-        self._commands.follow()
+        self._commands.on_graph_change()
         self._peer.follow(came)
 
-    def _act(self, updates: Updates) -> None:
+    def _apply(self, updates: Updates) -> None:
         """By the robot's state as it is now: holds, then confirmations, and the view last."""
         self._commands.holds.judge()
         for key, reading in updates.readings:
@@ -112,14 +112,14 @@ class Turn:
         if updates.urgent or self._again:
             self._again = False
             self._refresher.now()
-        elif updates.more:
+        elif updates.other:
             self._refresher.soon()
         elif updates.values:
             self._refresher.values(updates.values)
 
     def _confirm(self, key: str, reading: Reading) -> None:
         try:
-            self._commands.confirmations.hear(key, reading)
+            self._commands.confirmations.update(key, reading)
         except Exception:
             self._log.exception("whether %s confirms a command was not judged", key)
 

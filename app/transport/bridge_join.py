@@ -126,7 +126,7 @@ class GraphMembership:
 
     def _heard(self, key: str) -> bool:
         try:
-            return self._link.heard(key)
+            return self._link.has_reader(key)
         except LinkError:
             return False
 

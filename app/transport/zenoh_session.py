@@ -185,7 +185,7 @@ class ZenohSession:
         self._sent[expression] += 1
         return self._dialect.attachment(self.zid, expression, self._sent[expression], time.time_ns())
 
-    def heard(self, key: str) -> bool:
+    def has_reader(self, key: str) -> bool:
         """Whether someone is known to listen; not whether they act on it."""
         with _translated(f"can't ask who listens on {key}"):
             status: Any = self._publishers[key].matching_status  # an object, whatever the stub says

@@ -16,7 +16,7 @@ from app.audit import (
     Origin,
     audit_log,
     data_dir,
-    entered,
+    new_entry,
     writer_thread,
 )
 from app.audit.queries import rows
@@ -31,7 +31,7 @@ FREE = Limits(required=False)
 
 
 def pressed(number: int = 1) -> Entry:
-    return entered("pressed", Origin(address="10.0.0.7"), {}, press=f"p{number}", action="press")
+    return new_entry("pressed", Origin(address="10.0.0.7"), {}, press=f"p{number}", action="press")
 
 
 def sent(entry: Entry | None) -> Entry:

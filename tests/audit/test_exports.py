@@ -21,9 +21,9 @@ from typing import Any
 import httpx
 import pytest
 
-from app.audit import Filter, Limits, OperatorLog, Origin, entered, queries, reader_process, readers
+from app.audit import Filter, Limits, OperatorLog, Origin, new_entry, queries, reader_process, readers
 from app.audit.database import NAME
-from app.audit.export import FIELDS, lines
+from app.audit.export import FIELDS, csv_chunks
 from app.audit.store import Store
 from app.errors import LogError, TooMany
 from app.web.routes import audit_log as routes
@@ -76,7 +76,7 @@ while True:
 def large(folder: Path, last: int = ENTRIES) -> Path:
     folder.mkdir(exist_ok=True)
     store = Store(folder, "boot0")
-    store.append([entered("began", values={"mode": "live"})])
+    store.append([new_entry("began", values={"mode": "live"})])
     store.close()
     with sqlite3.connect(folder / NAME) as db:
         db.execute(FILL, {"last": last})
@@ -358,7 +358,7 @@ def test_a_search_that_takes_long_is_done_by_another_process(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(readers, "QUICK_S", 0.0)
-    monkeypatch.setattr(queries, "STEPS_BETWEEN_LOOKS", 1)
+    monkeypatch.setattr(queries, "STEPS_BETWEEN_CHECKS", 1)
     large(tmp_path, 100)
 
     async def work(log: OperatorLog) -> None:
@@ -376,9 +376,9 @@ def test_a_csv_has_every_column_of_an_entry_and_no_formula(tmp_path: Path) -> No
     store = Store(tmp_path, "boot1")
     origin = Origin(address="10.0.0.7", who="=cmd()", seen="\tx")
     texts = {"press": "-1", "widget": "a\u202eb", "reason": 'said "no",\nand no'}
-    (written,) = store.append([entered("refused", origin, {"text": "+\x7f"}, **texts)])
+    (written,) = store.append([new_entry("refused", origin, {"text": "+\x7f"}, **texts)])
     store.close()
-    text = b"".join(lines(tmp_path, Filter(), None)).decode()
+    text = b"".join(csv_chunks(tmp_path, Filter(), None)).decode()
     (row,) = csv.DictReader(io.StringIO(text.removeprefix("\ufeff"), newline=""))
     assert tuple(row) == FIELDS
     assert set(FIELDS) == {*written._fields, "pressed_at"}

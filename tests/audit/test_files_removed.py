@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from app.audit import Entry, Filter, Limits, NullLog, OperatorLog, Origin, entered
+from app.audit import Entry, Filter, Limits, NullLog, OperatorLog, Origin, new_entry
 from app.audit.data_dir import LOCK, DataDir
 from app.audit.database import NAME
 from app.audit.queries import rows
@@ -22,7 +22,7 @@ WAL = f"{NAME}-wal"
 
 
 def pressed(number: int = 1) -> Entry:
-    return entered("pressed", Origin(address="10.0.0.7"), {}, press=f"p{number}", action="press")
+    return new_entry("pressed", Origin(address="10.0.0.7"), {}, press=f"p{number}", action="press")
 
 
 def sent(entry: Entry | None) -> Entry:

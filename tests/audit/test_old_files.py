@@ -9,9 +9,9 @@ from typing import Any, Final
 
 import pytest
 
-from app.audit import Entry, Filter, Limits, OperatorLog, Origin, entered
+from app.audit import Entry, Filter, Limits, OperatorLog, Origin, new_entry
 from app.audit.database import NAME
-from app.audit.export import lines
+from app.audit.export import csv_chunks
 from app.audit.queries import open_presses, rows
 from app.audit.verify import verify
 from app.i18n import Text, say
@@ -74,7 +74,7 @@ def continued(folder: Path, press_id: str = "p3") -> None:
         try:
             assert log.fault == ""
             press = await log.pressed(
-                entered(
+                new_entry(
                     "pressed", Origin(address="10.0.0.7"), press=press_id, action="press", widget="say"
                 )
             )
@@ -95,7 +95,7 @@ def entries(folder: Path, **wanted: Any) -> list[Entry]:
 def test_an_old_file_is_read_and_verified_as_it_is(folder: Path) -> None:
     found = entries(folder)
     assert [(one.seq, one.reason, one.text) for one in found][2] == (3, SENT, "")
-    assert found[2].said == SENT
+    assert found[2].reason_text == SENT
     assert (verify(folder).count, verify(folder).fault) == (4, "")
     (unended,) = open_presses(folder, "", ["say"], 0)
     assert (unended.press.press, unended.reason, unended.code) == ("p2", "", "")
@@ -113,7 +113,7 @@ def test_an_old_file_is_opened_continued_and_verified(folder: Path) -> None:
         "log_began",
         "published",
     ]
-    said = found[-1].said
+    said = found[-1].reason_text
     assert isinstance(said, Text)
     assert said == say("published", topic="/say", time="11:00:00")
     assert found[-1].reason == str(said)
@@ -134,8 +134,8 @@ def test_a_reader_has_new_entries_in_their_language_and_old_ones_as_they_are(
             "Gesendet auf /say, 11:00:00.",
             str(say("published", topic="/say", time="11:00:00")),
         )
-        german = b"".join(lines(folder, Filter(), None, "de")).decode("utf-8-sig").splitlines()
-        english = b"".join(lines(folder, Filter(), None)).decode("utf-8-sig").splitlines()
+        german = b"".join(csv_chunks(folder, Filter(), None, "de")).decode("utf-8-sig").splitlines()
+        english = b"".join(csv_chunks(folder, Filter(), None)).decode("utf-8-sig").splitlines()
     assert german[0] == english[0]
     assert german[0].endswith(",reason,prev,hash,text")
     assert "Gesendet auf /say, 11:00:00." in german[1]
@@ -159,6 +159,6 @@ def test_a_code_that_was_changed_is_found(folder: Path, change: str, seq: int) -
 
 
 def test_an_entry_whose_code_this_version_does_not_know_is_shown_as_it_was_written() -> None:
-    strange = entered("refused", reason="As it was.")._replace(text='{"code": "gone", "params": {}}')
+    strange = new_entry("refused", reason="As it was.")._replace(text='{"code": "gone", "params": {}}')
     broken = strange._replace(text='{"code": 1')
     assert [one.reason_in("xx") for one in (strange, broken)] == ["As it was."] * 2

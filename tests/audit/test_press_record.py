@@ -122,7 +122,7 @@ class Bench:
     def put(self, key: str, payload: bytes) -> None:
         self.happened.append("sent")
 
-    def heard(self, key: str) -> bool:
+    def has_reader(self, key: str) -> bool:
         return True
 
     def query(self, key: str, payload: bytes, timeout_s: float) -> "asyncio.Future[bytes | None]":

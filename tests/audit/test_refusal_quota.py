@@ -67,7 +67,7 @@ class Counted:
         entries = 0
         for _ in range(times):
             if self.refusals.allowed(origin):
-                self.refusals.take(origin)
+                self.refusals.count(origin)
                 entries += 1
             else:
                 self.refusals.suppress(origin)
@@ -114,7 +114,7 @@ def test_it_remembers_no_more_than_it_must(counted: Counted) -> None:
     for number in range(10_000):
         counted.now += OF_ALL.every_s
         counted.come(Origin(address=f"10.1.{number}", browser="b"), 1)
-    assert len(counted.refusals._left) == MAX_QUOTAS
+    assert len(counted.refusals._balances) == MAX_QUOTAS
 
 
 def test_what_is_left_out_is_told_by_browser_and_the_rest_together(counted: Counted) -> None:
@@ -145,7 +145,7 @@ class Cell:
     def put(self, key: str, payload: bytes) -> None:
         self.sent += 1
 
-    def heard(self, key: str) -> bool:
+    def has_reader(self, key: str) -> bool:
         return True
 
     async def press(self, press_id: str, origin: Origin = KIM, **inputs: Any) -> Receipt:

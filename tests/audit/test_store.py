@@ -14,7 +14,7 @@ import pytest
 
 from app.audit.data_dir import LOCK, DataDir
 from app.audit.database import NAME, Head, set_aside
-from app.audit.entry import LONGEST_VALUES, Entry, Origin, as_json, entered, plain
+from app.audit.entry import LONGEST_VALUES, Entry, Origin, as_json, clean_text, new_entry
 from app.audit.opening import Opening
 from app.audit.queries import Filter, rows
 from app.audit.store import DAY_MS, REMOVED_AT_ONCE, Store
@@ -29,7 +29,7 @@ FROM = Origin(address="10.0.0.7", browser="b1", who="Kim", seen="boot-7")
 
 def pressed(number: int = 1, widget: str = "drive") -> Entry:
     values = {"speed": number}
-    return entered("pressed", FROM, values, press=f"p{number}", widget=widget, action="press")
+    return new_entry("pressed", FROM, values, press=f"p{number}", widget=widget, action="press")
 
 
 def fill(store: Store, count: int) -> None:
@@ -64,7 +64,7 @@ def test_an_entry_is_read_as_it_was_written(store: Store, tmp_path: Path) -> Non
 def test_a_hash_can_be_computed_by_whoever_reads_the_file(
     store: Store, tmp_path: Path, reason: TextLike
 ) -> None:
-    (written,) = store.append([entered("refused", FROM, {"text": 'ä"\n'}, reason=reason)])
+    (written,) = store.append([new_entry("refused", FROM, {"text": 'ä"\n'}, reason=reason)])
     with closing(sqlite3.connect(tmp_path / NAME)) as db:
         *row, prev, digest, code = db.execute("SELECT * FROM entry").fetchone()
     row += [code, prev] if code else [prev]
@@ -96,9 +96,9 @@ def test_entries_go_on_in_one_chain_when_the_file_is_opened_again(tmp_path: Path
     "text", ["", "日本語", "🤖", "\ud800 half", "a\0b", "x" * 10_000, "'; DROP TABLE entry; --"]
 )
 def test_every_text_can_be_written_and_verified(store: Store, tmp_path: Path, text: str) -> None:
-    store.append([entered("refused", FROM, {"message": text}, widget="w", reason=text)])
+    store.append([new_entry("refused", FROM, {"message": text}, widget="w", reason=text)])
     (found,) = read(tmp_path)
-    assert found.reason == plain(text)
+    assert found.reason == clean_text(text)
     assert len(found.reason) <= 510
     assert verify(tmp_path).fault == ""
 
@@ -211,7 +211,7 @@ def test_what_was_done_to_the_file_is_named(
 ) -> None:
     store = Store(tmp_path, "boot1")
     fill(store, 10)
-    store.append([entered("began", values={"mode": "live"}, reason="The panel server started.")])
+    store.append([new_entry("began", values={"mode": "live"}, reason="The panel server started.")])
     fill(store, 2)
     head = store.head.hash
     store.close()
@@ -225,7 +225,7 @@ def test_what_was_done_to_the_file_is_named(
 
 
 def began(values: dict[str, Any]) -> Entry:
-    return entered("began", values=values, reason="The log before this one was damaged.")
+    return new_entry("began", values=values, reason="The log before this one was damaged.")
 
 
 @pytest.mark.parametrize(
@@ -341,7 +341,7 @@ def test_only_what_is_old_goes(store: Store, tmp_path: Path) -> None:
 
 
 def test_what_was_written_before_the_clock_was_set_is_not_old_by_that(store: Store) -> None:
-    at_1970 = [entered("refused", FROM)._replace(at=number) for number in range(1, 4)]
+    at_1970 = [new_entry("refused", FROM)._replace(at=number) for number in range(1, 4)]
     store.append(at_1970)
     fill(store, 1)
     now = time.time_ns() // 1_000_000
@@ -365,7 +365,7 @@ def test_only_a_clock_that_nobody_set_for_an_hour_makes_anything_old() -> None:
 def test_a_large_log_loses_its_oldest_and_its_pages(store: Store, tmp_path: Path) -> None:
     long = {"message": "x" * 1500}
     for _ in range(6):
-        store.append([entered("refused", FROM, long, reason="r" * 400) for _ in range(1000)])
+        store.append([new_entry("refused", FROM, long, reason="r" * 400) for _ in range(1000)])
     used = store.used_bytes()
     assert used > 9_000_000
     removals = 0
@@ -404,7 +404,7 @@ def test_presses_of_an_earlier_server_are_undone_until_they_are_closed(tmp_path:
     store.close()
     store = Store(tmp_path, "boot2")
     assert [entry.seq for entry in store.undone()] == [goal.seq, cut.seq]
-    assert (store.answered(goal.seq), store.answered(cut.seq)) == (True, False)
+    assert (store.has_outcome(goal.seq), store.has_outcome(cut.seq)) == (True, False)
     store.append([e.follow_up("closed", "unknown", "ended") for e in store.undone()])
     assert store.undone() == []
     store.close()

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
 
-from app.commands.service_calls import MOST_UNANSWERED
+from app.commands.service_calls import MAX_UNANSWERED
 from tests.support import cyclone
 from tests.support.cyclone import TYPES, Client, CycloneRobot, served
 from tests.support.parts import Bridge, Server, Stream, http_client, live, until
@@ -188,7 +188,7 @@ def test_a_late_answer_corrects_the_receipt(kiosk: Server, robot: CycloneRobot) 
     again = press(kiosk, "slow", id="slow-1")
     assert (again.status_code, again.json()["outcome"]) == (200, "succeeded")
     assert len(robot.requests("/slow")) == 1
-    until(lambda: "a late answer" in kiosk.process.text, "it is logged")
+    until(lambda: "late response" in kiosk.process.text, "it is logged")
 
 
 def test_while_a_call_waits_its_button_is_locked_and_others_go_on(
@@ -226,7 +226,7 @@ def test_calls_that_wait_hold_up_no_press(
     servers: Callable[[Server], Server],
 ) -> None:
     path = tmp_path / "waiting.toml"
-    names = [f"wait_{n}" for n in range(3 * (MOST_UNANSWERED + 1))]
+    names = [f"wait_{n}" for n in range(3 * (MAX_UNANSWERED + 1))]
     path.write_text(PANEL + "".join(waiting_widget(*one) for one in enumerate(names)))
     kiosk = servers(live(cyclone_bridge.endpoint, tmp_path, KIOSK_PANEL=str(path)))
     robot.subscribe(topic="/said", type="std_msgs/msg/String")
@@ -243,8 +243,8 @@ def test_calls_that_wait_hold_up_no_press(
         beside = median(heard_after_s(kiosk, robot, f"beside {n}") for n in range(20))
         assert sum(call.done() for call in calls) == 3, "the others wait all the while"
         outcomes = Counter(call.result().json()["outcome"] for call in calls)
-    assert outcomes == {"timed_out": 3 * MOST_UNANSWERED, "refused": 3}
-    assert len(robot.requests("/slow")) == MOST_UNANSWERED
+    assert outcomes == {"timed_out": 3 * MAX_UNANSWERED, "refused": 3}
+    assert len(robot.requests("/slow")) == MAX_UNANSWERED
     assert beside < 3 * alone + 0.02, f"{beside * 1000:.1f} ms instead of {alone * 1000:.1f} ms"
 
 

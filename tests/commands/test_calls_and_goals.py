@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from app.commands.actions.goals import GoalTracker
-from app.commands.service_calls import LATE_S, LONGEST_SAID, MOST_UNANSWERED, ServiceCalls
+from app.commands.service_calls import LATE_S, MAX_UNANSWERED, MAX_VALUE_CHARS, ServiceCalls
 from app.dialect import bridge_dialect
 from app.errors import LinkError
 from app.panel.model import Panel
@@ -109,8 +109,8 @@ class Bench:
 
     def lose_the_bridge(self) -> None:
         self.robot.graph.apply_token(bridge_dialect.bridge_token(BRIDGE), False)
-        self.calls.follow()
-        self.actions.follow()
+        self.calls.on_graph_change()
+        self.actions.on_graph_change()
 
 
 Test = Callable[[Bench], Coroutine[Any, Any, None]]
@@ -175,11 +175,11 @@ def test_a_query_that_ends_without_an_answer_is_unknown() -> None:
 
 def test_calls_that_nobody_answers_are_bounded_and_forgotten() -> None:
     async def test(bench: Bench) -> None:
-        for number in range(MOST_UNANSWERED):
+        for number in range(MAX_UNANSWERED):
             assert (await bench.call(f"p{number}")).outcome == "timed_out"
         one_more = await bench.call("too many")
         assert one_more.outcome == "refused"
-        assert len(bench.line.asked) == MOST_UNANSWERED
+        assert len(bench.line.asked) == MAX_UNANSWERED
         for _, _, future in bench.line.asked:
             future.set_result(None)
         await asyncio.sleep(0)
@@ -256,7 +256,7 @@ def tell_states(bench: Bench, *states: tuple[bytes, int]) -> None:
     stamp = {"sec": 0, "nanosec": 0}
     told = [{"goal_info": {"goal_id": {"uuid": i}, "stamp": stamp}, "status": s} for i, s in states]
     payload = INTERFACES.encode(INTERFACES.action_types(COUNT).status, {"status_list": told})
-    bench.actions.hear_status("/count", sample_of(payload))
+    bench.actions.on_status("/count", sample_of(payload))
 
 
 async def accepted(bench: Bench, press_id: str = "g1") -> None:
@@ -547,15 +547,15 @@ def test_what_breaks_while_a_goal_is_followed_leaves_it_unknown(
 def test_a_goal_that_nobody_heard_of_is_asked_for_only_for_a_while(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("app.commands.actions.client.CUT_NEWS_S", 0)
+    monkeypatch.setattr("app.commands.actions.client.BRIDGE_LOSS_DELAY_S", 0)
 
     async def test(bench: Bench) -> None:
-        for number in range(MOST_UNANSWERED):
+        for number in range(MAX_UNANSWERED):
             assert (await bench.send_goal()).outcome == "timed_out"
             await asked(bench, 2 * (number + 1))
         assert bench.line.timeouts[1] == LATE_S
         assert (await bench.send_goal()).outcome == "refused"
-        assert len(bench.line.asked) == 2 * MOST_UNANSWERED
+        assert len(bench.line.asked) == 2 * MAX_UNANSWERED
         for _, _, future in bench.line.asked:
             if not future.done():
                 future.set_result(None)
@@ -572,7 +572,7 @@ def test_a_goal_whose_server_ends_is_unknown_and_asked_for_when_it_is_back() -> 
         await accepted(bench)
         token = bridge_dialect.server_token(BRIDGE, "AS", "count", COUNT)
         bench.robot.graph.apply_token(token, False)
-        bench.actions.follow()
+        bench.actions.on_graph_change()
         await in_doubt(bench)
         assert (bench.shown.goal, bench.shown.can_cancel) == ("UNKNOWN", False)
         assert "stopped offering /count" in str(bench.shown.text)
@@ -614,13 +614,13 @@ def test_feedback_and_results_of_any_length_are_cut() -> None:
         await accepted(bench)
         long = {"sequence": list(range(300_000))}
         one = {"goal_id": {"uuid": goal_id(bench)}, "feedback": long}
-        bench.actions.hear_feedback("/count", sample_of(INTERFACES.encode(types.feedback_message, one)))
+        bench.actions.on_feedback("/count", sample_of(INTERFACES.encode(types.feedback_message, one)))
         bench.line.answer(types.get_result_response, status=4, result=long)
         assert str(bench.shown.text).startswith("In progress. so far [0, 1, 2, ")
-        assert len(str(bench.shown.text)) < 2 * LONGEST_SAID
+        assert len(str(bench.shown.text)) < 2 * MAX_VALUE_CHARS
         await settled(bench)
         assert str(bench.shown.text).endswith("…")
-        assert len(str(bench.corrected[0][1].text)) < 2 * LONGEST_SAID
+        assert len(str(bench.corrected[0][1].text)) < 2 * MAX_VALUE_CHARS
 
     run(test)
 
@@ -632,8 +632,8 @@ def test_feedback_and_states_that_can_not_be_read_are_counted_and_fill_no_log(
         await accepted(bench)
         for number in range(100):
             garbage = Sample(b"\0\1\0\0\xff", number, number / 10, 0.0, BRIDGE)
-            bench.actions.hear_feedback("/count", garbage)
-            bench.actions.hear_status("/count", garbage)
+            bench.actions.on_feedback("/count", garbage)
+            bench.actions.on_status("/count", garbage)
         counted = {"count/_action/feedback": 100, "count/_action/status": 100}
         assert bench.robot.undecodable == counted
         lines = [line for line in caplog.messages if "_action" in line]
@@ -654,7 +654,7 @@ def test_feedback_of_another_programs_goal_is_passed_over() -> None:
         before = bench.robot.command_status["count"]
         other = {"goal_id": {"uuid": [7] * 16}, "feedback": {"sequence": [1]}}
         for payload in (INTERFACES.encode(types.feedback_message, other), b"\xff" * 9):
-            bench.actions.hear_feedback("/count", sample_of(payload))
+            bench.actions.on_feedback("/count", sample_of(payload))
         assert bench.robot.command_status["count"] == before
         await bench.actions.stop()
 
@@ -674,7 +674,7 @@ def test_feedback_is_taken_in_and_waits_for_the_next_frame() -> None:
         for number in range(100):
             feedback = {"goal_id": {"uuid": goal_id}, "feedback": {"sequence": [number]}}
             payload = INTERFACES.encode(types.feedback_message, feedback)
-            bench.actions.hear_feedback("/count", sample_of(payload))
+            bench.actions.on_feedback("/count", sample_of(payload))
         assert bench.shown.fraction == 0.99
         assert len(bench.shows) == shows
         await bench.actions.stop()

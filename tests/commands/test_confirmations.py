@@ -65,7 +65,7 @@ class Desk:
 
     def says(self, text: str, at: float) -> None:
         says(self.robot, "/heard", text, at=at, seq=next(self._seq))
-        self.confirmations.hear(self.robot.key("/heard"), self.robot.reading("/heard"))
+        self.confirmations.update(self.robot.key("/heard"), self.robot.reading("/heard"))
 
 
 def test_a_command_is_confirmed_by_what_comes_after_it() -> None:
@@ -109,7 +109,7 @@ def test_what_came_unseen_confirms_by_when_it_came() -> None:
         changes = Changes({desk.robot.key("/heard"): newest}, {}, link_up=True)
         for updates in intake.steps(changes):
             for key, reading in updates.readings:
-                desk.confirmations.hear(key, reading)
+                desk.confirmations.update(key, reading)
         return await press
 
     outcomes = [asyncio.run(pressed(came_at)).outcome for came_at in (99.9, 100.1)]

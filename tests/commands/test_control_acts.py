@@ -8,7 +8,7 @@ import pytest
 
 from app.audit import Entry, NullLog
 from app.audit.press_record import PressLog
-from app.commands.control_acts import ActReceipt, Asked, ControlActs
+from app.commands.control_acts import ActReceipt, ActRequest, ControlActs
 from app.commands.press_context import PressGuard
 from app.errors import NotFound
 from app.panel.rules import ControlRules
@@ -60,7 +60,7 @@ class Bench:
             ControlRules(required=True),
             "Robot 1",
             monotonic=lambda: self.now,
-            passed=lambda passing: self.acts.passed(passing),
+            passed=lambda passing: self.acts.log_passing(passing),
         )
         board = ViewPublisher(build_view(PANEL, robot_there(PANEL), NOW).view, "r1")
         self.guard = PressGuard(board, self.control, self.log, 3.0, lambda: ())
@@ -73,7 +73,7 @@ class Bench:
     async def do(
         self, act: str, who: Principal = ANN, act_id: str = "a1", to: str = "", at: float | None = None
     ) -> ActReceipt:
-        return await self.acts.act(Asked(act, who, to), act_id, at)
+        return await self.acts.act(ActRequest(act, who, to), act_id, at)
 
     @property
     def logged(self) -> list[tuple[str, str, str, str]]:
@@ -137,8 +137,10 @@ def test_the_same_id_is_the_same_act(bench: Bench) -> None:
     assert bench.acts.receipt("a1") == bench.acts.receipt("a1")
 
 
-@pytest.mark.parametrize("other", [Asked("take", BOB), Asked("release", ANN), Asked("take", ANN, "x")])
-def test_an_id_of_another_act_is_refused_and_does_nothing(bench: Bench, other: Asked) -> None:
+@pytest.mark.parametrize(
+    "other", [ActRequest("take", BOB), ActRequest("release", ANN), ActRequest("take", ANN, "x")]
+)
+def test_an_id_of_another_act_is_refused_and_does_nothing(bench: Bench, other: ActRequest) -> None:
     async def work() -> None:
         await bench.do("take")
         receipt = await bench.acts.act(other, "a1")
@@ -160,7 +162,7 @@ def test_what_refuses_a_press_refuses_an_act(bench: Bench, monkeypatch: pytest.M
         locked = await bench.do("take", act_id="a2")
         assert (locked.reason, locked.cause) == ("The disk is full.", "log")
         monkeypatch.setattr(bench.log, "lock", "")
-        bench.guard.end()
+        bench.guard.close()
         assert (await bench.do("take", act_id="a3")).cause == "link"
         assert bench.control.holder is None
 
@@ -214,7 +216,7 @@ def test_who_keeps_no_cookie_is_refused_with_a_receipt(bench: Bench) -> None:
         program = Principal(anonymous("192.0.2.9"))
         receipt = await bench.do("take", program)
         assert (receipt.outcome, receipt.code) == ("refused", "control_stranger")
-        again = bench.acts.limited(Asked("take", program), "a9")
+        again = bench.acts.limited(ActRequest("take", program), "a9")
         assert (again.cause, again.code) == ("limit", "control_too_often")
         assert bench.acts.receipt("a9") is None
 

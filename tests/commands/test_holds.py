@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
 from app.commands.holds.controller import HoldController
-from app.commands.holds.lease import AHEAD_S, LEASE_S, Lease, sent_at
+from app.commands.holds.lease import LEASE_S, MAX_AHEAD_S, Lease, sent_at
 from app.commands.holds.messages import HoldMessages
 from app.commands.holds.receipts import RELEASED, ActiveHold
-from app.commands.press_judge import Latest
+from app.commands.press_judge import Arrivals
 from app.commands.receipts import Receipt
 from app.dialect import bridge_dialect
 from app.errors import LinkError, NotFound
@@ -135,13 +135,13 @@ class Bench:
         self.robot = robot_there(self.panel)
         permits(self.robot, at=NOW)
         way: Any = self.way
-        checked = sending_of(self.panel, self.robot, way).checked
+        checked = sending_of(self.panel, self.robot, way).check_inputs
         self.receipts: list[Receipt] = []
         self.pending: list[Callable[[], None]] = []  # what has come from the robot, not taken in yet
         self.news: Callable[[], bool] = lambda: bool(self.pending)
         self.holds = HoldController(
             self.panel, self.robot, HoldMessages(INTERFACES, self.robot, self.way, checked),
-            self.loop, Latest(self.take, lambda: self.news()), changed=lambda: None,
+            self.loop, Arrivals(self.take, lambda: self.news()), changed=lambda: None,
         )  # fmt: skip
 
     def take(self) -> None:
@@ -471,7 +471,13 @@ def test_log_lines_say_who_how_long_and_why(bench: Bench, caplog: pytest.LogCapt
 
 @pytest.mark.parametrize(
     ("stamp_ms", "after_ms", "age_s"),
-    [(0, 0, 1.0), (900, 80, 0.02), (1000, 0, 0.0), (1000, 1000 * AHEAD_S, 0.0), (1500, 0, math.inf)],
+    [
+        (0, 0, 1.0),
+        (900, 80, 0.02),
+        (1000, 0, 0.0),
+        (1000, 1000 * MAX_AHEAD_S, 0.0),
+        (1500, 0, math.inf),
+    ],
 )
 def test_the_age_of_what_a_browser_says_shows_in_the_servers_own_time(
     stamp_ms: float, after_ms: float, age_s: float
@@ -481,11 +487,11 @@ def test_the_age_of_what_a_browser_says_shows_in_the_servers_own_time(
 
 def test_a_lease_that_is_over_is_over() -> None:
     lease = Lease.begun("one", 0.05, NOW, NOW)
-    assert lease.over(NOW + LEASE_S - 0.001) == ""
-    assert lease.over(NOW + LEASE_S) == "hold_by_heartbeat"
-    assert lease.over(NOW + LEASE_S + 0.2) == "hold_by_stall"
+    assert lease.end_code(NOW + LEASE_S - 0.001) == ""
+    assert lease.end_code(NOW + LEASE_S) == "hold_by_heartbeat"
+    assert lease.end_code(NOW + LEASE_S + 0.2) == "hold_by_stall"
     assert not lease.beat(1, NOW + LEASE_S, NOW + LEASE_S)
-    assert not lease.due(NOW + LEASE_S)
+    assert not lease.take_due(NOW + LEASE_S)
 
 
 AGES: Final = st.sampled_from([0.0, 0.0, 0.01, 0.1, 0.2, 0.249, 0.25, 0.4])  # seconds

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from app.audit import NullLog
-from app.commands.receipts import MOST_LOOKS, Receipt
+from app.commands.receipts import MAX_FINAL_CHECKS, Receipt
 from app.dialect.bridge_dialect import server_token
 from app.robot.state import RobotState
 from app.runtime.robot_session import RobotSession, ServerParts
@@ -57,7 +57,7 @@ class Way:
     def put(self, key: str, payload: bytes) -> None:
         self.sent.append(key)
 
-    def heard(self, key: str) -> bool:
+    def has_reader(self, key: str) -> bool:
         return True
 
     def query(self, key: str, payload: bytes, timeout_s: float) -> "asyncio.Future[bytes | None]":
@@ -116,7 +116,7 @@ def test_one_that_is_given_again_lets_it_through(widget: str) -> None:
 
 def test_news_that_come_faster_than_they_are_taken_in_stop_it() -> None:
     robot, way = robot_permits(), Way()
-    late = Late(robot, *[True] * (MOST_LOOKS + 5), ends=False)
+    late = Late(robot, *[True] * (MAX_FINAL_CHECKS + 5), ends=False)
     receipt = pressed("guarded", way, late, robot)
     assert (receipt.outcome, receipt.cause, way.sent) == ("refused", "link", [])
 

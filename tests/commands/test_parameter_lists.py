@@ -10,7 +10,7 @@ import httpx
 import pytest
 from playwright.sync_api import Page, expect
 
-from app.commands.parameters.values import checked
+from app.commands.parameters.values import check_value
 from app.errors import InputError
 from app.panel.list_text import join_list, quote_element, split_list
 from app.panel.number_range import Range
@@ -66,14 +66,14 @@ def test_what_is_no_list_is_refused(text: str) -> None:
     with pytest.raises(ValueError, match="of them is none"):
         split_list(text)
     with pytest.raises(InputError, match="separate several values with commas, not"):
-        checked(widget(type="string[]"), ParameterState("live"), text)
+        check_value(widget(type="string[]"), ParameterState("live"), text)
 
 
 @pytest.mark.parametrize("text", ['{}"a', 'a{}"', 'a,{}"', '"a{}', '"a"{}"'])
 def test_spaces_that_end_in_a_mistake_take_no_time(text: str) -> None:
     began = time.process_time()
     with pytest.raises(InputError, match="separate several values with commas, not"):
-        checked(widget(type="string[]"), ParameterState("live"), text.format(" " * 995))
+        check_value(widget(type="string[]"), ParameterState("live"), text.format(" " * 995))
     assert time.process_time() - began < 1  # it took 6 s, of the whole server
 
 
@@ -93,7 +93,7 @@ def test_spaces_that_end_in_a_mistake_take_no_time(text: str) -> None:
 )
 def test_a_list_is_typed_value_by_value(kind: str, given: Any, value: tuple[Any, ...]) -> None:
     of = widget(type=kind)
-    found = checked(
+    found = check_value(
         of, ParameterState("live"), of.parse_text(given) if isinstance(given, str) else given
     )
     assert found == value
@@ -122,7 +122,7 @@ def test_a_list_is_typed_value_by_value(kind: str, given: Any, value: tuple[Any,
 def test_each_value_of_a_list_is_checked(more: dict[str, Any], given: Any, why: str) -> None:
     limits = Range(0.0, 5.0) if more.get("type") is None else Range()
     with pytest.raises(InputError, match=why):
-        checked(widget(**more), ParameterState("live", range=limits), given)
+        check_value(widget(**more), ParameterState("live", range=limits), given)
 
 
 @pytest.mark.parametrize(
@@ -136,20 +136,20 @@ def test_each_value_of_a_list_is_checked(more: dict[str, Any], given: Any, why: 
     ],
 )
 def test_an_option_is_chosen_by_its_value_or_its_key(more: Any, given: Any, value: Any) -> None:
-    found = checked(widget(**{"options": OPTIONS, **more}), ParameterState("live"), given)
+    found = check_value(widget(**{"options": OPTIONS, **more}), ParameterState("live"), given)
     assert (found, type(found)) == (value, type(value))
 
 
 @pytest.mark.parametrize("given", ["", "3", 3, True, "Slow", [1]])
 def test_what_is_no_option_is_refused(given: Any) -> None:
     with pytest.raises(InputError, match="Gains must be one of Slow, Fast, not"):
-        checked(widget(type="integer", options=OPTIONS), ParameterState("live"), given)
+        check_value(widget(type="integer", options=OPTIONS), ParameterState("live"), given)
 
 
 def test_an_option_that_the_node_does_not_take_is_refused() -> None:
     of = widget(type="integer", options=OPTIONS)
     with pytest.raises(InputError, match="Gains is Fast: it must be 0 to 1"):
-        checked(of, ParameterState("live", range=Range(0, 1)), "2")
+        check_value(of, ParameterState("live", range=Range(0, 1)), "2")
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import pytest
 
 from app.commands.parameters import client, sync
 from app.commands.parameters.sync import ParameterSync
-from app.commands.parameters.values import checked
+from app.commands.parameters.values import check_value
 from app.commands.service_calls import ServiceCalls
 from app.dialect import bridge_dialect
 from app.errors import InputError
@@ -82,12 +82,12 @@ class Bench:
             if not alive:
                 self.lose(token)
             self.robot.graph.apply_token(token, alive)
-        self.parameters.follow()
+        self.parameters.on_graph_change()
 
     def lose(self, token: str) -> None:
         endpoint = bridge_dialect.parsed(token)
         assert endpoint is not None
-        self.parameters.lose(endpoint)
+        self.parameters.on_token_lost(endpoint)
 
     async def asked(self, count: int) -> None:
         async with asyncio.timeout(5):
@@ -113,7 +113,7 @@ class Bench:
         told = {"new_parameters": [], "changed_parameters": [], "deleted_parameters": [], **parts}
         fields = {"stamp": {"sec": 0, "nanosec": 0}, "node": node, **told}
         payload = INTERFACES.encode(EVENT_TYPE, fields)
-        self.parameters.hear(Sample(payload, 1, NOW, NOW, BRIDGE, skipped))
+        self.parameters.on_event(Sample(payload, 1, NOW, NOW, BRIDGE, skipped))
 
     async def until(self, what: Callable[[], bool]) -> None:
         async with asyncio.timeout(5):
@@ -158,11 +158,11 @@ def soon(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_a_node_is_asked_when_it_is_seen_and_no_more() -> None:
     async def test(bench: Bench) -> None:
-        bench.parameters.follow()
+        bench.parameters.on_graph_change()
         assert bench.line.keys == []
         assert "does not offer the parameters of /arm" in bench.reason()
         bench.offer()
-        bench.parameters.follow()
+        bench.parameters.on_graph_change()
         await bench.asked(1)
         assert "waiting for /arm to report speed" in bench.reason()
         await bench.tell(1, 0.5)
@@ -197,7 +197,7 @@ def test_an_event_of_the_node_counts_and_one_of_another_does_not() -> None:
         assert bench.known().value == 0.7
         for other in ("/arm2", "/cell/arm", "arm"):
             bench.event(other, changed_parameters=change(9.0))
-        bench.parameters.hear(Sample(b"\xff" * 9, 1, NOW, NOW, BRIDGE))
+        bench.parameters.on_event(Sample(b"\xff" * 9, 1, NOW, NOW, BRIDGE))
         assert bench.known().value == 0.7
         assert len(bench.line.asked) == 2
 
@@ -211,7 +211,7 @@ def test_an_event_by_a_bridge_that_is_gone_does_not_count() -> None:
         fields = {"stamp": {"sec": 0, "nanosec": 0}, "node": "/arm", "new_parameters": [],
                   "changed_parameters": change(0.7), "deleted_parameters": []}  # fmt: skip
         payload = INTERFACES.encode(EVENT_TYPE, fields)
-        bench.parameters.hear(Sample(payload, 1, NOW, NOW, "gone"))
+        bench.parameters.on_event(Sample(payload, 1, NOW, NOW, "gone"))
         assert bench.known().value == 0.5
 
     run(test)
@@ -273,7 +273,7 @@ def test_a_node_that_was_another_one_for_a_moment_is_asked_anew() -> None:
         bench.lose(bridge_dialect.bridge_token(BRIDGE))
         assert (bench.known().state, bench.known().value) == ("cut", 0.5)
         assert "waiting for /arm" in bench.reason()
-        bench.parameters.follow()
+        bench.parameters.on_graph_change()
         await bench.tell(3, 0.6)
         assert (bench.known().state, bench.known().value) == ("live", 0.6)
 
@@ -302,7 +302,7 @@ def test_a_node_that_does_not_answer_is_asked_again_when_it_is_touched_or_new(
         assert "“Read again” tries once more" in bench.reason()
         for _ in range(3):  # whatever it says by itself
             bench.event(skipped=1, changed_parameters=change(0.7), new_parameters=change(0.7))
-            bench.parameters.follow()
+            bench.parameters.on_graph_change()
             await asyncio.sleep(0.03)
         assert len(bench.line.asked) == 1
         assert bench.parameters.read_again(one) == ""
@@ -495,7 +495,7 @@ def test_an_empty_answer_to_a_set_is_unknown() -> None:
     ],
 )
 def test_a_value_is_typed(given: Any, kind: str, value: Any) -> None:
-    found = checked(widget(type=kind), ParameterState("live", range=Range(None, None, None)), given)
+    found = check_value(widget(type=kind), ParameterState("live", range=Range(None, None, None)), given)
     assert (found, type(found)) == (value, type(value))
 
 
@@ -520,7 +520,7 @@ def test_a_value_is_typed(given: Any, kind: str, value: Any) -> None:
 )
 def test_a_value_of_another_type_is_refused(given: Any, kind: str) -> None:
     with pytest.raises(InputError, match="Speed"):
-        checked(widget(type=kind), ParameterState("live"), given)
+        check_value(widget(type=kind), ParameterState("live"), given)
 
 
 @pytest.mark.parametrize(
@@ -542,10 +542,10 @@ def test_a_panel_narrows_what_the_node_describes(
 ) -> None:
     of, known = widget(**own), ParameterState("live", range=theirs)
     assert english(limits_text(of, allowed_range(of, known))) == limits
-    assert [checked(of, known, one) for one in good] == good
+    assert [check_value(of, known, one) for one in good] == good
     for one in bad:
         with pytest.raises(InputError, match="it must be"):
-            checked(of, known, one)
+            check_value(of, known, one)
 
 
 def test_no_value_that_both_allow_locks() -> None:
@@ -563,10 +563,10 @@ def test_no_value_that_both_allow_locks() -> None:
 def test_integers_are_exact_to_the_last_step() -> None:
     of = widget(type="integer")
     known = ParameterState("live", range=Range(-(2**63), 2**63 - 1, 2))
-    assert checked(of, known, str(2**53 + 2)) == 2**53 + 2
-    assert checked(of, known, str(2**63 - 1)) == 2**63 - 1  # the highest is always right
+    assert check_value(of, known, str(2**53 + 2)) == 2**53 + 2
+    assert check_value(of, known, str(2**63 - 1)) == 2**63 - 1  # the highest is always right
     with pytest.raises(InputError):
-        checked(of, known, str(2**53 + 1))
+        check_value(of, known, str(2**53 + 1))
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ import httpx
 import pytest
 from playwright.sync_api import Browser
 
-from app.commands.press_limits import OF_CLIENT
+from app.commands.press_limits import CLIENT_QUOTA
 from app.web.routes.press_socket import MOST_REFUSED
 from tests.browser.test_holds_in_browser import PANEL
 from tests.support.apps.small import PRESSES
@@ -80,7 +80,7 @@ def test_a_flood_reaches_the_robot_at_the_rate_of_a_client(
         answers = list(pool.map(lambda _: free(mine), range(presses)))
     took = time.monotonic() - began
     came = Counter(answer.status_code for answer in answers)
-    assert came[200] <= OF_CLIENT.burst + OF_CLIENT.per_s * took + 1
+    assert came[200] <= CLIENT_QUOTA.burst + CLIENT_QUOTA.per_s * took + 1
     assert came == {200: came[200], 429: presses - came[200]}
     metrics = mine.http.get("/metrics").text
     assert f"kiosk_presses_limited_total {came[429]:.1f}" in metrics

@@ -61,7 +61,7 @@ class Way:
             raise LinkError(self.fails)
         self.sent.append((key, payload))
 
-    def heard(self, key: str) -> bool:
+    def has_reader(self, key: str) -> bool:
         return self.listened_to
 
     @property
@@ -84,7 +84,7 @@ class Bench:
         self._presses = presses_of(panel, self.robot, self.way, monotonic=lambda: self.now)
         self.may_press: Callable[[Principal], Verdict] = lambda _: PERMITTED
         self.receipt = self._presses.receipt
-        self.typed = sending_of(panel, self.robot, self.way).typed
+        self.typed = sending_of(panel, self.robot, self.way).parse_form
 
     def press(
         self,

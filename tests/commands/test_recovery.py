@@ -9,14 +9,14 @@ from typing import Any
 
 import pytest
 
-from app.audit import Entry, Filter, Limits, OpenPress, OperatorLog, Origin, entered
+from app.audit import Entry, Filter, Limits, OpenPress, OperatorLog, Origin, new_entry
 from app.audit.press_record import PressLog
 from app.audit.queries import open_presses, rows
 from app.audit.store import Store
 from app.commands.actions.goal import goal_id
-from app.commands.actions.recovery import LOOKED_BACK_S, GoalRecovery
+from app.commands.actions.recovery import LOOK_BACK_S, GoalRecovery
 from app.commands.actions.results import RESULT_S
-from app.commands.service_calls import LATE_S, MOST_UNANSWERED
+from app.commands.service_calls import LATE_S, MAX_UNANSWERED
 from app.dialect import bridge_dialect
 from app.errors import LogError
 from app.permission.interlocks import call_blocked
@@ -41,7 +41,7 @@ async def pressed(
 ) -> Entry:
     """A press of the server before, with what the log says came of it."""
     about = {"robot": robot, "press": press_id, "widget": widget, "action": "press"}
-    entry = await log.pressed(entered("pressed", FROM, {}, **about))
+    entry = await log.pressed(new_entry("pressed", FROM, {}, **about))
     assert entry is not None
     for number, outcome in enumerate(outcomes):
         await log.closed(entry.follow_up("corrected" if number else "closed", outcome, "So."))
@@ -63,7 +63,7 @@ def test_the_log_knows_of_which_presses_it_has_no_end(tmp_path: Path) -> None:
         await pressed(log, "goes on", "accepted", "unknown")
         await pressed(log, "silent", "timed_out")
         about = {"widget": "count", "press": "x", "action": "cancel"}
-        await log.pressed(entered("pressed", FROM, {}, **about))
+        await log.pressed(new_entry("pressed", FROM, {}, **about))
         await log.stop()
 
     asyncio.run(test())
@@ -215,7 +215,7 @@ def test_its_feedback_tells_that_it_is_under_way(tmp_path: Path) -> None:
         await rig.started()
         goal = {"uuid": goal_id(entry.hash).bytes}
         said = {"goal_id": goal, "feedback": {"sequence": [1]}}
-        rig.bench.actions.hear_feedback(
+        rig.bench.actions.on_feedback(
             "/count", sample_of(INTERFACES.encode(TYPES.feedback_message, said))
         )
         assert english((rig.bench.shown.goal, rig.bench.shown.text)) == (
@@ -322,12 +322,12 @@ def test_a_press_id_that_was_used_twice_is_of_two_goals(
 
 def test_no_more_are_asked_for_than_may_be_sent_and_the_newest_is_shown(tmp_path: Path) -> None:
     async def test(rig: Rig, entry: Entry) -> None:
-        for number in range(MOST_UNANSWERED + 1):
+        for number in range(MAX_UNANSWERED + 1):
             await pressed(rig.log, f"n{number}", "timed_out")
-        await rig.started(questions=MOST_UNANSWERED)
-        assert rig.bench.shown.press == f"n{MOST_UNANSWERED}"
+        await rig.started(questions=MAX_UNANSWERED)
+        assert rig.bench.shown.press == f"n{MAX_UNANSWERED}"
         await asyncio.sleep(0.02)
-        assert len(rig.bench.line.asked) == MOST_UNANSWERED
+        assert len(rig.bench.line.asked) == MAX_UNANSWERED
 
     run(tmp_path, test, "accepted")
 
@@ -338,7 +338,7 @@ def test_what_is_of_another_robot_or_older_than_a_day_is_not_followed(
     async def test(rig: Rig, entry: Entry) -> None:
         await pressed(rig.log, "g2", "accepted", robot="arm")
         now = time.time()
-        monkeypatch.setattr(time, "time", lambda: now + LOOKED_BACK_S + 10)
+        monkeypatch.setattr(time, "time", lambda: now + LOOK_BACK_S + 10)
         await rig.resuming.start()
         assert "count" not in rig.bench.robot.command_status
 

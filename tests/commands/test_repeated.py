@@ -12,7 +12,7 @@ from typing import Any
 import httpx
 import pytest
 
-from app.audit import Entry, Limits, OperatorLog, Origin, Repeated, entered, same_values
+from app.audit import Entry, Limits, OperatorLog, Origin, Repeated, new_entry, same_values
 from app.audit.database import NAME
 from app.audit.entry import as_json
 from app.audit.store import Store
@@ -154,7 +154,7 @@ def test_what_is_known_later_is_in_the_receipt(start: Start, robot: CycloneRobot
 
 def pressed(number: int, robot: str = "") -> Entry:
     origin = Origin(address="10.0.0.7")
-    return entered("pressed", origin, {"n": number}, press=f"p{number}", action="press", robot=robot)
+    return new_entry("pressed", origin, {"n": number}, press=f"p{number}", action="press", robot=robot)
 
 
 def test_a_log_tells_of_a_press_that_it_has(tmp_path: Path) -> None:
@@ -165,8 +165,8 @@ def test_a_log_tells_of_a_press_that_it_has(tmp_path: Path) -> None:
             if again:
                 with pytest.raises(Repeated) as known:
                     await log.pressed(pressed(1))
-                assert known.value.told
-                assert (known.value.press.seq, known.value.told.outcome) == (2, "unknown")
+                assert known.value.last_entry
+                assert (known.value.press.seq, known.value.last_entry.outcome) == (2, "unknown")
                 assert await log.pressed(pressed(1, robot="r2")) is not None
             else:
                 assert await log.pressed(pressed(1)) is not None

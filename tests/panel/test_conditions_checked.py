@@ -212,7 +212,7 @@ def test_a_value_that_only_changes_the_reason_waits_for_the_next_frame(tmp_path:
         sample = Sample(encoded(value), 1, NOW, NOW, BRIDGE, skipped_payloads=passed)
         *between_two, last = intake.steps(Changes({robot.key(ENABLED): sample}, {}, True))
         shows.extend(value for _ in between_two)
-        return last.urgent, last.more
+        return last.urgent, last.other
 
     assert take(3.0) == (False, True)  # it was waited for: locked then as now
     assert take(3.1) == (False, True)

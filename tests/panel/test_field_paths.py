@@ -154,11 +154,11 @@ def test_an_element_by_its_key_confirms(level: int, outcome: str) -> None:
 
     async def test() -> None:
         press = asyncio.create_task(presses.press("free", {"message": "x"}, "p1", FROM))
-        while not confirmations.awaits("heard"):
+        while not confirmations.is_awaited("heard"):
             await asyncio.sleep(0)
         payload = INTERFACES.encode(DIAGNOSTICS, diagnostics(("a", 1), ("fan", level)))
         robot.update("heard", Sample(payload, 1, NOW + 1, NOW + 1, BRIDGE))
-        confirmations.hear("heard", robot.reading("/heard"))
+        confirmations.update("heard", robot.reading("/heard"))
         assert (await press).outcome == outcome
 
     asyncio.run(test())

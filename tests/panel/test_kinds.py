@@ -20,7 +20,7 @@ class Unsent:
     def put(self, key: str, payload: bytes) -> None:
         raise AssertionError(f"{key} was put")
 
-    def heard(self, key: str) -> bool:
+    def has_reader(self, key: str) -> bool:
         return True
 
 

@@ -78,7 +78,7 @@ class Way:
             raise LinkError("no way")
         self.put_texts.append(INTERFACES.decode(TEXT, payload).data)
 
-    def heard(self, key: str) -> bool:
+    def has_reader(self, key: str) -> bool:
         return True
 
     def query(self, key: str, payload: bytes, timeout_s: float) -> "asyncio.Future[bytes | None]":
@@ -199,7 +199,7 @@ class Panels(RuleBasedStateMachine):
     def link_goes(self) -> None:
         self.robot.mark_link_lost()
         self.grounds = Grounds(self.grounds.strict)
-        self.calls.follow()
+        self.calls.on_graph_change()
 
     @precondition(lambda self: self.grounds.link and not self.grounds.bridge)
     @rule()
@@ -220,7 +220,7 @@ class Panels(RuleBasedStateMachine):
         self.robot.update_publishers()
         self.robot.settled_at = float("inf")
         self.grounds.bridge, self.grounds.settled_at, self.grounds.value = False, None, None
-        self.calls.follow()
+        self.calls.on_graph_change()
 
     @precondition(lambda self: self.grounds.bridge)
     @rule()

@@ -222,9 +222,9 @@ class Cell:
         self.recorder.record_sample("heard", Sample(payload, 1, at, time.time() - ago, "b1", sent=1.5))
 
     def press(self, press_id: str = "p1", outcome: Any = "published") -> None:
-        self.recorder.pressed(press_id, "free", "10.0.0.1", {"message": "hello"})
+        self.recorder.record_press(press_id, "free", "10.0.0.1", {"message": "hello"})
         at, inputs = "2026-01-01T00:00:00.000+00:00", {"message": "hello"}
-        self.recorder.answered(
+        self.recorder.record_receipt(
             Receipt(press_id, "free", outcome, "Sent.", at, "", inputs, fingerprint(inputs))
         )
 
@@ -297,7 +297,7 @@ def test_presses_that_come_meanwhile_prolong_the_same_file(run: Callable[..., No
 
 def test_a_recording_waits_for_the_receipt(run: Callable[..., None]) -> None:
     async def test(cell: Cell) -> None:
-        cell.recorder.pressed("slow", "free", "10.0.0.1", {})
+        cell.recorder.record_press("slow", "free", "10.0.0.1", {})
         await asyncio.sleep(0.5)  # longer than after_s
         assert list(cell.folder.glob("*.mcap")) == []
         cell.press("slow", "timed_out")

@@ -111,7 +111,7 @@ def test_after_each_loss_and_each_new_publisher_the_next_is_the_first(event: str
 def test_what_was_said_as_a_publisher_appeared_is_the_first() -> None:
     replayed = ReplayedMessages()
     for at in (1.0, 5.0):
-        replayed.message(KEY, at, 0.0, False)
+        replayed.record_message(KEY, at, 0.0, False)
     replayed.begin(KEY, 4.9)  # the token's time, taken in after the message
     assert replayed.known_since(KEY) == 5.0 + REPLAY_S
 

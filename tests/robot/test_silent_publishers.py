@@ -25,7 +25,7 @@ from tests.support.builders import (
     ENABLED,
     INTERFACES,
     KIOSK,
-    Nobody,
+    NoServices,
     robot_there,
     small_panel,
 )
@@ -169,17 +169,17 @@ def incoming() -> Iterator[Incoming]:
 
 
 async def made() -> Incoming:
-    panel, nobody = small_panel(), Nobody()
+    panel, services = small_panel(), NoServices()
     robot = robot_there(panel)
-    calls = ServiceCalls(INTERFACES, robot, nobody, lambda: None)
+    calls = ServiceCalls(INTERFACES, robot, services, lambda: None)
     inbox = Inbox(lambda _: None)
     inbox.expect([], [KEY], [])
     intake = Ingest(
         panel,
         robot,
-        GoalTracker(INTERFACES, robot, nobody, lambda: None),
+        GoalTracker(INTERFACES, robot, services, lambda: None),
         Confirmations(robot, lambda: None),
-        ParameterSync(panel, INTERFACES, robot, nobody, calls, lambda: None),
+        ParameterSync(panel, INTERFACES, robot, services, calls, lambda: None),
         None,
     )
     return Incoming(inbox, intake, robot)

@@ -165,11 +165,11 @@ def test_a_robot_without_a_bridge_is_reached_by_its_own_keys(peer: tuple[str, ze
         await when(lambda: one.link_verdict.permitted)
         assert isinstance(one.peer, TinyPeer)
         assert one.peer.said == [f"found {robot.zid}"]
-        assert (await one.way_asked()).permitted
+        assert (await one.check_readiness()).permitted
 
         shown = one.publisher
         await when(lambda: robot.say(True) and shown.view["interlocks"]["operation"]["enabled"])
-        await when(lambda: one.link.heard("go"))
+        await when(lambda: one.link.has_reader("go"))
         for number, text in enumerate(("one", "two"), 1):
             receipt = await one.presses.press("go", {"message": text}, text, FROM)
             assert receipt.outcome == "published", receipt.reason

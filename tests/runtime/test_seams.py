@@ -13,7 +13,7 @@ from app.audit import NullLog
 from app.commands.holds import controller, lease
 from app.commands.holds.receipts import ActiveHold
 from app.commands.press_context import PressContext
-from app.commands.receipts import LONGEST_KEPT, Receipt
+from app.commands.receipts import MAX_KEPT_CHARS, Receipt
 from app.commands.service_calls import with_fields
 from app.panel.model import Panel
 from app.permission.clients import anonymous
@@ -118,7 +118,7 @@ def test_what_fails_at_a_sample_keeps_no_lock_from_closing(caplog: pytest.LogCap
     changes = Changes({feedback: sample(b""), robot.key(ENABLED): sample(flag(False))}, {}, True)
     page = Page(panel, robot)
     news = taken(intake.steps(changes), page)
-    assert (news.urgent, news.came) == (True, False)
+    assert (news.urgent, news.bridge_appeared) == (True, False)
     assert robot.reading(ENABLED).value("data") is False
     assert "was not taken in whole" in caplog.text
 
@@ -215,11 +215,11 @@ JOINTS = {
 
 def test_a_large_press_leaves_no_large_receipt() -> None:
     bench = Bench()
-    large = {"message": "x" * (LONGEST_KEPT + 1)}
+    large = {"message": "x" * (MAX_KEPT_CHARS + 1)}
     refused = bench.press(inputs=large)
     assert (refused.cause, refused.inputs) == ("input", {})
     assert bench.press(inputs=large) == refused
-    other = bench.press(inputs={"message": "y" * (LONGEST_KEPT + 1)})
+    other = bench.press(inputs={"message": "y" * (MAX_KEPT_CHARS + 1)})
     assert "already used" in str(other.reason)
 
 
@@ -341,7 +341,7 @@ def test_who_ends_or_takes_a_new_panel_sends_nothing_more() -> None:
     async def pressed() -> None:
         one = session_of(small_panel(), "tcp/127.0.0.1:1")
         permits(one.robot)
-        by = one.press_guard.by("free", Principal(anonymous("192.0.2.1")))
+        by = one.press_guard.context_for("free", Principal(anonymous("192.0.2.1")))
         assert not by.grounds().ending
         await one.stop()
         assert by.grounds().ending

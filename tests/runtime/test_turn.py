@@ -52,7 +52,7 @@ class Cell:
         ingest = self.session._ingest
         self.inbox.expect(ingest.prompt, ingest.watched, ingest.whole)
         monkeypatch.setattr(self.session.link, "put", lambda *_: None)
-        monkeypatch.setattr(self.session.link, "heard", lambda _: True)
+        monkeypatch.setattr(self.session.link, "has_reader", lambda _: True)
         monkeypatch.setattr(self.session.link, "hold", lambda _: None)
         self.inbox.transport(BRIDGE, True)
         self.inbox.token(bridge_dialect.bridge_token(BRIDGE), True)
@@ -64,7 +64,7 @@ class Cell:
         self.inbox.put("operation_enabled", INTERFACES.encode(BOOL, {"data": permitted}), None)
 
     def take(self) -> None:
-        self.session._turn.take()
+        self.session._turn.run()
 
     def hold(self, widget: str) -> None:
         inputs = HALF if widget == "jog" else {}
@@ -84,7 +84,7 @@ class Cell:
             self._monkeypatch.setattr(owner, name, note)
 
         noted(HoldController, "judge", "holds")
-        noted(Confirmations, "hear", "confirmations")
+        noted(Confirmations, "update", "confirmations")
         noted(refresh, "build_view", "view")
 
 
@@ -169,7 +169,7 @@ def test_a_turn_judges_holds_then_confirmations_and_shows_last(monkeypatch: pyte
         cell = Cell(monkeypatch)
         press = asyncio.ensure_future(cell.session.presses.press("free", {"message": "on"}, "p", FROM))
         async with asyncio.timeout(20):
-            while not cell.session._commands.confirmations.awaits("heard"):
+            while not cell.session._commands.confirmations.is_awaited("heard"):
                 await asyncio.sleep(0.001)
         cell.note_the_order()
         cell.inbox.put("heard", INTERFACES.encode(TEXT, {"data": "on"}), None)

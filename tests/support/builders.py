@@ -11,9 +11,9 @@ from app.commands.confirmations import Confirmations
 from app.commands.dispatch import Dispatcher, Trackers
 from app.commands.parameters.sync import ParameterSync
 from app.commands.press_context import PressContext
-from app.commands.press_judge import Latest, PressJudge
+from app.commands.press_judge import Arrivals, PressJudge
 from app.commands.presses import Presses
-from app.commands.service_calls import Asker, ServiceCalls
+from app.commands.service_calls import QueryClient, ServiceCalls
 from app.dialect import bridge_dialect
 from app.dialect.bridge_dialect import BridgeDialect
 from app.dialect.endpoint import TopicRole
@@ -128,33 +128,33 @@ def permits(robot: RobotState, permitted: bool = True, *, at: float = NOW) -> No
     says(robot, ENABLED, permitted, BOOL, at=at)
 
 
-class Nobody:
+class NoServices:
     """A link on which no service is ever asked."""
 
     def query(self, key: str, payload: bytes, timeout_s: float) -> "asyncio.Future[bytes | None]":
         raise AssertionError(f"{key} was asked")
 
 
-class Asked(Protocol):
+class FakeLink(Protocol):
     """The link as a test has it: what is put and what is asked."""
 
     def put(self, key: str, payload: bytes) -> None: ...
-    def heard(self, key: str) -> bool: ...
+    def has_reader(self, key: str) -> bool: ...
 
 
 def sending_of(
     panel: Panel,
     robot: RobotState,
-    way: Asked,
+    way: FakeLink,
     *,
-    asker: Asker | None = None,
+    asker: QueryClient | None = None,
     calls: ServiceCalls | None = None,
     confirmations: Confirmations | None = None,
     monotonic: Callable[[], float] = lambda: NOW,
     **more: Any,
 ) -> Dispatcher:
     """What is sent to a robot, with all that is needed for it and a test does not care for."""
-    asker = asker or Nobody()
+    asker = asker or NoServices()
     calls = calls or ServiceCalls(INTERFACES, robot, asker, lambda: None)
     return Dispatcher(
         panel,
@@ -175,7 +175,7 @@ def sending_of(
 def presses_of(
     panel: Panel,
     robot: RobotState,
-    way: Asked,
+    way: FakeLink,
     *,
     press_log: PressLog | None = None,
     monotonic: Callable[[], float] = lambda: NOW,
@@ -185,5 +185,5 @@ def presses_of(
 ) -> Presses:
     """The presses of a robot; `more` is for `sending_of`."""
     sending = sending_of(panel, robot, way, monotonic=monotonic, **more)
-    judge = PressJudge(panel, robot, Latest(catch_up, news), monotonic)
+    judge = PressJudge(panel, robot, Arrivals(catch_up, news), monotonic)
     return Presses(judge, sending, press_log or PressLog(NullLog()), robot.name)

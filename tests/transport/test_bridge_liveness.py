@@ -120,7 +120,7 @@ class Line:
 
     def put(self, key: str, payload: bytes) -> None: ...
 
-    def heard(self, key: str) -> bool:
+    def has_reader(self, key: str) -> bool:
         return True
 
 

@@ -131,7 +131,7 @@ def test_a_burst_is_not_dropped(peer: tuple[str, zenoh.Session]) -> None:
     session.declare_subscriber("b", Callback(hear, indirect=False))
     link = ZenohSession(config_to(endpoint), lambda _: None, DIALECT)
     link.start(declared([], ["b"]))
-    until(lambda: link.heard("b"), "the subscriber is known")
+    until(lambda: link.has_reader("b"), "the subscriber is known")
     for number in range(BURST):
         link.put("b", str(number).encode())
     until(lambda: len(heard) == BURST, f"all came, of {BURST}: {len(heard)}")
@@ -160,7 +160,7 @@ def test_a_link_that_takes_nothing_stops_the_loop_once_and_not_for_long() -> Non
         assert peer.stdout.readline() == b"ready\n"
         link = ZenohSession(config_to(endpoint), lambda urgent: None, DIALECT)
         link.start(declared([], ["b"]))
-        until(lambda: link.heard("b"), "the subscriber is known")
+        until(lambda: link.has_reader("b"), "the subscriber is known")
         peer.send_signal(signal.SIGSTOP)
         took = []
         for _ in range(2000):

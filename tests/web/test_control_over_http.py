@@ -12,7 +12,7 @@ from pathlib import Path
 import httpx
 import pytest
 
-from app.commands.press_limits import OF_CLIENT
+from app.commands.press_limits import CLIENT_QUOTA
 from app.web.client_cookie import COOKIE
 from tests.runtime.test_several_robots import entry, panel_file
 from tests.support.parts import ROOT, Server, http_client, until
@@ -380,7 +380,7 @@ def test_acts_are_in_the_operators_log_its_page_and_its_csv(
 def test_more_acts_than_a_client_may_are_refused(client: Callable[..., Client]) -> None:
     ann, bob = client("192.0.2.1"), client("192.0.2.2")
     ann.take()
-    answers = [bob.control("give", to="0" * 12) for _ in range(int(OF_CLIENT.burst) * 3)]
+    answers = [bob.control("give", to="0" * 12) for _ in range(int(CLIENT_QUOTA.burst) * 3)]
     limited = next(one for one in answers if one.status_code == 429)
     assert limited.headers["retry-after"] == "1"
     assert (limited.json()["outcome"], limited.json()["code"]) == ("refused", "control_too_often")

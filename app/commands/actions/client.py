@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from app.clock import format_time
 from app.commands.actions.goal import Goal
-from app.commands.service_calls import CUT_NEWS_S, Asker
+from app.commands.service_calls import BRIDGE_LOSS_DELAY_S, QueryClient
 from app.errors import DecodeError
 from app.i18n import Text, joined, say
 from app.interfaces import Fields, Interfaces
@@ -36,13 +36,13 @@ class ActionClient:
     """Those of one robot. What asks gives LinkError where that could not be sent; what reads a reply
     gives None for one that can't be read."""
 
-    def __init__(self, interfaces: Interfaces, robot: RobotState, link: Asker) -> None:
+    def __init__(self, interfaces: Interfaces, robot: RobotState, link: QueryClient) -> None:
         self._interfaces = interfaces
         self._robot = robot
         self._log = RobotLog(log, robot.name)
         self._link = link
 
-    def offered(self, widget: Action) -> bool:
+    def is_offered(self, widget: Action) -> bool:
         """Whether the robot offers a widget's action, with just its type."""
         return self._robot.graph.server_type("AS", self._robot.key(widget.action)) == widget.type
 
@@ -54,21 +54,21 @@ class ActionClient:
         )
 
     def send_goal(self, widget: Action, request: bytes) -> Query:
-        return self._ask(widget, "send_goal", request, widget.timeout_s)
+        return self._query(widget, "send_goal", request, widget.timeout_s)
 
     def cancel_goal(self, goal: Goal) -> Query:
         request, _ = self._interfaces.service_types(CANCEL)
         stamp = {"sec": 0, "nanosec": 0}
         info = {"goal_id": {"uuid": list(goal.id.bytes)}, "stamp": stamp}
         payload = self._interfaces.encode(request, {"goal_info": info})
-        return self._ask(goal.widget, "cancel_goal", payload, goal.widget.timeout_s)
+        return self._query(goal.widget, "cancel_goal", payload, goal.widget.timeout_s)
 
     def get_result(self, goal: Goal, timeout_s: float) -> Query:
         request = self._interfaces.action_types(goal.widget.type).get_result_request
         payload = self._interfaces.encode(request, {"goal_id": {"uuid": list(goal.id.bytes)}})
-        return self._ask(goal.widget, "get_result", payload, timeout_s)
+        return self._query(goal.widget, "get_result", payload, timeout_s)
 
-    def _ask(self, widget: Action, service: str, payload: bytes, timeout_s: float) -> Query:
+    def _query(self, widget: Action, service: str, payload: bytes, timeout_s: float) -> Query:
         key = of_action(self._robot.key(widget.action), service)
         return self._link.query(key, payload, timeout_s)
 
@@ -78,10 +78,10 @@ class ActionClient:
         await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
         reply = query.result() if query.done() else None
         if reply is None:
-            await asyncio.wait({goal.cut}, timeout=CUT_NEWS_S)  # the news of a cut may follow
+            await asyncio.wait({goal.cut}, timeout=BRIDGE_LOSS_DELAY_S)  # the news of a cut may follow
         return reply
 
-    def first_answer(self, goal: Goal, reply: bytes | None) -> Outcome:
+    def goal_response(self, goal: Goal, reply: bytes | None) -> Outcome:
         """What `send_goal` answered, or why it did not."""
         widget, now = goal.widget, format_time(time.time())
         if reply is not None:
@@ -101,9 +101,9 @@ class ActionClient:
         """What `cancel_goal` answered: a message with `return_code` and `goals_canceling`."""
         return self._decoded(widget, self._interfaces.service_types(CANCEL)[1], reply)
 
-    def why_silent(self, widget: Action) -> Text:
+    def no_response_reason(self, widget: Action) -> Text:
         """Why `cancel_goal` did not answer."""
-        if self.offered(widget):
+        if self.is_offered(widget):
             return say("timed_out", seconds=f"{widget.timeout_s:g}")
         return say("cancel_unheard", name=widget.action)
 

@@ -54,7 +54,7 @@ class Goal:
     state: int | None = None
     known: bool = False
     doubt: TextLike = ""
-    said: str = ""
+    feedback_text: str = ""
     fraction: float | None = None
 
     def advance(self, state: int) -> bool:
@@ -65,33 +65,33 @@ class Goal:
         self.known = self.known or state != UNKNOWN
         return True
 
-    def hear(self, message: Fields) -> None:
+    def apply_feedback(self, message: Fields) -> None:
         """Takes a feedback message: what it says, and how far the goal is."""
         widget = self.widget
         if widget.progress is not None:
             found = message.get(FEEDBACK + widget.progress)
             done = math.nan if found is None else float(found) / widget.progress_max
             self.fraction = min(1.0, max(0.0, done)) if done == done else None  # NaN is no progress
-        self.said = with_fields(widget.feedback, message, FEEDBACK)
+        self.feedback_text = with_fields(widget.feedback, message, FEEDBACK)
 
     @property
-    def lives(self) -> bool:
+    def is_running(self) -> bool:
         """Whether the robot is known to be at it."""
         return self.state is not None and self.state != UNKNOWN and self.state not in ENDS
 
     @property
-    def under_way(self) -> CommandStatus:
+    def running_status(self) -> CommandStatus:
         sentence = say("goal_canceling" if self.state == CANCELING else "goal_executing")
-        text = joined([sentence, self.said.rstrip()])
+        text = joined([sentence, self.feedback_text.rstrip()])
         return CommandStatus(True, "accepted", text, self.fraction, True, self._name, self.press_id)
 
     @property
-    def in_doubt(self) -> CommandStatus:
+    def doubt_status(self) -> CommandStatus:
         """What is shown of a goal that may be under way."""
         stoppable, press = not self.cut.done(), self.press_id
         return CommandStatus(True, "unknown", self.doubt, None, stoppable, NAMES[UNKNOWN], press)
 
-    def came_to(self, answer: Outcome) -> CommandStatus:
+    def end_status(self, answer: Outcome) -> CommandStatus:
         """What is shown when nothing is awaited any more."""
         return CommandStatus(outcome=answer.outcome, text=answer.text, goal=self._name)
 

@@ -14,7 +14,7 @@ from app.clock import format_time
 from app.commands.actions.client import CANCEL, NO_SUCH_GOAL, ActionClient
 from app.commands.actions.goal import ACCEPTED, CANCELING, EXECUTING, FEEDBACK, UNKNOWN, Goal, goal_id
 from app.commands.actions.results import ResultWaiter
-from app.commands.service_calls import MOST_UNANSWERED, Asker
+from app.commands.service_calls import MAX_UNANSWERED, QueryClient
 from app.errors import DecodeError
 from app.i18n import TextLike, say
 from app.interfaces import Fields, Interfaces, names
@@ -32,7 +32,7 @@ class GoalTracker:
     """The goals of one robot; used on the event loop only."""
 
     def __init__(
-        self, interfaces: Interfaces, robot: RobotState, link: Asker, changed: Callable[[], None]
+        self, interfaces: Interfaces, robot: RobotState, link: QueryClient, changed: Callable[[], None]
     ) -> None:
         """`changed` is called when what the widgets show has changed."""
         self._interfaces = interfaces
@@ -40,23 +40,23 @@ class GoalTracker:
         self._changed = changed
         self._services = ActionClient(interfaces, robot, link)
         self._results = ResultWaiter(
-            self._services, robot, cut=self._doubt, back=self._advanced, tell=self._tell
+            self._services, robot, cut=self._cut_off, back=self._advanced, tell=self._finish
         )
         self._latest: dict[str, Goal] = {}  # by widget
         self._feedback: dict[str, Topic] = {}  # by widget
         self._states: dict[str, Sample] = {}  # by action: what its server said last of its goals
 
-    def follow(self) -> None:
+    def on_graph_change(self) -> None:
         """After every change of the graph: of a goal whose server is gone nothing more is heard."""
         bridge = bool(self._robot.graph.bridges)
         if not bridge:
             self._states.clear()
         for goal in (*self._latest.values(), *self._results.goals):
-            if not goal.cut.done() and not (bridge and self._services.offered(goal.widget)):
+            if not goal.cut.done() and not (bridge and self._services.is_offered(goal.widget)):
                 gone = say("goal_gone", name=goal.widget.action)
                 goal.cut.set_result(gone if bridge else "")
                 if goal.doubt:
-                    self._note(goal, goal.in_doubt)
+                    self._set_status(goal, goal.doubt_status)
 
     async def stop(self) -> None:
         """Ends its tasks; goals go on in the robot."""
@@ -69,7 +69,7 @@ class GoalTracker:
         press_id: str,
         corrected: OnCorrection,
         entry: str = "",
-        look: FinalCheck = no_check,
+        final_check: FinalCheck = no_check,
     ) -> Outcome:
         """Sends a goal; `corrected` gets the result in the end, `entry` is the hash of the press's
         entry in the operator's log. FieldError for bad fields, LinkError where it could not be sent:
@@ -78,21 +78,21 @@ class GoalTracker:
         request = self._services.goal_request(widget, own_id, fields)
         if why := self.full(widget.action):
             return Outcome("refused", why)
-        look()
+        final_check()
         query = self._services.send_goal(widget, request)
         cut = asyncio.get_running_loop().create_future()
         goal = Goal(widget, press_id, own_id, cut, corrected)
         self._latest[widget.id] = goal
         self._show(goal, CommandStatus(busy=True, text=say("waiting_for_answer")))
-        answer = self._services.first_answer(goal, await self._services.reply(goal, query))
+        answer = self._services.goal_response(goal, await self._services.reply(goal, query))
         if answer.outcome != "rejected":
             goal.advance(ACCEPTED if answer.outcome == "accepted" else UNKNOWN)
             self._results.begin(goal)
-        if cut.done() and answer.outcome == "unknown" and not goal.lives:
+        if cut.done() and answer.outcome == "unknown" and not goal.is_running:
             self._show_doubt(goal, answer.text)
         else:
-            runs = goal.lives and not cut.done()
-            self._show(goal, goal.under_way if runs else goal.came_to(answer))
+            runs = goal.is_running and not cut.done()
+            self._show(goal, goal.running_status if runs else goal.end_status(answer))
         return answer
 
     def resume(self, goal: Goal) -> None:
@@ -102,16 +102,16 @@ class GoalTracker:
             return
         self._latest.setdefault(goal.widget.id, goal)
         self._results.begin(goal)
-        self._show(goal, goal.in_doubt)
+        self._show(goal, goal.doubt_status)
         if (said := self._states.get(goal.widget.action)) is not None:
-            self.hear_status(goal.widget.action, said)
+            self.on_status(goal.widget.action, said)
 
     def full(self, action: str) -> TextLike:
         """Why no further goal of an action is sent; "" while one may be."""
         count = sum(goal.widget.action == action for goal in self._results.goals)
-        return say("too_many", service=action) if count >= MOST_UNANSWERED else ""
+        return say("too_many", service=action) if count >= MAX_UNANSWERED else ""
 
-    def _stoppable(self, widget: Action, press_id: str) -> Goal | None:
+    def _cancelable(self, widget: Action, press_id: str) -> Goal | None:
         latest, shown = self._latest.get(widget.id), self._robot.command_status.get(widget.id, IDLE)
         if not press_id:
             return latest if shown.can_cancel else None
@@ -120,34 +120,34 @@ class GoalTracker:
         followed = (goal for goal in self._results.goals if goal.widget.id == widget.id)
         return next((goal for goal in followed if goal.press_id == press_id), None)
 
-    def over(self, widget: Action, press_id: str) -> TextLike:
+    def no_goal_reason(self, widget: Action, press_id: str) -> TextLike:
         """Why there is nothing to cancel; "" where there is."""
-        if self._stoppable(widget, press_id) is not None:
+        if self._cancelable(widget, press_id) is not None:
             return ""
         return say("goal_over" if press_id else "nothing_to_cancel")
 
     async def cancel(self, widget: Action, press_id: str = "") -> Outcome:
         """Asks the robot to cancel the goal of one press or, without its id, the one that is shown to
         be under way. LinkError where that could not be sent."""
-        if (goal := self._stoppable(widget, press_id)) is None:
-            return Outcome("refused", self.over(widget, press_id))
+        if (goal := self._cancelable(widget, press_id)) is None:
+            return Outcome("refused", self.no_goal_reason(widget, press_id))
         reply = await self._services.reply(goal, self._services.cancel_goal(goal))
         if reply is None:
-            return Outcome("unknown", self._services.why_silent(widget))
+            return Outcome("unknown", self._services.no_response_reason(widget))
         response = self._services.cancel_response(widget, reply)
         if response is None:
             return Outcome("unknown", say("answer_unreadable", wanted=CANCEL))
-        return self._cancel_answered(goal, response)
+        return self._cancel_outcome(goal, response)
 
-    def _cancel_answered(self, goal: Goal, response: Any) -> Outcome:
+    def _cancel_outcome(self, goal: Goal, response: Any) -> Outcome:
         """Only a goal that is listed is being canceled: rclpy refuses with return code 0."""
         now = format_time(time.time())
         if any(bytes(one.goal_id.uuid) == goal.id.bytes for one in response.goals_canceling):
             if goal.advance(CANCELING) and (
                 goal.doubt or self._robot.command_status[goal.widget.id].busy
             ):
-                self._find(goal)
-                self._show(goal, goal.under_way)
+                self._confirm_running(goal)
+                self._show(goal, goal.running_status)
             return Outcome("accepted", say("cancel_sent", time=now))
         if goal.state == CANCELING:  # by an earlier cancel
             return Outcome("accepted", say("goal_canceling"))
@@ -155,23 +155,23 @@ class GoalTracker:
             goal.cut.set_result("")  # its end is asked for again
         return Outcome("rejected", say("cancel_refused", time=now))
 
-    def hear_feedback(self, action: str, sample: Sample) -> None:
+    def on_feedback(self, action: str, sample: Sample) -> None:
         """The latest feedback of an action; of another program's goal it is passed over. Whoever
         calls this shows it when a frame is due."""
-        for goal in self._of(action):
+        for goal in self._latest_goals(action):
             if self._robot.command_status[goal.widget.id].can_cancel:
                 topic = self._feedback_of(goal.widget)
                 topic.update(sample)
-                self._hear(goal, topic.reading())
+                self._apply_reading(goal, topic.reading())
 
-    def _hear(self, goal: Goal, reading: Reading) -> None:
+    def _apply_reading(self, goal: Goal, reading: Reading) -> None:
         fields = reading.fields
         if reading.status == "message" and fields and bytes(fields.get(GOAL_ID)) == goal.id.bytes:
-            self._take_feedback(goal, fields)
+            self._apply_feedback(goal, fields)
 
-    def _hear_later(self, widget: str, reading: Reading) -> None:
+    def _apply_late_reading(self, widget: str, reading: Reading) -> None:
         if (goal := self._latest.get(widget)) and self._robot.command_status[widget].can_cancel:
-            self._hear(goal, reading)
+            self._apply_reading(goal, reading)
             self._changed()
 
     def _feedback_of(self, widget: Action) -> Topic:
@@ -183,31 +183,31 @@ class GoalTracker:
                 self._interfaces.field_reader(message, [GOAL_ID, *(FEEDBACK + path for path in shown)]),
                 self._robot.slices,
                 watched=False,
-                unreadable=partial(
+                on_unreadable=partial(
                     self._robot.count_unreadable,
                     names.feedback(self._robot.key(widget.action)),
                 ),
-                read_later=partial(self._hear_later, widget.id),
+                on_late_reading=partial(self._apply_late_reading, widget.id),
             )
         return self._feedback[widget.id]
 
-    def hear_status(self, action: str, sample: Sample) -> None:
+    def on_status(self, action: str, sample: Sample) -> None:
         """The states of an action's goals; those of other programs are passed over, and kept for a goal
         of before the server's start that is not known yet: the robot says nothing twice."""
         self._states[action] = sample
-        goals = {goal.id.bytes: goal for goal in self._of(action)}
+        goals = {goal.id.bytes: goal for goal in self._latest_goals(action)}
         if not goals:
             return
-        message = self._heard(names.status(self._robot.key(action)), STATUS, sample)
+        message = self._decode(names.status(self._robot.key(action)), STATUS, sample)
         for one in () if message is None else message.status_list:
             goal = goals.get(bytes(one.goal_info.goal_id.uuid))
             if goal is not None and goal.advance(one.status):
                 self._advanced(goal)
 
-    def _of(self, action: str) -> Iterator[Goal]:
+    def _latest_goals(self, action: str) -> Iterator[Goal]:
         return (goal for goal in self._latest.values() if goal.widget.action == action)
 
-    def _heard(self, key: str, type_name: str, sample: Sample) -> Any:
+    def _decode(self, key: str, type_name: str, sample: Sample) -> Any:
         """A sample's message; None where it can't be read."""
         try:
             return self._interfaces.decode(type_name, bytes(sample.payload))
@@ -220,45 +220,45 @@ class GoalTracker:
         cut, that will show."""
         if goal.cut.done() or goal not in self._results.goals:
             return
-        if goal.lives:
-            self._find(goal)
-            self._show(goal, goal.under_way)
+        if goal.is_running:
+            self._confirm_running(goal)
+            self._show(goal, goal.running_status)
         elif goal.doubt:
-            self._show(goal, goal.in_doubt)
+            self._show(goal, goal.doubt_status)
 
-    def _find(self, goal: Goal) -> None:
+    def _confirm_running(self, goal: Goal) -> None:
         """It is under way; where that was not known, it is told."""
         if goal.doubt or not self._robot.command_status[goal.widget.id].busy:
             goal.doubt = ""
             answer = Outcome("accepted", say("goal_found", time=format_time(time.time())))
             goal.corrected(goal.press_id, answer)
 
-    def _take_feedback(self, goal: Goal, message: Fields) -> None:
-        goal.hear(message)
+    def _apply_feedback(self, goal: Goal, message: Fields) -> None:
+        goal.apply_feedback(message)
         if goal.doubt and goal.advance(EXECUTING):
             self._advanced(goal)
-        self._note(goal, goal.under_way)  # shown with the next frame: a goal may say a lot
+        self._set_status(goal, goal.running_status)  # shown with the next frame: a goal may say a lot
 
-    def _doubt(self, goal: Goal, why: TextLike) -> None:
+    def _cut_off(self, goal: Goal, why: TextLike) -> None:
         """It was cut off: the robot may be at it, and until that is known no other is sent."""
         self._show_doubt(goal, why)
         goal.corrected(goal.press_id, Outcome("unknown", why))
 
     def _show_doubt(self, goal: Goal, why: TextLike) -> None:
         goal.doubt = why
-        self._show(goal, goal.in_doubt)
+        self._show(goal, goal.doubt_status)
 
-    def _tell(self, goal: Goal, answer: Outcome) -> None:
+    def _finish(self, goal: Goal, answer: Outcome) -> None:
         """The result, or that it is not known any more: to the widget and the receipt."""
         goal.doubt = ""
-        self._show(goal, goal.came_to(answer))
+        self._show(goal, goal.end_status(answer))
         goal.corrected(goal.press_id, answer)
 
     def _show(self, goal: Goal, progress: CommandStatus) -> None:
-        if self._note(goal, progress):
+        if self._set_status(goal, progress):
             self._changed()
 
-    def _note(self, goal: Goal, progress: CommandStatus) -> bool:
+    def _set_status(self, goal: Goal, progress: CommandStatus) -> bool:
         """What its widget will show; False where that shows another goal by now."""
         latest = self._latest.get(goal.widget.id) is goal
         if latest:

@@ -27,11 +27,11 @@ from app.ros_logging import RobotLog
 
 log = logging.getLogger("kiosk.actions")
 
-LOOKED_BACK_S: Final = 86_400.0
+LOOK_BACK_S: Final = 86_400.0
 # Of a goal that the robot does not know: it is not asked for again. Logs of versions that wrote no
 # codes have only the sentences of then.
 FINAL: Final = frozenset({"goal_lost", "goal_not_there"})
-FINAL_ONCE: Final = frozenset(
+FINAL_SENTENCES: Final = frozenset(
     {
         "The robot no longer knows this goal: what came of it is not known.",
         "The robot does not know this goal: it did not get it, or knows it no longer.",
@@ -61,7 +61,7 @@ class GoalRecovery:
         self._actions = actions
         self._changed = changed
         self._read_again_s = read_again_s
-        self._unread = IDLE  # what is shown while the log can't be read
+        self._unreadable_status = IDLE  # what is shown while the log can't be read
         self._reading: asyncio.Task[None] | None = None
 
     async def start(self) -> None:
@@ -82,27 +82,29 @@ class GoalRecovery:
             read = await self._read()
 
     async def _read(self) -> bool:
-        since = round((time.time() - LOOKED_BACK_S) * 1000)
+        since = round((time.time() - LOOK_BACK_S) * 1000)
         try:
             found = await self._press_log.open_presses(self._widgets, since)
         except LogError as error:
-            self._say_unread(error.text)
+            self._show_unreadable(error.text)
             return False
         self._show(IDLE)
         for open_press, pending in found:
-            if open_press.code not in FINAL and open_press.reason not in FINAL_ONCE:
+            if open_press.code not in FINAL and open_press.reason not in FINAL_SENTENCES:
                 self._resume(open_press, pending)
         return True
 
-    def _say_unread(self, why: TextLike) -> None:
+    def _show_unreadable(self, why: TextLike) -> None:
         text = say("goals_unread", why=why)
-        if text != self._unread.text:
+        if text != self._unreadable_status.text:
             self._log.warning("%s", text)
-        self._show(CommandStatus(busy=not self._press_log.unneeded, outcome="unknown", text=text))
+        self._show(
+            CommandStatus(busy=not self._press_log.is_optional_and_down, outcome="unknown", text=text)
+        )
 
     def _show(self, progress: CommandStatus) -> None:
         """Where nothing else is shown."""
-        before, self._unread = self._unread, progress
+        before, self._unreadable_status = self._unreadable_status, progress
         if before == progress:
             return
         for widget in self._widgets:
@@ -117,7 +119,7 @@ class GoalRecovery:
             return
 
         def corrected(press_id: str, answer: Outcome) -> None:
-            pending.corrected(answer)
+            pending.correct(answer)
 
         cut = asyncio.get_running_loop().create_future()
         cut.set_result("")  # until its server is offered

@@ -42,8 +42,8 @@ class ResultWaiter:
         self._robot = robot
         self._log = RobotLog(log, robot.name)
         self._cut = cut
-        self._back = back
-        self._tell = tell
+        self._restored = back
+        self._finished = tell
         self._goals: dict[asyncio.Task[None], Goal] = {}
 
     @property
@@ -52,7 +52,7 @@ class ResultWaiter:
 
     def begin(self, goal: Goal) -> None:
         """Follows a goal from now on."""
-        task = spawn_logged(self._follow(goal), self._log, "following a goal failed")
+        task = spawn_logged(self._track(goal), self._log, "following a goal failed")
         self._goals[task] = goal
         task.add_done_callback(self._ended)
 
@@ -67,17 +67,17 @@ class ResultWaiter:
         goal = self._goals.pop(task)
         if not task.cancelled() and task.exception():
             goal.state = UNKNOWN
-            self._tell(goal, Outcome("unknown", say("goal_fault")))
+            self._finished(goal, Outcome("unknown", say("goal_fault")))
 
-    async def _follow(self, goal: Goal) -> None:
+    async def _track(self, goal: Goal) -> None:
         while True:
             if goal.cut.done():
-                if goal.lives and not goal.doubt:
+                if goal.is_running and not goal.doubt:
                     goal.state = UNKNOWN
                     self._cut(goal, goal.cut.result() or say("goal_cut"))
                 await self._until_offered(goal)
                 goal.cut = asyncio.get_running_loop().create_future()
-                self._back(goal)
+                self._restored(goal)
             if answer := await self._end(goal):
                 break
             if not (goal.known or goal.cut.done()):
@@ -87,12 +87,12 @@ class ResultWaiter:
                 break
             await asyncio.wait({goal.cut}, timeout=ASK_AGAIN_S)
         self._log.info("press %s: goal %s: %s: %s", goal.press_id, goal.id, answer.outcome, answer.text)
-        self._tell(goal, answer)
+        self._finished(goal, answer)
 
     async def _until_offered(self, goal: Goal) -> None:
         key = self._robot.key(goal.widget.action)
         while not (
-            self._services.offered(goal.widget)
+            self._services.is_offered(goal.widget)
             and time.monotonic() >= self._robot.graph.served_since("AS", key) + SERVER_SETTLE_S
         ):
             await asyncio.sleep(ASK_AGAIN_S)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Final
 
 LEASE_S: Final = 0.25  # from the sending of a heartbeat to the end, if no newer one comes
-AHEAD_S: Final = 0.02  # by so much two clocks may differ over the life of one stamp
+MAX_AHEAD_S: Final = 0.02  # by so much two clocks may differ over the life of one stamp
 STALLED_S: Final = 0.1  # who comes so late to see a lease's end has stood still
 
 
@@ -21,7 +21,7 @@ def sent_at(opened_at: float, stamp_ms: float, after_ms: float, now: float) -> f
     how long it had it when it sent this.
     """
     sent = opened_at + (stamp_ms + after_ms) / 1000
-    return min(sent, now) if sent <= now + AHEAD_S else -math.inf
+    return min(sent, now) if sent <= now + MAX_AHEAD_S else -math.inf
 
 
 @dataclass(slots=True)
@@ -39,7 +39,7 @@ class Lease:
     def begun(cls, lease_id: str, period_s: float, sent: float, now: float) -> "Lease":
         return cls(lease_id, period_s, now, sent + LEASE_S, now)
 
-    def over(self, now: float) -> str:
+    def end_code(self, now: float) -> str:
         """The code of why it is over; "" while it is not."""
         if now < self.until:
             return ""
@@ -48,16 +48,16 @@ class Lease:
     def beat(self, number: int, sent: float, now: float) -> bool:
         """A heartbeat, sent at `sent`; whether the lease goes on. One that is late or was there
         already prolongs nothing, and none revives a lease that is over."""
-        if self.over(now):
+        if self.end_code(now):
             return False
         if number > self.last:
             self.last = number
             self.until = max(self.until, sent + LEASE_S)
         return True
 
-    def due(self, now: float) -> bool:
+    def take_due(self, now: float) -> bool:
         """Whether a message is due; those that were missed are passed over."""
-        if self.over(now) or now < self.next_at:
+        if self.end_code(now) or now < self.next_at:
             return False
         self.next_at += self.period_s
         if self.next_at <= now:

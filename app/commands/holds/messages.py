@@ -44,10 +44,10 @@ class HoldMessages:
             self._interfaces.encode(widget.type, fill_own_fields(widget, fields, 0, 0))
         return values
 
-    def put(self, widget: Hold, values: Values, look: FinalCheck) -> None:
+    def put(self, widget: Hold, values: Values, final_check: FinalCheck) -> None:
         """One message more; LinkError where it could not be sent, PressRefused where the last look
         finds that it may not be."""
-        self._put(widget, widget.message, values, widget.deadline_ms, look)
+        self._put(widget, widget.message, values, widget.deadline_ms, final_check)
 
     def put_last(self, widget: Hold, values: Values, now: float) -> TextLike:
         """The message that ends it, if there is any way now, be it in doubt: one stop too many harms
@@ -66,7 +66,7 @@ class HoldMessages:
         template: Mapping[str, Any],
         values: Values,
         deadline_ms: int,
-        look: FinalCheck,
+        final_check: FinalCheck,
     ) -> None:
         count = self._counts.get(widget.id, 0) + 1
         if widget.counter_field is not None:
@@ -75,6 +75,6 @@ class HoldMessages:
         fields = fill(template, add_now(values))
         whole = fill_own_fields(widget, fields, deadline_ms, count)
         payload = self._interfaces.encode(widget.type, whole)
-        look()
+        final_check()
         self._transport.put(self._robot.key(widget.topic), payload)
         self._counts[widget.id] = count

@@ -12,12 +12,12 @@ from app.commands.holds.lease import Lease
 from app.commands.holds.messages import Values
 from app.commands.press_context import PressContext
 from app.commands.receipts import (
-    LONGEST_LOGGED,
+    MAX_LOGGED_CHARS,
+    PressRecorder,
     Receipt,
-    Witness,
-    named,
+    origin_text,
+    outcome_text,
     receipt_of,
-    untyped,
 )
 from app.errors import Cause
 from app.i18n import Text, TextLike, joined, say
@@ -37,10 +37,10 @@ class ActiveHold:
 
     widget: Hold
     lease: Lease
-    by: PressContext
+    context: PressContext
     inputs: Mapping[str, Any]
     values: Values
-    told: Callable[[Receipt], None]
+    on_end: Callable[[Receipt], None]
     since: Text
     sent: int = 0
 
@@ -63,20 +63,20 @@ def refused(widget: Hold, inputs: Mapping[str, Any], refusal: Refusal, hold_id: 
 class HoldReceipts:
     """Those of one robot."""
 
-    def __init__(self, robot: str, witness: Witness | None) -> None:
+    def __init__(self, robot: str, recorder: PressRecorder | None) -> None:
         self._log = RobotLog(log, robot)
-        self._witness = witness
+        self._recorder = recorder
 
-    def began(self, holding: ActiveHold) -> None:
-        widget, lease, by = holding.widget, holding.lease, holding.by
-        if self._witness is not None:
-            self._witness.pressed(lease.id, widget.id, named(by.origin), holding.inputs)
-        who = named(by.origin)
+    def record_begin(self, holding: ActiveHold) -> None:
+        widget, lease, by = holding.widget, holding.lease, holding.context
+        if self._recorder is not None:
+            self._recorder.record_press(lease.id, widget.id, origin_text(by.origin), holding.inputs)
+        who = origin_text(by.origin)
         extra = rosout_extra(f"hold {lease.id} of {widget.id} by {who} begins")
         self._log.info("hold %s of %s by %s with %.*s begins", lease.id, widget.id, who,
-                LONGEST_LOGGED, holding.inputs, extra=extra)  # fmt: skip
+                MAX_LOGGED_CHARS, holding.inputs, extra=extra)  # fmt: skip
 
-    def ended(
+    def record_end(
         self, holding: ActiveHold, seconds: float, code: str, why: TextLike, unsaid: TextLike
     ) -> Receipt:
         """`code` and `why` it ended after so many seconds; `unsaid` is why its last message was not
@@ -88,11 +88,11 @@ class HoldReceipts:
         outcome: OutcomeCode = "unknown" if unsaid else "published" if code == RELEASED else "aborted"
         level = logging.INFO if outcome == "published" else logging.WARNING
         self._log.log(level, "hold %s of %s by %s ended after %.3f s and %d messages (%s): %s",
-                lease.id, widget.id, named(holding.by.origin), seconds, holding.sent,
+                lease.id, widget.id, origin_text(holding.context.origin), seconds, holding.sent,
                 code, text)  # fmt: skip
-        return self._answered(receipt_of(widget, holding.inputs, lease.id, Outcome(outcome, text)))
+        return self._recorded(receipt_of(widget, holding.inputs, lease.id, Outcome(outcome, text)))
 
-    def refused(
+    def record_refusal(
         self,
         widget: Hold,
         inputs: Mapping[str, Any],
@@ -102,22 +102,24 @@ class HoldReceipts:
     ) -> Receipt:
         """The same as the function, and told."""
         receipt = refused(widget, inputs, refusal, hold_id)
-        who = named(context.origin)
-        extra = rosout_extra(f"hold of {widget.id} by {who}: {untyped(widget, receipt)}")
+        who = origin_text(context.origin)
+        extra = rosout_extra(f"hold of {widget.id} by {who}: {outcome_text(widget, receipt)}")
         self._log.warning("hold of %s by %s with %.*s: %s", widget.id, who,
-                LONGEST_LOGGED, receipt.inputs, receipt.reason, extra=extra)  # fmt: skip
-        if self._witness is not None:
-            self._witness.pressed(receipt.id, widget.id, named(context.origin), receipt.inputs)
-        return self._answered(receipt)
+                MAX_LOGGED_CHARS, receipt.inputs, receipt.reason, extra=extra)  # fmt: skip
+        if self._recorder is not None:
+            self._recorder.record_press(
+                receipt.id, widget.id, origin_text(context.origin), receipt.inputs
+            )
+        return self._recorded(receipt)
 
-    def doubted(self, receipt: Receipt) -> Receipt:
+    def unconfirmed(self, receipt: Receipt) -> Receipt:
         """The receipt of a hold whose last message is not known to have reached the bridge."""
-        doubt = say("hold_unanswered")
-        self._log.warning("hold %s of %s: %s", receipt.id, receipt.widget, doubt)
-        reason = joined([receipt.reason, doubt])
-        return self._answered(replace(receipt, outcome="unknown", reason=reason))
+        unconfirmed = say("hold_unanswered")
+        self._log.warning("hold %s of %s: %s", receipt.id, receipt.widget, unconfirmed)
+        reason = joined([receipt.reason, unconfirmed])
+        return self._recorded(replace(receipt, outcome="unknown", reason=reason))
 
-    def _answered(self, receipt: Receipt) -> Receipt:
-        if self._witness is not None:
-            self._witness.answered(receipt)
+    def _recorded(self, receipt: Receipt) -> Receipt:
+        if self._recorder is not None:
+            self._recorder.record_receipt(receipt)
         return receipt

@@ -5,7 +5,7 @@ from collections.abc import Awaitable, Callable, Sequence
 from functools import partial
 from typing import Any, Final
 
-from app.commands.service_calls import Asker
+from app.commands.service_calls import QueryClient
 from app.errors import LinkError
 from app.interfaces import Interfaces
 from app.panel.widgets.parameter import DESCRIBE, GET
@@ -15,7 +15,7 @@ ANSWER_S: Final = 5.0  # within which a node has to tell its parameters
 LATE_S: Final = 5.0  # how long after that nothing more is asked: it may only be slow
 
 
-class NoAnswer(Exception):
+class NoResponse(Exception):
     """Nothing came in time; what comes late does not count. `dropped`: the question never got there."""
 
     def __init__(self, why: str, *, dropped: bool) -> None:
@@ -26,7 +26,7 @@ class NoAnswer(Exception):
 class ParameterClient:
     """The services of one robot's nodes; one question of a caller's at a time."""
 
-    def __init__(self, interfaces: Interfaces, robot: RobotState, link: Asker) -> None:
+    def __init__(self, interfaces: Interfaces, robot: RobotState, link: QueryClient) -> None:
         self._interfaces = interfaces
         self._robot = robot
         self._link = link
@@ -39,11 +39,11 @@ class ParameterClient:
         NoAnswer when it does not answer in time, which `silent` tells at once; DecodeError for what
         is no answer.
         """
-        ask = partial(self._ask, node, silent)
+        ask = partial(self._request, node, silent)
         descriptors = await _each(partial(ask, DESCRIBE, "descriptors"), names)
         return descriptors, await _each(partial(ask, GET, "values"), names)
 
-    async def _ask(
+    async def _request(
         self,
         node: str,
         silent: Callable[[], None],
@@ -58,7 +58,7 @@ class ParameterClient:
             query = self._link.query(key, payload, ANSWER_S + LATE_S)
         except LinkError as error:
             silent()
-            raise NoAnswer(str(error), dropped=True) from error
+            raise NoResponse(str(error), dropped=True) from error
         await asyncio.wait({query}, timeout=ANSWER_S)
         in_time = query.done()
         if not in_time:
@@ -66,7 +66,7 @@ class ParameterClient:
         reply = await query
         if reply is None or not in_time:
             silent()
-            raise NoAnswer(f"{key} did not answer", dropped=in_time)
+            raise NoResponse(f"{key} did not answer", dropped=in_time)
         answer: list[Any] = getattr(self._interfaces.decode(response, reply), part)
         return answer
 

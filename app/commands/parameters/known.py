@@ -17,43 +17,41 @@ class KnownParameters:
         self._robot = robot
         self._log = log
 
-    def of(self, widget: Parameter) -> ParameterState:
+    def state(self, widget: Parameter) -> ParameterState:
         return self._robot.parameters.get(widget.id, UNKNOWN)
 
-    def learn(self, widget: Parameter, state: ParameterState) -> None:
-        if state.state == "undeclared" and self.of(widget).state != "undeclared":
+    def set(self, widget: Parameter, state: ParameterState) -> None:
+        if state.state == "undeclared" and self.state(widget).state != "undeclared":
             self._log.warning("%s has no parameter %s", widget.node, widget.parameter)
         self._robot.parameters[widget.id] = state
 
-    def told(self, widget: Parameter, value: Any, wall: float) -> bool:
+    def apply_event(self, widget: Parameter, value: Any, wall: float) -> bool:
         """An event of its node says that it has this value (a ParameterValue) now, at `wall` (seconds
         since the epoch). False where that says too little: the node is to be asked."""
-        known = self.of(widget)
+        known = self.state(widget)
         if known.state not in ("live", "missing"):
             return False
         if type_name(value.type) != widget.type:
-            self.learn(widget, ParameterState("mistyped", robot_type=type_name(value.type), wall=wall))
+            self.set(widget, ParameterState("mistyped", robot_type=type_name(value.type), wall=wall))
         else:
-            self.learn(
-                widget, replace(known, state="live", value=decode_value(widget, value), wall=wall)
-            )
+            self.set(widget, replace(known, state="live", value=decode_value(widget, value), wall=wall))
         return True
 
-    def unreadable(self, widgets: Iterable[Parameter], wall: float) -> None:
+    def mark_unreadable(self, widgets: Iterable[Parameter], wall: float) -> None:
         """Their node's answer can't be read."""
         for widget in widgets:
-            self.learn(widget, ParameterState("unreadable", wall=wall))
+            self.set(widget, ParameterState("unreadable", wall=wall))
 
-    def silent(self, node: str, widgets: Collection[Parameter]) -> None:
+    def mark_silent(self, node: str, widgets: Collection[Parameter]) -> None:
         """Their node does not answer."""
-        if any(self.of(widget).state != "silent" for widget in widgets):
+        if any(self.state(widget).state != "silent" for widget in widgets):
             self._log.warning("%s does not answer when it is asked for its parameters", node)
         for widget in widgets:
-            self.learn(widget, replace(self.of(widget), state="silent"))
+            self.set(widget, replace(self.state(widget), state="silent"))
 
-    def cut(self, widgets: Iterable[Parameter]) -> None:
+    def mark_cut(self, widgets: Iterable[Parameter]) -> None:
         """Their node is gone: what it told is from before."""
         for widget in widgets:
-            known = self.of(widget)
+            known = self.state(widget)
             cut = replace(known, state="cut") if known.value is not None else UNKNOWN
             self._robot.parameters[widget.id] = cut

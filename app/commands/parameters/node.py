@@ -18,21 +18,21 @@ class Node:
 
     name: str
     widgets: list[Parameter] = field(default_factory=list)
-    wanted: asyncio.Event = field(default_factory=asyncio.Event)
-    urgent: asyncio.Event = field(default_factory=asyncio.Event)
-    heard: dict[str, Any] = field(default_factory=dict)
-    told_at: float = -math.inf
+    query_needed: asyncio.Event = field(default_factory=asyncio.Event)
+    query_now: asyncio.Event = field(default_factory=asyncio.Event)
+    event_values: dict[str, Any] = field(default_factory=dict)
+    answered_at: float = -math.inf
     task: "asyncio.Task[None] | None" = None
 
-    def ask_now(self) -> None:
-        self.wanted.set()
-        self.urgent.set()
+    def request_query(self) -> None:
+        self.query_needed.set()
+        self.query_now.set()
 
-    def asked(self) -> None:
+    def begin_query(self) -> None:
         """It is asked now: what was wanted until here is done by that."""
-        self.wanted.clear()
-        self.urgent.clear()
-        self.heard.clear()
+        self.query_needed.clear()
+        self.query_now.clear()
+        self.event_values.clear()
 
 
 async def within(event: asyncio.Event, longest_s: float | None) -> None:

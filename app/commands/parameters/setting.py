@@ -5,7 +5,7 @@ from functools import partial
 from typing import Final
 
 from app.clock import format_time
-from app.commands.service_calls import LONGEST_SAID, Request, with_reply
+from app.commands.service_calls import MAX_VALUE_CHARS, Request, with_reply
 from app.i18n import say
 from app.interfaces import Fields, Interfaces, plain_text
 from app.panel.widgets.parameter import SET, Parameter, Value
@@ -33,5 +33,5 @@ def _answer(widget: Parameter, value: Value, response: Fields) -> Outcome:
         return Outcome("unknown", say("answer_unreadable", wanted=SET[1]))
     if successful:
         return Outcome("succeeded", say("parameter_set", value=widget.value_text(value), time=now))
-    said = printable(plain_text(reason, LONGEST_SAID)) if reason else ""
+    said = printable(plain_text(reason, MAX_VALUE_CHARS)) if reason else ""
     return Outcome("rejected", with_reply(say("said_no", time=now), said))

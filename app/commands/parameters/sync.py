@@ -13,12 +13,12 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, Final, Literal
 
-from app.commands.parameters.client import NoAnswer, ParameterClient
+from app.commands.parameters.client import NoResponse, ParameterClient
 from app.commands.parameters.known import KnownParameters
 from app.commands.parameters.node import Node, within
 from app.commands.parameters.setting import set_request
-from app.commands.parameters.values import checked
-from app.commands.service_calls import Asker, ServiceCalls
+from app.commands.parameters.values import check_value
+from app.commands.service_calls import QueryClient, ServiceCalls
 from app.concurrency import spawn_logged
 from app.dialect.endpoint import Endpoint
 from app.errors import DecodeError
@@ -51,7 +51,7 @@ class ParameterSync:
         panel: Panel,
         interfaces: Interfaces,
         robot: RobotState,
-        link: Asker,
+        link: QueryClient,
         calls: ServiceCalls,
         changed: Callable[[], None],
     ) -> None:
@@ -75,7 +75,7 @@ class ParameterSync:
 
     # What the graph shows.
 
-    def lose(self, endpoint: Endpoint) -> None:
+    def on_token_lost(self, endpoint: Endpoint) -> None:
         """An endpoint's token ended, be it for a moment: its node may be another one now."""
         if endpoint.role is None:
             for node in self._nodes.values():
@@ -83,14 +83,14 @@ class ParameterSync:
         elif endpoint.role == "SS" and (lost := self._served_by.get(endpoint.key)):
             self._cut(lost)
 
-    def follow(self) -> None:
+    def on_graph_change(self) -> None:
         """After every change of the graph: asks the nodes that are there now."""
         for node in self._nodes.values():
             offered = parameters_offered(node.name, self._robot) is None
             if not (offered and self._robot.graph.bridges):
                 self._cut(node)
             elif node.task is None:
-                node.task = spawn_logged(self._follow_node(node), self._log, FAILED)
+                node.task = spawn_logged(self._keep_updated(node), self._log, FAILED)
 
     async def stop(self) -> None:
         """Ends its tasks."""
@@ -104,61 +104,61 @@ class ParameterSync:
             return
         node.task.cancel()
         node.task = None
-        self._end_asking(node)
-        self._known.cut(node.widgets)
+        self._end_query(node)
+        self._known.mark_cut(node.widgets)
 
     # What the node tells.
 
-    def hear(self, sample: Sample) -> None:
+    def on_event(self, sample: Sample) -> None:
         """An event of some node's: takes the values that changed; what it may hide is asked for."""
         passed_on = sample.source is None or sample.source in self._robot.graph.bridges
         if not (self._nodes and passed_on):
             return
         if sample.skipped:
-            self._missed()
+            self._query_all()
         try:
             event = self._interfaces.decode(EVENT_TYPE, bytes(sample.payload))
         except DecodeError as error:
             self._log.debug("%s", error)
-            self._missed()
+            self._query_all()
             return
         if (teller := self._nodes.get(event.node)) and teller.task is not None:
-            self._take_event(teller, event, sample.wall)
+            self._apply_event(teller, event, sample.wall)
 
-    def _missed(self) -> None:
+    def _query_all(self) -> None:
         """Whatever an event said that no one read: its node may be any."""
         for node in self._nodes.values():
-            node.wanted.set()
+            node.query_needed.set()
 
-    def _take_event(self, node: Node, event: Any, wall: float) -> None:
+    def _apply_event(self, node: Node, event: Any, wall: float) -> None:
         redeclared = {one.name for one in (*event.new_parameters, *event.deleted_parameters)}
         changed = {one.name: one.value for one in event.changed_parameters}
-        node.heard |= {
+        node.event_values |= {
             w.parameter: changed[w.parameter] for w in node.widgets if w.parameter in changed
         }
         for widget in node.widgets:
             name = widget.parameter
             if name in redeclared or (
-                name in changed and not self._known.told(widget, changed[name], wall)
+                name in changed and not self._known.apply_event(widget, changed[name], wall)
             ):
-                node.wanted.set()
+                node.query_needed.set()
 
-    async def _follow_node(self, node: Node) -> None:
+    async def _keep_updated(self, node: Node) -> None:
         """Asks a node, as often as there is need, until it is cut off."""
         confirmed, pause = False, AGAIN_S
         await asyncio.sleep(SETTLE_S)
         while True:
-            node.asked()
+            node.begin_query()
             read = await self._read(node)
-            await within(node.urgent, AGAIN_S)
+            await within(node.query_now, AGAIN_S)
             match read:
                 case "silent":
-                    await node.urgent.wait()
+                    await node.query_now.wait()
                 case "partly":
-                    await within(node.wanted, pause)
+                    await within(node.query_needed, pause)
                     pause = min(2 * pause, AGAIN_MOST_S)
                 case "whole":
-                    await within(node.wanted, None if confirmed else CONFIRM_S)
+                    await within(node.query_needed, None if confirmed else CONFIRM_S)
                     confirmed, pause = True, AGAIN_S
 
     async def _read(self, node: Node) -> Read:
@@ -166,36 +166,36 @@ class ParameterSync:
         self._robot.querying |= {widget.id for widget in node.widgets}
         self._changed()
         try:
-            return await self._answered(node)
+            return await self._query(node)
         finally:
             if node.task is asyncio.current_task():  # else it was cut off, and may be asked again
-                self._end_asking(node)
+                self._end_query(node)
                 self._changed()
 
-    async def _answered(self, node: Node) -> Read:
+    async def _query(self, node: Node) -> Read:
         names = list(dict.fromkeys(widget.parameter for widget in node.widgets))
         try:
             asked = self._services.read(node.name, names, partial(self._silent, node))
             descriptors, values = await asked
-        except NoAnswer as error:
+        except NoResponse as error:
             return "partly" if error.dropped else "silent"
         except DecodeError as error:
             self._log.error("%s: %s", node.name, error)
-            self._known.unreadable(node.widgets, time.time())
+            self._known.mark_unreadable(node.widgets, time.time())
             self._changed()
             return "partly"
-        node.told_at = time.monotonic()
+        node.answered_at = time.monotonic()
         self._calls.mark_answered(f"{node.name}/{SET[0]}")
-        values |= node.heard  # told after it was asked
+        values |= node.event_values  # told after it was asked
         for widget in node.widgets:
             name = widget.parameter
             found = read_parameter_state(widget, descriptors.get(name), values.get(name), time.time())
-            self._known.learn(widget, found)
+            self._known.set(widget, found)
         self._changed()
-        live = all(self._known.of(widget).state == "live" for widget in node.widgets)
+        live = all(self._known.state(widget).state == "live" for widget in node.widgets)
         return "whole" if live else "partly"
 
-    def _end_asking(self, node: Node) -> None:
+    def _end_query(self, node: Node) -> None:
         self._robot.querying -= {widget.id for widget in node.widgets}
 
     def read_again(self, widget: Parameter) -> TextLike:
@@ -204,16 +204,16 @@ class ParameterSync:
         node = self._nodes[widget.node]
         if node.task is None:
             return say("no_parameters", node=widget.node)
-        fresh = time.monotonic() - node.told_at < AGAIN_S
+        fresh = time.monotonic() - node.answered_at < AGAIN_S
         if widget.id not in self._robot.querying and not fresh:
-            node.ask_now()
+            node.request_query()
         return ""
 
     # Setting.
 
-    def checked(self, widget: Parameter, given: Any) -> Value:
+    def check_value(self, widget: Parameter, given: Any) -> Value:
         """The value to set; InputError with a sentence that names label and limits."""
-        return checked(widget, self._known.of(widget), given)
+        return check_value(widget, self._known.state(widget), given)
 
     async def set(
         self,
@@ -221,20 +221,20 @@ class ParameterSync:
         value: Value,
         press_id: str,
         corrected: OnCorrection,
-        look: FinalCheck = no_check,
+        final_check: FinalCheck = no_check,
     ) -> Outcome:
         """Sets a parameter, as a call does; whatever came of it, the node is asked how it is now."""
         request = set_request(self._interfaces, widget, value)
         node = self._nodes[widget.node]
 
         def late(press_id: str, answer: Outcome) -> None:
-            node.ask_now()
+            node.request_query()
             corrected(press_id, answer)
 
-        answer = await self._calls.ask(request, press_id, late, look)
-        node.ask_now()
+        answer = await self._calls.send_request(request, press_id, late, final_check)
+        node.request_query()
         return answer
 
     def _silent(self, node: Node) -> None:
-        self._known.silent(node.name, node.widgets)
+        self._known.mark_silent(node.name, node.widgets)
         self._changed()

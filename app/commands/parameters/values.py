@@ -22,7 +22,7 @@ from app.robot.parameter_state import (
 WHOLE: Final = re.compile(r"\s*[+-]?[0-9]{1,19}\s*", re.ASCII)
 
 
-def checked(parameter: Parameter, known: ParameterState, given: Any) -> Value:
+def check_value(parameter: Parameter, known: ParameterState, given: Any) -> Value:
     """The value to set; InputError names the label and what it may be."""
     if parameter.options:
         given = _chosen(parameter, given)

@@ -196,7 +196,7 @@ class Exported(Response):
         piece = self._first
         while piece and not going.done():
             await _taken(send, {"type": BODY, "body": piece, "more_body": True})
-            piece = await self._export.more()
+            piece = await self._export.read_next()
         await self._opened.aclose()  # who has it whole may ask for the next
         await _taken(send, {"type": BODY, "body": b"", "more_body": False})
 
@@ -204,7 +204,7 @@ class Exported(Response):
         """Until who asked is gone."""
         while (await receive())["type"] != "http.disconnect":
             pass
-        self._export.cut()
+        self._export.kill()
 
 
 async def _taken(send: Send, message: Message) -> None:

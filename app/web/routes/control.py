@@ -7,7 +7,7 @@ from fastapi import APIRouter, Path, Request
 from fastapi.responses import JSONResponse, RedirectResponse, Response
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
 
-from app.commands.control_acts import ACTS, ActReceipt, Asked
+from app.commands.control_acts import ACTS, ActReceipt, ActRequest
 from app.commands.press_context import PRESS_ID
 from app.commands.press_limits import RETRY_AFTER_S
 from app.errors import InputError, NotFound
@@ -114,7 +114,7 @@ async def act(act: Act, request: Request, state: CurrentState, session: CurrentS
     given = await _given(Acting, request)
     # One rendered page has one id for all its buttons, and each button is an act of its own.
     act_id = (f"{given.id}.{act}" if form else given.id) if given.id else secrets.token_hex(8)
-    asked = Asked(act, who, given.to)
+    asked = ActRequest(act, who, given.to)
     if not state.limits.admit(who):
         receipt = session.control_acts.limited(asked, act_id)
     else:

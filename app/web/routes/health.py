@@ -41,7 +41,7 @@ class NotReady(BaseModel):
 )
 async def readyz(request: Request, state: CurrentState) -> Response:
     sessions = state.fleet.sessions
-    ways = await asyncio.gather(*(session.way_asked() for session in sessions))
+    ways = await asyncio.gather(*(session.check_readiness() for session in sessions))
     way = next((way for way in ways if not way.permitted), None)
     if way is None:
         return JSONResponse({"status": "ready"})

@@ -32,8 +32,8 @@ from starlette.types import Message
 from app.audit.press_record import PendingEntry
 from app.commands.holds.lease import sent_at
 from app.commands.holds.receipts import RELEASED, ActiveHold
-from app.commands.press_context import SEEN, PressContext
-from app.commands.receipts import Receipt, with_doubt
+from app.commands.press_context import EVENT_ID, PressContext
+from app.commands.receipts import Receipt, with_log_fault
 from app.errors import InputError, LogError
 from app.i18n import localized, say
 from app.panel.template import needed_inputs
@@ -85,7 +85,7 @@ class Said(BaseModel):
 class Begin(Said):
     do: Literal["begin"]
     inputs: dict[str, JsonValue]
-    seen: Annotated[str, Field(pattern=SEEN)]
+    seen: Annotated[str, Field(pattern=EVENT_ID)]
 
 
 class Beat(Said):
@@ -128,8 +128,8 @@ class _HoldSocket:
         self._who = visitor(socket, state)
         self._language = language_of(socket)
         self._id = secrets.token_hex(8)  # of the hold: in the log, its receipt and its recording
-        self._context = session.press_guard.by(widget, self._who)
-        self._room = session.press_log.room(self._context.origin)
+        self._context = session.press_guard.context_for(widget, self._who)
+        self._room = session.press_log.has_room(self._context.origin)
         self._pending: PendingEntry | None = None
         self._receipt: Receipt | None = None  # of its end, when all of it is known
         self._next: asyncio.Future[Message] | None = None  # what the browser says next
@@ -139,7 +139,7 @@ class _HoldSocket:
         await self._say()
         begun = await self._begun(widget)
         if self._pending is not None:
-            self._pending.judged("permitted" if isinstance(begun, ActiveHold) else begun.cause)
+            self._pending.set_verdict("permitted" if isinstance(begun, ActiveHold) else begun.cause)
         if isinstance(begun, Receipt):
             begun = await self._refused(begun)
             await self._say(state="refused", status=CLOSE[begun.cause] - 4000, **begun.as_json())
@@ -172,7 +172,7 @@ class _HoldSocket:
         sent = self._sent(said)
         inputs = self._session.dispatcher.with_defaults(holds.widget(widget), said.inputs)
         try:
-            by = self._context = self._session.press_guard.by(widget, self._who, said.seen)
+            by = self._context = self._session.press_guard.context_for(widget, self._who, said.seen)
             if not self._room and (left_out := holds.refusal(widget, inputs, sent, by)):
                 return left_out
             still_held = await self._written(widget, inputs, by)
@@ -203,17 +203,17 @@ class _HoldSocket:
         if receipt.cause == "limit":
             return receipt
         if not self._room:
-            self._session.press_log.leave_out(self._context.origin)
+            self._session.press_log.count_unlogged(self._context.origin)
             return receipt
         why = await self._session.press_log.refused(
             receipt.widget, receipt.inputs, receipt.id, self._context.origin, receipt.reason, "hold"
         )
-        return with_doubt(receipt, why)
+        return with_log_fault(receipt, why)
 
     async def _closed(self, receipt: Receipt) -> Receipt:
         """Its end in the operator's log, on the disk before it is answered."""
-        why = await self._pending.closed(receipt.outcome, receipt.reason) if self._pending else ""
-        return with_doubt(receipt, why)
+        why = await self._pending.close(receipt.outcome, receipt.reason) if self._pending else ""
+        return with_log_fault(receipt, why)
 
     async def _listen(self, holding: ActiveHold) -> None:
         """Until the browser closes or says nothing any more: what is late gets its answer too."""
@@ -259,7 +259,7 @@ class _HoldSocket:
         """The end, as soon as it is there, whatever ended it; then the browser may close."""
         receipt = await asyncio.shield(self._ended)
         if receipt.outcome != "unknown" and not await self._session.peer.flushed():
-            receipt = self._session.holds.doubted(receipt)
+            receipt = self._session.holds.unconfirmed(receipt)
         self._receipt = receipt = await self._closed(receipt)
         with suppress(WebSocketDisconnect, RuntimeError):
             await self._say(state="ended", **receipt.as_json())

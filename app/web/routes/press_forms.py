@@ -43,11 +43,11 @@ async def pressed_by_form(
         raise InputError(f'_id: "{page_id:.40}" is not the id of a press')
     press_id = f"{page_id}.{widget}"
     seen, until = inputs.pop("_seen", ""), _until(inputs)
-    typed = session.dispatcher.typed(inputs)
+    typed = session.dispatcher.parse_form(inputs)
     if not state.limits.admit(who):
         receipt = session.presses.early_refusals.limited(widget, typed, press_id, shown=True)
         return RedirectResponse(page_after(session, widget, receipt.id), status_code=303)
-    by = session.press_guard.by(widget, who, seen, until)
+    by = session.press_guard.context_for(widget, who, seen, until)
     if too_soon:
         work = session.presses.early_refusals.too_soon(widget, typed, press_id, before, by.origin)
     else:

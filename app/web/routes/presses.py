@@ -9,7 +9,7 @@ from fastapi.responses import JSONResponse, RedirectResponse, Response
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, JsonValue, WithJsonSchema
 
 from app.audit.press_record import origin_of
-from app.commands.press_context import LONGEST_ID, PRESS_ID, SEEN
+from app.commands.press_context import EVENT_ID, MAX_ID_LENGTH, PRESS_ID
 from app.commands.press_limits import RETRY_AFTER_S
 from app.commands.receipts import Receipt
 from app.errors import InputError
@@ -57,7 +57,7 @@ class Press(BaseModel):
 
     inputs: Annotated[dict[str, JsonValue], WithJsonSchema(INPUTS)]
     id: Annotated[str, Field(pattern=PRESS_ID)] | None = None
-    seen: Annotated[str, Field(pattern=SEEN)] | None = None
+    seen: Annotated[str, Field(pattern=EVENT_ID)] | None = None
     at: AwareDatetime | None = None
 
 
@@ -142,7 +142,7 @@ async def cancel(
         of = form_of(body).get("_press", "")
     elif kind == JSON and body:
         of = as_model(Cancel, json_of(body)).press
-    if state.limits.admit_cancel(who, session.base, widget, of[:LONGEST_ID]):
+    if state.limits.admit_cancel(who, session.base, widget, of[:MAX_ID_LENGTH]):
         receipt = await state.counted(session.presses.cancel(widget, origin_of(who), of))
     else:
         receipt = session.presses.early_refusals.limited(widget, {}, "", "cancel_too_often", shown=form)
@@ -160,7 +160,7 @@ async def pressed(
     if not state.limits.admit(who):
         return session.presses.early_refusals.limited(widget, given.inputs, press_id)
     at = given.at.timestamp() if given.at else None
-    by = session.press_guard.by(widget, who, given.seen or "", at)
+    by = session.press_guard.context_for(widget, who, given.seen or "", at)
     return await state.counted(session.presses.press(widget, given.inputs, press_id, by))
 
 
