@@ -143,7 +143,7 @@ class Presses:
             receipt = await work
         except BaseException as error:
             under_way.receipt.set_exception(error)
-            under_way.receipt.exception()  # marks it as retrieved: there may be no repetition that waits
+            under_way.receipt.exception()  # retrieved: there may be no repetition that waits
             raise
         finally:
             del self._in_flight[press_id]
