@@ -1,4 +1,4 @@
-"""The operator's log: who pressed what, and the result."""
+"""The operator's log, an audit log: each press with its client, and the result."""
 
 from app.audit.audit_log import OperatorLog
 from app.audit.entry import Entry, Origin, new_entry, same_values

@@ -1,10 +1,9 @@
-"""The face of the operator's log to the event loop, and the thread that owns its file.
+"""The operator's log as the event loop uses it. A separate thread owns the file.
 
-`pressed` returns when the entry is committed to the operating system: a process that is killed
-after that has it. `closed` returns when the outcome, and every entry before it, is on the disk
-(fdatasync): so is all that has a receipt, after a power cut too. What comes together is committed
-together, and shares a sync; syncs have a thread of their own, so that no press waits for one of
-another. Neither ever blocks the event loop.
+`pressed` returns when the entry is committed to the operating system: it survives a kill of the
+process. `closed` returns when the result and every earlier entry are on the disk (fdatasync): every
+receipt survives a power cut. Entries that arrive together share a commit and a sync. Syncs have their
+own thread, so that no press waits for the sync of another. Nothing here blocks the event loop.
 """
 
 import asyncio
@@ -31,13 +30,13 @@ from app.i18n import ENGLISH, TextLike, say
 log = logging.getLogger("kiosk.log")
 
 MOST_WAITING: Final = 1000
-PRESSED_WITHIN_S: Final = 2.0  # an entry that takes longer is a press that is not sent
-CLOSED_WITHIN_S: Final = 3.0  # a receipt does not wait longer: it says that it is not on the disk
+PRESSED_WITHIN_S: Final = 2.0  # if the entry takes longer, the press is not sent
+CLOSED_WITHIN_S: Final = 3.0  # then the receipt is sent with a note that it is not on the disk
 ENDED_WITHIN_S: Final = 10.0
 
 
 class OperatorLog:
-    """One log for a whole server, in a folder that is its own; used on the event loop only."""
+    """The log of one server, in its own folder. Used on the event loop only."""
 
     def __init__(self, folder: Path, limits: Limits, mode: str = "live") -> None:
         self.folder = folder
@@ -54,15 +53,15 @@ class OperatorLog:
         )
 
     async def start(self) -> None:
-        """Opens the log; FolderInUse when another server has the folder. What else may be wrong is
-        its `fault`, and tried again."""
-        with suppress(OSError):  # the keeper meets it again, and says it
+        """Opens the log; FolderInUse if another server has the folder. Any other error becomes `fault`,
+        and opening is retried."""
+        with suppress(OSError):  # the writer thread meets the same error and reports it
             await self._folder.hold_soon()
         self._writer.start()
         await self._wait_on_thread(self._writer.tried.wait)
 
     async def stop(self) -> None:
-        """Writes what is waiting, and lets go of the folder."""
+        """Writes the waiting entries and releases the folder."""
         if self._summary_timer is not None:
             self._summary_timer.cancel()
             self._write_summary()
@@ -71,7 +70,7 @@ class OperatorLog:
         self._folder.release()
 
     async def _wait_on_thread(self, wait: Callable[[float], object]) -> None:
-        """Waits on a thread of its own, whatever else the process's threads are busy with."""
+        """Waits on its own thread: the default executor may be busy."""
         thread = ThreadPoolExecutor(1, "operators-log-wait")
         waited = self._loop.run_in_executor(thread, wait, ENDED_WITHIN_S)
         try:
@@ -85,12 +84,12 @@ class OperatorLog:
 
     @property
     def head(self) -> Head | None:
-        """None until it could be opened."""
+        """The newest entry; None until the log is open."""
         return self._writer.head
 
     @property
     def fault(self) -> TextLike:
-        """The sentence that says that the log can't be written; "" while it can."""
+        """The sentence for the operator if the log can't be written, else ""."""
         why = self._fault_reason
         sentence = "log_unwritable" if self._is_required else "log_unwritable_free"
         return say(sentence, why=why) if why else ""
@@ -103,17 +102,17 @@ class OperatorLog:
 
     @property
     def lock(self) -> TextLike:
-        """Why nothing may be pressed; "" while it may."""
+        """Why presses are locked, "" if they are not."""
         return self.fault if self._is_required else ""
 
     @property
     def _is_required(self) -> bool:
-        """Whether nothing is sent that is not logged."""
+        """Whether a press without a log entry is refused."""
         return self._limits.required or self._writer.displaced
 
     @contextmanager
     def notifying(self, changed: Callable[[], None]) -> Iterator[None]:
-        """`changed` is called, on the loop, whenever `fault` has changed."""
+        """Within the block, `changed` is called on the event loop when `fault` has changed."""
         self._listeners.add(changed)
         try:
             yield
@@ -121,10 +120,10 @@ class OperatorLog:
             self._listeners.discard(changed)
 
     async def pressed(self, entry: Entry) -> Entry | None:
-        """Writes the entry of a press that is about to be sent, and returns it as it stands.
+        """Writes the entry of a press before it is sent, and returns it as written.
 
-        Raises LogError when it can't be written and must be; where it need not be, None. Repeated
-        where the log has a press of this id: nothing is written then.
+        LogError if it can't be written and the log is required; None if it is not required. Repeated if
+        the log already has a press with this id: then nothing is written.
         """
         try:
             return await self._write_press(entry)
@@ -134,7 +133,7 @@ class OperatorLog:
             return None
 
     async def closed(self, entry: Entry) -> TextLike:
-        """Writes the result of a press; returns when that is on the disk, or why it is not."""
+        """Writes the result of a press. Returns "" when it is on the disk, else why it is not."""
         if entry.outcome == "refused":
             self._refusals.count(entry)
         try:
@@ -144,22 +143,22 @@ class OperatorLog:
         return ""
 
     def add(self, entry: Entry) -> None:
-        """Writes the result of a press, when no one waits for it."""
+        """Writes the result of a press without waiting."""
         self._add(entry)
 
     def allowed(self, origin: Origin) -> bool:
-        """Whether a refusal may be an entry; where not, it is left out."""
+        """Whether a refusal may have its own entry; if not, it is only counted."""
         return self._refusals.allowed(origin)
 
     def suppress(self, origin: Origin, limited: bool = False) -> None:
-        """Counts a refusal that is no entry, `limited` one that was not even judged; one entry tells of
-        those of a while."""
+        """Counts a refusal without an entry; `limited`: it was over the rate limit. A summary entry is
+        written later."""
         if self._refusals.suppress(origin, limited):
             self._schedule_summary()
 
     @property
     def left_out(self) -> int:
-        """How many refusals are no entries, since the start."""
+        """The number of refusals without an entry since the start."""
         return self._refusals.left_out
 
     def _schedule_summary(self) -> None:
@@ -178,23 +177,24 @@ class OperatorLog:
             self._writer.add(Ticket(entry, self._loop.create_future()), None)
 
     async def rows(self, wanted: Filter, before: int | None, count: int) -> list[Row]:
-        """The newest entries that are wanted before a number; LogError, TooMany."""
+        """The newest `count` entries that match, before the entry number `before`; LogError,
+        TooMany."""
         return await self._readers.rows(wanted, before, count)
 
     def export(
         self, wanted: Filter, before: int | None, gzip: bool, language: str = ENGLISH
     ) -> AbstractAsyncContextManager[ReaderProcess]:
-        """All that is wanted before a number, as CSV in a language, while this lasts; LogError,
+        """All entries that match before the entry number `before`, as CSV in a language; LogError,
         TooMany."""
         return self._readers.export(wanted, before, gzip, language)
 
     def close(self) -> None:
-        """The server is about to end: it waits for no one who reads."""
+        """Ends searches and exports at shutdown."""
         self._readers.close()
 
     async def open_presses(self, robot: str, widgets: Collection[str], since: int) -> list[OpenPress]:
-        """Presses of these widgets, not before `since` (ms), of which the end is not known, the newest
-        first; LogError when that can't be read, or what was cut off is not closed yet."""
+        """Presses of these widgets since `since` (ms) without a known end, the newest first; LogError
+        if the log can't be read or is not open yet."""
         if self.head is None:
             raise LogError(say("log_unreadable", why=self._fault_reason or say("log_closed")))
         return await self._readers.open_presses(robot, widgets, since)
@@ -225,26 +225,26 @@ class OperatorLog:
         raise ticket.result
 
     def _close_abandoned(self, ticket: Ticket) -> None:
-        """A press that no one waits for any more may have been written all the same."""
+        """Closes a press that was written after its waiting had ended."""
         if isinstance(ticket.result, Entry):
             self._add(ticket.result.follow_up("closed", "refused", say("log_abandoned")))
 
     def _add(self, entry: Entry) -> Ticket:
-        """Hands it to the keeper. Only what starts a press is turned away when too much waits: what
-        came of it is bounded by the presses that there are."""
+        """Queues an entry for the writer thread. If the queue is full, only new presses are rejected:
+        the number of their results is limited by the number of presses."""
         ticket = Ticket(entry, self._loop.create_future())
         if not self._writer.add(ticket, MOST_WAITING if entry.of is None else None):
             raise LogError(say("log_full_queue"))
         return ticket
 
     def _post_results(self, results: Results, changed: bool) -> None:
-        """On the keeper's threads; wakes the loop only where there is something to tell."""
+        """Runs on the writer and sync threads; wakes the event loop if there are results."""
         if not (results or changed):
             return
         try:
             self._loop.call_soon_threadsafe(self._deliver_results, results, changed)
         except RuntimeError:  # the loop is closed: the process ends
-            log.debug("nobody is told of %d entries", len(results))
+            log.debug("the results of %d entries are not delivered", len(results))
 
     def _deliver_results(self, results: Results, changed: bool) -> None:
         for ticket, result in results:

@@ -1,6 +1,6 @@
-"""The data folder, and the lock by which one server at a time has it.
+"""The data folder, locked by one server at a time.
 
-The lock is flock's: the system lets go of it when the process ends, however it ends.
+The lock is an flock: the system releases it when the process ends, for any reason.
 """
 
 import asyncio
@@ -18,12 +18,12 @@ from app.errors import FolderInUse
 from app.i18n import say
 
 LOCK: Final = "server.lock"
-HELD_BY_OTHER_S: Final = 5.0  # a server that is started again waits so long for the old one's lock
+HELD_BY_OTHER_S: Final = 5.0  # a restarted server waits this long for the lock of the old one
 RETRY_S: Final = 0.1
 
 
 class DataDir:
-    """A folder for databases, readable by its user alone; `hold` it before anything is written."""
+    """A folder for databases, readable by its user only. Call `hold` before anything is written."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -31,7 +31,8 @@ class DataDir:
         self._fd: int | None = None
 
     def hold(self) -> None:
-        """Makes and locks the folder; FolderInUse says who has it, OSError that it can't be made."""
+        """Creates and locks the folder; FolderInUse names the process that has it, OSError if it can't
+        be created."""
         if self._fd is not None and self._lock_is_in_place(self._fd):
             return
         self.path.parent.mkdir(parents=True, exist_ok=True)
@@ -51,7 +52,7 @@ class DataDir:
         self._write_holder(self._fd)
 
     def check(self) -> None:
-        """FolderInUse where its lock was removed, renamed or replaced: another server may have it."""
+        """FolderInUse if the lock file was removed, renamed or replaced: another server may have it."""
         if self._fd is not None and not self._lock_is_in_place(self._fd):
             raise FolderInUse(say("log_taken", name=LOCK))
 
@@ -62,7 +63,7 @@ class DataDir:
             return False
 
     async def hold_soon(self) -> None:
-        """The same, but waits a while for another server to end."""
+        """Like `hold`, but waits up to `HELD_BY_OTHER_S` for another server to end."""
         loop = asyncio.get_running_loop()
         end = loop.time() + HELD_BY_OTHER_S
         while True:
@@ -74,7 +75,7 @@ class DataDir:
             await asyncio.sleep(RETRY_S)
 
     def release(self) -> None:
-        """Lets others have it; the file stays."""
+        """Releases the lock; the lock file stays."""
         if self._fd is not None:
             os.close(self._fd)
             self._fd = None
@@ -82,13 +83,13 @@ class DataDir:
     def _write_holder(self, fd: int) -> None:
         since = datetime.now(UTC).isoformat(timespec="seconds")
         about = {"pid": os.getpid(), "since": since, "command": shlex.join(sys.argv)}
-        with suppress(OSError):  # on a full disk it has the lock all the same
+        with suppress(OSError):  # the lock holds even on a full disk
             os.ftruncate(fd, 0)
             os.pwrite(fd, json.dumps(about).encode(), 0)
 
 
 def _read_holder(fd: int) -> str:
-    """Who has the lock, as it signed; it may be about to."""
+    """The process that has the lock, from the lock file, which may not be written yet."""
     try:
         about = json.loads(os.pread(fd, 4096, 0))
         return f'process {about["pid"]} since {about["since"]} ("{about["command"]}")'

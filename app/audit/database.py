@@ -1,4 +1,4 @@
-"""The SQLite file of the operator's log: its shape, how it is opened, what its errors mean."""
+"""The SQLite file of the operator's log: schema, opening, error texts."""
 
 import os
 import secrets
@@ -17,9 +17,9 @@ NAME: Final = "operators-log.sqlite3"
 SUFFIXES: Final = ("", "-wal", "-shm")
 APPLICATION: Final = 0x4F504C47  # "OPLG"
 VERSION: Final = 2
-BUSY_TIMEOUT_S: Final = 1.0  # with a program of someone's that has the file locked
+BUSY_TIMEOUT_S: Final = 1.0  # waiting for another program's lock on the file
 
-# `undone` has the presses of which the end is not known; it can be made from `entry` again.
+# `undone` has the presses without a known end; it can be rebuilt from `entry`.
 SCHEMA: Final = """
 CREATE TABLE entry (
   seq INTEGER PRIMARY KEY, at INTEGER NOT NULL, boot TEXT NOT NULL, monotonic INTEGER NOT NULL,
@@ -32,7 +32,7 @@ CREATE TABLE entry (
 CREATE TABLE undone (seq INTEGER PRIMARY KEY, outcome TEXT NOT NULL) STRICT;
 CREATE TABLE about (key TEXT PRIMARY KEY, value ANY NOT NULL) STRICT, WITHOUT ROWID;
 """
-# By which a press that comes again is found; older files get it when they are opened.
+# For finding a repeated press; older files get the index when they are opened.
 INDEX: Final = "CREATE INDEX IF NOT EXISTS entry_press ON entry (press) WHERE press <> ''"
 
 ERROR_TEXTS: Final = {
@@ -47,7 +47,7 @@ ERROR_TEXTS: Final = {
 
 @dataclass(frozen=True, slots=True)
 class Head:
-    """The newest entry, and how many there are; `hash` is the genesis where there are none."""
+    """The newest entry and the number of entries; without entries `hash` is the genesis."""
 
     seq: int
     hash: str
@@ -59,7 +59,7 @@ DAMAGED: Final = frozenset({"SQLITE_CORRUPT", "SQLITE_NOTADB"})
 
 @contextmanager
 def as_log_error() -> Iterator[None]:
-    """What SQLite and the system raise, as LogError; LogCorrupt where the file is damaged."""
+    """Converts errors of SQLite and the system to LogError, or LogCorrupt if the file is damaged."""
     try:
         yield
     except sqlite3.Error as error:
@@ -75,10 +75,10 @@ def as_log_error() -> Iterator[None]:
 
 
 def open_database(folder: Path, after: Head | None = None) -> sqlite3.Connection:
-    """The file open for writing, made if it was not there: its first entry then follows the entry
-    `after`, which another file has, or none.
+    """Opens the file for writing, and creates it if needed: then its first entry follows the entry
+    `after` of an earlier file, if given.
 
-    Raises LogCorrupt where it is no such file, LogError where it can't be opened.
+    LogCorrupt if it is not an operator's log, LogError if it can't be opened.
     """
     path = folder / NAME
     with as_log_error():
@@ -93,7 +93,7 @@ def open_database(folder: Path, after: Head | None = None) -> sqlite3.Connection
 
 
 def _check_or_create(db: sqlite3.Connection, after: Head | None) -> None:
-    db.execute("PRAGMA auto_vacuum = INCREMENTAL")  # counts for a new file only
+    db.execute("PRAGMA auto_vacuum = INCREMENTAL")  # effective in a new file only
     db.execute("PRAGMA journal_mode = WAL")
     db.execute("PRAGMA synchronous = NORMAL")
     db.execute("PRAGMA wal_autocheckpoint = 0")
@@ -126,14 +126,14 @@ def _create_tables(db: sqlite3.Connection, after: Head | None) -> None:
 
 
 def _add_text(db: sqlite3.Connection) -> None:
-    """A file of version 1 has no codes of reasons; its entries stay as they are."""
+    """Upgrades a file of version 1, which has no codes of reasons; its entries stay unchanged."""
     column = "text TEXT NOT NULL DEFAULT ''"
     db.executescript(f"BEGIN IMMEDIATE; ALTER TABLE entry ADD COLUMN {column}; "
                      f"PRAGMA user_version = {VERSION}; COMMIT")  # fmt: skip
 
 
 def open_read_only(folder: Path) -> sqlite3.Connection:
-    """A connection of a reader's, which holds up no writer."""
+    """A read-only connection, which does not block the writer."""
     with as_log_error():
         path = folder / NAME
         path.stat()
@@ -143,24 +143,24 @@ def open_read_only(folder: Path) -> sqlite3.Connection:
             timeout=BUSY_TIMEOUT_S,
             isolation_level=None,
         )
-        if db.execute("PRAGMA user_version").fetchone()[0] == 1:  # no server has opened it since
+        if db.execute("PRAGMA user_version").fetchone()[0] == 1:  # not upgraded by a server yet
             db.execute("CREATE TEMP VIEW entry AS SELECT *, '' AS text FROM main.entry")
     db.text_factory = lambda data: data.decode("utf-8", "replace")
     return db
 
 
 class Files:
-    """The log's files as they are in the folder when it was opened.
+    """The log's files, to notice if one is replaced after the log was opened.
 
-    They are known by their inodes, and not by descriptors: the first one of a file that a process
-    closes takes all SQLite's locks with it.
+    Identified by inode instead of an open descriptor: closing any descriptor of a file releases all of
+    SQLite's locks on it.
     """
 
     def __init__(self, folder: Path) -> None:
         self._known = {str(path): _inode(str(path)) for path in _paths(folder)}
 
     def check(self) -> None:
-        """LogGone where one was removed, renamed or replaced; LogCorrupt where the log was emptied."""
+        """LogGone if a file was removed, renamed or replaced; LogCorrupt if the log was emptied."""
         for path, known in self._known.items():
             try:
                 found = _inode(path)
@@ -183,8 +183,8 @@ def _inode(path: str) -> tuple[int, int]:
 
 
 def make_room(folder: Path) -> str:
-    """Makes room for a new log where one was taken away: what another program put there is put aside
-    under the name that is returned, "" where nothing was."""
+    """Makes room for a new log after the old one was removed. A file that another program put there is
+    renamed; returns its new name, "" without one."""
     main, wal, shm = _paths(folder)
     if main.exists() or (wal.exists() and wal.stat().st_size):
         return set_aside(folder, "found")
@@ -194,7 +194,7 @@ def make_room(folder: Path) -> str:
 
 
 def set_aside(folder: Path, word: Literal["damaged", "found"] = "damaged") -> str:
-    """Renames what can't be used; returns its new name, with the time. Nothing is deleted."""
+    """Renames files that can't be used; returns the new name, with the time. Nothing is deleted."""
     stamp = time.strftime("%Y%m%dT%H%M%SZ", time.gmtime())
     stem = NAME.removesuffix(".sqlite3")
     number, name = 0, f"{stem}.{word}-{stamp}.sqlite3"

@@ -1,9 +1,9 @@
-"""One entry of the operator's log, and the hash that ties it to the one before.
+"""One entry of the operator's log, with the hash chain.
 
-An entry's hash is SHA-256 over a JSON array of all its fields but the hash itself, in their order,
-in UTF-8, without spaces, with nothing escaped that need not be. `prev`, the last of these fields,
-is the hash of the entry before; the first entry's is the log's genesis, 32 random bytes. `text` is left
-out where it is "": so were all entries written before there was this field.
+An entry's hash is SHA-256 of a JSON array of all its fields except the hash, in order, in UTF-8,
+without spaces, with minimal escapes. `prev`, the last of these fields, is the hash of the previous
+entry; for the first entry it is the log's genesis, 32 random bytes. An empty `text` is left out, as in
+entries written before this field existed.
 """
 
 import hashlib
@@ -23,8 +23,8 @@ LONGEST_TEXT: Final = 500
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Origin:
-    """Where a press comes from: the browser's address and id, who is logged in, and the version of
-    the page that was seen; "" where it is not known."""
+    """The origin of a press: the browser's address and id, its user, and the id of the last event seen.
+    "" stands for unknown."""
 
     address: str
     browser: str = ""
@@ -33,12 +33,13 @@ class Origin:
 
 
 class Entry(NamedTuple):
-    """`at` is milliseconds since 1970 (UTC); `monotonic` microseconds on a clock that no one sets,
-    which counts within one `boot` of the server; `of` the number of the press that it tells of.
+    """An entry. `at` is milliseconds since 1970 (UTC); `monotonic` is microseconds of a clock that is
+    never set, comparable within one `boot` of the server; `of` is the number of the press that it is
+    about.
 
-    `values` is JSON, `verdict` the code of what permitted or locked, `board` the version of the
-    view at that moment. `reason` is English, `text` the same as JSON, with its code and parameters; ""
-    for what is no sentence of the catalogue. `seq`, `boot`, `prev` and `hash` are there once it is
+    `values` is JSON, `verdict` the code of the permission's verdict, `board` the version of the view at
+    that moment. `reason` is in English; `text` is the same as JSON with code and parameters, "" for a
+    reason without a sentence of the catalogue. `seq`, `boot`, `prev` and `hash` are set when it is
     written.
     """
 
@@ -66,38 +67,38 @@ class Entry(NamedTuple):
     hash: str = ""
 
     def sealed(self, seq: int, boot: str, prev: str) -> "Entry":
-        """As it stands in the log, after the entry whose hash is `prev`."""
+        """The entry as written, after the entry with the hash `prev`."""
         row = (seq, self.at, boot, *self[MONOTONIC:PREV], prev)
         return Entry._make((*row, _hash(row)))
 
     @property
     def is_press(self) -> bool:
-        """Whether it begins a press that has an id."""
+        """Whether this is the first entry of a press with an id."""
         return self.kind == "pressed" and self.action == "press" and self.press != ""
 
     def computed_hash(self) -> str:
-        """What its hash must be."""
+        """The correct hash."""
         return _hash(self[:-1])
 
     @property
     def reason_text(self) -> TextLike:
-        """Its reason, for a reader's language where that is known."""
+        """The reason as a sentence to be rendered, or in English if there is no code."""
         try:
             return text_in(self.text) if self.text else self.reason
         except ValueError:
             return self.reason
 
     def reason_in(self, language: str) -> str:
-        """Its reason as a reader of this language reads it; English as it was written."""
-        if language == ENGLISH or isinstance(said := self.reason_text, str):
+        """The reason in a language; in English as it was written."""
+        if language == ENGLISH or isinstance(text := self.reason_text, str):
             return self.reason
         try:
-            return clean_text(render(said, language))
+            return clean_text(render(text, language))
         except (KeyError, IndexError, ValueError):  # of another version's catalogue
             return self.reason
 
     def follow_up(self, kind: Kind, outcome: str, reason: TextLike, **more: str) -> Self:
-        """The entry that tells, now, the result of this press."""
+        """A new entry about this press, with its result."""
         at, monotonic = _now()
         return self._replace(
             seq=0,
@@ -129,7 +130,7 @@ def new_entry(
     reason: TextLike = "",
     **texts: str,
 ) -> Entry:
-    """An entry as of now, with texts that any file and any page can take."""
+    """A new entry, dated now; texts are cleaned and shortened."""
     at, monotonic = _now()
     if origin is not None:
         texts |= {name: getattr(origin, name) for name in ORIGIN}
@@ -140,7 +141,7 @@ def new_entry(
 
 
 def reason_as_json(reason: TextLike) -> str:
-    """A reason as JSON; "" for one that is no sentence, or has parameters that are too long."""
+    """A reason as JSON; "" if it has no code, or its parameters are too long."""
     if isinstance(reason, str):
         return ""
     text = _as_text(reason.as_json())
@@ -148,7 +149,7 @@ def reason_as_json(reason: TextLike) -> str:
 
 
 def clean_text(text: str, longest: int = LONGEST_TEXT) -> str:
-    """A text that is Unicode, without NUL, and not too long; what was cut ends in "…"."""
+    """The text as valid Unicode, without NUL, shortened with "…" to `longest` characters."""
     if len(text) <= longest and text.isprintable():
         return text
     cut = text if len(text) <= longest else text[: longest - 1] + "…"
@@ -168,12 +169,12 @@ def as_json(values: Mapping[str, Any]) -> str:
 
 
 def same_values(text: str, values: Mapping[str, Any]) -> bool:
-    """Whether an entry's values are these, as far as an entry has them."""
+    """Whether an entry's values equal these, after the same shortening."""
     return _in_order(json.loads(text)) == _in_order(json.loads(as_json(values)))
 
 
 def _hash(row: tuple[Any, ...]) -> str:
-    """Of a row without its hash: `text` counts where it is there."""
+    """The hash of a row (without its hash field); an empty `text` is left out."""
     counted = row if row[TEXT] else (*row[:TEXT], *row[TEXT + 1 :])
     return hashlib.sha256(_as_text(counted).encode()).hexdigest()
 

@@ -1,6 +1,6 @@
 """The operator's log as CSV: RFC 4180 with a byte order mark, the newest entry first.
 
-Some rows at a time, with nothing open in between: a slow reader keeps nothing from being written.
+Reads some rows at a time and keeps nothing open in between: a slow reader does not block the writer.
 """
 
 import csv
@@ -18,8 +18,8 @@ from app.i18n import ENGLISH
 from app.printable import printable
 
 ROWS_AT_ONCE: Final = 500
-GZIP: Final = zlib.MAX_WBITS | 16  # the format, as zlib has it
-TEXTS: Final = entry.FIELDS.index("address")  # an entry's fields from here on
+GZIP: Final = zlib.MAX_WBITS | 16  # zlib's parameter for the gzip format
+TEXTS: Final = entry.FIELDS.index("address")  # the first text field of an entry
 # `text`, which is for programs, comes last.
 LATER: Final = tuple(name for name in entry.FIELDS[TEXTS:] if name != "text")
 FIELDS: Final = (*entry.FIELDS[:TEXTS], "pressed_at", *LATER, "text")
@@ -30,7 +30,7 @@ FORMULA: Final = ("=", "+", "-", "@", "\t", "\r")
 def csv_chunks(
     folder: Path, wanted: Filter, before: int | None, language: str = ENGLISH
 ) -> Iterator[bytes]:
-    """All that is wanted before a number, with reasons in a language; LogError."""
+    """All entries that match before the entry number `before`, with reasons in a language; LogError."""
     cells = partial(_cells, language)
     found = rows(folder, wanted, before, ROWS_AT_ONCE)
     yield "\ufeff".encode() + _csv([FIELDS, *map(cells, found)])
@@ -40,7 +40,7 @@ def csv_chunks(
 
 
 def gzipped(pieces: Iterable[bytes]) -> Iterator[bytes]:
-    """The same by gzip."""
+    """The chunks compressed by gzip."""
     packer = zlib.compressobj(wbits=GZIP)
     for piece in pieces:
         yield packer.compress(piece)

@@ -1,4 +1,4 @@
-"""What stands in the log's place where the panel file switches it off: it keeps nothing."""
+"""The operator's log if the panel file switches it off: keeps nothing."""
 
 import logging
 from collections.abc import Callable, Collection, Iterator
@@ -16,7 +16,7 @@ log = logging.getLogger("kiosk.log")
 
 
 class NullLog:
-    """Takes every entry and writes none; keeps a second server from the folder all the same."""
+    """Accepts every entry and writes none. Still locks the folder against a second server."""
 
     folder = None
     enabled = False
@@ -29,7 +29,7 @@ class NullLog:
         self._folder = DataDir(folder) if folder else None
 
     async def start(self) -> None:
-        """FolderInUse when another server has the folder: each would send what comes twice."""
+        """FolderInUse if another server has the folder: a repeated press could be sent by both."""
         try:
             if self._folder is not None:
                 await self._folder.hold_soon()
@@ -42,20 +42,20 @@ class NullLog:
 
     @contextmanager
     def notifying(self, changed: Callable[[], None]) -> Iterator[None]:
-        """There is never anything to be told."""
+        """`changed` is never called."""
         yield
 
     def allowed(self, origin: Origin) -> bool:
         return True
 
     def suppress(self, origin: Origin, limited: bool = False) -> None:
-        """It is not counted."""
+        """Does nothing."""
 
     async def open_presses(self, robot: str, widgets: Collection[str], since: int) -> list[OpenPress]:
         return []
 
     async def pressed(self, entry: Entry) -> Entry | None:
-        """LogError where another server took the folder in the meantime."""
+        """LogError if another server has taken the folder in the meantime."""
         if self._folder is not None:
             try:
                 self._folder.hold()
@@ -69,7 +69,7 @@ class NullLog:
         return ""
 
     def close(self) -> None:
-        """No one reads it."""
+        """Does nothing."""
 
     def add(self, entry: Entry) -> None:
-        """It is not kept."""
+        """Does nothing."""

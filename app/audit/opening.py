@@ -1,4 +1,4 @@
-"""Opening the operator's log, and what it is told before anything new."""
+"""Opens the file of the operator's log, and makes the first entries after that."""
 
 import logging
 from collections.abc import Sequence
@@ -14,7 +14,8 @@ log = logging.getLogger("kiosk.log")
 
 
 class Opening:
-    """Opens the file, as often as it takes; keeps why a new one was begun until that stands in it."""
+    """Opens the file, again after each failure. Keeps the reason for a new file until it is written
+    there."""
 
     def __init__(self, folder: Path, boot: str) -> None:
         self._folder = folder
@@ -23,13 +24,14 @@ class Opening:
         self._new_file_reason: TextLike = ""
 
     def mark_lost(self, error: LogError) -> None:
-        """The file was closed for this; what needs a new one stays known until there is one."""
+        """The file was closed because of this error. An error that needs a new file is kept until there
+        is one."""
         if not isinstance(self._cause, LogCorrupt | LogGone):
             self._cause = error
 
     def store(self, head: Head | None) -> Store:
-        """The file, open: a new one where the old one is damaged or gone. `head` is the newest entry
-        that this server has written. LogError where it can't be opened."""
+        """Opens the file, or a new one if the old one is damaged or gone. `head` is the newest entry
+        that this server has written. LogError if it can't be opened."""
         try:
             return self._store(head)
         except LogCorrupt as error:
@@ -58,7 +60,7 @@ class Opening:
         return why
 
     def first_entries(self, store: Store, head: Head | None) -> Sequence[Entry]:
-        """What the file has to be told first: that it is a new one, or lacks what was written.
+        """The first entries to write: that the file is new, or that written entries are missing in it.
 
         `first` in the first entry of a file is that entry's own number: its chain may begin there.
         """
@@ -73,12 +75,12 @@ class Opening:
         return [new_entry("resumed", reason=gone)]
 
     def mark_written(self) -> None:
-        """What was to be told first stands in the file."""
+        """The first entries are written."""
         self._new_file_reason = ""
 
 
 def unfinished_entries(store: Store) -> Sequence[Entry]:
-    """What is to be said of presses of servers that ended before they knew their results."""
+    """Closing entries for presses of servers that ended before the result was known."""
     return [
         entry.follow_up(
             "corrected" if store.has_outcome(entry.seq) else "closed", "unknown", say("log_ended")

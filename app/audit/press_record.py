@@ -1,4 +1,4 @@
-"""What a press writes into the operator's log, and what it needs of that log."""
+"""The log entries of presses, and the interface of the log that they need."""
 
 from collections.abc import Callable, Collection, Mapping
 from contextlib import AbstractContextManager
@@ -13,8 +13,8 @@ from app.robot.command_status import Outcome
 
 
 class Log(Protocol):
-    """`fault` says that the log can't be written, `lock` that nothing may be pressed for it; both
-    are "" while all is well."""
+    """The operator's log. `fault` is the sentence if it can't be written, `lock` the reason if presses
+    are locked because of that; both are "" otherwise."""
 
     @property
     def fault(self) -> TextLike: ...
@@ -23,28 +23,29 @@ class Log(Protocol):
     def notifying(self, changed: Callable[[], None]) -> AbstractContextManager[None]: ...
 
     async def pressed(self, entry: Entry) -> Entry | None:
-        """Returns when the entry is written; LogError when it can't be and must, Repeated where the log
-        has a press of this id."""
+        """Returns when the entry is written; LogError if it can't be and the log is required, Repeated
+        if the log already has a press with this id."""
 
     async def closed(self, entry: Entry) -> TextLike:
-        """Returns when the entry is on the disk, or why it is not."""
+        """Returns "" when the entry is on the disk, else why it is not."""
 
     def add(self, entry: Entry) -> None:
-        """Writes it, and no one waits."""
+        """Writes an entry without waiting."""
 
     def allowed(self, origin: Origin) -> bool:
-        """Whether a refusal may be an entry; where not, it is left out."""
+        """Whether a refusal may have its own entry; if not, it is only counted."""
 
     def suppress(self, origin: Origin, limited: bool = False) -> None:
-        """Counts a refusal that is no entry, `limited` one that was not even judged."""
+        """Counts a refusal without an entry; `limited`: it was over the rate limit."""
 
     async def open_presses(self, robot: str, widgets: Collection[str], since: int) -> list[OpenPress]:
-        """Presses of these widgets, not before `since` (ms), of which the end is not known, the newest
-        first; LogError when that can't be read (yet)."""
+        """Presses of these widgets since `since` (ms) without a known end, the newest first; LogError
+        if the log can't be read (yet)."""
 
 
 class PendingEntry:
-    """One press in the log; `entry` is None where it could not be written and need not be."""
+    """The log entry of one press; `entry` is None if it could not be written and the log is
+    optional."""
 
     def __init__(
         self, log: Log, entry: Entry | None, board: Callable[[], str], fault: TextLike = ""
@@ -58,26 +59,26 @@ class PendingEntry:
 
     @property
     def hash(self) -> str:
-        """That of the press's entry: no other has it; "" where there is none."""
+        """The hash of the press's entry, which is unique; "" without an entry."""
         return self._entry.hash if self._entry else ""
 
     def set_verdict(self, verdict: str) -> None:
-        """By which verdict, and by which version of the board: the one that there is now."""
+        """Sets the code of the permission's verdict, with the current version of the view."""
         self._verdict = {"verdict": verdict, "board": self._board()}
 
     async def close(self, outcome: str, reason: TextLike) -> TextLike:
-        """Writes the result; returns when that is on the disk, or why it is not."""
+        """Writes the result. Returns "" when it is on the disk, else why it is not."""
         if self._entry is None:
             return self._fault
         return await self._log.closed(self._entry.follow_up("closed", outcome, reason, **self._verdict))
 
     def close_unknown(self, sentence: str) -> None:
-        """No one will know the result."""
+        """Writes that the result is unknown, without waiting."""
         if self._entry is not None:
             self._log.add(self._entry.follow_up("closed", "unknown", say(sentence), **self._verdict))
 
     def correct(self, answer: Outcome) -> None:
-        """More is known now than when it was closed."""
+        """Writes a correction of the result, without waiting."""
         self.corrected_to = answer
         if self._entry is not None:
             text = answer.text
@@ -85,7 +86,8 @@ class PendingEntry:
 
 
 class PressLog:
-    """The operator's log as the presses of one robot write it; `board` gives what is shown now."""
+    """Writes the log entries of one robot's presses; `board` returns the current version of the
+    view."""
 
     def __init__(self, log: Log, robot: str = "", board: Callable[[], str] = str) -> None:
         self._log = log
@@ -93,11 +95,11 @@ class PressLog:
         self._board = board
 
     def has_room(self, origin: Origin) -> bool:
-        """Whether a refusal may be an entry."""
+        """Whether a refusal may have its own entry."""
         return self._log.allowed(origin)
 
     def count_unlogged(self, origin: Origin) -> None:
-        """Counts a refusal that is no entry."""
+        """Counts a refusal without an entry."""
         self._log.suppress(origin)
 
     async def pressed(
@@ -108,13 +110,13 @@ class PressLog:
         origin: Origin,
         action: str = "press",
     ) -> PendingEntry:
-        """Written before anything is sent; LogError and Repeated as `Log` has them."""
+        """Writes the entry of a press before it is sent; LogError and Repeated as in `Log.pressed`."""
         entry = new_entry("pressed", origin, inputs, **self._columns(widget, press_id, action))
         written = await self._log.pressed(entry)
         return PendingEntry(self._log, written, self._board, self._log.fault)
 
     async def canceled(self, widget: str, origin: Origin) -> PendingEntry:
-        """A cancel is written if it can be: no log that fails keeps anyone from stopping a robot."""
+        """Writes the entry of a cancel if possible: a failing log never blocks a cancel."""
         entry = new_entry("pressed", origin, {}, **self._columns(widget, "", "cancel"))
         try:
             written = await self._log.pressed(entry)
@@ -123,14 +125,14 @@ class PressLog:
         return PendingEntry(self._log, written, self._board, self._log.fault)
 
     @property
-    def is_optional_and_down(self) -> bool:
-        """Whether presses go on though the log can't be written."""
+    def is_bypassed(self) -> bool:
+        """Whether the log can't be written, but presses are not locked because of that."""
         return bool(self._log.fault) and not self._log.lock
 
     async def open_presses(
         self, widgets: Collection[str], since: int
     ) -> list[tuple[OpenPress, PendingEntry]]:
-        """Presses whose end the log does not know, as `Log` has it, each with what corrects it."""
+        """Presses without a known end, as in `Log.open_presses`, each with its log entry to correct."""
         found = await self._log.open_presses(self._robot, widgets, since)
         return [(one, PendingEntry(self._log, one.press, self._board)) for one in found]
 
@@ -143,7 +145,8 @@ class PressLog:
         reason: TextLike,
         action: str = "press",
     ) -> TextLike:
-        """A press that was not even judged; returns when it is on the disk, or why it is not."""
+        """Writes a refusal before the permission check. Returns "" when it is on the disk, else why it
+        is not."""
         about = self._columns(widget, press_id, action)
         entry = new_entry("refused", origin, inputs, outcome="refused", reason=reason, **about)
         return await self._log.closed(entry)
@@ -151,14 +154,14 @@ class PressLog:
     async def acted(
         self, action: str, act_id: str, origin: Origin, outcome: str, reason: TextLike
     ) -> TextLike:
-        """An act that is no press; returns when it is on the disk, or why it is not."""
+        """Writes an act on control authority. Returns "" when it is on the disk, else why it is not."""
         about = self._columns("", act_id, action)
         return await self._log.closed(
             new_entry("control", origin, {}, outcome=outcome, reason=reason, **about)
         )
 
     def note(self, action: str, origin: Origin, reason: TextLike) -> None:
-        """Control changed by no act."""
+        """Writes a change of control that no act made, without waiting."""
         self._log.add(new_entry("control", origin, {}, reason=reason, **self._columns("", "", action)))
 
     def _columns(self, widget: str, press_id: str, action: str) -> dict[str, str]:
@@ -166,6 +169,6 @@ class PressLog:
 
 
 def origin_of(who: Principal, seen: str = "") -> Origin:
-    """Where a press comes from: the client, and who is logged in there or, without users, its name."""
+    """The origin of a press: its client, and the user or, without users, the client's name."""
     client = who.client
     return Origin(address=client.address, browser=client.id, who=render(who.name), seen=seen)

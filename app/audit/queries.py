@@ -1,6 +1,6 @@
-"""Reading the operator's log, page by page, beside the writer and never holding it up.
+"""Reads the operator's log without blocking the writer.
 
-Each call is one short read on a connection of its own: a slow reader keeps nothing open.
+Each call is one short read on its own connection: a slow reader keeps nothing open.
 """
 
 import json
@@ -18,7 +18,7 @@ LONGEST_SEARCH_S: Final = 5.0
 STEPS_BETWEEN_CHECKS: Final = 10_000
 MAX_SCANNED: Final = 20_000  # entries, from the newest back
 
-# What has become more by now is told by a later entry.
+# Without presses whose result is in a later entry.
 CLOSED_CONDITION: Final = "(e.kind <> 'pressed' OR e.seq IN (SELECT seq FROM undone))"
 CONDITIONS: Final = {
     "since": "e.at >= :since",
@@ -36,9 +36,9 @@ CONDITIONS: Final = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Filter:
-    """Which entries; times in ms since 1970 (UTC), `since` included and `until` not.
+    """Which entries to read. Times in ms since 1970 (UTC), `since` inclusive, `until` exclusive.
 
-    `every`: presses too of which a later entry tells their results.
+    `every`: also presses whose result is in a later entry.
     """
 
     since: int | None = None
@@ -52,7 +52,7 @@ class Filter:
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """An entry, and when what it tells of was pressed (ms; None where that is no longer there)."""
+    """An entry, with the time of the press that it is about (ms; None if that entry was removed)."""
 
     entry: Entry
     pressed_at: int | None
@@ -60,8 +60,8 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class OpenPress:
-    """A press of which the log has no end: its entry, what was told of it last ("" where nothing was;
-    `text` is the reason with its code), and whether what it was for was `accepted` once."""
+    """A press without a known end: its entry, the latest outcome and reason ("" without one; `text` is
+    the reason with its code), and whether its goal was `accepted`."""
 
     press: Entry
     outcome: str
@@ -71,7 +71,7 @@ class OpenPress:
 
     @property
     def code(self) -> str:
-        """That of the reason; "" where the log has none."""
+        """The code of the reason, "" without one."""
         return str(json.loads(self.text)["code"]) if self.text else ""
 
 
@@ -82,15 +82,15 @@ def rows(
     count: int,
     longest_s: float = LONGEST_SEARCH_S,
 ) -> list[Row]:
-    """The newest `count` entries before the number `before`, the newest first; LogError, SearchTooLong
-    where that takes longer than `longest_s`."""
+    """The newest `count` entries that match before the entry number `before`, the newest first;
+    LogError, SearchTooLong after `longest_s`."""
     query, values = _query(wanted, before, count)
     return [Row(Entry(*row[:-1]), row[-1]) for row in _fetch(folder, query, values, longest_s)]
 
 
 def open_presses(folder: Path, robot: str, widgets: Collection[str], since: int) -> list[OpenPress]:
-    """Presses of these widgets of a robot, not before `since` (ms), of which the end is not known; the
-    newest first. LogError."""
+    """Presses of these widgets of a robot since `since` (ms) without a known end, the newest first.
+    LogError."""
     names = {f"widget{number}": widget for number, widget in enumerate(widgets)}
     columns = ", ".join(f'p."{name}"' for name in FIELDS)
     query = f"""
@@ -98,14 +98,14 @@ def open_presses(folder: Path, robot: str, widgets: Collection[str], since: int)
           SELECT * FROM entry
           WHERE seq > (SELECT max(seq) FROM entry) - {MAX_SCANNED} AND action = 'press'
             AND robot = :robot AND widget IN ({", ".join(f":{name}" for name in names)})
-        ), told AS (
+        ), results AS (
           SELECT of, max(seq) AS last, max(outcome = 'accepted') AS accepted FROM recent GROUP BY of
         )
-        SELECT {columns}, ifnull(l.outcome, '') AS said, ifnull(l.reason, ''), ifnull(l.text, ''),
-          ifnull(t.accepted, 0)
-        FROM recent p LEFT JOIN told t ON t.of = p.seq LEFT JOIN entry l ON l.seq = t.last
+        SELECT {columns}, ifnull(l.outcome, '') AS latest, ifnull(l.reason, ''), ifnull(l.text, ''),
+          ifnull(r.accepted, 0)
+        FROM recent p LEFT JOIN results r ON r.of = p.seq LEFT JOIN entry l ON l.seq = r.last
         WHERE p.kind = 'pressed' AND p.at >= :since
-          AND said IN ('', 'accepted', 'unknown', 'timed_out')
+          AND latest IN ('', 'accepted', 'unknown', 'timed_out')
         ORDER BY p.seq DESC
     """
     found = _fetch(folder, query, {"robot": robot, "since": since, **names})

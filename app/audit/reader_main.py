@@ -1,8 +1,8 @@
-"""A process of its own that reads the operator's log for the server: `run`.
+"""The process that reads the operator's log for the server: `run`.
 
-A thread would take interpreter and processor from presses and holds. What is wanted comes as JSON on
-the standard input (`Wish`); on the standard output comes CSV or, where a count is wanted, JSON.
-Exit status: 0 all of it, 1 not: see stderr.
+A thread would take interpreter and processor time from presses and holds. The request arrives as JSON
+on stdin (`ReadRequest`); stdout gets CSV or, for a request with a count, JSON. Exit status: 0 if
+complete, 1 after an error, which is on stderr.
 """
 
 import json
@@ -20,19 +20,20 @@ from app.audit.queries import Filter, Row, rows
 from app.errors import LogError
 from app.i18n import ENGLISH
 
-NICE_INCREMENT: Final = 10  # than the server, which has no time to lose
+NICE_INCREMENT: Final = 10  # lower priority than the server
 
 
 @dataclass(frozen=True, slots=True)
 class ReadRequest:
-    """Entries before a number, the newest first: `count` at most, or all as CSV where that is None."""
+    """A request for entries before the entry number `before`, the newest first: at most `count`, or
+    with None all of them as CSV."""
 
     folder: Path
     wanted: Filter
     before: int | None
     count: int | None = None
     gzip: bool = False
-    language: str = ENGLISH  # of the reasons of CSV
+    language: str = ENGLISH  # of the reasons in CSV
 
     def as_json(self) -> bytes:
         return json.dumps(asdict(self) | {"folder": str(self.folder)}).encode()
@@ -45,25 +46,25 @@ def parse_request(text: bytes) -> ReadRequest:
 
 
 def parse_rows(text: bytes) -> list[Row]:
-    """The entries that were wanted."""
+    """The rows in a JSON response."""
     return [Row(Entry(*entry), pressed_at) for entry, pressed_at in json.loads(text)]
 
 
-def read(wish: ReadRequest) -> Iterator[bytes]:
-    """What is wanted, some at a time; LogError."""
-    if wish.count is not None:
-        found = rows(wish.folder, wish.wanted, wish.before, wish.count)
+def read(request: ReadRequest) -> Iterator[bytes]:
+    """The response, in chunks; LogError."""
+    if request.count is not None:
+        found = rows(request.folder, request.wanted, request.before, request.count)
         yield json.dumps([(row.entry, row.pressed_at) for row in found]).encode()
         return
-    pieces = csv_chunks(wish.folder, wish.wanted, wish.before, wish.language)
-    yield from gzipped(pieces) if wish.gzip else pieces
+    pieces = csv_chunks(request.folder, request.wanted, request.before, request.language)
+    yield from gzipped(pieces) if request.gzip else pieces
 
 
 def main(given: BinaryIO, out: BinaryIO) -> int:
-    wish = parse_request(given.read())
+    request = parse_request(given.read())
     os.nice(NICE_INCREMENT)
     try:
-        for piece in read(wish):
+        for piece in read(request):
             out.write(piece)
             out.flush()
     except LogError as error:
@@ -73,6 +74,6 @@ def main(given: BinaryIO, out: BinaryIO) -> int:
 
 
 def run() -> NoReturn:
-    """The process."""
-    signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # who wanted it may go
+    """The entry point of the process."""
+    signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # ends the process when the server stops reading
     sys.exit(main(sys.stdin.buffer, sys.stdout.buffer))

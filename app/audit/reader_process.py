@@ -1,4 +1,4 @@
-"""What another process reads of the operator's log for the server, piece by piece."""
+"""Reads the operator's log in another process, chunk by chunk."""
 
 import asyncio
 import os
@@ -13,45 +13,46 @@ from app.errors import LogError
 from app.i18n import say
 from app.settings import PACKAGE
 
-PIECE_BYTES: Final = 65_536  # bytes: as many as a pipe has
+PIECE_BYTES: Final = 65_536  # the capacity of a pipe
 COMMAND: Final = (sys.executable, "-P", "-c", "from app.audit.reader_main import run; run()")
 
 Done = TypeVar("Done")
 
 
 class ReaderProcess:
-    """Used on the event loop; what waits for the process, does so on a thread."""
+    """Runs `app.audit.reader_main` in a process. Used on the event loop; a thread waits for the
+    process."""
 
-    def __init__(self, wish: ReadRequest) -> None:
-        self._request = wish
+    def __init__(self, request: ReadRequest) -> None:
+        self._request = request
         self._loop = asyncio.get_running_loop()
         self._thread = ThreadPoolExecutor(1, "operators-log-process")
         self._process: subprocess.Popen[bytes] | None = None
         self._killed = False
 
     async def start(self) -> bytes:
-        """Its first piece; LogError where the log can't be read."""
+        """Starts the process; returns the first chunk. LogError if the log can't be read."""
         return await self._on_thread(self._start_process)
 
     async def read_next(self) -> bytes:
-        """Its next piece, b"" after the last; LogError where it breaks off."""
+        """The next chunk, b"" after the last; LogError if the process fails."""
         return await self._on_thread(self._read_piece)
 
     async def read_all(self) -> bytes:
-        """All of it, of what is not much; LogError."""
+        """The whole output, for short ones; LogError."""
         pieces = [await self.start()]
         while pieces[-1]:
             pieces.append(await self.read_next())
         return b"".join(pieces)
 
     def kill(self) -> None:
-        """It ends now: the client that reads gets an error."""
+        """Kills the process: the client that reads gets an error."""
         self._killed = True
         if self._process is not None:
             self._process.kill()
 
     async def close(self) -> None:
-        """Leaves neither process nor thread."""
+        """Ends the process and the thread."""
         self.kill()
         await asyncio.shield(self._on_thread(self._close))
         self._thread.shutdown(wait=False)
@@ -71,7 +72,7 @@ class ReaderProcess:
             process.stdin.write(self._request.as_json())
             process.stdin.close()
         except BrokenPipeError:
-            pass  # it has ended: why is read with its answer
+            pass  # the process has ended; `_read_piece` raises the reason
         return self._read_piece()
 
     def _read_piece(self) -> bytes:
@@ -82,8 +83,8 @@ class ReaderProcess:
         if piece := process.stdout.read(PIECE_BYTES):
             return piece
         if process.wait():
-            said = process.stderr.read(PIECE_BYTES).decode(errors="replace").strip()
-            why = said.splitlines()[-1] if said else say("log_reader_ended")
+            output = process.stderr.read(PIECE_BYTES).decode(errors="replace").strip()
+            why = output.splitlines()[-1] if output else say("log_reader_ended")
             raise LogError(say("log_unreadable", why=why))
         return b""
 
@@ -102,5 +103,5 @@ def _popen() -> "subprocess.Popen[bytes]":
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         env={**os.environ, "PYTHONPATH": path},
-        start_new_session=True,  # what a terminal tells the server is not for this one
+        start_new_session=True,  # signals of the server's terminal do not reach it
     )

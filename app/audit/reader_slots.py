@@ -1,4 +1,4 @@
-"""How many may read the operator's log at a time: who finds no place is told when to come again."""
+"""Limits the number of concurrent readers of the operator's log."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -8,19 +8,19 @@ from app.i18n import TextLike
 
 
 class ReaderSlots:
-    """On the event loop; no one waits."""
+    """A semaphore that rejects instead of waiting. Used on the event loop only."""
 
-    def __init__(self, most: int, again_s: int, message: TextLike) -> None:
-        """`again_s`: when it makes sense to come again; `message` says that all places are taken."""
+    def __init__(self, most: int, retry_after_s: int, message: TextLike) -> None:
+        """`message` and `retry_after_s` are for a client that is rejected."""
         self._free = most
-        self._again_s = again_s
+        self._retry_after_s = retry_after_s
         self._message = message
 
     @contextmanager
     def slot(self) -> Iterator[None]:
-        """One place, while it lasts; TooMany where there is none."""
+        """Takes a slot within the block; TooMany if none is free."""
         if not self._free:
-            raise TooMany(self._message, self._again_s)
+            raise TooMany(self._message, self._retry_after_s)
         self._free -= 1
         try:
             yield

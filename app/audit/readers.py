@@ -1,5 +1,5 @@
-"""Who reads the operator's log beside the event loop: few at a time, and where it takes long by another
-process, so that presses and holds keep this one's time."""
+"""Reads the operator's log beside the event loop: few readers at a time, and slow reads in another
+process, so that they take no time from presses and holds."""
 
 import asyncio
 from collections.abc import AsyncIterator, Callable, Collection
@@ -17,8 +17,8 @@ from app.errors import LogError, SearchTooLong
 from app.i18n import ENGLISH, say
 
 MAX_SEARCHES: Final = 2  # at a time
-THREADS: Final = MAX_SEARCHES + 1  # one for what the server itself has to know
-QUICK_S: Final = 0.03  # a search that takes longer is done by another process
+THREADS: Final = MAX_SEARCHES + 1  # one for the server's own reads
+QUICK_S: Final = 0.03  # a search that takes longer is repeated in another process
 SEARCH_AGAIN_S: Final = 2
 EXPORT_AGAIN_S: Final = 10
 
@@ -26,7 +26,7 @@ Read = TypeVar("Read")
 
 
 class Readers:
-    """Of one log; used on the event loop only."""
+    """The readers of one log. Used on the event loop only."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
@@ -37,8 +37,8 @@ class Readers:
         self._closed = False
 
     async def rows(self, wanted: Filter, before: int | None, count: int) -> list[Row]:
-        """The newest entries that are wanted before a number; LogError when they can't be read, TooMany
-        when others search."""
+        """The newest `count` entries that match, before the entry number `before`; LogError if they
+        can't be read, TooMany if too many searches run."""
         with self._searching.slot():
             try:
                 return await self._read(partial(rows, self._folder, wanted, before, count, QUICK_S))
@@ -49,28 +49,28 @@ class Readers:
                     return parse_rows(await process.read_all())
 
     async def open_presses(self, robot: str, widgets: Collection[str], since: int) -> list[OpenPress]:
-        """See `unended` of app/audit/queries.py."""
+        """See `queries.open_presses`."""
         return await self._read(partial(open_presses, self._folder, robot, widgets, since))
 
     @asynccontextmanager
     async def export(
         self, wanted: Filter, before: int | None, gzip: bool, language: str = ENGLISH
     ) -> AsyncIterator[ReaderProcess]:
-        """All that is wanted before a number, as CSV in a language, while this lasts; TooMany beside
-        another one, LogError when the server ends."""
-        wish = ReadRequest(self._folder, wanted, before, gzip=gzip, language=language)
+        """All entries that match before the entry number `before`, as CSV in a language; TooMany if
+        another export runs, LogError at shutdown."""
+        request = ReadRequest(self._folder, wanted, before, gzip=gzip, language=language)
         with self._exporting.slot():
-            async with self._reader_process(wish) as process:
+            async with self._reader_process(request) as process:
                 yield process
 
     def close(self) -> None:
-        """The server is about to end: it waits for no one who reads."""
+        """Ends searches and exports at shutdown."""
         self._closed = True
         for process in self._processes:
             process.kill()
 
     def stop(self) -> None:
-        """Leaves no thread behind."""
+        """Ends the threads."""
         self._threads.shutdown(wait=False, cancel_futures=True)
 
     async def _read(self, read: Callable[[], Read]) -> Read:
@@ -82,10 +82,10 @@ class Readers:
             raise LogError(say("log_unreadable", why=error.text)) from error
 
     @asynccontextmanager
-    async def _reader_process(self, wish: ReadRequest) -> AsyncIterator[ReaderProcess]:
+    async def _reader_process(self, request: ReadRequest) -> AsyncIterator[ReaderProcess]:
         if self._closed:
             raise LogError(say("ending"))
-        process = ReaderProcess(wish)
+        process = ReaderProcess(request)
         self._processes.add(process)
         try:
             yield process

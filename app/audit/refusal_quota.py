@@ -1,8 +1,8 @@
-"""How many refusals are entries of the operator's log, and what is told of those that are not.
+"""Limits how many refusals get their own entries in the operator's log; the others are summarised.
 
-Who presses what is refused, as fast as a network takes it, would push older entries out of a log that
-keeps so much. So there is an allowance for each browser, for each address (a browser may throw its
-cookie away) and for all together. What is sent is not counted here.
+A client that floods the server with refused presses would otherwise push older entries out of the log,
+origin size is limited. There is a quota per browser, per address (a browser may drop its cookie) and in
+total. Presses that are sent do not count.
 """
 
 import time
@@ -15,14 +15,14 @@ from app.audit.entry import Entry, Origin, new_entry
 from app.clock import format_time
 from app.i18n import render, say
 
-SUMMARY_INTERVAL_S: Final = 60.0  # from the first that is left out to the entry that tells of it
-MAX_BROWSERS: Final = 5  # browsers in that time; the rest is told together
+SUMMARY_INTERVAL_S: Final = 60.0  # from the first suppressed refusal to the summary entry
+MAX_BROWSERS: Final = 5  # with their own summary entry per interval; the others share one
 MAX_QUOTAS: Final = 500  # browsers and addresses
 
 
 @dataclass(frozen=True, slots=True)
 class Allowance:
-    """So many at once, and one more each `every_s` seconds."""
+    """A quota: `burst` at once, then one more every `every_s` seconds."""
 
     burst: float
     every_s: float
@@ -34,7 +34,7 @@ OF_ALL: Final = Allowance(600, 10.0)
 
 
 class HasOrigin(Protocol):
-    """An origin, or an entry of it."""
+    """An origin, or an entry with its fields."""
 
     @property
     def address(self) -> str: ...
@@ -43,7 +43,7 @@ class HasOrigin(Protocol):
 
 
 class _Balance:
-    """What is left of an allowance, at a time in monotonic seconds; less than nothing is a debt."""
+    """The rest of an allowance; may be negative. Times in monotonic seconds."""
 
     def __init__(self, of: Allowance, now: float) -> None:
         self._of = of
@@ -61,7 +61,7 @@ class _Balance:
 
 @dataclass(slots=True)
 class _Suppressed:
-    """Refusals of one browser that are no entries; `limited`: they were not even judged."""
+    """Refusals of one browser without entries; `limited`: they were over the rate limit."""
 
     origin: Origin
     limited: bool
@@ -70,7 +70,7 @@ class _Suppressed:
 
 
 class RefusalQuota:
-    """Used on the event loop only."""
+    """The quotas of one log. Used on the event loop only."""
 
     def __init__(
         self,
@@ -84,25 +84,25 @@ class RefusalQuota:
         self._suppressed: dict[tuple[str, str, bool], _Suppressed] = {}
         self.left_out = 0
 
-    def allowed(self, whose: HasOrigin) -> bool:
-        """Whether a refusal may be an entry."""
+    def allowed(self, origin: HasOrigin) -> bool:
+        """Whether a refusal may have its own entry."""
         now = self._monotonic()
-        known = (self._balances.get(key) for key in _keys(whose))
+        known = (self._balances.get(key) for key in _keys(origin))
         return all(left is None or left.refill(now) >= 1 for left in (self._all, *known))
 
-    def count(self, whose: HasOrigin) -> None:
-        """A refusal became an entry."""
+    def count(self, origin: HasOrigin) -> None:
+        """Counts a refusal with its own entry."""
         now = self._monotonic()
         self._all.take(now)
-        for key, of in zip(_keys(whose), (OF_BROWSER, OF_ADDRESS), strict=True):
+        for key, of in zip(_keys(origin), (OF_BROWSER, OF_ADDRESS), strict=True):
             self._balances.setdefault(key, _Balance(of, now)).take(now)
             self._balances.move_to_end(key)
         while len(self._balances) > MAX_QUOTAS:
             self._balances.popitem(last=False)
 
     def suppress(self, origin: Origin, limited: bool = False) -> bool:
-        """A refusal is only counted, `limited` where there were too many presses to judge it; whether
-        it is the first since all were told."""
+        """Counts a refusal without an entry; `limited`: it was over the rate limit. Returns whether it
+        is the first since the last summary."""
         first = not self._suppressed
         key = (origin.address, origin.browser, limited)
         if key not in self._suppressed and len(self._suppressed) >= MAX_BROWSERS:
@@ -112,18 +112,18 @@ class RefusalQuota:
         return first
 
     def summary_due(self) -> list[Entry]:
-        """An entry for each browser of which some were left out, and none of these any more."""
-        more, self._suppressed = self._suppressed, {}
-        return [_entry(one) for one in more.values()]
+        """The summary entries, one per browser; the counts begin at zero again."""
+        suppressed, self._suppressed = self._suppressed, {}
+        return [_entry(one) for one in suppressed.values()]
 
 
-def _keys(whose: HasOrigin) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    return (whose.address, whose.browser), (whose.address,)
+def _keys(origin: HasOrigin) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    return (origin.address, origin.browser), (origin.address,)
 
 
-def _entry(more: _Suppressed) -> Entry:
-    origin = more.origin
+def _entry(suppressed: _Suppressed) -> Entry:
+    origin = suppressed.origin
     name = " ".join(filter(None, (origin.who, f"({origin.address})" if origin.address else "")))
-    sentence = "log_more_limited" if more.limited else "log_more_refused"
-    reason = say(sentence, count=more.count, name=name, since=format_time(more.since))
-    return new_entry("refused", origin, {"more": more.count}, outcome="refused", reason=reason)
+    sentence = "log_more_limited" if suppressed.limited else "log_more_refused"
+    reason = say(sentence, count=suppressed.count, name=name, since=format_time(suppressed.since))
+    return new_entry("refused", origin, {"more": suppressed.count}, outcome="refused", reason=reason)

@@ -1,8 +1,8 @@
-"""The operator's log as a file that is written: append, sync, retention. Blocks; used by one thread.
+"""Writes the file of the operator's log: append, sync, retention. Blocks; used by one thread.
 
-`append` returns when its entries are committed to the operating system: they outlive the process,
-not a power cut. They, and all before them, outlive that too once a `sync` that began later returned.
-SQLite itself (WAL, synchronous = NORMAL) keeps the file whole through both.
+`append` returns when its entries are committed to the operating system: they survive a kill of the
+process, but not a power cut. After a later `sync` they survive that too. SQLite (WAL, synchronous =
+NORMAL) keeps the file consistent in both cases.
 """
 
 import os
@@ -21,14 +21,15 @@ INSERT: Final = f"INSERT INTO entry ({COLUMNS}) VALUES ({', '.join('?' * len(FIE
 REMOVED_AT_ONCE: Final = 1000
 PROBE_BYTES: Final = 256 * 1024
 DAY_MS: Final = 86_400_000
-UNSET_BEFORE_MS: Final = 1_704_067_200_000  # 2024: a clock that says less was never set
+UNSET_BEFORE_MS: Final = 1_704_067_200_000  # 2024: a clock before that was never set
 
 
 class Store:
-    """The file, open; used by the thread that opened it, but for `sync`."""
+    """The open file. Used only by the thread that opened it, except for `sync`."""
 
     def __init__(self, folder: Path, boot: str, after: Head | None = None) -> None:
-        """Raises LogError, LogCorrupt; a new file goes on `after` an entry of another one."""
+        """LogError, LogCorrupt. A new file continues the chain after the entry `after` of an earlier
+        one."""
         self._db = open_database(folder, after)
         self._wal = -1
         self._boot = boot
@@ -48,7 +49,7 @@ class Store:
         newest = self._db.execute("SELECT seq, hash FROM entry ORDER BY seq DESC LIMIT 1").fetchone()
         oldest = self._db.execute("SELECT seq FROM entry ORDER BY seq LIMIT 1").fetchone()
         before = (int(about["first"]) - 1, str(about["genesis"]))
-        self.opened_before = about.get("opened", self._boot) != self._boot  # before this server
+        self.opened_before = about.get("opened", self._boot) != self._boot  # by an earlier server
         self._seq: int
         self._hash: str
         self._seq, self._hash = newest or before
@@ -59,21 +60,21 @@ class Store:
         return Head(self._seq, self._hash, self._seq - self._oldest + 1)
 
     def check(self) -> None:
-        """LogError unless what is written goes to the files that are in the folder."""
+        """LogError if the open files are no longer those in the folder."""
         with as_log_error():
             self._files.check()
 
     def append(self, entries: Sequence[Entry]) -> list[Entry]:
-        """Writes them in one commit, and returns them as they stand in the file."""
+        """Writes entries in one commit, and returns them as written."""
         return self._commit(entries)
 
     def sync(self) -> None:
-        """On the disk is, after this, all that was committed before. May be called by any thread."""
+        """Syncs everything committed so far to the disk. May be called by any thread."""
         with as_log_error():
             os.fdatasync(self._wal)
 
     def undone(self) -> list[Entry]:
-        """Presses of servers before this one of which the end is not known."""
+        """Presses of earlier servers without a known end."""
         with as_log_error():
             rows = self._db.execute(
                 f"SELECT {COLUMNS} FROM entry WHERE boot <> ? AND seq IN (SELECT seq FROM undone)"
@@ -83,7 +84,7 @@ class Store:
         return [Entry(*row) for row in rows]
 
     def entries_of_press(self, press: Entry) -> list[Entry]:
-        """All that the log has of the press with this id on this robot, the oldest first."""
+        """All entries of the press with this id on this robot, the oldest first."""
         with as_log_error():
             rows = self._db.execute(
                 f"SELECT {COLUMNS} FROM entry WHERE press = ? AND press <> '' AND robot = ?"
@@ -93,16 +94,16 @@ class Store:
         return [Entry(*row) for row in rows]
 
     def has_outcome(self, seq: int) -> bool:
-        """Whether a press that is not done has an outcome already."""
+        """Whether a press without a known end has an outcome so far."""
         with as_log_error():
             found = self._db.execute("SELECT outcome FROM undone WHERE seq = ?", (seq,)).fetchone()
         return bool(found and found[0])
 
     def remove_old(self, days: float, size_mb: float, now_ms: int) -> bool:
-        """Removes some of the oldest entries, if there are any to remove; whether it did.
+        """Removes some of the oldest entries if they are too old or too many; returns whether it did.
 
-        What was removed, and why, is an entry of its own; it has the hash of the last of them, by
-        which what is left can be verified.
+        An entry `removed` says which and why. It has the hash of the last removed entry, so that the
+        rest can be verified.
         """
         with as_log_error():
             if last := self._last_older(now_ms - days * DAY_MS):
@@ -112,9 +113,10 @@ class Store:
         return False
 
     def _last_older(self, limit_ms: float) -> int:
-        """The last one before the first that is young enough, of those looked at; 0 for none.
+        """The number of the last entry before the first one that is recent enough; 0 for none.
 
-        One that was written before its machine had the time goes with the next that has it.
+        An entry from before the machine's clock was set is removed with the next one that has a valid
+        time.
         """
         last = 0
         for seq, at in self._db.execute(
@@ -185,7 +187,7 @@ class Store:
                 self._db.execute("DELETE FROM undone WHERE seq = ?", (entry.of,))
 
     def probe(self) -> None:
-        """Whether there is room, and the disk takes it: written, synced, and taken out again."""
+        """Checks that the disk is writable and has room: writes, syncs and removes some data."""
         with as_log_error():
             self._db.execute(
                 "INSERT OR REPLACE INTO about VALUES ('probe', zeroblob(?))", (PROBE_BYTES,)
@@ -198,10 +200,10 @@ class Store:
             return os.fstat(self._wal).st_size
 
     def checkpoint(self) -> None:
-        """Takes the log that is beside the file into it, and begins that one again; synced.
+        """Moves the write-ahead log into the file and truncates it, with a sync.
 
-        What a reader still needs stays for the next time. The first commit after it waits for the
-        disk, so that is done here.
+        Pages that a reader still needs stay for the next time. The first commit after a checkpoint
+        waits for the disk, so it is made here.
         """
         with as_log_error():
             self._db.execute("PRAGMA busy_timeout = 0")
@@ -212,12 +214,12 @@ class Store:
             self._db.execute("UPDATE about SET value = ? WHERE key = 'opened'", (self._boot,))
 
     def complete(self) -> None:
-        """Takes all that is beside the file into it, also where it is in the folder no more."""
+        """Moves the write-ahead log into the file, even if the file is no longer in the folder."""
         with as_log_error():
             self._db.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchall()
 
     def close(self) -> None:
-        """Closes the file, whatever state it is in."""
+        """Closes the file, in any state."""
         if self._wal >= 0:
             os.close(self._wal)
             self._wal = -1

@@ -1,4 +1,4 @@
-"""The thread that takes the operator's log to the disk."""
+"""The thread that syncs the operator's log to the disk."""
 
 import threading
 from collections.abc import Callable
@@ -10,7 +10,7 @@ from app.i18n import say
 
 
 class Syncer:
-    """Takes what was committed to the disk, all that came together at once."""
+    """Syncs committed entries; entries that arrive together share a sync."""
 
     def __init__(self, done: Callable[[Results], None], failed: Callable[[Results], None]) -> None:
         self._done = done
@@ -26,7 +26,7 @@ class Syncer:
         self._thread.start()
 
     def set_store(self, store: Store | None) -> None:
-        """Waits for a sync that is under way: a file must stay open while it is synced."""
+        """Sets the file. Waits for a running sync first: the old file must stay open during it."""
         with self._syncing:
             self._store = store
 
@@ -36,7 +36,7 @@ class Syncer:
             self._wake.notify()
 
     def end(self, timeout_s: float) -> None:
-        """Does what is waiting, and ends."""
+        """Syncs the waiting entries, and ends the thread."""
         with self._wake:
             self._ended = True
             self._wake.notify()

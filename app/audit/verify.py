@@ -1,7 +1,7 @@
-"""Whether the operator's log is as it was written: each entry's hash, and how they follow.
+"""Verifies the hash chain of the operator's log.
 
-What this can't see is the removal of the newest entries, and a log that someone wrote again as a
-whole: for that the head is compared with one that was noted elsewhere.
+The chain alone does not show the removal of the newest entries, or a log that was rewritten as a whole.
+For that, an earlier head that was noted elsewhere has to be in the log.
 """
 
 import json
@@ -19,22 +19,22 @@ from app.errors import LogError
 
 @dataclass(frozen=True, slots=True)
 class Verified:
-    """`fault` says which entry is the first that is not as it was written; "" when all are."""
+    """The result: `fault` names the first entry that was changed, "" if there is none."""
 
     count: int
     head: str
     fault: str = ""
 
 
-def verify(folder: Path, noted: str = "") -> Verified:
-    """Checks the whole log, as it is at this moment, and that a head which was noted once is in it,
-    unless that is ""; LogError where it can't be read."""
+def verify(folder: Path, known_head: str = "") -> Verified:
+    """Verifies the whole log at this moment, and that `known_head`, if given, is in it; LogError if it
+    can't be read."""
     db = open_read_only(folder)
     try:
         with as_log_error():
             db.execute("BEGIN")
             (genesis,) = db.execute("SELECT value FROM about WHERE key = 'genesis'").fetchone() or ("",)
-            return _Chain(genesis, noted).check(_entries(db))
+            return _Chain(genesis, known_head).check(_entries(db))
     finally:
         db.close()
 
@@ -48,11 +48,11 @@ def _entries(db: sqlite3.Connection) -> Iterator[Entry]:
 
 
 class _Chain:
-    """Follows the entries from the oldest; keeps no more of them than the last two hashes."""
+    """Verifies entries from the oldest on; keeps only the last two hashes."""
 
-    def __init__(self, genesis: str, noted: str) -> None:
+    def __init__(self, genesis: str, known_head: str) -> None:
         self._genesis = genesis
-        self._known_head = noted
+        self._known_head = known_head
         self._first: Entry | None = None
         self._begins = False
         self._kinds: set[str] = set()
@@ -114,7 +114,7 @@ class _Chain:
             return first.seq == 1
         if entry is first and _values(entry).get("first") == entry.seq:
             return True
-        # As it was written at first: after what was owed of presses, the only one without a mode.
+        # As early versions wrote it: after the closing entries of earlier presses, without a mode.
         return self._kinds <= {"closed", "corrected"} and not _values(entry)
 
 

@@ -1,4 +1,4 @@
-"""The thread that owns the file of the operator's log: it writes, keeps it small, opens it again."""
+"""The thread that owns the file of the operator's log: writing, retention, reopening after errors."""
 
 import logging
 import math
@@ -22,25 +22,25 @@ from app.i18n import TextLike, say
 
 log = logging.getLogger("kiosk.log")
 
-RETRY_DELAYS_S: Final = (0.5, 1.0, 2.0, 4.0, 8.0)  # the last one again and again
+RETRY_DELAYS_S: Final = (0.5, 1.0, 2.0, 4.0, 8.0)  # the last one is repeated
 HOUR_S: Final = 3600.0
-CLOCK_SET_BY_S: Final = 60.0  # what moves it by more is no drift
-IDLE_S: Final = 1.0  # after so long without a press there is time for the file
-FILE_CHECK_S: Final = 1.0  # between two looks whether the files are still in the folder
-WAL_BYTES: Final = 16_000_000  # then it can wait no longer
+CLOCK_SET_BY_S: Final = 60.0  # a larger change of the wall clock is no drift
+IDLE_S: Final = 1.0  # after this time without a press, the file is tidied
+FILE_CHECK_S: Final = 1.0  # between two checks that the files are still in the folder
+WAL_BYTES: Final = 16_000_000  # a larger write-ahead log is checkpointed without waiting for a pause
 TIDY_INTERVAL_S: Final = (
-    0.1  # between two looks while presses come: each keeps the press from its interpreter
+    0.1  # at least between two runs during presses: each takes interpreter time from them
 )
-CHECKPOINT_S: Final = 5.0  # between two that can't wait: a reader may hold them up
+CHECKPOINT_S: Final = 5.0  # at least between two forced checkpoints: a reader may block them
 TIDY_AFTER: Final = 1000  # entries
 MAX_UNWRITTEN: Final = 1000
 
 
 class ClockSteadiness:
-    """Whether the wall's clock can be trusted to tell what is old: no one set it for an hour."""
+    """Whether the wall clock can be trusted for retention: it was not set for an hour."""
 
     def __init__(self) -> None:
-        self._ahead: float | None = None  # of the clock that no one sets
+        self._ahead: float | None = None  # of the monotonic clock
         self._since = 0.0
 
     def is_steady(self, wall: float, now: float) -> bool:
@@ -51,7 +51,7 @@ class ClockSteadiness:
 
 
 class WriterThread:
-    """Owns the file: writes what is handed to it, keeps the file small, and opens it again."""
+    """Owns the file: writes queued entries, limits the file's size, and reopens it after errors."""
 
     def __init__(
         self,
@@ -59,13 +59,14 @@ class WriterThread:
         limits: Limits,
         boot: str,
         mode: str,
-        tell: Callable[[Results, bool], None],
+        report: Callable[[Results, bool], None],
     ) -> None:
-        """`tell` gets, on a thread of these, what is done; and whether `fault` has changed."""
+        """`report` is called on the writer or sync thread with results, and whether `fault` has
+        changed."""
         self._folder = folder
         self._limits = limits
         self._mode = mode
-        self._report = tell
+        self._report = report
         self.fault: TextLike = ""
         self.displaced = False  # another server has the folder, or may
         self.head: Head | None = None
@@ -96,19 +97,19 @@ class WriterThread:
         self._thread.start()
 
     def stop(self, timeout_s: float) -> None:
-        """Writes what is waiting, and closes the file; gives up after the time."""
+        """Writes the queued entries and closes the file; waits at most `timeout_s`."""
         self._ended = True
         self._queue.put(None)
         self._thread.join(timeout_s)
 
     def add(self, ticket: Ticket, most: int | None) -> bool:
-        """Takes it, unless as many as `most` are waiting already."""
+        """Queues a ticket; False if `most` are waiting already."""
         if most is not None and self._queue.qsize() >= most:
             return False
         self._queue.put(ticket)
         return True
 
-    # On the keeper's thread.
+    # On the writer thread.
 
     def _run(self) -> None:
         ended = False
@@ -129,7 +130,7 @@ class WriterThread:
         self._close()
 
     def _next(self) -> list[Ticket]:
-        """All that waits, as soon as there is something to do; none where that is no writing."""
+        """The waiting tickets, as soon as there is something to do; empty if that is not writing."""
         try:
             waiting = [self._queue.get(timeout=self._idle_s())]
         except queue.Empty:
@@ -145,8 +146,8 @@ class WriterThread:
     def _write(self, batch: list[Ticket]) -> None:
         wanted = [ticket for ticket in batch if not ticket.abandoned]
         if len(wanted) < len(batch):
-            given_up = LogError(say("log_abandoned"))
-            self._report([(ticket, given_up) for ticket in batch if ticket.abandoned], False)
+            abandoned = LogError(say("log_abandoned"))
+            self._report([(ticket, abandoned) for ticket in batch if ticket.abandoned], False)
         if self._store is None:
             self._fail(wanted, LogError(self.fault))
             return
@@ -167,14 +168,14 @@ class WriterThread:
             self._syncer.add(durable)
 
     def _without_repeated(self, store: Store, tickets: Sequence[Ticket]) -> list[Ticket]:
-        """Those that are no presses which the log has already: of these it is told what it knows."""
+        """The tickets without repeated presses; these are answered with `Repeated`."""
         new: list[Ticket] = []
         known: Results = []
         for ticket in tickets:
             found = store.entries_of_press(ticket.entry) if ticket.entry.is_press else []
             if found and found[0].is_press:
-                told = [one for one in found if one.of == found[0].seq]
-                known.append((ticket, Repeated(found[0], told[-1] if told else None)))
+                results = [one for one in found if one.of == found[0].seq]
+                known.append((ticket, Repeated(found[0], results[-1] if results else None)))
             else:
                 new.append(ticket)
         self._report(known, False)
@@ -185,13 +186,13 @@ class WriterThread:
         self._report([(ticket, error) for ticket in tickets], False)
 
     def _check(self, store: Store) -> None:
-        """LogError unless what was written is in the folder, and the folder is this server's alone."""
+        """LogError if the files were replaced, or another server may have the folder."""
         store.check()
         with as_log_error():
             self._folder.check()
 
     def _handle_failure(self, error: LogError) -> None:
-        """From now on nothing is written, until the file could be opened again."""
+        """Closes the file. Nothing is written until it is open again."""
         self._sync_error = None
         self._close(complete=isinstance(error, LogGone))
         self.displaced = isinstance(error, FolderInUse)
@@ -225,7 +226,7 @@ class WriterThread:
             self._report([], True)
 
     def _write_first_entries(self, store: Store) -> None:
-        """What the file has to be told before anything new."""
+        """Writes the entries that come before any new ones."""
         entries = [*self._opening.first_entries(store, self.head), *self._unwritten]
         if not self._start_logged:
             entries += unfinished_entries(store)
@@ -242,7 +243,8 @@ class WriterThread:
         store.sync()
 
     def _tidy(self, store: Store, quiet: bool) -> None:
-        """Keeps the files small, a little at a time; says the head once an hour."""
+        """Removes old entries and empties the write-ahead log, a little at a time; logs the head once
+        an hour."""
         try:
             self._check(store)
             self._remove_old(store)
@@ -277,16 +279,16 @@ class WriterThread:
             store, self._store = self._store, None
             try:
                 if complete:
-                    with suppress(LogError):  # as far as its disk takes it
+                    with suppress(LogError):  # as far as the disk allows
                         store.complete()
                 store.close()
             except LogError as error:
                 log.error("the operator's log could not be closed: %s", error)
 
-    # On the syncer's thread.
+    # On the sync thread.
 
     def _sync_failed(self, results: Results) -> None:
-        """What is not known to be on the disk is not known to be in the log."""
+        """Reports the failure; the writer thread then closes the file."""
         self._report(results, False)
         self._sync_error = next(error for _, error in results if isinstance(error, LogError))
         self._queue.put(None)

@@ -354,7 +354,7 @@ def unreadable(rig: Rig, monkeypatch: pytest.MonkeyPatch, *, unneeded: bool) -> 
 
     with monkeypatch.context() as broken:
         broken.setattr(rig.log, "open_presses", gone)
-        broken.setattr(PressLog, "unneeded", unneeded)
+        broken.setattr(PressLog, "is_bypassed", unneeded)
         yield
 
 

@@ -1,1 +1,1 @@
-"""Action goals: sent, tracked to their end, canceled, recovered after a restart."""
+"""Action goals: sending, tracking, canceling, and recovery after a restart."""

@@ -1,4 +1,4 @@
-"""The services of an action server, by which a goal is sent, canceled and asked for its result.
+"""Client of an action server's services: `send_goal`, `cancel_goal`, `get_result`.
 
 Wire format: ROS 2's `<action>/_action/…` services (design.ros2.org, "Actions").
 """
@@ -26,15 +26,15 @@ log = logging.getLogger("kiosk.actions")
 
 CANCEL: Final = "action_msgs/srv/CancelGoal"
 STATUS: Final = "status"
-RESULT: Final = "result."  # where it is in the response of `get_result`
-NO_SUCH_GOAL: Final = frozenset({2, 3})  # its ERROR_UNKNOWN_GOAL_ID, ERROR_GOAL_TERMINATED
+RESULT: Final = "result."  # prefix of the result's fields in the response of `get_result`
+NO_SUCH_GOAL: Final = frozenset({2, 3})  # ERROR_UNKNOWN_GOAL_ID, ERROR_GOAL_TERMINATED
 
 Query = asyncio.Future[bytes | None]
 
 
 class ActionClient:
-    """Those of one robot. What asks gives LinkError where that could not be sent; what reads a reply
-    gives None for one that can't be read."""
+    """The action services of one robot. Methods that send raise LinkError if the request could not be
+    sent; methods that read a reply return None if it is not readable."""
 
     def __init__(self, interfaces: Interfaces, robot: RobotState, link: QueryClient) -> None:
         self._interfaces = interfaces
@@ -43,11 +43,11 @@ class ActionClient:
         self._link = link
 
     def is_offered(self, widget: Action) -> bool:
-        """Whether the robot offers a widget's action, with just its type."""
+        """Whether the robot offers a widget's action with the same type."""
         return self._robot.graph.server_type("AS", self._robot.key(widget.action)) == widget.type
 
     def goal_request(self, widget: Action, goal_id: uuid.UUID, fields: dict[str, Any]) -> bytes:
-        """What `send_goal` sends; FieldError for bad fields."""
+        """The encoded request of `send_goal`; FieldError for bad fields."""
         wrapped = {"goal_id": {"uuid": list(goal_id.bytes)}, "goal": fields}
         return self._interfaces.encode(
             self._interfaces.action_types(widget.type).send_goal_request, wrapped
@@ -73,16 +73,18 @@ class ActionClient:
         return self._link.query(key, payload, timeout_s)
 
     async def reply(self, goal: Goal, query: Query) -> bytes | None:
-        """The reply; None when there is none in time, or the bridge went away in the meantime."""
+        """The reply; None at a timeout, or if the bridge was lost in the meantime."""
         ends: set[asyncio.Future[Any]] = {query} if goal.cut.done() else {query, goal.cut}
         await asyncio.wait(ends, return_when=asyncio.FIRST_COMPLETED)
         reply = query.result() if query.done() else None
         if reply is None:
-            await asyncio.wait({goal.cut}, timeout=BRIDGE_LOSS_DELAY_S)  # the news of a cut may follow
+            await asyncio.wait(
+                {goal.cut}, timeout=BRIDGE_LOSS_DELAY_S
+            )  # the bridge's token may end a little later
         return reply
 
     def goal_response(self, goal: Goal, reply: bytes | None) -> Outcome:
-        """What `send_goal` answered, or why it did not."""
+        """The outcome of `send_goal`, from its reply; None stands for no reply."""
         widget, now = goal.widget, format_time(time.time())
         if reply is not None:
             response = self._interfaces.action_types(widget.type).send_goal_response
@@ -98,17 +100,17 @@ class ActionClient:
         return Outcome("timed_out", joined([sentence, say("cyclone_hint")]))
 
     def cancel_response(self, widget: Action, reply: bytes) -> Any:
-        """What `cancel_goal` answered: a message with `return_code` and `goals_canceling`."""
+        """The response of `cancel_goal`: a message with `return_code` and `goals_canceling`."""
         return self._decoded(widget, self._interfaces.service_types(CANCEL)[1], reply)
 
     def no_response_reason(self, widget: Action) -> Text:
-        """Why `cancel_goal` did not answer."""
+        """Why `cancel_goal` did not respond."""
         if self.is_offered(widget):
             return say("timed_out", seconds=f"{widget.timeout_s:g}")
         return say("cancel_unheard", name=widget.action)
 
     async def result(self, widget: Action, reply: bytes) -> Fields | None:
-        """What `get_result` answered: its status, and what the widget shows of the result."""
+        """The response of `get_result`: the status, and the result fields that the widget shows."""
         paths = (STATUS, *(RESULT + path for path in RESPONSE_PLACEHOLDER.findall(widget.result)))
         response = self._interfaces.action_types(widget.type).get_result_response
         try:

@@ -1,4 +1,4 @@
-"""One goal of an action: its state by its ROS name, and what is shown of it. Pure.
+"""One goal of an action: its state, and the command status that its widget shows. Pure.
 
 States and their order: action_msgs/msg/GoalStatus.
 """
@@ -16,13 +16,13 @@ from app.interfaces import Fields
 from app.panel.widgets.service_action import Action
 from app.robot.command_status import CommandStatus, Outcome, OutcomeCode
 
-FEEDBACK: Final = "feedback."  # where it is in the message that has it
+FEEDBACK: Final = "feedback."  # prefix of the feedback's fields in the feedback message
 UNKNOWN: Final = 0
 ACCEPTED: Final = 1
 EXECUTING: Final = 2
 CANCELING: Final = 3
 NAMES: Final = ("UNKNOWN", "ACCEPTED", "EXECUTING", "CANCELING", "SUCCEEDED", "CANCELED", "ABORTED")
-# The outcome, and the sentences for an end that was seen and for one that was asked for later.
+# The outcome, the sentence for an end during the connection, and the one for an end before it.
 ENDS: Final[Mapping[int, tuple[OutcomeCode, str, str]]] = {
     4: ("succeeded", "goal_succeeded", "goal_had_succeeded"),
     5: ("canceled", "goal_canceled", "goal_had_been_canceled"),
@@ -31,19 +31,19 @@ ENDS: Final[Mapping[int, tuple[OutcomeCode, str, str]]] = {
 
 
 def goal_id(entry: str) -> uuid.UUID:
-    """That of the goal of the press whose entry in the operator's log has this hash, so that the log is
-    enough to ask for it; a random one where there is no entry."""
+    """The goal id for a press, made of the hash of its entry in the operator's log, so that the log is
+    enough to find the goal again. Random without an entry."""
     return uuid.UUID(entry[:32]) if entry else uuid.uuid4()
 
 
 @dataclass(slots=True)
 class Goal:
-    """A goal that was sent; `state` is None until something is known of it, and `known` says
-    whether the robot ever had it.
+    """A goal that was sent. `state` is None until it is known; `known` is true once the robot has
+    reported the goal.
 
-    `cut` is done when nothing more is heard of it: with a sentence, or "" for a lost connection.
-    `doubt` is the sentence for a goal that may be under way, of before a cut or the server's start,
-    until something is heard of it.
+    `cut` is done when the action server or the connection is lost: with a sentence, or "" for a lost
+    connection. `doubt` is the sentence while it is unknown whether the goal still runs, after a lost
+    connection or a restart of the server.
     """
 
     widget: Action
@@ -58,7 +58,7 @@ class Goal:
     fraction: float | None = None
 
     def advance(self, state: int) -> bool:
-        """Takes a state; False for one that it had already: states only go on."""
+        """Sets a later state; False if the goal has this or a later state already."""
         if state not in range(len(NAMES)) or (self.state is not None and state <= self.state):
             return False
         self.state = state
@@ -66,7 +66,7 @@ class Goal:
         return True
 
     def apply_feedback(self, message: Fields) -> None:
-        """Takes a feedback message: what it says, and how far the goal is."""
+        """Updates feedback text and progress from a feedback message."""
         widget = self.widget
         if widget.progress is not None:
             found = message.get(FEEDBACK + widget.progress)
@@ -76,7 +76,7 @@ class Goal:
 
     @property
     def is_running(self) -> bool:
-        """Whether the robot is known to be at it."""
+        """Whether the goal is known to be running."""
         return self.state is not None and self.state != UNKNOWN and self.state not in ENDS
 
     @property
@@ -87,12 +87,12 @@ class Goal:
 
     @property
     def doubt_status(self) -> CommandStatus:
-        """What is shown of a goal that may be under way."""
+        """The status of a goal that may be running."""
         stoppable, press = not self.cut.done(), self.press_id
         return CommandStatus(True, "unknown", self.doubt, None, stoppable, NAMES[UNKNOWN], press)
 
     def end_status(self, answer: Outcome) -> CommandStatus:
-        """What is shown when nothing is awaited any more."""
+        """The status when tracking has ended."""
         return CommandStatus(outcome=answer.outcome, text=answer.text, goal=self._name)
 
     @property

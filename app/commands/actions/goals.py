@@ -1,7 +1,7 @@
-"""Action goals: sent, followed by their feedback, canceled, and known to the end.
+"""Sends action goals and tracks them to their end: feedback, status, cancel, result.
 
-A goal belongs to the robot, not to a browser: it goes on when a page is closed and shows in every
-one. Wire format: ROS 2's `<action>/_action/…` topics (design.ros2.org, "Actions").
+A goal belongs to the robot, not to a browser: it continues when a page is closed, and every page shows
+it. Wire format: ROS 2's `<action>/_action/…` topics (design.ros2.org, "Actions").
 """
 
 import asyncio
@@ -29,25 +29,26 @@ GOAL_ID: Final = "goal_id.uuid"
 
 
 class GoalTracker:
-    """The goals of one robot; used on the event loop only."""
+    """The goals of one robot. Used on the event loop only."""
 
     def __init__(
         self, interfaces: Interfaces, robot: RobotState, link: QueryClient, changed: Callable[[], None]
     ) -> None:
-        """`changed` is called when what the widgets show has changed."""
+        """`changed` is called when the status of a command has changed."""
         self._interfaces = interfaces
         self._robot = robot
         self._changed = changed
         self._services = ActionClient(interfaces, robot, link)
         self._results = ResultWaiter(
-            self._services, robot, cut=self._cut_off, back=self._advanced, tell=self._finish
+            self._services, robot, cut=self._cut_off, restored=self._advanced, finished=self._finish
         )
         self._latest: dict[str, Goal] = {}  # by widget
         self._feedback: dict[str, Topic] = {}  # by widget
-        self._states: dict[str, Sample] = {}  # by action: what its server said last of its goals
+        self._states: dict[str, Sample] = {}  # by action: the last status message
 
     def on_graph_change(self) -> None:
-        """After every change of the graph: of a goal whose server is gone nothing more is heard."""
+        """Cuts off goals whose action server or bridge is lost. Call it after every change of the
+        graph."""
         bridge = bool(self._robot.graph.bridges)
         if not bridge:
             self._states.clear()
@@ -59,7 +60,7 @@ class GoalTracker:
                     self._set_status(goal, goal.doubt_status)
 
     async def stop(self) -> None:
-        """Ends its tasks; goals go on in the robot."""
+        """Ends the tasks. The goals continue on the robot."""
         await self._results.stop()
 
     async def start(
@@ -71,9 +72,9 @@ class GoalTracker:
         entry: str = "",
         final_check: FinalCheck = no_check,
     ) -> Outcome:
-        """Sends a goal; `corrected` gets the result in the end, `entry` is the hash of the press's
-        entry in the operator's log. FieldError for bad fields, LinkError where it could not be sent:
-        then nothing is under way."""
+        """Sends a goal and waits for its acceptance; `corrected` is called with the result. `entry` is
+        the hash of the press's entry in the operator's log. FieldError for bad fields, LinkError if the
+        goal could not be sent."""
         own_id = goal_id(entry)
         request = self._services.goal_request(widget, own_id, fields)
         if why := self.full(widget.action):
@@ -96,8 +97,8 @@ class GoalTracker:
         return answer
 
     def resume(self, goal: Goal) -> None:
-        """Follows a goal of before the server's start, whose `cut` is done. Its widget shows it, unless
-        it has a later one."""
+        """Tracks a goal that was sent before the server's start; its `cut` is done. Its widget shows it
+        unless there is a newer goal."""
         if any(goal.id == one.id for one in (*self._latest.values(), *self._results.goals)):
             return
         self._latest.setdefault(goal.widget.id, goal)
@@ -107,7 +108,7 @@ class GoalTracker:
             self.on_status(goal.widget.action, said)
 
     def full(self, action: str) -> TextLike:
-        """Why no further goal of an action is sent; "" while one may be."""
+        """Why no further goal of an action may be sent, "" if it may."""
         count = sum(goal.widget.action == action for goal in self._results.goals)
         return say("too_many", service=action) if count >= MAX_UNANSWERED else ""
 
@@ -121,14 +122,14 @@ class GoalTracker:
         return next((goal for goal in followed if goal.press_id == press_id), None)
 
     def no_goal_reason(self, widget: Action, press_id: str) -> TextLike:
-        """Why there is nothing to cancel; "" where there is."""
+        """Why there is no goal to cancel, "" if there is one."""
         if self._cancelable(widget, press_id) is not None:
             return ""
         return say("goal_over" if press_id else "nothing_to_cancel")
 
     async def cancel(self, widget: Action, press_id: str = "") -> Outcome:
-        """Asks the robot to cancel the goal of one press or, without its id, the one that is shown to
-        be under way. LinkError where that could not be sent."""
+        """Asks the robot to cancel the goal of a press; without a press id, the goal shown as running.
+        LinkError if the request could not be sent."""
         if (goal := self._cancelable(widget, press_id)) is None:
             return Outcome("refused", self.no_goal_reason(widget, press_id))
         reply = await self._services.reply(goal, self._services.cancel_goal(goal))
@@ -140,7 +141,7 @@ class GoalTracker:
         return self._cancel_outcome(goal, response)
 
     def _cancel_outcome(self, goal: Goal, response: Any) -> Outcome:
-        """Only a goal that is listed is being canceled: rclpy refuses with return code 0."""
+        """Only a goal in `goals_canceling` is being canceled: rclpy refuses with return code 0."""
         now = format_time(time.time())
         if any(bytes(one.goal_id.uuid) == goal.id.bytes for one in response.goals_canceling):
             if goal.advance(CANCELING) and (
@@ -152,12 +153,12 @@ class GoalTracker:
         if goal.state == CANCELING:  # by an earlier cancel
             return Outcome("accepted", say("goal_canceling"))
         if response.return_code in NO_SUCH_GOAL and goal.doubt and not goal.cut.done():
-            goal.cut.set_result("")  # its end is asked for again
+            goal.cut.set_result("")  # requests the result again
         return Outcome("rejected", say("cancel_refused", time=now))
 
     def on_feedback(self, action: str, sample: Sample) -> None:
-        """The latest feedback of an action; of another program's goal it is passed over. Whoever
-        calls this shows it when a frame is due."""
+        """Processes the latest feedback of an action. Feedback of other programs' goals is ignored. The
+        caller refreshes the view with the next frame."""
         for goal in self._latest_goals(action):
             if self._robot.command_status[goal.widget.id].can_cancel:
                 topic = self._feedback_of(goal.widget)
@@ -175,7 +176,7 @@ class GoalTracker:
             self._changed()
 
     def _feedback_of(self, widget: Action) -> Topic:
-        """The feedback of an action, with what its widget shows of it."""
+        """The feedback topic of an action, with the fields that its widget shows."""
         if widget.id not in self._feedback:
             message = self._interfaces.action_types(widget.type).feedback_message
             shown = [*RESPONSE_PLACEHOLDER.findall(widget.feedback), *filter(None, [widget.progress])]
@@ -192,8 +193,8 @@ class GoalTracker:
         return self._feedback[widget.id]
 
     def on_status(self, action: str, sample: Sample) -> None:
-        """The states of an action's goals; those of other programs are passed over, and kept for a goal
-        of before the server's start that is not known yet: the robot says nothing twice."""
+        """Processes a status message of an action. Goals of other programs are ignored. The message is
+        kept for goals that are resumed later: the robot does not repeat it."""
         self._states[action] = sample
         goals = {goal.id.bytes: goal for goal in self._latest_goals(action)}
         if not goals:
@@ -208,7 +209,7 @@ class GoalTracker:
         return (goal for goal in self._latest.values() if goal.widget.action == action)
 
     def _decode(self, key: str, type_name: str, sample: Sample) -> Any:
-        """A sample's message; None where it can't be read."""
+        """The message of a sample; None if it is not decodable."""
         try:
             return self._interfaces.decode(type_name, bytes(sample.payload))
         except DecodeError as error:
@@ -216,8 +217,8 @@ class GoalTracker:
             return None
 
     def _advanced(self, goal: Goal) -> None:
-        """It has another state; while its first answer or its result is awaited, or its server after a
-        cut, that will show."""
+        """Shows a goal's new state, unless it is cut off or not tracked: the pending response will show
+        it then."""
         if goal.cut.done() or goal not in self._results.goals:
             return
         if goal.is_running:
@@ -227,7 +228,7 @@ class GoalTracker:
             self._show(goal, goal.doubt_status)
 
     def _confirm_running(self, goal: Goal) -> None:
-        """It is under way; where that was not known, it is told."""
+        """The goal is running. Corrects the receipt if that was unknown."""
         if goal.doubt or not self._robot.command_status[goal.widget.id].busy:
             goal.doubt = ""
             answer = Outcome("accepted", say("goal_found", time=format_time(time.time())))
@@ -237,10 +238,12 @@ class GoalTracker:
         goal.apply_feedback(message)
         if goal.doubt and goal.advance(EXECUTING):
             self._advanced(goal)
-        self._set_status(goal, goal.running_status)  # shown with the next frame: a goal may say a lot
+        self._set_status(
+            goal, goal.running_status
+        )  # shown with the next frame: feedback may be frequent
 
     def _cut_off(self, goal: Goal, why: TextLike) -> None:
-        """It was cut off: the robot may be at it, and until that is known no other is sent."""
+        """The goal may still be running on the robot. No other goal is sent until that is known."""
         self._show_doubt(goal, why)
         goal.corrected(goal.press_id, Outcome("unknown", why))
 
@@ -249,7 +252,7 @@ class GoalTracker:
         self._show(goal, goal.doubt_status)
 
     def _finish(self, goal: Goal, answer: Outcome) -> None:
-        """The result, or that it is not known any more: to the widget and the receipt."""
+        """Shows a goal's result, or that it is unknown, and corrects the receipt."""
         goal.doubt = ""
         self._show(goal, goal.end_status(answer))
         goal.corrected(goal.press_id, answer)
@@ -259,7 +262,7 @@ class GoalTracker:
             self._changed()
 
     def _set_status(self, goal: Goal, progress: CommandStatus) -> bool:
-        """What its widget will show; False where that shows another goal by now."""
+        """Sets the widget's status; False if the widget shows a newer goal."""
         latest = self._latest.get(goal.widget.id) is goal
         if latest:
             self._robot.command_status[goal.widget.id] = progress

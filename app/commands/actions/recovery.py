@@ -1,8 +1,7 @@
-"""Goals of before this server's start: those whose end the operator's log does not know are followed
-again.
+"""Recovery of goals after a restart: goals whose end is not in the operator's log are tracked again.
 
-A goal's id is made of the hash of its press's entry (`goals.goal_id`), so the log is enough to ask the
-robot for it. Nothing is sent by itself but that question.
+A goal's id is made of the hash of its press's entry (`goal.goal_id`), so the log is enough to request
+its result from the robot. Recovery sends nothing else.
 """
 
 import asyncio
@@ -28,8 +27,8 @@ from app.ros_logging import RobotLog
 log = logging.getLogger("kiosk.actions")
 
 LOOK_BACK_S: Final = 86_400.0
-# Of a goal that the robot does not know: it is not asked for again. Logs of versions that wrote no
-# codes have only the sentences of then.
+# Reasons for goals that the robot does not know: these are not tracked again. Logs of older versions
+# have no codes, only these sentences.
 FINAL: Final = frozenset({"goal_lost", "goal_not_there"})
 FINAL_SENTENCES: Final = frozenset(
     {
@@ -37,12 +36,12 @@ FINAL_SENTENCES: Final = frozenset(
         "The robot does not know this goal: it did not get it, or knows it no longer.",
     }
 )
-TODAY_S: Final = 43_200.0  # an older time has its date
+TODAY_S: Final = 43_200.0  # older times are shown with their date
 READ_AGAIN_S: Final = 1.0
 
 
 class GoalRecovery:
-    """Of one robot; on the event loop only."""
+    """Recovers the goals of one robot. Used on the event loop only."""
 
     def __init__(
         self,
@@ -53,7 +52,7 @@ class GoalRecovery:
         changed: Callable[[], None],
         read_again_s: float = READ_AGAIN_S,
     ) -> None:
-        """`changed` is called when what the widgets show has changed."""
+        """`changed` is called when the status of a command has changed."""
         self._widgets = {w.id: w for w in panel.widgets() if isinstance(w, Action)}
         self._robot = robot
         self._log = RobotLog(log, robot.name)
@@ -61,14 +60,14 @@ class GoalRecovery:
         self._actions = actions
         self._changed = changed
         self._read_again_s = read_again_s
-        self._unreadable_status = IDLE  # what is shown while the log can't be read
+        self._unreadable_status = IDLE  # shown while the log can't be read
         self._reading: asyncio.Task[None] | None = None
 
     async def start(self) -> None:
-        """Returns when the goals are known; where the log can't be read, that is tried again and again,
-        and in the meantime no goal is sent, unless the panel goes on without its log."""
+        """Returns when the goals are known. If the log can't be read, reading is retried; until then no
+        goal is sent, unless the panel file makes the log optional."""
         if self._widgets and not await self._read():
-            self._reading = spawn_logged(self._read_later(), self._log, "goals were not followed anew")
+            self._reading = spawn_logged(self._read_later(), self._log, "recovering goals failed")
 
     async def stop(self) -> None:
         if self._reading is not None:
@@ -98,12 +97,10 @@ class GoalRecovery:
         text = say("goals_unread", why=why)
         if text != self._unreadable_status.text:
             self._log.warning("%s", text)
-        self._show(
-            CommandStatus(busy=not self._press_log.is_optional_and_down, outcome="unknown", text=text)
-        )
+        self._show(CommandStatus(busy=not self._press_log.is_bypassed, outcome="unknown", text=text))
 
     def _show(self, progress: CommandStatus) -> None:
-        """Where nothing else is shown."""
+        """Shows a status on widgets that show no other."""
         before, self._unreadable_status = self._unreadable_status, progress
         if before == progress:
             return
@@ -112,10 +109,10 @@ class GoalRecovery:
                 self._robot.command_status[widget] = progress
         self._changed()
 
-    def _resume(self, unended: OpenPress, pending: PendingEntry) -> None:
-        press, widget = unended.press, self._widgets[unended.press.widget]
+    def _resume(self, open_press: OpenPress, pending: PendingEntry) -> None:
+        press, widget = open_press.press, self._widgets[open_press.press.widget]
         if why := self._actions.full(widget.action):
-            self._log.warning("press %s is not followed anew: %s", press.press, why)
+            self._log.warning("press %s: its goal is not tracked again: %s", press.press, why)
             return
 
         def corrected(press_id: str, answer: Outcome) -> None:
@@ -127,7 +124,7 @@ class GoalRecovery:
         pressed = format_time(at) if abs(time.time() - at) < TODAY_S else format_datetime(at)
         doubt = say("goal_in_doubt", time=pressed)
         own = goal_id(press.hash)
-        self._log.info("press %s: goal %s is followed anew: %s", press.press, own, doubt)
+        self._log.info("press %s: tracking goal %s again: %s", press.press, own, doubt)
         self._actions.resume(
-            Goal(widget, press.press, own, cut, corrected, UNKNOWN, unended.accepted, doubt)
+            Goal(widget, press.press, own, cut, corrected, UNKNOWN, open_press.accepted, doubt)
         )

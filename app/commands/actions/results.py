@@ -1,4 +1,4 @@
-"""Goals are followed to their ends, over cuts of the connection too: the robot goes on meanwhile."""
+"""Waits for the results of goals, also across lost connections: the goals continue on the robot."""
 
 import asyncio
 import logging
@@ -20,12 +20,12 @@ from app.ros_logging import RobotLog
 
 log = logging.getLogger("kiosk.actions")
 
-RESULT_S: Final = 86_400.0  # a result is waited for as long as the goal takes
+RESULT_S: Final = 86_400.0  # timeout of `get_result`, which responds when the goal ends
 ASK_AGAIN_S: Final = 1.0
 
 
 class ResultWaiter:
-    """The goals of one robot whose ends are not known yet, each with a task of its own."""
+    """The goals of one robot without a known end, each with its own task."""
 
     def __init__(
         self,
@@ -33,17 +33,17 @@ class ResultWaiter:
         robot: RobotState,
         *,
         cut: Callable[[Goal, TextLike], None],
-        back: Callable[[Goal], None],
-        tell: Callable[[Goal, Outcome], None],
+        restored: Callable[[Goal], None],
+        finished: Callable[[Goal, Outcome], None],
     ) -> None:
-        """`tell` gets the result of a goal, or that it is not known any more; `cut` is called with the
-        sentence when one is cut off, and `back` when its server is offered again."""
+        """`finished` is called with a goal's result, or with an unknown outcome. `cut` is called with a
+        sentence when the goal is cut off, and `restored` when its server is available again."""
         self._services = services
         self._robot = robot
         self._log = RobotLog(log, robot.name)
         self._cut = cut
-        self._restored = back
-        self._finished = tell
+        self._restored = restored
+        self._finished = finished
         self._goals: dict[asyncio.Task[None], Goal] = {}
 
     @property
@@ -51,13 +51,13 @@ class ResultWaiter:
         return self._goals.values()
 
     def begin(self, goal: Goal) -> None:
-        """Follows a goal from now on."""
-        task = spawn_logged(self._track(goal), self._log, "following a goal failed")
+        """Starts to track a goal."""
+        task = spawn_logged(self._track(goal), self._log, "tracking a goal failed")
         self._goals[task] = goal
         task.add_done_callback(self._ended)
 
     async def stop(self) -> None:
-        """Ends the tasks; goals go on in the robot."""
+        """Ends the tasks. The goals continue on the robot."""
         tasks = list(self._goals)
         for task in tasks:
             task.cancel()
@@ -82,7 +82,7 @@ class ResultWaiter:
                 break
             if not (goal.known or goal.cut.done()):
                 if not goal.doubt:
-                    return  # it was never heard of: what was said of it stands
+                    return  # the robot never reported it: the receipt stays as it is
                 answer = Outcome("unknown", say("goal_silent", seconds=f"{LATE_S:g}"))
                 break
             await asyncio.wait({goal.cut}, timeout=ASK_AGAIN_S)
@@ -98,7 +98,7 @@ class ResultWaiter:
             await asyncio.sleep(ASK_AGAIN_S)
 
     async def _end(self, goal: Goal) -> Outcome | None:
-        """The result; None where nothing more is heard, or no one answered."""
+        """The result; None if the goal is cut off or there is no response."""
         reply = await self._result(goal)
         if reply is None:
             return None
@@ -115,10 +115,9 @@ class ResultWaiter:
         return Outcome(outcome, with_reply(say(sentence, time=format_time(time.time())), said))
 
     async def _result(self, goal: Goal) -> bytes | None:
-        """The reply of `get_result`, which is asked for again where Zenoh refuses.
+        """The reply of `get_result`, requested again if Zenoh refuses to send.
 
-        Of one that the robot is not known to have, or to be at, it is awaited not much longer than a
-        call's.
+        The timeout is short for a goal that the robot has not reported or that may have ended.
         """
         refused = False
         while not goal.cut.done():

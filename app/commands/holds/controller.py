@@ -1,8 +1,9 @@
-"""Hold-to-run: a message at a rate while one browser holds a button, and one more when it ends.
+"""Hold-to-run: publishes a message at a rate while one browser holds a button, and a stop message at
+the end.
 
-Each message is judged as a press is. Whatever ends a hold ends it for good: to go on, the operator
-has to let go and press again. Nothing is sent late: where there is no way for the last message when
-a hold ends, it is not sent at all.
+Permission is checked for each message. A hold that has ended never resumes: the operator has to release
+and press again. Nothing is sent late: if the stop message cannot be sent when a hold ends, it is not
+sent at all.
 """
 
 import asyncio
@@ -29,14 +30,14 @@ from app.robot.state import RobotState
 
 
 class Clock(Protocol):
-    """What a hold needs of the event loop; `time` is in monotonic seconds."""
+    """The part of the event loop that holds need; `time` is in monotonic seconds."""
 
     def time(self) -> float: ...
     def call_at(self, when: float, callback: Callable[[], object]) -> asyncio.TimerHandle: ...
 
 
 class HoldController:
-    """The holds of one robot, one for each widget at most; used on the event loop only."""
+    """The holds of one robot, at most one per widget. Used on the event loop only."""
 
     def __init__(
         self,
@@ -49,7 +50,7 @@ class HoldController:
         changed: Callable[[], None],
         recorder: PressRecorder | None = None,
     ) -> None:
-        """`changed` is called when what the widgets show has changed."""
+        """`changed` is called when a hold begins or ends."""
         self._panel = panel
         self._robot = robot
         self._loop = loop
@@ -63,11 +64,11 @@ class HoldController:
         self._closed = False
 
     def unconfirmed(self, receipt: Receipt) -> Receipt:
-        """The receipt of a hold whose last message is not known to have reached the bridge."""
+        """The receipt of a hold whose stop message may not have reached the bridge."""
         return self._receipts.unconfirmed(receipt)
 
     def widget(self, widget_id: str) -> Hold:
-        """What can be held; NotFound for everything else."""
+        """The hold widget with this id; NotFound for every other id."""
         if widget_id not in self._widgets:
             raise NotFound(f'there is no widget "{widget_id}" that can be held')
         return self._widgets[widget_id]
@@ -81,8 +82,9 @@ class HoldController:
         told: Callable[[Receipt], None],
         hold_id: str = "",
     ) -> Receipt | ActiveHold:
-        """Begins to publish, or says why not. `sent` is when the browser asked, at the latest; a hold
-        without an id gets one."""
+        """Begins a hold, or returns the receipt of a refusal. `sent` is the latest time at which the
+        browser can have sent the request. `on_end` is called with the receipt when the hold ends. A
+        hold without an id gets one."""
         self._arrivals.ingest()
         self.judge()
         widget, now = self.widget(widget_id), self._loop.time()
@@ -109,7 +111,8 @@ class HoldController:
         hold_id: str = "",
         trace: bool = True,
     ) -> Receipt:
-        """A hold that is not even judged; it may leave a trace or none."""
+        """Refuses a hold without checking permission; with `trace`, the refusal is logged and
+        recorded."""
         widget = self.widget(widget_id)
         refusal = Refusal(why, cause)
         if trace:
@@ -119,7 +122,7 @@ class HoldController:
     def refusal(
         self, widget_id: str, inputs: Mapping[str, Any], sent: float, context: PressContext
     ) -> Receipt | None:
-        """The receipt of a hold that `begin` would refuse now, without a trace; None for others."""
+        """The receipt of the refusal if `begin` would refuse now, else None. Not logged or recorded."""
         self._arrivals.ingest()
         self.judge()
         widget = self.widget(widget_id)
@@ -129,7 +132,7 @@ class HoldController:
     def _prepare(
         self, widget: Hold, inputs: Mapping[str, Any], sent: float, context: PressContext, now: float
     ) -> Values | Refusal:
-        """What it would publish if it began now, or why it may not."""
+        """The values to publish, or the reason why the hold may not begin now."""
         why, cause = self._refusal_reason(widget, sent, context, now)
         if why:
             return Refusal(why, cause)
@@ -141,7 +144,7 @@ class HoldController:
     def _refusal_reason(
         self, widget: Hold, sent: float, context: PressContext, now: float
     ) -> tuple[TextLike, Cause]:
-        """Why it may not begin now, "" if it may."""
+        """Why the hold may not begin now ("" if it may), and the receipt's cause."""
         if self._closed:
             return say("hold_by_stopping"), "interlock"
         if other := next(
@@ -156,7 +159,7 @@ class HoldController:
         return context.stale_reason(), "interlock"
 
     def beat(self, holding: ActiveHold, number: int, sent: float) -> bool:
-        """A heartbeat; whether the hold goes on."""
+        """Processes a heartbeat; returns whether the hold continues."""
         self.judge()
         if not self._is_active(holding) or not holding.lease.beat(number, sent, self._loop.time()):
             return False
@@ -164,35 +167,36 @@ class HoldController:
         return True
 
     def end(self, holding: ActiveHold, code: str) -> None:
-        """Ends a hold, if it is going on; `code` is of the sentence that says why."""
+        """Ends a hold if it is active; `code` is that of the sentence with the reason."""
         self.judge()
         if self._is_active(holding):
             self._end(holding, code, say(code) if code != RELEASED else "")
 
     def end_all(self, code: str) -> None:
-        """Ends all that is going on."""
+        """Ends all active holds."""
         for holding in list(self._held.values()):
             self.end(holding, code)
         self._schedule()
 
     def close(self) -> None:
-        """Ends all for good."""
+        """Ends all holds and refuses new ones from now on."""
         self._closed = True
         self.end_all("hold_by_stopping")
 
     def judge(self) -> None:
-        """Ends what has lost its ground: after every change, and before anything goes on."""
+        """Ends holds whose lease or permission has ended. Call it after every change, and before any
+        hold continues."""
         for holding in list(self._held.values()):
             now = self._loop.time()
             if not self._is_active(holding):
-                continue  # ended in the meantime, by what the end of another one showed
+                continue  # ended in the meantime: the end of another hold triggered this
             if code := holding.lease.end_code(now):
                 self._end(holding, code, say(code))
             elif not (verdict := self._verdict(holding.widget, holding.context, now)).permitted:
                 self._end(holding, verdict.code, verdict.reason or "")
 
     def step(self) -> None:
-        """Sends what is due, by all that has come until now, and plans the next step."""
+        """Ingests what has arrived, sends the messages that are due, and schedules the next step."""
         self._arrivals.ingest()
         self.judge()
         for holding in list(self._held.values()):
@@ -230,7 +234,7 @@ class HoldController:
             holding.sent += 1
 
     def _final_check(self, holding: ActiveHold) -> None:
-        """Right before a message is sent: what came while it was judged and encoded counts, too."""
+        """Called right before a message is sent: checks again if more has arrived since the verdict."""
         for _ in range(MAX_FINAL_CHECKS):
             if not self._is_active(holding):
                 raise PressRefused("", "interlock")

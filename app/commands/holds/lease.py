@@ -1,24 +1,24 @@
-"""A lease: one browser's right to keep a hold going, prolonged by its heartbeats and nothing else.
+"""The lease of a hold, extended only by the heartbeats of its browser.
 
-Pure: times are monotonic seconds of the server and come from outside. How old a heartbeat is shows
-without trust in the browser's clock: it says which stamp of the server's it had last and how long
-before, so that it can't have been sent earlier than that. The way back and forth counts as age.
+Pure: times are arguments, in the server's monotonic seconds. The age of a heartbeat is computed without
+the browser's clock: it contains the last `stamp` of the server that the browser received, and how long
+ago that was. So the round trip counts as age.
 """
 
 import math
 from dataclasses import dataclass
 from typing import Final
 
-LEASE_S: Final = 0.25  # from the sending of a heartbeat to the end, if no newer one comes
-MAX_AHEAD_S: Final = 0.02  # by so much two clocks may differ over the life of one stamp
-STALLED_S: Final = 0.1  # who comes so late to see a lease's end has stood still
+LEASE_S: Final = 0.25  # from the sending of the last heartbeat to the end of the lease
+MAX_AHEAD_S: Final = 0.02  # drift between two clocks over the life of one stamp
+STALLED_S: Final = 0.1  # a lease whose end is noticed this late means that the server stalled
 
 
 def sent_at(opened_at: float, stamp_ms: float, after_ms: float, now: float) -> float:
-    """When a message was sent, at the latest; -inf for one that claims to be from the future.
+    """The latest time at which a message can have been sent; -inf if it is in the future.
 
-    `stamp_ms` is the server's last stamp that the browser has, in ms since `opened_at`; `after_ms`
-    how long it had it when it sent this.
+    `stamp_ms` is the last stamp that the browser received, in ms since `opened_at`; `after_ms` is how
+    many ms later it sent this message.
     """
     sent = opened_at + (stamp_ms + after_ms) / 1000
     return min(sent, now) if sent <= now + MAX_AHEAD_S else -math.inf
@@ -26,7 +26,8 @@ def sent_at(opened_at: float, stamp_ms: float, after_ms: float, now: float) -> f
 
 @dataclass(slots=True)
 class Lease:
-    """`until` is its end, `next_at` when the next message is due."""
+    """A lease; `until` is its end, `next_at` the time of the next message, `last` the number of the
+    newest heartbeat."""
 
     id: str
     period_s: float
@@ -40,14 +41,14 @@ class Lease:
         return cls(lease_id, period_s, now, sent + LEASE_S, now)
 
     def end_code(self, now: float) -> str:
-        """The code of why it is over; "" while it is not."""
+        """The code of the reason if the lease has ended, else ""."""
         if now < self.until:
             return ""
         return "hold_by_stall" if now >= self.until + STALLED_S else "hold_by_heartbeat"
 
     def beat(self, number: int, sent: float, now: float) -> bool:
-        """A heartbeat, sent at `sent`; whether the lease goes on. One that is late or was there
-        already prolongs nothing, and none revives a lease that is over."""
+        """Processes a heartbeat sent at `sent`; returns whether the lease continues. A late or repeated
+        heartbeat extends nothing, and a lease that has ended stays ended."""
         if self.end_code(now):
             return False
         if number > self.last:
@@ -56,7 +57,7 @@ class Lease:
         return True
 
     def take_due(self, now: float) -> bool:
-        """Whether a message is due; those that were missed are passed over."""
+        """Whether a message is due; if so, schedules the next one. Missed messages are skipped."""
         if self.end_code(now) or now < self.next_at:
             return False
         self.next_at += self.period_s

@@ -1,5 +1,5 @@
-"""What a hold publishes: a message while it is held and one that ends it, each with the fields that the
-panel lets the server fill in (a deadline, a counter)."""
+"""The messages of a hold: one published repeatedly while it is active, and the stop message at its end.
+The server fills in a deadline and a counter if the panel file names fields for them."""
 
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Protocol
@@ -13,23 +13,23 @@ from app.permission.interlocks import link_verdict
 from app.robot.command_status import FinalCheck, no_check
 from app.robot.state import RobotState
 
-Values = Mapping[str, Any]  # of inputs by their ids, as they were when the hold began
+Values = Mapping[str, Any]  # input values by input id, from the beginning of the hold
 Checked = Callable[[Iterable[str], Values], dict[str, Any]]
 
 
 class Transport(Protocol):
-    """What a hold needs of the link."""
+    """The part of the Zenoh session that holds need."""
 
     def put(self, key: str, payload: bytes) -> None: ...
 
 
 class HoldMessages:
-    """Those of one robot; the counter of a widget goes on from hold to hold."""
+    """The hold messages of one robot. A widget's counter continues from hold to hold."""
 
     def __init__(
         self, interfaces: Interfaces, robot: RobotState, transport: Transport, checked: Checked
     ) -> None:
-        """`checked` are the values that a template gets of what was entered."""
+        """`checked` checks inputs and returns the values for the templates."""
         self._interfaces = interfaces
         self._robot = robot
         self._transport = transport
@@ -37,7 +37,7 @@ class HoldMessages:
         self._counts: dict[str, int] = {}
 
     def values(self, widget: Hold, inputs: Mapping[str, Any]) -> Values:
-        """Those that both messages get; FieldError or InputError for bad input."""
+        """The checked values for both messages; FieldError or InputError for bad input."""
         values = self._checked(input_ids(widget), inputs)
         for template in (widget.message, widget.release):
             fields = fill(template, add_now(values))
@@ -45,13 +45,12 @@ class HoldMessages:
         return values
 
     def put(self, widget: Hold, values: Values, final_check: FinalCheck) -> None:
-        """One message more; LinkError where it could not be sent, PressRefused where the last look
-        finds that it may not be."""
+        """Publishes one message; LinkError if it could not be sent, PressRefused from `final_check`."""
         self._put(widget, widget.message, values, widget.deadline_ms, final_check)
 
     def put_last(self, widget: Hold, values: Values, now: float) -> TextLike:
-        """The message that ends it, if there is any way now, be it in doubt: one stop too many harms
-        no one. Why it was not sent, or ""."""
+        """Publishes the stop message if the link is up, even without permission: an extra stop does no
+        harm. Returns why it was not sent, else ""."""
         if not self._robot.link_up or not self._robot.graph.bridges:
             return link_verdict(self._robot, now).reason or ""
         try:

@@ -1,4 +1,4 @@
-"""What is told of holds: their receipts, in the server's log and to who records."""
+"""Receipts of holds, written to the server's log and to recordings."""
 
 import logging
 import secrets
@@ -33,7 +33,7 @@ RELEASED: Final = "hold_released"
 
 @dataclass(slots=True, eq=False)
 class ActiveHold:
-    """A hold that is going on; `told` gets its receipt when it ends, whatever ends it."""
+    """An active hold. `on_end` is called with its receipt when it ends, for any reason."""
 
     widget: Hold
     lease: Lease
@@ -53,7 +53,7 @@ class Refusal(NamedTuple):
 
 
 def refused(widget: Hold, inputs: Mapping[str, Any], refusal: Refusal, hold_id: str = "") -> Receipt:
-    """The receipt of a hold that may not begin; without an id it gets one."""
+    """The receipt of a hold that may not begin. A hold without an id gets one."""
     text = say("refused", why=refusal.why, time=format_time(time.time()))
     own = needed_inputs(widget, inputs)
     own_id = hold_id or secrets.token_hex(8)
@@ -61,7 +61,7 @@ def refused(widget: Hold, inputs: Mapping[str, Any], refusal: Refusal, hold_id: 
 
 
 class HoldReceipts:
-    """Those of one robot."""
+    """The hold receipts of one robot."""
 
     def __init__(self, robot: str, recorder: PressRecorder | None) -> None:
         self._log = RobotLog(log, robot)
@@ -79,8 +79,8 @@ class HoldReceipts:
     def record_end(
         self, holding: ActiveHold, seconds: float, code: str, why: TextLike, unsaid: TextLike
     ) -> Receipt:
-        """`code` and `why` it ended after so many seconds; `unsaid` is why its last message was not
-        sent, "" where it was."""
+        """The receipt of a hold that ended after `seconds`; `code` and `why` are the reason. `unsaid`
+        is why its stop message was not sent, "" if it was."""
         widget, lease = holding.widget, holding.lease
         sentence = RELEASED if code == RELEASED else "hold_ended"
         end = say(sentence, time=format_time(time.time()), seconds=f"{seconds:.1f}", why=why)
@@ -100,7 +100,7 @@ class HoldReceipts:
         refusal: Refusal,
         hold_id: str,
     ) -> Receipt:
-        """The same as the function, and told."""
+        """The receipt of a hold that may not begin, logged and recorded."""
         receipt = refused(widget, inputs, refusal, hold_id)
         who = origin_text(context.origin)
         extra = rosout_extra(f"hold of {widget.id} by {who}: {outcome_text(widget, receipt)}")
@@ -113,7 +113,7 @@ class HoldReceipts:
         return self._recorded(receipt)
 
     def unconfirmed(self, receipt: Receipt) -> Receipt:
-        """The receipt of a hold whose last message is not known to have reached the bridge."""
+        """The receipt of a hold whose stop message may not have reached the bridge."""
         unconfirmed = say("hold_unanswered")
         self._log.warning("hold %s of %s: %s", receipt.id, receipt.widget, unconfirmed)
         reason = joined([receipt.reason, unconfirmed])

@@ -1,1 +1,1 @@
-"""The parameters of a robot's nodes: read, kept up to date, set."""
+"""The parameters of a robot's nodes: reading, updates by events, setting."""

@@ -1,4 +1,4 @@
-"""Asking a node for its parameters: ROS 2's services `get_parameters` and `describe_parameters`."""
+"""Client of a node's parameter services `get_parameters` and `describe_parameters`."""
 
 import asyncio
 from collections.abc import Awaitable, Callable, Sequence
@@ -11,12 +11,12 @@ from app.interfaces import Interfaces
 from app.panel.widgets.parameter import DESCRIBE, GET
 from app.robot.state import RobotState
 
-ANSWER_S: Final = 5.0  # within which a node has to tell its parameters
-LATE_S: Final = 5.0  # how long after that nothing more is asked: it may only be slow
+ANSWER_S: Final = 5.0  # timeout of a request
+LATE_S: Final = 5.0  # after the timeout, no new request for this time: the node may only be slow
 
 
 class NoResponse(Exception):
-    """Nothing came in time; what comes late does not count. `dropped`: the question never got there."""
+    """No response within the timeout; late ones are ignored. `dropped`: the request never arrived."""
 
     def __init__(self, why: str, *, dropped: bool) -> None:
         super().__init__(why)
@@ -24,7 +24,7 @@ class NoResponse(Exception):
 
 
 class ParameterClient:
-    """The services of one robot's nodes; one question of a caller's at a time."""
+    """The parameter services of one robot's nodes. One request per caller at a time."""
 
     def __init__(self, interfaces: Interfaces, robot: RobotState, link: QueryClient) -> None:
         self._interfaces = interfaces
@@ -34,10 +34,10 @@ class ParameterClient:
     async def read(
         self, node: str, names: Sequence[str], silent: Callable[[], None]
     ) -> tuple[dict[str, Any], dict[str, Any]]:
-        """ParameterDescriptor and ParameterValue by name, without those that the node has not.
+        """ParameterDescriptor and ParameterValue by name, without parameters that the node does not
+        have.
 
-        NoAnswer when it does not answer in time, which `silent` tells at once; DecodeError for what
-        is no answer.
+        NoResponse at a timeout, and `silent` is called then; DecodeError for an invalid response.
         """
         ask = partial(self._request, node, silent)
         descriptors = await _each(partial(ask, DESCRIBE, "descriptors"), names)
@@ -66,7 +66,7 @@ class ParameterClient:
         reply = await query
         if reply is None or not in_time:
             silent()
-            raise NoResponse(f"{key} did not answer", dropped=in_time)
+            raise NoResponse(f"{key} did not respond", dropped=in_time)
         answer: list[Any] = getattr(self._interfaces.decode(response, reply), part)
         return answer
 
@@ -74,7 +74,8 @@ class ParameterClient:
 async def _each(
     ask: Callable[[Sequence[str]], Awaitable[list[Any]]], names: Sequence[str]
 ) -> dict[str, Any]:
-    """What a node answers by name: where one of several is not declared, rclcpp answers none."""
+    """The response by parameter name. If one of several is undeclared, rclcpp returns none, so they are
+    requested one by one."""
     found = await ask(names)
     if len(found) == len(names):
         return dict(zip(names, found, strict=True))

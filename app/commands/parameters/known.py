@@ -1,4 +1,4 @@
-"""What is known of the parameters of one robot: the only place that writes it."""
+"""The known states of one robot's parameters. Only this module changes them."""
 
 from collections.abc import Collection, Iterable
 from dataclasses import replace
@@ -11,7 +11,7 @@ from app.ros_logging import RobotLog
 
 
 class KnownParameters:
-    """By widget; used on the event loop only."""
+    """Parameter states by widget. Used on the event loop only."""
 
     def __init__(self, robot: RobotState, log: RobotLog) -> None:
         self._robot = robot
@@ -26,8 +26,8 @@ class KnownParameters:
         self._robot.parameters[widget.id] = state
 
     def apply_event(self, widget: Parameter, value: Any, wall: float) -> bool:
-        """An event of its node says that it has this value (a ParameterValue) now, at `wall` (seconds
-        since the epoch). False where that says too little: the node is to be asked."""
+        """Applies a new value (a ParameterValue) from a parameter event at `wall` (seconds since the
+        epoch). False if the node has to be queried instead."""
         known = self.state(widget)
         if known.state not in ("live", "missing"):
             return False
@@ -38,19 +38,19 @@ class KnownParameters:
         return True
 
     def mark_unreadable(self, widgets: Iterable[Parameter], wall: float) -> None:
-        """Their node's answer can't be read."""
+        """The node's response is not decodable."""
         for widget in widgets:
             self.set(widget, ParameterState("unreadable", wall=wall))
 
     def mark_silent(self, node: str, widgets: Collection[Parameter]) -> None:
-        """Their node does not answer."""
+        """The node does not respond."""
         if any(self.state(widget).state != "silent" for widget in widgets):
-            self._log.warning("%s does not answer when it is asked for its parameters", node)
+            self._log.warning("%s does not respond to requests for its parameters", node)
         for widget in widgets:
             self.set(widget, replace(self.state(widget), state="silent"))
 
     def mark_cut(self, widgets: Iterable[Parameter]) -> None:
-        """Their node is gone: what it told is from before."""
+        """The node is gone. Its values are no longer current."""
         for widget in widgets:
             known = self.state(widget)
             cut = replace(known, state="cut") if known.value is not None else UNKNOWN

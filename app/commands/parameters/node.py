@@ -1,4 +1,4 @@
-"""A node with parameters that the panel shows, and when it is to be asked again."""
+"""A node with parameters that the panel shows, and when to query it again."""
 
 import asyncio
 import math
@@ -10,10 +10,11 @@ from app.panel.widgets.parameter import Parameter
 
 @dataclass(slots=True)
 class Node:
-    """`heard` are values of events that came while it is being asked.
+    """A node; `task` queries it while its services are available.
 
-    `wanted` is set when it is to be asked again, `urgent` when that is not to wait for the pause
-    between two readings; `told_at` (monotonic seconds) is when it answered last.
+    `event_values` are values from events during a query. `query_needed` is set when the node has to be
+    queried again, `query_now` when that must not wait for the pause between two queries. `answered_at`
+    (monotonic seconds) is the time of its last response.
     """
 
     name: str
@@ -29,14 +30,14 @@ class Node:
         self.query_now.set()
 
     def begin_query(self) -> None:
-        """It is asked now: what was wanted until here is done by that."""
+        """Resets the requests for a query, which this query fulfils."""
         self.query_needed.clear()
         self.query_now.clear()
         self.event_values.clear()
 
 
 async def within(event: asyncio.Event, longest_s: float | None) -> None:
-    """Waits for an event, or until this time is up."""
+    """Waits for an event, at most `longest_s` seconds (None: no limit)."""
     try:
         async with asyncio.timeout(longest_s):
             await event.wait()

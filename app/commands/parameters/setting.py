@@ -1,4 +1,5 @@
-"""Setting a parameter by ROS 2's `set_parameters`: the request, and what its response says. Pure."""
+"""Setting a parameter by ROS 2's `set_parameters`: the request, and the outcome in its response.
+Pure."""
 
 import time
 from functools import partial
@@ -17,7 +18,7 @@ SET_PATHS: Final = ("results[0].successful", "results[0].reason", "results[1].su
 
 
 def set_request(interfaces: Interfaces, widget: Parameter, value: Value) -> Request:
-    """The request that sets one parameter, with what reads its response."""
+    """The request that sets one parameter, with the function that reads its response."""
     service, type_name = SET
     fields = {"parameters": [{"name": widget.parameter, "value": encode_value(widget, value)}]}
     payload = interfaces.encode(interfaces.service_types(type_name)[0], fields)
@@ -26,7 +27,7 @@ def set_request(interfaces: Interfaces, widget: Parameter, value: Value) -> Requ
 
 
 def _answer(widget: Parameter, value: Value, response: Fields) -> Outcome:
-    """What a response of SetParameters says of the one parameter that was to be set."""
+    """The outcome in a response of SetParameters for one parameter."""
     now = format_time(time.time())
     successful, reason, second = (response.get(path) for path in SET_PATHS)
     if successful is None or second is not None:

@@ -1,9 +1,9 @@
-"""The parameters of a robot's nodes: read when a node is there, followed by its events, and set.
+"""Keeps the parameters of a robot's nodes up to date by queries and events, and sets them.
 
-A node is asked when its services appear in the graph, once more when events must have been flowing
-for a while, after a set, and where an event may have been missed; never twice at a time. One that did
-not answer is asked again only when someone wants it: each question makes a node on Fast DDS print an
-error. What was asked of a bridge or a node that went away in the meantime no longer counts.
+A node is queried when its services appear in the graph, once more when its events surely arrive, after
+a set, and if an event may have been missed; never twice at a time. A node that did not respond is
+queried again only on demand: each request makes a node on Fast DDS print an error. Responses by way of
+a bridge or node that was lost in the meantime are ignored.
 """
 
 import asyncio
@@ -36,15 +36,15 @@ log = logging.getLogger("kiosk.parameters")
 
 Read = Literal["whole", "partly", "silent"]
 
-FAILED: Final = "following a node's parameters failed"
-SETTLE_S: Final = SERVER_SETTLE_S  # before which a question to a node that appeared may be lost
-CONFIRM_S: Final = 3.0  # after which the bridge surely brings the events of a node that appeared
-AGAIN_S: Final = 1.0  # between two readings at least, and before the first try again
-AGAIN_MOST_S: Final = 600.0  # the pause between tries doubles up to this
+FAILED: Final = "updating a node's parameters failed"
+SETTLE_S: Final = SERVER_SETTLE_S  # earlier requests to a node that has just appeared may be lost
+CONFIRM_S: Final = 3.0  # after this time the bridge surely forwards the events of a new node
+AGAIN_S: Final = 1.0  # at least between two queries, and before the first retry
+AGAIN_MOST_S: Final = 600.0  # the pause between retries doubles up to this
 
 
 class ParameterSync:
-    """The parameters of one robot that its panel shows; used on the event loop only."""
+    """The parameters of one robot that its panel shows. Used on the event loop only."""
 
     def __init__(
         self,
@@ -55,7 +55,7 @@ class ParameterSync:
         calls: ServiceCalls,
         changed: Callable[[], None],
     ) -> None:
-        """`changed` is called when what the widgets show has changed."""
+        """`changed` is called when the state of a parameter has changed."""
         self._interfaces = interfaces
         self._robot = robot
         self._log = RobotLog(log, robot.name)
@@ -73,10 +73,10 @@ class ParameterSync:
             for node in self._nodes.values()
         }
 
-    # What the graph shows.
+    # Changes of the graph.
 
     def on_token_lost(self, endpoint: Endpoint) -> None:
-        """An endpoint's token ended, be it for a moment: its node may be another one now."""
+        """An endpoint's token ended, possibly for a moment: the node may have been replaced."""
         if endpoint.role is None:
             for node in self._nodes.values():
                 self._cut(node)
@@ -84,7 +84,8 @@ class ParameterSync:
             self._cut(lost)
 
     def on_graph_change(self) -> None:
-        """After every change of the graph: asks the nodes that are there now."""
+        """Starts to query new nodes and stops for lost ones. Call it after every change of the
+        graph."""
         for node in self._nodes.values():
             offered = parameters_offered(node.name, self._robot) is None
             if not (offered and self._robot.graph.bridges):
@@ -93,7 +94,7 @@ class ParameterSync:
                 node.task = spawn_logged(self._keep_updated(node), self._log, FAILED)
 
     async def stop(self) -> None:
-        """Ends its tasks."""
+        """Ends the tasks."""
         tasks = [node.task for node in self._nodes.values() if node.task is not None]
         for task in tasks:
             task.cancel()
@@ -107,10 +108,10 @@ class ParameterSync:
         self._end_query(node)
         self._known.mark_cut(node.widgets)
 
-    # What the node tells.
+    # Queries and events.
 
     def on_event(self, sample: Sample) -> None:
-        """An event of some node's: takes the values that changed; what it may hide is asked for."""
+        """Applies a parameter event of any node. Queries the nodes if an event may have been missed."""
         passed_on = sample.source is None or sample.source in self._robot.graph.bridges
         if not (self._nodes and passed_on):
             return
@@ -122,11 +123,11 @@ class ParameterSync:
             self._log.debug("%s", error)
             self._query_all()
             return
-        if (teller := self._nodes.get(event.node)) and teller.task is not None:
-            self._apply_event(teller, event, sample.wall)
+        if (node := self._nodes.get(event.node)) and node.task is not None:
+            self._apply_event(node, event, sample.wall)
 
     def _query_all(self) -> None:
-        """Whatever an event said that no one read: its node may be any."""
+        """Queries all nodes: an event was missed, and its node is unknown."""
         for node in self._nodes.values():
             node.query_needed.set()
 
@@ -144,7 +145,7 @@ class ParameterSync:
                 node.query_needed.set()
 
     async def _keep_updated(self, node: Node) -> None:
-        """Asks a node, as often as there is need, until it is cut off."""
+        """Queries a node whenever needed, until the task is canceled."""
         confirmed, pause = False, AGAIN_S
         await asyncio.sleep(SETTLE_S)
         while True:
@@ -162,21 +163,21 @@ class ParameterSync:
                     confirmed, pause = True, AGAIN_S
 
     async def _read(self, node: Node) -> Read:
-        """Asks for all of a node's parameters: whether it told all, not all, or nothing."""
+        """Queries all of a node's parameters; returns whether it sent all, some, or nothing."""
         self._robot.querying |= {widget.id for widget in node.widgets}
         self._changed()
         try:
             return await self._query(node)
         finally:
-            if node.task is asyncio.current_task():  # else it was cut off, and may be asked again
+            if node.task is asyncio.current_task():  # else it was canceled, and another task may query
                 self._end_query(node)
                 self._changed()
 
     async def _query(self, node: Node) -> Read:
         names = list(dict.fromkeys(widget.parameter for widget in node.widgets))
         try:
-            asked = self._services.read(node.name, names, partial(self._silent, node))
-            descriptors, values = await asked
+            reading = self._services.read(node.name, names, partial(self._silent, node))
+            descriptors, values = await reading
         except NoResponse as error:
             return "partly" if error.dropped else "silent"
         except DecodeError as error:
@@ -186,7 +187,7 @@ class ParameterSync:
             return "partly"
         node.answered_at = time.monotonic()
         self._calls.mark_answered(f"{node.name}/{SET[0]}")
-        values |= node.event_values  # told after it was asked
+        values |= node.event_values  # newer than the query
         for widget in node.widgets:
             name = widget.parameter
             found = read_parameter_state(widget, descriptors.get(name), values.get(name), time.time())
@@ -199,8 +200,8 @@ class ParameterSync:
         self._robot.querying -= {widget.id for widget in node.widgets}
 
     def read_again(self, widget: Parameter) -> TextLike:
-        """Asks the node of a parameter once more, unless it is being asked or has just answered; why it
-        can't be, or "". However often anyone wants it, a node has no more than `AGAIN_S` allows."""
+        """Queries the node of a parameter again, unless a query runs or it has just responded: a node
+        gets at most one query per `AGAIN_S` on demand. Returns why it can't be queried, else ""."""
         node = self._nodes[widget.node]
         if node.task is None:
             return say("no_parameters", node=widget.node)
@@ -212,7 +213,7 @@ class ParameterSync:
     # Setting.
 
     def check_value(self, widget: Parameter, given: Any) -> Value:
-        """The value to set; InputError with a sentence that names label and limits."""
+        """The value to set; InputError with the label and the limits."""
         return check_value(widget, self._known.state(widget), given)
 
     async def set(
@@ -223,7 +224,7 @@ class ParameterSync:
         corrected: OnCorrection,
         final_check: FinalCheck = no_check,
     ) -> Outcome:
-        """Sets a parameter, as a call does; whatever came of it, the node is asked how it is now."""
+        """Sets a parameter by a service call, then queries the node, whatever the outcome."""
         request = set_request(self._interfaces, widget, value)
         node = self._nodes[widget.node]
 

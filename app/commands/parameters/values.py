@@ -1,4 +1,4 @@
-"""The value that a parameter is set to: from what was entered or chosen, and checked. Pure."""
+"""Checks and converts the entered value of a parameter. Pure."""
 
 import math
 import re
@@ -23,7 +23,7 @@ WHOLE: Final = re.compile(r"\s*[+-]?[0-9]{1,19}\s*", re.ASCII)
 
 
 def check_value(parameter: Parameter, known: ParameterState, given: Any) -> Value:
-    """The value to set; InputError names the label and what it may be."""
+    """The value to set; InputError with the label and the limits."""
     if parameter.options:
         given = _chosen(parameter, given)
     if not parameter.is_list:
@@ -38,7 +38,7 @@ def check_value(parameter: Parameter, known: ParameterState, given: Any) -> Valu
 
 
 def _chosen(parameter: Parameter, given: Any) -> Any:
-    """The value of the option that was given by its value or its key."""
+    """The value of an option, given by its value or its key."""
     option = parameter.find_option(given) or next(
         (one for one in parameter.options if one.key == given), None
     )
@@ -51,7 +51,7 @@ def _chosen(parameter: Parameter, given: Any) -> Any:
 
 
 def _several(parameter: Parameter, known: ParameterState, given: Any) -> list[Any]:
-    """What was entered with commas between; a program gives a list."""
+    """The elements of a list: from text with commas, or from a program's list."""
     if isinstance(given, list):
         return given
     try:
@@ -124,7 +124,7 @@ def _number(parameter: Parameter, known: ParameterState, label: TextLike, given:
 
 
 def _whole(given: Any) -> int | None:
-    """An int64: as a number, or as text where a browser's numbers are not exact."""
+    """An int64, given as a number, or as text beyond the exact range of a browser's numbers."""
     if isinstance(given, str) and WHOLE.fullmatch(given):
         given = int(given)
     if isinstance(given, float) and given.is_integer():
