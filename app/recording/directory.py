@@ -23,10 +23,10 @@ def recording_name(moment: float, robot: str, widget: str) -> str:
 class RecordingDirectory:
     """The folder of recordings. Its methods raise OSError if it can't be used."""
 
-    def __init__(self, path: Path, most: int) -> None:
-        """`most` is the limit in bytes for finished and unfinished files together."""
+    def __init__(self, path: Path, max_bytes: int) -> None:
+        """`max_bytes` is the limit for finished and unfinished files together."""
         self.path = path
-        self._max_bytes = most
+        self._max_bytes = max_bytes
 
     def open(self) -> None:
         """Creates the folder, and finishes the files that an earlier process left."""
@@ -34,10 +34,10 @@ class RecordingDirectory:
         self.make_room(0)
         for left in sorted(self.path.glob(f"*{UNFINISHED}")):
             if left.name.endswith(f".recovered{UNFINISHED}"):
-                left.unlink()  # it is recovered again from its source
+                left.unlink()  # recovered again from its source below
         for left in sorted(self.path.glob(f"*{UNFINISHED}")):
             if found := recover(self.path, left):
-                log.warning("%s was left unfinished and is recovered as far as it goes", found)
+                log.warning("%s was unfinished; its readable part is recovered", found)
         self.make_room(0)
 
     def make_room(self, size: int) -> None:

@@ -21,7 +21,7 @@ PRESS_TOPIC: Final = "/web_ui/presses"
 PRESS_SCHEMA: Final[Mapping[str, Any]] = {
     "$schema": "https://json-schema.org/draft/2020-12/schema",
     "title": "web_ui/Press",
-    "description": "A press when it is made, and again with what came of it.",
+    "description": "A press when it is made, and again with its result.",
     "type": "object",
     "properties": {
         "id": {"type": "string"},

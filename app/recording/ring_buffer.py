@@ -31,11 +31,11 @@ def to_buffered(key: str, sample: Sample) -> Buffered:
 
 
 class RingBuffer:
-    """The newest samples: at most `longest_s` seconds and `most` bytes."""
+    """The newest samples: at most `max_age_s` seconds and `max_bytes` bytes."""
 
-    def __init__(self, longest_s: float, most: int) -> None:
-        self._max_age_s = longest_s
-        self._max_bytes = most
+    def __init__(self, max_age_s: float, max_bytes: int) -> None:
+        self._max_age_s = max_age_s
+        self._max_bytes = max_bytes
         self._samples: deque[Buffered] = deque()
         self.size = 0
 
@@ -47,8 +47,7 @@ class RingBuffer:
         self._drop_old(one.sample.at)
 
     def recent(self, now: float) -> Iterator[Buffered]:
-        """The samples that are not older than `longest_s` at `now` (monotonic seconds), oldest
-        first."""
+        """The samples that are at most `max_age_s` old at `now` (monotonic seconds), oldest first."""
         self._drop_old(now)
         yield from self._samples
 

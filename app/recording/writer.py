@@ -202,7 +202,7 @@ class Recording:
             return
         if self._dropped:
             self._file.add_metadata("left_out", {"samples": str(self._dropped)})
-            log.warning("%d samples were left out: too many or too large", self._dropped)
+            log.warning("%d samples were not recorded: too many or too large", self._dropped)
         path = self._file.finish()
         self._file = None
         log.info("recorded %s", path)

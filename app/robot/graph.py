@@ -78,12 +78,12 @@ class Graph:
         namespace: str | None = None,
         keys: Collection[str] | None = None,
     ) -> None:
-        """`namespace` distinguishes this robot's bridges from others; None: all are its. Of tokens for
-        other keys than `keys` nothing is kept; None: all are."""
+        """`namespace` distinguishes this robot's bridges from others; None: all bridges belong to it.
+        Only tokens for `keys` are kept; None: all."""
         self._dialect = dialect
-        self.own_zid = own_zid  # whose tokens are not the robot's
+        self.own_zid = own_zid  # of the panel's session: its tokens are ignored
         self._relevant_names = None if keys is None else frozenset(map(dialect.in_token, keys))
-        self.cache: dict[Any, Any] = {}  # see `remembered`
+        self.cache: dict[Any, Any] = {}  # see `cached_until_change`
         self._namespace = namespace
         self._bridges: set[str] = set()
         self._namespace_matches: dict[str, bool] = {}  # whether a bridge's namespace is the robot's
@@ -94,20 +94,20 @@ class Graph:
         self._bridge_versions: Mapping[str, str] | None = None
 
     def is_relevant(self, token_key: str) -> bool:
-        """Whether a token is a bridge's own, or about one of the keys that count."""
+        """Whether a token is a bridge's own, or for one of the keys that are kept."""
         if self._relevant_names is None:
             return True
         name = self._dialect.name_in(token_key)
         return not name or name in self._relevant_names
 
     def has_token(self, token_key: str) -> bool:
-        """Whether a token is there by all that was taken."""
+        """Whether a token has been applied and has not ended."""
         endpoint = self._dialect.endpoint(token_key)
         return endpoint is not None and token_key in self._tokens.get(endpoint.key, {})
 
     def apply_token(self, token_key: str, alive: bool, now: float = -math.inf) -> str | None:
-        """Takes one token's appearance (`now`, monotonic seconds) or end; returns the zid of a
-        bridge that came or went."""
+        """Applies a token's appearance (`now`, monotonic seconds) or end; returns the zid of a bridge
+        that appeared or was lost."""
         endpoint = self._dialect.endpoint(token_key) if self.is_relevant(token_key) else None
         if endpoint is None or endpoint.zid == self.own_zid:
             return None

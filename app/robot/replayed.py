@@ -1,43 +1,42 @@
-"""Messages that may be latched ones, sent again: their age is unknown.
+"""Messages that may be replayed latched messages of unknown age.
 
-A publisher that is TRANSIENT_LOCAL keeps its last messages, and DDS sends them to every reader that is
-new to it: when the bridge makes its reader, or discovers the publisher, which may take seconds. The
-bridge stamps them with the time at which it passes them on, as it does any other message, so that
-nothing in a message shows that it is sent again. Only what comes from a cache of the bridge's own is
-known to be.
+A TRANSIENT_LOCAL publisher keeps its last messages, and DDS sends them to every new reader: when the
+bridge creates its reader, or discovers the publisher, which may take seconds. The bridge stamps them
+with the time of forwarding, as any message, so a replayed message looks like a new one. Only messages
+from the bridge's own cache are known to be replayed.
 
-So the first message since a reader or a publisher was new, whenever it comes, shows the value, but not
-since when; and so do all that come within `REPLAY_S` of it, as a publisher may keep several and DDS
-sends them one after the other. The next message of a periodic publisher is believed.
+So the age of the first message after a new reader or publisher is unknown, whenever it arrives. The
+same holds for all messages within `REPLAY_S` of it, as a publisher may keep several. Later messages of
+a periodic publisher count as new.
 """
 
 import math
 from typing import Final
 
-REPLAY_S: Final = 1.0  # from the first message of what is sent again to the last, at most
+REPLAY_S: Final = 1.0  # at most, from the first replayed message to the last
 
 
 class ReplayedMessages:
-    """Of one robot; times in monotonic seconds."""
+    """The replayed messages of one robot; times in monotonic seconds."""
 
     def __init__(self) -> None:
-        self._first: dict[str, float] = {}  # by topic's key: when the first message came since
+        self._first: dict[str, float] = {}  # by key: the arrival of the first message
         self._last: dict[str, float] = {}
 
     def record_message(self, key: str, at: float, joined_at: float, cached: bool) -> None:
-        """A message came at `at`; the graph was joined at `joined_at`."""
+        """A message arrived at `at`; the graph was joined at `joined_at`."""
         first = self._first.get(key)
         if cached or first is None or first < joined_at <= at:
             self._first[key] = at
         self._last[key] = at
 
     def begin(self, key: str, at: float = math.inf) -> None:
-        """A reader or a publisher is new since `at`: what comes from then on may be sent again. By
-        default, what comes next."""
+        """A new reader or publisher appeared at `at`: messages from then on may be replayed. By
+        default, the next messages."""
         if self._last.get(key, -math.inf) >= at:
             self._first[key] = self._last[
                 key
-            ]  # a later one than the first may have been: the safe side
+            ]  # the first one may have been earlier: this is the safe side
         else:
             self._first.pop(key, None)
 
@@ -47,5 +46,5 @@ class ReplayedMessages:
         self._last.clear()
 
     def known_since(self, key: str) -> float:
-        """From when on a message of this topic was surely published when it came; inf for never yet."""
+        """The time from which messages of this topic are surely new; inf before the first one."""
         return self._first.get(key, math.inf) + REPLAY_S

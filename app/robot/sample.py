@@ -21,12 +21,11 @@ class SkippedPayload(NamedTuple):
 class Sample(NamedTuple):
     """One received message: `at` in monotonic seconds, `wall` in seconds since the epoch.
 
-    `source` is the zid of the bridge that sent it (from its timestamp), None if it did not say;
-    `seq` orders samples and losses of bridges as this session saw them; `skipped` is how many came
-    just before it that were not read; `sent` is the timestamp of its sender's clock, in seconds
-    since the epoch; `skipped_payloads` are other payloads that came and went unseen, for watched
-    topics, and `overrun` says that there were more before these, with unknown content. `cached` is
-    one of a cache: it was published before, at an unknown time.
+    `source` is the zid of the bridge that sent it (from its timestamp), None if unknown. `seq` orders
+    samples and losses of bridges as this session received them. `sent` is the timestamp of the sender's
+    clock, in seconds since the epoch. `skipped` is the number of messages just before it that were not
+    read; for watched topics `skipped_payloads` are their payloads, and `overrun` is true if there were
+    even more. `cached`: it is from a cache, published at an unknown time.
     """
 
     payload: Buffer

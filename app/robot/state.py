@@ -50,14 +50,14 @@ class RobotState:
         entry: RobotEntry | None = None,
         slices: Slices | None = None,
     ) -> None:
-        """`own_zid` is of the panel's session. `entry` is which of the panel's robots this is, where
-        it has several; `slices` is of all that is read on one event loop."""
+        """`own_zid` is that of the panel's session. `entry` is this robot's entry if the panel has
+        several robots. `slices` is shared by everything that is decoded on one event loop."""
         self.dialect = dialect
         self.name = entry.name if entry else ""
         self.namespace = entry.namespace if entry else panel.namespace
         self.link_up = False
         self.endpoints: tuple[str, ...] = ()  # the bridge's, as Zenoh names them
-        self.settled_at = math.inf  # monotonic: when a new bridge will have set up its routes
+        self.settled_at = math.inf  # monotonic seconds: then a new bridge has set up its routes
         self._keys: dict[str, str] = {}  # ROS name → key expression
         self._own_namespace = entry.namespace if entry else None
         needed = list(required_endpoints(panel))
@@ -67,12 +67,10 @@ class RobotState:
         self._interlock_keys = frozenset(self.key(interlock.topic) for interlock in panel.interlocks)
         self.silent_publishers = SilentPublishers(self._interlock_keys)
         self.replayed = ReplayedMessages()
-        self.command_status: dict[str, CommandStatus] = {}  # of what widgets have asked, by their ids
-        self.parameters: dict[
-            str, ParameterState
-        ] = {}  # what nodes said of them, by their widgets' ids
-        self.querying: set[str] = set()  # ids of parameter widgets whose nodes are being asked
-        self.held_since: dict[str, Text] = {}  # by the ids of hold widgets: since when, in words
+        self.command_status: dict[str, CommandStatus] = {}  # by widget id
+        self.parameters: dict[str, ParameterState] = {}  # by widget id
+        self.querying: set[str] = set()  # ids of parameter widgets whose nodes are being queried
+        self.held_since: dict[str, Text] = {}  # by hold widget id: the sentence with the time
         self._log = RobotLog(log, self.name)
         self.is_responding = True  # False: its bridges do not respond
         self.is_caught_up = True  # False: the event loop stalled, and the inbox has not been read yet
@@ -123,7 +121,7 @@ class RobotState:
             topic.update(sample)
 
     def mark_bridge_lost(self, bridge: str, seq: int) -> None:
-        """A bridge went away at `seq`: what came by it before no longer says what is so."""
+        """A bridge was lost at `seq`: its earlier samples are no longer valid."""
         self.silent_publishers.remove_bridge(bridge)
         for key, topic in self._topics.items():
             sample = topic.sample

@@ -1,1 +1,1 @@
-"""One session per robot, and the fleet: wires robot, permission, view, commands and transport."""
+"""One session per robot, and the fleet. Connects robot, permission, view, commands and transport."""

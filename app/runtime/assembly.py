@@ -1,4 +1,4 @@
-"""What a server is made of, opened and closed in its order: operator's log, recordings, robots."""
+"""Opens and closes the parts of a server in order: operator's log, recordings, robots."""
 
 import asyncio
 import logging
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger("kiosk")
 
-# (namespace, distribution) → a simulated robot that runs while it is entered, by its endpoint.
+# (namespace, distribution) → a context in which a simulated robot runs; its value is the endpoint.
 SimulatedRobot = Callable[[str, str], AbstractContextManager[str]]
 
 
@@ -28,7 +28,7 @@ def mode_of(settings: Settings, panel: Panel) -> Mode:
 
 
 def check_zenoh(settings: Settings, panel: Panel) -> None:
-    """Raises KioskError for a Zenoh configuration that can't be used."""
+    """KioskError if the Zenoh configuration can't be used."""
     if mode_of(settings, panel) == "live":
         for entry in panel.robots or (None,):
             config_from(settings.zenoh, entry.connect if entry else ())
@@ -36,7 +36,7 @@ def check_zenoh(settings: Settings, panel: Panel) -> None:
 
 @asynccontextmanager
 async def open_log(settings: Settings, panel: Panel) -> AsyncIterator[OperatorLog | NullLog]:
-    """The operator's log; FolderInUse where another server has its folder."""
+    """The operator's log; FolderInUse if another server has its folder."""
     mode, rules = mode_of(settings, panel), panel.log
     folder = settings.data_folder(mode)
     oplog: OperatorLog | NullLog = NullLog(folder)
@@ -58,7 +58,7 @@ async def open_fleet(
     oplog: OperatorLog | NullLog,
     simulated_robot: SimulatedRobot,
 ) -> AsyncIterator[Fleet]:
-    """The robots of the panel, real or simulated. `revision` is of all that a page loads."""
+    """The robots of the panel, real or simulated. `revision` is that of the page's files."""
     demo = mode_of(settings, panel) == "demo"
     with ExitStack() as stack:
 
@@ -85,7 +85,7 @@ async def open_fleet(
 
 
 def _recordings(settings: Settings, panel: Panel) -> "Recordings | None":
-    """Imported only where the panel records: what writes MCAP takes time and memory."""
+    """Imports the MCAP writer only if the panel records: it takes time and memory."""
     if panel.record is None:
         return None
     from app.recording import Recordings

@@ -1,7 +1,7 @@
-"""The robots of one panel: each has a session of its own, with its own link, state and presses.
+"""The robots of one panel. Each has its own session, with its own link, state and presses.
 
-They share nothing that can fail: a lost bridge, a renewed session or a flood is one robot's. Each
-page shows how the others are.
+Sessions are isolated: a lost bridge, a renewed session or a flood affects only one robot. Each page
+shows the link status of the other robots.
 """
 
 import asyncio
@@ -47,22 +47,22 @@ class Fleet:
             )
 
     async def start(self) -> None:
-        """Opens every link; whether anyone is there shows later."""
+        """Starts all sessions. Does not wait for the robots."""
         for session in self.sessions:
             await session.start()
 
     async def stop(self) -> None:
-        """Ends the streams and the sessions of all."""
+        """Ends all streams and sessions."""
         self.close()
         await asyncio.gather(*(session.stop() for session in self.sessions))
 
     def close(self) -> None:
-        """Ends holds and streams: what would keep the process from its end, or go on after it."""
+        """Ends holds and streams, which would delay the shutdown."""
         for session in self.sessions:
             session.close()
 
     def cancel_all(self) -> None:
-        """Ends the waiting of what was pressed."""
+        """Ends all waiting presses; their outcome is unknown."""
         for session in self.sessions:
             session.presses.cancel_all()
 
@@ -72,7 +72,7 @@ class Fleet:
 
     @property
     def state(self) -> TextLike:
-        """How the way to each robot is, in words."""
+        """The state of the link to each robot, as text."""
         states = [
             (session.robot.name, session.link_verdict.reason or say("ready"))
             for session in self.sessions
@@ -84,7 +84,7 @@ class Fleet:
         return self.sessions[0]
 
     def session(self, robot: str | None) -> RobotSession:
-        """The session of a robot; None is the one without a name. NotFound says which there are."""
+        """The session of a robot; None for the robot without a name. NotFound lists the robots."""
         if robot in self._sessions:
             return self._sessions[robot]
         if robot is None:
@@ -92,7 +92,7 @@ class Fleet:
         known = ", ".join(str(name) for name in self._sessions if name) or "one robot without a name"
         raise NotFound(f'there is no robot "{robot:.64}" on this panel; there is {known}')
 
-    # What each robot's session needs of the others (`refresh.OtherRobots`).
+    # The protocol `refresh.OtherRobots`, for each robot's session.
 
     def link_statuses(self) -> Mapping[str, Lamp]:
         return {entry: k.refresher.lamp for entry, k in self._sessions.items() if entry is not None}

@@ -1,6 +1,6 @@
-"""What arrived since the last turn becomes the robot's state: samples first, then tokens.
+"""Applies what has arrived since the last turn to the robot's state: samples first, then tokens.
 
-Knows nothing of what is shown, and judges no hold: see `turn`.
+Holds, confirmations and the view follow in `turn`.
 """
 
 import logging
@@ -31,12 +31,12 @@ Change = Literal["", "soon", "now"]
 
 @dataclass(slots=True)
 class Updates:
-    """What has changed: `urgent` is a permission or the graph; `values` are the topics (their keys)
-    with a new message, and `more` is whatever else can wait for the next frame. `readings` are the
-    messages (topic's key, reading) by which a command may be confirmed.
+    """The changes of a turn. `urgent`: a permission or the graph has changed; `values`: the keys of
+    topics with a new message; `other`: another change that can wait for the next frame. `readings` are
+    messages (topic's key, reading) that may confirm a command.
 
-    `graph` says that tokens changed, `came` that there is a bridge where there was none; `found` and
-    `lost` are the zids of bridges.
+    `graph`: tokens have changed; `bridge_appeared`: there was no bridge before. `bridges_found` and
+    `bridges_lost` are zids.
     """
 
     urgent: bool = False
@@ -49,13 +49,13 @@ class Updates:
     bridges_lost: list[str] = field(default_factory=list)
 
     def step(self) -> "Updates":
-        """What has changed a permission in between; each change is given once."""
+        """The update for an intermediate permission. Each reading is returned once."""
         readings, self.readings = self.readings, []
         return Updates(urgent=True, readings=readings)
 
 
 class Ingest:
-    """Of one robot; on the event loop only."""
+    """Ingests the data of one robot. Used on the event loop only."""
 
     def __init__(
         self,
@@ -80,16 +80,16 @@ class Ingest:
             for of in panel.interlocks
         }
         self._events = robot.key(EVENTS)
-        # What is judged by them is judged by each value that they had, however short.
+        # Every message of these topics counts, also values that were replaced within one turn.
         self.watched = self._interlocks.keys() | {robot.key(one.topic) for one in panel.confirmations()}
         self.prompt = self.watched | self._status.keys() | {self._events}
         self.whole = frozenset() if recorder is None else recorder.keys
 
     def steps(self, changes: Changes) -> Iterator[Updates]:
-        """Takes it in, step by step: yields after each value in between that changed a permission, and
-        at the end. At each step the robot's state is the one to judge by."""
+        """Ingests changes step by step: yields after each intermediate value that changed a permission,
+        and at the end. At each step the robot's state is up to date."""
         updates = Updates(urgent=bool(changes.tokens), graph=bool(changes.tokens))
-        # What permits and forbids comes first, and nothing that fails keeps it from being taken in.
+        # Interlocks first: a failure in another topic must not delay them.
         ordered = sorted(changes.samples.items(), key=lambda one: one[0] not in self._interlocks)
         for key, sample in ordered:
             if sample.overrun and key in self._interlocks:
@@ -111,11 +111,11 @@ class Ingest:
         yield updates
 
     def late_reading(self, key: str, reading: Reading) -> Updates:
-        """A message that took more than one turn is read."""
+        """The update for a message that took more than one turn to decode."""
         return Updates(urgent=key in self._interlocks, values={key}, readings=[(key, reading)])
 
     def _ingest(self, key: str, sample: Sample, updates: Updates) -> Change:
-        """Takes a sample in; whether a permission is another one by it."""
+        """Ingests a sample; returns whether it changed a permission."""
         now = time.monotonic()
         before = self._verdicts(key, now)
         self._guarded(key, sample, lambda key, sample: self._apply(key, sample, updates))
@@ -124,7 +124,7 @@ class Ingest:
         return "now" if "now" in changes else "soon" if "soon" in changes else ""
 
     def _verdicts(self, key: str, now: float) -> list[Verdict]:
-        """Of the interlocks on a topic."""
+        """The verdicts of the interlocks on a topic."""
         return [interlock_verdict(one, self._robot, now) for one in self._interlocks.get(key, ())]
 
     def _record(self, changes: Changes) -> None:
@@ -136,7 +136,7 @@ class Ingest:
         try:
             take(key, sample)
         except Exception:
-            self._log.exception("a sample of %s was not taken in whole", key)
+            self._log.exception("a sample of %s was not processed completely", key)
 
     def _apply(self, key: str, sample: Sample, updates: Updates) -> None:
         if key in self._feedback:
@@ -151,7 +151,7 @@ class Ingest:
                 updates.readings.append((key, self._robot.reading_by_key(key)))
 
     def _apply_tokens(self, tokens: Mapping[str, Token], updates: Updates) -> None:
-        """Takes them in."""
+        """Applies token changes to the graph and to the robot's state."""
         now, graph = time.monotonic(), self._robot.graph
         had_bridge = bool(tokens and graph.bridges)
         for key, token in tokens.items():
@@ -166,18 +166,20 @@ class Ingest:
                 updates.bridges_lost.append(zid)
                 had_bridge = had_bridge and bool(graph.bridges)
             if token.lost_seq and token.alive:
-                self._robot.update_publishers(token.lost_seq)  # gone, be it for a moment
+                self._robot.update_publishers(token.lost_seq)  # gone, possibly for a moment
             if token.alive and (zid := graph.apply_token(key, True, now)):
                 updates.bridges_found.append(zid)
         updates.bridge_appeared = bool(updates.bridges_found) and not had_bridge
 
     def _track_publisher(self, key: str, token: Token, endpoint: Endpoint) -> None:
-        """Whether a publisher has appeared, be it for a moment: until it publishes, what it permits is
-        unknown."""
+        """Tracks publishers that appear, possibly for a moment: until they publish, permissions on
+        their topics are unknown."""
         graph, silent_publishers = self._robot.graph, self._robot.silent_publishers
         if endpoint.zid == graph.own_zid:
             return
-        if token.came_seq and (token.lost_before or not graph.has_token(key)):  # else it came twice
+        if token.came_seq and (
+            token.lost_before or not graph.has_token(key)
+        ):  # else the token was received twice
             silent_publishers.add_publisher(endpoint, token.came_seq, token.came_at, token.lost_before)
             if endpoint.role == "MP" and endpoint.transient_local:
                 self._robot.replayed.begin(endpoint.key, token.came_at)
@@ -186,7 +188,8 @@ class Ingest:
 
 
 def _change(before: Verdict, verdict: Verdict) -> Change:
-    """A reason with the robot's value in it may change as often as a readout, and waits as one."""
+    """How urgent a change of a verdict is. A reason that contains the robot's value may change as often
+    as a readout, so it waits for a frame as a readout does."""
     if (before.permitted, before.reason) == (verdict.permitted, verdict.reason):
         return ""
     return "soon" if verdict.code == "unmet" and not before.permitted else "now"

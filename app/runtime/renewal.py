@@ -1,4 +1,4 @@
-"""A new Zenoh session in place of one that was lost, tried until there is one."""
+"""Replaces a lost Zenoh session, with retries."""
 
 import asyncio
 import logging
@@ -14,7 +14,7 @@ RENEW_AGAIN_S: Final = 1.0
 
 
 class Renewal:
-    """Of one robot's session; on the event loop only."""
+    """Renews one robot's Zenoh session. Used on the event loop only."""
 
     def __init__(self, link: ZenohSession, robot: RobotState) -> None:
         self._link = link
@@ -25,24 +25,24 @@ class Renewal:
         self._stopped = False
 
     def begin(self) -> None:
-        """Opens a new session, in a thread; once more where one is being opened already."""
+        """Opens a new session in a thread; another one afterwards if one is being opened already."""
         self._lost = True
         if self._renewing is None:
             self._renewing = asyncio.get_running_loop().create_task(self._renew())
 
     async def stop(self) -> None:
-        """Waits for the session that is being opened."""
+        """Waits for a session that is being opened."""
         self._stopped = True
         if self._renewing is not None:
             await asyncio.gather(self._renewing, return_exceptions=True)
 
     async def _renew(self) -> None:
-        """Until there is a session that was not lost while it was opened."""
+        """Retries until a session is open that was not lost in the meantime."""
         while self._lost and not self._stopped:
             self._lost = False
             try:
                 await asyncio.to_thread(self._link.renew)
-            except Exception as error:  # whatever Zenoh makes of it: without a session all is locked
+            except Exception as error:  # any error of Zenoh: without a session everything stays locked
                 self._log.error("%s", error)
                 self._lost = True
                 await asyncio.sleep(RENEW_AGAIN_S)

@@ -1,4 +1,4 @@
-"""All by which one robot is commanded: presses and holds, and what they are made of."""
+"""Wires the commands of one robot: presses, holds and their trackers."""
 
 import asyncio
 from collections.abc import Callable
@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 
 
 class RobotCommands:
-    """Opened by `start`, ended by `close` and `stop`; on the event loop only."""
+    """The commands of one robot, opened by `start`, ended by `close` and `stop`. Used on the event loop
+    only."""
 
     def __init__(
         self,
@@ -30,9 +31,9 @@ class RobotCommands:
         peer: Peer,
         press_log: PressLog,
         recorder: "Recorder | None",
-        take: Callable[[], None],
+        ingest: Callable[[], None],
     ) -> None:
-        """`take` takes in what has arrived from the robot, before anything is judged."""
+        """`ingest` applies what has arrived from the robot, before each permission check."""
         panel, interfaces, robot, link = context.panel, context.interfaces, context.robot, context.link
         changed = context.changed
         self.calls = ServiceCalls(interfaces, robot, link, changed)
@@ -48,36 +49,36 @@ class RobotCommands:
             Trackers(self.calls, self.actions, self.confirmations, self.parameters),
             reached=peer.flushed,
         )
-        latest = Arrivals(take, lambda: link.hurried)
-        judge = PressJudge(panel, robot, latest)
+        arrivals = Arrivals(ingest, lambda: link.hurried)
+        judge = PressJudge(panel, robot, arrivals)
         self.presses = Presses(judge, self.dispatcher, press_log, robot.name, recorder)
         self.holds = HoldController(
             panel,
             robot,
             HoldMessages(interfaces, robot, link, self.dispatcher.check_inputs),
             asyncio.get_running_loop(),
-            latest,
+            arrivals,
             changed=changed,
             recorder=recorder,
         )
 
     async def start(self) -> None:
-        """Before anything arrives: finds the goals that ran before the server's start."""
+        """Resumes goals that were sent before the server's start. Call it before anything arrives."""
         await self._recovery.start()
 
     def on_graph_change(self) -> None:
-        """After every change of the graph."""
+        """Call it after every change of the graph."""
         self.calls.on_graph_change()
         self.actions.on_graph_change()
         self.parameters.on_graph_change()
 
     def close(self) -> None:
-        """Ends holds, while there is a way to say so to the robot, and presses."""
+        """Ends holds, while their stop messages can still be sent, and refuses presses."""
         self.holds.close()
         self.presses.close()
 
     async def stop(self) -> None:
-        """Ends its tasks; goals go on in the robot."""
+        """Ends the tasks. Goals continue on the robot."""
         await self._recovery.stop()
         await self.actions.stop()
         await self.parameters.stop()

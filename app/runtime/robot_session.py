@@ -1,6 +1,6 @@
-"""A session with one robot: its link, view and presses, and how they are wired.
+"""A session with one robot: wires its link, view and presses.
 
-Down: the inbox wakes the loop → `Turn` → robot, holds, confirmations, view → streams.
+Data flow: the inbox wakes the event loop → `Turn` → robot, holds, confirmations, view → event streams.
 """
 
 import asyncio
@@ -45,7 +45,7 @@ ALONE: Final = NoOtherRobots()
 
 @dataclass(frozen=True, slots=True)
 class ServerParts:
-    """What the sessions of all robots share; `revision` is of all that a page loads."""
+    """The parts that all sessions share; `revision` is that of the page's files."""
 
     panel: Panel
     revision: str
@@ -56,7 +56,7 @@ class ServerParts:
 
 
 class RobotSession:
-    """Opened by `start`, closed by `stop`; between them everything is on the event loop."""
+    """The session with one robot, opened by `start`, closed by `stop`. Used on the event loop only."""
 
     def __init__(
         self,
@@ -67,8 +67,8 @@ class RobotSession:
         entry: RobotEntry | None = None,
         others: OtherRobots = ALONE,
     ) -> None:
-        """`access` is how the robot is reached. `entry` is which of the panel's robots this is for,
-        where it has several, `others` are then all of them."""
+        """`access` is how the robot is reached. If the panel has several robots, `entry` is this one
+        and `others` gives access to all of them."""
         panel, operators_log = server.panel, server.operators_log
         self.panel = panel
         self.entry = entry
@@ -122,7 +122,7 @@ class RobotSession:
         self._rosout = Rosout(self.robot, self.interfaces, self.link, asyncio.get_running_loop())
 
     async def start(self) -> None:
-        """Declares everything; whether anyone is there shows later."""
+        """Declares subscribers, publishers and queries. Does not wait for the robot."""
         await self._commands.start()
         self.interfaces.prepare_codecs(
             {*self.panel.subscriptions().values(), *self.panel.publications().values()}
@@ -137,7 +137,7 @@ class RobotSession:
         self._listeners.enter_context(self._operators_log.notifying(self.show))
 
     async def stop(self) -> None:
-        """Ends the streams, takes the session down; leaves no task behind."""
+        """Ends the streams, all tasks and the Zenoh session."""
         self.close()
         self._turn.stop()
         self._listeners.close()
@@ -155,12 +155,12 @@ class RobotSession:
             self._log.warning("%s", error)
 
     def close(self) -> None:
-        """Ends holds, while there is a way to say so to the robot, presses and streams."""
+        """Ends holds, while their stop messages can still be sent, presses and streams."""
         self._commands.close()
         self.publisher.close()
 
     def _recording(self, recordings: "Recordings | None") -> "Recorder | None":
-        """What records around presses, where the panel asks for it."""
+        """The recorder, if the panel file has `[record]`."""
         if recordings is None or self.panel.record is None:
             return None
         from app.recording import Recorder
@@ -171,7 +171,7 @@ class RobotSession:
         return Recorder(self.panel, rules, self.interfaces, self.robot, name, recordings)
 
     def show(self) -> None:
-        """Something has changed that permits, forbids or is shown."""
+        """Updates holds and the view. Call it after a change of a permission or of anything shown."""
         self._turn.changed()
 
     @property
@@ -182,25 +182,26 @@ class RobotSession:
         return link_verdict(self.robot, time.monotonic())
 
     async def check_readiness(self) -> Verdict:
-        """The same, when the bridges have been asked whether they run: a second at most."""
+        """`link_verdict` after a query of the bridges, which takes at most a second."""
         if not self.link_verdict.permitted or await self.peer.answers():
             return self.link_verdict
         return locked("bridge_silent") if self.link_verdict.permitted else self.link_verdict
 
     def read_again(self, widget_id: str) -> TextLike:
-        """Asks the node of a parameter for it; why it can't be asked, or "". NotFound for other ids."""
+        """Queries the node of a parameter; returns why it can't be queried, else "". NotFound for other
+        ids."""
         widget = self.dispatcher.widget(widget_id)
         if not isinstance(widget, Parameter):
             raise NotFound(f'"{widget_id}" is not a parameter: there is nothing to read')
         return self._commands.parameters.read_again(widget)
 
     def reopen(self) -> None:
-        """A new session though there is a link: what is held gets its last message by the old one."""
+        """Replaces a working Zenoh session. The old one still sends the stop messages of holds."""
         self.holds.end_all("hold_by_renewal")
         self.renew()
 
     def renew(self) -> None:
-        """A new Zenoh session: until it has joined, no endpoint is known."""
+        """Replaces the Zenoh session. Until the new one has joined, no endpoint is known."""
         self.robot.mark_link_lost()
         self._turn.on_graph_change(came=False)
         self.show()

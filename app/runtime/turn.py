@@ -1,7 +1,7 @@
 """One turn of a robot's session: inbox → robot's state → holds → confirmations → view.
 
-The order is said here and nowhere else. Holds and confirmations depend on nothing that is shown: a view
-that is slow, or that fails, keeps no hold from its end.
+Only this module defines the order. Holds and confirmations do not depend on the view: a slow or failing
+view never delays the end of a hold.
 """
 
 import asyncio
@@ -20,7 +20,7 @@ log = logging.getLogger("kiosk")
 
 
 class Turn:
-    """The turns of one robot; on the event loop only, but for `wake`."""
+    """The turns of one robot. Used on the event loop only, except `wake`."""
 
     def __init__(
         self,
@@ -39,18 +39,18 @@ class Turn:
         self._refresher = refresher
         self._log = RobotLog(log, self._robot.name)
         self._loop = asyncio.get_running_loop()
-        self._frame: asyncio.TimerHandle | None = None  # when what waits is taken
+        self._frame: asyncio.TimerHandle | None = None  # the turn that is scheduled for the next frame
         self._running = False
-        self._again = False  # something changed while a turn ran, that it may not have shown
+        self._again = False  # something changed during a turn, which may not have shown it
         self._stopped = False
 
     def stop(self) -> None:
-        """Takes nothing any more."""
+        """Runs no further turns."""
         self._stopped = True
         self._cancel_frame()
 
     def wake(self, prompt: bool) -> None:
-        """On a thread of Zenoh's; what is not prompt waits for the next frame."""
+        """Called on Zenoh's threads. Data that is not `prompt` waits for the next frame."""
         with suppress(RuntimeError):  # the loop is closed: the process ends
             self._loop.call_soon_threadsafe(self.run if prompt else self._run_by_frame)
 
@@ -61,7 +61,7 @@ class Turn:
             self._frame = self._loop.call_at(self._refresher.due, self.run)
 
     def run(self) -> None:
-        """One turn, with all that has arrived until now."""
+        """Runs a turn with everything that has arrived so far."""
         self._cancel_frame()
         if self._stopped:
             return
@@ -85,13 +85,13 @@ class Turn:
                 self._apply(updates)
 
     def run_late_reading(self, key: str, reading: Reading) -> None:
-        """The same for a message of a topic that took more than one turn to read."""
+        """Runs a turn for a message that took more than one turn to decode."""
         if not self._stopped:
             with self._turn():
                 self._apply(self._ingest.late_reading(key, reading))
 
     def changed(self) -> None:
-        """The same for what has changed by itself: of the peer, a command, or who has control."""
+        """Runs a turn after a change that no data caused: of the peer, a command, or control."""
         if self._running:
             self._again = True
             return
@@ -99,13 +99,13 @@ class Turn:
             self._apply(Updates(urgent=True))
 
     def on_graph_change(self, came: bool) -> None:
-        """After every change of the graph; `came`: there is a peer where there was none."""
+        """Updates everything after a change of the graph; `came`: there was no peer before."""
         self._robot.update_publishers()
         self._commands.on_graph_change()
         self._peer.follow(came)
 
     def _apply(self, updates: Updates) -> None:
-        """By the robot's state as it is now: holds, then confirmations, and the view last."""
+        """Updates holds, then confirmations, then the view, from the robot's current state."""
         self._commands.holds.judge()
         for key, reading in updates.readings:
             self._confirm(key, reading)
@@ -121,11 +121,11 @@ class Turn:
         try:
             self._commands.confirmations.update(key, reading)
         except Exception:
-            self._log.exception("whether %s confirms a command was not judged", key)
+            self._log.exception("checking %s for confirmations failed", key)
 
     @contextmanager
     def _turn(self) -> Iterator[None]:
-        """While it runs, what changes by it is shown by it: at its end, or in one more turn."""
+        """Marks a running turn. Changes during it are shown at its end, or in one more turn."""
         running, self._running = self._running, True
         try:
             yield

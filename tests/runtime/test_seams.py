@@ -120,7 +120,7 @@ def test_what_fails_at_a_sample_keeps_no_lock_from_closing(caplog: pytest.LogCap
     news = taken(intake.steps(changes), page)
     assert (news.urgent, news.bridge_appeared) == (True, False)
     assert robot.reading(ENABLED).value("data") is False
-    assert "was not taken in whole" in caplog.text
+    assert "was not processed completely" in caplog.text
 
 
 def test_a_permission_that_blinked_is_shown_in_between() -> None:
