@@ -191,12 +191,12 @@ class Dispatcher:
     def _put(self, widget: SinglePublish, fields: dict[str, Any], final_check: FinalCheck) -> Outcome:
         payload = self._interfaces.encode(widget.type, fields)
         key = self._robot.key(widget.topic)
-        heard = self._transport.has_reader(key)
+        has_reader = self._transport.has_reader(key)
         final_check()
         self._transport.put(key, payload)
-        sentence = "published" if heard else "sent_to_nobody"
+        sentence = "published" if has_reader else "sent_to_nobody"
         text = say(sentence, topic=widget.topic, time=format_time(time.time()))
-        return Outcome("published" if heard else "unknown", text)
+        return Outcome("published" if has_reader else "unknown", text)
 
     async def _until_reached(self, widget: SinglePublish, answer: Outcome) -> Outcome:
         """Waits for the bridge's response: until then a published message may still be lost."""

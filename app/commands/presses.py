@@ -205,10 +205,10 @@ class Presses:
             return refused("refused", why, cause)
         try:
             correct = partial(self._correct, pending)
-            look = partial(self._judge.final_check, widget, pending, context)
+            final_check = partial(self._judge.final_check, widget, pending, context)
             async with self._waits.cancellable():
                 answer = await self._dispatcher.send(
-                    widget, inputs, press_id, correct, pending.hash, look
+                    widget, inputs, press_id, correct, pending.hash, final_check
                 )
         except TimeoutError:
             return receipt(Outcome("unknown", say("server_ends")))

@@ -176,8 +176,8 @@ class ServiceCalls:
     async def _correct(self, waiting: _Waiting, reply: bytes, corrected: OnCorrection) -> None:
         request = waiting.request
         answer = await self._read(request, reply)
-        said = f"press {waiting.press_id}: late response: {answer.outcome}"
-        self._log.warning("%s: %s", said, answer.text, extra=rosout_extra(said))
+        line = f"press {waiting.press_id}: late response: {answer.outcome}"
+        self._log.warning("%s: %s", line, answer.text, extra=rosout_extra(line))
         corrected(waiting.press_id, answer)
         if self._latest.get(request.widget) == waiting.press_id:
             self._show(request, CommandStatus(outcome=answer.outcome, text=answer.text))
@@ -213,11 +213,11 @@ def _read_call(widget: Call, success: str | None, message: str | None, fields: F
     without."""
     words = [with_fields(f"{{{message}}}", fields)] if message else []
     words += [with_fields(widget.answer, fields)] if widget.answer else []
-    said = " – ".join(word for word in words if word)
+    reply = " – ".join(word for word in words if word)
     now = format_time(time.time())
     if success is None or fields.get(success):
-        return Outcome("succeeded", with_reply(say("answered", time=now), said))
-    return Outcome("rejected", with_reply(say("said_no", time=now), said))
+        return Outcome("succeeded", with_reply(say("answered", time=now), reply))
+    return Outcome("rejected", with_reply(say("said_no", time=now), reply))
 
 
 def with_reply(said: Text, reply: str) -> Text:

@@ -104,8 +104,8 @@ class GoalTracker:
         self._latest.setdefault(goal.widget.id, goal)
         self._results.begin(goal)
         self._show(goal, goal.doubt_status)
-        if (said := self._states.get(goal.widget.action)) is not None:
-            self.on_status(goal.widget.action, said)
+        if (status := self._states.get(goal.widget.action)) is not None:
+            self.on_status(goal.widget.action, status)
 
     def full(self, action: str) -> TextLike:
         """Why no further goal of an action may be sent, "" if it may."""
@@ -118,8 +118,8 @@ class GoalTracker:
             return latest if shown.can_cancel else None
         if latest is not None and latest.press_id == press_id and shown.busy:
             return latest
-        followed = (goal for goal in self._results.goals if goal.widget.id == widget.id)
-        return next((goal for goal in followed if goal.press_id == press_id), None)
+        tracked = (goal for goal in self._results.goals if goal.widget.id == widget.id)
+        return next((goal for goal in tracked if goal.press_id == press_id), None)
 
     def no_goal_reason(self, widget: Action, press_id: str) -> TextLike:
         """Why there is no goal to cancel, "" if there is one."""

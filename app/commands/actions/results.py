@@ -109,10 +109,10 @@ class ResultWaiter:
         goal.state = status if status in ENDS else UNKNOWN
         if status not in ENDS:
             return Outcome("unknown", say("goal_lost") if goal.known else say("goal_not_there"))
-        outcome, seen, asked = ENDS[status]
-        sentence = asked if goal.doubt else seen
-        said = with_fields(goal.widget.result, fields, RESULT)
-        return Outcome(outcome, with_reply(say(sentence, time=format_time(time.time())), said))
+        outcome, ended, had_ended = ENDS[status]
+        sentence = had_ended if goal.doubt else ended
+        text = with_fields(goal.widget.result, fields, RESULT)
+        return Outcome(outcome, with_reply(say(sentence, time=format_time(time.time())), text))
 
     async def _result(self, goal: Goal) -> bytes | None:
         """The reply of `get_result`, requested again if Zenoh refuses to send.

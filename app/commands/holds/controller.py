@@ -79,7 +79,7 @@ class HoldController:
         inputs: Mapping[str, Any],
         sent: float,
         context: PressContext,
-        told: Callable[[Receipt], None],
+        on_end: Callable[[Receipt], None],
         hold_id: str = "",
     ) -> Receipt | ActiveHold:
         """Begins a hold, or returns the receipt of a refusal. `sent` is the latest time at which the
@@ -93,7 +93,8 @@ class HoldController:
             return self._receipts.record_refusal(widget, inputs, context, ready, hold_id)
         lease = Lease.begun(hold_id or secrets.token_hex(8), widget.period_s, sent, now)
         since = say("hold_since", time=format_time(time.time()))
-        holding = ActiveHold(widget, lease, context, needed_inputs(widget, inputs), ready, told, since)
+        own = needed_inputs(widget, inputs)
+        holding = ActiveHold(widget, lease, context, own, ready, on_end, since)
         self._held[widget_id] = holding
         self._robot.held_since[widget_id] = since
         self._receipts.record_begin(holding)

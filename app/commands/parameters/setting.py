@@ -34,5 +34,5 @@ def _answer(widget: Parameter, value: Value, response: Fields) -> Outcome:
         return Outcome("unknown", say("answer_unreadable", wanted=SET[1]))
     if successful:
         return Outcome("succeeded", say("parameter_set", value=widget.value_text(value), time=now))
-    said = printable(plain_text(reason, MAX_VALUE_CHARS)) if reason else ""
-    return Outcome("rejected", with_reply(say("said_no", time=now), said))
+    text = printable(plain_text(reason, MAX_VALUE_CHARS)) if reason else ""
+    return Outcome("rejected", with_reply(say("said_no", time=now), text))
