@@ -32,7 +32,7 @@ class Receipt:
     without a reason), and `cause` why the press was refused.
 
     `inputs` are those that the widget uses. `entered` are all inputs of the press, if they are few and
-    short: a page without scripts shows them again. `fingerprint` is a hash of all inputs. `from_log` is
+    short: a page without scripts shows them again. `fingerprint` is a hash of all inputs. `recalled` is
     true for a receipt restored from the operator's log after a restart.
     """
 
@@ -45,7 +45,7 @@ class Receipt:
     inputs: Mapping[str, Any]
     fingerprint: str
     entered: Mapping[str, Any] = field(default_factory=dict)
-    from_log: bool = False
+    recalled: bool = False
 
     @property
     def code(self) -> str | None:
@@ -100,7 +100,7 @@ class Receipts:
             self._recorder.record_press(press_id, widget, origin_text(origin), inputs)
 
     def keep(self, receipt: Receipt) -> None:
-        if receipt.from_log:
+        if receipt.recalled:
             _keep(self._from_log, receipt)
             return
         if self._recorder is not None:
@@ -145,7 +145,7 @@ def recalled_receipt(
         answer, at = Outcome(cast(OutcomeCode, last.outcome), last.reason_text), last.at
     receipt = receipt_of(widget, inputs, press.press, answer, cause)
     wall = datetime.fromtimestamp(at / 1000, UTC).isoformat(timespec="milliseconds")
-    return replace(receipt, at=wall, from_log=True)
+    return replace(receipt, at=wall, recalled=True)
 
 
 def fingerprint(inputs: Mapping[str, Any]) -> str:

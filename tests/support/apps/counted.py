@@ -19,7 +19,7 @@ from app.web.app_state import site_of
 LATE_S = 0.5
 UNLIMITED = Quota(1e9, 1e9)
 vars(service_calls)["LATE_S"] = LATE_S  # Final in what is shipped
-vars(press_limits).update(OF_CLIENT=UNLIMITED, OF_ADDRESS=UNLIMITED)
+vars(press_limits).update(CLIENT_QUOTA=UNLIMITED, ADDRESS_QUOTA=UNLIMITED)
 
 
 @app.get("/sizes")

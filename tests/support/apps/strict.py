@@ -5,5 +5,5 @@ from app.commands import press_limits
 from app.rate_limit import Quota
 from tests.support.apps.small import PRESSES
 
-vars(press_limits).update(OF_CLIENT=Quota(PRESSES, 1), OF_CANCELS=Quota(PRESSES, 1))
+vars(press_limits).update(CLIENT_QUOTA=Quota(PRESSES, 1), CANCEL_QUOTA=Quota(PRESSES, 1))
 app = main.app
