@@ -148,10 +148,10 @@ def stalled_table(results: Results, titles: Titles) -> str:
         "server grows, MiB": of("grown_mib", ".1f"),
         "others before, p50": of("before_p50", ".1f"),
         "p99": of("before_p99", ".1f"),
-        "meanwhile, p50": of("during_p50", ".1f"),
+        "during the stall, p50": of("during_p50", ".1f"),
         "p99 then": of("during_p99", ".1f"),
-        "first it shows after: put before, ms": of("first_ms", ".0f"),
-        "old ones it shows": of("old", ".0f"),
+        "age of the first value shown after, ms": of("first_ms", ".0f"),
+        "old values shown": of("old", ".0f"),
     }
     return peers_table(columns, titles)
 

@@ -1,1 +1,1 @@
-"""The fault suite: what breaks, what the kiosk shows in the meantime, and what the robot received."""
+"""The fault suite: breaks a part, and checks what the panel shows and what the robot receives."""

@@ -1,4 +1,4 @@
-"""Many browsers at the event stream, as bare sockets: one that reads nothing, two hundred that do."""
+"""Many clients of the event stream, as plain sockets: one that does not read, two hundred that do."""
 
 import selectors
 import socket
@@ -10,14 +10,14 @@ REQUEST = b"GET /events HTTP/1.1\r\nHost: 127.0.0.1\r\nAccept-Encoding: identity
 
 
 def asking(server: Server) -> socket.socket:
-    """A connection that has asked for the events and not read yet."""
+    """A connection that has requested the events and has not read yet."""
     one = socket.create_connection(("127.0.0.1", server.port), 10)
     one.sendall(REQUEST)
     return one
 
 
 class Browsers:
-    """So many streams, read by this thread whenever it is asked what they show."""
+    """A number of event streams, read by this thread in `showing`."""
 
     def __init__(self, server: Server, count: int) -> None:
         self._texts: dict[socket.socket, bytes] = {}
@@ -29,7 +29,7 @@ class Browsers:
             self._selector.register(one, selectors.EVENT_READ)
 
     def showing(self, what: bytes) -> int:
-        """How many have had this text since `forget`."""
+        """How many have received this text since `forget`."""
         for key, _ in self._selector.select(0):
             one = key.fileobj
             assert isinstance(one, socket.socket)
@@ -46,7 +46,7 @@ class Browsers:
 
 
 def unread(one: socket.socket, idle_s: float = 1.0) -> bytes:
-    """All that waited in the connection, up to a silence that is longer than the beat."""
+    """Everything that was buffered in the connection, read for 5 s."""
     one.settimeout(idle_s)
     got = b""
     end = time.monotonic() + 5
@@ -56,7 +56,7 @@ def unread(one: socket.socket, idle_s: float = 1.0) -> bytes:
 
 
 def storm(server: Server, for_s: float) -> int:
-    """Connects, asks and goes away, again and again; returns how often."""
+    """Connects, requests the events and disconnects, repeatedly; returns how often."""
     end = time.monotonic() + for_s
     times = 0
     while time.monotonic() < end:

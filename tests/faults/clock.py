@@ -1,4 +1,4 @@
-"""A wall clock that is set under a running process: libfaketime, which leaves CLOCK_MONOTONIC be."""
+"""Sets the wall clock of a running process with libfaketime; CLOCK_MONOTONIC is unchanged."""
 
 from pathlib import Path
 
@@ -27,12 +27,12 @@ class Clock:
         }
 
     def set(self, off_s: int) -> None:
-        """So many seconds from the true time."""
+        """Sets the clock to `off_s` seconds from the true time."""
         new = self._file.with_suffix(".new")
         new.write_text(f"{off_s:+d}")
-        new.replace(self._file)  # a reader never finds half of it
+        new.replace(self._file)  # atomic for readers
 
     def clean(self, pid: int) -> None:
-        """What the library leaves of a process that a signal ended."""
+        """Removes the files that the library leaves when its process is killed."""
         for name in (f"faketime_shm_{pid}", f"sem.faketime_sem_{pid}"):
             (Path("/dev/shm") / name).unlink(missing_ok=True)

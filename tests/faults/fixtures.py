@@ -1,4 +1,4 @@
-"""The rig of a module, on a domain that the one before did not have, and a kiosk on it."""
+"""Fixtures: a rig per module, each on another domain than the one before, and a kiosk server on it."""
 
 import itertools
 from collections.abc import Iterator

@@ -1,6 +1,6 @@
-"""A server that is killed at random moments under presses, again and again.
+"""Kills a server repeatedly at random moments during presses.
 
-What it knew is gone with it; what the robot received must still fit the receipts that were given.
+What the robot received must still match the receipts that were sent.
 """
 
 import random
@@ -19,21 +19,22 @@ PRESSED_EVERY_S = 0.01
 
 @dataclass(frozen=True, slots=True)
 class Life:
-    """A server from its first press to its kill (monotonic seconds), with all that was pressed."""
+    """One run of a server, from its first press to its kill (monotonic seconds), with its presses."""
 
     began_at: float
     killed_at: float
     presses: list[Press]
 
     def whole(self, press: Press, under_way_s: float) -> bool:
-        """Whether the answer was there for so long before the kill that nothing was on its way."""
+        """Whether the response came at least `under_way_s` before the kill, so that nothing was in
+        flight."""
         return 0.0 < press.answered_at < self.killed_at - under_way_s
 
 
 def kill_at_random_moments(
     start: Callable[[], Server], times: int, widget: str, chance: random.Random
 ) -> Iterator[Life]:
-    """Starts a server, presses its widget, kills it in the midst; yields what came of each life."""
+    """Starts a server, presses its widget, kills it in the middle of that; yields each run."""
     for _ in range(times):
         server = start()
         try:

@@ -1,9 +1,9 @@
-"""Network namespaces of a test's own, and a cable between two of them that can be cut, slow or lossy.
+"""Network namespaces for a test, and a cable between two of them that can be cut, slow or lossy.
 
-A namespace lives as long as the process that holds it, and that one ends with the pipe to the tests:
-nothing is left, whatever happens to them. Many kernels come without `tc netem`; so the cable is two
-pairs of veth with a small program in the middle (`wire.py`) that carries the frames: TCP itself meets
-the loss and the delay, on any kernel.
+A namespace exists as long as the process that holds it, which ends with the pipe to the tests, so
+nothing is left behind. Many kernels lack `tc netem`. So the cable is two veth pairs with a small
+program in between (`wire.py`) that forwards the frames: TCP is exposed to the loss and the delay, on
+any kernel.
 """
 
 import ctypes
@@ -23,8 +23,8 @@ CLONE_NEWNET: Final = 0x40000000
 KIOSK_IP: Final = "10.99.0.1"
 ROBOT_IP: Final = "10.99.0.2"
 
-# linux/sockios.h, linux/ethtool.h: a frame that is carried by hand needs its checksum, and no more
-# than the MTU.
+# linux/sockios.h, linux/ethtool.h: a frame that a program forwards needs its checksum, and must fit the
+# MTU.
 SIOCETHTOOL: Final = 0x8946
 ETHTOOL_STXCSUM: Final = 0x17
 ETHTOOL_STSO: Final = 0x1F
@@ -53,7 +53,7 @@ class Namespace:
 
     @property
     def enter(self) -> list[str]:
-        """What stands before a command that is to run in it."""
+        """The command prefix that runs a command in the namespace."""
         return ["nsenter", f"--net=/proc/{self.pid}/ns/net"]
 
     def run(self, *command: str) -> None:
@@ -61,7 +61,7 @@ class Namespace:
 
     @contextmanager
     def inside(self) -> Iterator[None]:
-        """This thread, and all that it starts in the meantime, is in the namespace."""
+        """Within the block, this thread and everything that it starts are in the namespace."""
         with open("/proc/thread-self/ns/net") as before, open(f"/proc/{self.pid}/ns/net") as here:
             _set(here.fileno())
             try:
@@ -78,7 +78,7 @@ class Namespace:
 
 
 class Cable:
-    """Two namespaces, `kiosk` and `robot`, and what lies between."""
+    """Two namespaces, `kiosk` and `robot`, connected by a cable."""
 
     def __init__(self) -> None:
         with ExitStack() as stack:
@@ -114,14 +114,14 @@ class Cable:
         assert self._wire.wait(5) == 0, "the wire broke by itself"
 
     def cut(self) -> None:
-        """The kiosk's link goes down; frames on their way are lost."""
+        """Takes the kiosk's link down; frames in flight are lost."""
         self._middle.run("ip", "link", "set", "to-kiosk", "down")
 
     def mend(self) -> None:
         self._middle.run("ip", "link", "set", "to-kiosk", "up")
 
     def weather(self, *, delay_s: float = 0.0, loss: float = 0.0) -> None:
-        """From now on each frame takes so long, each way, and this fraction of them is lost."""
+        """Delays each frame by `delay_s` each way, and drops the fraction `loss`, from now on."""
         assert self._wire.stdin is not None
         self._wire.stdin.write(json.dumps({"delay_s": delay_s, "loss": loss}) + "\n")
         self._wire.stdin.flush()

@@ -1,4 +1,4 @@
-"""Presses that go on whatever breaks, each with its number; and what must be true of them."""
+"""Continuous numbered presses during a fault, and the checks of their results."""
 
 import itertools
 import json
@@ -15,7 +15,7 @@ import httpx
 from tests.support.parts import ENOUGH_S, Server, http_client, until
 
 PERIOD_S: Final = 0.03
-TWICE_EACH: Final = 5  # each fifth press is posted a second time, with the same id
+TWICE_EACH: Final = 5  # every fifth press is posted a second time, with the same id
 SETTLE_S: Final = ENOUGH_S
 
 _runs = itertools.count()
@@ -24,7 +24,7 @@ _this = secrets.token_hex(3)
 
 @dataclass(slots=True)
 class Press:
-    """One press; `outcome` is "" while nothing was answered. Times are monotonic seconds."""
+    """One press; `outcome` is "" before its response. Times are monotonic seconds."""
 
     text: str
     at: float
@@ -34,7 +34,7 @@ class Press:
 
 
 class Presser:
-    """Presses a widget again and again; its message is a text that no other press has."""
+    """Presses a widget continuously, each time with a unique text."""
 
     def __init__(self, server: Server, widget: str, period_s: float = PERIOD_S) -> None:
         self.presses: list[Press] = []
@@ -61,7 +61,7 @@ class Presser:
                 answer = http.post(f"{self._server.base}/widgets/{self._widget}", json=body)
                 receipt = answer.json()
             except (httpx.HTTPError, json.JSONDecodeError):
-                return  # The result is unknown, and it is not pressed again
+                return  # the result is unknown, and it is not repeated
             if not press.outcome:
                 press.outcome, press.reason = receipt["outcome"], receipt["reason"]
                 press.answered_at = time.monotonic()
@@ -77,7 +77,7 @@ class Presser:
     def goes_on(
         self, outcome: str = "published", since: float = 0.0, within_s: float = ENOUGH_S
     ) -> None:
-        """Waits until a press since then got this outcome."""
+        """Waits until a press made after `since` has this outcome."""
         until(
             lambda: self.count(outcome, since), f"a press is {outcome}: {self.presses[-1:]}", within_s
         )
@@ -85,7 +85,7 @@ class Presser:
 
 @dataclass(frozen=True, slots=True)
 class Account:
-    """The result of a number of presses."""
+    """The counts of a series of presses."""
 
     pressed: int
     received: int
@@ -102,24 +102,24 @@ Arrivals = Callable[[], Sequence[tuple[float, str]]]
 def accounted(
     presses: Sequence[Press], arrivals: Arrivals, whole: Callable[[Press], bool], late_s: float
 ) -> Account:
-    """Waits for what is under way, then checks that no press came twice, late, or though refused, and
-    that each whose receipt says `published` while the way was whole did come."""
+    """Waits for presses in flight, then checks that none was received twice, late or after a refusal,
+    and that each press with the outcome `published` was received if the link was intact (`whole`)."""
     by_text = {press.text: press for press in presses}
-    owed = {p.text for p in presses if p.outcome == "published" and whole(p)}
+    expected = {p.text for p in presses if p.outcome == "published" and whole(p)}
 
     def mine() -> list[tuple[float, str]]:
         return [(at, text) for at, text in arrivals() if text in by_text]
 
     try:
-        until(lambda: owed <= {text for _, text in mine()}, "", SETTLE_S, every_s=0.2)
+        until(lambda: expected <= {text for _, text in mine()}, "", SETTLE_S, every_s=0.2)
     except AssertionError:
-        lost = sorted(owed - {text for _, text in mine()})
+        lost = sorted(expected - {text for _, text in mine()})
         raise AssertionError(f"published, but not received: {[by_text[t] for t in lost[:5]]}") from None
     came = mine()
     twice = [text for text, times in Counter(text for _, text in came).items() if times > 1]
     assert not twice, f"received twice: {[by_text[t] for t in twice[:5]]}"
-    lies = [by_text[text] for _, text in came if by_text[text].outcome == "refused"]
-    assert not lies, f"refused, but received: {lies[:5]}"
+    refused_ones = [by_text[text] for _, text in came if by_text[text].outcome == "refused"]
+    assert not refused_ones, f"refused, but received: {refused_ones[:5]}"
     latest = max((at - by_text[text].at for at, text in came), default=0.0)
     assert latest <= late_s, f"received {latest:.2f} s after its press"
     refused = sum(p.outcome == "refused" for p in presses)

@@ -1,4 +1,4 @@
-"""Whether a `false` that a new publisher says reaches the panel, by the kind of publisher.
+"""Measures whether a `false` of a new publisher reaches the panel, by kind of publisher.
 
 `python -m tests.faults.publishers [TIMES]` measures all kinds and prints a table.
 """
@@ -27,14 +27,15 @@ Outcome = Literal["heard", "locked", "unnoticed"]
 TOPIC: Final = "/kept"
 KEY: Final = TOPIC[1:]
 WIDGET: Final = "guarded"
-NEWS_WITHIN_S: Final = 5.0  # Fast DDS tells of a participant every 3 s; one that is missed, after 4
+NEWS_WITHIN_S: Final = 5.0  # Fast DDS announces a participant every 3 s
 GONE_WITHIN_S: Final = 30.0
 OPENED_BY: Final = 5  # publishers, at most
 
 
 @dataclass(frozen=True)
 class Kind:
-    """How a publisher speaks; `stays` is how long it is there after its last message, in seconds."""
+    """A kind of publisher: `times` messages, then it ends after `stays` seconds. `matched`: it waits
+    for a subscriber before it publishes."""
 
     name: str
     times: int = 1
@@ -46,8 +47,8 @@ class Kind:
 KINDS: Final = (
     Kind("`--once`"),
     Kind("`--times 3 --rate 10`", times=3),
-    Kind("says it when somebody listens, and stays", stays=NEWS_WITHIN_S),
-    Kind("says it as it is made, and stays", stays=NEWS_WITHIN_S, matched=False),
+    Kind("publishes when it has a subscriber, and stays", stays=NEWS_WITHIN_S),
+    Kind("publishes at its creation, and stays", stays=NEWS_WITHIN_S, matched=False),
     Kind("latched (transient local)", stays=NEWS_WITHIN_S, durability="transient_local", matched=False),
     Kind("periodic, 10 Hz", times=40),
 )
@@ -64,7 +65,7 @@ class Publisher(Commanded):
         super().__init__([ROS_PYTHON, TESTS / "ros/publishers.py", vendor], env)
 
     def says(self, value: bool, kind: Kind) -> None:
-        """A new publisher says it, in a process of its own, as the command line's is."""
+        """Publishes the value from a new process, as `ros2 topic pub` does."""
         self.end()
         self.start()
         how: Mapping[str, Any] = {"times": kind.times, "durability": kind.durability}
@@ -75,7 +76,7 @@ class Publisher(Commanded):
 
 
 class Observer:
-    """What the bridge tells of the topic, seen beside the panel."""
+    """Receives the topic and its tokens from the bridge, independently of the panel."""
 
     def __init__(self, endpoint: str) -> None:
         config = zenoh.Config()
@@ -107,7 +108,7 @@ class Observer:
             self.there.discard(token)
 
     def forget(self) -> None:
-        """What was said and who came, until now."""
+        """Clears the received values and publishers."""
         self.values.clear()
         self.came.clear()
 
@@ -117,8 +118,8 @@ class Observer:
 
 @dataclass(frozen=True)
 class Trial:
-    """What came of one `false`: whether the bridge brought it, whether it told of the publisher, and
-    whether the panel still permits."""
+    """The result of one `false`: whether the bridge forwarded it, whether it announced the publisher,
+    and whether the panel still permits operation."""
 
     heard: bool
     seen: bool
@@ -130,8 +131,8 @@ class Trial:
 
 
 class Publishers:
-    """A bridge, a panel on it that no one permits anything, and publishers that come and go, all with
-    one durability: the panel listens as the first one it saw."""
+    """A bridge, a panel behind it without any permission, and publishers that appear and end, all with
+    the same durability: the panel subscribes with that of the first publisher it discovered."""
 
     def __init__(self, domain: int, folder: Path, durability: str = "volatile") -> None:
         matched = durability == "volatile"
@@ -151,18 +152,18 @@ class Publishers:
         return bool(self._server.widget(WIDGET)["enabled"])
 
     def open(self) -> None:
-        """A publisher on Cyclone DDS, of which next to nothing is lost, permits it and goes."""
+        """A publisher on Cyclone DDS, which loses almost no messages, permits operation and ends."""
         for _ in range(OPENED_BY):
             self._by["cyclone"].says(True, self._opens)
             self._by["cyclone"].goes(self._opens.stays)
             self._alone()
             if self.permitted:
                 return
-        raise AssertionError("nobody could permit it")
+        raise AssertionError("no publisher could permit it")
 
     @contextmanager
     def there(self, vendor: Vendor, kind: Kind) -> Iterator[None]:
-        """A new publisher, for as long as it lasts; until it is gone."""
+        """Within the block, a new publisher exists; returns when the bridge has removed it."""
         self._observer.forget()
         self._by[vendor].says(True, kind)
         until(lambda: self._observer.came, "the bridge tells of it", within_s=GONE_WITHIN_S)
@@ -171,11 +172,11 @@ class Publishers:
         self._alone()
 
     def until_reason(self, reason: str) -> None:
-        """Until the control is locked for it."""
+        """Waits until the control is locked for this reason."""
         until(lambda: self._server.widget(WIDGET)["reason"] == reason, reason)
 
     def trial(self, vendor: Vendor, kind: Kind) -> Trial:
-        """A new publisher takes the permission back."""
+        """A new publisher revokes the permission."""
         self.open()
         self._observer.forget()
         self._by[vendor].says(False, kind)
@@ -189,7 +190,8 @@ class Publishers:
         return Trial(heard, seen, permitted)
 
     def _news(self) -> None:
-        """Until the message came, or its publisher came and went, or neither will."""
+        """Waits for the message, or for the publisher's token to appear and end, at most
+        `NEWS_WITHIN_S`."""
         end = time.monotonic() + NEWS_WITHIN_S
         observer = self._observer
         while (
@@ -200,7 +202,7 @@ class Publishers:
             time.sleep(0.02)
 
     def _alone(self) -> None:
-        """Until no one publishes the topic."""
+        """Waits until the topic has no publisher."""
         until(lambda: not self._observer.there, "its publisher is gone", within_s=GONE_WITHIN_S)
 
     def close(self) -> None:

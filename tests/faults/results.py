@@ -1,7 +1,7 @@
-"""What the faults measured, as lines of JSON in the file that `FAULTS_RESULTS` names, and as a table.
+"""The results of the fault suite: lines of JSON in the file `FAULTS_RESULTS`, and a table.
 
-`python -m tests.faults.results RESULTS [PAGE]` prints the table; with a page it is written there,
-between its two markers.
+`python -m tests.faults.results RESULTS [PAGE]` prints the table, and writes it between the two markers
+of a page.
 """
 
 import json
@@ -13,7 +13,7 @@ from typing import Final
 COLUMNS: Final = {
     "fault": "what breaks",
     "locked": "locked after",
-    "presses": "presses meanwhile",
+    "presses": "presses during it",
     "latest": "latest arrival",
     "after": "afterwards",
 }
@@ -24,7 +24,7 @@ END: Final = "<!-- /faults -->"
 def record(
     fault: str, *, locked: str = "", presses: object = "", latest: str = "", after: str = ""
 ) -> None:
-    """Keeps one row, if anyone collects them."""
+    """Appends a row to the results file, if one is set."""
     if path := os.environ.get("FAULTS_RESULTS"):
         row = {
             "fault": fault,
@@ -56,7 +56,7 @@ def main(results: str, page: str = "") -> None:
 
 
 def write(text: str, page: Path) -> None:
-    """Puts the table between the page's two markers; ValueError where it has none."""
+    """Writes the table between the page's two markers; ValueError if it has none."""
     before, begin, rest = page.read_text().partition(BEGIN)
     _, end, after = rest.partition(END)
     if not begin or not end:

@@ -1,6 +1,7 @@
-"""The parts that faults are tried on: a bridge, two nodes, a kiosk with a panel for it.
+"""The test rig: a bridge, two nodes, and a kiosk server with a panel for them.
 
-`robot` says what is permitted and is the one that breaks; `ears` hears what the kiosk sends, and stays.
+`robot` publishes the permissions and is the node that fails; `ears` receives what the panel sends, and
+keeps running.
 """
 
 import os
@@ -21,13 +22,13 @@ PANEL: Final = """
 title = "Faults"
 
 [[interlock]]
-id = "kept"            # said once, and believed until something breaks
+id = "kept"            # published once, valid until something fails
 topic = "/kept"
 type = "std_msgs/msg/Bool"
 field = "data"
 
 [[interlock]]
-id = "pulsed"          # said again and again
+id = "pulsed"          # published periodically
 topic = "/pulsed"
 type = "std_msgs/msg/Bool"
 field = "data"
@@ -85,18 +86,18 @@ LISTENED_TO: Final = ("kept", "pulsed", "heard")
 
 
 def several(short: int, long: int) -> int:
-    """How often, or how long: by the form of the suite."""
+    """A count or a time, by the form of the suite."""
     return long if LONG else short
 
 
 def limit(seconds: float) -> float:
-    """A limit of time as it is in the long form, which measures. The short one runs beside other tests:
-    what happens counts there, and `tests/faults/test_faults_on_bridge.py` asserts the times."""
+    """A time limit, exact in the long form, which measures. The short form runs beside other tests, so
+    its limits are loose; `tests/faults/test_faults_on_bridge.py` checks the times."""
     return seconds if LONG else seconds + ENOUGH_S
 
 
 def ears(domain: int) -> RosNode:
-    """A node that hears all that the panel sends."""
+    """A node that receives everything that the panel sends."""
     node = RosNode(domain, "ears")
     for topic in SENT_ON.values():
         node.subscribe(topic, TEXT, depth=1000)
@@ -104,7 +105,7 @@ def ears(domain: int) -> RosNode:
 
 
 def permitting(node: RosNode) -> None:
-    """It permits both: once, so that it is kept; and every tenth of a second."""
+    """The node publishes both permissions: one once and latched, one every `PULSE_S`."""
     node.advertise("/kept", BOOL, durability="transient_local", depth=1)
     node.publish("/kept", {"data": True})
     node.advertise("/pulsed", BOOL)
@@ -112,7 +113,7 @@ def permitting(node: RosNode) -> None:
 
 
 def kiosk(endpoint: str, folder: Path, port: int = 0, panel: str = PANEL, **environment: str) -> Server:
-    """A kiosk as users start it, which writes its stacks when it is aborted."""
+    """A kiosk server as users start it, which writes its stacks when it is aborted."""
     path = folder / "faults.toml"
     path.write_text(panel)
     zenoh = str(zenoh_file(folder, endpoint))
@@ -121,7 +122,7 @@ def kiosk(endpoint: str, folder: Path, port: int = 0, panel: str = PANEL, **envi
 
 
 class Rig:
-    """Bridge and nodes, behind `endpoint`."""
+    """Bridge and nodes; the bridge listens on `endpoint`."""
 
     def __init__(self, domain: int, ip: str = "127.0.0.1") -> None:
         self.bridge = Bridge(domain)
@@ -143,7 +144,7 @@ class Rig:
     def serving(
         self, folder: Path, endpoint: str = "", panel: str = PANEL, **environment: str
     ) -> Iterator[Server]:
-        """A kiosk on it that permits everything."""
+        """A kiosk server on the rig, with all permissions given."""
         server = kiosk(endpoint or self.endpoint, folder, 0, panel, **environment)
         try:
             permitted(server)
@@ -159,7 +160,7 @@ class Rig:
 
 
 def permitted(server: Server) -> None:
-    """Waits until every button of the panel is open."""
+    """Waits until every button of the panel is enabled."""
     until(
         lambda: all(server.widget(name)["enabled"] for name in SENT_ON),
         "everything is permitted",

@@ -1,4 +1,4 @@
-"""`python router.py LISTEN CONNECT`: a Zenoh router in a process of its own; it ends with its stdin."""
+"""`python router.py LISTEN CONNECT`: a Zenoh router; ends when its stdin is closed."""
 
 import json
 import sys

@@ -1,8 +1,8 @@
-"""`python -m tests.faults.soak`: an ordinary day at the panel, for `SOAK_S` seconds (3,600).
+"""`python -m tests.faults.soak`: a soak test of `SOAK_S` seconds (default 3,600).
 
-A robot that permits and forbids every second and tells a new value twenty times a second, presses ten
-times a second, a browser that watches. It prints what it measured, and fails where an event was lost or
-a press came twice.
+The robot toggles a permission every second and publishes a value twenty times a second; a client
+presses ten times a second; another watches the events. Prints the measurements, and fails if an event
+was lost or a press was received twice.
 """
 
 import os
@@ -18,7 +18,7 @@ from tests.faults.watch import Resources, Watch, answering, resources
 from tests.support.parts import Server
 
 DOMAIN: Final = 99
-LOST_S: Final = 10.0  # what is not shown after so long is lost
+LOST_S: Final = 10.0  # a change that is not shown within this time is lost
 WARM_S: Final = 30.0
 LOOKED_EVERY_S: Final = 5.0
 
@@ -49,7 +49,7 @@ class Soak:
         return accounted(presses, lambda: self._rig.arrivals("free"), lambda _: True, 1.0)
 
     def _change(self, watch: Watch) -> None:
-        """The robot says something else, which has to be shown; then it speaks for a while."""
+        """Toggles the permission and waits until that is shown; then publishes values for a second."""
         wanted = self.changes % 2 == 1
         self.changes += 1
         told_at = time.monotonic()
@@ -63,7 +63,7 @@ class Soak:
         self._rig.robot.flood("/heard", {"data": f"{self.changes}.{{n}}"}, 20.0, 1.0)
 
     def slope(self) -> float | None:
-        """MB an hour since it was warm; None where it was too short to tell."""
+        """Memory growth in MB per hour after the warm-up; None if the run was too short."""
         warm = [(at, look.rss_mb) for at, look in self.looks if at >= WARM_S]
         if len(warm) < 3:
             return None

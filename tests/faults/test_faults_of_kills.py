@@ -1,4 +1,4 @@
-"""The server is killed in the midst of presses: nothing is sent twice, late, or though refused."""
+"""The server is killed during presses: nothing is sent twice, late, or after a refusal."""
 
 import random
 import secrets

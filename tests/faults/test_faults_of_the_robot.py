@@ -1,4 +1,4 @@
-"""The robot's own parts break, lie or shout while someone goes on pressing."""
+"""The robot's nodes fail, send invalid data or flood topics during continuous presses."""
 
 import json
 import random
@@ -33,8 +33,8 @@ SHOWN_WITHIN_S = 1.0
 MARGIN_MB = 40.0
 
 
-def begun_anew(rig: Rig) -> None:
-    """A node of another name: the graph shows the old one for some more seconds."""
+def replace_robot(rig: Rig) -> None:
+    """Starts a node with another name: the graph shows the old one for some more seconds."""
     rig.robot.end()
     rig.robot = RosNode(rig.bridge.domain, f"robot_{secrets.token_hex(2)}")
     permitting(rig.robot)
@@ -45,7 +45,7 @@ def test_a_killed_node(rig: Rig, server: Server) -> None:
         rig,
         server,
         rig.robot.kill,
-        lambda: begun_anew(rig),
+        lambda: replace_robot(rig),
         locks_within_s=MAX_AGE_S + 0.5,
         interlock="pulsed",
         widget="paced",
@@ -78,7 +78,7 @@ def test_a_publisher_that_is_replaced_by_one_of_another_type(rig: Rig, server: S
     def right_again() -> None:
         until(
             lambda: "std_msgs/msg/String" in (server.widget("paced")["reason"] or ""),
-            "the other type is told",
+            "the wrong type is shown",
         )
         rig.robot.withdraw("/pulsed")
         rig.robot.advertise("/pulsed", BOOL)
@@ -91,7 +91,7 @@ def test_a_publisher_that_is_replaced_by_one_of_another_type(rig: Rig, server: S
 
 
 def test_a_robot_that_restarts_again_and_again(rig: Rig, server: Server) -> None:
-    """Bridge and node are killed together; nothing is left of each of its lives."""
+    """Bridge and node are killed together; nothing accumulates over the restarts."""
     before: Resources | None = None
     latest = longest = 0.0
     for life in range(RESTARTS):
@@ -102,11 +102,11 @@ def test_a_robot_that_restarts_again_and_again(rig: Rig, server: Server) -> None
 
         def on() -> None:
             rig.bridge.start()
-            begun_anew(rig)
+            replace_robot(rig)
 
         trial = tried(rig, server, off, on, locks_within_s=1.0)
         latest, longest = max(latest, trial.account.latest_s), max(longest, trial.locked_s)
-        if life == 1:  # until then it grows to its size
+        if life == 1:  # memory grows to its usual size until then
             before = resources(server.process.pid)
     assert before is not None
     after = came_back(server.process.pid, before, MARGIN_MB)
@@ -135,7 +135,7 @@ def shouting(domain: int) -> Iterator[RosNode]:
 def flooded(
     rig: Rig, server: Server, topic: str, node: RosNode, fields: dict[str, Any]
 ) -> tuple[Account, int, Watch]:
-    """What came of presses while a node said something 2,000 times a second; how often it did."""
+    """The account of presses during a flood of `FLOOD_PER_S` messages, and the number of messages."""
     until(lambda: node.subscribers(topic), "the bridge listens")
     watch = Watch(server)
     before = resources(server.process.pid)
@@ -152,7 +152,7 @@ def flooded(
 
 
 def test_a_flood_on_an_interlock(rig: Rig, server: Server) -> None:
-    """What is said last counts, and soon."""
+    """The last message counts, and is shown soon."""
     account, said, watch = flooded(rig, server, "/kept", rig.robot, {"data": True})
     until(lambda: watch.now("kept").enabled, "still permitted")
     told_at = time.monotonic()
@@ -216,7 +216,7 @@ def test_messages_of_ten_megabytes(rig: Rig, server: Server) -> None:
 
 
 def client_of(endpoint: str) -> zenoh.Config:
-    """Of a client a bridge passes on everything, of a peer it leaves that to the peers."""
+    """In client mode: a bridge forwards everything from a client, but not between peers."""
     config = zenoh.Config()
     for place, value in {
         "mode": "client",
@@ -229,21 +229,21 @@ def client_of(endpoint: str) -> zenoh.Config:
 
 
 def over(liar: zenoh.Session, watch: Watch) -> bool:
-    """Says a last word, which comes after all that was said before; whether it is shown."""
+    """Publishes a last message after all others; whether it is shown."""
     liar.put("heard", b"\0\1\0\0\5\0\0\0over\0")
     return bool(watch.widgets["heard"]["text"] == "over")
 
 
 def lie(chance: random.Random) -> bytes:
-    """No message: an encapsulation that there is none of, or a body that is far too long for a bool
-    and no text."""
+    """Invalid data: an unknown encapsulation, or a body that is too long for a bool and no valid
+    text."""
     if chance.random() < 0.5:
         return b"\xff" + chance.randbytes(chance.randrange(200))
     return b"\0\1\0\0" + b"\xff" * 4 + chance.randbytes(chance.randrange(60, 200))
 
 
 def test_garbage_on_all_that_is_listened_to(rig: Rig, server: Server) -> None:
-    """Nothing that is not the message permits anything, and the next good one does."""
+    """Invalid messages never permit anything, and the next valid one does."""
     before = resources(server.process.pid)
     watch, presser = Watch(server), Presser(server, "guarded")
     chance = random.Random(7)

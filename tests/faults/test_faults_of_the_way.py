@@ -1,4 +1,4 @@
-"""The way to the robot breaks while someone goes on pressing: what is shown, and what arrives."""
+"""The link to the robot fails during continuous presses: what is shown, and what arrives."""
 
 import subprocess
 import sys
@@ -30,7 +30,7 @@ CUTS_S = (1, 5, 30) if LONG else (1, 5)
 
 @pytest.fixture
 def cable() -> Iterator[Cable]:
-    """The tests are at the kiosk's end of it."""
+    """A cable; the test itself runs at the kiosk's end."""
     mine = Cable()
     with mine.kiosk.inside():
         yield mine
@@ -67,7 +67,8 @@ def test_a_frozen_bridge(rig: Rig, server: Server) -> None:
 
 
 def test_a_bridge_that_comes_back_on_another_domain(rig: Rig, server: Server) -> None:
-    """No one of the robot is there any more: what is sent is sent to no one, and told so."""
+    """No node of the robot is reachable: a press is sent without a subscriber, and its receipt says
+    so."""
     right = rig.bridge.domain
 
     def moved(domain: int) -> None:
@@ -78,7 +79,7 @@ def test_a_bridge_that_comes_back_on_another_domain(rig: Rig, server: Server) ->
     def moved_back() -> None:
         until(server.ready, "the bridge of the other domain is joined")
         assert "Waiting for a new /kept" in server.widget("guarded")["reason"]
-        assert server.press("free", "is anybody there?").json()["outcome"] == "unknown"
+        assert server.press("free", "no subscriber").json()["outcome"] == "unknown"
         moved(right)
 
     trial = tried(rig, server, lambda: moved(right + 1), moved_back, locks_within_s=1.5)
@@ -114,7 +115,7 @@ def test_a_router_between_is_killed(rig: Rig, tmp_path: Path) -> None:
 
 
 def test_a_cable_that_is_cut(cable: Cable, far_rig: Rig, tmp_path: Path) -> None:
-    """Shorter than the silence that counts as lost, and longer."""
+    """Cuts shorter and longer than the lease after which the link counts as lost."""
     with far_rig.serving(tmp_path) as server:
         for seconds in CUTS_S:
             if seconds < 2:
@@ -135,7 +136,7 @@ def test_a_cable_that_is_cut(cable: Cable, far_rig: Rig, tmp_path: Path) -> None
 
 
 def short_cut(cable: Cable, rig: Rig, server: Server, seconds: float) -> None:
-    """The pulse is missed at once, and the bridge's answer; the connection itself lasts."""
+    """The pulse and the bridge's responses are missing at once; the connection survives."""
     trial = tried(
         rig,
         server,
@@ -153,7 +154,7 @@ def short_cut(cable: Cable, rig: Rig, server: Server, seconds: float) -> None:
 
 
 def test_a_slow_and_lossy_network(cable: Cable, far_rig: Rig, tmp_path: Path) -> None:
-    """300 ms each way and every tenth frame lost: it works, late by what TCP needs."""
+    """300 ms each way and every tenth frame lost: everything works, delayed by TCP."""
     with far_rig.serving(tmp_path) as server:
         account, locked = weathered(cable, far_rig, server, several(8, 30))
     record(
@@ -165,7 +166,7 @@ def test_a_slow_and_lossy_network(cable: Cable, far_rig: Rig, tmp_path: Path) ->
 
 
 def weathered(cable: Cable, rig: Rig, server: Server, seconds: float) -> tuple[Account, int]:
-    """What came of presses in bad weather, and how often an interlock that wants a pulse was locked."""
+    """The account of presses on a bad network, and how often the interlock with a pulse was locked."""
     watch, presser = Watch(server), Presser(server, "guarded")
     with answering(server):
         well(presser)

@@ -1,4 +1,5 @@
-"""What happens when the real bridge or node breaks: locked in time, opened by what the robot says."""
+"""The real bridge or node fails: controls are locked in time, and enabled by the robot's next
+message."""
 
 import signal
 import time
@@ -17,7 +18,7 @@ LONG: Final = 400_000  # bytes of a message
 
 
 def speaking(node: RosNode, value: bool = True) -> None:
-    """The robot tells its permission once, so that it is kept for who comes later."""
+    """The robot publishes its permission once, latched."""
     node.advertise("/operation_enabled", "std_msgs/msg/Bool", durability="transient_local", depth=1)
     node.publish("/operation_enabled", {"data": value})
 
@@ -43,7 +44,7 @@ def opened(kiosk: Server) -> None:
 
 
 def next_lock(stream: Stream) -> tuple[float, str]:
-    """When (monotonic seconds) the stream said that the interlock is locked, and why."""
+    """The time (monotonic seconds) of the next lock in the stream, and its reason."""
     while True:
         _, data, _ = stream.next(ENABLED)
         if not data["enabled"]:
@@ -85,7 +86,7 @@ def test_after_a_return_an_old_permission_does_not_count(
     own_bridge.start()
     until(kiosk.ready, "the bridge is back")
     assert "Waiting for a new /operation_enabled" in kiosk.widget("operation1")["reason"]
-    # Said until it is heard: to the node the killed bridge is a subscriber for some more seconds.
+    # Published repeatedly: to the node, the killed bridge is a subscriber for some more seconds.
     own_node.advertise("/operation_enabled", "std_msgs/msg/Bool")
     own_node.every("/operation_enabled", {"data": True}, 0.1)
     opened(kiosk)
@@ -123,9 +124,9 @@ def test_what_changed_while_the_bridge_was_frozen_is_what_counts(
         own_bridge.thaw()
         until(
             lambda: "does not permit" in (kiosk.widget("operation1")["reason"] or ""),
-            "what the robot said meanwhile",
+            "the robot's message of that time",
         )
-        # On the way there it was never open.
+        # It was never enabled in between.
         while True:
             _, data, _ = stream.next(ENABLED)
             assert data["enabled"] is False
@@ -169,7 +170,7 @@ def test_a_value_that_grows_old_locks_and_a_fresh_one_opens(
     opened(kiosk)
     with kiosk.stream() as stream:
         stream.next("snapshot")
-        own_node.kill()  # the graph shows it for up to 20 s; the age of its topic tells sooner
+        own_node.kill()  # the graph shows it for up to 20 s; `max_age_s` locks sooner
         killed_at = time.monotonic()
         locked_at, reason = next_lock(stream)
     assert locked_at - killed_at < 1.0
@@ -181,7 +182,7 @@ def test_a_value_that_grows_old_locks_and_a_fresh_one_opens(
 def test_what_the_robot_says_counts_after_each_of_many_freezes(
     own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:
-    """A session that Zenoh took up again by itself went deaf here after some of these."""
+    """A session that Zenoh resumed by itself received nothing here after some freezes."""
     speaking(own_node)
     kiosk = servers(live(own_bridge.endpoint, tmp_path))
     for _ in range(FREEZES):
@@ -243,7 +244,7 @@ def test_what_the_robot_forbids_while_the_server_stands_still_counts_behind_all_
     servers: Callable[[Server], Server],
     waiting: int,
 ) -> None:
-    """Of 60 long messages not all find room on the way, and the permission comes last."""
+    """Not all of 60 long messages fit the queues, and the permission comes last."""
     own_node.advertise("/last_heard", "std_msgs/msg/String")
     own_node.advertise("/operation_enabled", "std_msgs/msg/Bool")
     own_node.subscribe("/operation1", "std_msgs/msg/String")
@@ -267,10 +268,10 @@ def test_what_the_robot_forbids_while_the_server_stands_still_counts_behind_all_
         assert press.result().json()["outcome"] == "refused"
     until(kiosk.ready, "ready again")
     time.sleep(0.5)
-    # What the bridge had no room for, DDS sends again: 1.7 s were seen on a machine that did much else.
-    until(lambda: not permitted(kiosk), "nothing of it is lost")
+    # DDS resends what did not fit the bridge's queue: this took up to 1.7 s on a busy machine.
+    until(lambda: not permitted(kiosk), "the last message is not lost")
     assert own_node.heard("/operation1") == []
-    until(says_so, "permitted anew", every_s=0.2)
+    until(says_so, "permitted again", every_s=0.2)
 
 
 def test_an_old_latched_value_is_no_fresh_one(

@@ -1,4 +1,4 @@
-"""One fault from beginning to end: presses go on, something breaks, it is mended, all is well again."""
+"""One fault from beginning to end during continuous presses: break, lock, repair, permission again."""
 
 import time
 from collections.abc import Callable
@@ -11,15 +11,15 @@ from tests.faults.rig import Rig, limit
 from tests.faults.watch import Watch, answering
 from tests.support.parts import Server, until
 
-# What is answered `published` so shortly before a fault may be on its way when it breaks.
+# A press with the outcome `published` this shortly before a fault may still be in flight.
 UNDER_WAY_S: Final = 0.2
 WELL: Final = 20  # presses that come through before and after
 
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """`locked_s` from the fault to the first lock shown, `opened_s` from the mending to permitted;
-    `claimed` are presses between fault and mending of which it was said that they are published."""
+    """The result: `locked_s` from the fault to the first lock shown, `opened_s` from the repair to the
+    permission; `claimed` counts presses in between with the outcome `published`."""
 
     locked_s: float
     reason: str
@@ -29,7 +29,7 @@ class Trial:
 
 
 def nothing() -> None:
-    """There is nothing to be mended: it mends by itself."""
+    """For faults that need no repair."""
 
 
 def tried(
@@ -46,7 +46,8 @@ def tried(
     opens_within_s: float = 30.0,
     because: str = "",
 ) -> Trial:
-    """Breaks it, waits for the lock and until `lasts_s` are over, mends it, waits until all is well.
+    """Breaks a part, waits for the lock and for `lasts_s`, repairs it, waits until presses are
+    published.
 
     `because` is in the reason of the lock that counts.
     """

@@ -19,7 +19,7 @@ DEAD_AFTER_S: Final = 10.0
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """What an interlock was shown as; `at` in monotonic seconds."""
+    """A state of an interlock in the events; `at` in monotonic seconds."""
 
     at: float
     enabled: bool
@@ -27,7 +27,7 @@ class Seen:
 
 
 class Watch:
-    """One open stream of events, read by a thread; each state of the interlocks with its time."""
+    """Reads an event stream in a thread, and keeps each state of the interlocks with its time."""
 
     def __init__(self, server: Server) -> None:
         self.seen: dict[str, list[Seen]] = {}
@@ -75,7 +75,8 @@ class Watch:
     def locked_after(
         self, since: float, interlock: str, within_s: float, because: str = ""
     ) -> tuple[float, str]:
-        """Seconds from `since` to the first lock after it for that reason, and the whole reason."""
+        """Seconds from `since` to the first later lock whose reason contains `because`, and its
+        reason."""
 
         def found() -> Seen | None:
             locks = (s for s in self.seen[interlock] if s.at >= since and not s.enabled)
@@ -93,7 +94,7 @@ class Watch:
             ) from None
 
     def was_open(self, interlock: str, since: float, to: float) -> bool:
-        """Whether it was shown as permitted at any moment between."""
+        """Whether the interlock was shown as permitted at any moment in between."""
         seen = self.seen[interlock]
         shown_at_first = [s for s in seen if s.at <= since][-1:]
         return any(s.enabled for s in (*shown_at_first, *(s for s in seen if since < s.at <= to)))
@@ -105,9 +106,9 @@ class Watch:
 
 @contextmanager
 def answering(server: Server) -> Iterator[None]:
-    """Asks the server all the time; one that does not answer is ended, with where its threads stood.
+    """Within the block, polls the server; aborts one that does not respond, and fails with its stacks.
 
-    It has to run with `PYTHONFAULTHANDLER=1`: Python then writes all stacks when it is aborted.
+    The server has to run with `PYTHONFAULTHANDLER=1`: then Python writes all stacks when it is aborted.
     """
     over = threading.Event()
     stood: list[str] = []
@@ -121,7 +122,7 @@ def answering(server: Server) -> Iterator[None]:
                     stood.append(stacks(server))
                     return
                 except httpx.TransportError:
-                    continue  # it was ended, by a client that knows it
+                    continue  # the test has ended the server
 
     thread = threading.Thread(target=ask, daemon=True)
     thread.start()
@@ -130,11 +131,11 @@ def answering(server: Server) -> Iterator[None]:
     finally:
         over.set()
         thread.join(DEAD_AFTER_S + 5)
-        assert not stood, f"no answer in {DEAD_AFTER_S:g} s; it stood here:\n{stood[0]}"
+        assert not stood, f"no response in {DEAD_AFTER_S:g} s; its stacks:\n{stood[0]}"
 
 
 def stacks(server: Server) -> str:
-    """Where all threads of a server are; it is dead after that."""
+    """Aborts a server; returns the stacks of all threads."""
     server.process.send(signal.SIGABRT)
     server.process.wait(10)
     until(lambda: "Current thread" in server.process.text, "the stacks are written", 5)
@@ -143,7 +144,7 @@ def stacks(server: Server) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Resources:
-    """What a process takes."""
+    """The resources of a process."""
 
     rss_mb: float
     threads: int
@@ -163,7 +164,8 @@ def resources(pid: int) -> Resources:
 
 
 def came_back(pid: int, before: Resources, margin_mb: float, within_s: float = ENOUGH_S) -> Resources:
-    """Waits until memory is within a margin of what it was, and threads and open files are no more."""
+    """Waits until memory is within a margin of the value before, and threads and open files are not
+    more."""
 
     def found() -> Resources | None:
         now = resources(pid)

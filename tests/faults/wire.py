@@ -1,6 +1,6 @@
-"""`python wire.py IFACE IFACE`: carries Ethernet frames between two interfaces, as badly as it is told.
+"""`python wire.py IFACE IFACE`: forwards Ethernet frames between two interfaces with delay and loss.
 
-Each line on stdin is `{"delay_s": seconds, "loss": fraction}`; it ends with stdin.
+Each line on stdin is `{"delay_s": seconds, "loss": fraction}`; ends when stdin is closed.
 """
 
 import heapq

@@ -158,7 +158,7 @@ def test_ten_thousand_calls_leave_nothing_behind(kiosk: Server, robot: Robot) ->
     assert robot.unanswered == UNANSWERED + UNANSWERED // 5
     after, memory_after = rest(kiosk)
     assert after.pop("objects") - before.pop("objects") < STRAY_OBJECTS
-    assert after.pop("Receipts._past") - before.pop("Receipts._past") == CALLS < PAST_IDS_KEPT
+    assert after.pop("Receipts._past_ids") - before.pop("Receipts._past_ids") == CALLS < PAST_IDS_KEPT
     assert max(after.pop("Graph.cache"), before.pop("Graph.cache")) < MOST_KNOWN
     assert abs(after.pop("tasks") - before.pop("tasks")) < PASSING_TASKS
     assert after == before

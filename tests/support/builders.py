@@ -1,4 +1,4 @@
-"""Small real things that unit tests are made of: a panel, a robot that is there, what it says."""
+"""Builders for unit tests: a panel, a robot that is connected, its messages."""
 
 import asyncio
 from collections.abc import Callable, Iterable, Mapping
@@ -65,14 +65,15 @@ COUNT: Final[Table] = {
 
 
 def told(error: PanelError) -> str:
-    """The faults of a panel file, a line for each, without what only helps to find them."""
+    """The faults of a panel file, one per line, without their positions."""
     return "\n".join(f"{fault.place}: {fault.message}" for fault in error.faults)
 
 
 def panel_of(
     *widgets: Table, interlock: Table = NOTHING, further: Iterable[Table] = (), **more: Any
 ) -> Panel:
-    """A panel of one page; `interlock` changes the one that it has, `further` are others."""
+    """A panel with one page. `interlock` overrides keys of its interlock; `further` are more
+    interlocks."""
     page = {"id": "one", "title": "One", "widget": list(widgets)}
     tables = {"title": "Cell", "interlock": [{**INTERLOCK, **interlock}, *further], "page": [page]}
     return Panel.model_validate({**tables, **more})
@@ -84,7 +85,7 @@ def small_panel(interlock: Table = NOTHING, **more: Any) -> Panel:
 
 
 def robot_there(panel: Panel) -> RobotState:
-    """A robot that commands can reach: a link, a bridge, joined; it has said nothing yet."""
+    """A robot that commands can reach: link and bridge are up. It has not published anything yet."""
     robot = RobotState(panel, INTERFACES, DIALECT, KIOSK)
     robot.link_up = True
     robot.settled_at = 0.0
@@ -101,7 +102,8 @@ def endpoint(
     alive: bool = True,
     qos: Qos | None = None,
 ) -> str:
-    """A publisher ("MP") or subscriber ("MS") appears behind a bridge, or ends; its token."""
+    """Adds or removes (`alive=False`) a publisher ("MP") or subscriber ("MS") behind a bridge; returns
+    its token."""
     type_hash = INTERFACES.type_hash(type_name)
     token = bridge_dialect.token(zid, role, robot.key(topic), type_name, qos or Qos(), type_hash)
     robot.graph.apply_token(token, alive)
@@ -124,19 +126,19 @@ def says(
 
 
 def permits(robot: RobotState, permitted: bool = True, *, at: float = NOW) -> None:
-    """The robot says whether operation is permitted."""
+    """The robot publishes whether operation is permitted."""
     says(robot, ENABLED, permitted, BOOL, at=at)
 
 
 class NoServices:
-    """A link on which no service is ever asked."""
+    """A link on which no query is expected."""
 
     def query(self, key: str, payload: bytes, timeout_s: float) -> "asyncio.Future[bytes | None]":
-        raise AssertionError(f"{key} was asked")
+        raise AssertionError(f"unexpected query: {key}")
 
 
 class FakeLink(Protocol):
-    """The link as a test has it: what is put and what is asked."""
+    """A fake of the Zenoh session."""
 
     def put(self, key: str, payload: bytes) -> None: ...
     def has_reader(self, key: str) -> bool: ...
@@ -153,7 +155,7 @@ def sending_of(
     monotonic: Callable[[], float] = lambda: NOW,
     **more: Any,
 ) -> Dispatcher:
-    """What is sent to a robot, with all that is needed for it and a test does not care for."""
+    """A dispatcher, with defaults for the parts that a test does not provide."""
     asker = asker or NoServices()
     calls = calls or ServiceCalls(INTERFACES, robot, asker, lambda: None)
     return Dispatcher(

@@ -1,5 +1,5 @@
-"""A process that is driven by JSON lines: one command in, one answer out, as `tests/ros/commands.py`
-has it."""
+"""A process that is controlled by JSON lines: one command in, one response out; see
+`tests/ros/commands.py`."""
 
 import json
 import os
@@ -14,8 +14,8 @@ ENDS_WITHIN_S: Final = 10.0
 
 
 class Commanded:
-    """`first` is what it says when it is ready. It ends when its stdin does, and so never outlives who
-    started it."""
+    """A controlled process. `first` is its first response, sent when it is ready. It ends when its
+    stdin is closed, so it never outlives the process that started it."""
 
     def __init__(self, command: Sequence[str | Path], env: Mapping[str, str], **options: Any) -> None:
         inherited = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
@@ -25,7 +25,7 @@ class Commanded:
         self.start()
 
     def start(self) -> None:
-        """The program, and after its end the program again."""
+        """Starts the program, or restarts it after its end."""
         self._process: subprocess.Popen[str] = subprocess.Popen(
             self._command,
             stdin=subprocess.PIPE,
@@ -40,7 +40,7 @@ class Commanded:
         return self._process.pid
 
     def __call__(self, do: str, **named: Any) -> Any:
-        """The answer; an AssertionError has what went wrong there."""
+        """Sends a command and returns the response; AssertionError with the error of the process."""
         with self._lock:
             assert self._process.stdin is not None
             self._process.stdin.write(json.dumps({"do": do, **named}) + "\n")
@@ -66,7 +66,7 @@ class Commanded:
         self.end()
 
     def end(self) -> None:
-        """Lets it end and waits; it is killed if it does not end in time."""
+        """Ends the process and waits; kills it after `ENDS_WITHIN_S`."""
         self.thaw()
         for pipe in (self._process.stdin, self._process.stdout):
             if pipe is not None:

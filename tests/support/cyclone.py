@@ -1,6 +1,6 @@
-"""A robot on Cyclone DDS, a Zenoh client that calls it through the bridge, and their types.
+"""A robot on Cyclone DDS, a Zenoh client that calls it through the bridge, and their message types.
 
-A test file takes the fixtures by name: `robot = cyclone.robot`, and with it what that one needs.
+A test file assigns the fixtures by name, with those that they depend on: `robot = cyclone.robot`.
 """
 
 import json
@@ -19,8 +19,8 @@ from tests.support.parts import ROS_PYTHON, TESTS, Bridge, until
 
 NODE = "cyclone_robot"
 
-# On loopback and without multicast, like the bridge; `lease` is after how long of silence others
-# hold a killed robot for gone (by default 10 s).
+# On loopback and without multicast, like the bridge. After `lease_s` of silence (default 10 s) others
+# consider a killed robot lost.
 CYCLONE = (
     "<CycloneDDS><Domain>"
     "<General><AllowMulticast>false</AllowMulticast>"
@@ -88,7 +88,7 @@ def type_store() -> Any:
     for name, text in DEFINITIONS.items():
         texts[f"{name}_Request"], texts[f"{name}_Response"] = text.split("---\n")
     for name, text in texts.items():
-        # Under its own name: rosbags gives every definition the kind `msg`.
+        # Register it by its own name: rosbags names every definition `…/msg/…`.
         (definition,) = get_types_from_msg(text, name).values()
         store.register({name: definition})
     return store
@@ -109,7 +109,7 @@ def decoded(type_name: str, payload: bytes) -> Any:
 class CycloneRobot(Commanded):
     """A node on Cyclone DDS in its own environment; see `tests/ros/cyclone_robot.py`.
 
-    Ended, it takes leave, and the bridge forgets it at once.
+    If it ends regularly, it announces that, and the bridge removes it at once.
     """
 
     def __init__(self, domain: int, lease_s: float = 10) -> None:
@@ -122,12 +122,12 @@ class CycloneRobot(Commanded):
         return partial(self, name)
 
     def requests(self, service: str) -> list[Any]:
-        """What the robot executed on a service."""
+        """The requests that the robot executed on a service."""
         return [call["request"] for call in self.calls(service=service)]
 
 
 class Client:
-    """A Zenoh session at the bridge that speaks ROS 2 in bytes, as the panel does."""
+    """A Zenoh session at the bridge that exchanges ROS 2 messages as CDR, like the panel."""
 
     def __init__(self, endpoint: str) -> None:
         config = zenoh.Config()
@@ -152,7 +152,7 @@ class Client:
 
     @contextmanager
     def hearing(self, key: str, type_name: str) -> Iterator[list[Any]]:
-        """The messages on a topic, from now on."""
+        """Within the block, collects the messages on a topic."""
         heard: list[Any] = []
 
         def hear(sample: zenoh.Sample) -> None:
@@ -165,10 +165,10 @@ class Client:
             subscriber.undeclare()
 
     def join(self, kind: str, key: str, type_name: str, qos: str = "") -> None:
-        """Joins the ROS graph by a token until the session ends, so that the bridge keeps its route.
+        """Declares a token in the ROS graph until the session ends, so that the bridge keeps its route.
 
-        `MS` for a topic (with a `qos`), `AC` for an action. A route that ends when a robot goes
-        leaves its DDS reader behind, and each of these brings a copy of each message.
+        `MS` for a topic (with a `qos`), `AC` for an action. A route that ends with its robot leaves its
+        DDS reader behind, and each such reader delivers another copy of each message.
         """
         parts = [kind, key.replace("/", "§"), type_name.replace("/", "§"), *([qos] if qos else [])]
         self._held.append(self.session.liveliness().declare_token(self._own + "/".join(parts)))
@@ -196,15 +196,15 @@ def payloads(replies: Iterable[zenoh.Reply]) -> list[bytes]:
 
 
 def errors(replies: Iterable[zenoh.Reply]) -> set[str]:
-    """What came instead of an answer: `Timeout`, from here, from the bridge or from both."""
+    """The error replies: `Timeout`, of this session, of the bridge or of both."""
     return {reply.err.payload.to_string() for reply in replies if reply.err is not None}
 
 
 def served(robot: CycloneRobot, client: Client) -> None:
-    """Waits until the bridge has found the robot, and the client the bridge's routes.
+    """Waits until the bridge has discovered the robot, and the client the bridge's routes.
 
-    The first call would be lost before that. The bridge makes a service's readers and writers,
-    then its queryable, then its token.
+    Earlier calls would be lost. The bridge creates a service's readers and writers, then its queryable,
+    then its token.
     """
     until(lambda: not robot.unmatched(), "the bridge found the robot")
     until(lambda: set(client.tokens()) >= GRAPH, "the robot's services are announced")
@@ -212,10 +212,10 @@ def served(robot: CycloneRobot, client: Client) -> None:
 
 @pytest.fixture(scope="module")
 def cyclone_bridge() -> Iterator[Bridge]:
-    """The bridge that the tests of a file share; who ends a bridge takes `own_cyclone_bridge`.
+    """The bridge that the tests of a file share. A test that ends its bridge uses `own_cyclone_bridge`.
 
-    It ends with the file, as the next file's is on the same domain: a bridge takes another one's
-    readers and writers for a robot's.
+    It ends with the file, because the next file's bridge is on the same domain: a bridge mistakes
+    another bridge's readers and writers for a robot's.
     """
     shared = Bridge(domains.cyclone()[0])
     shared.start()
@@ -233,7 +233,7 @@ def own_cyclone_bridge() -> Iterator[Bridge]:
 
 @pytest.fixture(scope="module")
 def client(cyclone_bridge: Bridge) -> Iterator[Client]:
-    """A session for all tests of a file, that gets each message once whatever the robots do."""
+    """A session for all tests of a file. It receives each message once, also when robots restart."""
     shared = Client(cyclone_bridge.endpoint)
     shared.join("MS", "parameter_events", "rcl_interfaces/msg/ParameterEvent", ":::")
     shared.join("AC", "fibonacci", "example_interfaces/action/Fibonacci")
@@ -243,7 +243,7 @@ def client(cyclone_bridge: Bridge) -> Iterator[Client]:
 
 @pytest.fixture
 def robots() -> Iterator[Callable[..., CycloneRobot]]:
-    """Makes robots, and ends them when the test is over."""
+    """Starts robots, and ends them after the test."""
     with ExitStack() as stack:
 
         def made(domain: int, **more: Any) -> CycloneRobot:

@@ -1,5 +1,5 @@
-"""ROS 2's domains and ports of this process alone: workers, and runs of the tests on one machine, hear
-nothing of each other."""
+"""ROS 2 domains and ports reserved for this process, so that parallel workers and test runs on one
+machine do not interfere."""
 
 import atexit
 import os
@@ -9,19 +9,19 @@ from functools import cache
 from itertools import cycle, islice
 from typing import Final
 
-EACH: Final = 11  # of one process
+EACH: Final = 11  # per process
 # ROS 2's domains 0 to 101 work on every system, on Linux 215 to 232 as well.
 FIRSTS: Final = (*range(1, 91, EACH), 215)
-LOCK: Final = "\0operator-panel-tests-{}"  # a name in the kernel: it goes with the process
+LOCK: Final = "\0operator-panel-tests-{}"  # an abstract socket name: released with the process
 
 
-PORTS: Final = 1000  # of one process
+PORTS: Final = 1000  # per process
 FIRST_PORT: Final = 20_000
 
 
 @cache
 def _place() -> int:
-    """A number that no other process has until this one ends."""
+    """A number that is unique among running processes."""
     for number in range(len(FIRSTS)):
         place = (os.getpid() + number) % len(FIRSTS)
         lock = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
@@ -47,10 +47,10 @@ def _ports() -> Iterator[int]:
 
 
 def ports() -> Iterator[int]:
-    """Each port of this process once, those first that were not given for long."""
+    """Each port of this process once, the least recently used first."""
     return islice(_ports(), PORTS)
 
 
 def cyclone() -> tuple[int, int]:
-    """Those of the Cyclone DDS robot."""
+    """The domains of the Cyclone DDS robot."""
     return first() + 9, first() + 10

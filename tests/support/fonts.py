@@ -1,4 +1,4 @@
-"""The fonts that a kiosk may have: a browser gets one set of them and no other."""
+"""Sets of fonts as installed on kiosks, one set per browser."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -16,7 +16,7 @@ SETS: Final[Mapping[str, Sequence[str]]] = {
 
 
 def fonts_file(name: str, folder: Path) -> Path:
-    """A configuration of fontconfig that knows one of the sets alone."""
+    """A fontconfig file with only one of the sets."""
     folders = "".join(f"<dir>{one}</dir>" for one in SETS[name])
     path = folder / "fonts.conf"
     path.write_text(

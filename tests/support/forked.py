@@ -1,4 +1,4 @@
-"""Kiosks that are forked from one process, see `kiosk_parent`; each is as a `Popen` would be."""
+"""Kiosk servers forked from one process, see `kiosk_parent`, with the interface of `Popen`."""
 
 import atexit
 import json
@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import IO, Final
 
 ROOT: Final = Path(__file__).resolve().parent.parent.parent
-# What is read when a process begins.
+# Variables that take effect only at the start of a process.
 AT_BEGIN: Final = ("LD_", "MALLOC", "PYTHON")
 NETWORK: Final = Path("/proc/thread-self/ns/net")  # a test may have moved its thread into another one
 OURS: Final = NETWORK.stat().st_ino
@@ -24,7 +24,7 @@ FORKED_TOO: Final = {"PYTHONFAULTHANDLER": "1", "PYTHONPATH": ""}
 
 
 def can_fork(command: Sequence[str], env: Mapping[str, str], folder: object) -> bool:
-    """Whether that is the server of this project, by this Python, and nothing special about it."""
+    """Whether the command starts this project's server with this Python and no special environment."""
     if list(command[:3]) != [sys.executable, "-m", "uvicorn"] or folder != ROOT:
         return False
     if not command[3].startswith(APPS):
@@ -37,7 +37,7 @@ def can_fork(command: Sequence[str], env: Mapping[str, str], folder: object) -> 
 
 @cache
 def _parent() -> socket.socket:
-    """Where orders go."""
+    """The socket to the parent of all forked servers, which is started on first use."""
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     for one in (ours, theirs):
         one.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 1 << 18)
@@ -58,7 +58,7 @@ def _parent() -> socket.socket:
 
 
 class Forked:
-    """What of a `Popen` is used."""
+    """A forked server; the subset of `Popen` that the tests use."""
 
     stdin = stdout = None
 
@@ -66,23 +66,23 @@ class Forked:
         self.args = command
         self.returncode: int | None = None
         self._lock = threading.Lock()
-        stderr, said = os.pipe2(os.O_CLOEXEC)
-        self._told, tells = os.pipe2(os.O_CLOEXEC)
+        stderr, stderr_writer = os.pipe2(os.O_CLOEXEC)
+        self._status, status_writer = os.pipe2(os.O_CLOEXEC)
         order = json.dumps({"arguments": list(command[3:]), "env": {**os.environ, **env}})
-        socket.send_fds(_parent(), [order.encode()], [said, tells])
-        os.close(said)
-        os.close(tells)
-        self.stderr: IO[str] = open(stderr, encoding="utf-8")  # noqa: SIM115 - whoever reads it closes it
+        socket.send_fds(_parent(), [order.encode()], [stderr_writer, status_writer])
+        os.close(stderr_writer)
+        os.close(status_writer)
+        self.stderr: IO[str] = open(stderr, encoding="utf-8")  # noqa: SIM115 - closed by the reader
         self._text = b""
         self.pid = int(self._line(None) or 0)
 
     def _line(self, timeout_s: float | None) -> bytes | None:
-        """The next that is told, within that time; nothing more after the exit code."""
-        if not select.select([self._told], [], [], timeout_s)[0]:
+        """The next line of the status pipe (the pid, then the exit code); None at the timeout."""
+        if not select.select([self._status], [], [], timeout_s)[0]:
             return None
         line = bytearray()
         while not line.endswith(b"\n"):
-            byte = os.read(self._told, 1)
+            byte = os.read(self._status, 1)
             assert byte, f"the parent of the kiosks has ended before {self.args!r}"
             line += byte
         return bytes(line)
@@ -91,7 +91,7 @@ class Forked:
         with self._lock:
             if self.returncode is None and (line := self._line(timeout_s)):
                 self.returncode = int(line)
-                os.close(self._told)
+                os.close(self._status)
             return self.returncode
 
     def poll(self) -> int | None:

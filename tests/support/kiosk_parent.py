@@ -1,9 +1,9 @@
-"""A process that has read the server's libraries once, and begins kiosks by forking: reading them again
-takes a second of work for each. Message types, the panel's models and templates are prepared once, too.
+"""A process that imports the server's libraries once, and forks kiosk servers: importing them takes a
+second per server. Message types, the panel's models and templates are prepared once, too.
 
-It is `python -m tests.support.kiosk_parent FD` in the project's folder. FD is a socket: each message is
-an order in JSON with two files, the kiosk's stderr and where its pid and then its exit code are told.
-It ends when the other end is closed.
+Run as `python -m tests.support.kiosk_parent FD` in the project's folder. FD is a socket: each message
+is an order in JSON with two files, the server's stderr and a pipe for its pid and then its exit code.
+The process ends when the other end is closed.
 """
 
 import ast
@@ -42,7 +42,8 @@ LONGEST: Final = 1 << 18
 
 
 def read_libraries() -> dict[str, str]:
-    """All that `app.main` imports, but not itself; and what that put into the environment."""
+    """Imports everything that `app.main` imports, but not `app.main`; returns the environment variables
+    that the imports set."""
     before = dict(os.environ)
     for name in UVICORN:
         import_module(f"uvicorn.{name}")
@@ -60,20 +61,20 @@ def read_libraries() -> dict[str, str]:
 
 
 def prepare(templates: str) -> None:
-    """Reads the message types and builds the models of a panel; the first kiosk compiles the templates
-    into that folder, the others read them there."""
+    """Loads the message types and builds a panel's models. The first server compiles the templates into
+    the folder `templates`, the others read them from there."""
     load_panel(PANEL)
     keep = partialmethod(Environment.__init__, bytecode_cache=FileSystemBytecodeCache(templates))
     setattr(Environment, "__init__", keep)  # noqa: B010 - mypy takes no assignment to a method
 
 
 class Parent:
-    """Forks, and tells how each one ended."""
+    """Forks servers, and reports their exit codes."""
 
     def __init__(self, orders: socket.socket) -> None:
         self._orders = orders
         self._added = read_libraries()
-        self._told: dict[int, int] = {}  # where a child's end is told, by pid
+        self._status: dict[int, int] = {}  # status pipe by pid
         self._woken, self._wakes = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         signal.signal(signal.SIGHUP, signal.SIG_DFL)  # the tests may run under nohup
@@ -93,26 +94,26 @@ class Parent:
                 self._begin(json.loads(text), *files)
 
     def _reap(self) -> None:
-        while self._told:
+        while self._status:
             pid, status = os.waitpid(-1, os.WNOHANG)
             if not pid:
                 return
-            told = self._told.pop(pid)
-            os.write(told, f"{os.waitstatus_to_exitcode(status)}\n".encode())
-            os.close(told)
+            pipe = self._status.pop(pid)
+            os.write(pipe, f"{os.waitstatus_to_exitcode(status)}\n".encode())
+            os.close(pipe)
 
-    def _begin(self, order: Mapping[str, Any], stderr: int, told: int) -> None:
+    def _begin(self, order: Mapping[str, Any], stderr: int, status: int) -> None:
         pid = os.fork()
         if pid:
-            self._told[pid] = told
-            os.write(told, f"{pid}\n".encode())
+            self._status[pid] = status
+            os.write(status, f"{pid}\n".encode())
             os.close(stderr)
             return
         signal.set_wakeup_fd(-1)
         signal.signal(signal.SIGCHLD, signal.SIG_DFL)
         signal.signal(signal.SIGINT, signal.default_int_handler)
         self._orders.close()
-        for file in (told, self._woken, self._wakes, *self._told.values()):
+        for file in (status, self._woken, self._wakes, *self._status.values()):
             os.close(file)
         os.dup2(stderr, 2)
         os.close(stderr)
@@ -122,7 +123,7 @@ class Parent:
 
 
 def become(arguments: list[str]) -> None:
-    """As `python -m uvicorn ARGUMENTS` in this folder."""
+    """Continues as `python -m uvicorn ARGUMENTS` in this folder."""
     time.tzset()
     if os.environ.get("PYTHONFAULTHANDLER"):
         faulthandler.enable()
@@ -135,5 +136,5 @@ if __name__ == "__main__":
     parent = Parent(socket.socket(fileno=int(sys.argv[1])))
     compiled = tempfile.mkdtemp(prefix="templates-")
     prepare(compiled)
-    parent.run()  # a kiosk leaves it by SystemExit
+    parent.run()  # in a forked server, it ends by SystemExit
     shutil.rmtree(compiled)

@@ -1,4 +1,4 @@
-"""Messages of any size, as CDR: what takes long to build takes a moment here."""
+"""Large messages as CDR, built from bytes because encoding them takes long."""
 
 import struct
 from collections.abc import Callable, Mapping
@@ -15,7 +15,7 @@ POINT: Final = struct.pack("<IIIIiI", 0, 0, 0, 0, 0, 0)
 
 
 class Large(NamedTuple):
-    """A message of a type, and a field of it that is read, with its value."""
+    """An encoded message, with the path and the value of a field to read."""
 
     type: str
     path: str
@@ -30,7 +30,7 @@ def poses(size: int) -> Large:
 
 
 def path(size: int) -> Large:
-    """Poses with a text each."""
+    """Poses with a frame id each."""
     one = HEADER + POSE
     count = size // len(one)
     body = HEADER + struct.pack("<I", count) + HEADER + bytes(4) + POSE + one * (count - 1)
@@ -38,7 +38,7 @@ def path(size: int) -> Large:
 
 
 def diagnostics(size: int, name: bytes = b"") -> Large:
-    """The last one has the name."""
+    """The last status has the name."""
     count = size // len(STATUS)
     last = struct.pack(f"<B3xI{len(name) + 1}s", 1, len(name) + 1, name)
     last += bytes(-len(last) % 4) + STATUS[12:]
@@ -78,7 +78,7 @@ def numbers(size: int) -> Large:
 
 
 def text(size: int) -> Large:
-    """Of letters of three bytes each; of a long one the beginning is read."""
+    """A text of letters with three bytes each; of a long text only the beginning is read."""
     count, most = size // 3, MAX_TEXT // 3
     body = struct.pack("<I", 3 * count + 1) + "漢".encode() * count + b"\0"
     value = "漢" * count if count <= most else "漢" * most + "…"
@@ -86,7 +86,7 @@ def text(size: int) -> Large:
 
 
 def garbage(size: int) -> Large:
-    """It says that it has as many elements as would have room."""
+    """Invalid data that claims as many elements as would fit."""
     body = HEADER + struct.pack("<I", size // 5) + b"\1\0\0\0" * (size // 4)
     return Large("diagnostic_msgs/msg/DiagnosticArray", "status[0].level", None, LITTLE + body)
 

@@ -1,5 +1,5 @@
-"""The real parts that tests are made of: bridge, ROS 2 nodes, kiosk servers. Each is a process of
-its own, on loopback, and each is ended by who started it."""
+"""The real parts of tests: bridge, ROS 2 nodes, kiosk servers. Each is a process on loopback, and is
+ended by the test or fixture that started it."""
 
 import json
 import os
@@ -27,7 +27,7 @@ from tests.support import domains
 from tests.support.commanded import Commanded
 from tests.support.forked import Forked, can_fork
 
-# Without scripts, what comes within 700 ms of its page is a second tap; a busy driver waits less.
+# Without scripts, a press within 700 ms of its page counts as a second tap. Longer, for busy machines.
 TAP_AGAIN_MS = 1000
 ROOT = Path(__file__).resolve().parent.parent.parent
 TESTS = ROOT / "tests"
@@ -36,7 +36,7 @@ BRIDGE = Path(
 )
 ROS_PYTHON = Path(os.environ.get("TEST_ROS_PYTHON") or ROOT / ".venv-ros/bin/python")
 CHROMIUM = "/usr/bin/chromium"
-# The same engine without what a window needs: a page takes a quarter of the work.
+# The same engine without windows: a page takes a quarter of the CPU time.
 HEADLESS = "/usr/bin/chromium-headless-shell"
 CHROMIUM_FLAGS = [
     "--no-sandbox",
@@ -48,7 +48,7 @@ CHROMIUM_FLAGS = [
     "--disable-sync",
 ]
 
-# Bridge and nodes find each other on loopback only, whatever else is on this machine's network.
+# Bridge and nodes discover each other on loopback only.
 CYCLONE_ON_LOOPBACK = (
     "<CycloneDDS><Domain><General><Interfaces>"
     '<NetworkInterface name="lo"/>'
@@ -58,10 +58,10 @@ CYCLONE_ON_LOOPBACK = (
 
 MOST_MEMORY = 2 << 30  # bytes of a node
 
-STOOD = "Timeout (0:00:20)!"  # a server stood still as it ended, and left
+STOOD = "Timeout (0:00:20)!"  # written by a server that hung at shutdown
 
 
-# What happens at once happens within this time also where much else runs.
+# Even on a busy machine, anything immediate happens within this time.
 ENOUGH_S = 40.0
 
 
@@ -77,8 +77,7 @@ def until(what: Callable[[], Any], why: str, within_s: float = ENOUGH_S, every_s
 
 
 def free_port() -> int:
-    """A port of this process's own: below those that the system gives away, so that none is taken
-    before its server listens."""
+    """A free port that is reserved for this process, below the system's ephemeral ports."""
     for port in domains.ports():
         with socket.socket() as probe, suppress(OSError):
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -90,7 +89,7 @@ def free_port() -> int:
 class Process:
     """A child process whose stderr is kept as lines."""
 
-    latest: ClassVar[deque["Process"]] = deque(maxlen=6)  # what a failed test shows
+    latest: ClassVar[deque["Process"]] = deque(maxlen=6)  # shown by a failed test
 
     def __init__(self, command: Sequence[str], env: Mapping[str, str], **options: Any) -> None:
         self._process: subprocess.Popen[str] | Forked
@@ -116,7 +115,7 @@ class Process:
         return "\n".join(self.lines)
 
     def count(self, words: str) -> int:
-        """How often it wrote the words: at least once, for its lines come after its answers."""
+        """How often it wrote the words. Waits for the first: log lines arrive later than responses."""
         until(lambda: words in self.text, f"it writes {words!r}")
         return self.text.count(words)
 
@@ -129,7 +128,7 @@ class Process:
         return self._process.poll() is None
 
     def told(self, lines: int = 40) -> str:
-        """Which one it is, and the last that it said."""
+        """Pid, state, command and the last lines."""
         state = "runs" if self.running else f"ended with {self._process.returncode}"
         return "\n".join([f"{self.pid}, {state}: {self._process.args!r}", *self.lines[-lines:]])
 
@@ -143,7 +142,7 @@ class Process:
         self.end(signal.SIGKILL)
 
     def end(self, number: signal.Signals = signal.SIGTERM, timeout_s: float = 25) -> int:
-        """Ends it and waits; it is killed if it does not end in time."""
+        """Ends the process and waits; kills it after `timeout_s`."""
         if self.running:
             self.send(number)
         try:
@@ -161,7 +160,7 @@ class Process:
 
 
 class Bridge:
-    """The real bridge, with the shipped configuration; ports and domain are of this test alone."""
+    """The real bridge with the shipped configuration, on a port and a domain of this test."""
 
     def __init__(self, domain: int, namespace: str = "/") -> None:
         self.domain = domain
@@ -207,7 +206,7 @@ class Bridge:
 
 
 class RosNode(Commanded):
-    """A real rclpy node in its own environment; see `tests/ros/node.py` for what it can do."""
+    """A real rclpy node in its own environment; see `tests/ros/node.py` for its commands."""
 
     def __init__(self, domain: int, name: str = "system_controller", **options: Any) -> None:
         super().__init__(
@@ -223,7 +222,8 @@ class RosNode(Commanded):
         )
 
     def start(self) -> None:
-        """A request that Fast DDS misreads says how much memory it wants: not that of the machine."""
+        """Starts the node with a memory limit: Fast DDS may misread a request and allocate a huge
+        size."""
         super().start()
         resource.prlimit(self.pid, resource.RLIMIT_DATA, (MOST_MEMORY, MOST_MEMORY))
 
@@ -234,7 +234,7 @@ class RosNode(Commanded):
         return do
 
     def heard_data(self, topic: str) -> list[Any]:
-        """The `data` field of all that a subscription heard."""
+        """The `data` field of all messages that a subscription received."""
         return [message["data"] for message in self.heard(topic)]
 
     def kill(self) -> None:
@@ -244,7 +244,8 @@ class RosNode(Commanded):
             path.unlink(missing_ok=True)
 
     def _shared_memory(self) -> set[Path]:
-        """What Fast DDS would remove when it ends: the files whose lock this process has."""
+        """The shared memory files that Fast DDS removes at its end: those that this process has
+        locked."""
         opened = {path.resolve() for path in Path(f"/proc/{self.pid}/fd").iterdir()}
         locks = {path for path in opened if path.match("/dev/shm/fastdds_*_el")}
         segments = {path.with_name(path.name.removesuffix("_el")) for path in locks}
@@ -276,7 +277,7 @@ ORDERS: Mapping[str, tuple[str, ...]] = {
 
 
 def http_client(url: str, timeout_s: float = ENOUGH_S, **more: Any) -> httpx.Client:
-    """A client of a server of the tests. None speaks TLS: to read the certificates takes 0.1 s."""
+    """An HTTP client for a test server, without TLS: reading the certificates takes 0.1 s."""
     return httpx.Client(base_url=url, timeout=timeout_s, trust_env=False, verify=False, **more)
 
 
@@ -294,8 +295,8 @@ class Server:
         before: Sequence[str] = (),
         **environment: str,
     ) -> None:
-        """`before` is a command that starts it, such as `unshare`; without a KIOSK_DATA it has a
-        data folder of its own, which goes with it."""
+        """`before` is a command that starts the server, such as `unshare`. Without KIOSK_DATA it has
+        its own data folder, which is removed with it."""
         self._own_data = tempfile.TemporaryDirectory(prefix="kiosk-data-")
         self.data = Path(environment.setdefault("KIOSK_DATA", self._own_data.name))
         self.base = ""
@@ -312,13 +313,13 @@ class Server:
             raise
 
     def robot(self, name: str) -> "Server":
-        """The same server, asked for one of its robots."""
+        """The same server, for requests about one of its robots."""
         one = copy(self)
         one.base = f"/robots/{name}"
         return one
 
     def by(self, way: str) -> "Server":
-        """The same server, with its presses by "post" or by "socket"."""
+        """The same server, with presses by "post" or by "socket"."""
         one = copy(self)
         one.way = way
         return one
@@ -343,7 +344,7 @@ class Server:
         return found
 
     def press(self, widget: str, message: str = "", **more: Any) -> httpx.Response:
-        """What comes of it; one that was more than a client may is made again, as programs do."""
+        """The response to a press, repeated while it is over the rate limit, as programs do."""
         press = {"inputs": {"message": message}, **more}
 
         def pressed() -> httpx.Response | None:
@@ -361,7 +362,7 @@ class Server:
 
     @contextmanager
     def socket(self, **headers: str) -> Iterator["PressSocket"]:
-        """A socket for presses, of a client that has the same cookies."""
+        """A press WebSocket of a client with the same cookies."""
         kept = "; ".join(f"{name}={value}" for name, value in self.http.cookies.items())
         headers = {**({"cookie": kept} if kept else {}), **headers}
         host = headers.pop("host", f"127.0.0.1:{self.port}")
@@ -384,17 +385,17 @@ class Server:
 
 
 class PressSocket:
-    """One socket for presses, spoken by hand."""
+    """A press WebSocket."""
 
     def __init__(self, connection: ClientConnection) -> None:
         self._connection = connection
 
     def say(self, text: str | bytes | list[str]) -> None:
-        """A list is one message in pieces."""
+        """Sends a message; a list is one message in fragments."""
         self._connection.send(text)
 
     def closed(self) -> int:
-        """The code that the server closes with, after whatever it says before."""
+        """Waits until the server closes the socket; returns the close code."""
         with suppress(ConnectionClosed):
             while True:
                 self._connection.recv(10)
@@ -406,7 +407,7 @@ class PressSocket:
         return said
 
     def press(self, **press: Any) -> httpx.Response:
-        """Its answer as that to a post; nothing else may be under way."""
+        """Makes a press; returns the response as that to a post. No other press may be in flight."""
         self.say(json.dumps({"id": secrets.token_hex(8), **press}))
         return as_response(self.hear())
 
@@ -423,7 +424,7 @@ class Stream:
         self._text = ""
 
     def next(self, *names: str) -> tuple[str, Any, str]:
-        """The next event with one of these names; beats and others are passed over."""
+        """The next event with one of these names; other events are skipped."""
         while True:
             while "\n\n" not in self._text:
                 self._text += next(self._chunks)
@@ -434,7 +435,7 @@ class Stream:
 
 
 def events_in(text: str) -> list[tuple[str, str, str]]:
-    """(event, data, id) of each whole event in a text."""
+    """(event, data, id) of each complete event in a text."""
     events = []
     for block in text.split("\n\n"):
         fields = dict(line.split(": ", 1) for line in block.split("\n") if ": " in line)
@@ -444,7 +445,7 @@ def events_in(text: str) -> list[tuple[str, str, str]]:
 
 
 def zenoh_file(folder: Path, endpoint: str) -> Path:
-    """The shipped zenoh.json5, connecting to another place."""
+    """The shipped zenoh.json5 with another endpoint."""
     shipped = (ROOT / "zenoh.json5").read_text()
     path = folder / "zenoh.json5"
     path.write_text(shipped.replace("tcp/127.0.0.1:7447", endpoint))
@@ -453,6 +454,6 @@ def zenoh_file(folder: Path, endpoint: str) -> Path:
 
 
 def live(endpoint: str, folder: Path, port: int = 0, **environment: str) -> Server:
-    """A kiosk with the shipped panel, on the robot behind a bridge."""
+    """A kiosk server with the shipped panel, in live mode behind a bridge."""
     zenoh = str(zenoh_file(folder, endpoint))
     return Server(ROOT, port, KIOSK_MODE="live", KIOSK_ZENOH=zenoh, **environment)

@@ -1,4 +1,4 @@
-"""Values for any interface: random ones, and those at the edges of what a definition takes."""
+"""Sample values for any interface: random ones, and the limits of each definition."""
 
 import math
 import random
@@ -21,7 +21,7 @@ LARGEST: Final[Mapping[str, float]] = {
 
 
 class Samples:
-    """Fields for any structure; the same seed gives the same ones.
+    """Sample fields for any structure, reproducible by seed.
 
     "least" has the lowest values and the shortest lists and texts, "most" the highest and longest.
     """

@@ -1,4 +1,4 @@
-"""What is seen in a reader's words."""
+"""Rendering of texts within any value."""
 
 from typing import Any
 
@@ -6,7 +6,7 @@ from app.i18n import Text, localized, render
 
 
 def english(value: Any) -> Any:
-    """The same value with every text in it as an English reader reads it."""
+    """The same value with every `Text` in it rendered in English."""
     if isinstance(value, Text):
         return render(value)
     if isinstance(value, tuple):

@@ -1,7 +1,7 @@
-"""The kiosk's application with one path more, `/sizes`: how much it holds, for a test of memory.
+"""The server's application with another path, `/sizes`, for a test of memory growth.
 
-It waits for late answers for `LATE_S` only, so that a test sees the end of that, and takes presses as
-fast as they come.
+It waits for late responses only for `LATE_S`, so that a test sees the end of the wait, and has no rate
+limits.
 """
 
 import asyncio
@@ -18,13 +18,14 @@ from app.web.app_state import site_of
 
 LATE_S = 0.5
 UNLIMITED = Quota(1e9, 1e9)
-vars(service_calls)["LATE_S"] = LATE_S  # Final in what is shipped
+vars(service_calls)["LATE_S"] = LATE_S  # Final in the application
 vars(press_limits).update(CLIENT_QUOTA=UNLIMITED, ADDRESS_QUOTA=UNLIMITED)
 
 
 @app.get("/sizes")
 async def sizes(request: Request) -> dict[str, int]:
-    """Objects, tasks, and the length of everything that the kiosk and its parts hold."""
+    """The number of objects and tasks, and the length of all collections of the session and its
+    parts."""
     kiosk = site_of(request).fleet.first
     gc.collect()
     held = {"objects": len(gc.get_objects()), "tasks": len(asyncio.all_tasks())}

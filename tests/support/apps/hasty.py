@@ -1,4 +1,5 @@
-"""The application with little time and few places, for `uvicorn tests.support.apps.hasty:app`."""
+"""The application with short timeouts and few connections, for `uvicorn
+tests.support.apps.hasty:app`."""
 
 from app import main
 from app.web import connections, request_body

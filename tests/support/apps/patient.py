@@ -1,6 +1,6 @@
-"""The application with times that a busy machine keeps, for `uvicorn tests.support.apps.patient:app`.
+"""The application with long timeouts, for busy machines, for `uvicorn tests.support.apps.patient:app`.
 
-Its demo robot always permits operation, and a hold lasts long without a heartbeat.
+Its demo robot always permits operation, and a hold continues long without a heartbeat.
 """
 
 from app import main

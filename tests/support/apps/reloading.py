@@ -1,4 +1,4 @@
-"""The application whose pages without scripts soon load themselves again, for
+"""The application with a short refresh interval of pages without scripts, for
 `uvicorn tests.support.apps.reloading:app`."""
 
 from app import main

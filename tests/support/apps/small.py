@@ -1,4 +1,4 @@
-"""Limits as small as tests need them, of `tests.support.apps.hasty` and `tests.support.apps.strict`."""
+"""Small limits for the tests, of `tests.support.apps.hasty` and `tests.support.apps.strict`."""
 
 from typing import Final
 

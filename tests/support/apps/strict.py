@@ -1,4 +1,4 @@
-"""The application with small limits of presses, for `uvicorn tests.support.apps.strict:app`."""
+"""The application with low rate limits, for `uvicorn tests.support.apps.strict:app`."""
 
 from app import main
 from app.commands import press_limits

@@ -1,4 +1,4 @@
-"""The kiosk's application with one language more, "qps": every sentence of English in brackets."""
+"""The application with another language, "qps": every sentence of English in brackets."""
 
 import json
 import tempfile
@@ -11,7 +11,7 @@ LANGUAGE = "qps"
 
 
 def bracketed(folder: Path) -> None:
-    """The catalogue of that language; what stands between texts stays."""
+    """The catalogue of that language; separators stay unchanged."""
     texts = {
         code: text if code.startswith("between_") else f"⟦{text}⟧"
         for code, text in sentences(ENGLISH).items()
