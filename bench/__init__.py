@@ -1,1 +1,1 @@
-"""`make bench`: this panel and its rivals, measured side by side in one run."""
+"""`make bench`: measures this panel and its rivals side by side in one run."""

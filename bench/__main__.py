@@ -1,7 +1,7 @@
-"""`python -m bench [PHASE…]`: measures, and writes what was found as JSON, Markdown and a picture.
+"""`python -m bench [PHASE…]`: measures, and writes the results as JSON, Markdown and a picture.
 
-Each phase keeps its results as it goes, so that one that breaks loses nothing. With `QUICK=1` little
-is measured: that shows that the harness works, and no more.
+Results are saved after each measurement, so that a failing phase loses nothing. With `QUICK=1` only a
+few samples are measured, to check that the harness works.
 """
 
 import argparse
@@ -33,14 +33,14 @@ from bench.store import Store
 from tests.support.parts import ROOT
 
 KIOSK: Final = Kiosk()
-SAME_STREAM: Final = ("plain-ws",)  # as another peer's: it differs in how it presses only
-AGAIN: Final = "-again"  # the floor once more, as its own control
+SAME_STREAM: Final = ("plain-ws",)  # same event stream as another peer: only its presses differ
+AGAIN: Final = "-again"  # the floor measured twice, as a control
 
 Measure = Callable[[Rig, Peer], Mapping[str, Any]]
 
 
 class Run:
-    """The phases, on the peers that are there."""
+    """The phases, on the available peers."""
 
     def __init__(self, rig: Rig, store: Store, peers: Sequence[Peer]) -> None:
         self._rig = rig
@@ -50,11 +50,11 @@ class Run:
 
     def down(self) -> None:
         floor = next(peer for peer in self._peers if peer.id == "floor")
-        asked = [(peer.id, peer) for peer in self._peers] + [(floor.id + AGAIN, floor)]
-        self._interleaved("down", asked, latency.down, self._rounds)
+        measured = [(peer.id, peer) for peer in self._peers] + [(floor.id + AGAIN, floor)]
+        self._interleaved("down", measured, latency.down, self._rounds)
 
     def bridge(self) -> None:
-        """Down again, from rclpy over the real bridge."""
+        """Latency down, from rclpy over the real bridge."""
         with self._rig.bridge() as locator:
             self._interleaved(
                 "bridge",
@@ -83,13 +83,13 @@ class Run:
                 self._store.add("growth", 0, axis, {"points": measure()})
 
     def _shown(self) -> list[tuple[str, Peer]]:
-        """Those whose pages show texts, each stream once."""
+        """The peers whose pages show texts, each event stream once."""
         return [(p.id, p) for p in self._peers if p.button and p.id not in SAME_STREAM]
 
     def _interleaved(
         self, phase: str, peers: Sequence[tuple[str, Peer]], measure: Measure, rounds: int
     ) -> None:
-        """Each peer once in a round, and in each round another one first."""
+        """Measures each peer once per round, in a rotating order."""
         self._store.begin(phase)
         for turn in range(rounds):
             first = turn * len(peers) // rounds
@@ -104,7 +104,7 @@ PHASES: Final = ("down", "bridge", "up", "cost", "stalled", "start", "growth")
 
 @contextmanager
 def timed(what: str) -> Iterator[None]:
-    """Tells what is measured now, and how long it took."""
+    """Prints what is being measured, and the time it took."""
     print(what, end=" ", flush=True)
     began = time.monotonic()
     yield
@@ -112,7 +112,7 @@ def timed(what: str) -> Iterator[None]:
 
 
 def proven(rig: Rig, store: Store, peers: Iterable[Peer]) -> list[Peer]:
-    """The peers that work; of the others, why they are not measured."""
+    """The peers that work. For the others, the reason is stored."""
     found = []
     for peer in peers:
         if not peer.installed():
@@ -128,7 +128,7 @@ def proven(rig: Rig, store: Store, peers: Iterable[Peer]) -> list[Peer]:
 
 @contextmanager
 def ended_like_ctrl_c() -> Iterator[None]:
-    """SIGTERM ends all that was started, as Ctrl-C does."""
+    """Within the block, SIGTERM raises KeyboardInterrupt, so that all processes are ended."""
 
     def on_signal(number: int, frame: FrameType | None) -> None:
         raise KeyboardInterrupt
@@ -162,7 +162,7 @@ def main(arguments: Sequence[str]) -> int:
             for phase in given.phases or PHASES:
                 getattr(run, phase)()
     except KeyboardInterrupt:
-        print("ended before its time; what was measured is kept", file=sys.stderr)
+        print("interrupted; the results so far are kept", file=sys.stderr)
         return 130
     except Exception:
         traceback.print_exc()

@@ -1,4 +1,4 @@
-"""Chromium: pages, their clock, what they show, and what is pressed on them."""
+"""Chromium: opens pages, reads their clocks, observes what they show, and presses buttons."""
 
 import json
 import time
@@ -19,7 +19,7 @@ TEXT_INPUT: Final = "#text, #input-text"
 ROUND_TRIPS: Final = 20
 TEXT_FRAME: Final = 1
 
-# What was shown when, in the page's time. It sees the DOM's changes as the page's own script would.
+# Records changes of the DOM with the page's time, by MutationObserver.
 WATCH: Final = """([shown, values]) => {
   const bench = (window.bench = { toggles: [], texts: [], ups: [] });
   const root = document.querySelector(shown);
@@ -34,7 +34,7 @@ WATCH: Final = """([shown, values]) => {
   addEventListener("pointerup", () => bench.ups.push(performance.now()), true);
 }"""
 
-# From the very beginning: when the page shows that the robot permits, by its own clock.
+# Injected before the page's scripts: the page's time when it first shows the permission.
 SHOWN_AT: Final = """(() => {
   window.benchShownAt = 0;
   const look = () => {
@@ -47,7 +47,7 @@ SHOWN_AT: Final = """(() => {
   observer.observe(document, { subtree: true, childList: true, attributes: true });
 })()"""
 
-# As WATCH does with values, but from the very beginning and over the page's own reloads.
+# Like WATCH for values, but injected before the page's scripts, and across the page's own reloads.
 KEEP: Final = """((values) => {
   const origin = performance.timeOrigin;
   const moved = (texts, by) => texts.map(([at, index, text]) => [at + by, index, text]);
@@ -82,23 +82,24 @@ TYPE: Final = """([input, buttons, turn, text]) => {
 
 
 def value_of(topic: str) -> str:
-    """Selector of the element that shows a topic: as a peer names it, or as the panel's widget."""
+    """The selector of the element that shows a topic, for peers and for the panel's widgets."""
     return f'[data-topic="{topic}"], [data-widget="{topic[1:]}"] .value'
 
 
 @dataclass(frozen=True)
 class Clock:
-    """From a page's time (ms) to CLOCK_MONOTONIC (ns), by Chromium's own word for when it began."""
+    """Converts a page's time (ms) to CLOCK_MONOTONIC (ns), from the page's start as Chromium reports
+    it."""
 
     began_ns: float
-    doubt_ms: float  # how far the shortest round trips to the page leave it open
+    doubt_ms: float  # the uncertainty that the shortest round trips to the page leave
 
     def ns(self, page_ms: float) -> float:
         return self.began_ns + page_ms * 1e6
 
 
 class Watched:
-    """A page of a peer."""
+    """An open page of a peer."""
 
     def __init__(self, page: Page, peer_shown: str, topics: Sequence[str] = ()) -> None:
         self.page = page
@@ -106,14 +107,14 @@ class Watched:
         self._topics = topics
 
     def permitted(self) -> bool:
-        """Waits until it shows that the robot permits."""
+        """Waits until the page shows the robot's permission; False at the timeout."""
         with suppress(PlaywrightError):
             self.page.wait_for_selector(f":is({self._shown}):not([disabled])", timeout=WITHIN_MS)
             return True
         return False
 
     def followed(self) -> None:
-        """Waits until each topic shows a numbered text of the robot's."""
+        """Waits until each topic shows a numbered text of the robot."""
         for topic in self._topics:
             self.page.wait_for_function(
                 "(value) => document.querySelector(value)?.textContent.startsWith('#')",
@@ -125,21 +126,22 @@ class Watched:
         self.page.evaluate(WATCH, [self._shown, [value_of(topic) for topic in self._topics]])
 
     def take(self, what: str) -> list[Any]:
-        """What was noted, which is forgotten then: `toggles`, `texts` or `ups`."""
+        """Returns and clears the recorded `toggles`, `texts` or `ups`."""
         return list(self.page.evaluate(f"bench.{what}.splice(0)"))
 
     def kept(self) -> list[Any]:
-        """(page's time, index of the topic, text) of all that it showed, if it was to keep that."""
+        """(page's time, index of the topic, text) of everything that was shown, for a page opened with
+        `keep`."""
         return list(self.page.evaluate("benchKept"))
 
     def clock(self) -> Clock:
-        """Chromium's TimeTicks are CLOCK_MONOTONIC: when the page's time began is read from it, and
-        checked by round trips."""
+        """The page's clock. Chromium's TimeTicks are CLOCK_MONOTONIC: the start of the page's time is
+        read from Chromium, and checked by round trips."""
         session = self.page.context.new_cdp_session(self.page)
         session.send("Performance.enable", {"timeDomain": "timeTicks"})
-        told = session.send("Performance.getMetrics")["metrics"]
+        metrics = session.send("Performance.getMetrics")["metrics"]
         session.detach()
-        began = next(one["value"] for one in told if one["name"] == "NavigationStart") * 1e9
+        began = next(one["value"] for one in metrics if one["name"] == "NavigationStart") * 1e9
         least, most = float("-inf"), float("inf")
         for _ in range(ROUND_TRIPS):
             before = time.monotonic_ns()
@@ -150,7 +152,7 @@ class Watched:
         return Clock(began, max(outside, (most - least) / 2) / 1e6)
 
     def press(self, buttons: str, turn: int, text: str) -> bool:
-        """Types a text and presses; False where the button is locked."""
+        """Types a text and presses a button; False if the button is locked."""
         x, y, open_ = self.page.evaluate(TYPE, [TEXT_INPUT, buttons, turn, text])
         if not open_:
             return False
@@ -161,7 +163,7 @@ class Watched:
 
 
 class Chromium:
-    """One browser; a page is open only while it is measured."""
+    """A browser. Pages are open only while they are measured."""
 
     def __init__(self, playwright: Playwright) -> None:
         self._browser: Browser = playwright.chromium.launch(
@@ -172,9 +174,9 @@ class Chromium:
             handle_sighup=False,
         )
         session = self._browser.new_browser_cdp_session()
-        told = session.send("SystemInfo.getProcessInfo")["processInfo"]
+        processes = session.send("SystemInfo.getProcessInfo")["processInfo"]
         session.detach()
-        self._root = next(int(one["id"]) for one in told if one["type"] == "browser")
+        self._root = next(int(one["id"]) for one in processes if one["type"] == "browser")
         self.version = self._browser.version
 
     def pids(self) -> set[int]:
@@ -184,7 +186,7 @@ class Chromium:
     def page(
         self, url: str, shown: str, topics: Sequence[str] = (), keep: bool = False
     ) -> Iterator[Watched]:
-        """A page in a context of its own, loaded; `keep`: see `Watched.kept`."""
+        """A loaded page in its own context; `keep`: see `Watched.kept`."""
         with self.blank() as page:
             if keep:
                 page.add_init_script(f"{KEEP}({json.dumps([value_of(topic) for topic in topics])})")
@@ -202,8 +204,8 @@ class Chromium:
                 context.close()
 
     def load(self, url: str, shown: str) -> tuple[float, int]:
-        """(ms from the request until it shows that the robot permits, bytes over the wire) of a page
-        that this browser does not know yet."""
+        """(ms from the request until the robot's permission is shown, bytes over the wire), with an
+        empty cache."""
         with self.blank() as page:
             page.add_init_script(SHOWN_AT.replace("SELECTOR", repr(shown)))
             wire = Wire(page.context.new_cdp_session(page))
@@ -219,7 +221,7 @@ class Chromium:
 
 
 class Wire:
-    """What a page gets over the wire, headers and streams too, compressed as it comes."""
+    """Counts the bytes that a page receives, compressed, with headers and streams."""
 
     def __init__(self, session: CDPSession) -> None:
         self._of: dict[str, int] = {}
@@ -245,6 +247,6 @@ class Wire:
         self._of[event["requestId"]] = int(event["encodedDataLength"])
 
     def _message(self, event: Any) -> None:
-        told = event["response"]
-        length = len(told["payloadData"])
-        self._messages += length if told["opcode"] == TEXT_FRAME else length * 3 // 4  # base64
+        frame = event["response"]
+        length = len(frame["payloadData"])
+        self._messages += length if frame["opcode"] == TEXT_FRAME else length * 3 // 4  # base64

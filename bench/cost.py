@@ -1,4 +1,4 @@
-"""What a server and a browser cost: processor time in % of one core, resident memory in MiB."""
+"""The cost of a server and a browser: CPU time in % of one core, resident memory in MiB."""
 
 import time
 from collections.abc import Mapping, Sequence
@@ -26,12 +26,12 @@ Figures = dict[str, float]
 
 
 def cost(rig: Rig, peer: Peer) -> Figures:
-    """All of one peer."""
+    """All costs of one peer."""
     return single(rig, peer) | wide(rig, peer) | many(rig, peer)
 
 
 def single(rig: Rig, peer: Peer) -> Figures:
-    """One topic and one page, at the second start in a folder: memory at rest, cost of each rate."""
+    """One topic and one page, at the second start in a folder: memory at rest, and the cost by rate."""
     topics = (TOPIC,)
     with ExitStack() as stack:
         folder = stack.enter_context(scratch(peer))
@@ -62,7 +62,7 @@ def loaded(
     hz: float,
     name: str,
 ) -> Figures:
-    """Server and browser while the robot says so much."""
+    """The cost of server and browser while the robot publishes at `hz`."""
     if hz:
         rig.robot("load", ways=[peer.robot], topics=list(topics), hz=hz, size=SIZE)
         time.sleep(SETTLE_S / 2)
@@ -78,7 +78,7 @@ def loaded(
 
 
 def many(rig: Rig, peer: Peer) -> Figures:
-    """Bare streams beside one page, all on one topic; nothing where only a page can attach."""
+    """The cost of bare streams beside one page, all on one topic; empty if only a page can connect."""
     topics = (TOPIC,)
     with rig.running(peer, topics) as server, rig.page(peer, server, peer.robot, topics):
         found: Figures = {}
@@ -93,7 +93,7 @@ def many(rig: Rig, peer: Peer) -> Figures:
 
 
 def join(clients: Commanded, server: Running, count: int) -> None:
-    """Makes it so many clients."""
+    """Connects clients until there are `count`."""
     assert server.bare is not None
     page = urlsplit(server.url).port or 80
     clients(
@@ -110,7 +110,7 @@ def join(clients: Commanded, server: Running, count: int) -> None:
 
 
 def crowded(rig: Rig, way: str, server: Running, clients: Commanded, count: int) -> Figures:
-    """All of a crowd at 10 Hz."""
+    """The figures of a crowd at `CROWD_HZ`."""
     time.sleep(SETTLE_S)
     clients("forget")
     rig.robot("load", ways=[way], topics=[TOPIC], hz=CROWD_HZ, size=SIZE)
@@ -119,13 +119,13 @@ def crowded(rig: Rig, way: str, server: Running, clients: Commanded, count: int)
     used = meter.percent()
     put_at = rig.robot("quiet")[0]
     time.sleep(SETTLE_S / 2)
-    told: Mapping[str, Any] = clients("came")
-    ms = [(at - put_at[number]) / 1e6 for number, at in told["came"] if number < len(put_at)]
+    received: Mapping[str, Any] = clients("came")
+    ms = [(at - put_at[number]) / 1e6 for number, at in received["came"] if number < len(put_at)]
     return {
         "p50": percentile(ms, 50),
         "p99": percentile(ms, 99),
         "crowd": used,
         "mib": rss_mib(family(server.pids)),
         "came": len(ms) / (count * len(put_at)),
-        "cut": told["lost"],
+        "cut": received["lost"],
     }

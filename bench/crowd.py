@@ -1,7 +1,7 @@
-"""Many bare clients in one process: each holds a stream open and notes when numbered texts come.
+"""Many bare clients in one process: each keeps a stream open and records the arrival of numbered texts.
 
-Driven by JSON lines, see `tests/ros/commands.py`. Nothing but sockets, so that hundreds of clients take
-little of the machine that they share with what is measured.
+Controlled by JSON lines, see `tests/ros/commands.py`. Uses plain sockets, so that hundreds of clients
+take little CPU time from the measured server.
 """
 
 import base64
@@ -47,7 +47,7 @@ def frame(said: str | bytes) -> bytes:
 
 
 def found_in_page(port: int, pattern: str) -> str:
-    """What is found in a page that no one else gets."""
+    """The match of a pattern in a newly requested page."""
     with contextlib.closing(http.client.HTTPConnection("127.0.0.1", port, timeout=CONNECT_S)) as server:
         server.request("GET", "/")
         page = server.getresponse().read().decode()
@@ -79,7 +79,8 @@ class Crowd:
         found: str,
         answers: list[str] | None,
     ) -> int:
-        """Makes it so many clients; for the rest see `bench.peer.Bare`, `say_bytes` is in hex."""
+        """Connects clients until there are `count`. For the other arguments see `bench.peer.Bare`;
+        `say_bytes` is in hex."""
         if answers is not None:
             asked, answer = answers
             self._asked, self._answer = bytes([0x81, len(asked)]) + asked.encode(), frame(answer)
@@ -129,14 +130,15 @@ class Crowd:
                 self._came.append((number, at))
 
     def forget(self) -> None:
-        """Begins again with what has come and its numbers."""
+        """Clears the recorded arrivals and numbers."""
         with self._lock:
             for key in self._selector.get_map().values():
                 key.data[0] = -1
             self._came, self._bytes = [], 0
 
     def came(self) -> dict[str, Any]:
-        """(number, when) of all that came to any client; bytes; clients that were cut off."""
+        """(number, monotonic ns) of all arrivals at any client, the bytes received, and the number of
+        clients that were disconnected."""
         return {"came": self._came, "bytes": self._bytes, "lost": self._lost}
 
     def leave(self) -> None:

@@ -1,4 +1,4 @@
-"""What is made of measured numbers; no I/O."""
+"""Statistics of measurements. Pure."""
 
 import math
 import statistics
@@ -11,7 +11,7 @@ LINEAR_AT_MOST: Final = 1.25  # times what a unit costs at the beginning
 
 
 def percentile(values: Sequence[float], percent: float) -> float:
-    """Between the two nearest values, as numpy does; NaN of none."""
+    """The percentile, interpolated linearly as in numpy; NaN without values."""
     if not values:
         return math.nan
     ordered = sorted(values)
@@ -22,13 +22,13 @@ def percentile(values: Sequence[float], percent: float) -> float:
 
 
 def median(values: Sequence[float]) -> float:
-    """NaN of none."""
+    """The median; NaN without values."""
     return statistics.median(values) if values else math.nan
 
 
 @dataclass(frozen=True)
 class Matched:
-    """Milliseconds from each event that was seen; how many were not."""
+    """The latencies of matched events in ms, and the number of lost events."""
 
     ms: tuple[float, ...]
     lost: int
@@ -37,15 +37,15 @@ class Matched:
 def toggles_matched(
     said: Sequence[tuple[float, bool]], seen: Sequence[tuple[float, bool]], slack_ms: float = 0.5
 ) -> Matched:
-    """Each change of the robot's to when it showed; times in ms, in order.
+    """Matches each change by the robot to its display; times in ms, in order.
 
-    As many are lost as did not show: those after which the next that shows came only when the same had
-    been said again. `slack_ms` is what clocks may differ.
+    A change is lost if the next display came only after the same value had been published again.
+    `slack_ms` is the tolerance between the clocks.
     """
     left = deque(seen)
     found: list[float] = []
     for turn, (at, value) in enumerate(said):
-        while left and left[0][0] < at - slack_ms:  # of one that was given up
+        while left and left[0][0] < at - slack_ms:  # of a change that counts as lost
             left.popleft()
         missing = len(said) - turn - len(left)
         again = said[turn + 2][0] if turn + 2 < len(said) else math.inf
@@ -58,7 +58,7 @@ def toggles_matched(
 def presses_matched(
     released: Mapping[str, float], heard: Sequence[tuple[float, str]]
 ) -> tuple[Matched, int]:
-    """Each press to when the robot heard it (ms), and how often one came again."""
+    """Matches each press to its arrival at the robot (ms); also returns the number of duplicates."""
     first: dict[str, float] = {}
     for at, text in heard:
         first.setdefault(text, at)
@@ -70,15 +70,15 @@ def presses_matched(
 def shown_after(
     shown: Sequence[tuple[float, float]], went_on_ns: float, old_s: float
 ) -> tuple[float, int]:
-    """Of what a page showed after it went on, as (when it showed, when it was put) in ns: how long
-    before that moment the first was put (ms), and how many were put longer than `old_s` before it."""
+    """For values that a page showed after a stall, given as (shown, put) in ns: the age of the first
+    one at the end of the stall (ms), and the number of values older than `old_s` at that time."""
     ages = [went_on_ns - put for at, put in shown if at >= went_on_ns]
     return (ages[0] / 1e6 if ages else math.nan), sum(age > old_s * 1e9 for age in ages)
 
 
 @dataclass(frozen=True)
 class Slope:
-    """How a cost grows: what one more unit costs over all, in the first and in the second half."""
+    """The growth of a cost: per unit in total, in the first and in the second half of the range."""
 
     per_unit: float
     first: float
@@ -87,10 +87,11 @@ class Slope:
 
 
 def slope(points: Sequence[tuple[float, float]], noise: float) -> Slope:
-    """`noise`: what two looks at the same cost may differ by; less than that is no growth.
+    """The slope of a cost. `noise` is the difference of two measurements of the same cost; less is no
+    growth.
 
-    Linear or better: the second half of the range costs per unit at most a quarter more than the first,
-    or no more than noise explains.
+    Linear or better means: the second half of the range costs per unit at most a quarter more than the
+    first, or the difference is within the noise.
     """
     xs, ys = zip(*sorted(points), strict=True)
     whole = statistics.linear_regression(xs, ys).slope
@@ -103,5 +104,5 @@ def slope(points: Sequence[tuple[float, float]], noise: float) -> Slope:
 
 
 def ratio(ours: float, theirs: float) -> float:
-    """NaN where there is nothing to compare with."""
+    """The ratio; NaN if `theirs` is 0 or NaN."""
     return ours / theirs if theirs and not math.isnan(theirs) else math.nan

@@ -1,4 +1,4 @@
-"""How this panel's cost grows, one thing at a time."""
+"""The growth of this panel's cost along one axis at a time."""
 
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -25,13 +25,13 @@ CLIENTS_HZ: Final = 10.0
 SETTLE_S: Final = 0.8
 JOINED_S: Final = 1.5
 
-# How much, the server's CPU %, its MiB, and by how many % two looks at the CPU differed.
+# The value on the axis, the server's CPU %, its MiB, and the difference of two CPU measurements in %.
 Point = tuple[float, float, float, float]
 Points = list[Point]
 
 
 class Growth:
-    """Each axis is measured with one client on a bare stream, but for that of clients."""
+    """Measures each axis with one client on a bare stream, except the axis of clients."""
 
     def __init__(self, rig: Rig) -> None:
         self._rig = rig
@@ -50,22 +50,22 @@ class Growth:
         def one(count: int) -> Point:
             topics = tuple(f"/t{number}" for number in range(count))
             with self._served(Kiosk(), topics) as (server, _):
-                return self._look(count, server, topics, HZ)
+                return self._measure(count, server, topics, HZ)
 
         return [one(count) for count in self._some(TOPICS)]
 
     def rate(self) -> Points:
         with self._served(Kiosk(), (TOPIC,)) as (server, _):
-            return [self._look(hz, server, (TOPIC,), hz) for hz in self._some(RATES)]
+            return [self._measure(hz, server, (TOPIC,), hz) for hz in self._some(RATES)]
 
     def size(self) -> Points:
         with self._served(Kiosk(), (TOPIC,)) as (server, _):
-            return [self._look(size, server, (TOPIC,), HZ, size=size) for size in self._some(SIZES)]
+            return [self._measure(size, server, (TOPIC,), HZ, size=size) for size in self._some(SIZES)]
 
     def widgets(self) -> Points:
         def one(count: int) -> Point:
             with self._served(Kiosk(widgets=count), (TOPIC,)) as (server, _):
-                return self._look(count, server, (TOPIC,), HZ)
+                return self._measure(count, server, (TOPIC,), HZ)
 
         return [one(count) for count in self._some(WIDGETS)]
 
@@ -74,7 +74,7 @@ class Growth:
         with self._served(Kiosk(), (TOPIC,)) as (server, clients):
             for count in self._some(CLIENTS):
                 join(clients, server, count)
-                points.append(self._look(count, server, (TOPIC,), CLIENTS_HZ))
+                points.append(self._measure(count, server, (TOPIC,), CLIENTS_HZ))
         return points
 
     def robots(self) -> Points:
@@ -86,7 +86,7 @@ class Growth:
                 self._rig.robot("offer", way=way, topics=[TOPIC])
             all_of_them = tuple(map(Robot, ids, locators))
             with self._served(Kiosk(robots=all_of_them), (TOPIC,)) as (server, _):
-                return self._look(count, server, (TOPIC,), HZ, ways=ways)
+                return self._measure(count, server, (TOPIC,), HZ, ways=ways)
 
         try:
             return [one(count) for count in self._some(ROBOTS)]
@@ -103,7 +103,7 @@ class Growth:
             time.sleep(JOINED_S)
             yield server, clients
 
-    def _look(
+    def _measure(
         self,
         x: float,
         server: Running,
@@ -116,11 +116,11 @@ class Growth:
             self._rig.robot("load", ways=list(ways), topics=list(topics), hz=hz, size=size)
         time.sleep(SETTLE_S)
         meter = Meter(lambda: family(server.pids))
-        looks = []
+        readings = []
         for _ in range(2):
             meter.restart()
             time.sleep(self._rig.sizes.growth_s)
-            looks.append(meter.percent())
+            readings.append(meter.percent())
         self._rig.robot("quiet")
         mib = rss_mib(family(server.pids))
-        return x, sum(looks) / 2, mib, abs(looks[0] - looks[1])
+        return x, sum(readings) / 2, mib, abs(readings[0] - readings[1])

@@ -1,4 +1,4 @@
-"""This project as a peer: its wheel as it is shipped, with the operator's log and an interlock."""
+"""This project as a peer: its wheel as shipped, with the operator's log and an interlock."""
 
 import os
 import subprocess
@@ -61,7 +61,7 @@ connect = ["{locator}"]
 
 @dataclass(frozen=True)
 class Robot:
-    """One of several: its namespace without the slash, and where it listens."""
+    """One of several robots: its namespace without the slash, and its Zenoh locator."""
 
     id: str
     locator: str
@@ -70,7 +70,8 @@ class Robot:
 def panel(
     topics: Sequence[str], buttons: int = 1, widgets: int = 0, robots: Sequence[Robot] = ()
 ) -> str:
-    """A panel file with a readout for each topic; with `widgets`, so many of the first topic."""
+    """A panel file with a readout for each topic, and in total `widgets` readouts of the first
+    topic."""
 
     def parts() -> Iterator[str]:
         yield HEAD
@@ -89,7 +90,7 @@ def panel(
 
 @dataclass(frozen=True)
 class Kiosk(Peer):
-    """`widgets` and `robots`: as a panel has them."""
+    """This panel; `widgets` and `robots` as in `panel`."""
 
     id: str = "kiosk"
     title: str = "this panel"
@@ -127,11 +128,11 @@ class Kiosk(Peer):
 def _started(
     command: Sequence[str | Path], env: dict[str, str], log: Path
 ) -> "subprocess.Popen[bytes]":
-    """In a session of its own: Ctrl-C is the harness's."""
+    """Starts a process in its own session, so that Ctrl-C reaches only the harness."""
     with log.open("wb") as out:
         return subprocess.Popen(
             command,
-            cwd=log.parent,  # not the checkout: its modules would be read before the installed ones
+            cwd=log.parent,  # not the checkout: its modules would shadow the installed ones
             env={**os.environ, **env},
             stdin=subprocess.DEVNULL,
             stdout=out,

@@ -1,4 +1,5 @@
-"""Down: the robot's put → the DOM has changed. Up: the pointer is released → the robot hears it."""
+"""Latency. Down: the robot's put → the DOM has changed. Up: pointer released → received by the
+robot."""
 
 import random
 import time
@@ -10,15 +11,15 @@ from bench.figures import Matched, percentile, presses_matched, toggles_matched
 from bench.peer import Peer
 from bench.rig import Rig
 
-GAP_S: Final = (0.015, 0.025)  # random: no peer's own clock may fall in step with it
+GAP_S: Final = (0.015, 0.025)  # random, so that it does not synchronise with a peer's timers
 BETWEEN_PRESSES_S: Final = (0.04, 0.06)
 SETTLE_S: Final = 0.4
-BUTTONS: Final = 20  # each takes another press after 0.7 s on this panel's page
+BUTTONS: Final = 20  # on this panel's page each accepts another press only after 0.7 s
 
 
 def down(rig: Rig, peer: Peer, over: str = "", router: str = "") -> dict[str, float]:
-    """One round of one peer; `over` is how the robot speaks where that is not the peer's own way,
-    `router` is where the peer listens then."""
+    """One round of one peer. `over` is the robot's transport if it is not the peer's own; `router` is
+    the locator that the peer connects to then."""
     way = over or peer.robot
     with (
         rig.running(peer, router=router) as server,
@@ -36,7 +37,7 @@ def down(rig: Rig, peer: Peer, over: str = "", router: str = "") -> dict[str, fl
             toggles = Watched(page, peer.shown).take("toggles")
         seen = [(clock.ns(at) / 1e6, value) for at, value in toggles]
         matched = toggles_matched([(at / 1e6, value) for at, value in said], seen)
-        return told(matched, clock.doubt_ms)
+        return figures_of(matched, clock.doubt_ms)
 
 
 def up(rig: Rig, peer: Peer) -> dict[str, float]:
@@ -56,11 +57,14 @@ def up(rig: Rig, peer: Peer) -> dict[str, float]:
         released = [clock.ns(at) / 1e6 for at in page.take("ups")]
         heard = [(at / 1e6, text) for at, text in rig.robot("heard", way=way)]
         matched, twice = presses_matched(dict(zip(pressed, released, strict=True)), heard)
-        return told(matched, clock.doubt_ms) | {"twice": twice, "locked": len(texts) - len(pressed)}
+        return figures_of(matched, clock.doubt_ms) | {
+            "twice": twice,
+            "locked": len(texts) - len(pressed),
+        }
 
 
 def _press(rig: Rig, peer: Peer, page: Watched, texts: Sequence[str]) -> list[str]:
-    """Which were pressed: all but those that found the button locked."""
+    """Presses with each text; returns the texts for which the button was not locked."""
     pressed = []
     for turn, text in enumerate(texts):
         if page.press(peer.button, turn, text):
@@ -69,8 +73,8 @@ def _press(rig: Rig, peer: Peer, page: Watched, texts: Sequence[str]) -> list[st
     return pressed
 
 
-def told(matched: Matched, doubt_ms: float) -> dict[str, float]:
-    """The figures of a round; `doubt_ms` is how well the page's clock is known by round trips."""
+def figures_of(matched: Matched, doubt_ms: float) -> dict[str, float]:
+    """The figures of a round; `doubt_ms` is the uncertainty of the page's clock."""
     return {
         "p50": percentile(matched.ms, 50),
         "p99": percentile(matched.ms, 99),

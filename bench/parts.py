@@ -1,4 +1,4 @@
-"""The processes of a run: the robot, the crowd of bare clients, and what processes cost."""
+"""The processes of a run (robot, crowd of bare clients), and measurements of processes."""
 
 import os
 import signal
@@ -23,7 +23,7 @@ ENDS_WITHIN_S: Final = 10.0
 
 
 def of_domain(domain: int) -> dict[str, str]:
-    """The environment of a ROS 2 process: on loopback alone."""
+    """The environment of a ROS 2 process, on loopback only."""
     return {
         "ROS_DOMAIN_ID": str(domain),
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
@@ -34,7 +34,7 @@ def of_domain(domain: int) -> dict[str, str]:
 
 
 def ended(process: "subprocess.Popen[Any]", number: signal.Signals = signal.SIGTERM) -> None:
-    """Ends a process and waits; it is killed if it does not end in time."""
+    """Ends a process and waits; kills it after `ENDS_WITHIN_S`."""
     if process.poll() is None:
         process.send_signal(signal.SIGCONT)
         process.send_signal(number)
@@ -46,7 +46,7 @@ def ended(process: "subprocess.Popen[Any]", number: signal.Signals = signal.SIGT
 
 
 def commanded(python: str | Path, module: str, env: Mapping[str, str]) -> Commanded:
-    """A part of the benchmark in a session of its own: Ctrl-C is the harness's."""
+    """A process of the benchmark in its own session, so that Ctrl-C reaches only the harness."""
     return Commanded([python, "-m", module], env, cwd=ROOT, start_new_session=True)
 
 
@@ -66,7 +66,7 @@ def crowd() -> Iterator[Commanded]:
 
 
 def family(pids: Iterable[int]) -> set[int]:
-    """These processes and all that they started."""
+    """These processes and all their descendants."""
     children: dict[int, list[int]] = {}
     for entry in Path("/proc").iterdir():
         if entry.name.isdigit() and (stat := _stat(int(entry.name))):
@@ -80,17 +80,17 @@ def family(pids: Iterable[int]) -> set[int]:
 
 
 def cpu_s(pids: Iterable[int]) -> float:
-    """Seconds of processor time that these processes have taken; one that is gone took none."""
+    """The CPU time of these processes in seconds; 0 for ended ones."""
     return sum((int(s[11]) + int(s[12])) / TICKS_PER_S for pid in pids if (s := _stat(pid)))
 
 
 def rss_mib(pids: Iterable[int]) -> float:
-    """Resident memory, shared pages counted in each."""
+    """Resident memory in MiB, with shared pages counted for each process."""
     return sum(_status_kib(pid, "VmRSS") for pid in pids) / 1024
 
 
 def _stat(pid: int) -> list[str]:
-    """The fields after the process's name: [1] is the parent, [11] and [12] are processor time."""
+    """The fields after the process's name: [1] is the parent, [11] and [12] are CPU time."""
     try:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     except OSError:
@@ -106,7 +106,7 @@ def _status_kib(pid: int, name: str) -> int:
 
 
 class Meter:
-    """Processor time between two looks, in % of one core."""
+    """CPU time since `restart`, in % of one core."""
 
     def __init__(self, pids: Callable[[], Iterable[int]]) -> None:
         self._pids = pids

@@ -1,4 +1,4 @@
-"""Down and up as a picture: a bar to each peer's p50, and a line on to its p99."""
+"""A picture of the latencies: a bar to each peer's p50, and a line from there to its p99."""
 
 import math
 from collections.abc import Mapping
@@ -9,8 +9,8 @@ from typing import Final
 from bench.store import Results, figure
 
 WIDTH: Final = 860
-LEFT: Final = 250  # of the bars: titles stand before it
-RIGHT: Final = 110  # for the figures
+LEFT: Final = 250  # width of the titles
+RIGHT: Final = 110  # width of the figures
 ROW: Final = 26
 BAR: Final = 14
 HEAD: Final = 46
@@ -20,7 +20,7 @@ PANELS: Final = {
     "bridge": "Down from rclpy, over the real bridge (ms)",
     "up": "Up: pointer released → the robot's callback (ms)",
 }
-SHOWN_AT_MOST: Final = 4.0  # times the largest p50: a longer p99 runs out of the picture
+SHOWN_AT_MOST: Final = 4.0  # times the largest p50; a longer p99 is cut off
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Row:
 
 
 def picture(results: Results, titles: Mapping[str, str]) -> str:
-    """An SVG that is readable on a light and on a dark page."""
+    """An SVG, readable on light and dark pages."""
     parts: list[str] = []
     y = 0
     for phase, title in PANELS.items():

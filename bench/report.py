@@ -1,4 +1,4 @@
-"""What was measured as Markdown: tables for docs/benchmark.md, and all of it beside the results."""
+"""The results as Markdown: tables for docs/benchmark.md, and all tables in results.md."""
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -20,7 +20,7 @@ Cell = Callable[[str], str]
 
 
 def write(results: Results, titles: Titles, folder: Path, page: Path | None) -> None:
-    """results.md and results.svg in a folder; the section of a page, if one is named."""
+    """Writes results.md and results.svg to a folder, and the section of a page, if given."""
     (folder / "results.svg").write_text(picture(results, titles))
     (folder / "results.md").write_text(whole(results, titles))
     if page is not None:
@@ -32,7 +32,7 @@ def write(results: Results, titles: Titles, folder: Path, page: Path | None) -> 
 
 
 def section(results: Results, titles: Titles) -> str:
-    """What docs/benchmark.md shows."""
+    """The section of docs/benchmark.md."""
     parts = [PICTURE, main_table(results, titles), targets_table(results), faults(results, titles)]
     return "\n\n".join(filter(None, [machine(results), *parts]))
 
@@ -48,8 +48,8 @@ def whole(results: Results, titles: Titles) -> str:
         "Growth of this panel": growth_table(results),
         "Not measured": faults(results, titles),
     }
-    told = [f"## {title}\n\n{part}" for title, part in parts.items() if part]
-    return "\n\n".join(["# Results", machine(results), noise(results), *told]) + "\n"
+    sections = [f"## {title}\n\n{part}" for title, part in parts.items() if part]
+    return "\n\n".join(["# Results", machine(results), noise(results), *sections]) + "\n"
 
 
 def machine(results: Results) -> str:
@@ -65,7 +65,7 @@ def machine(results: Results) -> str:
 
 
 def noise(results: Results) -> str:
-    """The floor against itself."""
+    """The sentence about the noise: the floor compared with itself."""
 
     def down(peer: str, name: str) -> float:
         return figure(results, "down", peer, name)
@@ -205,7 +205,7 @@ def faults(results: Results, titles: Titles) -> str:
 
 
 def peers_table(columns: Mapping[str, Cell], titles: Titles) -> str:
-    """Those of which there is anything."""
+    """A table of the peers with at least one figure."""
     rows = [[title, *(cell(peer) for cell in columns.values())] for peer, title in titles.items()]
     known = [row for row in rows if any(cell.strip(f"{NONE} /") for cell in row[1:])]
     return table([["", *columns], *known]) if known else ""
@@ -217,7 +217,7 @@ def table(lines: Sequence[Sequence[str]]) -> str:
 
 
 def slashed(cells: Iterable[str]) -> str:
-    """Several figures in a cell; one dash where there is none."""
+    """Several figures in a cell; one dash if there is none."""
     shown = list(cells)
     return " / ".join(shown) if set(shown) != {NONE} else NONE
 

@@ -1,4 +1,4 @@
-"""What all phases of a run share: the robot, the real bridge, Chromium, and where results go."""
+"""The test rig of all phases: the robot, the real bridge, Chromium."""
 
 import tempfile
 import time
@@ -24,13 +24,13 @@ WARM_TOGGLES: Final = 20
 
 @dataclass(frozen=True)
 class Sizes:
-    """How much is measured."""
+    """The number and duration of measurements."""
 
     rounds: int = 3
-    toggles: int = 170  # of each peer in each round
+    toggles: int = 170  # per peer and round
     presses: int = 60
     cost_rounds: int = 3
-    window_s: float = 3.0  # of each look at a cost
+    window_s: float = 3.0  # per measurement of a cost
     crowds: tuple[int, ...] = (1, 50, 200, 500)
     stalled_s: float = 30.0
     before_stall_s: float = 3.0
@@ -53,13 +53,13 @@ QUICK: Final = Sizes(
 
 @contextmanager
 def scratch(peer: Peer) -> Iterator[Path]:
-    """A folder for a peer, removed in the end."""
+    """A temporary folder for a peer."""
     with tempfile.TemporaryDirectory(prefix=f"bench-{peer.id}-") as folder:
         yield Path(folder)
 
 
 class Rig:
-    """Opened and closed as a context; whatever happens, it ends what it started."""
+    """A context manager that ends everything it started."""
 
     def __init__(self, sizes: Sizes) -> None:
         self.sizes = sizes
@@ -93,7 +93,7 @@ class Rig:
 
     @contextmanager
     def bridge(self) -> Iterator[str]:
-        """The real bridge, as long as it is needed; its locator."""
+        """Runs the real bridge within the block; yields its locator."""
         bridge = Bridge(DOMAIN)
         bridge.start()
         try:
@@ -110,15 +110,15 @@ class Rig:
         buttons: int = 1,
         folder: Path | None = None,
     ) -> Iterator[Running]:
-        """A peer's server, alone: no other gets what the robot says meanwhile. Without a `folder` it
-        has a new one."""
+        """Runs a peer's server within the block, without other peers. Without a `folder` it gets a new
+        one."""
         with ExitStack() as stack:
             folder = folder or stack.enter_context(scratch(peer))
             place = Place(router or self.robot.first, DOMAIN, folder, tuple(topics), buttons)
             self.robot("offer", way=peer.robot, topics=list(topics))
             began = time.monotonic()
             server = peer.start(place)
-            self.started_s = time.monotonic() - began  # until it answered HTTP
+            self.started_s = time.monotonic() - began  # until the first HTTP response
             stack.callback(server.end)
             stack.callback(self.robot, "quiet")
             yield server
@@ -127,7 +127,7 @@ class Rig:
     def page(
         self, peer: Peer, server: Running, way: str, topics: Sequence[str] = ()
     ) -> Iterator[Watched]:
-        """Its page, permitted by the robot."""
+        """The peer's page, with the robot's permission shown."""
         with self.chromium.page(server.url, peer.shown, topics) as page:
             self.permit(way, page)
             yield page
@@ -136,8 +136,8 @@ class Rig:
     def unattended(
         self, peer: Peer, server: Running, topics: Sequence[str] = (), way: str = ""
     ) -> Iterator[Unattended]:
-        """A browser of its own with its page, permitted by the robot, which speaks `way` if that is not
-        the peer's own. What it says of `topics` in the meantime, the page has to show in the end."""
+        """A separate browser with the peer's page, with the robot's permission shown. `way` is the
+        robot's transport if it is not the peer's own. At the end the page has to show `topics`."""
         with tempfile.TemporaryDirectory(
             prefix="bench-chromium-", ignore_cleanup_errors=True
         ) as profile:
@@ -156,7 +156,7 @@ class Rig:
         self.robot("repeat", way=way, values=[True], period_s=SAID_EVERY_S)
         shown = page.permitted()
         self.robot("quiet")
-        assert shown, "its page did not show what the robot permits"
+        assert shown, "the page did not show the robot's permission"
 
     def warm(self, way: str) -> None:
         self.robot("toggle", way=way, count=WARM_TOGGLES, least_s=0.01, most_s=0.02)

@@ -1,6 +1,6 @@
-"""The robot of all peers: one process that speaks Zenoh as a bridge would, and ROS 2 as a node.
+"""The robot of all peers: one process that publishes by Zenoh, like a bridge, and by ROS 2, as a node.
 
-Driven by JSON lines, see `tests/ros/commands.py`. It runs in an environment of its own, with rclpy and
+Controlled by JSON lines, see `tests/ros/commands.py`. It runs in its own environment with rclpy and
 eclipse-zenoh. Times are CLOCK_MONOTONIC in nanoseconds, the same clock in all processes of a machine.
 """
 
@@ -30,14 +30,14 @@ TICK_S: Final = 0.001
 
 
 def text_of(number: int, size: int) -> str:
-    """A text of at least so many bytes that begins with its number."""
+    """A text of at least `size` bytes that begins with its number."""
     return f"#{number:09d}#".ljust(size, "x")
 
 
 class Way(Protocol):
-    """How a message gets to the peers."""
+    """A transport between the robot and the peers."""
 
-    heard: list[tuple[int, str]]  # when, and the text of each command
+    heard: list[tuple[int, str]]  # (time, text) of each command received
 
     def enable(self, value: bool) -> None: ...
     def offer(self, topic: str) -> None: ...
@@ -46,7 +46,7 @@ class Way(Protocol):
 
 
 class OverZenoh:
-    """Keys, CDR bytes, tokens and admin space as of a robot behind zenoh-bridge-ros2dds."""
+    """Keys, CDR payloads, tokens and admin space like those of a robot behind zenoh-bridge-ros2dds."""
 
     def __init__(self, namespace: str = "") -> None:
         self.locator = f"tcp/127.0.0.1:{free_port()}"
@@ -86,7 +86,7 @@ class OverZenoh:
 
     def _offer(self, topic: str, type_name: str) -> None:
         if topic not in self._publishers:
-            # As the bridge's for reliable topics; express: a robot's bridge sends what it gets at once.
+            # As in the bridge for reliable topics; express, because a bridge forwards without batching.
             self._publishers[topic] = self._session.declare_publisher(
                 self._prefix + topic[1:], congestion_control=zenoh.CongestionControl.DROP, express=True
             )
@@ -146,10 +146,10 @@ class OverRos:
 
 
 class Load:
-    """Texts on all of some topics, so many a second on each, until it is ended."""
+    """Publishes texts on several topics, at `hz` on each, until `end`."""
 
     def __init__(self, say: list[Callable[[str], None]], hz: float, size: int) -> None:
-        self.put_at: list[int] = []  # of each number
+        self.put_at: list[int] = []  # time by number
         self._say = say
         self._per_s = hz * len(say)
         self._size = size
@@ -175,7 +175,7 @@ class Load:
 
 
 class Robot:
-    """What the harness can ask for; `way` is "zenoh", "ros", or a further robot's namespace."""
+    """The commands of the harness; `way` is "zenoh", "ros", or another robot's namespace."""
 
     def __init__(self) -> None:
         first = OverZenoh()
@@ -186,7 +186,7 @@ class Robot:
         self.locator = first.locator
 
     def robots(self, namespaces: list[str]) -> list[str]:
-        """Further robots, each listening for itself; none ends those that were there."""
+        """Runs further robots with these namespaces, and ends others; returns their locators."""
         for gone in set(self._more) - set(namespaces):
             self._more.pop(gone).close()
             self._ways.pop(gone)
@@ -205,11 +205,11 @@ class Robot:
         return at
 
     def repeat(self, way: str, values: list[bool], period_s: float) -> None:
-        """Says these permissions in turn, so often, until `quiet`."""
+        """Publishes these permissions in turn, one per period, until `quiet`."""
         self._repeats.append(Repeat(self._ways[way].enable, values, period_s))
 
     def toggle(self, way: str, count: int, least_s: float, most_s: float) -> list[tuple[int, bool]]:
-        """Forbids and permits in turn, at random intervals; (when, what) of each."""
+        """Publishes false and true in turn, at random intervals; returns (time, value) of each."""
         said = []
         for value in toggles(count):
             time.sleep(random.uniform(least_s, most_s))
@@ -226,7 +226,7 @@ class Robot:
         self._loads.append(Load(says, hz, size))
 
     def quiet(self) -> list[list[int]]:
-        """Ends all that goes on; when each number of each load was put."""
+        """Ends all repeats and loads; returns the times of each load's numbers."""
         for repeat in self._repeats:
             repeat.end()
         put_at = [load.end() for load in self._loads]
@@ -239,7 +239,7 @@ class Robot:
             way.close()
 
     def heard(self, way: str) -> list[tuple[int, str]]:
-        """The commands since it was asked last."""
+        """The commands received since the last call."""
         all_of_them = self._ways[way].heard
         count = len(all_of_them)
         heard = all_of_them[:count]

@@ -1,5 +1,5 @@
-"""A browser that stands still: its processes are stopped, as when a lid is closed. What its server
-keeps for it, what the others feel, and what it shows first when it goes on."""
+"""A stalled browser: its processes are stopped, as when a lid is closed. Measures the server's memory,
+the latency of other clients, and the age of what it shows first afterwards."""
 
 import os
 import signal
@@ -18,12 +18,12 @@ SMALL: Final = "/t1"
 LOADS: Final = {LARGE: (100.0, 20_000), SMALL: (1000.0, 16)}  # Hz, bytes
 AFTER_S: Final = 4.0
 GAP_S: Final = (0.04, 0.06)
-OLD_S: Final = 0.5  # put so long before it went on: old
+OLD_S: Final = 0.5  # values this old at the end of the stall count as old
 SETTLE_S: Final = 1.0
 
 
 def stalled(rig: Rig, peer: Peer) -> dict[str, Any]:
-    """One peer."""
+    """The figures of one peer."""
     topics = tuple(LOADS)
     with ExitStack() as stack:
         still = stack.enter_context(rig.another_chromium())
@@ -63,7 +63,7 @@ def stalled(rig: Rig, peer: Peer) -> dict[str, Any]:
 def _others(
     rig: Rig, peer: Peer, page: Watched, for_s: float, pids: tuple[int, ...]
 ) -> tuple[list[float], float]:
-    """(latencies in ms, the most memory in the meantime) of another page."""
+    """(latencies in ms, maximum of the server's memory) of another page during `for_s`."""
     clock = page.clock()
     page.take("toggles")
     said: list[tuple[float, bool]] = []
@@ -80,7 +80,7 @@ def _others(
 
 
 def number_of(text: str) -> int:
-    """The number of a text of the robot's; see `bench/robot.py`."""
+    """The number in a text of the robot; see `bench/robot.py`."""
     return int(text[1:10])
 
 

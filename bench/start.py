@@ -1,4 +1,4 @@
-"""Start: process → first answer and → ready; request → first page → the robot's state shows; bytes."""
+"""Start times: process → first response → ready; request → first page → robot's state shown; bytes."""
 
 import time
 import urllib.request
@@ -14,8 +14,8 @@ SAID_EVERY_S: Final = 0.02
 
 
 def start(rig: Rig, peer: Peer) -> dict[str, Any]:
-    """The second start of one peer in a folder, which has what it keeps there, and what the first one
-    took. Each load is of a browser that does not know the page."""
+    """The figures of a peer's first and second start in a folder; the second finds its caches and data.
+    The page is loaded with an empty browser cache."""
     with scratch(peer) as folder:
         with _started(rig, peer, folder) as (_, first):
             found: dict[str, Any] = {f"first_{name}": seconds for name, seconds in first.items()}
@@ -33,7 +33,7 @@ def _started(rig: Rig, peer: Peer, folder: Path) -> Iterator[tuple[Running, dict
     began = time.monotonic()
     with rig.running(peer, folder=folder) as server:
         found = {"answers_s": rig.started_s}
-        if peer.id == "kiosk":  # the others do not tell whether commands can reach the robot
+        if peer.id == "kiosk":  # the other peers have no readiness check
             until_answers(server.url + "readyz", lambda: True)
             found["ready_s"] = time.monotonic() - began
         yield server, found

@@ -1,4 +1,4 @@
-"""The results of a run: kept as JSON, phase by phase, whatever breaks later."""
+"""The results of a run, saved as JSON after each measurement."""
 
 import json
 import math
@@ -57,7 +57,7 @@ class Store:
 
     @contextmanager
     def faults(self, where: str) -> Iterator[None]:
-        """What breaks one measurement is kept, and ends no other."""
+        """Stores an error of one measurement; the next ones continue."""
         try:
             yield
         except Exception as error:
@@ -71,14 +71,14 @@ class Store:
 
 
 def figure(results: Results, phase: str, peer: str, name: str) -> float:
-    """The median over the rounds; NaN where it was not measured."""
+    """The median over the rounds; NaN if it was not measured."""
     rounds = results.get(phase, {}).get("rounds", [])
     found = [of[peer][name] for of in rounds if name in of.get(peer, {})]
     return median([one for one in found if one is not None])
 
 
 def _rounded(value: Any) -> Any:
-    """Four digits; None for what is no number: JSON has none for it."""
+    """Rounded to four digits; None for NaN and infinity, which JSON does not have."""
     if isinstance(value, float):
         return float(f"{value:.4g}") if math.isfinite(value) else None
     if isinstance(value, (list, tuple)):
@@ -94,6 +94,6 @@ def _processor() -> str:
 
 
 def _commit() -> str:
-    asked = ["git", "describe", "--always", "--dirty"]
-    told = subprocess.run(asked, cwd=ROOT, capture_output=True, text=True, check=False)
-    return told.stdout.strip()
+    command = ["git", "describe", "--always", "--dirty"]
+    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    return result.stdout.strip()

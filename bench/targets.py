@@ -1,4 +1,4 @@
-"""What is to be reached, against what was measured in the same run."""
+"""The targets, compared with the results of the same run."""
 
 import math
 from collections.abc import Iterator
@@ -19,7 +19,7 @@ NOISE_MIB: Final = 1.0  # malloc takes memory in steps
 
 @dataclass(frozen=True)
 class Target:
-    """`measured` is in words; `reached` is None where it was not measured."""
+    """A target; `measured` is text, `reached` is None if it was not measured."""
 
     text: str
     measured: str
@@ -31,7 +31,7 @@ def targets(results: Results) -> list[Target]:
 
 
 def best_rival(results: Results, phase: str, name: str) -> tuple[str, float]:
-    """Of all peers but this panel and the floor, the plain ways too: ("", NaN) where there is none."""
+    """(id, value) of the best peer besides this panel and the floor; ("", NaN) without one."""
     rounds = results.get(phase, {}).get("rounds", [])
     peers = {peer for of in rounds for peer in of} - {KIOSK, FLOOR, FLOOR_AGAIN}
     found = [(figure(results, phase, peer, name), peer) for peer in sorted(peers)]
@@ -114,11 +114,11 @@ def _judged(text: str, shown: str, measured: float, reached: bool) -> Target:
 
 @dataclass(frozen=True)
 class Axis:
-    """What grows, in which unit it is counted, and what of the cost is looked at."""
+    """An axis of growth, with the unit in which it is counted."""
 
     text: str
     unit: str
-    per: float = 1.0  # slopes are told of so many units
+    per: float = 1.0  # slopes are given per this many units
 
 
 AXES: Final = {
@@ -133,7 +133,7 @@ AXES: Final = {
 
 @dataclass(frozen=True)
 class Grown:
-    """One axis: where it was looked at, the costs there, and how they grow."""
+    """The results of one axis: its values, the costs there, and their slopes."""
 
     axis: Axis
     xs: tuple[float, ...]

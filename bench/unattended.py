@@ -1,5 +1,5 @@
-"""A Chromium that nobody is attached to while it is measured, as on a kiosk: whoever drives one through
-the DevTools makes it tell of every frame, which takes a fifth of what it costs."""
+"""A Chromium without an attached DevTools client during the measurement, as on a kiosk: reporting every
+frame to DevTools would take a fifth of its CPU time."""
 
 import subprocess
 import time
@@ -17,10 +17,11 @@ STARTS_WITHIN_S: Final = 15.0
 
 
 class Unattended:
-    """One page of one browser, in front; it is spoken to before and after, never in the meantime."""
+    """One browser with one page in the foreground. DevTools are attached before and after a measurement
+    only."""
 
     def __init__(self, playwright: Playwright, profile: Path) -> None:
-        """`profile` is a folder of its own."""
+        """`profile` is an empty folder."""
         self._playwright = playwright
         self._port_file = profile / "DevToolsActivePort"
         self._process = subprocess.Popen(
@@ -44,23 +45,23 @@ class Unattended:
 
     @contextmanager
     def attached(self) -> Iterator[Page]:
-        """Its page, which stays as it is."""
+        """Attaches DevTools within the block; yields the page, which stays open."""
         browser = self._playwright.chromium.connect_over_cdp(f"http://127.0.0.1:{self._port()}")
         try:
             yield browser.contexts[0].pages[0]
         finally:
-            browser.close()  # the connection alone
+            browser.close()  # closes only the connection
 
     def _port(self) -> int:
         end = time.monotonic() + STARTS_WITHIN_S
         while time.monotonic() < end:
-            if self._port_file.exists() and (told := self._port_file.read_text().split()):
-                return int(told[0])
+            if self._port_file.exists() and (words := self._port_file.read_text().split()):
+                return int(words[0])
             time.sleep(0.05)
-        raise TimeoutError(f"Chromium did not tell its port within {STARTS_WITHIN_S:g} s")
+        raise TimeoutError(f"Chromium did not report its port within {STARTS_WITHIN_S:g} s")
 
     def close(self) -> None:
-        """Returns when none of its processes writes into the profile any more."""
+        """Ends the browser, and waits until no process writes to the profile."""
         pids = self.pids()
         ended(self._process)
         end = time.monotonic() + ENDS_WITHIN_S

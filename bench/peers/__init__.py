@@ -1,4 +1,4 @@
-"""What the kiosk is measured against, each written as its documentation and a sensible user would."""
+"""The peers that this panel is compared with, each written as its documentation recommends."""
 
 from typing import Final
 

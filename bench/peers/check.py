@@ -1,4 +1,5 @@
-"""Proves a peer before it is measured: its page follows the robot, and the robot hears its button."""
+"""Checks a peer before it is measured: its page shows the robot's state, and the robot receives
+presses."""
 
 import math
 import time
@@ -10,15 +11,15 @@ from playwright.sync_api import Page
 from bench.peer import Peer, Running
 from tests.support.parts import until
 
-FOUND_WITHIN_S: Final = 20.0  # nodes find each other, scripts load
+FOUND_WITHIN_S: Final = 20.0  # for discovery and loading
 THEN_WITHIN_S: Final = 3.0
 AGAIN_S: Final = 0.5
 
-Robot = Callable[..., Any]  # asked as in `bench/robot.py`: robot("enable", way=…, value=…)
+Robot = Callable[..., Any]  # commands of `bench/robot.py`: robot("enable", way=…, value=…)
 
 
 def fault_of(peer: Peer, running: Running, topics: tuple[str, ...], robot: Robot, page: Page) -> str:
-    """What does not work of a peer that runs, "" where all does. `page` is a fresh one."""
+    """What does not work in a running peer, "" if everything works. `page` is a new page."""
     try:
         page.goto(running.url)
         _follows(peer, robot, page)
@@ -26,13 +27,14 @@ def fault_of(peer: Peer, running: Running, topics: tuple[str, ...], robot: Robot
             _shows(peer, topics, robot, page)
         if peer.button:
             _presses(peer, robot, page)
-    except Exception as fault:  # whatever it is, it is this peer's alone
+    except Exception as fault:  # any error excludes only this peer
         return f"{peer.title}: {fault}"
     return ""
 
 
 def _follows(peer: Peer, robot: Robot, page: Page) -> None:
-    """The first value may come too early for the peer; of those after it, each is said once."""
+    """The first values may be published too early for the peer, so they are repeated; later ones are
+    not."""
 
     def shows(value: bool) -> bool:
         return page.locator(peer.shown).first.is_enabled() == value
@@ -60,7 +62,7 @@ def _shows(peer: Peer, topics: tuple[str, ...], robot: Robot, page: Page) -> Non
 
 
 def _presses(peer: Peer, robot: Robot, page: Page) -> None:
-    """The first press may come too early for the robot; the second is heard once."""
+    """The first press may come too early for the robot; the second must be received once."""
     button = page.locator(peer.button).first
     heard: list[str] = []
 
@@ -78,7 +80,7 @@ def _presses(peer: Peer, robot: Robot, page: Page) -> None:
 def _done(
     do: Callable[[], object], seen: Callable[[], bool], what: str, again_s: float = math.inf
 ) -> None:
-    """Does it, again from time to time if it may need that, until it is seen."""
+    """Acts, again every `again_s`, until the effect is seen."""
     due = 0.0
 
     def look() -> bool:

@@ -1,4 +1,4 @@
-"""What peers have in common: their processes, the page that needs no server of its own, their files."""
+"""Common parts of peers: their processes, and a file server for pages without their own web server."""
 
 import gzip
 import html
@@ -16,14 +16,14 @@ from bench.peer import Bare, Place, Running, until_answers
 from tests.support.parts import Process, until
 
 PEERS: Final = Path(__file__).resolve().parent
-# As bench/parts.py has it, and the Makefile.
+# The same as in bench/parts.py and the Makefile.
 CACHE: Final = Path(os.environ.get("BENCH_CACHE") or Path.home() / ".cache/operator-panel/bench")
 KIOSK_PYTHON: Final = CACHE / "kiosk/bin/python"
 TOPICS_HERE: Final = "<!-- topics -->"
 
 
 def started(command: Sequence[str | Path], env: Mapping[str, str], folder: Path) -> Process:
-    """A server process; what it has to say is in its `text`."""
+    """A server process; its stderr is in `text`."""
     own = {"PYTHONPATH": "", **env}
     return Process([str(part) for part in command], own, cwd=folder, stdout=subprocess.DEVNULL)
 
@@ -43,8 +43,8 @@ def serving(
 
 
 def uvicorn(app: Path, port: int) -> list[str | Path]:
-    """The server of an `app.py`, in the kiosk's own environment. A stream that a browser left open
-    keeps it a second at most."""
+    """The command that serves an `app.py` in this panel's environment. An open stream delays its
+    shutdown by at most a second."""
     options = ["--port", str(port), "--log-level", "warning", "--timeout-graceful-shutdown", "1"]
     return [KIOSK_PYTHON, "-m", "uvicorn", "--app-dir", app, *options, "app:app"]
 
@@ -56,8 +56,8 @@ def with_topics(page: Path, topics: Sequence[str]) -> str:
 
 
 class Files:
-    """Serves a page and a script, as any web server does. It is no part of the peer and is not
-    measured with it: a thread, so that it is there at once."""
+    """A web server for a page and its scripts. It is not part of the peer and not measured: a thread,
+    so that it starts at once."""
 
     def __init__(self, files: Mapping[str, bytes]) -> None:
         """`files`: by path; "/" is the page."""
@@ -106,8 +106,8 @@ def with_page(
     end: Callable[[], None],
     bare: Bare | None = None,
 ) -> Running:
-    """A peer whose server is no web server: it listens on `port`, its page and the files of the folder
-    `scripts` come from elsewhere."""
+    """A peer whose server on `port` is no web server. `Files` serves its page and the folder
+    `scripts`."""
     try:
         until_listens(port, process)
         files = {f"/{path.name}": path.read_bytes() for path in scripts.iterdir()}
@@ -119,7 +119,7 @@ def with_page(
 
 
 def until_listens(port: int, process: Process) -> None:
-    """Waits for a server that is no HTTP server."""
+    """Waits until a server listens that has no HTTP."""
 
     def listens() -> bool:
         assert process.running, process.text
@@ -130,7 +130,7 @@ def until_listens(port: int, process: Process) -> None:
 
 
 def ending(*ends: Callable[[], object]) -> Callable[[], None]:
-    """Ends all, in this order, whatever one of them raises."""
+    """A function that calls all of these in order, even if one raises."""
 
     def end() -> None:
         failures = []

@@ -1,4 +1,4 @@
-"""The floor: a raw event stream. Nothing that shows a robot's topic in a browser does less."""
+"""The floor: a raw event stream, the minimum for showing a robot's topic in a browser."""
 
 from pathlib import Path
 

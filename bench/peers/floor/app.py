@@ -1,4 +1,4 @@
-"""A raw event stream: what Zenoh, one hop between threads and Chromium cost at the least."""
+"""A raw event stream: the minimal cost of Zenoh, one hop between threads, and Chromium."""
 
 import asyncio
 import os

@@ -9,7 +9,7 @@ from tests.support.parts import free_port
 
 VENV: Final = CACHE / "nicegui"
 
-# Socket.IO by hand: the page's own handshake is in the query, "40" connects, "2" is asked for a "3".
+# Socket.IO without a library: the page's handshake is in the query, "40" connects, "3" answers a "2".
 SOCKET: Final = (
     "/_nicegui_ws/socket.io/?client_id={id}&next_message_id=0&implicit_handshake=true"
     "&document_id=bare&tab_id={id}&EIO=4&transport=websocket"

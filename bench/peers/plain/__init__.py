@@ -12,7 +12,7 @@ HERE = Path(__file__).parent
 
 @dataclass(frozen=True)
 class Plain(Peer):
-    """`query` of its page's address says by what way it presses."""
+    """The plain way; `query` of the page's URL selects how it presses."""
 
     query: str = ""
 

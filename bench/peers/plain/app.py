@@ -1,5 +1,5 @@
-"""The plain way: Zenoh's callback, `call_soon_threadsafe`, an event stream; a press comes by fetch or
-by WebSocket and is put."""
+"""The plain way: Zenoh's callback, `call_soon_threadsafe`, an event stream. Presses arrive by fetch or
+by WebSocket and are put."""
 
 import asyncio
 import json

@@ -23,30 +23,31 @@ class RosbridgeRs(Peer):
 
     def start(self, place: Place) -> Running:
         port = free_port()
-        # rosapi answers questions that this page does not ask; its messages are in no registry.
+        # The page does not need rosapi, whose messages are in no registry.
         command: list[str | Path] = [PROGRAM, "--bind", f"127.0.0.1:{port}", "--no-rosapi"]
         process = started(command, environment(place), place.folder)
-        bare = Bare("websocket", "/", tuple(asked(place.topics)), port)
+        bare = Bare("websocket", "/", tuple(subscriptions(place.topics)), port)
         page = HERE / "page.html"
         return with_page(process, port, page, SCRIPTS, place.topics, lambda: ended(process), bare)
 
 
 def ended(process: Process) -> None:
-    """Ends it, and removes what Fast DDS leaves for the next one on the same domain."""
+    """Ends the process, and removes the files of Fast DDS that the next one on the domain would
+    find."""
     maps = Path(f"/proc/{process.pid}/maps").read_text() if process.running else ""
     process.end()
     for path in set(re.findall(r"/dev/shm/(?:sem\.)?fastrtps_\S+", maps)):
         Path(path).unlink(missing_ok=True)
 
 
-def asked(topics: tuple[str, ...]) -> Iterator[str]:
-    """What roslib says to the server."""
+def subscriptions(topics: tuple[str, ...]) -> Iterator[str]:
+    """The messages that roslib sends to the server."""
     for topic in topics:
         yield json.dumps({"op": "subscribe", "topic": topic, "type": "std_msgs/msg/String"})
 
 
 def environment(place: Place) -> dict[str, str]:
-    """As a sourced setup.bash of ROS 2 leaves it; `shims`: see the Makefile."""
+    """The environment after sourcing ROS 2's setup.bash; `shims`: see the Makefile."""
     libraries = [VENV / "shims", VENV / "lib", *sorted(PACKAGES.glob("ros_*.libs"))]
     return {
         "ROS_DISTRO": "jazzy",

@@ -24,12 +24,13 @@ class ZenohTs(Peer):
         config.write_text(json.dumps(configuration(place.router, port)))
         process = started([ROUTER, config], {}, place.folder)
         page = HERE / "page.html"
-        bare = Bare("websocket", "/", tuple(asked(place.topics)), port)
+        bare = Bare("websocket", "/", tuple(subscriptions(place.topics)), port)
         return with_page(process, port, page, SCRIPTS, place.topics, ending(process.end), bare)
 
 
-def asked(topics: Sequence[str]) -> Iterator[bytes]:
-    """What the page's library sends: a session, then a subscriber for each topic (names are short)."""
+def subscriptions(topics: Sequence[str]) -> Iterator[bytes]:
+    """The messages that the page's library sends: a session, then a subscriber per topic (short
+    names)."""
     yield b"\x99" + bytes(4)
     for number, topic in enumerate(topics, 1):
         key = topic.removeprefix("/").encode()
@@ -38,7 +39,7 @@ def asked(topics: Sequence[str]) -> Iterator[bytes]:
 
 
 def configuration(robot: str, port: int) -> dict[str, object]:
-    """A router between a robot and browsers, and no one else."""
+    """The configuration of a router between one robot and browsers."""
     return {
         "mode": "router",
         "connect": {"endpoints": [robot]},
