@@ -106,14 +106,14 @@ class Watched:
         self._shown = peer_shown
         self._topics = topics
 
-    def permitted(self) -> bool:
+    def until_permitted(self) -> bool:
         """Waits until the page shows the robot's permission; False at the timeout."""
         with suppress(PlaywrightError):
             self.page.wait_for_selector(f":is({self._shown}):not([disabled])", timeout=WITHIN_MS)
             return True
         return False
 
-    def followed(self) -> None:
+    def until_shown(self) -> None:
         """Waits until each topic shows a numbered text of the robot."""
         for topic in self._topics:
             self.page.wait_for_function(

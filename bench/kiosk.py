@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from bench.parts import COMMAND, ENABLED, KIOSK_PYTHON, ended
+from bench.parts import COMMAND, ENABLED, KIOSK_PYTHON, end_process
 from bench.peer import Bare, Peer, Place, Running, until_answers
 from tests.support.parts import free_port, zenoh_file
 
@@ -117,12 +117,12 @@ class Kiosk(Peer):
         try:
             until_answers(f"{url}/healthz", lambda: process.poll() is None)
         except BaseException as error:
-            ended(process)
+            end_process(process)
             error.add_note(log.read_text()[-2000:])
             raise
         base = f"/robots/{self.robots[0].id}" if self.robots else ""
         bare = Bare("events", f"{base}/events")
-        return Running(f"{url}{base}/", (process.pid,), lambda: ended(process), bare)
+        return Running(f"{url}{base}/", (process.pid,), lambda: end_process(process), bare)
 
 
 def _started(

@@ -33,7 +33,7 @@ def of_domain(domain: int) -> dict[str, str]:
     }
 
 
-def ended(process: "subprocess.Popen[Any]", number: signal.Signals = signal.SIGTERM) -> None:
+def end_process(process: "subprocess.Popen[Any]", number: signal.Signals = signal.SIGTERM) -> None:
     """Ends a process and waits; kills it after `ENDS_WITHIN_S`."""
     if process.poll() is None:
         process.send_signal(signal.SIGCONT)

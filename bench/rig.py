@@ -148,13 +148,13 @@ class Rig:
                     self.permit(way or peer.robot, Watched(page, peer.shown))
                 yield browser
                 with browser.attached() as page:
-                    Watched(page, peer.shown, topics).followed()
+                    Watched(page, peer.shown, topics).until_shown()
             finally:
                 browser.close()
 
     def permit(self, way: str, page: Watched) -> None:
         self.robot("repeat", way=way, values=[True], period_s=SAID_EVERY_S)
-        shown = page.permitted()
+        shown = page.until_permitted()
         self.robot("quiet")
         assert shown, "the page did not show the robot's permission"
 

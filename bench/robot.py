@@ -56,8 +56,8 @@ class OverZenoh:
         self._zid = str(self._session.zid())
         self._publishers: dict[str, Any] = {}
         self._kept = [
-            self._told("version", '"1.10.2"'),
-            self._told("config", json.dumps({"namespace": namespace or "/"})),
+            self._queryable("version", '"1.10.2"'),
+            self._queryable("config", json.dumps({"namespace": namespace or "/"})),
             self._session.declare_subscriber(
                 self._prefix + COMMAND[1:], Callback(self._hear, indirect=False)
             ),
@@ -70,7 +70,7 @@ class OverZenoh:
         at = time.monotonic_ns()
         self.heard.append((at, sample.payload.to_bytes()[8:].split(b"\0")[0].decode()))
 
-    def _told(self, what: str, text: str) -> Any:
+    def _queryable(self, what: str, text: str) -> Any:
         key = f"@/{self._zid}/ros2/{what}"
 
         def answer(query: zenoh.Query) -> None:

@@ -10,7 +10,7 @@ from typing import Final
 
 from playwright.sync_api import Page, Playwright
 
-from bench.parts import ENDS_WITHIN_S, ended, family
+from bench.parts import ENDS_WITHIN_S, end_process, family
 from tests.support.parts import CHROMIUM, CHROMIUM_FLAGS
 
 STARTS_WITHIN_S: Final = 15.0
@@ -63,7 +63,7 @@ class Unattended:
     def close(self) -> None:
         """Ends the browser, and waits until no process writes to the profile."""
         pids = self.pids()
-        ended(self._process)
+        end_process(self._process)
         end = time.monotonic() + ENDS_WITHIN_S
         while any(Path(f"/proc/{pid}").exists() for pid in pids) and time.monotonic() < end:
             time.sleep(0.02)

@@ -76,7 +76,7 @@ def pytest_runtest_makereport(
     if report.failed:
         began = time.monotonic() - call.duration - 10
         shown = [one for one in Process.latest if one.running or one.began > began]
-        report.sections += [("a process", process.told()) for process in shown]
+        report.sections += [("a process", process.describe()) for process in shown]
     return report
 
 

@@ -55,13 +55,13 @@ def test_a_false_that_a_new_publisher_says_is_never_passed_over_where_that_one_w
     publishers: Publishers,
 ) -> None:
     found = [publishers.trial("fast", kind) for kind in (ONCE, AT_ONCE) for _ in range(TRIALS)]
-    assert [one for one in found if one.permitted and (one.seen or one.heard)] == []
+    assert [one for one in found if one.permitted and (one.announced or one.received)] == []
 
 
 def test_a_publisher_that_stays_and_says_nothing_locks_until_one_speaks(publishers: Publishers) -> None:
     publishers.open()
     silent = Kind("silent", times=0, matched=False)
-    with publishers.there("fast", silent):
+    with publishers.running("fast", silent):
         publishers.until_reason("Locked: a new publisher of /kept has not published yet.")
     publishers.until_reason("Locked: a new publisher of /kept has not published yet.")
     publishers.open()

@@ -28,10 +28,10 @@ from tests.support.builders import (
     INTERFACES,
     MESSAGE,
     TEXT,
+    faults_text,
     presses_of,
     robot_there,
     says,
-    told,
 )
 from tests.support.builders import panel_of as panel_with
 from tests.support.parts import ROOT, TAP_AGAIN_MS, Server, until
@@ -275,7 +275,7 @@ def panel_file(folder: Path, more: str) -> Path:
 def test_what_is_wrong_with_it_is_told_at_load(tmp_path: Path, more: str, fault: str) -> None:
     with pytest.raises(PanelError) as caught:
         load_panel(panel_file(tmp_path, more))
-    assert fault in told(caught.value)
+    assert fault in faults_text(caught.value)
 
 
 def test_the_type_is_that_which_the_panel_gives_elsewhere(tmp_path: Path) -> None:

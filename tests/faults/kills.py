@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from tests.faults.presser import Press, Presser
-from tests.faults.rig import permitted
+from tests.faults.rig import until_permitted
 from tests.support.parts import Server
 
 LIVES_AT_MOST_S = 0.8
@@ -38,10 +38,10 @@ def kill_at_random_moments(
     for _ in range(times):
         server = start()
         try:
-            permitted(server)
+            until_permitted(server)
             began_at = time.monotonic()
             presser = Presser(server, widget, PRESSED_EVERY_S)
-            presser.goes_on()
+            presser.wait_for()
             moment = time.monotonic() + chance.uniform(0, LIVES_AT_MOST_S)
             while time.monotonic() < moment:
                 time.sleep(0.0005)

@@ -117,10 +117,10 @@ class Cable:
         """Takes the kiosk's link down; frames in flight are lost."""
         self._middle.run("ip", "link", "set", "to-kiosk", "down")
 
-    def mend(self) -> None:
+    def restore(self) -> None:
         self._middle.run("ip", "link", "set", "to-kiosk", "up")
 
-    def weather(self, *, delay_s: float = 0.0, loss: float = 0.0) -> None:
+    def impair(self, *, delay_s: float = 0.0, loss: float = 0.0) -> None:
         """Delays each frame by `delay_s` each way, and drops the fraction `loss`, from now on."""
         assert self._wire.stdin is not None
         self._wire.stdin.write(json.dumps({"delay_s": delay_s, "loss": loss}) + "\n")

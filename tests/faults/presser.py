@@ -74,7 +74,7 @@ class Presser:
     def count(self, outcome: str, since: float = 0.0) -> int:
         return sum(p.outcome == outcome and p.at >= since for p in self.presses)
 
-    def goes_on(
+    def wait_for(
         self, outcome: str = "published", since: float = 0.0, within_s: float = ENOUGH_S
     ) -> None:
         """Waits until a press made after `since` has this outcome."""

@@ -64,14 +64,14 @@ class Publisher(Commanded):
             env["CYCLONEDDS_URI"] = CYCLONE.format(lease_s=10)
         super().__init__([ROS_PYTHON, TESTS / "ros/publishers.py", vendor], env)
 
-    def says(self, value: bool, kind: Kind) -> None:
+    def publish(self, value: bool, kind: Kind) -> None:
         """Publishes the value from a new process, as `ros2 topic pub` does."""
         self.end()
         self.start()
         how: Mapping[str, Any] = {"times": kind.times, "durability": kind.durability}
         self("begin", topic=TOPIC, value=value, matched=kind.matched, **how)
 
-    def goes(self, after_s: float) -> None:
+    def finish(self, after_s: float) -> None:
         self("finish", after_s=after_s)
 
 
@@ -84,8 +84,8 @@ class Observer:
         config.insert_json5("connect/endpoints", f'["{endpoint}"]')
         self._session = zenoh.open(config)
         self.values: list[bool] = []
-        self.came: list[str] = []
-        self.there: set[str] = set()
+        self.appeared: list[str] = []
+        self.present: set[str] = set()
         self._subscribers = (
             self._session.declare_subscriber(KEY, self._sample),
             self._session.liveliness().declare_subscriber(
@@ -102,15 +102,15 @@ class Observer:
         if endpoint is None or (endpoint.role, endpoint.key) != ("MP", KEY):
             return
         if sample.kind == zenoh.SampleKind.PUT:
-            self.came.append(token)
-            self.there.add(token)
+            self.appeared.append(token)
+            self.present.add(token)
         else:
-            self.there.discard(token)
+            self.present.discard(token)
 
     def forget(self) -> None:
         """Clears the received values and publishers."""
         self.values.clear()
-        self.came.clear()
+        self.appeared.clear()
 
     def close(self) -> None:
         self._session.close()
@@ -121,13 +121,13 @@ class Trial:
     """The result of one `false`: whether the bridge forwarded it, whether it announced the publisher,
     and whether the panel still permits operation."""
 
-    heard: bool
-    seen: bool
+    received: bool
+    announced: bool
     permitted: bool
 
     @property
     def outcome(self) -> Outcome:
-        return "heard" if self.heard else "unnoticed" if self.permitted else "locked"
+        return "heard" if self.received else "unnoticed" if self.permitted else "locked"
 
 
 class Publishers:
@@ -154,21 +154,21 @@ class Publishers:
     def open(self) -> None:
         """A publisher on Cyclone DDS, which loses almost no messages, permits operation and ends."""
         for _ in range(OPENED_BY):
-            self._by["cyclone"].says(True, self._opens)
-            self._by["cyclone"].goes(self._opens.stays)
+            self._by["cyclone"].publish(True, self._opens)
+            self._by["cyclone"].finish(self._opens.stays)
             self._alone()
             if self.permitted:
                 return
         raise AssertionError("no publisher could permit it")
 
     @contextmanager
-    def there(self, vendor: Vendor, kind: Kind) -> Iterator[None]:
+    def running(self, vendor: Vendor, kind: Kind) -> Iterator[None]:
         """Within the block, a new publisher exists; returns when the bridge has removed it."""
         self._observer.forget()
-        self._by[vendor].says(True, kind)
-        until(lambda: self._observer.came, "the bridge tells of it", within_s=GONE_WITHIN_S)
+        self._by[vendor].publish(True, kind)
+        until(lambda: self._observer.appeared, "the bridge tells of it", within_s=GONE_WITHIN_S)
         yield
-        self._by[vendor].goes(0.0)
+        self._by[vendor].finish(0.0)
         self._alone()
 
     def until_reason(self, reason: str) -> None:
@@ -179,15 +179,15 @@ class Publishers:
         """A new publisher revokes the permission."""
         self.open()
         self._observer.forget()
-        self._by[vendor].says(False, kind)
-        self._by[vendor].goes(kind.stays)
+        self._by[vendor].publish(False, kind)
+        self._by[vendor].finish(kind.stays)
         self._news()
-        heard, seen = False in self._observer.values, bool(self._observer.came)
+        received, announced = False in self._observer.values, bool(self._observer.appeared)
         end = time.monotonic() + 2.0
-        while (permitted := self.permitted) and (heard or seen) and time.monotonic() < end:
+        while (permitted := self.permitted) and (received or announced) and time.monotonic() < end:
             time.sleep(0.05)
         self._alone()
-        return Trial(heard, seen, permitted)
+        return Trial(received, announced, permitted)
 
     def _news(self) -> None:
         """Waits for the message, or for the publisher's token to appear and end, at most
@@ -197,13 +197,13 @@ class Publishers:
         while (
             time.monotonic() < end
             and not observer.values
-            and not (observer.came and not observer.there)
+            and not (observer.appeared and not observer.present)
         ):
             time.sleep(0.02)
 
     def _alone(self) -> None:
         """Waits until the topic has no publisher."""
-        until(lambda: not self._observer.there, "its publisher is gone", within_s=GONE_WITHIN_S)
+        until(lambda: not self._observer.present, "its publisher is gone", within_s=GONE_WITHIN_S)
 
     def close(self) -> None:
         for publisher in self._by.values():

@@ -147,7 +147,7 @@ class Rig:
         """A kiosk server on the rig, with all permissions given."""
         server = kiosk(endpoint or self.endpoint, folder, 0, panel, **environment)
         try:
-            permitted(server)
+            until_permitted(server)
             yield server
         finally:
             if server.process.running:
@@ -159,7 +159,7 @@ class Rig:
         self.ears.end()
 
 
-def permitted(server: Server) -> None:
+def until_permitted(server: Server) -> None:
     """Waits until every button of the panel is enabled."""
     until(
         lambda: all(server.widget(name)["enabled"] for name in SENT_ON),

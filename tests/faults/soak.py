@@ -52,14 +52,14 @@ class Soak:
         """Toggles the permission and waits until that is shown; then publishes values for a second."""
         wanted = self.changes % 2 == 1
         self.changes += 1
-        told_at = time.monotonic()
+        published_at = time.monotonic()
         self._rig.robot.publish("/kept", {"data": wanted})
         while watch.now("kept").enabled != wanted:
-            if time.monotonic() > told_at + LOST_S:
+            if time.monotonic() > published_at + LOST_S:
                 self.lost += 1
                 break
             time.sleep(0.002)
-        self.shown_after_s.append(time.monotonic() - told_at)
+        self.shown_after_s.append(time.monotonic() - published_at)
         self._rig.robot.flood("/heard", {"data": f"{self.changes}.{{n}}"}, 20.0, 1.0)
 
     def slope(self) -> float | None:

@@ -9,8 +9,8 @@ from tests.faults.browsers import Browsers, asking, storm, unread
 from tests.faults.presser import Presser, accounted
 from tests.faults.results import ms, record
 from tests.faults.rig import TEXT, Rig, limit, several
-from tests.faults.trial import well
-from tests.faults.watch import Watch, answering, came_back, resources
+from tests.faults.trial import presses_work
+from tests.faults.watch import Watch, answering, resources, until_released
 from tests.support.parts import ENOUGH_S, Server, until
 
 rig = fixtures.rig
@@ -32,13 +32,13 @@ def test_a_browser_that_reads_nothing(rig: Rig, server: Server) -> None:
     before = resources(server.process.pid)
     presser = Presser(server, "guarded")
     with answering(server), ThreadPoolExecutor(1) as pool, asking(server) as deaf:
-        well(presser)
+        presses_work(presser)
         said = {"data": "{n} " + "long " * 30}
         telling = pool.submit(rig.robot.flood, "/heard", said, UPDATES_PER_S, READS_NOTHING_S)
         until(telling.done, "the time is over", READS_NOTHING_S + ENOUGH_S)
         rig.robot.publish("/heard", {"data": "now"})
         until(lambda: watch.widgets["heard"]["text"] == "now", "who reads sees it", limit(2))
-        well(presser)
+        presses_work(presser)
         got = unread(deaf)
     presses = presser.end()
     rig.robot.withdraw("/heard")
@@ -46,7 +46,7 @@ def test_a_browser_that_reads_nothing(rig: Rig, server: Server) -> None:
     assert len(got) < MOST_UNREAD
     assert b'"text":"now"' in got
     account = accounted(presses, lambda: rig.arrivals("guarded"), lambda _: True, limit(2.0))
-    came_back(server.process.pid, before, MARGIN_MB)
+    until_released(server.process.pid, before, MARGIN_MB)
     record(
         f"a browser that reads nothing for {READS_NOTHING_S} s",
         presses=account,
@@ -61,18 +61,18 @@ def test_two_hundred_browsers(rig: Rig, server: Server) -> None:
     browsers = Browsers(server, BROWSERS)
     with answering(server):
         until(lambda: browsers.showing(b"event: snapshot") == BROWSERS, "each has a snapshot")
-        well(presser)
+        presses_work(presser)
         browsers.forget()
-        told_at = time.monotonic()
+        published_at = time.monotonic()
         rig.robot.publish("/kept", {"data": False})
         until(lambda: browsers.showing(b'"enabled":false') == BROWSERS, "each is locked", limit(5))
-        locked_s = time.monotonic() - told_at
+        locked_s = time.monotonic() - published_at
         rig.robot.publish("/kept", {"data": True})
         until(lambda: browsers.showing(b'"enabled":true') == BROWSERS, "each is open", limit(5))
     presses = presser.end()
     browsers.close()
     account = accounted(presses, lambda: rig.arrivals("paced"), lambda _: True, limit(2.0))
-    after = came_back(server.process.pid, before, MARGIN_MB)
+    after = until_released(server.process.pid, before, MARGIN_MB)
     record(
         f"{BROWSERS} browsers at once",
         locked=f"{ms(locked_s)}, in the last of them",
@@ -88,12 +88,12 @@ def test_browsers_that_come_and_go(rig: Rig, server: Server) -> None:
     before = resources(server.process.pid)
     presser = Presser(server, "guarded")
     with answering(server):
-        well(presser)
+        presses_work(presser)
         times = storm(server, STORM_S)
-        well(presser)
+        presses_work(presser)
     presses = presser.end()
     account = accounted(presses, lambda: rig.arrivals("guarded"), lambda _: True, limit(2.0))
-    after = came_back(server.process.pid, before, MARGIN_MB)
+    after = until_released(server.process.pid, before, MARGIN_MB)
     watch.end()
     record(
         f"{times} streams opened and dropped in {STORM_S} s",

@@ -16,8 +16,8 @@ from tests.faults import fixtures
 from tests.faults.presser import Account, Presser, accounted
 from tests.faults.results import ms, record
 from tests.faults.rig import BOOL, LISTENED_TO, MAX_AGE_S, TEXT, Rig, limit, permitting, several
-from tests.faults.trial import recorded, tried, well
-from tests.faults.watch import Resources, Watch, answering, came_back, resources
+from tests.faults.trial import presses_work, recorded, try_fault
+from tests.faults.watch import Resources, Watch, answering, resources, until_released
 from tests.support.parts import ENOUGH_S, RosNode, Server, until
 
 rig = fixtures.rig
@@ -41,7 +41,7 @@ def replace_robot(rig: Rig) -> None:
 
 
 def test_a_killed_node(rig: Rig, server: Server) -> None:
-    trial = tried(
+    trial = try_fault(
         rig,
         server,
         rig.robot.kill,
@@ -55,7 +55,7 @@ def test_a_killed_node(rig: Rig, server: Server) -> None:
 
 
 def test_a_hung_node(rig: Rig, server: Server) -> None:
-    trial = tried(
+    trial = try_fault(
         rig,
         server,
         rig.robot.freeze,
@@ -84,7 +84,7 @@ def test_a_publisher_that_is_replaced_by_one_of_another_type(rig: Rig, server: S
         rig.robot.advertise("/pulsed", BOOL)
         rig.robot.every("/pulsed", {"data": True}, 0.1)
 
-    trial = tried(
+    trial = try_fault(
         rig, server, replaced, right_again, locks_within_s=1.0, interlock="pulsed", widget="paced"
     )
     recorded("publisher replaced by one of another type, and back", trial)
@@ -104,12 +104,12 @@ def test_a_robot_that_restarts_again_and_again(rig: Rig, server: Server) -> None
             rig.bridge.start()
             replace_robot(rig)
 
-        trial = tried(rig, server, off, on, locks_within_s=1.0)
+        trial = try_fault(rig, server, off, on, locks_within_s=1.0)
         latest, longest = max(latest, trial.account.latest_s), max(longest, trial.locked_s)
         if life == 1:  # memory grows to its usual size until then
             before = resources(server.process.pid)
     assert before is not None
-    after = came_back(server.process.pid, before, MARGIN_MB)
+    after = until_released(server.process.pid, before, MARGIN_MB)
     record(
         f"robot (bridge and node) killed and started {RESTARTS} times",
         locked=f"{ms(longest)} at most",
@@ -141,13 +141,13 @@ def flooded(
     before = resources(server.process.pid)
     presser = Presser(server, "guarded")
     with answering(server), ThreadPoolExecutor(1) as pool:
-        well(presser)
+        presses_work(presser)
         said = pool.submit(node.flood, topic, fields, FLOOD_PER_S, FLOOD_S)
         until(said.done, "the flood ends", FLOOD_S + ENOUGH_S)
-        well(presser)
+        presses_work(presser)
     presses = presser.end()
     account = accounted(presses, lambda: rig.arrivals("guarded"), lambda _: True, limit(2.0))
-    came_back(server.process.pid, before, MARGIN_MB)
+    until_released(server.process.pid, before, MARGIN_MB)
     return account, said.result(), watch
 
 
@@ -155,9 +155,9 @@ def test_a_flood_on_an_interlock(rig: Rig, server: Server) -> None:
     """The last message counts, and is shown soon."""
     account, said, watch = flooded(rig, server, "/kept", rig.robot, {"data": True})
     until(lambda: watch.now("kept").enabled, "still permitted")
-    told_at = time.monotonic()
+    published_at = time.monotonic()
     rig.robot.publish("/kept", {"data": False})
-    locked_s, _ = watch.locked_after(told_at, "kept", limit(SHOWN_WITHIN_S), "does not permit")
+    locked_s, _ = watch.locked_after(published_at, "kept", limit(SHOWN_WITHIN_S), "does not permit")
     rig.robot.publish("/kept", {"data": True})
     watch.opened("kept")
     watch.end()
@@ -193,12 +193,12 @@ def test_messages_of_ten_megabytes(rig: Rig, server: Server) -> None:
     watch, presser = Watch(server), Presser(server, "guarded")
     began = time.monotonic()
     with answering(server):
-        well(presser)
+        presses_work(presser)
         for _ in range(LONG_MESSAGES):
             rig.robot.publish_long("/heard", LONG_MESSAGE)
         until(lambda: watch.widgets["heard"]["text"].startswith("xxx"), "it is shown, cut")
         assert len(watch.widgets["heard"]["text"]) <= 200
-        well(presser)
+        presses_work(presser)
     presses = presser.end()
     rig.robot.publish("/heard", {"data": "short"})
     until(lambda: watch.widgets["heard"]["text"] == "short", "shown")
@@ -206,7 +206,7 @@ def test_messages_of_ten_megabytes(rig: Rig, server: Server) -> None:
     watch.end()
     rig.robot.withdraw("/heard")
     account = accounted(presses, lambda: rig.arrivals("guarded"), lambda _: True, limit(2.0))
-    after = came_back(server.process.pid, before, MARGIN_MB)
+    after = until_released(server.process.pid, before, MARGIN_MB)
     record(
         f"{LONG_MESSAGES} messages of 10 MB on a readout's topic",
         presses=account,
@@ -248,7 +248,7 @@ def test_garbage_on_all_that_is_listened_to(rig: Rig, server: Server) -> None:
     watch, presser = Watch(server), Presser(server, "guarded")
     chance = random.Random(7)
     with answering(server), zenoh.open(client_of(rig.endpoint)) as liar:
-        well(presser)
+        presses_work(presser)
         lied_at = time.monotonic()
         until(lambda: (liar.put("kept", b"\0\1\0\0"), not watch.now("kept").enabled)[1], "it locks")
         locked_s, _ = watch.locked_after(lied_at, "kept", limit(SHOWN_WITHIN_S), "cannot be read")
@@ -260,11 +260,11 @@ def test_garbage_on_all_that_is_listened_to(rig: Rig, server: Server) -> None:
         rig.robot.publish("/kept", {"data": True})
         watch.opened("kept")
         watch.opened("pulsed")
-        well(presser)
+        presses_work(presser)
     presses = presser.end()
     watch.end()
     account = accounted(presses, lambda: rig.arrivals("guarded"), lambda _: True, limit(2.0))
-    after = came_back(server.process.pid, before, MARGIN_MB)
+    after = until_released(server.process.pid, before, MARGIN_MB)
     errors = sum("are not a std_msgs/msg/Bool" in line for line in server.process.lines)
     assert errors <= 10, "a line a minute at most"
     record(

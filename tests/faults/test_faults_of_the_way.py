@@ -13,7 +13,7 @@ from tests.faults.net import ROBOT_IP, Cable
 from tests.faults.presser import Account, Presser, accounted
 from tests.faults.results import ms, record
 from tests.faults.rig import LONG, Rig, limit, several
-from tests.faults.trial import UNDER_WAY_S, recorded, tried, well
+from tests.faults.trial import UNDER_WAY_S, presses_work, recorded, try_fault
 from tests.faults.watch import Watch, answering
 from tests.support.parts import TESTS, Server, free_port, until
 
@@ -24,7 +24,7 @@ CUT_OFF = "No connection to the robot"
 DELAY_S = 0.3
 LOSS = 0.1
 SEEN_S = 1.0
-LATE_IN_BAD_WEATHER_S = 5.0
+LATE_IMPAIRED_S = 5.0
 CUTS_S = (1, 5, 30) if LONG else (1, 5)
 
 
@@ -47,12 +47,14 @@ def far_rig(domain: int, cable: Cable) -> Iterator[Rig]:
 
 
 def test_a_killed_bridge(rig: Rig, server: Server) -> None:
-    trial = tried(rig, server, rig.bridge.kill, rig.bridge.start, locks_within_s=1.0, because=CUT_OFF)
+    trial = try_fault(
+        rig, server, rig.bridge.kill, rig.bridge.start, locks_within_s=1.0, because=CUT_OFF
+    )
     recorded("bridge killed and started again", trial)
 
 
 def test_a_frozen_bridge(rig: Rig, server: Server) -> None:
-    trial = tried(
+    trial = try_fault(
         rig,
         server,
         rig.bridge.freeze,
@@ -82,7 +84,7 @@ def test_a_bridge_that_comes_back_on_another_domain(rig: Rig, server: Server) ->
         assert server.press("free", "no subscriber").json()["outcome"] == "unknown"
         moved(right)
 
-    trial = tried(rig, server, lambda: moved(right + 1), moved_back, locks_within_s=1.5)
+    trial = try_fault(rig, server, lambda: moved(right + 1), moved_back, locks_within_s=1.5)
     recorded("bridge restarted on another domain, and back", trial)
 
 
@@ -104,7 +106,7 @@ def test_a_router_between_is_killed(rig: Rig, tmp_path: Path) -> None:
     start()
     try:
         with rig.serving(tmp_path, endpoint) as server:
-            trial = tried(rig, server, kill, start, locks_within_s=1.0, because=CUT_OFF)
+            trial = try_fault(rig, server, kill, start, locks_within_s=1.0, because=CUT_OFF)
     finally:
         kill()
         for router in routers:
@@ -121,11 +123,11 @@ def test_a_cable_that_is_cut(cable: Cable, far_rig: Rig, tmp_path: Path) -> None
             if seconds < 2:
                 short_cut(cable, far_rig, server, seconds)
                 continue
-            trial = tried(
+            trial = try_fault(
                 far_rig,
                 server,
                 cable.cut,
-                cable.mend,
+                cable.restore,
                 locks_within_s=SEEN_S,
                 lasts_s=seconds,
                 late_s=3.0,
@@ -137,11 +139,11 @@ def test_a_cable_that_is_cut(cable: Cable, far_rig: Rig, tmp_path: Path) -> None
 
 def short_cut(cable: Cable, rig: Rig, server: Server, seconds: float) -> None:
     """The pulse and the bridge's responses are missing at once; the connection survives."""
-    trial = tried(
+    trial = try_fault(
         rig,
         server,
         cable.cut,
-        cable.mend,
+        cable.restore,
         locks_within_s=1.0,
         lasts_s=seconds,
         late_s=3.0,
@@ -156,7 +158,7 @@ def short_cut(cable: Cable, rig: Rig, server: Server, seconds: float) -> None:
 def test_a_slow_and_lossy_network(cable: Cable, far_rig: Rig, tmp_path: Path) -> None:
     """300 ms each way and every tenth frame lost: everything works, delayed by TCP."""
     with far_rig.serving(tmp_path) as server:
-        account, locked = weathered(cable, far_rig, server, several(8, 30))
+        account, locked = impaired(cable, far_rig, server, several(8, 30))
     record(
         "300 ms delay each way, 10 % of the frames lost",
         locked=f"{locked} times, as pulses came late",
@@ -165,19 +167,19 @@ def test_a_slow_and_lossy_network(cable: Cable, far_rig: Rig, tmp_path: Path) ->
     )
 
 
-def weathered(cable: Cable, rig: Rig, server: Server, seconds: float) -> tuple[Account, int]:
+def impaired(cable: Cable, rig: Rig, server: Server, seconds: float) -> tuple[Account, int]:
     """The account of presses on a bad network, and how often the interlock with a pulse was locked."""
     watch, presser = Watch(server), Presser(server, "guarded")
     with answering(server):
-        well(presser)
+        presses_work(presser)
         began = time.monotonic()
-        cable.weather(delay_s=DELAY_S, loss=LOSS)
+        cable.impair(delay_s=DELAY_S, loss=LOSS)
         until(lambda: time.monotonic() > began + seconds, "the weather lasts", seconds + 1)
-        cable.weather()
+        cable.impair()
         watch.opened("kept")
         watch.opened("pulsed")
         cleared_at = time.monotonic()
-        well(presser)
+        presses_work(presser)
     presses = presser.end()
     watch.end()
     held = not any(not seen.enabled for seen in watch.seen["kept"] if seen.at > began)
@@ -185,6 +187,6 @@ def weathered(cable: Cable, rig: Rig, server: Server, seconds: float) -> tuple[A
         presses,
         lambda: rig.arrivals("guarded"),
         lambda press: held or press.answered_at < began - UNDER_WAY_S or press.at > cleared_at,
-        limit(LATE_IN_BAD_WEATHER_S),
+        limit(LATE_IMPAIRED_S),
     )
     return account, sum(not seen.enabled for seen in watch.seen["pulsed"] if seen.at > began)

@@ -9,7 +9,7 @@ from tests.faults.clock import Clock
 from tests.faults.presser import Presser, accounted
 from tests.faults.results import ms, record
 from tests.faults.rig import MAX_AGE_S, PANEL, Rig, limit
-from tests.faults.trial import well
+from tests.faults.trial import presses_work
 from tests.faults.watch import Watch, answering
 from tests.support.parts import Server, until
 
@@ -39,7 +39,7 @@ def test_a_clock_that_is_set_back_and_forward(rig: Rig, tmp_path: Path) -> None:
             for off in (0, -HOUR_S, HOUR_S, 0):
                 clock.set(off)
                 is_off(server, off)
-                well(presser)
+                presses_work(presser)
         presses = presser.end()
         watch.end()
     clock.clean(server.process.pid)

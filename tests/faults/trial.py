@@ -32,7 +32,7 @@ def nothing() -> None:
     """For faults that need no repair."""
 
 
-def tried(
+def try_fault(
     rig: Rig,
     server: Server,
     breaks: Callable[[], object],
@@ -53,7 +53,7 @@ def tried(
     """
     watch, presser = Watch(server), Presser(server, widget)
     with answering(server):
-        well(presser)
+        presses_work(presser)
         broken_at = time.monotonic()
         breaks()
         locked_s, reason = watch.locked_after(broken_at, interlock, limit(locks_within_s), because)
@@ -62,7 +62,7 @@ def tried(
         mends()
         watch.opened(interlock, limit(opens_within_s))
         opened_at = watch.now(interlock).at
-        well(presser)
+        presses_work(presser)
     presses = presser.end()
     watch.end()
 
@@ -85,7 +85,7 @@ def recorded(fault: str, trial: Trial) -> None:
     )
 
 
-def well(presser: Presser) -> None:
+def presses_work(presser: Presser) -> None:
     """Waits until some more presses came through."""
     since = time.monotonic()
     until(

@@ -163,7 +163,9 @@ def resources(pid: int) -> Resources:
     )
 
 
-def came_back(pid: int, before: Resources, margin_mb: float, within_s: float = ENOUGH_S) -> Resources:
+def until_released(
+    pid: int, before: Resources, margin_mb: float, within_s: float = ENOUGH_S
+) -> Resources:
     """Waits until memory is within a margin of the value before, and threads and open files are not
     more."""
 

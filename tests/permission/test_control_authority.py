@@ -16,7 +16,7 @@ from app.permission.clients import Clients, anonymous
 from app.permission.control_authority import ASK_AGAIN_S, LIFE_S, ControlAuthority, Refusal
 from app.permission.control_authority_view import Role, role
 from app.permission.principal import Principal
-from tests.support.builders import told
+from tests.support.builders import faults_text
 from tests.support.words import english
 
 RULES = ControlRules(required=True)
@@ -459,8 +459,8 @@ def test_what_is_wrong_with_the_table_is_told_with_all_else(
 ) -> None:
     with pytest.raises(PanelError) as caught:
         panel_with(tmp_path, f'{table}\n[[interlock]]\nid = "a"\ntopic = "nowhere"\n')
-    assert fault in told(caught.value)
-    assert "interlock[0].topic" in told(caught.value)
+    assert fault in faults_text(caught.value)
+    assert "interlock[0].topic" in faults_text(caught.value)
 
 
 # Whatever they do, in whatever order.

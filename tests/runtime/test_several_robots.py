@@ -13,7 +13,7 @@ from websockets.exceptions import InvalidStatus
 
 from app.errors import PanelError
 from app.panel import load_panel
-from tests.support.builders import told
+from tests.support.builders import faults_text
 from tests.support.parts import (
     ENOUGH_S,
     ROOT,
@@ -245,7 +245,7 @@ def test_the_panel_file_says_what_is_wrong_with_its_robots(tmp_path: Path) -> No
     )
     with pytest.raises(PanelError) as caught:
         load_panel(path)
-    assert told(caught.value).splitlines() == [
+    assert faults_text(caught.value).splitlines() == [
         'robot[1].id: "r1" is already the id of robot[0]',
         'robot[2].namespace: "a b" is not a ROS 2 namespace: it must be like /robot1',
         'robot[3].name: "Robot 1" is already the name of robot[0]',
@@ -279,7 +279,7 @@ def test_endpoints_that_zenoh_takes_are_taken(tmp_path: Path, endpoint: str) -> 
 def test_an_endpoint_that_is_none_is_a_fault_of_the_panel(tmp_path: Path, endpoint: str) -> None:
     with pytest.raises(PanelError) as caught:
         load_panel(panel_file(tmp_path, entry(1, "tcp/robot1:7447"), entry(2, endpoint)))
-    assert told(caught.value) == (
+    assert faults_text(caught.value) == (
         f'robot[1].connect[0]: "{endpoint}" is not a Zenoh endpoint: it must be like tcp/robot1:7447'
     )
 

@@ -64,7 +64,7 @@ COUNT: Final[Table] = {
 }
 
 
-def told(error: PanelError) -> str:
+def faults_text(error: PanelError) -> str:
     """The faults of a panel file, one per line, without their positions."""
     return "\n".join(f"{fault.place}: {fault.message}" for fault in error.faults)
 

@@ -127,7 +127,7 @@ class Process:
     def running(self) -> bool:
         return self._process.poll() is None
 
-    def told(self, lines: int = 40) -> str:
+    def describe(self, lines: int = 40) -> str:
         """Pid, state, command and the last lines."""
         state = "runs" if self.running else f"ended with {self._process.returncode}"
         return "\n".join([f"{self.pid}, {state}: {self._process.args!r}", *self.lines[-lines:]])

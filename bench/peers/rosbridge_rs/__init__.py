@@ -28,10 +28,10 @@ class RosbridgeRs(Peer):
         process = started(command, environment(place), place.folder)
         bare = Bare("websocket", "/", tuple(subscriptions(place.topics)), port)
         page = HERE / "page.html"
-        return with_page(process, port, page, SCRIPTS, place.topics, lambda: ended(process), bare)
+        return with_page(process, port, page, SCRIPTS, place.topics, lambda: end_process(process), bare)
 
 
-def ended(process: Process) -> None:
+def end_process(process: Process) -> None:
     """Ends the process, and removes the files of Fast DDS that the next one on the domain would
     find."""
     maps = Path(f"/proc/{process.pid}/maps").read_text() if process.running else ""
