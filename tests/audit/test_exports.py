@@ -13,7 +13,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import AsyncExitStack, contextmanager
+from contextlib import AsyncExitStack, contextmanager, suppress
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -226,9 +226,11 @@ def test_one_export_at_a_time_and_it_is_whole(kiosk: Server) -> None:
 
 
 def children(kiosk: Server) -> list[int]:
-    path = Path(f"/proc/{kiosk.process.pid}/task/")
-    found = (task / "children" for task in path.iterdir())
-    return [int(pid) for each in found for pid in each.read_text().split()]
+    found: list[int] = []
+    for task in Path(f"/proc/{kiosk.process.pid}/task/").iterdir():
+        with suppress(FileNotFoundError, ProcessLookupError):  # the thread has ended
+            found += map(int, (task / "children").read_text().split())
+    return found
 
 
 def test_an_export_that_breaks_off_is_not_taken_for_whole(kiosk: Server) -> None:

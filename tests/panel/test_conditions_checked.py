@@ -192,7 +192,8 @@ def test_what_is_not_there_permits_by_no_condition() -> None:
 
 
 class Deaf:
-    def is_awaited(self, *_: object) -> None: ...
+    def is_awaited(self, *_: object) -> bool:
+        return False
 
 
 def test_a_value_that_only_changes_the_reason_waits_for_the_next_frame(tmp_path: Path) -> None:
