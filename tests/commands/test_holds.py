@@ -299,7 +299,7 @@ def test_what_comes_while_a_message_is_encoded_counts_before_it_is_sent(bench: B
     looks: list[bool] = []
 
     def news() -> bool:
-        """It comes between the judging and the last look."""
+        """It arrives between the verdict and the final check."""
         looks.append(True)
         if len(looks) == 1:
             bench.pending.append(lambda: permits(bench.robot, False))
