@@ -10,6 +10,7 @@
     ├── PressRefused           409  the permission was lost right before the message was sent
     ├── TooSlow                408  a request body took too long
     ├── TooMany                429  a limit is reached; `retry_after_s` is when to try again
+    ├── RecordingError         –    a recording can't be replayed
     ├── DecodeError            –    bytes are not a message of the type
     ├── LinkError              503  Zenoh refused; nothing was sent
     └── LogError               503  the operator's log can't be written or read
@@ -149,6 +150,10 @@ class TooMany(KioskError):
     def __init__(self, message: TextLike, again_s: int) -> None:
         super().__init__(message)
         self.retry_after_s = again_s
+
+
+class RecordingError(KioskError):
+    pass
 
 
 class DecodeError(KioskError):

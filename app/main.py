@@ -23,7 +23,7 @@ from app.process.shutdown import graceful_shutdown
 from app.process.watchdog import Watchdog
 from app.runtime.assembly import check_zenoh, mode_of, open_fleet, open_log
 from app.settings import Settings, shipped_path
-from app.simulator import zenoh_peer
+from app.simulator.in_process import in_process
 from app.web.app_state import AppState, named_robot
 from app.web.asgi import Application, StartErrorsInWords
 from app.web.assets import load_assets
@@ -136,7 +136,7 @@ async def _app_state(
             revision += f"-{secrets.token_hex(4)}"  # open pages reload after every restart
         limits = PressLimits(partial(oplog.suppress, limited=True))
         metrics = Metrics(lambda: oplog.left_out, lambda: limits.refused)
-        async with open_fleet(settings, panel, revision, oplog, zenoh_peer.in_process) as fleet:
+        async with open_fleet(settings, panel, revision, oplog, in_process) as fleet:
             metrics.follow(fleet)
             templates = PageTemplates(shipped_path("templates"))
             yield AppState(fleet, assets, templates, metrics, oplog, limits)

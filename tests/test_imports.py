@@ -53,7 +53,13 @@ SPEAK_ZENOH = {
 # The bridge's dialect and peer, and who else may know them.
 OF_THE_BRIDGE = ("app.dialect.bridge_", "app.transport.bridge_")
 WIRE_THE_BRIDGE = {"app.runtime.robot_session", "app.simulator.zenoh_peer"}
-KNOWN_TO_THE_SIMULATOR = ("app.simulator", "app.interfaces", "app.dialect", "app.errors")
+KNOWN_TO_THE_SIMULATOR = (
+    "app.simulator",
+    "app.interfaces",
+    "app.dialect",
+    "app.panel",  # descriptions: what a robot has to have
+    "app.errors",
+)
 
 
 def name_of(path: Path) -> str:

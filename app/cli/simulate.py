@@ -1,26 +1,42 @@
-"""`operator-panel simulate [ENDPOINT [NAMESPACE]]`: the demo robot alone.
+"""`operator-panel simulate [PANEL] [ENDPOINT [NAMESPACE]]`: the demo robot alone, or a recording.
 
-Exit status: 0 it was ended, 1 it can't listen there, 2 a mistake on the command line.
+Exit status: 0 it was ended, or the recording is over, 1 it can't listen there, 2 a mistake on the
+command line, a panel with faults, or a recording that can't be read.
 """
 
+import math
 import signal
 import sys
 import threading
-from collections.abc import Sequence
+from argparse import ArgumentTypeError
+from collections.abc import Mapping, Sequence
 from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from app.cli.parser import Parser
-from app.errors import LinkError
+from app.errors import KioskError, LinkError
+from app.interfaces import load_interfaces
 from app.interfaces.names import NAMESPACE
+from app.panel import load_panel
+from app.panel.model import Panel
+from app.settings import Settings
+from app.simulator.in_process import robots_of
 from app.simulator.zenoh_peer import ENDPOINT, serve
 
+if TYPE_CHECKING:
+    from app.simulator.simulated import SimulatedRobot
+
 PROG = "python -m app.simulator"
+SUFFIX = ".toml"
+
+say = partial(print, file=sys.stderr, flush=True)
 
 
 def main(arguments: Sequence[str], prog: str = PROG) -> int:
-    given = _parser(prog).parse_args(arguments)
-    endpoint, namespace = given.endpoint, given.namespace.rstrip("/")
-    say = partial(print, file=sys.stderr, flush=True)
+    parser = _parser(prog)
+    given = _sorted_out(parser, parser.parse_args(arguments))
+    namespace = given.namespace.rstrip("/")
     if not NAMESPACE.fullmatch(namespace):
         say(f'demo robot: "{namespace}" is not a ROS 2 namespace, like /robot1')
         return 2
@@ -28,26 +44,98 @@ def main(arguments: Sequence[str], prog: str = PROG) -> int:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: ends.set())
     try:
-        serve(endpoint, namespace, ends, lambda: say(f"demo robot: listening at {endpoint}"))
-    except LinkError as error:
+        panel = load_panel(given.panel or Settings.from_environment().panel)
+        robots = _replayed(given, panel, namespace, ends) if given.bag else _simulated(panel, namespace)
+        interfaces = load_interfaces(panel.distro, panel.interfaces)
+        said = partial(say, f"demo robot: listening at {given.endpoint}")
+        serve(given.endpoint, robots, interfaces, ends, said)
+    except KioskError as error:
         say(f"demo robot: {error}")
-        return 1
+        return 1 if isinstance(error, LinkError) else 2
     return 0
+
+
+def _simulated(panel: Panel, namespace: str) -> "Mapping[str, SimulatedRobot]":
+    """The robots of the panel; with a namespace the first of them, in it."""
+    robots = robots_of(panel)
+    return {namespace: next(iter(robots.values()))} if namespace else robots
+
+
+def _replayed(
+    given: Any, panel: Panel, namespace: str, ends: threading.Event
+) -> "Mapping[str, SimulatedRobot]":
+    """A recording; what the panel misses in it is said where a panel was named."""
+    from app.simulator.recording import Recording
+    from app.simulator.replay import ReplayedRobot, missing
+
+    recording = Recording(given.bag)
+    robot = ReplayedRobot(recording, given.rate, given.loop, ends.set)
+    lacks = list(missing(panel, robot.publishes)) if given.panel else []
+    for note in (*recording.notes, *lacks):
+        say(f"demo robot: {note}")
+    about = f"{len(robot.publishes)} topic(s), {recording.duration_s:.1f} s"
+    say(f"demo robot: replaying {given.bag}: {about}")
+    return {namespace: robot}
+
+
+def _sorted_out(parser: Parser, given: Any) -> Any:
+    """The arguments with what is no panel file moved to where it belongs."""
+    words = [one for one in (given.panel, given.endpoint, given.namespace) if one is not None]
+    panel = words.pop(0) if words and words[0].endswith(SUFFIX) else None
+    if len(words) > 2:
+        parser.error(f'"{words[2]}" is one argument too many')
+    if given.bag is None and (given.loop or given.rate is not None):
+        parser.error("--loop and --rate are of a recording: give --bag too")
+    given.panel = None if panel is None else Path(panel)
+    given.endpoint = words[0] if words else ENDPOINT
+    given.namespace = words[1] if len(words) > 1 else ""
+    given.rate = 1.0 if given.rate is None else given.rate
+    return given
+
+
+def _rate(text: str) -> float:
+    try:
+        rate = float(text)
+    except ValueError:
+        rate = math.nan
+    if not 0 < rate <= 1000:
+        raise ArgumentTypeError(f'"{text}" is not a rate: more than 0, 1000 at most, like 2 or 0.5')
+    return rate
 
 
 def _parser(prog: str) -> Parser:
     parser = Parser(
         prog=prog,
-        description="The demo robot as a Zenoh peer of its own, for panels to connect to.",
+        usage=f"{prog} [-h] [--bag FILE [--loop] [--rate RATE]] [PANEL] [ENDPOINT [NAMESPACE]]",
+        description="The demo robot as a Zenoh peer of its own, for panels to connect to: it has what a"
+        " panel shows, publishes, calls and sets, or publishes what was recorded.",
+    )
+    parser.add_argument(
+        "panel",
+        nargs="?",
+        metavar="PANEL",
+        help="its panel file, *.toml; default: that of KIOSK_PANEL, else the shipped one",
     )
     parser.add_argument(
         "endpoint",
         nargs="?",
-        default=ENDPOINT,
         metavar="ENDPOINT",
-        help="where it listens, as Zenoh names it; default: %(default)s",
+        help=f"where it listens, as Zenoh names it; default: {ENDPOINT}",
     )
     parser.add_argument(
-        "namespace", nargs="?", default="", metavar="NAMESPACE", help="of its topics, such as /robot1"
+        "namespace",
+        nargs="?",
+        metavar="NAMESPACE",
+        help="of its topics, such as /robot1; default: what the panel file says",
+    )
+    parser.add_argument(
+        "--bag",
+        type=Path,
+        metavar="FILE",
+        help="replay this recording: an .mcap or .db3 file, or a folder of rosbag2",
+    )
+    parser.add_argument("--loop", action="store_true", help="replay it again and again")
+    parser.add_argument(
+        "--rate", type=_rate, metavar="RATE", help="how many times as fast as recorded; default: 1"
     )
     return parser

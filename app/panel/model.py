@@ -1,12 +1,13 @@
 """The descriptions of a panel and its pages. docs/reference/panel-file.md describes each key."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import Annotated, Final, Literal
 
 from pydantic import AfterValidator, Field
 
 from app.panel.base import Description, Endpoint, Folder, Id, Label, TopicQos, parse_namespace
+from app.panel.demo import DemoEntry
 from app.panel.interlock import Interlock
 from app.panel.rules import ControlRules, LogRules, RecordRules
 from app.panel.widgets.families import BaseWidget, Command, Display, PublishCommand, TopicWidget
@@ -51,6 +52,7 @@ class Panel(Description):
     record: RecordRules | None = None
     robots: Annotated[tuple[RobotEntry, ...], Field(strict=False)] = Field((), alias="robot")
     log: LogRules = LogRules()
+    demo: Mapping[str, DemoEntry] = Field(default_factory=dict)
     interlocks: Annotated[tuple[Interlock, ...], Field(strict=False)] = Field((), alias="interlock")
     pages: Annotated[tuple[Page, ...], Field(strict=False)] = Field(alias="page")
     # Computed from the file: differs when loaded pages are out of date.

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
 log = logging.getLogger("kiosk")
 
-# (namespace, distribution) → a context in which a simulated robot runs; its value is the endpoint.
-SimulatedRobot = Callable[[str, str], AbstractContextManager[str]]
+# (panel, which of its robots) → a simulated robot that runs while it is entered, by its endpoint.
+SimulatedRobot = Callable[[Panel, RobotEntry | None], AbstractContextManager[str]]
 
 
 def mode_of(settings: Settings, panel: Panel) -> Mode:
@@ -65,8 +65,7 @@ async def open_fleet(
         def config_of(entry: RobotEntry | None) -> Config:
             if not demo:
                 return config_from(settings.zenoh, entry.connect if entry else ())
-            namespace = entry.namespace if entry else panel.namespace
-            return config_to(stack.enter_context(simulated_robot(namespace, panel.distro)))
+            return config_to(stack.enter_context(simulated_robot(panel, entry)))
 
         recordings = _recordings(settings, panel)
         fleet = Fleet(panel, config_of, revision, oplog, recordings=recordings, simulated=demo)

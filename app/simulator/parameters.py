@@ -1,28 +1,38 @@
-"""The parameters of the demo robot, as the services of a node give and take them: pure.
+"""The parameters of simulated nodes, as the services of a node give and take them: pure.
 
 Shapes: rcl_interfaces' GetParameters, DescribeParameters, SetParameters and ParameterEvent.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-NODE: Final = "/system_controller"
+from app.panel.number_range import Range
+from app.panel.values import same_value
+
+NODE: Final = "/system_controller"  # of the robot that the shipped panel is for
 EVENTS: Final = "/parameter_events"
 EVENT_TYPE: Final = "rcl_interfaces/msg/ParameterEvent"
 SERVICES: Final[Mapping[str, str]] = {
-    f"{NODE}/get_parameters": "rcl_interfaces/srv/GetParameters",
-    f"{NODE}/describe_parameters": "rcl_interfaces/srv/DescribeParameters",
-    f"{NODE}/set_parameters": "rcl_interfaces/srv/SetParameters",
+    "get_parameters": "rcl_interfaces/srv/GetParameters",
+    "describe_parameters": "rcl_interfaces/srv/DescribeParameters",
+    "set_parameters": "rcl_interfaces/srv/SetParameters",
 }
 
 BOOL, INTEGER, DOUBLE, STRING = 1, 2, 3, 4
+INTEGERS, DOUBLES = 7, 8
 FIELDS: Final = {
     BOOL: "bool_value",
     INTEGER: "integer_value",
     DOUBLE: "double_value",
     STRING: "string_value",
+    6: "bool_array_value",
+    INTEGERS: "integer_array_value",
+    DOUBLES: "double_array_value",
+    9: "string_array_value",
 }
+FIRST_ARRAY: Final = 6
 EMPTY: Final[Mapping[str, Any]] = {
     "bool_value": False,
     "integer_value": 0,
@@ -34,32 +44,31 @@ EMPTY: Final[Mapping[str, Any]] = {
     "double_array_value": (),
     "string_array_value": (),
 }
+INT64: Final = (-(2**63), 2**63 - 1)
 
 Fields = dict[str, Any]
 
 
 @dataclass(slots=True)
 class Parameter:
-    """One parameter; `limits` are (lowest, highest, step) of a number."""
+    """One parameter; `limits` are those of a number, or of each in a list. `options` are the only
+    values that it takes, if there are any."""
 
     type: int
     value: Any
-    description: str
-    limits: tuple[float, float, float] | None = None
+    description: str = ""
+    limits: Range | None = None
     read_only: bool = False
+    options: tuple[Any, ...] = ()
+    empty: str = ""  # why a text without a character is not taken; "" where it is
 
 
-class DemoParameters:
+class NodeParameters:
     """A node's parameters; `news` has an event for each change."""
 
-    def __init__(self) -> None:
-        self._declared = {
-            "speed": Parameter(DOUBLE, 120.0, "of the feed", (0.0, 500.0, 10.0)),
-            "parts": Parameter(INTEGER, 24, "in a batch", (1, 200, 1)),
-            "work_light": Parameter(BOOL, False, "follows the door"),
-            "batch": Parameter(STRING, "A-17", "printed on the label"),
-            "serial": Parameter(STRING, "DEMO-0001", "from the factory", read_only=True),
-        }
+    def __init__(self, node: str, declared: Mapping[str, Parameter]) -> None:
+        self._node = node
+        self._declared = dict(declared)
         self._news: list[Fields] = []
 
     def serve(self, service: str, request: Any) -> Fields:
@@ -81,9 +90,9 @@ class DemoParameters:
         reason = self._refusal(given)
         if not reason:
             declared = self._declared[given.name]
-            declared.value = getattr(given.value, FIELDS[declared.type])
+            declared.value = _plain(getattr(given.value, FIELDS[declared.type]))
             changed = {"name": given.name, "value": _value(declared.type, declared.value)}
-            self._news.append(_event([changed]))
+            self._news.append(_event(self._node, [changed]))
         return {"successful": not reason, "reason": reason}
 
     def _refusal(self, given: Any) -> str:
@@ -95,14 +104,20 @@ class DemoParameters:
             return f"parameter '{given.name}' is read-only"
         if given.value.type != declared.type:
             return f"parameter '{given.name}' has another type"
-        value = getattr(given.value, FIELDS[declared.type])
-        if given.name == "batch" and not value.strip():
-            return "a batch needs a name"
-        if declared.limits is None:
+        value = _plain(getattr(given.value, FIELDS[declared.type]))
+        if declared.empty and not value.strip():
+            return declared.empty
+        if declared.options and not any(same_value(value, one) for one in declared.options):
+            return f"parameter '{given.name}' has no such option"
+        several = value if declared.type >= FIRST_ARRAY else [value]
+        if declared.limits is None or all(declared.limits.contains(one) for one in several):
             return ""
-        low, high, step = declared.limits
-        fits = low <= value <= high and (value - low) % step == 0
-        return "" if fits else f"parameter '{given.name}' is out of its range"
+        return f"parameter '{given.name}' is out of its range"
+
+
+def _plain(value: Any) -> Any:
+    """A value of a message; a list of any kind as a list."""
+    return value if isinstance(value, bool | int | float | str) else list(value)
 
 
 def _value(kind: int, value: Any) -> Fields:
@@ -110,25 +125,32 @@ def _value(kind: int, value: Any) -> Fields:
 
 
 def _descriptor(name: str, parameter: Parameter) -> Fields:
-    ranges: list[Fields] = []
-    if parameter.limits is not None:
-        low, high, step = parameter.limits
-        ranges = [{"from_value": low, "to_value": high, "step": step}]
     return {
         "name": name,
         "type": parameter.type,
         "description": parameter.description,
         "additional_constraints": "",
         "read_only": parameter.read_only,
-        "floating_point_range": ranges if parameter.type == DOUBLE else [],
-        "integer_range": ranges if parameter.type == INTEGER else [],
+        "floating_point_range": _described(parameter, (DOUBLE, DOUBLES), (-math.inf, math.inf)),
+        "integer_range": _described(parameter, (INTEGER, INTEGERS), INT64),
     }
 
 
-def _event(changed: Sequence[Fields]) -> Fields:
+def _described(parameter: Parameter, kinds: tuple[int, ...], ends: tuple[float, float]) -> list[Fields]:
+    limits = parameter.limits
+    if limits is None or parameter.type not in kinds:
+        return []
+    low, high = (
+        ends[0] if limits.low is None else limits.low,
+        (ends[1] if limits.high is None else limits.high),
+    )
+    return [{"from_value": low, "to_value": high, "step": limits.step or 0}]
+
+
+def _event(node: str, changed: Sequence[Fields]) -> Fields:
     return {
         "stamp": {"sec": 0, "nanosec": 0},
-        "node": NODE,
+        "node": node,
         "new_parameters": [],
         "changed_parameters": list(changed),
         "deleted_parameters": [],

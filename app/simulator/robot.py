@@ -8,7 +8,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from app.simulator.parameters import EVENTS, DemoParameters
+from app.panel.number_range import Range
+from app.simulator.parameters import (
+    BOOL,
+    DOUBLE,
+    EVENTS,
+    INTEGER,
+    NODE,
+    STRING,
+    NodeParameters,
+    Parameter,
+)
 
 PERMITTED_S: Final = 20.0
 FORBIDDEN_S: Final = 8.0
@@ -34,6 +44,17 @@ Message = tuple[str, Mapping[str, Any]]
 Fields = dict[str, Any]
 
 
+def own_parameters() -> dict[str, Parameter]:
+    """The parameters of the `system_controller`, as at its start."""
+    return {
+        "speed": Parameter(DOUBLE, 120.0, "of the feed", Range(0.0, 500.0, 10.0)),
+        "parts": Parameter(INTEGER, 24, "in a batch", Range(1, 200, 1)),
+        "work_light": Parameter(BOOL, False, "follows the door"),
+        "batch": Parameter(STRING, "A-17", "printed on the label", empty="a batch needs a name"),
+        "serial": Parameter(STRING, "DEMO-0001", "from the factory", read_only=True),
+    }
+
+
 @dataclass(slots=True)
 class Goal:
     """A count under way or ended; `next_at` is when its next number comes."""
@@ -53,7 +74,7 @@ class DemoRobot:
         self._told: tuple[bool, float] | None = None
         self._heard: list[Message] = []
         self._goals: dict[bytes, Goal] = {}
-        self.parameters = DemoParameters()
+        self.parameters = NodeParameters(NODE, own_parameters())
 
     @property
     def permits(self) -> bool:

@@ -37,6 +37,8 @@ def examples_of(tables: Mapping[str, Schema]) -> dict[str, Any]:
         for key, value in table.items():
             found.setdefault(f"{name}.{key}", value)
             inner = value if isinstance(value, list) else [value]
+            if _by_name(tables[name]["properties"].get(key, {})):
+                inner = list(value.values())
             for one in inner:
                 if isinstance(one, dict) and (part := one.get("kind", key)) in tables:
                     walk(part, one)
@@ -60,7 +62,13 @@ def _table(name: str, table: Schema, examples: Mapping[str, Any]) -> str:
 
 def _is_table(prop: Schema) -> bool:
     """Whether it has a section of its own, with an example."""
-    return "$ref" in prop or "$ref" in prop.get("items", {})
+    return "$ref" in prop or "$ref" in prop.get("items", {}) or _by_name(prop)
+
+
+def _by_name(prop: Schema) -> bool:
+    """Whether it is a table of tables, by their names."""
+    inner = prop.get("additionalProperties")
+    return isinstance(inner, dict) and "$ref" in inner
 
 
 def words(prop: Schema) -> str:
@@ -73,6 +81,8 @@ def words(prop: Schema) -> str:
         return f"[table](#{_anchor(prop['$ref'])})"
     if "anyOf" in prop:
         return " or ".join(map(words, prop["anyOf"]))
+    if _by_name(prop):
+        return f"[tables](#{_anchor(prop['additionalProperties']['$ref'])}), by name"
     match prop.get("type"):
         case None:
             return "any value"

@@ -23,7 +23,7 @@ GOOD: Final = (TESTS / "everything.toml").read_text()
 LINES: Final = GOOD.splitlines()
 TABLES: Final = tomllib.loads(GOOD)
 KEY: Final = re.compile(r"([a-z_.]+) = ")
-HEADER: Final = re.compile(r"\[+([a-z_.]+)\]+")
+HEADER: Final = re.compile(r'\[+([a-z_.]+)(?:\."[^"]*")?\]+')
 WITH_ID: Final = re.compile(r"\[\[(?:page|page\.widget|robot|interlock)\]\]")
 # What belongs to Python, its libraries and this program, and means nothing to who writes a panel.
 INTERNAL: Final = re.compile(
@@ -83,7 +83,8 @@ def lacking(table: Mapping[str, Any], model: Any, where: str = "") -> Iterator[s
         if key not in table:
             yield f"{where}{key}"
         elif (within := inner_model(model, key)) and key != "page":
-            parts = table[key] if isinstance(table[key], list) else [table[key]]
+            tables = list(table[key].values()) if key == "demo" else [table[key]]
+            parts = table[key] if isinstance(table[key], list) else tables
             yield from lacking({k: v for part in parts for k, v in part.items()}, within, f"{key}.")
 
 

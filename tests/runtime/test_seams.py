@@ -23,7 +23,7 @@ from app.robot.state import RobotState, Sample, SkippedPayload
 from app.runtime import renewal
 from app.runtime.ingest import Ingest, Updates
 from app.runtime.robot_session import RobotSession, ServerParts
-from app.simulator import zenoh_peer
+from app.simulator.in_process import in_process
 from app.transport.inbox import Changes, Token
 from app.transport.zenoh_config import config_to
 from app.view.kinds import Enabled
@@ -305,7 +305,7 @@ def test_a_kiosk_that_gives_its_session_up_ends_what_is_held_before(
 
     async def scene() -> None:
         panel = panel_of(SPEED, JOG, {**HEARD, "topic": "/last_heard"}, mode="demo")
-        with zenoh_peer.in_process("", panel.distro) as there:
+        with in_process(panel) as there:
             one = session_of(panel, there)
             await one.start()
             sent: list[float] = []

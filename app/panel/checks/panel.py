@@ -43,6 +43,8 @@ def find_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = 
     yield from _topic_conflicts(panel, [fault.place for fault in found])
     yield from type_faults((at, w) for at, w in _widgets_with_places(panel) if isinstance(w, Parameter))
     yield from _record_faults(panel)
+    if not (found or ids or inputs or faulty):  # else they may be consequences
+        yield from _demo_faults(panel, interfaces)
 
 
 def _id_faults(panel: Panel) -> Iterator[Fault]:
@@ -124,6 +126,14 @@ def _record_faults(panel: Panel) -> Iterator[Fault]:
         if topic not in known:
             what = f"{topic} is no topic that this panel listens to; there is {list_names(known)}"
             yield Fault(f"record.topics[{t}]", what, cause=f"listens {topic}")
+
+
+def _demo_faults(panel: Panel, interfaces: Interfaces) -> Iterator[Fault]:
+    """Imported only where a panel has the table, for a faster start."""
+    if panel.demo:
+        from app.panel.checks.demo import demo_faults
+
+        yield from demo_faults(panel, interfaces)
 
 
 def _robot_faults(panel: Panel) -> Iterator[Fault]:

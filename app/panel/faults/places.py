@@ -10,6 +10,7 @@ from app.panel.faults.toml_lines import Path, lines_of
 
 MAX_ID: Final = 64
 _OWNER: Final = re.compile(r"(?:page\[(?P<page>[0-9]+)\]\.)?(?P<key>[a-z]+)\[(?P<index>[0-9]+)\]")
+_QUOTED: Final = re.compile(r"[/\[]")
 _LAST: Final = re.compile(r"(?:\[[0-9]+\]|\.?[^.\[\]]*)$")
 
 AnyRemark = TypeVar("AnyRemark", bound=Remark)
@@ -19,7 +20,11 @@ def place_of(path: Path) -> str:
     """("page", 0, "widget", 2, "topic") → `page[0].widget[2].topic`."""
     place = ""
     for step in path:
-        place += f"[{step}]" if isinstance(step, int) else f".{step}" if place else step
+        if isinstance(step, int):
+            place += f"[{step}]"
+            continue
+        key = f'"{step}"' if _QUOTED.search(step) else step  # a topic or a path, as TOML writes it
+        place += f".{key}" if place else key
     return place
 
 
@@ -56,5 +61,6 @@ def _lines(text: str) -> dict[Path, int]:
 def _nearest_line(place: str, lines: dict[str, int]) -> int:
     """The line of a place, or of the nearest place around it; 0 without one."""
     while place and place not in lines:
-        place = _LAST.sub("", place)
+        shorter = _LAST.sub("", place)
+        place = shorter if shorter != place else place[:-1]  # in a quoted name
     return lines.get(place, 0)

@@ -1,0 +1,139 @@
+"""Fields that permit operation and forbid it in turns, by the conditions of interlocks: pure."""
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any, Final
+
+from app.interfaces import INTEGER_RANGES
+from app.interfaces.definitions import FLOAT_TYPES
+from app.panel.interlock import Interlock
+from app.panel.values import same_value
+from app.simulator import robot
+from app.simulator.signals import Signal, as_type, swing
+
+APART_S: Final = 3.0  # by which each interlock drops later than the one before
+SPREAD_S: Final = 8.0  # all of them together: so that there is time in which all permit
+INSIDE: Final = 0.3  # of the limits' distance, to both sides of their middle
+
+
+def offset_of(number: int, count: int) -> float:
+    """By how many seconds the interlock `number` of `count` is behind the first."""
+    return number * min(APART_S, SPREAD_S / max(count - 1, 1))
+
+
+def permitted(t: float, offset: float, period_s: float | None) -> bool:
+    """Whether an interlock permits: 20 s of 28, or the same part of another period."""
+    whole = robot.PERMITTED_S + robot.FORBIDDEN_S
+    at = (t - offset) % whole if period_s is None else (t - offset) / period_s * whole % whole
+    return at < robot.PERMITTED_S
+
+
+def permitting(
+    interlocks: Sequence[Interlock],
+    kind: str,
+    others: Sequence[Any],
+    offset: float,
+    period_s: float | None,
+) -> Signal:
+    """A field of the base type `kind` that satisfies its interlocks, and then does not; `others` are
+    further values that the field may have. Where no value satisfies all, each has its turn."""
+    found = (_as_kind(one, kind) for one in _candidates(interlocks, kind, others))
+    candidates = [one for one in found if _fits(one, kind)]
+    met = [sum(satisfies(interlock, one) for interlock in interlocks) for one in candidates]
+    best, least = max(met), min(met)
+    good = [one for one, count in zip(candidates, met, strict=True) if count == best]
+    bad = [one for one, count in zip(candidates, met, strict=True) if count == least] or good
+    moving = _moving(interlocks, kind) if best == len(interlocks) else None
+    turn_s = period_s or robot.PERMITTED_S + robot.FORBIDDEN_S
+
+    def value(t: float) -> Any:
+        turn = math.floor((t - offset) / turn_s)
+        if not permitted(t, offset, period_s):
+            return bad[turn % len(bad)]
+        if moving is not None:
+            return moving(t)
+        return good[turn % len(good)] if best < len(interlocks) else good[0]
+
+    return value
+
+
+def satisfies(interlock: Interlock, value: Any) -> bool:
+    """Whether a value meets all conditions; without any, whether it is true."""
+    given = interlock.conditions
+    if not given:
+        return value is True
+    return (
+        ("equals" not in given or same_value(value, interlock.equals))
+        and ("not_equals" not in given or not same_value(value, interlock.not_equals))
+        and ("one_of" not in given or any(same_value(value, one) for one in given["one_of"]))
+        and ("min" not in given or value >= given["min"])
+        and ("max" not in given or value <= given["max"])
+    )
+
+
+def _candidates(interlocks: Sequence[Interlock], kind: str, others: Sequence[Any]) -> Iterator[Any]:
+    """Values to choose from, the likeliest first."""
+    if kind == "bool":
+        yield from (True, False)
+        return
+    numeric = kind in INTEGER_RANGES or kind in FLOAT_TYPES
+    for interlock in interlocks:
+        given = interlock.conditions
+        for one in (given.get("equals"), *given.get("one_of", ())):
+            if one is not None:
+                yield one
+        if "min" in given or "max" in given:
+            low, high = _limits(interlock)
+            span = high - low
+            yield from ((low + high) / 2, low - span / 4, high + span / 4, low, high)
+    yield from others
+    for interlock in interlocks if numeric else ():
+        for one in interlock.conditions.values():
+            near = one if isinstance(one, tuple) else (one,)
+            for value in near:
+                yield from (value + 1, value - 1)
+    for interlock in interlocks:
+        if "not_equals" in interlock.conditions:
+            yield interlock.not_equals
+    if not numeric:
+        yield from ("ready", "not ready")
+
+
+def _limits(interlock: Interlock) -> tuple[float, float]:
+    """Both limits: one that is not given is a fifth of the other away."""
+    low, high = interlock.conditions.get("min"), interlock.conditions.get("max")
+    if low is None:
+        assert high is not None
+        return high - max(abs(high) / 5, 4), high
+    return low, low + max(abs(low) / 5, 4) if high is None else high
+
+
+def _moving(interlocks: Sequence[Interlock], kind: str) -> Signal | None:
+    """A number that moves inside the limits, if there are any."""
+    limits = [_limits(one) for one in interlocks if {"min", "max"} & one.conditions.keys()]
+    if not limits:
+        return None
+    low, high = max(one[0] for one in limits), min(one[1] for one in limits)
+    middle, part = (low + high) / 2, (high - low) * INSIDE
+    ends = as_type(swing(middle - part, middle + part, 1), kind)
+    if not all(satisfies(one, ends(t)) for one in interlocks for t in (0, 0.25, 0.5)):
+        return None
+    return as_type(swing(middle - part, middle + part), kind)
+
+
+def _as_kind(value: Any, kind: str) -> Any:
+    """A number as its field has it."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return value
+    return round(value) if kind in INTEGER_RANGES else float(value)
+
+
+def _fits(value: Any, kind: str) -> bool:
+    if kind == "bool":
+        return isinstance(value, bool)
+    if kind in FLOAT_TYPES:
+        return isinstance(value, float)
+    if kind in INTEGER_RANGES:
+        low, high = INTEGER_RANGES[kind]
+        return isinstance(value, int) and not isinstance(value, bool) and low <= value <= high
+    return isinstance(value, str)

@@ -1,0 +1,174 @@
+"""What each kind of widget needs of the simulated robot: a row for each kind or family.
+
+A kind without a row has that of its family. A display with keys `min`, `max`, `unit`, `scale` or
+`offset` needs none: its numbers move within them.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+from app.interfaces import Interfaces
+from app.panel.base import TopicQos
+from app.panel.constants import parent_type
+from app.panel.template import RESPONSE_PLACEHOLDER
+from app.panel.widgets.displays import Indicator, Readout
+from app.panel.widgets.families import BaseWidget, Display, PublishCommand
+from app.panel.widgets.kinds import find_row
+from app.panel.widgets.parameter import Parameter
+from app.panel.widgets.publish import Confirm, SinglePublish
+from app.panel.widgets.service_action import Action, Call, ServerCommand
+
+DEFAULT_QOS: Final = TopicQos()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shown:
+    """A field that the panel shows. `low` and `high` are limits of the message's number, `values` those
+    that the widget tells apart; `scale` and `offset` lead from the number to what has the `unit`."""
+
+    topic: str
+    type: str
+    field: str
+    label: str = ""
+    unit: str = ""
+    scale: float = 1.0
+    offset: float = 0.0
+    low: float | None = None
+    high: float | None = None
+    values: tuple[Any, ...] = ()
+    max_age_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Published:
+    """A topic that the panel publishes; a press of `template` shows as `confirm` says."""
+
+    topic: str
+    type: str
+    qos: TopicQos = DEFAULT_QOS
+    template: Mapping[str, Any] | None = None
+    confirm: Confirm | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Served:
+    """A service that the panel calls; `success` and `message` are paths in its response."""
+
+    service: str
+    type: str
+    success: str | None = None
+    message: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Acted:
+    """An action that the panel sends goals to; its feedback's field `progress` goes up to `most`."""
+
+    action: str
+    type: str
+    progress: str | None = None
+    most: float = 100.0
+    shown: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Declared:
+    """A parameter of a node."""
+
+    widget: Parameter
+
+
+Need = Shown | Published | Served | Acted | Declared
+
+
+def needs_of(widget: BaseWidget, interfaces: Interfaces) -> Iterator[Need]:
+    """What a widget needs of the robot."""
+    yield from find_row(SIMULATED, widget)(widget, interfaces)
+
+
+def _shown(display: Display, values: tuple[Any, ...] = ()) -> Iterator[Need]:
+    limits = {key: getattr(display, key, None) for key in ("min", "max")}
+    numbers = {key: one for key, one in limits.items() if isinstance(one, int | float)}
+    scale, offset = getattr(display, "scale", 1.0) or 1.0, getattr(display, "offset", 0.0)
+    low, high = ((numbers[k] - offset) / scale if k in numbers else None for k in ("min", "max"))
+    if scale < 0:
+        low, high = high, low
+    yield Shown(
+        topic=display.topic,
+        type=display.type,
+        field=display.field,
+        label=display.label,
+        unit=getattr(display, "unit", ""),
+        scale=scale,
+        offset=offset,
+        low=low,
+        high=high,
+        values=values,
+        max_age_s=display.max_age_s,
+    )
+
+
+def _readout(readout: Readout, interfaces: Interfaces) -> Iterator[Need]:
+    if readout.constants is None:
+        return _shown(readout)
+    constants = interfaces.constants(parent_type(readout, interfaces))
+    named = (value for name, value in constants.items() if name.startswith(readout.constants or ""))
+    return _shown(readout, tuple(dict.fromkeys(named)))
+
+
+def _indicator(indicator: Indicator, _: Interfaces) -> Iterator[Need]:
+    return _shown(indicator, tuple(state.value for state in indicator.states))
+
+
+def _published(command: PublishCommand, _: Interfaces) -> Iterator[Need]:
+    yield Published(topic=command.topic, type=command.type, qos=command.qos)
+
+
+def _pressed(command: SinglePublish, _: Interfaces) -> Iterator[Need]:
+    yield Published(
+        topic=command.topic,
+        type=command.type,
+        qos=command.qos,
+        template=command.template,
+        confirm=command.confirm,
+    )
+
+
+def _server(command: ServerCommand, _: Interfaces) -> Iterator[Need]:
+    if command.role == "SS":
+        yield Served(service=command.server_name, type=command.type)
+    else:
+        yield Acted(action=command.server_name, type=command.type)
+
+
+def _call(call: Call, _: Interfaces) -> Iterator[Need]:
+    yield Served(service=call.service, type=call.type, success=call.success, message=call.message)
+
+
+def _action(action: Action, _: Interfaces) -> Iterator[Need]:
+    yield Acted(
+        action=action.action,
+        type=action.type,
+        progress=action.progress,
+        most=action.progress_max,
+        shown=tuple(RESPONSE_PLACEHOLDER.findall(action.feedback)),
+    )
+
+
+def _parameter(parameter: Parameter, _: Interfaces) -> Iterator[Need]:
+    yield Declared(widget=parameter)
+
+
+SIMULATED: Final[Mapping[type[BaseWidget], Callable[[Any, Interfaces], Iterator[Need]]]] = {
+    BaseWidget: lambda *_: iter(()),
+    Display: lambda of, _: _shown(of),
+    Readout: _readout,
+    Indicator: _indicator,
+    PublishCommand: _published,
+    SinglePublish: _pressed,
+    ServerCommand: _server,
+    Call: _call,
+    Action: _action,
+    Parameter: _parameter,
+}

@@ -1,0 +1,223 @@
+"""The robot of any panel: it has everything that the panel listens to, publishes, calls and sets.
+
+Pure: `step` it with the time. The names of the reference system's `system_controller` are played by
+`DemoRobot`, as far as the panel has them with the same types.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any, Final, TypeVar
+
+from app.errors import DecodeError
+from app.interfaces import load_interfaces
+from app.interfaces.names import Qos
+from app.panel.demo import NO_ENTRY
+from app.panel.model import Panel
+from app.simulator.answers import DONE, feedback_at, good_response
+from app.simulator.declared import declared_by
+from app.simulator.goals import ActionServer, CountAction, SimulatedAction
+from app.simulator.kinds import Acted, Declared, Need, Published, Served, Shown, needs_of
+from app.simulator.known_types import Moment
+from app.simulator.parameters import EVENT_TYPE, EVENTS, NODE, SERVICES, NodeParameters
+from app.simulator.presses import effects
+from app.simulator.robot import (
+    COUNT,
+    COUNT_TYPE,
+    LISTENS,
+    SERVES,
+    SPEAKS,
+    TEXT,
+    DemoRobot,
+    own_parameters,
+)
+from app.simulator.simulated import Topic
+from app.simulator.topics import simulated_topics
+
+LATCHED: Final = Qos(transient_local=True, depth=1)
+APART: Final = 0.37  # of a period, between one robot's numbers and the next one's
+OF_EVENTS: Final = Qos(depth=1000)  # rmw_qos_profile_parameter_events
+
+Response = Callable[[Moment], Mapping[str, Any]]
+AnyNeed = TypeVar("AnyNeed", bound=Need)
+
+
+class PanelRobot:
+    """One robot of a panel; see `SimulatedRobot`. `number` is its place among several."""
+
+    def __init__(self, panel: Panel, number: int = 0) -> None:
+        self._interfaces = load_interfaces(panel.distro, panel.interfaces)
+        self._panel = panel
+        self._demo = DemoRobot()
+        needs = [need for widget in panel.widgets() for need in needs_of(widget, self._interfaces)]
+        self._own = _reference_topics(panel)
+        skipped = {**self._own, EVENTS: EVENT_TYPE}
+        shown = _of(needs, Shown)
+        self._topics = simulated_topics(panel, shown, self._interfaces, skipped, APART * number)
+        self._published = _by_topic(_of(needs, Published))
+        self._nodes = self._declared(_of(needs, Declared))
+        self._responses = self._served(_of(needs, Served))
+        self._simulated = self._acted(_of(needs, Acted))
+        self._moment = Moment(0.0, 0)
+        self._began: float | None = None
+
+    # What it has.
+
+    @property
+    def publishes(self) -> Mapping[str, Topic]:
+        own = {topic: Topic(name, LATCHED, self._hash(name)) for topic, name in self._own.items()}
+        simulated = {
+            topic: Topic(one.type, self._panel.qos(topic).wire_qos, self._hash(one.type))
+            for topic, one in self._topics.items()
+        }
+        events = Topic(EVENT_TYPE, OF_EVENTS, self._hash(EVENT_TYPE))
+        return {**own, **simulated, EVENTS: events}
+
+    @property
+    def subscribes(self) -> Mapping[str, Topic]:
+        found = {topic: Topic(name, Qos(), self._hash(name)) for topic, name in LISTENS.items()}
+        for topic, several in self._published.items():
+            one = several[0]
+            found[topic] = Topic(one.type, one.qos.wire_qos, self._hash(one.type))
+        return {topic: one for topic, one in found.items() if self._has(topic)}
+
+    @property
+    def services(self) -> Mapping[str, str]:
+        of_panel = {name: kind for name, (kind, _) in self._responses.items()}
+        of_nodes = {f"{node}/{name}": kind for node in self._nodes for name, kind in SERVICES.items()}
+        return {
+            name: kind for name, kind in {**SERVES, **of_panel, **of_nodes}.items() if self._has(name)
+        }
+
+    @property
+    def actions(self) -> Mapping[str, ActionServer]:
+        own = {COUNT: CountAction(COUNT_TYPE, self._demo)} if self._has(COUNT) else {}
+        return {**own, **self._simulated}
+
+    # What it hears and says.
+
+    def hear(self, topic: str, payload: bytes) -> None:
+        """A press: it is echoed where the panel shows it, and has its effect."""
+        type_name = self.subscribes[topic].type
+        try:
+            message = self._interfaces.decode(type_name, payload)
+        except DecodeError:
+            return  # as a ROS node that can't read a message: nothing happens
+        if topic in LISTENS and type_name == TEXT:
+            self._demo.hear(topic, message.data)
+        if topic in self._topics:
+            self._topics[topic].copy(payload, self._moment.t)
+        for effect in effects(message, self._published.get(topic, ())):
+            if effect.topic in self._topics:
+                self._topics[effect.topic].show(effect.field, effect.value, self._moment.t)
+
+    def serve(self, service: str, payload: bytes) -> bytes | None:
+        request_type, response_type = self._interfaces.service_types(self.services[service])
+        try:
+            request = self._interfaces.decode(request_type, payload)
+        except DecodeError:
+            return None
+        return self._interfaces.encode(response_type, self._answer(service, request))
+
+    def _answer(self, service: str, request: Any) -> Mapping[str, Any]:
+        node, _, _ = service.rpartition("/")
+        if service in self._responses:
+            return self._responses[service][1](self._moment)
+        if node in self._nodes:
+            return self._nodes[node].serve(service, request)
+        return self._demo.serve(service, request)
+
+    def step(self, moment: Moment) -> Iterator[tuple[str, bytes]]:
+        if self._began is None:
+            self._began = moment.t
+        self._moment = Moment(moment.t - self._began, moment.wall_ns)
+        for action in self._simulated.values():
+            action.step(self._moment)
+        for topic, fields in self._demo.step(moment.t):
+            if topic in self._own:
+                yield topic, self._interfaces.encode(self._own[topic], fields)
+        for node in self._nodes.values():
+            for event in node.news():
+                yield EVENTS, self._interfaces.encode(EVENT_TYPE, event)
+        for name, simulated in self._topics.items():
+            payload = simulated.step(self._moment)
+            if payload is not None:
+                yield name, payload
+
+    # How it is made.
+
+    def _has(self, name: str) -> bool:
+        return not self._panel.demo.get(name, NO_ENTRY).silent
+
+    def _hash(self, type_name: str) -> str:
+        return self._interfaces.type_hash(type_name)
+
+    def _declared(self, declared: Iterable[Declared]) -> dict[str, NodeParameters]:
+        """The nodes. The `system_controller` keeps its own parameters, where the types are equal."""
+        found = declared_by((one.widget for one in declared), self._panel.demo)
+        given = self._panel.demo.get(NODE, NO_ENTRY).parameters
+        own = {
+            name: one
+            for name, one in own_parameters().items()
+            if name not in given and found.get(NODE, {}).get(name, one).type == one.type
+        }
+        found[NODE] = {**found.get(NODE, {}), **own}
+        return {node: NodeParameters(node, one) for node, one in found.items() if self._has(node)}
+
+    def _served(self, served: Iterable[Served]) -> dict[str, tuple[str, Response]]:
+        """Service → (type, responses), without those of the `system_controller`."""
+        found: dict[str, tuple[str, Response]] = {}
+        for one in served:
+            entry = self._panel.demo.get(one.service, NO_ENTRY)
+            if SERVES.get(one.service) == one.type and not entry.response and self._permits_known():
+                continue
+            response = self._interfaces.service_types(one.type)[1]
+            paths = {one.success or "": True, one.message or "": DONE}
+            paths.pop("", None)
+            made = good_response(response, self._interfaces, entry.response, paths)
+            found[one.service] = one.type, made
+        return found
+
+    def _permits_known(self) -> bool:
+        """Whether the panel shows why the `system_controller` refuses a reset."""
+        return "/operation_enabled" in self._own and "/operation_enabled" in self._panel.subscriptions()
+
+    def _acted(self, acted: Iterable[Acted]) -> dict[str, SimulatedAction]:
+        """Action → its goals, without the count of the `system_controller`."""
+        several: dict[str, list[Acted]] = {}
+        for one in acted:
+            several.setdefault(one.action, []).append(one)
+        found = {}
+        for name, widgets in several.items():
+            entry = self._panel.demo.get(name, NO_ENTRY)
+            own = name == COUNT and widgets[0].type == COUNT_TYPE
+            if (own and not {"result", "duration_s"} & entry.model_fields_set) or entry.silent:
+                continue
+            types = self._interfaces.action_types(widgets[0].type)
+            progress = {one.progress: one.most for one in widgets if one.progress is not None}
+            found[name] = SimulatedAction(
+                widgets[0].type,
+                feedback_at(types.feedback, self._interfaces, progress),
+                good_response(types.result, self._interfaces, entry.result, {}),
+                entry.duration_s,
+            )
+        return found
+
+
+def _reference_topics(panel: Panel) -> dict[str, str]:
+    """The topics that the `system_controller` publishes, unless the panel has others of these names."""
+    listened = panel.subscriptions()
+    return {
+        topic: name
+        for topic, name in SPEAKS.items()
+        if listened.get(topic, name) == name and topic not in panel.demo
+    }
+
+
+def _by_topic(published: Iterable[Published]) -> dict[str, list[Published]]:
+    found: dict[str, list[Published]] = {}
+    for one in published:
+        found.setdefault(one.topic, []).append(one)
+    return found
+
+
+def _of(needs: Iterable[Need], kind: type[AnyNeed]) -> list[AnyNeed]:
+    return [need for need in needs if isinstance(need, kind)]
