@@ -10,6 +10,7 @@ import sys
 import threading
 from argparse import ArgumentTypeError
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack, closing
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -45,10 +46,13 @@ def main(arguments: Sequence[str], prog: str = PROG) -> int:
         signal.signal(number, lambda *_: ends.set())
     try:
         panel = load_panel(given.panel or Settings.from_environment().panel)
-        robots = _replayed(given, panel, namespace, ends) if given.bag else _simulated(panel, namespace)
         interfaces = load_interfaces(panel.distro, panel.interfaces)
         said = partial(say, f"demo robot: listening at {given.endpoint}")
-        serve(given.endpoint, robots, interfaces, ends, said)
+        with ExitStack() as stack:
+            robots = _simulated(panel, namespace)
+            if given.bag is not None:
+                robots = {namespace: _replayed(given, panel, ends, stack)}
+            serve(given.endpoint, robots, interfaces, ends, said)
     except KioskError as error:
         say(f"demo robot: {error}")
         return 1 if isinstance(error, LinkError) else 2
@@ -61,21 +65,19 @@ def _simulated(panel: Panel, namespace: str) -> "Mapping[str, SimulatedRobot]":
     return {namespace: next(iter(robots.values()))} if namespace else robots
 
 
-def _replayed(
-    given: Any, panel: Panel, namespace: str, ends: threading.Event
-) -> "Mapping[str, SimulatedRobot]":
+def _replayed(given: Any, panel: Panel, ends: threading.Event, stack: ExitStack) -> "SimulatedRobot":
     """A recording; what the panel misses in it is said where a panel was named."""
     from app.simulator.recording import Recording
     from app.simulator.replay import ReplayedRobot, missing
 
-    recording = Recording(given.bag)
+    recording = stack.enter_context(closing(Recording(given.bag)))
     robot = ReplayedRobot(recording, given.rate, given.loop, ends.set)
-    lacks = list(missing(panel, robot.publishes)) if given.panel else []
+    lacks = missing(panel, recording.topics) if given.panel else ()
     for note in (*recording.notes, *lacks):
         say(f"demo robot: {note}")
-    about = f"{len(robot.publishes)} topic(s), {recording.duration_s:.1f} s"
+    about = f"{len(recording.topics)} topic(s), {recording.duration_s:.1f} s"
     say(f"demo robot: replaying {given.bag}: {about}")
-    return {namespace: robot}
+    return robot
 
 
 def _sorted_out(parser: Parser, given: Any) -> Any:

@@ -22,10 +22,10 @@ def offset_of(number: int, count: int) -> float:
 
 
 def permitted(t: float, offset: float, period_s: float | None) -> bool:
-    """Whether an interlock permits: 20 s of 28, or the same part of another period."""
+    """Whether an interlock permits: at first, then 20 s of 28, or the same part of a period."""
     whole = robot.PERMITTED_S + robot.FORBIDDEN_S
-    at = (t - offset) % whole if period_s is None else (t - offset) / period_s * whole % whole
-    return at < robot.PERMITTED_S
+    since = t - offset if period_s is None else (t - offset) / period_s * whole
+    return since < 0 or since % whole < robot.PERMITTED_S
 
 
 def permitting(

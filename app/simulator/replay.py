@@ -10,6 +10,7 @@ from app.simulator.recording import Message, Recording
 from app.simulator.simulated import Topic
 
 PAUSE_S: Final = 1.0  # between the last message and the first one of the next round
+EARLY_S: Final = 1e-6  # of floating-point numbers
 MOST_AT_ONCE: Final = 5000  # messages of one step: more wait for the next one
 
 
@@ -51,7 +52,7 @@ class ReplayedRobot:
             if self._next is None:
                 self._end(moment)
                 return
-            if self._next.at_s > (moment.t - self._began) * self._rate:
+            if self._next.at_s > (moment.t - self._began) * self._rate + EARLY_S:
                 return
             yield self._next.topic, self._next.payload
             self._next = None
@@ -73,5 +74,7 @@ def missing(panel: Panel, topics: Mapping[str, Topic]) -> Iterator[str]:
         elif topics[topic].type != name:
             yield f"{topic} is {topics[topic].type} in the recording, but {name} in the panel"
     if panel.commands:
-        what = "topics that a panel publishes, services, actions and parameters"
-        yield f"a recording has no {what}: the panel's controls stay locked"
+        yield (
+            "a recording does not answer: no node receives what the panel publishes, and its calls, "
+            "actions and parameters stay locked"
+        )

@@ -17,7 +17,7 @@ from app.simulator.kinds import Shown
 from app.simulator.known_types import KNOWN, Moment
 from app.simulator.messages import Message, field_constants, plausible
 from app.simulator.paths import Fields, get, put
-from app.simulator.signals import Signal, cycle, fixed, phase_of
+from app.simulator.signals import OTHER_S, Signal, cycle, fixed, phase_of
 
 MOVING_HZ: Final = 5.0  # of numbers
 OTHERS_HZ: Final = 1.0
@@ -148,7 +148,9 @@ class _Maker:
 
     def _still(self, topic: str, field: _Field) -> _Field:
         """The field; one that confirms presses changes with them only."""
-        if field.prompt or (topic, field.path) not in self._confirmed:
+        entry = self._panel.demo.get(topic, NO_ENTRY)
+        given = {"values", "range", "ranges"} & entry.model_fields_set
+        if field.prompt or given or (topic, field.path) not in self._confirmed:
             return field
         first = field.signal(0.0)
         return replace(field, signal=fixed(False if isinstance(first, bool) else first))
@@ -180,9 +182,9 @@ class _Maker:
             return _Field(
                 path, self._permitting(topic, path, kind.name, interlocks, mine, entry), prompt=True
             )
-        phase = phase_of(f"{topic} {path}") + self._phase
         if entry.values:
-            return _Field(path, cycle(entry.values, entry.period_s, phase))
+            return _Field(path, cycle(entry.values, _round_s(entry)))
+        phase = (phase_of(f"{topic} {path}") + self._phase) % 1
         values = next((one.values for one in mine if one.values), ())
         own = self._own(type_name, path, message)
         if values and not (entry.ranges.get(path) or entry.range):
@@ -236,7 +238,7 @@ class _Maker:
         entry: DemoEntry,
     ) -> Signal:
         if entry.values:
-            return cycle(entry.values, entry.period_s)
+            return cycle(entry.values, _round_s(entry))
         limits = entry.ranges.get(path) or entry.range
         if limits and (kind in INTEGER_RANGES or kind in FLOAT_TYPES):
             return moving(Span(limits[0], limits[1]), kind, entry.period_s, 0.0)
@@ -271,6 +273,11 @@ class _Maker:
         locks = (one.max_age_s for one in self._panel.interlocks if one.topic == topic)
         ages = [age for age in (*locks, *(one.max_age_s for one in shown)) if age is not None]
         return max([hz, *(TIMES_WITHIN_AGE / age for age in ages)])
+
+
+def _round_s(entry: DemoEntry) -> float:
+    """How long the values of an entry take together."""
+    return entry.period_s or OTHER_S * len(entry.values or ())
 
 
 def _limited(given: Shown, guess: Span) -> Span:

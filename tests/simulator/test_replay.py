@@ -1,0 +1,304 @@
+"""Recordings are replayed as they are: MCAP files, rosbag2's SQLite files and folders."""
+
+import json
+import sqlite3
+import subprocess
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import ExitStack, closing
+from pathlib import Path
+from typing import Any, Final
+
+import pytest
+import zenoh
+from mcap.writer import Writer
+
+from app.errors import RecordingError
+from app.interfaces.names import Qos
+from app.panel import load_panel
+from app.simulator.known_types import Moment
+from app.simulator.recording import Recording
+from app.simulator.replay import PAUSE_S, ReplayedRobot, missing
+from tests.support.builders import BOOL, INTERFACES, TEXT
+from tests.support.parts import ROOT, Process, Server, free_port, until, zenoh_file
+
+START_NS: Final = 1_700_000_000 * 10**9
+JOINTS: Final = "sensor_msgs/msg/JointState"
+QOS: Final = (
+    "- history: 1\n  depth: 1\n  reliability: {reliability}\n  durability: {durability}\n"
+    "  deadline: {{sec: 0, nsec: 0}}\n  lifespan: {{sec: 0, nsec: 0}}\n  liveliness: 1\n"
+    "  liveliness_lease_duration: {{sec: 0, nsec: 0}}\n  avoid_ros_namespace_conventions: false\n"
+)
+LATCHED: Final = QOS.format(reliability=1, durability=1)
+SENSOR: Final = QOS.format(reliability=2, durability=2)
+# Topic → type, offered QoS.
+TOPICS: Final[Mapping[str, tuple[str, str]]] = {
+    "/operation_enabled": (BOOL, LATCHED),
+    "/last_heard": (TEXT, ""),
+    "/joint_states": (JOINTS, SENSOR),
+}
+JOINT_PAYLOAD: Final = INTERFACES.encode(JOINTS, {"name": ["a"], "position": [0.25]})
+# (seconds, topic, payload)
+MESSAGES: Final[tuple[tuple[float, str, bytes], ...]] = (
+    (0.0, "/operation_enabled", INTERFACES.encode(BOOL, {"data": True})),
+    (0.1, "/last_heard", INTERFACES.encode(TEXT, {"data": "first"})),
+    (0.2, "/joint_states", JOINT_PAYLOAD),
+    (0.6, "/last_heard", INTERFACES.encode(TEXT, {"data": "second"})),
+)
+
+
+def mcap_file(folder: Path, *, also_json: bool = False) -> Path:
+    """As rosbag2 and this panel write it."""
+    path = folder / "cell.mcap"
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start("ros2")
+        channels = {}
+        for topic, (name, qos) in TOPICS.items():
+            schema = writer.register_schema(name, "ros2msg", INTERFACES.definition(name).encode())
+            about = {"offered_qos_profiles": qos}
+            channels[topic] = writer.register_channel(topic, "cdr", schema, about)
+        for at, topic, payload in MESSAGES:
+            now = START_NS + int(at * 1e9)
+            writer.add_message(channels[topic], now, payload, now)
+        if also_json:
+            schema = writer.register_schema("web_ui/Press", "jsonschema", b"{}")
+            presses = writer.register_channel("/web_ui/presses", "json", schema)
+            writer.add_message(presses, START_NS, json.dumps({"id": "1"}).encode(), START_NS)
+        writer.finish()
+    return path
+
+
+def sqlite_file(folder: Path) -> Path:
+    """A .db3 file as rosbag2 of ROS 2 Humble writes it."""
+    path = folder / "cell_0.db3"
+    with closing(sqlite3.connect(path)) as base:
+        base.execute(
+            "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL,"
+            " serialization_format TEXT NOT NULL, offered_qos_profiles TEXT NOT NULL)"
+        )
+        base.execute(
+            "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL,"
+            " timestamp INTEGER NOT NULL, data BLOB NOT NULL)"
+        )
+        ids = {topic: number for number, topic in enumerate(TOPICS, 1)}
+        for topic, (name, qos) in TOPICS.items():
+            base.execute("INSERT INTO topics VALUES(?, ?, ?, 'cdr', ?)", (ids[topic], topic, name, qos))
+        for at, topic, payload in MESSAGES:
+            row = (ids[topic], START_NS + int(at * 1e9), payload)
+            base.execute("INSERT INTO messages(topic_id, timestamp, data) VALUES(?, ?, ?)", row)
+        base.commit()
+    return path
+
+
+def folder_of_rosbag2(folder: Path) -> Path:
+    """A folder whose metadata.yaml names its files."""
+    bag = folder / "bag"
+    bag.mkdir()
+    name = sqlite_file(bag).name
+    counts = {topic: sum(t == topic for _, t, _ in MESSAGES) for topic in TOPICS}
+    topics = [
+        {
+            "topic_metadata": {
+                "name": topic,
+                "type": kind,
+                "serialization_format": "cdr",
+                "offered_qos_profiles": qos,
+            },
+            "message_count": counts[topic],
+        }
+        for topic, (kind, qos) in TOPICS.items()
+    ]
+    about = {
+        "version": 5,
+        "storage_identifier": "sqlite3",
+        "duration": {"nanoseconds": int(MESSAGES[-1][0] * 1e9)},
+        "starting_time": {"nanoseconds_since_epoch": START_NS},
+        "message_count": len(MESSAGES),
+        "topics_with_message_count": topics,
+        "compression_format": "",
+        "compression_mode": "",
+        "relative_file_paths": [name],
+        "files": [],
+    }
+    # JSON is YAML.
+    (bag / "metadata.yaml").write_text(json.dumps({"rosbag2_bagfile_information": about}))
+    return bag
+
+
+@pytest.fixture
+def opened() -> Iterator[Callable[[Path], Recording]]:
+    """Recordings, closed at the end."""
+    with ExitStack() as stack:
+        yield lambda path: stack.enter_context(closing(Recording(path)))
+
+
+Opened = Callable[[Path], Recording]
+FORMS: Final = pytest.mark.parametrize("made", [mcap_file, sqlite_file, folder_of_rosbag2])
+Made = Callable[[Path], Path]
+
+
+def stepped(robot: ReplayedRobot, times: Iterable[float]) -> list[tuple[float, str, bytes]]:
+    return [(t, *said) for t in times for said in robot.step(Moment(100 + t, START_NS))]
+
+
+@FORMS
+def test_a_recording_has_its_topics_types_and_qos(made: Made, tmp_path: Path, opened: Opened) -> None:
+    recording = opened(made(tmp_path))
+    topics = recording.topics
+    assert {topic: one.type for topic, one in topics.items()} == {
+        topic: name for topic, (name, _) in TOPICS.items()
+    }
+    assert topics["/operation_enabled"].qos == Qos(True, True, 1)
+    assert topics["/joint_states"].qos == Qos(False, False, 1)
+    assert topics["/last_heard"].qos == Qos()
+    assert recording.duration_s == pytest.approx(0.6)
+    assert recording.notes == []
+
+
+@FORMS
+def test_each_message_comes_in_its_time_as_it_was_recorded(
+    made: Made, tmp_path: Path, opened: Opened
+) -> None:
+    robot = ReplayedRobot(opened(made(tmp_path)))
+    times = [0, 0.1, 0.2, 0.3, 0.5, 0.7]
+    assert stepped(robot, times) == [
+        (min(t for t in times if t >= at), topic, payload) for at, topic, payload in MESSAGES
+    ]
+
+
+def test_the_rate_is_how_many_times_as_fast(tmp_path: Path, opened: Opened) -> None:
+    fast = ReplayedRobot(opened(mcap_file(tmp_path)), rate=2)
+    assert [t for t, *_ in stepped(fast, [0, 0.05, 0.1, 0.2, 0.3])] == [0, 0.05, 0.1, 0.3]
+
+
+def test_it_ends_once_or_begins_again_after_a_pause(tmp_path: Path, opened: Opened) -> None:
+    path, ended = mcap_file(tmp_path), []
+    once = ReplayedRobot(opened(path), ended=lambda: ended.append("once"))
+    assert len(stepped(once, [0, 1, 2])) == len(MESSAGES)
+    assert ended
+    loop = ReplayedRobot(opened(path), loop=True, ended=lambda: ended.append("loop"))
+    said = stepped(loop, [0, 0.6, 0.6 + PAUSE_S, 1.3 + PAUSE_S, 1.4 + PAUSE_S])
+    assert len(said) == 2 * len(MESSAGES)
+    assert "loop" not in ended
+
+
+def test_what_is_no_ros_topic_is_left_out_and_named(tmp_path: Path, opened: Opened) -> None:
+    recording = opened(mcap_file(tmp_path, also_json=True))
+    assert set(recording.topics) == set(TOPICS)
+    assert len(list(recording.messages())) == len(MESSAGES)
+    (note,) = recording.notes
+    assert note.startswith("/web_ui/presses")
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("gone.mcap", None, "does not exist: it must be an .mcap or a .db3 file, or a folder"),
+        ("cell.bag", b"#ROSBAG V2.0\n", "is not a recording: it must be"),
+        ("cell.mcap", b"no mcap at all", "can't be read"),
+        ("cell.db3", b"no database at all", "can't be read"),
+        ("empty.mcap", b"", "can't be read"),
+    ],
+)
+def test_what_can_not_be_replayed_is_named(
+    tmp_path: Path, name: str, content: bytes | None, words: str
+) -> None:
+    path = tmp_path / name
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(RecordingError) as raised:
+        Recording(path)
+    assert f"{path} {words}" in str(raised.value)
+
+
+def test_a_folder_without_metadata_and_a_file_without_messages_are_named(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match=r"has no metadata\.yaml"):
+        Recording(tmp_path)
+    path = tmp_path / "empty.mcap"
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start("ros2")
+        writer.finish()
+    with pytest.raises(RecordingError, match=r"has no message of a ROS 2 topic in CDR"):
+        Recording(path)
+
+
+def test_what_a_panel_misses_in_a_recording_is_named(tmp_path: Path, opened: Opened) -> None:
+    path = tmp_path / "cell.toml"
+    text = (ROOT / "docs/examples/palletizer.toml").read_text()
+    path.write_text(text.replace('topic = "/last_heard"', 'topic = "/heard_last"'))
+    lacks = list(missing(load_panel(path), opened(mcap_file(tmp_path)).topics))
+    assert "the recording has no /heard_last (std_msgs/msg/String), which the panel listens to" in lacks
+    assert lacks[-1].startswith(
+        "a recording does not answer: no node receives what the panel publishes"
+    )
+
+
+def replaying(path: Path, endpoint: str, *options: str) -> Process:
+    command = [sys.executable, "-m", "app.simulator", endpoint, "--bag", str(path), *options]
+    simulator = Process(command, {}, cwd=ROOT)
+    until(lambda: "listening" in simulator.text or not simulator.running, "it listens")
+    assert simulator.running, simulator.text
+    return simulator
+
+
+@FORMS
+def test_a_zenoh_session_receives_the_bytes(made: Made, tmp_path: Path) -> None:
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    config = zenoh.Config()
+    config.insert_json5("connect/endpoints", f'["{endpoint}"]')
+    config.insert_json5("scouting/multicast/enabled", "false")
+    simulator = replaying(made(tmp_path), endpoint, "--loop", "--rate", "2")
+    try:
+        with zenoh.open(config) as session:
+            received: list[tuple[str, bytes]] = []
+            session.declare_subscriber(
+                "**",
+                lambda sample: received.append((str(sample.key_expr), sample.payload.to_bytes())),
+            )
+            wanted = {(topic[1:], payload) for _, topic, payload in MESSAGES}
+            until(lambda: wanted <= set(received), "every message is received")
+    finally:
+        assert simulator.end() == 0, simulator.text
+
+
+def test_a_panel_shows_what_was_recorded(tmp_path: Path, servers: Callable[[Server], Server]) -> None:
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    simulator = replaying(mcap_file(tmp_path), endpoint, "--loop")
+    try:
+        environment: dict[str, Any] = {"KIOSK_ZENOH": str(zenoh_file(tmp_path, endpoint))}
+        kiosk = servers(Server(ROOT, KIOSK_MODE="live", **environment))
+        until(lambda: kiosk.widget("last_heard")["text"] == "first", "it shows the first")
+        until(lambda: kiosk.widget("last_heard")["text"] == "second", "it shows the second")
+        assert kiosk.snapshot()["notice"]["banner"] == "SIMULATED ROBOT"
+    finally:
+        assert simulator.end() == 0, simulator.text
+
+
+def test_it_ends_with_the_recording(tmp_path: Path) -> None:
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    simulator = replaying(sqlite_file(tmp_path), endpoint)
+    try:
+        assert simulator.wait(30) == 0
+        assert "3 topic(s), 0.6 s" in simulator.text
+    finally:
+        simulator.end()
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (["--bag", "/nowhere/cell.mcap"], "demo robot: /nowhere/cell.mcap does not exist: it must be"),
+        (["--loop"], "--loop and --rate are of a recording: give --bag too"),
+        (["--bag", "x", "--rate", "0"], '"0" is not a rate: more than 0'),
+        (["nowhere.toml"], "nowhere.toml can't be used"),
+        (["a.toml", "tcp/127.0.0.1:0", "/r1", "more"], '"more" is one argument too many'),
+        (["tcp/127.0.0.1:0", "r1"], '"r1" is not a ROS 2 namespace'),
+    ],
+)
+def test_a_mistake_on_the_command_line_is_one_sentence(words: list[str], sentence: str) -> None:
+    command = [sys.executable, "-m", "app.simulator", *words]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, timeout=60)
+    assert (done.returncode, sentence in done.stderr) == (2, True), done.stderr
+    assert "Traceback" not in done.stderr
