@@ -38,6 +38,15 @@ topic = "/battery"
 type = "sensor_msgs/msg/BatteryState"
 field = "percentage"
 """
+DEMO: Final = {
+    "/operation_enabled": '[[interlock]]\nid = "operation"\ntopic = "/operation_enabled"\n',
+    "/add_two_ints": '[[page.widget]]\nid = "add"\nkind = "call"\nlabel = "Add"\n'
+    'service = "/add_two_ints"\ntype = "example_interfaces/srv/AddTwoInts"\n',
+    "/count": '[[page.widget]]\nid = "count"\nkind = "action"\nlabel = "Count"\n'
+    'action = "/count"\ntype = "example_interfaces/action/Fibonacci"\n',
+    "/cyclone_robot": '[[page.widget]]\nid = "speed"\nkind = "parameter"\nlabel = "Speed"\n'
+    'node = "/cyclone_robot"\nparameter = "speed"\ntype = "double"\n',
+}
 INPUTS: Final = {
     "message": '[[page.widget]]\nid = "message"\nkind = "text"\nlabel = "Message"\n',
     "speed": '[[page.widget]]\nid = "speed"\nkind = "slider"\nlabel = "Speed"\nmin = 0.0\nmax = 1.0\n',
@@ -73,6 +82,8 @@ def completed(example: str) -> str:
         text = f'interfaces = ["cell_msgs"]\n{text}'
     if "/battery" in tables.get("record", {}).get("topics", ()):
         text += BATTERY
+    named_in_demo = {"/battery": BATTERY, **DEMO}
+    text += "".join(named_in_demo[name] for name in tables.get("demo", {}))
     widgets = {one["id"] for each in tables["page"] for one in each.get("widget", [])}
     named = set(re.findall(r'"\{(\w+)\}"', text)) - widgets
     text += "".join(INPUTS[name] for name in sorted(named & set(INPUTS)))

@@ -13,7 +13,7 @@ COMMANDS = {
     "run": "serve a panel to browsers",
     "check": "check panel files: every fault with its place",
     "log": "check that the operator's log is as it was written",
-    "simulate": "run the demo robot as a Zenoh peer of its own",
+    "simulate": "run the robot of a panel, or a recording, as a Zenoh peer of its own",
 }
 Command = Callable[[Sequence[str], str], int]
 

@@ -4,10 +4,12 @@ Pure: `step` it with the time. The names of the reference system's `system_contr
 `DemoRobot`, as far as the panel has them with the same types.
 """
 
+import logging
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import cached_property
 from typing import Any, Final, TypeVar
 
-from app.errors import DecodeError
+from app.errors import DecodeError, FieldError
 from app.interfaces import load_interfaces
 from app.interfaces.names import Qos
 from app.panel.demo import NO_ENTRY
@@ -27,11 +29,15 @@ from app.simulator.robot import (
     SPEAKS,
     TEXT,
     DemoRobot,
+    echoed,
     own_parameters,
 )
 from app.simulator.simulated import Topic
 from app.simulator.topics import simulated_topics
 
+log = logging.getLogger("kiosk.simulator")
+
+STEP_S: Final = 0.1
 LATCHED: Final = Qos(transient_local=True, depth=1)
 APART: Final = 0.37  # of a period, between one robot's numbers and the next one's
 OF_EVENTS: Final = Qos(depth=1000)  # rmw_qos_profile_parameter_events
@@ -56,12 +62,17 @@ class PanelRobot:
         self._nodes = self._declared(_of(needs, Declared))
         self._responses = self._served(_of(needs, Served))
         self._simulated = self._acted(_of(needs, Acted))
+        self._effects: list[tuple[str, Mapping[str, Any]]] = []  # on topics of `DemoRobot`
         self._moment = Moment(0.0, 0)
         self._began: float | None = None
 
     # What it has.
 
-    @property
+    @cached_property
+    def step_s(self) -> float:
+        return min([STEP_S, *(one.period_s for one in self._topics.values())])
+
+    @cached_property
     def publishes(self) -> Mapping[str, Topic]:
         own = {topic: Topic(name, LATCHED, self._hash(name)) for topic, name in self._own.items()}
         simulated = {
@@ -71,7 +82,7 @@ class PanelRobot:
         events = Topic(EVENT_TYPE, OF_EVENTS, self._hash(EVENT_TYPE))
         return {**own, **simulated, EVENTS: events}
 
-    @property
+    @cached_property
     def subscribes(self) -> Mapping[str, Topic]:
         found = {topic: Topic(name, Qos(), self._hash(name)) for topic, name in LISTENS.items()}
         for topic, several in self._published.items():
@@ -79,7 +90,7 @@ class PanelRobot:
             found[topic] = Topic(one.type, one.qos.wire_qos, self._hash(one.type))
         return {topic: one for topic, one in found.items() if self._has(topic)}
 
-    @property
+    @cached_property
     def services(self) -> Mapping[str, str]:
         of_panel = {name: kind for name, (kind, _) in self._responses.items()}
         of_nodes = {f"{node}/{name}": kind for node in self._nodes for name, kind in SERVICES.items()}
@@ -87,7 +98,7 @@ class PanelRobot:
             name: kind for name, kind in {**SERVES, **of_panel, **of_nodes}.items() if self._has(name)
         }
 
-    @property
+    @cached_property
     def actions(self) -> Mapping[str, ActionServer]:
         own = {COUNT: CountAction(COUNT_TYPE, self._demo)} if self._has(COUNT) else {}
         return {**own, **self._simulated}
@@ -101,13 +112,18 @@ class PanelRobot:
             message = self._interfaces.decode(type_name, payload)
         except DecodeError:
             return  # as a ROS node that can't read a message: nothing happens
-        if topic in LISTENS and type_name == TEXT:
+        echoes = topic in LISTENS and type_name == TEXT
+        if echoes:
             self._demo.hear(topic, message.data)
         if topic in self._topics:
             self._topics[topic].copy(payload, self._moment.t)
         for effect in effects(message, self._published.get(topic, ())):
             if effect.topic in self._topics:
                 self._topics[effect.topic].show(effect.field, effect.value, self._moment.t)
+            elif effect.topic in self._own and not (
+                echoes and effect.value == echoed(topic, message.data)
+            ):
+                self._effects.append((effect.topic, {effect.field: effect.value}))
 
     def serve(self, service: str, payload: bytes) -> bytes | None:
         request_type, response_type = self._interfaces.service_types(self.services[service])
@@ -131,14 +147,20 @@ class PanelRobot:
         self._moment = Moment(moment.t - self._began, moment.wall_ns)
         for action in self._simulated.values():
             action.step(self._moment)
-        for topic, fields in self._demo.step(moment.t):
+        of_presses, self._effects = self._effects, []
+        for topic, fields in (*self._demo.step(moment.t), *of_presses):
             if topic in self._own:
                 yield topic, self._interfaces.encode(self._own[topic], fields)
         for node in self._nodes.values():
             for event in node.news():
                 yield EVENTS, self._interfaces.encode(EVENT_TYPE, event)
-        for name, simulated in self._topics.items():
-            payload = simulated.step(self._moment)
+        for name, simulated in list(self._topics.items()):
+            try:
+                payload = simulated.step(self._moment)
+            except FieldError as error:  # that one is silent, the others go on
+                log.error("%s is not simulated any more: %s", name, error)
+                del self._topics[name]
+                continue
             if payload is not None:
                 yield name, payload
 

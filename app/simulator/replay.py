@@ -9,7 +9,8 @@ from app.simulator.known_types import Moment
 from app.simulator.recording import Message, Recording
 from app.simulator.simulated import Topic
 
-PAUSE_S: Final = 1.0  # between the last message and the first one of the next round
+STEP_S: Final = 0.01
+PAUSE_S: Final = 1.0  # between the last message and the first one of the next round, or the end
 EARLY_S: Final = 1e-6  # of floating-point numbers
 MOST_AT_ONCE: Final = 5000  # messages of one step: more wait for the next one
 
@@ -24,14 +25,16 @@ class ReplayedRobot:
         loop: bool = False,
         ended: Callable[[], None] = lambda: None,
     ) -> None:
-        """`ended` is called after the last message, unless it begins again."""
+        """`ended` is called a pause after the last message, unless it begins again."""
         self._recording = recording
         self._rate = rate
         self._loop = loop
         self._messages = recording.messages()
         self._next: Message | None = None
         self._began: float | None = None
+        self._ends_at: float | None = None
         self._ended = ended
+        self.step_s = STEP_S
         self.publishes: Mapping[str, Topic] = recording.topics
         self.subscribes: Mapping[str, Topic] = {}
         self.services: Mapping[str, str] = {}
@@ -58,11 +61,13 @@ class ReplayedRobot:
             self._next = None
 
     def _end(self, moment: Moment) -> None:
-        """Begins again after a pause, or has ended."""
+        """Begins again after a pause, or ends then."""
         if self._loop:
             self._messages = self._recording.messages()
             self._began = moment.t + PAUSE_S
-        else:
+        elif self._ends_at is None:
+            self._ends_at = moment.t + PAUSE_S
+        elif moment.t >= self._ends_at:
             self._ended()
 
 

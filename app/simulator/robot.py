@@ -65,6 +65,11 @@ class Goal:
     status: int = EXECUTING
 
 
+def echoed(topic: str, text: str) -> str:
+    """What it says of a text that it heard."""
+    return f"{text} ({topic})"
+
+
 class DemoRobot:
     """The robot: `step` it with the time (seconds, monotonic), and let it hear and serve."""
 
@@ -83,7 +88,7 @@ class DemoRobot:
         return (self._now - began) % (PERMITTED_S + FORBIDDEN_S) < PERMITTED_S
 
     def hear(self, topic: str, text: str) -> None:
-        self._heard.append(("/last_heard", {"data": f"{text} ({topic})"}))
+        self._heard.append(("/last_heard", {"data": echoed(topic, text)}))
 
     def serve(self, service: str, request: Any) -> Fields:
         """The response of one of `SERVES`."""

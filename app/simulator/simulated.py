@@ -22,6 +22,10 @@ class SimulatedRobot(Protocol):
     """A robot without Zenoh: bytes and time in, bytes out. Names are without the namespace."""
 
     @property
+    def step_s(self) -> float:
+        """How often it is stepped, in seconds."""
+
+    @property
     def publishes(self) -> Mapping[str, Topic]: ...
     @property
     def subscribes(self) -> Mapping[str, Topic]: ...

@@ -21,6 +21,7 @@ from app.simulator.signals import OTHER_S, Signal, cycle, fixed, phase_of
 
 MOVING_HZ: Final = 5.0  # of numbers
 OTHERS_HZ: Final = 1.0
+EARLY: Final = 0.95  # of a period: a step may come a little too early
 SLOW: Final = frozenset({
     "sensor_msgs/msg/BatteryState",
     "nav_msgs/msg/OccupancyGrid",
@@ -54,7 +55,7 @@ class SimulatedTopic:
         self.type = type_name
         self._message = message
         self._fields = list(fields)
-        self._period_s = 1 / hz
+        self.period_s = 1 / hz
         self._interfaces = interfaces
         self._last: tuple[float, tuple[Any, ...]] | None = None
         self._effects: dict[str, tuple[Any, float | None]] = {}
@@ -64,7 +65,7 @@ class SimulatedTopic:
     def step(self, moment: Moment) -> bytes | None:
         """The message that is due, if one is."""
         prompt = tuple(self._value(one, moment) for one in self._fields if one.prompt)
-        due = self._last is None or moment.t - self._last[0] >= self._period_s - 1e-6
+        due = self._last is None or moment.t - self._last[0] >= self.period_s * EARLY
         if not due and not self._changed and self._last is not None and self._last[1] == prompt:
             return None
         self._last, self._changed = (moment.t, prompt), False

@@ -5,6 +5,7 @@ zenoh-bridge-ros2dds, so that the panel can't tell the difference; it knows noth
 """
 
 import json
+import logging
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -16,15 +17,16 @@ from zenoh.handlers import Callback
 
 from app.dialect import bridge_dialect
 from app.dialect.endpoint import DEMO_VERSION
-from app.errors import DecodeError, LinkError
+from app.errors import DecodeError, KioskError, LinkError
 from app.interfaces import Interfaces, names
 from app.simulator.goals import ActionServer
 from app.simulator.known_types import Moment
 from app.simulator.simulated import SimulatedRobot, Topic
 
+log = logging.getLogger("kiosk.simulator")
+
 ENDPOINT: Final = "tcp/127.0.0.1:7447"
 ANY_PORT: Final = "tcp/127.0.0.1:0"
-STEP_S: Final = 0.1
 Answer = Callable[[bytes], bytes | None]
 
 
@@ -32,8 +34,15 @@ class Simulator:
     """Robots on Zenoh, by their namespaces, at one endpoint; opened and closed as a context."""
 
     def __init__(
-        self, endpoint: str, robots: Mapping[str, SimulatedRobot], interfaces: Interfaces
+        self,
+        endpoint: str,
+        robots: Mapping[str, SimulatedRobot],
+        interfaces: Interfaces,
+        failed: Callable[[KioskError], None] = lambda error: log.error("%s", error),
     ) -> None:
+        """`failed` is called when a robot ends with an error: then all stand still."""
+        self._step_s = min(robot.step_s for robot in robots.values())
+        self._failed = failed
         self._lock = threading.Lock()
         self._ends = threading.Event()
         self._session = zenoh.open(_listening(endpoint))
@@ -74,10 +83,14 @@ class Simulator:
         yield self._session.liveliness().declare_token(bridge_dialect.bridge_token(zid))
 
     def _run(self) -> None:
-        while not self._ends.wait(STEP_S):
+        while not self._ends.wait(self._step_s):
             moment = Moment(time.monotonic(), time.time_ns())
-            for played in self._played:
-                played.step(moment)
+            try:
+                for played in self._played:
+                    played.step(moment)
+            except KioskError as error:
+                self._failed(error)
+                return
 
 
 class _Played:
@@ -298,11 +311,19 @@ def serve(
 ) -> None:
     """Robots at this endpoint until `ends` is set; calls `listening` when they are there.
 
-    Raises LinkError where it can't listen there.
+    Raises LinkError where it can't listen there, and the error of a robot that fails.
     """
+    errors: list[KioskError] = []
+
+    def failed(error: KioskError) -> None:
+        errors.append(error)
+        ends.set()
+
     try:
-        with Simulator(endpoint, robots, interfaces):
+        with Simulator(endpoint, robots, interfaces, failed):
             listening()
             ends.wait()
     except zenoh.ZError as error:
         raise LinkError(f"can't listen at {endpoint}: {error}") from error
+    if errors:
+        raise errors[0]

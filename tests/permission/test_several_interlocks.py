@@ -227,6 +227,9 @@ topic = "/below"
 type = "std_msgs/msg/Empty"
 message = {}
 span = 12
+[demo]
+"/doors_closed" = { silent = true }
+"/air" = { silent = true }
 """
 NO_AIR: Final = "Locked: waiting for /air."
 

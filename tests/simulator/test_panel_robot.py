@@ -4,20 +4,25 @@ import itertools
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 import pytest
 
 from app.interfaces import load_interfaces
 from app.interfaces.names import Qos
 from app.panel import Panel, load_panel
+from app.panel.widgets.families import BaseWidget, Display
+from app.panel.widgets.kinds import KINDS, find_row
+from app.panel.widgets.publish import SinglePublish
 from app.permission.conditions import permits
 from app.robot.parameter_state import EMPTY_VALUE
 from app.simulator.interlocks import APART_S
+from app.simulator.kinds import SIMULATED, Published, Shown, needs_of
 from app.simulator.known_types import Moment
 from app.simulator.panel_robot import PanelRobot
 from app.simulator.parameters import EVENTS
 from app.simulator.robot import FORBIDDEN_S, PERMITTED_S
+from tests.support.builders import INTERFACES
 from tests.support.parts import TESTS
 
 STEP_S: Final = 0.1
@@ -532,3 +537,68 @@ def test_the_reference_system_is_as_it_was() -> None:
 
 def test_interlocks_are_apart_by_no_more_than_they_forbid() -> None:
     assert APART_S < FORBIDDEN_S
+
+
+class Gauge(Display):
+    """A kind that no table knows, with limits of what it shows."""
+
+    kind: Literal["gauge"]
+    min: float
+    max: float
+    scale: float = 1.0
+    offset: float = 0.0
+
+
+class Big(SinglePublish):
+    """A command that no table knows."""
+
+    kind: Literal["big"]
+
+
+GAUGE: Final = {"id": "g", "kind": "gauge", "label": "G", "topic": "/g", "type": "std_msgs/msg/Float32"}
+BIG: Final = {"id": "b", "kind": "big", "label": "B", "topic": "/b", "type": "std_msgs/msg/Bool"}
+
+
+@pytest.mark.parametrize(
+    ("more", "low", "high"),
+    [
+        ({"min": -3.0, "max": 9.0}, -3.0, 9.0),
+        ({"min": 0.0, "max": 100.0, "scale": 100.0}, 0.0, 1.0),
+        ({"min": 0.0, "max": 10.0, "scale": -1.0, "offset": 5.0}, -5.0, 5.0),
+    ],
+)
+def test_a_new_kind_needs_no_row_where_its_family_says_all(
+    more: dict[str, float], low: float, high: float
+) -> None:
+    (need,) = needs_of(Gauge.model_validate(GAUGE | more), INTERFACES)
+    assert isinstance(need, Shown)
+    assert (need.topic, need.field, need.low, need.high) == ("/g", "data", low, high)
+    (press,) = needs_of(Big.model_validate(BIG | {"message": {"data": True}}), INTERFACES)
+    assert isinstance(press, Published)
+    assert (press.topic, press.template) == ("/b", {"data": True})
+
+
+@pytest.mark.parametrize(("kind", "of"), KINDS.items())
+def test_each_kind_is_simulated(kind: str, of: type[BaseWidget]) -> None:
+    assert callable(find_row(SIMULATED, of.model_construct(id="one", label="One", kind=kind)))
+
+
+def test_a_topic_that_no_row_tells_of_has_values_all_the_same(
+    loaded: Loaded, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As of a kind with several topics, which the panel subscribes to."""
+    panel = loaded("")
+    subscribed = {"/pose": "geometry_msgs/msg/PoseStamped", "/x": "std_msgs/msg/Float32"}
+    monkeypatch.setattr(type(panel), "subscriptions", lambda _: subscribed)
+    monkeypatch.setattr(type(panel), "subscribed_fields", lambda _: {"/x": ["data"]})
+    robot = Stepped(panel).run(5)
+    assert len(set(robot.values("/pose", "pose.position.x"))) > 10
+    assert len(set(robot.values("/x"))) > 10
+
+
+def test_a_press_is_confirmed_on_a_topic_of_the_reference_system_too(loaded: Loaded) -> None:
+    confirm = 'confirm = { topic = "/last_heard", type = "std_msgs/msg/String", equals = "{note}" }'
+    plain = PRESSES.replace('topic = "/heard", type = "std_msgs/msg/String", equals = "{note}"', "")
+    robot = Stepped(loaded(plain.replace("confirm = {  }", confirm))).run(1)
+    robot.hear("/note", data="note: hello!")
+    assert robot.run(STEP_S).values("/last_heard") == ["hello"]

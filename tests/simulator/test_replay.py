@@ -175,7 +175,7 @@ def test_the_rate_is_how_many_times_as_fast(tmp_path: Path, opened: Opened) -> N
 def test_it_ends_once_or_begins_again_after_a_pause(tmp_path: Path, opened: Opened) -> None:
     path, ended = mcap_file(tmp_path), []
     once = ReplayedRobot(opened(path), ended=lambda: ended.append("once"))
-    assert len(stepped(once, [0, 1, 2])) == len(MESSAGES)
+    assert len(stepped(once, [0, 1, 1 + PAUSE_S])) == len(MESSAGES)
     assert ended
     loop = ReplayedRobot(opened(path), loop=True, ended=lambda: ended.append("loop"))
     said = stepped(loop, [0, 0.6, 0.6 + PAUSE_S, 1.3 + PAUSE_S, 1.4 + PAUSE_S])
