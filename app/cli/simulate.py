@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 PROG = "python -m app.simulator"
 SUFFIX = ".toml"
 
-say = partial(print, file=sys.stderr, flush=True)
+report = partial(print, file=sys.stderr, flush=True)
 
 
 def main(arguments: Sequence[str], prog: str = PROG) -> int:
@@ -39,7 +39,7 @@ def main(arguments: Sequence[str], prog: str = PROG) -> int:
     given = _sorted_out(parser, parser.parse_args(arguments))
     namespace = given.namespace.rstrip("/")
     if not NAMESPACE.fullmatch(namespace):
-        say(f'demo robot: "{namespace}" is not a ROS 2 namespace, like /robot1')
+        report(f'demo robot: "{namespace}" is not a ROS 2 namespace, like /robot1')
         return 2
     ends = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -47,14 +47,14 @@ def main(arguments: Sequence[str], prog: str = PROG) -> int:
     try:
         panel = load_panel(given.panel or Settings.from_environment().panel)
         interfaces = load_interfaces(panel.distro, panel.interfaces)
-        said = partial(say, f"demo robot: listening at {given.endpoint}")
+        listening = partial(report, f"demo robot: listening at {given.endpoint}")
         with ExitStack() as stack:
             robots = _simulated(panel, namespace)
             if given.bag is not None:
                 robots = {namespace: _replayed(given, panel, ends, stack)}
-            serve(given.endpoint, robots, interfaces, ends, said)
+            serve(given.endpoint, robots, interfaces, ends, listening)
     except KioskError as error:
-        say(f"demo robot: {error}")
+        report(f"demo robot: {error}")
         return 1 if isinstance(error, LinkError) else 2
     return 0
 
@@ -66,7 +66,7 @@ def _simulated(panel: Panel, namespace: str) -> "Mapping[str, SimulatedRobot]":
 
 
 def _replayed(given: Any, panel: Panel, ends: threading.Event, stack: ExitStack) -> "SimulatedRobot":
-    """A recording; what the panel misses in it is said where a panel was named."""
+    """A recording. If a panel file was given, prints what the recording lacks for it."""
     from app.simulator.recording import Recording
     from app.simulator.replay import ReplayedRobot, missing
 
@@ -74,9 +74,9 @@ def _replayed(given: Any, panel: Panel, ends: threading.Event, stack: ExitStack)
     robot = ReplayedRobot(recording, given.rate, given.loop, ends.set)
     lacks = missing(panel, recording.topics) if given.panel else ()
     for note in (*recording.notes, *lacks):
-        say(f"demo robot: {note}")
+        report(f"demo robot: {note}")
     about = f"{len(recording.topics)} topic(s), {recording.duration_s:.1f} s"
-    say(f"demo robot: replaying {given.bag}: {about}")
+    report(f"demo robot: replaying {given.bag}: {about}")
     return robot
 
 

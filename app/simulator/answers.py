@@ -13,7 +13,7 @@ from app.simulator.paths import Fields, put
 from app.simulator.topics import merged
 
 DONE: Final = "done"
-# Whole numbers that say how something went: zero is good.
+# Whole numbers for a status: zero is success.
 STATUS: Final = re.compile(r"error|code|status|result|reason|flag|id$", re.IGNORECASE)
 LEFT: Final = re.compile(r"remain|left|to_go|todo", re.IGNORECASE)
 PART: Final = re.compile(r"progress|fraction|complet|done|ratio", re.IGNORECASE)
@@ -37,7 +37,7 @@ def good_response(
 
 
 def _good(structure: Structure, interfaces: Interfaces, depth: int) -> Fields:
-    """The fields that say that all went well."""
+    """The fields of a success."""
     found: Fields = {}
     for field in structure.fields:
         kind = field.type
@@ -78,7 +78,7 @@ def feedback_at(
 
 
 def _partly(field: Field, part: float) -> Any:
-    """A field of feedback; None for what the type alone tells."""
+    """A field of feedback; None if its plausible value is used."""
     kind, name = field.type, field.name
     if kind.name == "builtin_interfaces/msg/Duration" and kind.container == "one":
         return {"sec": round(STEPS * (1 - part if LEFT.search(name) else part))}

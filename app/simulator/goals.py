@@ -49,12 +49,12 @@ class ActionServer(Protocol):
 @dataclass(slots=True)
 class _Goal:
     began: float
-    told: float
+    feedback_at: float  # of the last feedback
     status: int = EXECUTING
 
 
 class SimulatedAction:
-    """Each goal takes its time, tells its progress and succeeds; several may run at a time."""
+    """Each goal runs for a time, sends feedback and succeeds; several may run at a time."""
 
     def __init__(
         self,
@@ -100,8 +100,8 @@ class SimulatedAction:
     def feedback(self) -> list[tuple[bytes, Fields]]:
         moment, found = self._now, []
         for goal_id, goal in self._goals.items():
-            if goal.status == EXECUTING and moment.t - goal.told >= FEEDBACK_S - 1e-6:
-                goal.told = moment.t
+            if goal.status == EXECUTING and moment.t - goal.feedback_at >= FEEDBACK_S - 1e-6:
+                goal.feedback_at = moment.t
                 part = min((moment.t - goal.began) / self._duration_s, 1.0)
                 found.append((goal_id, self._feedback(moment, part)))
         return found

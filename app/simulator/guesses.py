@@ -116,7 +116,7 @@ PHRASES: Final = ("ready", "moving to the part", "gripping", "placing", "waiting
 
 
 def span_of(unit: str, *names: str) -> Span:
-    """The span of a number with a unit, or of these names, the most telling first."""
+    """The span of a number with a unit, or of these names, in order of precedence."""
     known = UNITS.get(unit.strip())
     by_name = next((s for name in names for words, s in NAMES if words.search(name)), None)
     if known is None:

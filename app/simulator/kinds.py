@@ -24,8 +24,8 @@ DEFAULT_QOS: Final = TopicQos()
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shown:
-    """A field that the panel shows. `low` and `high` are limits of the message's number, `values` those
-    that the widget tells apart; `scale` and `offset` lead from the number to what has the `unit`."""
+    """A field that the panel shows. `low` and `high` are limits of the number in the message, `values`
+    the values that the widget distinguishes. Times `scale` plus `offset` the number has the `unit`."""
 
     topic: str
     type: str
@@ -42,7 +42,7 @@ class Shown:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Published:
-    """A topic that the panel publishes; a press of `template` shows as `confirm` says."""
+    """A topic that the panel publishes; the robot confirms a press of `template` by `confirm`."""
 
     topic: str
     type: str

@@ -129,7 +129,7 @@ def _range(moment: Moment, _: Collection[str]) -> Fields:
 
 
 def _scan(moment: Moment, _: Collection[str]) -> Fields:
-    """The walls of a room of 6 by 4 m, with somebody who walks by."""
+    """The walls of a room of 6 by 4 m, and a person who walks by."""
     step = 2 * math.pi / BEAMS
     walker = int(moment.t * 6) % BEAMS
     ranges = []

@@ -103,9 +103,9 @@ class PanelRobot:
         own = {COUNT: CountAction(COUNT_TYPE, self._demo)} if self._has(COUNT) else {}
         return {**own, **self._simulated}
 
-    # What it hears and says.
+    # What it receives and publishes.
 
-    def hear(self, topic: str, payload: bytes) -> None:
+    def receive(self, topic: str, payload: bytes) -> None:
         """A press: it is echoed where the panel shows it, and has its effect."""
         type_name = self.subscribes[topic].type
         try:

@@ -58,8 +58,8 @@ class _File(Protocol):
 
 
 class Recording:
-    """A recording, open until `close`. RecordingError says what is wrong with it; `notes` are sentences
-    about topics that are left out."""
+    """A recording, open until `close`. RecordingError if it can't be read. `notes` are sentences about
+    topics that are left out."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -126,7 +126,7 @@ class _Mcap:
     def __init__(self, path: Path) -> None:
         self._stream: IO[bytes] = path.open("rb")
         try:
-            self._reader = make_reader(self._stream)
+            self._reader = make_reader(self._stream, validate_crcs=True)
             summary = self._reader.get_summary()
             if summary is None or summary.statistics is None:
                 raise RecordingError(f"{path} was not finished: `mcap recover` mends it")
@@ -168,7 +168,8 @@ class _Rosbag:
         self._reader = Reader(path)
         self._reader.open()
         self.start_ns = self._reader.start_time
-        self.end_ns = max(self._reader.end_time - 1, self.start_ns)  # it tells the time after the last
+        last_ns = self._reader.end_time - 1  # the library has the time after the last message
+        self.end_ns = max(last_ns, self.start_ns)
         self.topics: Sequence[RecordedTopic] = [_of_connection(one) for one in self._reader.connections]
 
     def messages(self, topics: Collection[str]) -> Iterator[Recorded]:
@@ -188,7 +189,7 @@ def _of_connection(one: Connection) -> RecordedTopic:
 
 
 def _qos(offered: Sequence[Any]) -> Qos:
-    """As the first publisher offered it; reliable and volatile where the file does not say."""
+    """As the first publisher offered it; reliable and volatile if the file does not have it."""
     if not offered:
         return Qos()
     one: OfferedQos = offered[0]

@@ -40,8 +40,8 @@ class ReplayedRobot:
         self.services: Mapping[str, str] = {}
         self.actions: Mapping[str, ActionServer] = {}
 
-    def hear(self, topic: str, payload: bytes) -> None:
-        """A recording does not listen."""
+    def receive(self, topic: str, payload: bytes) -> None:
+        """It subscribes to nothing."""
 
     def serve(self, service: str, payload: bytes) -> bytes | None:
         return None

@@ -35,7 +35,7 @@ class SimulatedRobot(Protocol):
 
     @property
     def actions(self) -> Mapping[str, ActionServer]: ...
-    def hear(self, topic: str, payload: bytes) -> None:
+    def receive(self, topic: str, payload: bytes) -> None:
         """A message on a topic that it subscribes to."""
 
     def serve(self, service: str, payload: bytes) -> bytes | None:

@@ -1,7 +1,7 @@
 """Simulated robots behind a bridge of their own, as a separate Zenoh peer.
 
 It has the keys, CDR bytes, liveliness tokens and admin space that a real robot has behind
-zenoh-bridge-ros2dds, so that the panel can't tell the difference; it knows nothing of the server.
+zenoh-bridge-ros2dds, so that the panel needs nothing special for it. It knows nothing of the server.
 """
 
 import json
@@ -65,18 +65,18 @@ class Simulator:
     @property
     def endpoint(self) -> str:
         """Where it listens, with the port that the system chose for `ANY_PORT`."""
-        for told in self._session.get(f"@/{self._session.zid()}/peer"):
-            if told.ok is not None:
-                return str(json.loads(told.ok.payload.to_bytes())["locators"][0])
-        raise zenoh.ZError("the session does not tell where it listens")
+        for reply in self._session.get(f"@/{self._session.zid()}/peer"):
+            if reply.ok is not None:
+                return str(json.loads(reply.ok.payload.to_bytes())["locators"][0])
+        raise zenoh.ZError("the session has no locator")
 
     def _graph(self, robots: Mapping[str, SimulatedRobot]) -> Iterator[Any]:
         """The admin space and the tokens of a bridge. With one robot it has its namespace."""
         zid = str(self._session.zid())
         namespace = next(iter(robots)) if len(robots) == 1 else ""
         config = json.dumps({"namespace": namespace or "/"})
-        yield _told(self._session, bridge_dialect.version(zid), DEMO_VERSION)
-        yield _told(self._session, bridge_dialect.config(zid), config)
+        yield _admin_value(self._session, bridge_dialect.version(zid), DEMO_VERSION)
+        yield _admin_value(self._session, bridge_dialect.config(zid), config)
         for played in self._played:
             for token in played.tokens(zid):
                 yield self._session.liveliness().declare_token(token)
@@ -134,8 +134,8 @@ class _Played:
 
     def step(self, moment: Moment) -> None:
         with self._lock:
-            said = list(self._robot.step(moment))
-        for topic, payload in said:
+            messages = list(self._robot.step(moment))
+        for topic, payload in messages:
             self._publishers[topic].put(payload)
         for action in self._actions:
             action.step()
@@ -154,7 +154,7 @@ class _Played:
 
         def on_sample(sample: zenoh.Sample) -> None:
             with self._lock:
-                self._robot.hear(topic, sample.payload.to_bytes())
+                self._robot.receive(topic, sample.payload.to_bytes())
 
         return self._session.declare_subscriber(
             self._key(topic), Callback(on_sample, indirect=False), allowed_origin=zenoh.Locality.REMOTE
@@ -211,7 +211,7 @@ class _PlayedAction:
             self._session.put(names.feedback(self._key), payload)
         if states != self._states:
             self._states = states
-            self._tell_states()
+            self._publish_states()
         for query, (status, result) in ended:
             response = {"status": status, "result": result}
             with query:
@@ -250,7 +250,7 @@ class _PlayedAction:
         with self._lock:
             self._results.append((bytes(request.goal_id.uuid), query))
 
-    def _tell_states(self) -> None:
+    def _publish_states(self) -> None:
         """As an action server does whenever a goal has another state."""
         known = [
             {"goal_info": {"goal_id": {"uuid": goal_id}}, "status": status}
@@ -277,8 +277,8 @@ def _served(session: zenoh.Session, key: str, answer: Answer) -> Any:
     return session.declare_queryable(key, Callback(on_query, indirect=False), complete=True)
 
 
-def _told(session: zenoh.Session, key: str, text: str) -> Any:
-    """A part of the admin space, which always says the same."""
+def _admin_value(session: zenoh.Session, key: str, text: str) -> Any:
+    """A constant value in the admin space."""
     return _served(session, key, lambda _: text.encode())
 
 
@@ -292,7 +292,7 @@ def _listening(endpoint: str) -> zenoh.Config:
         "timestamping/enabled": "true",
         "transport/unicast/accept_timeout": "3000",  # who is at it holds up the session's end
         "transport/shared_memory/enabled": "false",  # its file stays when the process is killed
-        "adminspace/enabled": "true",  # it tells the port
+        "adminspace/enabled": "true",  # `endpoint` reads the port there
     }.items():
         config.insert_json5(place, value)
     return config

@@ -70,7 +70,7 @@ class Stepped:
 
     def hear(self, topic: str, **fields: Any) -> None:
         type_name = self.robot.subscribes[topic].type
-        self.robot.hear(topic, self.interfaces.encode(type_name, fields))
+        self.robot.receive(topic, self.interfaces.encode(type_name, fields))
 
     def call(self, service: str, **fields: Any) -> Any:
         request, response = self.interfaces.service_types(self.robot.services[service])
@@ -311,7 +311,7 @@ def test_a_message_of_no_press_has_no_effect(loaded: Loaded) -> None:
     robot = Stepped(loaded(PRESSES)).run(1)
     before = robot.values("/heard")[-1]
     robot.hear("/note", data="something else")
-    robot.robot.hear("/fan", b"\0")
+    robot.robot.receive("/fan", b"\0")
     robot.run(2)
     assert robot.values("/heard")[-1] == before
 
@@ -602,3 +602,25 @@ def test_a_press_is_confirmed_on_a_topic_of_the_reference_system_too(loaded: Loa
     robot = Stepped(loaded(plain.replace("confirm = {  }", confirm))).run(1)
     robot.hear("/note", data="note: hello!")
     assert robot.run(STEP_S).values("/last_heard") == ["hello"]
+
+
+def test_a_fast_topic_comes_as_often_as_the_table_says(loaded: Loaded) -> None:
+    panel = loaded(readout("/fast", "std_msgs/msg/Float32") + '[demo."/fast"]\nhz = 100\n')
+    robot = PanelRobot(panel)
+    assert robot.step_s == 0.01
+    times = range(200)
+    count = sum(t == "/fast" for at in times for t, _ in robot.step(Moment(at / 100, 10**18)))
+    assert count == 200
+
+
+def test_a_topic_that_can_not_be_made_is_silent_and_the_others_go_on(
+    loaded: Loaded, caplog: pytest.LogCaptureFixture
+) -> None:
+    panel = loaded(readout("/a", "std_msgs/msg/Float32") + readout("/b", "std_msgs/msg/Float32"))
+    stepped = Stepped(panel).run(1)
+    assert {"/a", "/b"} <= set(stepped.robot.publishes)
+    stepped.robot._topics["/a"].show("data", "no number", 1.0)
+    stepped.run(2)
+    assert stepped.timed("/a")[-1][0] < 1.1
+    assert stepped.timed("/b")[-1][0] > 2.5
+    assert caplog.text.count("/a is not simulated any more: data: must be a number") == 1

@@ -4,6 +4,7 @@ import json
 import sqlite3
 import subprocess
 import sys
+import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, closing
 from pathlib import Path
@@ -19,6 +20,7 @@ from app.panel import load_panel
 from app.simulator.known_types import Moment
 from app.simulator.recording import Recording
 from app.simulator.replay import PAUSE_S, ReplayedRobot, missing
+from app.simulator.zenoh_peer import ANY_PORT, serve
 from tests.support.builders import BOOL, INTERFACES, TEXT
 from tests.support.parts import ROOT, Process, Server, free_port, until, zenoh_file
 
@@ -302,3 +304,26 @@ def test_a_mistake_on_the_command_line_is_one_sentence(words: list[str], sentenc
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, timeout=60)
     assert (done.returncode, sentence in done.stderr) == (2, True), done.stderr
     assert "Traceback" not in done.stderr
+
+
+class Failing(ReplayedRobot):
+    """A recording that is damaged behind its first message."""
+
+    def step(self, moment: Moment) -> Iterator[tuple[str, bytes]]:
+        raise RecordingError("cell.mcap is damaged: no chunk")
+
+
+def test_a_recording_that_is_damaged_later_ends_the_program(tmp_path: Path, opened: Opened) -> None:
+    robot = Failing(opened(mcap_file(tmp_path)))
+    with pytest.raises(RecordingError, match="is damaged"):
+        serve(ANY_PORT, {"": robot}, INTERFACES, threading.Event(), lambda: None)
+
+
+def test_damage_is_named(tmp_path: Path, opened: Opened) -> None:
+    path = mcap_file(tmp_path)
+    data = bytearray(path.read_bytes())
+    data[150:170] = bytes(20)
+    path.write_bytes(data)
+    recording = opened(path)
+    with pytest.raises(RecordingError, match=r"cell\.mcap is damaged: "):
+        list(recording.messages())

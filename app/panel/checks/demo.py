@@ -50,7 +50,7 @@ class _Names:
 
 
 def demo_faults(panel: Panel, interfaces: Interfaces) -> Iterator[Fault]:
-    """The faults of all entries. Their causes say that they depend on what the panel listens to."""
+    """The faults of all entries. By their cause they are consequences of faults of subscriptions."""
     for fault in _entry_faults(panel, interfaces):
         yield replace(fault, cause=f"listens {fault.cause or fault.place}")
 
