@@ -48,11 +48,17 @@ WIRING = {"app.main", "app.check", "app.log", "app.simulator.__main__"}  # these
 SPEAK_ZENOH = {
     "app.transport.zenoh_config",
     "app.transport.zenoh_session",
+    "app.simulator.zenoh_action",
     "app.simulator.zenoh_peer",
+    "app.simulator.zenoh_robot",
 }
 # The bridge's dialect and peer, and who else may know them.
 OF_THE_BRIDGE = ("app.dialect.bridge_", "app.transport.bridge_")
-WIRE_THE_BRIDGE = {"app.runtime.robot_session", "app.simulator.zenoh_peer"}
+WIRE_THE_BRIDGE = {
+    "app.runtime.robot_session",
+    "app.simulator.zenoh_peer",
+    "app.simulator.zenoh_robot",
+}
 KNOWN_TO_THE_SIMULATOR = (
     "app.simulator",
     "app.interfaces",
@@ -146,7 +152,8 @@ def test_a_start_reads_no_library_that_most_kiosks_never_need(tmp_path: Path) ->
     code = "import sys, app.main; print(*sys.modules)"
     read = subprocess.check_output([sys.executable, "-c", code], cwd=PACKAGE.parent, env=env, text=True)
     of_faults = {"app.panel.faults.shape", "app.panel.faults.toml_lines", "app.panel.preview"}
-    assert {"mcap", "prometheus_client", *of_faults} & set(read.split()) == set()
+    of_demos = {"app.simulator.panel_robot", "app.simulator.zenoh_peer", "rosbags.rosbag2"}
+    assert {"mcap", "prometheus_client", *of_faults, *of_demos} & set(read.split()) == set()
 
 
 def test_what_a_start_makes_is_left_alone_by_the_garbage_collector(tmp_path: Path) -> None:

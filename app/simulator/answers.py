@@ -9,8 +9,7 @@ from app.interfaces.definitions import FLOAT_TYPES, STRING_TYPES, Field
 from app.simulator.guesses import NEGATIVE, span_of
 from app.simulator.known_types import KNOWN, Moment
 from app.simulator.messages import DEEPEST, plausible
-from app.simulator.paths import Fields, put
-from app.simulator.topics import merged
+from app.simulator.paths import Fields, merged, put
 
 DONE: Final = "done"
 # Whole numbers for a status: zero is success.

@@ -89,3 +89,12 @@ def _get_by_key(fields: Mapping[str, Any], name: str, key: Key, rest: Sequence[S
         keys = [get(item, path_steps(key.path)) for item in items]
     found = next((i for i, one in enumerate(keys) if one == key.value), len(items))
     return get(items[found], rest) if found < len(items) else None
+
+
+def merged(fields: Fields, over: Mapping[str, Any]) -> Fields:
+    """Both; tables within tables are merged too."""
+    for key, value in over.items():
+        inner: Any = fields.get(key)
+        tables = isinstance(value, Mapping) and isinstance(inner, dict)
+        fields[key] = merged(inner, value) if tables else value
+    return fields

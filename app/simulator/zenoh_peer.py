@@ -12,22 +12,20 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Final
 
 import zenoh
-from zenoh.ext import CacheConfig, declare_advanced_publisher
-from zenoh.handlers import Callback
 
 from app.dialect import bridge_dialect
 from app.dialect.endpoint import DEMO_VERSION
-from app.errors import DecodeError, KioskError, LinkError
-from app.interfaces import Interfaces, names
-from app.simulator.goals import ActionServer
+from app.errors import KioskError, LinkError
+from app.interfaces import Interfaces
 from app.simulator.known_types import Moment
-from app.simulator.simulated import SimulatedRobot, Topic
+from app.simulator.simulated import SimulatedRobot
+from app.simulator.zenoh_action import served
+from app.simulator.zenoh_robot import PlayedRobot
 
 log = logging.getLogger("kiosk.simulator")
 
 ENDPOINT: Final = "tcp/127.0.0.1:7447"
 ANY_PORT: Final = "tcp/127.0.0.1:0"
-Answer = Callable[[bytes], bytes | None]
 
 
 class Simulator:
@@ -47,7 +45,7 @@ class Simulator:
         self._ends = threading.Event()
         self._session = zenoh.open(_listening(endpoint))
         self._played = [
-            _Played(self._session, namespace, robot, interfaces, self._lock)
+            PlayedRobot(self._session, namespace, robot, interfaces, self._lock)
             for namespace, robot in robots.items()
         ]
         self._declared = list(self._graph(robots))
@@ -93,193 +91,9 @@ class Simulator:
                 return
 
 
-class _Played:
-    """One robot, in its namespace."""
-
-    def __init__(
-        self,
-        session: zenoh.Session,
-        namespace: str,
-        robot: SimulatedRobot,
-        interfaces: Interfaces,
-        lock: threading.Lock,
-    ) -> None:
-        self._session = session
-        self._namespace = namespace
-        self._robot = robot
-        self._lock = lock
-        self._publishers = {
-            topic: self._publisher(topic, about) for topic, about in robot.publishes.items()
-        }
-        self._actions = [
-            _PlayedAction(session, self._key(name), action, interfaces, lock)
-            for name, action in robot.actions.items()
-        ]
-        self._declared = [
-            *(self._subscriber(topic) for topic in robot.subscribes),
-            *(_served(session, self._key(one), self._server(one)) for one in robot.services),
-        ]
-
-    def tokens(self, zid: str) -> Iterator[str]:
-        """The liveliness tokens of its endpoints."""
-        robot, key = self._robot, self._key
-        for topic, of in robot.subscribes.items():
-            yield bridge_dialect.token(zid, "MS", key(topic), of.type, of.qos, of.type_hash)
-        for topic, of in robot.publishes.items():
-            yield bridge_dialect.token(zid, "MP", key(topic), of.type, of.qos, of.type_hash)
-        for service, name in robot.services.items():
-            yield bridge_dialect.server_token(zid, "SS", key(service), name)
-        for action, server in robot.actions.items():
-            yield bridge_dialect.server_token(zid, "AS", key(action), server.type)
-
-    def step(self, moment: Moment) -> None:
-        with self._lock:
-            messages = list(self._robot.step(moment))
-        for topic, payload in messages:
-            self._publishers[topic].put(payload)
-        for action in self._actions:
-            action.step()
-
-    def _key(self, topic: str) -> str:
-        return names.key_of(topic, self._namespace)
-
-    def _publisher(self, topic: str, about: Topic) -> Any:
-        """What is TRANSIENT_LOCAL is kept for subscribers that come late."""
-        if about.qos.transient_local:
-            return _latched(self._session, self._key(topic))
-        return self._session.declare_publisher(self._key(topic))
-
-    def _subscriber(self, topic: str) -> Any:
-        """What the robot itself publishes is no press."""
-
-        def on_sample(sample: zenoh.Sample) -> None:
-            with self._lock:
-                self._robot.receive(topic, sample.payload.to_bytes())
-
-        return self._session.declare_subscriber(
-            self._key(topic), Callback(on_sample, indirect=False), allowed_origin=zenoh.Locality.REMOTE
-        )
-
-    def _server(self, service: str) -> Answer:
-        def answer(payload: bytes) -> bytes | None:
-            with self._lock:
-                return self._robot.serve(service, payload)
-
-        return answer
-
-
-class _PlayedAction:
-    """One action of a robot: three services and two topics."""
-
-    def __init__(
-        self,
-        session: zenoh.Session,
-        key: str,
-        server: ActionServer,
-        interfaces: Interfaces,
-        lock: threading.Lock,
-    ) -> None:
-        self._session = session
-        self._key = key
-        self._server = server
-        self._interfaces = interfaces
-        self._lock = lock
-        self._types = interfaces.action_types(server.type)
-        self._status = _latched(session, names.status(key))
-        self._states: list[tuple[bytes, int]] = []
-        self._results: list[tuple[bytes, zenoh.Query]] = []
-        self._declared = [
-            _served(session, names.of_action(key, "send_goal"), self._begin),
-            _served(session, names.of_action(key, "cancel_goal"), self._cancel),
-            session.declare_queryable(
-                names.of_action(key, "get_result"),
-                Callback(self._on_result, indirect=False),
-                complete=True,
-            ),
-        ]
-
-    def step(self) -> None:
-        with self._lock:
-            news = self._server.feedback()
-            states = self._server.states()
-            ended = [(q, end) for goal, q in self._results if (end := self._server.result(goal))]
-            answered = {id(query) for query, _ in ended}
-            self._results = [one for one in self._results if id(one[1]) not in answered]
-        for goal_id, fields in news:
-            message = {"goal_id": {"uuid": goal_id}, "feedback": fields}
-            payload = self._interfaces.encode(self._types.feedback_message, message)
-            self._session.put(names.feedback(self._key), payload)
-        if states != self._states:
-            self._states = states
-            self._publish_states()
-        for query, (status, result) in ended:
-            response = {"status": status, "result": result}
-            with query:
-                query.reply(
-                    names.of_action(self._key, "get_result"),
-                    self._interfaces.encode(self._types.get_result_response, response),
-                )
-
-    def _begin(self, payload: bytes) -> bytes | None:
-        try:
-            request = self._interfaces.decode(self._types.send_goal_request, payload)
-        except DecodeError:
-            return None
-        with self._lock:
-            accepted = self._server.begin(bytes(request.goal_id.uuid), request.goal)
-        return self._interfaces.encode(self._types.send_goal_response, {"accepted": accepted})
-
-    def _cancel(self, payload: bytes) -> bytes | None:
-        request_type, response_type = self._interfaces.service_types(self._types.cancel_goal)
-        try:
-            request = self._interfaces.decode(request_type, payload)
-        except DecodeError:
-            return None
-        with self._lock:
-            code, canceled = self._server.cancel(bytes(request.goal_info.goal_id.uuid))
-        goals = [{"goal_id": {"uuid": one}} for one in canceled]
-        fields = {"return_code": code, "goals_canceling": goals}
-        return self._interfaces.encode(response_type, fields)
-
-    def _on_result(self, query: zenoh.Query) -> None:
-        try:
-            request = self._interfaces.decode(self._types.get_result_request, _payload(query))
-        except DecodeError:
-            query.drop()
-            return
-        with self._lock:
-            self._results.append((bytes(request.goal_id.uuid), query))
-
-    def _publish_states(self) -> None:
-        """As an action server does whenever a goal has another state."""
-        known = [
-            {"goal_info": {"goal_id": {"uuid": goal_id}}, "status": status}
-            for goal_id, status in self._states
-        ]
-        self._status.put(self._interfaces.encode(self._types.status, {"status_list": known}))
-
-
-def _latched(session: zenoh.Session, key: str) -> Any:
-    """A publisher that keeps its last message for subscribers that come late."""
-    cache = CacheConfig(max_samples=1)
-    return declare_advanced_publisher(session, key, cache=cache, publisher_detection=True)
-
-
-def _served(session: zenoh.Session, key: str, answer: Answer) -> Any:
-    """A queryable that answers as a service server behind a bridge does."""
-
-    def on_query(query: zenoh.Query) -> None:
-        with query:
-            response = answer(_payload(query))
-            if response is not None:
-                query.reply(key, response)
-
-    return session.declare_queryable(key, Callback(on_query, indirect=False), complete=True)
-
-
 def _admin_value(session: zenoh.Session, key: str, text: str) -> Any:
     """A constant value in the admin space."""
-    return _served(session, key, lambda _: text.encode())
+    return served(session, key, lambda _: text.encode())
 
 
 def _listening(endpoint: str) -> zenoh.Config:
@@ -296,10 +110,6 @@ def _listening(endpoint: str) -> zenoh.Config:
     }.items():
         config.insert_json5(place, value)
     return config
-
-
-def _payload(query: zenoh.Query) -> bytes:
-    return b"" if query.payload is None else query.payload.to_bytes()
 
 
 def serve(

@@ -8,7 +8,7 @@ from typing import Any, Final, Literal
 
 import pytest
 
-from app.interfaces import load_interfaces
+from app.interfaces import DISTROS, load_interfaces
 from app.interfaces.names import Qos
 from app.panel import Panel, load_panel
 from app.panel.widgets.families import BaseWidget, Display
@@ -624,3 +624,16 @@ def test_a_topic_that_can_not_be_made_is_silent_and_the_others_go_on(
     assert stepped.timed("/a")[-1][0] < 1.1
     assert stepped.timed("/b")[-1][0] > 2.5
     assert caplog.text.count("/a is not simulated any more: data: must be a number") == 1
+
+
+@pytest.mark.parametrize("distro", DISTROS)
+def test_everything_is_simulated_in_each_distribution(tmp_path: Path, distro: str) -> None:
+    messages = tmp_path / "msgs/cell_msgs/msg"
+    messages.mkdir(parents=True)
+    (messages / "Jog.msg").write_text("float64 speed\nuint32 valid_ms\nuint16 number\n")
+    path = tmp_path / "cell.toml"
+    text = (TESTS / "everything.toml").read_text()
+    path.write_text(text.replace('distro = "jazzy"', f'distro = "{distro}"'))
+    robot = Stepped(load_panel(path)).run(2)
+    assert set(robot.panel.subscriptions()) - {EVENTS} <= set(robot.said)
+    assert all(one.type_hash for one in robot.robot.publishes.values())

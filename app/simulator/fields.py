@@ -1,0 +1,205 @@
+"""How each field of a topic that a panel shows changes with time: pure."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Final
+
+from app.interfaces import INTEGER_RANGES, Interfaces, parent_path
+from app.interfaces.definitions import FLOAT_TYPES
+from app.interfaces.field_path import field_name, path_steps
+from app.panel.demo import NO_ENTRY, DemoEntry
+from app.panel.interlock import Interlock
+from app.panel.model import Panel
+from app.simulator.guesses import Span, guessed, moving, span_of
+from app.simulator.interlocks import offset_of, permitting
+from app.simulator.kinds import Shown
+from app.simulator.known_types import KNOWN, Moment
+from app.simulator.messages import Message, field_constants
+from app.simulator.paths import get
+from app.simulator.signals import OTHER_S, Signal, cycle, fixed, phase_of
+
+SAMPLES_S: Final = (0.0, 40.0, 120.0, 230.0)  # times at which a field of a type has its values
+
+
+@dataclass(frozen=True, slots=True)
+class FieldSignal:
+    """A field and its value at a time. `prompt`: a change is published at once."""
+
+    path: str
+    signal: Signal
+    prompt: bool = False
+    moving: bool = False
+
+
+class PanelFields:
+    """What a panel says of the fields of its topics; `phase` sets several robots apart."""
+
+    def __init__(self, panel: Panel, interfaces: Interfaces, phase: float) -> None:
+        self.panel = panel
+        self.interfaces = interfaces
+        self.phase = phase
+        self.paths = {
+            topic: list(dict.fromkeys(paths)) for topic, paths in panel.subscribed_fields().items()
+        }
+        self.confirmed = {(one.topic, one.field) for one in panel.confirmations()}
+        locked = dict.fromkeys((one.topic, one.field) for one in panel.interlocks)
+        self.offsets: Mapping[tuple[str, str], float] = {
+            field: offset_of(number, len(locked)) for number, field in enumerate(locked)
+        }
+
+    def entry(self, topic: str) -> DemoEntry:
+        return self.panel.demo.get(topic, NO_ENTRY)
+
+    def signals(
+        self, topic: str, type_name: str, shown: Sequence[Shown], message: Message
+    ) -> list[FieldSignal]:
+        """The fields that have another value than `message` gives them."""
+        fixed_by_table = self.entry(topic).message
+        paths = (
+            one for one in self.paths.get(topic, ()) if get(fixed_by_table, path_steps(one)) is None
+        )
+        made = (_Field(self, topic, type_name, path, shown, message).made() for path in paths)
+        return [one for one in made if one is not None]
+
+
+class _Field:
+    """One field of one topic."""
+
+    def __init__(
+        self,
+        of: PanelFields,
+        topic: str,
+        type_name: str,
+        path: str,
+        shown: Sequence[Shown],
+        message: Message,
+    ) -> None:
+        self._of = of
+        self._topic = topic
+        self._type = type_name
+        self._path = path
+        self._shown = [one for one in shown if one.field == path]
+        self._message = message
+        self._kind = of.interfaces.type_at(type_name, path)
+        self._entry = of.entry(topic)
+        self._limits = self._entry.ranges.get(path) or self._entry.range
+        self._phase = (phase_of(f"{topic} {path}") + of.phase) % 1
+
+    def made(self) -> FieldSignal | None:
+        """None where the message's own value is the best."""
+        if self._kind.is_nested or self._kind.container != "one":
+            return None
+        interlocks = [
+            one
+            for one in self._of.panel.interlocks
+            if (one.topic, one.field) == (self._topic, self._path)
+        ]
+        if interlocks:
+            return FieldSignal(self._path, self._permitting(interlocks), prompt=True)
+        if self._entry.values:
+            return self._with(cycle(self._entry.values, self._round_s))
+        found = self._by_values() if self._values and not self._limits else self._by_type()
+        return found if found is None or self._limits else self._still(found)
+
+    def _with(self, signal: Signal, *, is_moving: bool = False) -> FieldSignal:
+        return FieldSignal(self._path, signal, moving=is_moving)
+
+    def _still(self, field: FieldSignal) -> FieldSignal:
+        """The field; one that confirms presses changes with them only."""
+        if (self._topic, self._path) not in self._of.confirmed:
+            return field
+        first = field.signal(0.0)
+        return replace(field, signal=fixed(False if isinstance(first, bool) else first), moving=False)
+
+    @property
+    def _values(self) -> tuple[Any, ...]:
+        """The values that a widget distinguishes."""
+        return next((one.values for one in self._shown if one.values), ())
+
+    @property
+    def _round_s(self) -> float:
+        """How long the values of the entry take together."""
+        return self._entry.period_s or OTHER_S * len(self._entry.values or ())
+
+    def _by_values(self) -> FieldSignal | None:
+        """Each of a widget's values; the usual one is that of the message, if it has one."""
+        if len(self._own) > 1:
+            return None
+        usual = [one for one in self._values if one in self._own]
+        others = [one for one in self._values if one not in usual]
+        return self._with(cycle([*usual, *others], self._entry.period_s, self._phase))
+
+    def _by_type(self) -> FieldSignal | None:
+        if self._kind.name in INTEGER_RANGES or self._kind.name in FLOAT_TYPES:
+            return self._number()
+        if self._own:
+            return None
+        names = (self._path, *(one.label for one in self._shown), self._topic)
+        return self._with(guessed(self._kind.name, self._kind.bound, *names))
+
+    def _number(self) -> FieldSignal | None:
+        unit = next((one for one in self._shown if one.unit), None)
+        limited = any(one.low is not None or one.high is not None for one in self._shown)
+        if not self._limits and not limited:
+            if self._own:
+                return None
+            if self._constants and unit is None and self._kind.name in INTEGER_RANGES:
+                return self._with(cycle(self._constants, self._entry.period_s, self._phase))
+        span = self._span(unit)
+        signal = moving(span, self._kind.name, self._entry.period_s, self._phase)
+        return self._with(signal, is_moving=True)
+
+    def _span(self, unit: Shown | None) -> Span:
+        """By the entry, else by a widget's limits, else by its unit, else by names."""
+        label = self._shown[0].label if self._shown else ""
+        guess = span_of(unit.unit if unit else "", field_name(self._path), label, self._topic)
+        limits = (one for one in self._shown if one.low is not None or one.high is not None)
+        if self._limits:
+            return Span(self._limits[0], self._limits[1], guess.shape)
+        if given := next(limits, None):
+            return _limited(given, guess)
+        if unit is None:
+            return guess
+        low, high = sorted((end - unit.offset) / unit.scale for end in (guess.low, guess.high))
+        return Span(low, high, guess.shape)
+
+    def _permitting(self, interlocks: Sequence[Interlock]) -> Signal:
+        entry, kind = self._entry, self._kind.name
+        if entry.values:
+            return cycle(entry.values, self._round_s)
+        if self._limits and (kind in INTEGER_RANGES or kind in FLOAT_TYPES):
+            return moving(Span(self._limits[0], self._limits[1]), kind, entry.period_s, 0.0)
+        others = [value for one in self._shown for value in one.values]
+        others += [*self._constants, *interlocks[0].constants]
+        offset = self._of.offsets[self._topic, self._path]
+        return permitting(interlocks, kind, others, offset, entry.period_s)
+
+    @cached_property
+    def _parent(self) -> str:
+        """The type of the message that the field is in."""
+        around = parent_path(self._path)
+        return self._of.interfaces.field_type(self._type, around) if around else self._type
+
+    @property
+    def _constants(self) -> list[Any]:
+        structure = self._of.interfaces.structures.get(self._parent)
+        return [] if structure is None else field_constants(field_name(self._path), structure)
+
+    @cached_property
+    def _own(self) -> list[Any]:
+        """The values that it has as a field of a type whose fields belong together; none elsewhere."""
+        if self._parent not in KNOWN and self._type not in KNOWN:
+            return []
+        steps = path_steps(self._path)
+        found = (get(self._message(Moment(t, 0)), steps) for t in SAMPLES_S)
+        return list(dict.fromkeys(value for value in found if value is not None))
+
+
+def _limited(given: Shown, guess: Span) -> Span:
+    """The limits of a widget; one that it does not give is far from the other."""
+    low, high = given.low, given.high
+    if low is None:
+        assert high is not None
+        low = min(guess.low, high - 1)
+    return Span(low, max(guess.high, low + 1) if high is None else high, guess.shape)

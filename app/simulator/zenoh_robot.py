@@ -1,0 +1,89 @@
+"""A simulated robot on Zenoh: its topics, services and actions, and their liveliness tokens."""
+
+import threading
+from collections.abc import Iterator
+from typing import Any
+
+import zenoh
+from zenoh.handlers import Callback
+
+from app.dialect import bridge_dialect
+from app.interfaces import Interfaces, names
+from app.simulator.known_types import Moment
+from app.simulator.simulated import SimulatedRobot, Topic
+from app.simulator.zenoh_action import Answer, PlayedAction, latched, served
+
+
+class PlayedRobot:
+    """One robot, in its namespace."""
+
+    def __init__(
+        self,
+        session: zenoh.Session,
+        namespace: str,
+        robot: SimulatedRobot,
+        interfaces: Interfaces,
+        lock: threading.Lock,
+    ) -> None:
+        self._session = session
+        self._namespace = namespace
+        self._robot = robot
+        self._lock = lock
+        self._publishers = {
+            topic: self._publisher(topic, about) for topic, about in robot.publishes.items()
+        }
+        self._actions = [
+            PlayedAction(session, self._key(name), action, interfaces, lock)
+            for name, action in robot.actions.items()
+        ]
+        self._declared = [
+            *(self._subscriber(topic) for topic in robot.subscribes),
+            *(served(session, self._key(one), self._server(one)) for one in robot.services),
+        ]
+
+    def tokens(self, zid: str) -> Iterator[str]:
+        """The liveliness tokens of its endpoints."""
+        robot, key = self._robot, self._key
+        for topic, of in robot.subscribes.items():
+            yield bridge_dialect.token(zid, "MS", key(topic), of.type, of.qos, of.type_hash)
+        for topic, of in robot.publishes.items():
+            yield bridge_dialect.token(zid, "MP", key(topic), of.type, of.qos, of.type_hash)
+        for service, name in robot.services.items():
+            yield bridge_dialect.server_token(zid, "SS", key(service), name)
+        for action, server in robot.actions.items():
+            yield bridge_dialect.server_token(zid, "AS", key(action), server.type)
+
+    def step(self, moment: Moment) -> None:
+        with self._lock:
+            messages = list(self._robot.step(moment))
+        for topic, payload in messages:
+            self._publishers[topic].put(payload)
+        for action in self._actions:
+            action.step()
+
+    def _key(self, topic: str) -> str:
+        return names.key_of(topic, self._namespace)
+
+    def _publisher(self, topic: str, about: Topic) -> Any:
+        """What is TRANSIENT_LOCAL is kept for subscribers that come late."""
+        if about.qos.transient_local:
+            return latched(self._session, self._key(topic))
+        return self._session.declare_publisher(self._key(topic))
+
+    def _subscriber(self, topic: str) -> Any:
+        """What the robot itself publishes is no press."""
+
+        def on_sample(sample: zenoh.Sample) -> None:
+            with self._lock:
+                self._robot.receive(topic, sample.payload.to_bytes())
+
+        return self._session.declare_subscriber(
+            self._key(topic), Callback(on_sample, indirect=False), allowed_origin=zenoh.Locality.REMOTE
+        )
+
+    def _server(self, service: str) -> Answer:
+        def answer(payload: bytes) -> bytes | None:
+            with self._lock:
+                return self._robot.serve(service, payload)
+
+        return answer
