@@ -36,6 +36,7 @@ from app.web.request_body import LONGEST
 from app.web.routes import audit_log as log_routes
 from app.web.routes import (
     control,
+    display,
     events,
     health,
     hold_socket,
@@ -114,7 +115,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     for routes in (pages, events, presses, press_socket, control, hold_socket, parameters):
         app.include_router(routes.router)
         app.include_router(routes.router, prefix="/robots/{robot}", dependencies=[Depends(named_robot)])
-    for common in (static, health):
+    for common in (static, health, display):
         app.include_router(common.router)
     app.include_router(log_routes.router, responses=errors(403, 404, 422, 503))
     return app
@@ -128,9 +129,8 @@ async def _app_state(
     async with open_log(settings, panel) as oplog:
         check_port(server)
         kinds: set[str] = {widget.kind for widget in panel.widgets()}
-        if any(len(widget.interlocks) > 1 for widget in panel.commands):
-            kinds.add("interlocks")
-        assets = load_assets(shipped_path("static"), shipped_path("templates"), panel.mm_per_px, kinds)
+        static_files, templates = shipped_path("static"), shipped_path("templates")
+        assets = load_assets(static_files, templates, panel.mm_per_px, kinds, panel.picture_files)
         revision = f"{panel.revision}-{assets.revision}"
         if settings.dev:
             revision += f"-{secrets.token_hex(4)}"  # open pages reload after every restart
@@ -138,8 +138,7 @@ async def _app_state(
         metrics = Metrics(lambda: oplog.left_out, lambda: limits.refused)
         async with open_fleet(settings, panel, revision, oplog, in_process) as fleet:
             metrics.follow(fleet)
-            templates = PageTemplates(shipped_path("templates"))
-            yield AppState(fleet, assets, templates, metrics, oplog, limits)
+            yield AppState(fleet, assets, PageTemplates(templates), metrics, oplog, limits)
 
 
 async def _log_urls(server: ServerConfig | None, ports: set[int], hosts: Sequence[str]) -> None:

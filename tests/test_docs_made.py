@@ -64,8 +64,8 @@ def test_each_key_has_a_description_and_an_example_that_it_takes(table: str, key
 
 
 def test_a_key_that_nobody_has_described_is_named() -> None:
-    with pytest.raises(KeyError, match='does not say what "colour" of "panel" means'):
-        schema.about("panel", "colour")
+    with pytest.raises(KeyError, match='does not say what "shade" of "panel" means'):
+        schema.about("panel", "shade")
 
 
 def test_nothing_is_described_that_is_no_key() -> None:

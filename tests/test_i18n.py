@@ -17,11 +17,16 @@ from app.settings import PACKAGE, shipped_path
 SPEAKERS = ("say", "said", "locked", "refused")  # functions whose first argument is a code
 PREFIXES = (
     "control_",
+    "display_",
+    "display_hand_",
+    "display_text_size_",
+    "display_theme_",
     "lamp_",
     "log_",
     "log_done_",
     "log_page_",
     "log_page_control_",
+    "state_",
 )  # of codes that are put together
 SENTENCES = sentences(ENGLISH)
 

@@ -38,6 +38,7 @@ COMMON = {
     "app.i18n",
     "app.i18n.__main__",
     "app.i18n.catalogue",
+    "app.icons",
     "app.i18n.text",
     "app.printable",
     "app.rate_limit",

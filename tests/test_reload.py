@@ -72,9 +72,9 @@ def test_every_kind_of_change_reaches_an_open_browser(checkout: Checkout, page: 
     expect(page.get_by_role("button", name="Publish1")).to_be_visible()
     checkout.edit("app/panel.toml", 'label = "Publish1"', 'label = "Pick up"')
     expect(page.get_by_role("button", name="Pick up")).to_be_visible(timeout=STARTED_MS)
-    checkout.edit("templates/screen.html", "<h2>{{ page.title }}</h2>", "<h2>A new heading</h2>")
+    checkout.edit("templates/screen.html", ">{{ page.title }}</h2>", ">A new heading</h2>")
     expect(page.get_by_role("heading", name="A new heading")).to_be_visible(timeout=STARTED_MS)
-    checkout.edit("static/css/tokens.css", "--ground: #d8dbde", "--ground: #123456")
+    checkout.edit("static/css/tokens.css", "--ground: #bbc2c8", "--ground: #123456")
     expect(page.locator("body")).to_have_css("background-color", "rgb(18, 52, 86)", timeout=STARTED_MS)
     checkout.edit("app/i18n/en.po", 'msgstr "Server"', 'msgstr "Changed server"')
     expect(page.locator('[data-lamp="server"]')).to_contain_text("Changed server", timeout=STARTED_MS)
@@ -86,8 +86,8 @@ def test_a_panel_with_a_fault_is_a_page_that_says_where_until_it_is_mended(
     page.goto(checkout.server.url)
     expect(page.get_by_role("button", name="Publish1")).to_be_visible()
     checkout.edit("app/panel.toml", 'kind = "readout"', 'kind = "readuot" # <b>')
-    fault = 'page[0].widget[4].kind "last_heard", line 54: unknown kind "readuot"'
-    expect(page.locator("li")).to_contain_text(fault, timeout=STARTED_MS)
+    fault = 'page[0].group[0].widget[1].kind "last_heard", line 42: unknown kind "readuot"'
+    expect(page.locator("li").first).to_contain_text(fault, timeout=STARTED_MS)
     expect(page.locator("h1")).to_contain_text("app/panel.toml can't be used:")
     answer = checkout.server.http.get("/pages/operation")
     assert (answer.status_code, answer.headers["refresh"]) == (503, "1")

@@ -1,8 +1,9 @@
 """The panel file: parses TOML into frozen, checked descriptions."""
 
 from app.panel.interlock import Interlock
+from app.panel.layout import Page
 from app.panel.load import Checked, check_panel, load_panel
-from app.panel.model import Page, Panel
+from app.panel.model import Panel
 from app.panel.widgets.displays import Indicator, LampState, Readout
 from app.panel.widgets.families import Display, Input
 from app.panel.widgets.hold import Hold

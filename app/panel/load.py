@@ -12,6 +12,7 @@ from app.panel.checks.panel import find_faults
 from app.panel.constants import resolve_interlock
 from app.panel.faults.toml_file import TomlFile, read_toml
 from app.panel.model import Panel
+from app.panel.widgets.families import BaseWidget
 
 CacheFolder = Callable[[Panel], Path | None]
 
@@ -63,10 +64,16 @@ def _load(file: TomlFile, kept: CacheFolder = lambda _: None) -> Panel:
 
 def _resolve_constants(panel: Panel, interfaces: Interfaces) -> Panel:
     """The panel with values in place of constants' names in lamps and interlocks."""
-    pages = [
-        page.model_copy(update={"widgets": tuple(w.with_constants(interfaces) for w in page.widgets)})
-        for page in panel.pages
-    ]
+
+    def resolved(widgets: Iterable[BaseWidget]) -> tuple[BaseWidget, ...]:
+        return tuple(widget.with_constants(interfaces) for widget in widgets)
+
+    pages = []
+    for page in panel.pages:
+        groups = [
+            group.model_copy(update={"widgets": resolved(group.widgets)}) for group in page.groups
+        ]
+        pages.append(page.model_copy(update={"own": resolved(page.own), "groups": tuple(groups)}))
     interlocks = tuple(resolve_interlock(one, interfaces) for one in panel.interlocks)
     return panel.model_copy(update={"pages": tuple(pages), "interlocks": interlocks})
 

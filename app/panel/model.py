@@ -1,7 +1,9 @@
 """The descriptions of a panel and its pages. docs/reference/panel-file.md describes each key."""
 
+import re
 from collections.abc import Iterator, Mapping
 from functools import cached_property
+from pathlib import Path
 from typing import Annotated, Final, Literal
 
 from pydantic import AfterValidator, Field
@@ -9,12 +11,13 @@ from pydantic import AfterValidator, Field
 from app.panel.base import Description, Endpoint, Folder, Id, Label, TopicQos, parse_namespace
 from app.panel.demo import DemoEntry
 from app.panel.interlock import Interlock
+from app.panel.layout import Frame, Hand, Page, Screens, TextSize, Theme
 from app.panel.rules import ControlRules, LogRules, RecordRules
 from app.panel.widgets.families import BaseWidget, Command, Display, PublishCommand, TopicWidget
-from app.panel.widgets.kinds import Widget
 from app.panel.widgets.parameter import EVENT_TYPE, EVENTS, Parameter
 from app.panel.widgets.publish import Confirm, SinglePublish
 from app.panel.widgets.service_action import Action
+from app.panel.widgets.static import PICTURE
 
 
 class RobotEntry(Description):
@@ -32,12 +35,6 @@ class RobotEntry(Description):
 EVENTS_QOS: Final = TopicQos(durability="volatile", depth=1000)
 
 
-class Page(Description):
-    id: Id
-    title: Label
-    widgets: Annotated[tuple[Widget, ...], Field(strict=False)] = Field((), alias="widget")
-
-
 class Panel(Description):
     title: Label
     mode: Literal["demo", "live"] = "live"
@@ -48,6 +45,12 @@ class Panel(Description):
     press_expires_s: Annotated[float, Field(ge=0.5, le=60)] = 2.0
     display_hz: Annotated[float, Field(ge=1, le=60)] = 20.0
     mm_per_px: Annotated[float, Field(gt=0.02, lt=1)] = 0.22
+    theme: Theme = "light"
+    text_size: TextSize = "normal"
+    hand: Hand = "right"
+    screens: Screens = ()
+    pictures: Folder | None = None
+    frame: Frame = Frame.model_validate({})
     control: ControlRules = ControlRules(required=False)
     record: RecordRules | None = None
     robots: Annotated[tuple[RobotEntry, ...], Field(strict=False)] = Field((), alias="robot")
@@ -58,9 +61,16 @@ class Panel(Description):
     # Computed from the file: differs when loaded pages are out of date.
     revision: Annotated[str, Field(exclude=True)] = ""
 
+    @cached_property
+    def picture_files(self) -> dict[str, Path]:
+        """The files of the folder of pictures by their names."""
+        files = sorted(self.pictures.iterdir()) if self.pictures else []
+        return {file.name: file for file in files if re.fullmatch(PICTURE, file.name)}
+
     def widgets(self) -> Iterator[BaseWidget]:
         for page in self.pages:
             yield from page.widgets
+        yield from self.frame.widgets
 
     @cached_property
     def commands(self) -> tuple[Command, ...]:

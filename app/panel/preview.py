@@ -17,10 +17,13 @@ def previews(panel: Panel, interfaces: Interfaces) -> Iterator[Remark]:
     for p, page in enumerate(panel.pages):
         comments = {w.id: w.comment for w in page.widgets if isinstance(w, Input)}
         comments[NOW] = "the time of sending"
-        for w, widget in enumerate(page.widgets):
+        for place, widget in page.placed():
             if isinstance(widget, Command):
                 lines = _preview_lines(widget, interfaces, comments)
-                yield Remark(f"page[{p}].widget[{w}]", "\n".join(lines))
+                yield Remark(f"page[{p}].{place}", "\n".join(lines))
+    for w, widget in enumerate(panel.frame.widgets):
+        if isinstance(widget, Command):
+            yield Remark(f"frame.widget[{w}]", "\n".join(_preview_lines(widget, interfaces, {})))
 
 
 def _preview_lines(widget: Command, interfaces: Interfaces, comments: Comments) -> Iterator[str]:

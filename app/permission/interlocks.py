@@ -156,7 +156,7 @@ def publish_blocked(of: PublishCommand, robot: RobotState) -> Verdict | None:
 def call_blocked(call: ServerCommand, robot: RobotState, now: float) -> Verdict | None:
     """Why a service may not be called or a goal not be sent: its server is not there with its type,
     or an answer is awaited."""
-    role, name = call.role, call.server_name
+    role, name = call.server_role, call.server_name
     key = robot.key(name)
     found = robot.graph.server_type(role, key)
     if found is None:

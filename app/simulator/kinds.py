@@ -136,7 +136,7 @@ def _pressed(command: SinglePublish, _: Interfaces) -> Iterator[Need]:
 
 
 def _server(command: ServerCommand, _: Interfaces) -> Iterator[Need]:
-    if command.role == "SS":
+    if command.server_role == "SS":
         yield Served(service=command.server_name, type=command.type)
     else:
         yield Acted(action=command.server_name, type=command.type)

@@ -12,6 +12,7 @@ from app.panel.widgets.kinds import find_row
 from app.panel.widgets.numbers import Numeric
 from app.panel.widgets.parameter import Parameter
 from app.panel.widgets.publish import SinglePublish
+from app.panel.widgets.static import Static
 from app.permission.interlocks import PERMITTED, Verdict
 from app.robot.command_status import IDLE, CommandStatus
 from app.robot.state import RobotState
@@ -88,6 +89,7 @@ def _parameter(widget: Parameter, robot: RobotState, verdict: Verdict, now: floa
 
 
 SHOWN: Final[Mapping[type[BaseWidget], Callable[[Any, RobotState, Verdict, float], Shown]]] = {
+    Static: lambda of, robot, verdict, now: ({}, math.inf),
     Input: lambda of, robot, verdict, now: ({}, math.inf),
     Numeric: lambda of, robot, verdict, now: ({"limits": of.limits_text}, math.inf),
     PressCommand: _pressed,

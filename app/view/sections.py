@@ -1,20 +1,21 @@
 """The sections of a view: a row for each, the same for a page, a snapshot and the events after it."""
 
 from collections.abc import Callable, Mapping
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, Literal, NamedTuple
 
 Events = dict[str, Mapping[str, Any]]  # the data of each by its name, in their order
 
 
 class Section(NamedTuple):
     """`name` is its key in a view and in a snapshot, `events` what brings a browser from one content
-    to another. `template` is its part of a page between the header and the widgets, "" where it has
-    its place elsewhere; `shown` says for which content that is there."""
+    to another. `template` is its part of a page, in the header or below it (`place`), "" where the page
+    itself has it; `shown` says for which content that is there."""
 
     name: str
     events: Callable[[str, Any, Any], Events]
     template: str = ""
     shown: Callable[[Any], bool] = bool
+    place: Literal["below", "header"] = "below"
 
 
 def whole(name: str, old: Any, new: Any) -> Events:
@@ -47,7 +48,8 @@ SECTIONS: Final = (
     Section("link", whole, "sections/link.html"),
     Section("notice", whole, "sections/notice.html"),
     Section("robots", whole, "sections/robots.html"),
-    Section("control", whole, "sections/control.html", shown=lambda control: control["required"]),
+    Section("state", whole),
+    Section("control", whole, "sections/control.html", lambda of: of["required"], place="header"),
 )
 
 

@@ -20,6 +20,7 @@ from app.permission.press_permission import Grounds, Question, permission
 from app.robot.state import RobotState
 from app.view.kinds import Attributes, Enabled, enabled, show
 from app.view.link_status import Lamp, LinkStatus, link_statuses, summary
+from app.view.robot_state import UNKNOWN, RobotWord, robot_word
 
 
 class Notice(TypedDict):
@@ -37,6 +38,7 @@ class View(TypedDict):
     interlocks: dict[str, Enabled]
     widgets: dict[str, dict[str, Any]]
     notice: Notice
+    state: RobotWord
     robots: dict[str, Lamp]
     control: ControlView
 
@@ -93,6 +95,7 @@ def build_view(
         interlocks={i: enabled(verdict) for i, verdict in interlocks.items()},
         widgets={name: attributes for name, (attributes, _) in widgets.items()},
         notice=Notice(banner=banner, fault=fault),
+        state=robot_word(passable, interlocks.values()),
         robots=dict(robots),
         control=control,
     )
@@ -122,6 +125,7 @@ def lock_all(seen: ViewWithDeadlines, reason: Text) -> ViewWithDeadlines:
     view = seen.view.copy()
     view["interlocks"] = {name: locked(one) for name, one in view["interlocks"].items()}
     view["widgets"] = {name: locked(one) for name, one in view["widgets"].items()}
+    view["state"] = UNKNOWN
     without = {name: locked(one) for name, one in seen.without_control.items()}
     return seen._replace(view=view, without_control=without)
 

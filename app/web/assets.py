@@ -10,15 +10,14 @@ styles apart stay here.
 import gzip
 import hashlib
 import re
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-LAYERS: Final = ("tokens", "base", "layout", "widgets")
+LAYERS: Final = ("tokens", "base", "layout", "widgets", "keys")
 OF_KINDS: Final = {
-    "entries": frozenset({"number", "slider", "toggle", "parameter"}),
-    "reasons": frozenset({"interlocks"}),
+    "entries": frozenset({"text", "number", "slider", "select", "toggle", "parameter"}),
 }
 OWN_PAGE: Final = "log"
 LEFT_OUT: Final = {
@@ -26,6 +25,15 @@ LEFT_OUT: Final = {
     ".js": re.compile(rb"^[ \t]*(//.*)?", re.MULTILINE),
 }
 MEDIA_TYPES: Final = {".css": "text/css", ".js": "text/javascript"}
+PICTURES: Final = "pictures"
+NO_PICTURES: Final[Mapping[str, Path]] = {}
+PICTURE_TYPES: Final = {
+    ".svg": "image/svg+xml",
+    ".png": "image/png",
+    ".jpg": "image/jpeg",
+    ".jpeg": "image/jpeg",
+    ".webp": "image/webp",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,11 +60,24 @@ class Assets:
     scripts: frozenset[str] = frozenset()  # the kinds of widgets that have a script of their own
 
 
-def load_assets(static: Path, templates: Path, mm_per_px: float, kinds: Collection[str]) -> Assets:
+def picture(file: Path) -> Asset:
+    """A picture of the panel; of these kinds only SVG is worth packing, and the others are sent as they
+    are."""
+    content = file.read_bytes()
+    return Asset(content, PICTURE_TYPES[file.suffix], gzip.compress(content, mtime=0))
+
+
+def load_assets(
+    static: Path,
+    templates: Path,
+    mm_per_px: float,
+    kinds: Collection[str],
+    pictures: Mapping[str, Path] = NO_PICTURES,
+) -> Assets:
     """Reads `static`, and `templates` for the revision only.
 
     `mm_per_px` (millimetres per CSS pixel) gives the sizes of buttons; `kinds` are those of the panel's
-    widgets, and "interlocks" where one has several.
+    widgets.
     """
     needed = [name for name, of in OF_KINDS.items() if not of.isdisjoint(kinds)]
     layers = [(static / "css" / f"{name}.css").read_bytes() for name in (*LAYERS, *needed)]
@@ -69,6 +90,7 @@ def load_assets(static: Path, templates: Path, mm_per_px: float, kinds: Collecti
     scripts = static / "js"
     for script in sorted(scripts.rglob("*.js")):
         files[script.relative_to(scripts).as_posix()] = asset(script.read_bytes(), ".js")
+    files |= {f"{PICTURES}/{name}": picture(file) for name, file in pictures.items()}
     digest = hashlib.sha256()
     for name, file in sorted(files.items()):
         digest.update(name.encode() + b"\0" + file.content + b"\0")

@@ -36,10 +36,10 @@ def errors(*statuses: int) -> Described:
 
 
 def described_body(
-    model: type[BaseModel], form: dict[str, Any] | None, *, required: bool
+    model: type[BaseModel] | None, form: dict[str, Any] | None, *, required: bool
 ) -> dict[str, Any]:
-    """JSON or, where there is a schema of one, a form: as a route's `openapi_extra`."""
-    content = {JSON: {"schema": model.model_json_schema()}}
+    """JSON, a form or either, by what there is a schema of: as a route's `openapi_extra`."""
+    content = {JSON: {"schema": model.model_json_schema()}} if model else {}
     if form is not None:
         content[FORM] = {"schema": form}
     return {"requestBody": {"required": required, "content": content}}

@@ -14,6 +14,7 @@ from app.errors import KioskError, TooMany, TooSlow
 from app.i18n import TextLike, render
 from app.printable import printable
 from app.web.app_state import site_of
+from app.web.display_choice import display_of
 from app.web.language import language_of
 
 TRY_AGAIN: Final = {"refresh": "1"}  # seconds
@@ -24,7 +25,9 @@ def error_answer(request: Request, status: int, message: TextLike) -> Response:
     site, language = site_of(request), language_of(request)
     if "text/html" not in request.headers.get("accept", ""):
         return JSONResponse({"error": render(message, language)}, status_code=status)
-    context = {"site": site, "panel": site.fleet.panel, "status": status, "message": message}
+    panel = site.fleet.panel
+    display = display_of(request, panel)
+    context = {"site": site, "panel": panel, "display": display, "status": status, "message": message}
     html = site.templates.render("error.html", language, **context)
     return HTMLResponse(html, status_code=status, headers={"cache-control": "no-store"})
 

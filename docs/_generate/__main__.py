@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Final
 
+from docs._generate.icon_names import icon_list
 from docs._generate.keys import key_tables
 from docs._generate.locks import lock_tables
 from docs._generate.places import models_table, paths_table, sentences_table
@@ -25,6 +26,7 @@ def files() -> Iterator[tuple[Path, str]]:
     yield SCHEMA, json.dumps(panel_schema(), indent=1, ensure_ascii=False) + "\n"
     pages: Mapping[str, Mapping[str, str]] = {
         "reference/panel-file.md": key_tables(),
+        "reference/icons.md": {"icons": icon_list()},
         "reference/locks.md": lock_tables(),
         "reference/settings.md": {"settings": settings_table()},
         "reference/sentences.md": {"sentences": sentences_table()},

@@ -37,6 +37,8 @@ FORMATS: Final[Mapping[str, tuple[str, str]]] = {
     "namespace": ("namespace", ""),
     "connect": ("Zenoh endpoint", ""),
     "interfaces": ("folder", ""),
+    "screens": ("width x height", ""),
+    "icon": ("name of an icon", ""),
     "field": ("field path", ""),
     "success": ("field path", ""),
     "call.message": ("field path", ""),
@@ -57,7 +59,8 @@ def panel_schema() -> Schema:
     models = {id(table): name for name, table in by_name.items()}
     names = {REF + model: REF + models[id(table)] for model, table in definitions.items()}
     kinds = kinds_of(tables)
-    by_name["page"]["properties"]["widget"]["items"] = {"$ref": REF + WIDGET}
+    for owner in ("page", "group", "frame"):
+        by_name[owner]["properties"]["widget"]["items"] = {"$ref": REF + WIDGET}
     by_name[WIDGET] = _widget(kinds)
     whole = {
         "$schema": "http://json-schema.org/draft-07/schema#",

@@ -50,6 +50,12 @@ function showRobots(robots) {
   }
 }
 
+function showState({ state, text }) {
+  const box = document.getElementById("state");
+  box.dataset.state = state;
+  setText(box.querySelector("b"), text);
+}
+
 function showNotice(notice) {
   for (const [id, text] of Object.entries(notice)) {
     const element = document.getElementById(id);
@@ -64,6 +70,7 @@ function lockAll() {
   body.dataset.cut = "";
   control.lost();
   const { lostShort, locksAll, lost, unknown } = body.dataset;
+  showState({ state: "lost", text: lostShort });
   showLamp("server", { state: "bad", text: lostShort, since: clock.textContent, locks: locksAll, reason: lost });
   for (const name of ["bridge", "node"]) {
     showLamp(name, { state: "wait", text: unknown, since: "", locks: "", reason: "" });
@@ -95,6 +102,7 @@ const SECTIONS = {
   widgets: showWidgets,
   link: showLink,
   notice: showNotice,
+  state: showState,
   robots: showRobots,
 };
 
@@ -131,5 +139,7 @@ for (const kind of body.dataset.scripts.split(" ").filter(Boolean)) {
     for (const root of roots) equip?.(root, source);
   });
 }
+if (document.querySelector(".group-tab")) source.load("./tabs.js", () => {});
+source.load("./whole.js", () => {});
 const presser = new Presser(widgets, source, { unsure: body.dataset.unsure });
 source.start();

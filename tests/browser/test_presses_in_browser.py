@@ -83,7 +83,7 @@ def test_a_press_leaves_once_within_its_event_and_then_shows(shown: Page, by: st
     if way == "post":
         shown.route("**/line.js", lambda route: route.abort())
     else:
-        shown.get_by_role("heading", name="Operation", exact=True).click()
+        shown.locator("header h1").click()
         shown.wait_for_function("() => opened")
     began = shown.evaluate("Date.now()")
     make(shown, by)
@@ -112,7 +112,7 @@ def test_each_press_has_an_id_of_its_own(shown: Page) -> None:
 def test_a_locked_button_is_pressed_by_no_program(shown: Page, by: str) -> None:
     publish(shown).evaluate("(button) => { button.disabled = true; }")
     make(shown, by)
-    shown.evaluate("() => document.querySelector('main form').requestSubmit()")
+    shown.evaluate("() => document.querySelector('form.page').requestSubmit()")
     publish(shown).evaluate("(button) => { button.disabled = false; }")
     publish(shown).press("Enter")
     expect(receipt(shown)).to_contain_text("Sent on /operation at")
@@ -122,7 +122,7 @@ def test_a_locked_button_is_pressed_by_no_program(shown: Page, by: str) -> None:
 def test_a_button_that_opens_under_a_resting_finger_is_not_pressed(shown: Page) -> None:
     shown.evaluate(
         "() => { window.clicks = 0;"
-        " document.querySelector('main form').addEventListener('click', () => clicks++); }"
+        " document.querySelector('form.page').addEventListener('click', () => clicks++); }"
     )
     publish(shown).evaluate("(button) => { button.disabled = true; }")
     publish(shown).hover(force=True)

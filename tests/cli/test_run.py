@@ -85,7 +85,7 @@ def test_a_faulty_panel_file_is_told_with_its_places(tmp_path: Path) -> None:
     panel.write_text(SHIPPED.read_text().replace('kind = "text"', 'kind = "txt"'))
     text = said(str(panel), "--port", str(free_port()), status=1)
     assert text.splitlines()[0] == f"{panel} can't be used:"
-    assert 'page[0].widget[0].kind "message", line 22: unknown kind "txt"' in text
+    assert 'page[0].group[0].widget[2].kind "message", line 50: unknown kind "txt"' in text
     missing = said(str(tmp_path / "none.toml"), "--port", str(free_port()), status=1)
     assert missing == f"{tmp_path / 'none.toml'} can't be used:\n  No such file or directory\n"
 

@@ -26,9 +26,11 @@ def faulty(tmp_path: Path) -> Path:
 def test_a_good_panel_is_summed_up(capsys: pytest.CaptureFixture[str]) -> None:
     assert main([str(SHIPPED)]) == 0
     said = capsys.readouterr()
-    first, note = said.out.splitlines()
-    assert first == f'{SHIPPED}: good: "Robot cell 1", 1 page(s), 5 widget(s)'
-    assert note.startswith('  note: interlock[0] "operation", line 10: the last value on ')
+    first, note, *fits = said.out.splitlines()
+    assert first == f'{SHIPPED}: good: "Robot cell 1", 3 page(s), 29 widget(s)'
+    assert note.startswith('  note: interlock[0] "operation", line 11: the last value on ')
+    screens = "1280x800, 1024x600, 800x480, 800x1280"
+    assert [line.partition("fits ")[2] for line in fits] == [screens, screens]
     assert said.err == ""
 
 
@@ -39,7 +41,7 @@ def test_a_permission_that_is_kept_fresh_needs_no_note(
     path = tmp_path / "cell.toml"
     path.write_text(SHIPPED.read_text().replace('field = "data"\n', f'field = "data"\n{rule}\n', 1))
     assert main([str(path)]) == 0
-    assert "note:" not in capsys.readouterr().out
+    assert "interlock[0]" not in capsys.readouterr().out
 
 
 def test_every_fault_is_printed_with_its_place(
@@ -52,7 +54,7 @@ def test_every_fault_is_printed_with_its_place(
     assert first == f"{faulty} can't be used:"
     assert [line.split(": ")[0] for line in lines] == [
         "  title",
-        '  page[0].widget[4].topic "last_heard", line 55',
+        '  page[0].group[0].widget[1].topic "last_heard", line 43',
     ]
 
 
@@ -116,14 +118,14 @@ def test_it_tells_how_it_is_used(capsys: pytest.CaptureFixture[str]) -> None:
 def test_a_note_is_no_fault_and_has_its_place(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    noted = [Note("interlock[0]", "is worth a look"), Note("page[0].widget[4].max_age_s", "is missing")]
+    noted = [Note("interlock[0]", "is worth a look"), Note("page[0].group[0].widget[1].span", "is large")]
     monkeypatch.setattr("app.panel.checks.notes.find_notes", lambda *_: noted)
     assert main([str(SHIPPED)]) == 0
     said = capsys.readouterr()
     assert said.err == ""
     assert said.out.splitlines()[1:] == [
-        '  note: interlock[0] "operation", line 10: is worth a look',
-        '  note: page[0].widget[4].max_age_s "last_heard", line 52: is missing',
+        '  note: interlock[0] "operation", line 11: is worth a look',
+        '  note: page[0].group[0].widget[1].span "last_heard", line 46: is large',
     ]
     load_panel(SHIPPED)
 
@@ -136,6 +138,7 @@ def test_the_whole_message_of_each_press_is_printed(
     jog = tmp_path / "msgs/cell_msgs/msg/Jog.msg"
     jog.parent.mkdir(parents=True)
     jog.write_text("float64 speed\nuint32 valid_ms\nuint16 number\n")
+    (tmp_path / "msgs/plan.svg").write_text("<svg/>")
     assert main(["-v", str(path)]) == 0
     first, _, said = capsys.readouterr().out.partition("\n")
     assert "good" in first

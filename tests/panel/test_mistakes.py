@@ -15,6 +15,7 @@ from app.errors import Fault, PanelError
 from app.panel import load_panel
 from app.panel.faults.table_keys import inner_model, known_keys
 from app.panel.interlock import CONDITIONS
+from app.panel.layout import Page
 from app.panel.model import Panel
 from app.panel.widgets.kinds import KINDS
 from tests.support.parts import TESTS
@@ -24,7 +25,9 @@ LINES: Final = GOOD.splitlines()
 TABLES: Final = tomllib.loads(GOOD)
 KEY: Final = re.compile(r"([a-z_.]+) = ")
 HEADER: Final = re.compile(r'\[+([a-z_.]+)(?:\."[^"]*")?\]+')
-WITH_ID: Final = re.compile(r"\[\[(?:page|page\.widget|robot|interlock)\]\]")
+WITH_ID: Final = re.compile(
+    r"\[\[(?:page|page\.widget|page\.group\.widget|frame\.widget|robot|interlock)\]\]"
+)
 # What belongs to Python, its libraries and this program, and means nothing to who writes a panel.
 INTERNAL: Final = re.compile(
     r"pydantic|valid(ation|ator)|Literal|<class|Traceback|datetime|\bNone\b|\bTrue\b|\bFalse\b|\bdict\b"
@@ -41,6 +44,7 @@ def told(tmp_path_factory: pytest.TempPathFactory) -> Told:
     messages.mkdir(parents=True)
     (messages / "Jog.msg").write_text("float64 speed\nuint32 valid_ms\nuint16 number\n")
     (messages / "Wear.msg").write_text("float65 hours\n")
+    (folder / "msgs/plan.svg").write_text("<svg/>")
     path = folder / "cell.toml"
 
     def faults(text: str) -> list[Fault]:
@@ -73,6 +77,8 @@ def id_at(number: int) -> str:
         name = HEADER.fullmatch(LINES[header - 1])
         if name and "." not in name[1]:
             return ""
+        if name and name[1] == "page.group":
+            return id_at(max(n for n in range(1, header) if LINES[n - 1] == "[[page]]"))
         header -= 1
     return LINES[header].removeprefix('id = "').removesuffix('"') if header else ""
 
@@ -82,7 +88,7 @@ def lacking(table: Mapping[str, Any], model: Any, where: str = "") -> Iterator[s
     for key in known_keys(model):
         if key not in table:
             yield f"{where}{key}"
-        elif (within := inner_model(model, key)) and key != "page":
+        elif (within := inner_model(model, key)) and key not in ("page", "widget"):
             tables = list(table[key].values()) if key == "demo" else [table[key]]
             parts = table[key] if isinstance(table[key], list) else tables
             yield from lacking({k: v for part in parts for k, v in part.items()}, within, f"{key}.")
@@ -93,7 +99,10 @@ def test_the_panel_with_everything_is_good_and_has_everything(told: Told) -> Non
     conditions = [f"interlock.{key}" for key in (*CONDITIONS, "unit")]  # not all fit one interlock
     # There are robots, which have their own namespaces.
     assert list(lacking(TABLES, Panel)) == ["namespace", *conditions]
-    widgets = [widget for page in TABLES["page"] for widget in page["widget"]]
+    pages, groups = TABLES["page"], [one for page in TABLES["page"] for one in page.get("group", ())]
+    widgets = [widget for part in (*pages, *groups, TABLES["frame"]) for widget in part["widget"]]
+    together = {key: value for page in pages for key, value in page.items()}
+    assert list(lacking(together, Page)) == []
     for kind, model in KINDS.items():
         own = {k: v for widget in widgets if widget["kind"] == kind for k, v in widget.items()}
         qos = {k: v for w in widgets if w["kind"] == kind for k, v in w.get("qos", {}).items()}
@@ -146,6 +155,8 @@ def test_a_misspelt_key_or_table_is_one_fault(told: Told, number: int) -> None:
 SHOWS_AT: Final[Mapping[str, str]] = {
     'title = "Robot cell 1"': "",
     'interfaces = ["msgs"]': 'type = "cell_msgs/msg/Jog"',
+    'pictures = "msgs"': 'src = "plan.svg"',
+    'role = "reset"': 'colour = "blue"',
     'durability = "volatile"': 'qos = { durability = "volatile" }',
 }
 
@@ -193,9 +204,9 @@ def test_a_mistake_is_one_fault_in_words(told: Told, mistake: Mapping[str, str])
 def test_it_is_not_toml(told: Told) -> None:
     for old, new, line in (
         ('title = "Robot cell 1"', "title = Robot cell 1", 2),
-        ('label = "Speed"', 'label = "Speed', 79),
-        ('kind = "slider"', 'kind = "slider"\nkind = "number"', 79),
-        ("min = -1.0", "min : -1.0", 81),
+        ('label = "Speed"', 'label = "Speed', 95),
+        ('kind = "slider"', 'kind = "slider"\nkind = "number"', 95),
+        ("min = -1.0", "min : -1.0", 98),
     ):
         fault = the_one(told, changed(old, new))
         assert (fault.place, fault.line) == ("", line)

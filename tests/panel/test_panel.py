@@ -14,6 +14,7 @@ from app.errors import PanelError
 from app.interfaces import DISTROS
 from app.panel import Panel, Publish, Readout, TextInput, check_panel, load_panel
 from app.panel.checks.types import ROSOUT
+from app.panel.widgets.kinds import KINDS
 from app.panel.widgets.service_action import ACTION_SERVER_TYPES
 from app.settings import PACKAGE
 from app.transport.rosout import LOG_TYPE
@@ -74,9 +75,10 @@ def faults(load: Load, given: dict[str, Any]) -> dict[str, str]:
 def test_the_shipped_panel_is_good_and_a_demo() -> None:
     panel = load_panel(PACKAGE / "panel.toml")
     assert panel.mode == "demo"
-    assert [w.id for w in panel.widgets()] == [
-        "message", "operation", "operation1", "operation2", "last_heard",
+    assert [w.id for w in panel.pages[0].widgets] == [
+        "enabled", "last_heard", "message", "operation", "operation1", "operation2",
     ]  # fmt: skip
+    assert {w.kind for w in panel.widgets()} == set(KINDS) - {"image"}  # it has no picture
     assert [i.id for i in panel.interlocks] == ["operation"]
 
 
@@ -248,7 +250,7 @@ def test_an_interlock_and_a_widget_may_have_one_id(load: Load) -> None:
             "page[0].widget[0]",
             '"kind" is missing; one of text, number, slider, select, toggle, publish',
         ),
-        (with_widget(1, colour="red"), f"{BUTTON}.colour", "unknown key; known here: id, label, span"),
+        (with_widget(1, shade="red"), f"{BUTTON}.shade", "unknown key; known here: id, label, span"),
         (with_widget(1, lable="x"), f"{BUTTON}.lable", 'did you mean "label"?'),
         (with_widget(1, max_length=3), f"{BUTTON}.max_length", "unknown key"),
         (with_widget(1, label=""), f"{BUTTON}.label", "must not be empty"),
@@ -475,7 +477,7 @@ def test_keys_that_are_unknown_in_a_widget_are_told_together(load: Load) -> None
     page = {"id": "one", "title": "One", "widget": [text]}
     assert faults(load, tables(page=[page])) == {
         "page[0].widget[0].scale": (
-            'unknown key, as "offset"; known here: id, label, span, kind, max_length, default'
+            'unknown key, as "offset"; known here: id, label, span, rows, kind, max_length, default'
         )
     }
 

@@ -77,6 +77,7 @@ def test_a_changed_permission_is_sent_by_its_name_and_at_its_widgets(
         "operation-enabled-updated": {"enabled": True, "reason": None},
         "update": {"guarded": {"enabled": True, "reason": None}},
         "link": english(publisher.view["link"]),  # the node locks nothing any more
+        "state": {"state": "ready", "text": "READY"},
     }
 
 
@@ -179,8 +180,8 @@ def test_what_says_all_of_something_is_encoded_once_for_streams_however_far(
     sent = [events(publisher.since(version, view)) for version, view in enumerate(views, 1)]
     assert all(one["operation-enabled-updated"] == {"enabled": True, "reason": None} for one in sent)
     assert all(one["link"] == english(publisher.view["link"]) for one in sent)
-    assert [one["update"] for one in sent] == encoded[1:2] + encoded[3:]
-    assert len(encoded) == 5  # the permission and the links once, the widgets for each
+    assert [one["update"] for one in sent] == encoded[1:2] + encoded[4:]
+    assert len(encoded) == 6  # the permission, the links and the state once, the widgets for each
 
 
 def test_each_language_has_events_of_its_own_encoded_once(

@@ -47,8 +47,8 @@ def test_the_stylesheet_is_its_layers_in_order_with_the_millimetre(
 
 @pytest.mark.parametrize(
     ("kinds", "needed"),
-    [((), False), (("text", "publish", "select"), False)]
-    + [((kind,), True) for kind in ("number", "slider", "toggle", "parameter")],
+    [((), False), (("publish", "hold", "readout", "indicator"), False)]
+    + [((kind,), True) for kind in ("text", "number", "slider", "select", "toggle", "parameter")],
 )
 def test_the_stylesheet_has_what_the_panels_widgets_need(
     static: Path, templates: Path, kinds: tuple[str, ...], needed: bool
@@ -141,14 +141,3 @@ def test_no_shipped_file_loads_anything_from_elsewhere() -> None:
         assert b"http:" not in asset.content, name
         assert b"https:" not in asset.content, name
         assert b"@import" not in asset.content, name
-
-
-def test_only_a_panel_that_needs_it_gets_the_look_of_several_reasons() -> None:
-    several, single = (
-        load_assets(shipped_path("static"), shipped_path("templates"), 0.22, kinds)
-        .files["kiosk.css"]
-        .content
-        for kinds in (("publish", "interlocks"), tuple(KINDS))
-    )
-    assert b"button.why" in several
-    assert b"button.why" not in single

@@ -53,8 +53,8 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
 def test_a_page_is_in_the_language_of_its_reader(server: Server) -> None:
     pseudo = server.http.get("/", headers=PSEUDO).text
     english = server.http.get("/").text
-    assert '<html lang="qps">' in pseudo
-    assert '<html lang="en">' in english
+    assert '<html lang="qps" ' in pseudo
+    assert '<html lang="en" ' in english
     assert 'data-lost="⟦' in pseudo
     assert "⟦Server⟧" in pseudo
     assert "⟦" not in english
@@ -63,7 +63,7 @@ def test_a_page_is_in_the_language_of_its_reader(server: Server) -> None:
 
 def test_the_cookie_counts_before_the_browsers_settings(server: Server) -> None:
     given = {"cookie": f"{COOKIE}={LANGUAGE}", "accept-language": "en"}
-    assert '<html lang="qps">' in server.http.get("/", headers=given).text
+    assert '<html lang="qps" ' in server.http.get("/", headers=given).text
 
 
 def test_events_are_in_the_language_of_their_reader(server: Server) -> None:

@@ -198,7 +198,7 @@ def touched(page: Page) -> WebSocket:
     page.wait_for_function("() => document.querySelector('#clock').textContent")
     page.evaluate(NOTE_OPENED)
     with page.expect_websocket() as opened:
-        page.get_by_role("heading", name="P", exact=True).click()
+        page.locator("header h1").click()
     page.wait_for_function("() => opened")
     return opened.value
 
@@ -264,7 +264,7 @@ def test_a_press_whose_socket_breaks_is_not_known_and_not_repeated(
     expect(publish(page)).to_be_enabled()
     page.wait_for_function("() => document.querySelector('#clock').textContent")
     page.evaluate(NOTE_ENDED if fault == "it does not open" else NOTE_OPENED)
-    page.get_by_role("heading", name="P", exact=True).click()
+    page.locator("header h1").click()
     page.wait_for_function("() => opened")  # the socket is there, or not
     publish(page).click()
     receipt = page.locator("#receipt-free")

@@ -75,8 +75,8 @@ def _names(panel: Panel) -> _Names:
     types: dict[Use, Mapping[str, str]] = {
         "topic": panel.subscriptions(),
         "publication": panel.publications(),
-        "service": {one.server_name: one.type for one in servers if one.role == "SS"},
-        "action": {one.server_name: one.type for one in servers if one.role == "AS"},
+        "service": {one.server_name: one.type for one in servers if one.server_role == "SS"},
+        "action": {one.server_name: one.type for one in servers if one.server_role == "AS"},
     }
     parameters: dict[str, dict[str, Parameter]] = {}
     for widget in panel.parameters():

@@ -13,9 +13,17 @@ from app.panel.faults.wording import list_names
 from app.panel.interlock import Interlock
 from app.panel.model import Panel, RobotEntry
 from app.panel.template import NOW
-from app.panel.widgets.families import BaseWidget, CheckContext, EntryWidget, Input, TopicWidget
+from app.panel.widgets.families import (
+    BaseWidget,
+    CheckContext,
+    EntryWidget,
+    Input,
+    KeyCommand,
+    TopicWidget,
+)
 from app.panel.widgets.parameter import Parameter, type_faults
 from app.panel.widgets.publish import Confirm, SinglePublish
+from app.panel.widgets.service_action import Action
 
 
 def find_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = ()) -> Iterator[Fault]:
@@ -64,7 +72,8 @@ def _contains_any(place: str, places: Iterable[str]) -> bool:
 def _widgets_with_places(panel: Panel) -> Iterator[tuple[str, BaseWidget]]:
     """(place, widget) of every widget."""
     for p, page in enumerate(panel.pages):
-        yield from ((f"page[{p}].widget[{w}]", widget) for w, widget in enumerate(page.widgets))
+        yield from ((f"page[{p}].{place}", widget) for place, widget in page.placed())
+    yield from ((f"frame.widget[{w}]", widget) for w, widget in enumerate(panel.frame.widgets))
 
 
 def _required_type_faults(panel: Panel, interfaces: Interfaces) -> Iterator[Fault]:
@@ -96,6 +105,8 @@ def _check_context(
         interlocks=[one.id for one in panel.interlocks],
         types=panel.subscriptions(),
         faulty=faulty,
+        pages=[page.id for page in panel.pages],
+        pictures=panel.picture_files,
     )
 
 
@@ -114,9 +125,22 @@ def _interlock_faults(panel: Panel, interfaces: Interfaces) -> Iterator[Fault]:
 def _widget_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str]) -> Iterator[Fault]:
     for p, page in enumerate(panel.pages):
         checking = _check_context(panel, interfaces, page.widgets, faulty)
-        for w, widget in enumerate(page.widgets):
+        for place, widget in page.placed():
             if not isinstance(widget, Input):
-                yield from widget.faults(f"page[{p}].widget[{w}]", checking)
+                yield from widget.faults(f"page[{p}].{place}", checking)
+    yield from _frame_faults(panel, _check_context(panel, interfaces, (), faulty), faulty)
+
+
+def _frame_faults(panel: Panel, checking: CheckContext, faulty: Collection[str]) -> Iterator[Fault]:
+    for w, widget in enumerate(panel.frame.widgets):
+        place = f"frame.widget[{w}]"
+        if isinstance(widget, KeyCommand) and not isinstance(widget, Action):
+            yield from widget.faults(place, checking)
+        elif widget.id not in faulty:
+            what = (
+                f'"{widget.kind}" is not for the frame: it has keys of the kinds publish, call and hold'
+            )
+            yield Fault(f"{place}.kind", what)
 
 
 def _record_faults(panel: Panel) -> Iterator[Fault]:
@@ -168,11 +192,16 @@ def _duplicate_widget_ids(panel: Panel) -> Iterator[Fault]:
     seen: dict[str, str] = {}
     ids = [page.id for page in panel.pages]
     for p, page in enumerate(panel.pages):
-        for w, widget in enumerate(page.widgets):
-            place = f"page[{p}].widget[{w}]"
+        for at, widget in page.placed():
+            place = f"page[{p}].{at}"
             if widget.id in seen and page.id not in ids[:p]:  # not in a page with a duplicate id
                 yield Fault(f"{place}.id", f'"{widget.id}" is already the id of {seen[widget.id]}')
             seen.setdefault(widget.id, place)
+    for w, widget in enumerate(panel.frame.widgets):
+        if widget.id in seen:
+            already = f'"{widget.id}" is already the id of {seen[widget.id]}'
+            yield Fault(f"frame.widget[{w}].id", already)
+        seen.setdefault(widget.id, f"frame.widget[{w}]")
 
 
 def _topic_conflicts(panel: Panel, reported: Sequence[str]) -> Iterator[Fault]:

@@ -8,7 +8,7 @@ from typing import Final
 from app.errors import Fault
 
 MAX_PLACES: Final = 3
-OWNER: Final = re.compile(r"page\[[0-9]+\]\.widget\[[0-9]+\]\.")
+OWNER: Final = re.compile(r"(?:page\[[0-9]+\]|frame)(?:\.group\[[0-9]+\])?\.widget\[[0-9]+\]\.")
 
 
 def merge_duplicates(faults: Iterable[Fault]) -> list[Fault]:

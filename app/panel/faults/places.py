@@ -9,7 +9,10 @@ from app.errors import Remark
 from app.panel.faults.toml_lines import Path, lines_of
 
 MAX_ID: Final = 64
-_OWNER: Final = re.compile(r"(?:page\[(?P<page>[0-9]+)\]\.)?(?P<key>[a-z]+)\[(?P<index>[0-9]+)\]")
+_OWNER: Final = re.compile(
+    r"(?:^|\.)(page|group|frame|widget|interlock|robot)(?:\[([0-9]+)\])?(?=\.|$)"
+)
+_WITH_ID: Final = ("page", "widget", "interlock", "robot")
 _QUOTED: Final = re.compile(r"[/\[]")
 _LAST: Final = re.compile(r"(?:\[[0-9]+\]|\.?[^.\[\]]*)$")
 
@@ -41,12 +44,16 @@ def add_locations(remarks: Iterable[AnyRemark], text: str, tables: Any) -> Itera
 
 def id_at(place: str, tables: Any) -> str:
     """The id of the widget, page, interlock or robot around a place; "" without one."""
-    owner = _OWNER.match(place)
-    try:
-        around = tables["page"][int(owner["page"])] if owner and owner["page"] else tables
-        known = around[owner["key"]][int(owner["index"])]["id"] if owner else ""
-    except (LookupError, TypeError):
-        return ""
+    known: Any = ""
+    around = tables
+    for name, index in _OWNER.findall(place):
+        try:
+            around = around[name][int(index)] if index else around[name]
+            known = around["id"] if name in _WITH_ID else known
+        except (LookupError, TypeError):
+            return ""
+        if name == "widget":
+            break
     is_valid = isinstance(known, str) and known.isprintable() and '"' not in known
     return known[:MAX_ID] if is_valid else ""
 

@@ -32,6 +32,7 @@ def find_shape_faults(error: ValidationError, tables: Mapping[str, Any]) -> Shap
     """One fault for each mistake that pydantic found in a panel file's tables."""
     faults: list[Fault] = []
     keys: dict[Path, TableKeys] = {}
+    without_header: list[Path] = []
     for one in error.errors():
         _, path = _resolve_location(one["loc"])
         match one["type"]:
@@ -41,11 +42,17 @@ def find_shape_faults(error: ValidationError, tables: Mapping[str, Any]) -> Shap
                 (table.missing if kind == "missing" else table.unknown).append(str(path[-1]))
             case "union_tag_not_found" | "union_tag_invalid":
                 faults.append(_kind_fault(path, one["input"]))
+            case "tuple_type" if path[-1] == "group" and isinstance(one["input"], Mapping):
+                without_header.append(path)
             case _:
                 key = next(step for step in reversed(path) if isinstance(step, str))
                 faults.append(Fault(place_of(path), describe_error(one, key)))
     of_keys, follow = key_faults(keys)
     faults += of_keys
+    for path in without_header:
+        fault = Fault(place_of(path), "[[page.group]] is missing above the first [[page.group.widget]]")
+        faults.append(fault)
+        follow.append((place_of(_last_widget(tables, path[:-1])), fault))
 
     def follows(fault: Fault) -> bool:
         return any(source is not fault and _is_in(fault.place, place) for place, source in follow)
@@ -77,6 +84,12 @@ def _table_at(tables: Any, path: Path) -> Any:
     for step in path:
         tables = tables[step]
     return tables
+
+
+def _last_widget(tables: Any, page: Path) -> Path:
+    """Where the keys of a group without a header are: in the table before it."""
+    widgets = _table_at(tables, page).get("widget", ())
+    return (*page, "widget", len(widgets) - 1) if widgets else page
 
 
 def _kind_fault(path: Path, table: Any) -> Fault:

@@ -3,13 +3,15 @@
 import copy
 import re
 from dataclasses import dataclass, field
-from pathlib import Path
+from pathlib import Path as FilePath
 from typing import Any, Final
 
 from pydantic import ValidationError
 
 from app.errors import Fault
 from app.panel.base import ID
+from app.panel.faults.table_keys import widget_path
+from app.panel.faults.toml_lines import Path
 from app.panel.faults.wording import closest_name
 from app.panel.model import Panel
 
@@ -26,7 +28,7 @@ class StandIns:
     faulty: set[str] = field(default_factory=set)
     undecidable: set[str] = field(default_factory=set)
 
-    def validate(self, folder: Path) -> Panel | None:
+    def validate(self, folder: FilePath) -> Panel | None:
         """The panel; None if it still has faults of shape."""
         try:
             return Panel.model_validate(self.tables, context=folder)
@@ -42,16 +44,20 @@ def make_stand_ins(tables: dict[str, Any], error: ValidationError) -> StandIns |
     """The stand-ins for the tables in `error`; None if the rest can't be checked."""
     rest = StandIns(copy.deepcopy(tables))
     for fault in error.errors():
+        if path := widget_path(fault["loc"]):
+            _widget(rest, tables, path)
+            continue
         match fault["loc"]:
             case ("interfaces" | "distro", *_):
                 return None  # all types may be different
-            case ("page", int(p), "widget", int(w), *_):
-                _widget(rest, tables, p, w)
-            case ("page", int(p), str(key)):
+            case ("page", int(p), "group", int(g), str(key), *_):
+                rest.tables["page"][p]["group"][g].pop(key, None)
+                rest.undecidable.update(("input", "listens"))
+            case ("page", int(p), str(key), *_):
                 page = rest.tables["page"][p]
                 page.pop(key, None)
                 rest.tables["page"][p] = {"id": f"faulty_{p}", "title": "?"} | page
-                rest.undecidable.update(("input", "listens"))
+                rest.undecidable.update(("input", "listens", "page"))
             case ("interlock", int(i), *_):
                 rest.tables["interlock"][i] = _stand_in(tables["interlock"][i], str(i)) | {
                     "topic": f"/faulty_{i}"
@@ -65,15 +71,21 @@ def make_stand_ins(tables: dict[str, Any], error: ValidationError) -> StandIns |
             case (str(key), *_):
                 rest.tables.pop(key, None)
                 rest.tables.setdefault("title", "?")
+                if closest_name(key, ("pictures",)):
+                    rest.undecidable.add("picture")
                 if closest_name(key, TABLES):
-                    rest.undecidable.update(("interlock", "listens"))
+                    rest.undecidable.update(("interlock", "listens", "page"))
     return rest
 
 
-def _widget(rest: StandIns, tables: dict[str, Any], p: int, w: int) -> None:
-    old = tables["page"][p]["widget"][w]
-    stand_in = _stand_in(old, f"{p}_{w}")
-    rest.tables["page"][p]["widget"][w] = stand_in | {"kind": "text"}
+def _widget(rest: StandIns, tables: dict[str, Any], path: Path) -> None:
+    old: Any = tables
+    around: Any = rest.tables
+    for step in path[:-1]:
+        old, around = old[step], around[step]
+    old = old[path[-1]]
+    stand_in = _stand_in(old, "_".join(str(step) for step in path if isinstance(step, int)))
+    around[path[-1]] = stand_in | {"kind": "text"}
     rest.faulty.add(stand_in["id"])
     rest.undecidable.update(("listens", *_unnamed("input", old)))
 

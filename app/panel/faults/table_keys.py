@@ -17,8 +17,16 @@ from app.panel.widgets.kinds import KINDS
 
 Model = type[BaseModel]
 
-WHOLE_WIDGET: Final = 4  # steps of its path
+WHOLE_PAGE: Final = 2  # steps of its path
 ITS_HEADER: Final = "is its header missing above?"
+
+
+def widget_path(path: Path) -> Path:
+    """The path of the widget's table that a path is in; empty without one."""
+    for n, step in enumerate(path[:-1]):
+        if step == "widget" and isinstance(path[n + 1], int):
+            return path[: n + 2]
+    return ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +128,8 @@ def _missing_header(table: TableKeys, follow: Consequences) -> list[Fault]:
     fault = table.fault(
         table.unknown[0], f"{_quote_names(table.unknown)} are keys of {names[0]}: {ITS_HEADER}"
     )
-    follow += [(place_of(table.path[:WHOLE_WIDGET]), fault)] if table.path else []
+    around = widget_path(table.path) or table.path[:WHOLE_PAGE]
+    follow += [(place_of(around), fault)] if table.path else []
     return [fault]
 
 

@@ -26,7 +26,9 @@ LIST_WORDS: Final[Mapping[str, str]] = {
     "options": 'tables, like [{ value = 1, label = "One" }]',
     "states": 'tables, like [{ value = 0, text = "Idle", shape = "circle" }]',
     "page": "tables: write [[page]]",
+    "group": "tables: write [[page.group]]",
     "widget": "tables: write [[page.widget]]",
+    "screens": 'sizes in CSS pixels: write ["1280x800"]',
     "robot": "tables: write [[robot]]",
     "interlock": "tables: write [[interlock]]",
 }

@@ -8,7 +8,7 @@ send. How a kind is shown, permitted and sent is in tables of other rooms (`app/
 from abc import abstractmethod
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 from pydantic import Field
 
@@ -30,12 +30,15 @@ from app.panel.base import (
 )
 from app.panel.checks.types import field_faults
 from app.panel.faults.wording import list_names
+from app.panel.icons import Icon
+from app.panel.widgets.roles import COLOURS, ICONS, OWN_COLOURS, KeyColour, KeyRole
 
 
 @dataclass(frozen=True, slots=True)
 class CheckContext:
     """What a widget's check needs: the inputs of its page by id, the ids of all inputs and of all
-    interlocks, and topic → type of the subscriptions (`types`). Faults of the widgets in `faulty` are
+    interlocks, topic → type of the subscriptions (`types`), the ids of all `pages` and the names of
+    all `pictures`. Faults of the widgets in `faulty` are
     reported already: checks that depend on them are skipped."""
 
     interfaces: Interfaces
@@ -44,14 +47,18 @@ class CheckContext:
     interlocks: Collection[str]
     types: Mapping[str, str]
     faulty: Collection[str] = ()
+    pages: Collection[str] = ()
+    pictures: Collection[str] = ()
 
 
 class BaseWidget(Description):
-    """The keys of every widget; `span` is its width in twelfths of the page."""
+    """The keys of every widget; `span` is its width in columns of its group, which are twelfths of the
+    page where the group does not say, and `rows` its height in rows of its group."""
 
     id: Id
     label: Label
     span: Span = 12
+    rows: Annotated[int, Field(ge=1, le=8)] = 1
     kind: str
 
     # Why a key is required, if that is not obvious.
@@ -177,6 +184,32 @@ class Command(BaseWidget):
                 at = f"[{i}]" if len(self.interlocks) > 1 else ""
                 what = f'no interlock "{name}"; there is {list_names(checking.interlocks)}'
                 yield Fault(f"{place}.interlock{at}", what, cause=f"interlock {name}")
+
+
+class KeyCommand(Command):
+    """A command with a key of its own; its colour is one that IEC 60204-1 has for its role."""
+
+    role: KeyRole = "neutral"
+    colour: KeyColour | None = None
+    icon: Icon | None = None
+    note: Annotated[str, Field(min_length=1, max_length=40)] | None = None
+
+    @property
+    def shown_colour(self) -> str:
+        """The colour of the panel file, or that of the role; "" where the theme decides."""
+        return self.colour or OWN_COLOURS.get(self.role) or ""
+
+    @property
+    def shown_icon(self) -> str:
+        """The icon of the panel file, or that of the role; "" without one."""
+        return self.icon or ICONS.get(self.role, "")
+
+    def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
+        allowed = COLOURS[self.role]
+        if self.colour is not None and self.colour not in allowed:
+            what = f"a {self.role} key is {' or '.join(allowed)} (IEC 60204-1), never {self.colour}"
+            yield Fault(f"{place}.colour", what)
+        yield from super().faults(place, checking)
 
 
 class PressCommand(Command):

@@ -13,13 +13,14 @@ from app.panel.checks.templates import template_faults
 from app.panel.checks.types import type_fault
 from app.panel.template import set_field
 from app.panel.values import number_text
-from app.panel.widgets.families import CheckContext, PublishCommand, SentMessage
+from app.panel.widgets.families import CheckContext, KeyCommand, PublishCommand, SentMessage
+from app.panel.widgets.roles import KeyRole
 
 DEADLINE_TYPES: Final = (r"uint(16|32|64)|float(32|64)", "uint16, uint32, uint64, float32 or float64")
 COUNTER_TYPES: Final = (r"uint(8|16|32|64)", "uint8, uint16, uint32 or uint64")
 
 
-class Hold(PublishCommand):
+class Hold(KeyCommand, PublishCommand):
     """Publishes `message` `rate_hz` times a second while its button is held, and `release` once after.
 
     `deadline_field` gets the milliseconds within which the next message arrives, 0 in the last one;
@@ -27,6 +28,7 @@ class Hold(PublishCommand):
     """
 
     kind: Literal["hold"]
+    role: KeyRole = "hold"
     message: dict[str, Any]
     release: dict[str, Any]
     interlocks: Interlocks = Field(alias="interlock")

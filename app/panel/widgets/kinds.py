@@ -13,6 +13,7 @@ from app.panel.widgets.numbers import NumberInput, SliderInput
 from app.panel.widgets.parameter import Parameter
 from app.panel.widgets.publish import Publish
 from app.panel.widgets.service_action import Action, Call
+from app.panel.widgets.static import PageLink, Picture, TextLabel
 
 KINDS: Final[Mapping[str, type[BaseWidget]]] = {
     "text": TextInput,
@@ -27,6 +28,9 @@ KINDS: Final[Mapping[str, type[BaseWidget]]] = {
     "parameter": Parameter,
     "readout": Readout,
     "indicator": Indicator,
+    "label": TextLabel,
+    "image": Picture,
+    "link": PageLink,
 }
 
 # The description of a widget's table, by its "kind".

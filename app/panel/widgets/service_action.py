@@ -26,7 +26,7 @@ class ServerCommand(TemplateCommand):
     type: str
     timeout_s: Seconds = 5.0
 
-    role: ClassVar[ServerRole]
+    server_role: ClassVar[ServerRole]
 
     @property
     @abstractmethod
@@ -34,7 +34,7 @@ class ServerCommand(TemplateCommand):
         """The name of the service or the action."""
 
     def endpoints(self) -> Iterator[tuple[Role, str]]:
-        yield self.role, self.server_name
+        yield self.server_role, self.server_name
 
 
 class Call(ServerCommand):
@@ -51,7 +51,7 @@ class Call(ServerCommand):
     span: Span = 4
 
     template_key: ClassVar[str] = "request"
-    role: ClassVar[ServerRole] = "SS"
+    server_role: ClassVar[ServerRole] = "SS"
 
     @property
     def template(self) -> dict[str, Any]:
@@ -91,7 +91,7 @@ class Action(ServerCommand):
     span: Span = 6
 
     template_key: ClassVar[str] = "goal"
-    role: ClassVar[ServerRole] = "AS"
+    server_role: ClassVar[ServerRole] = "AS"
     required_types: ClassVar[tuple[str, ...]] = ACTION_SERVER_TYPES
 
     @property

@@ -8,10 +8,10 @@ from app.errors import Fault, InterfaceError
 from app.interfaces import Interfaces
 from app.panel.checks.templates import template_faults
 from app.panel.checks.types import type_fault
-from app.panel.widgets.families import CheckContext, PressCommand, SentMessage
+from app.panel.widgets.families import CheckContext, KeyCommand, PressCommand, SentMessage
 
 
-class TemplateCommand(PressCommand):
+class TemplateCommand(KeyCommand, PressCommand):
     """A press that sends a filled template of one type."""
 
     template_key: ClassVar[str]  # the key that holds the template

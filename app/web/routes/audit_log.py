@@ -23,6 +23,7 @@ from app.panel.widgets.families import Command, EntryWidget
 from app.printable import printable, printable_texts
 from app.web.app_state import AppState, CurrentState
 from app.web.described import TEXT, errors
+from app.web.display_choice import Display, display_of
 from app.web.language import language_of
 
 log = logging.getLogger("kiosk.log")
@@ -90,6 +91,7 @@ class LogContext(TypedDict):
 
     site: AppState
     panel: Panel
+    display: Display
     wanted: Wanted
     typed: dict[str, str]
     rows: list[Row]
@@ -122,6 +124,7 @@ async def page(request: Request, state: CurrentState, wanted: Annotated[Wanted, 
     context = LogContext(
         site=state,
         panel=panel,
+        display=display_of(request, panel),
         wanted=wanted,
         typed=printable_texts(wanted.model_dump()),
         rows=rows,

@@ -16,7 +16,8 @@ from app.clock import format_datetime, format_time
 from app.commands.receipts import Receipt
 from app.errors import NotFound
 from app.i18n import Text, TextLike, say
-from app.panel.model import Page, Panel
+from app.panel.layout import Page
+from app.panel.model import Panel
 from app.panel.template import input_ids
 from app.panel.widgets.families import EntryWidget, PressCommand
 from app.permission.control_authority_view import role
@@ -26,8 +27,10 @@ from app.runtime.robot_session import RobotSession
 from app.view.sections import SECTIONS, Section
 from app.view.view import View
 from app.web.app_state import AppState, CurrentState
+from app.web.assets import PICTURES
 from app.web.client_cookie import by_hand, keep, welcomed
 from app.web.described import PAGE, Described, errors
+from app.web.display_choice import Choice, Display, choices, display_of
 from app.web.language import language_of
 
 router = APIRouter(include_in_schema=True)
@@ -47,6 +50,9 @@ RELOADED_S = 2.0  # a press on a page that should have reloaded before is one on
 GRACE_S = 5
 TOO_OFTEN = "control_too_often"
 WORDS = (
+    "menu",
+    "whole",
+    "phone",
     "cancel",
     "robots",
     "control",
@@ -72,6 +78,8 @@ class PageContext(TypedDict):
     """What `screen.html` gets."""
 
     site: AppState
+    display: Display
+    choices: Sequence[Choice]
     panel: Panel
     page: Page
     base: str
@@ -170,8 +178,11 @@ def _context(
     receipt = session.presses.receipt(request.query_params.get("receipt", ""))
     again = {RELOADED: 1} | ({"receipt": receipt.id} if receipt else {})
     now, wall = clock.server_now(), time.time()
+    display = display_of(request, state.fleet.panel)
     return PageContext(
         site=state,
+        display=display,
+        choices=choices(display),
         panel=state.fleet.panel,
         page=page,
         base=session.base,
@@ -185,7 +196,7 @@ def _context(
         press_id=secrets.token_hex(8),
         receipt=receipt,
         inputs=dict(receipt.entered) | printable_texts(receipt.entered) if receipt else {},
-        words=_words(session, page),
+        words=_words(session, page, f"/static/{state.assets.revision}/{PICTURES}"),
         lost=say("server_lost"),
         lost_short=say("lost"),
         locks_all=say("locks_all"),
@@ -209,16 +220,18 @@ def _refused(session: RobotSession, query: str) -> TextLike:
     return receipt.reason if receipt else ""
 
 
-def _words(session: RobotSession, page: Page) -> dict[str, Any]:
+def _words(session: RobotSession, page: Page, pictures: str) -> dict[str, Any]:
     """The words of a page by their names in its templates, and what it asks before a press."""
-    own = {"base": session.base, "log": say("log_link"), "asks": asks_of(session, page)}
+    own = {"base": session.base, "pictures": pictures, "log": say("log_link")}
+    own |= {"asks": asks_of(session, page)}
     plain = {word: say(word) for word in (*WORDS, *LINK_WORDS)}
     return own | plain | {act: say(f"control_{act}") for act in CONTROL_ACTS}
 
 
 def asks_of(session: RobotSession, page: Page) -> dict[str, Ask]:
     """What is asked before the presses of a page that ask first."""
-    pressed = (w for w in page.widgets if isinstance(w, PressCommand) and w.confirm_press)
+    shown = (*page.widgets, *session.panel.frame.widgets)
+    pressed = (w for w in shown if isinstance(w, PressCommand) and w.confirm_press)
     return {widget.id: ask_of(session, widget) for widget in pressed}
 
 

@@ -3,7 +3,7 @@
 import math
 import re
 import secrets
-from typing import Final
+from typing import Final, NamedTuple
 from urllib.parse import quote
 
 from fastapi.responses import HTMLResponse, RedirectResponse, Response
@@ -12,12 +12,21 @@ from app import clock
 from app.commands.press_context import PRESS_ID
 from app.errors import InputError
 from app.i18n import say
-from app.panel.model import Page
+from app.panel.layout import Page
 from app.permission.principal import Principal
 from app.printable import printable_texts
 from app.runtime.robot_session import RobotSession
 from app.web.app_state import AppState
+from app.web.display_choice import Display
 from app.web.routes.pages import ask_of
+
+
+class Reader(NamedTuple):
+    """In which language, and how, the pages of a browser are."""
+
+    language: str
+    display: Display
+
 
 CONFIRMED: Final = "_confirmed"  # a form's field: the server has asked, and this is the yes
 TAP_AGAIN_S: Final = 0.7  # as the page's scripts have it
@@ -30,13 +39,14 @@ async def pressed_by_form(
     who: Principal,
     widget: str,
     inputs: dict[str, str],
-    language: str,
+    reader: Reader,
 ) -> Response:
     """Back to the page, with the receipt on it; or the question that comes first."""
     too_soon, before = _is_second_tap(inputs), inputs.pop("_last", "")
+    shown_on = inputs.pop("_page", "")
     asks = session.presses.widget(widget).confirm_press
     if asks and (inputs.pop(CONFIRMED, "") != "yes" or too_soon):
-        return _ask(state, session, widget, inputs, language)
+        return _ask(state, session, widget, inputs, reader, shown_on)
     # One rendered page has one id for all its buttons, and each button is a press of its own.
     page_id = inputs.pop("_id", secrets.token_hex(8))
     if not re.fullmatch(PRESS_ID, page_id):
@@ -46,32 +56,39 @@ async def pressed_by_form(
     typed = session.dispatcher.parse_form(inputs)
     if not state.limits.admit(who):
         receipt = session.presses.early_refusals.limited(widget, typed, press_id, shown=True)
-        return RedirectResponse(page_after(session, widget, receipt.id), status_code=303)
+        return RedirectResponse(page_after(session, widget, receipt.id, shown_on), status_code=303)
     by = session.press_guard.context_for(widget, who, seen, until)
     if too_soon:
         work = session.presses.early_refusals.too_soon(widget, typed, press_id, before, by.origin)
     else:
         work = session.presses.press(widget, typed, press_id, by)
     receipt = await state.counted(work)
-    return RedirectResponse(page_after(session, widget, receipt.id), status_code=303)
+    return RedirectResponse(page_after(session, widget, receipt.id, shown_on), status_code=303)
 
 
 def _ask(
-    state: AppState, session: RobotSession, widget: str, inputs: dict[str, str], language: str
+    state: AppState,
+    session: RobotSession,
+    widget: str,
+    inputs: dict[str, str],
+    reader: Reader,
+    shown_on: str,
 ) -> Response:
     """Asks a browser without scripts whether it is meant: the answer is the press."""
     pressed = session.presses.widget(widget)
     html = state.templates.render(
         "ask.html",
-        language,
+        reader.language,
         site=state,
+        display=reader.display,
         panel=session.panel,
         banner=session.publisher.view["notice"]["banner"],
         asked=ask_of(session, pressed),
         action=f"{session.base}/widgets/{widget}",
-        back=f"{session.base}/pages/{_page_of(session, widget).id}",
+        back=page_after(session, widget, "", shown_on),
         fields={
             **inputs,
+            "_page": shown_on,
             CONFIRMED: "yes",
             "_seen": session.publisher.id,
             "_until": str(round(clock.server_now() + ASKED_S, 3)),
@@ -85,8 +102,12 @@ def _ask(
     return HTMLResponse(html, headers={"cache-control": "no-store"})
 
 
-def _page_of(session: RobotSession, widget: str) -> Page:
-    return next(p for p in session.panel.pages if any(w.id == widget for w in p.widgets))
+def _page_of(session: RobotSession, widget: str, shown_on: str) -> Page:
+    """The page of a widget; of one in the frame the page that it was `shown_on`, else the first."""
+    panel = session.panel
+    if any(one.id == widget for one in panel.frame.widgets):
+        return panel.page(shown_on) or panel.pages[0]
+    return next(page for page in panel.pages if any(one.id == widget for one in page.widgets))
 
 
 def _until(inputs: dict[str, str]) -> float | None:
@@ -118,7 +139,8 @@ def _moment(inputs: dict[str, str], name: str) -> float | None:
     return moment
 
 
-def page_after(session: RobotSession, widget: str, receipt_id: str) -> str:
-    """The page of a widget, with a receipt if there is one."""
-    page = f"{session.base}/pages/{_page_of(session, widget).id}"
+def page_after(session: RobotSession, widget: str, receipt_id: str, shown_on: str = "") -> str:
+    """The path of a widget's page, with a receipt if there is one; `shown_on` is the page's id where
+    it was pressed, "" if unknown."""
+    page = f"{session.base}/pages/{_page_of(session, widget, shown_on).id}"
     return f"{page}?receipt={quote(receipt_id)}" if receipt_id else page

@@ -29,9 +29,10 @@ from app.web.described import (
     errors,
     fields,
 )
+from app.web.display_choice import display_of
 from app.web.language import language_of
 from app.web.request_body import as_model, body_of, form_of, json_of, kind_of
-from app.web.routes.press_forms import page_after, pressed_by_form
+from app.web.routes.press_forms import Reader, page_after, pressed_by_form
 
 router = APIRouter()
 
@@ -119,7 +120,8 @@ async def press(
         receipt = await pressed(state, session, who, widget, as_model(Press, json_of(body)))
         return _answer(request, receipt)
     if kind == FORM:
-        return await pressed_by_form(state, session, who, widget, form_of(body), language_of(request))
+        reader = Reader(language_of(request), display_of(request, state.fleet.panel))
+        return await pressed_by_form(state, session, who, widget, form_of(body), reader)
     raise InputError(f'a press is "{JSON}" or "{FORM}", not "{kind}"')
 
 

@@ -1,0 +1,161 @@
+"""Which screens a page with `fit` fits, computed from the sizes that static/css gives its parts.
+
+The parts of such a page have fixed heights: neither a font nor a value changes them. Lengths are CSS
+pixels. tests/browser/test_fit_in_browser.py holds all this against a browser.
+"""
+
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+from app.errors import Note
+from app.panel.checks.tile_sizes import (
+    GAP_MM,
+    KEY_MM,
+    MIDDLE,
+    NARROW,
+    TOUCH,
+    Screen,
+    height_of,
+    width_needed,
+)
+from app.panel.layout import COLUMNS, Group, Page
+from app.panel.model import Panel
+from app.panel.widgets.families import BaseWidget
+
+GAP: Final = 12.0  # between groups, and between the rows of a group
+HEAD: Final = 48.0  # of a group
+TABS_OF_GROUPS: Final = 48.0
+
+
+def fit_notes(panel: Panel) -> Iterator[Note]:
+    """For each page that must fit: which of the panel's screens it fits, and why not the others."""
+    for p, page in enumerate(panel.pages):
+        if not page.fit or not panel.screens:
+            continue
+        short = {size: reason(panel, page, Screen.of(size, panel.mm_per_px)) for size in panel.screens}
+        fitting = [size for size, why in short.items() if not why]
+        said = [f"fits {', '.join(fitting)}"] if fitting else []
+        said += [f"does not fit {size}: {why}" for size, why in short.items() if why]
+        yield Note(f"page[{p}]", "; ".join(said))
+
+
+def reason(panel: Panel, page: Page, screen: Screen) -> str:
+    """Why a page does not fit a screen; "" where it does."""
+    if screen.width < NARROW:
+        return ""  # a phone shows it without keys, and scrolls
+    space = page_height(panel, page, screen)
+    width = page_width(panel, screen)
+    for rows in arranged(page, screen):
+        needed = 0.0
+        for row in rows:
+            needed += max(group_height(group, screen, page) for group in row) + (GAP if needed else 0)
+        if needed > space:
+            named = ", ".join(f'"{group.title or page.title}"' for row in rows for group in row)
+            return f"{named} needs {needed:.0f} px of height and has {space:.0f}"
+        for group in (group for row in rows for group in row):
+            if narrow := too_narrow(group, group_width(group, page, screen, width), screen):
+                return narrow
+    return ""
+
+
+def page_height(panel: Panel, page: Page, screen: Screen) -> float:
+    """What the frame leaves for the groups."""
+    header = 56.0 if screen.is_wide else 48.0 if screen.width >= MIDDLE else 46.0
+    robots = max(TOUCH, 11 * screen.mm) + 13 if panel.robots else 0.0
+    tabs = 60.0 if screen.width >= MIDDLE else 52.0
+    has_tabs = len(panel.pages) > 1 or len(page.parts) > 1 or bool(panel.frame.widgets)
+    below = 0.0 if screen.is_wide or not has_tabs else tabs + 1
+    return screen.height - header - robots - below - 2 * screen.pad
+
+
+def page_width(panel: Panel, screen: Screen) -> float:
+    """The width for the groups."""
+    rail = max(88.0, KEY_MM * screen.mm)
+    has_rail = screen.is_wide and (len(panel.pages) > 1 or bool(panel.frame.widgets))
+    return screen.width - (rail if has_rail else 0) - 2 * screen.pad
+
+
+def arranged(page: Page, screen: Screen) -> list[list[list[Group]]]:
+    """The rows of groups that are seen at once; more than one arrangement where groups take turns."""
+    groups = page.parts
+    if screen.is_wide or (screen.width >= MIDDLE and len(groups) == 1):
+        rows: list[list[Group]] = []
+        left = 0
+        for group in groups:
+            if group.span > left:
+                rows.append([])
+                left = COLUMNS
+            rows[-1].append(group)
+            left -= group.span
+        return [rows]
+    first, *others = groups
+    if screen.is_upright and others:
+        return [[[first], [other]] for other in others]
+    return [[[group]] for group in groups]
+
+
+def group_width(group: Group, page: Page, screen: Screen, width: float) -> float:
+    """The width inside a group."""
+    if screen.is_wide:
+        span = group.span
+    else:
+        span = COLUMNS // 2 if screen.width >= MIDDLE and len(page.parts) > 1 else COLUMNS
+    return (width + GAP) * span / COLUMNS - GAP - 2 * screen.pad
+
+
+def group_height(group: Group, screen: Screen, page: Page) -> float:
+    """The height that a group needs, with its padding and heading."""
+    heights = row_heights(group, screen)
+    inside = sum(heights) + GAP * (len(heights) - 1)
+    alone = not screen.is_wide and len(page.parts) > 1
+    if not alone:
+        head = HEAD if group.title else screen.pad
+    elif screen.width < MIDDLE and not screen.is_upright:
+        head = screen.pad
+    elif group is page.parts[0] or len(page.parts) == 2:
+        head = HEAD if group.title else screen.pad
+    else:
+        head = TABS_OF_GROUPS + screen.pad
+    return head + inside + screen.pad
+
+
+def row_heights(group: Group, screen: Screen) -> list[float]:
+    """The heights of a group's rows, as the browser places its widgets."""
+    heights: list[float] = []
+    for widget, row, rows in placed(group.widgets, group):
+        heights += [0.0] * (row + rows - len(heights))
+        needed = (height_of(widget, screen) - GAP * (rows - 1)) / rows
+        for at in range(row, row + rows):
+            heights[at] = max(heights[at], needed)
+    return heights
+
+
+def placed(widgets: Sequence[BaseWidget], group: Group) -> Iterator[tuple[BaseWidget, int, int]]:
+    """(widget, its first row, its rows), placed one after the other as CSS places them in a grid."""
+    taken: set[tuple[int, int]] = set()
+    row = column = 0
+    for widget in widgets:
+        span = group.span_of(widget)
+        while column + span > group.grid or taken & _cells(row, column, span, widget.rows):
+            column += 1
+            if column + span > group.grid:
+                row, column = row + 1, 0
+        taken |= _cells(row, column, span, widget.rows)
+        yield widget, row, widget.rows
+        column += span
+
+
+def _cells(row: int, column: int, span: int, rows: int) -> set[tuple[int, int]]:
+    return {(r, c) for r in range(row, row + rows) for c in range(column, column + span)}
+
+
+def too_narrow(group: Group, width: float, screen: Screen) -> str:
+    """What is too narrow in a group of this inner width; "" where nothing is."""
+    gap = GAP_MM * screen.mm
+    column = (width - gap * (group.grid - 1)) / group.grid
+    for widget in group.widgets:
+        span = group.span_of(widget)
+        has, needs = column * span + gap * (span - 1), width_needed(widget, screen)
+        if has < needs - 0.5:
+            return f'"{widget.label}" would be {has:.0f} px wide and needs {needs:.0f}'
+    return ""

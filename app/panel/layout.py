@@ -1,0 +1,90 @@
+"""How a page is laid out: groups with a grid of their own, the frame, what the screen is like."""
+
+from collections.abc import Iterator
+from functools import cached_property
+from typing import Annotated, Final, Literal
+
+from pydantic import AfterValidator, Field
+
+from app.interfaces.validation import format_value
+from app.panel.base import Description, Id, Label, Span
+from app.panel.icons import Icon
+from app.panel.widgets.families import BaseWidget
+from app.panel.widgets.kinds import Widget
+
+COLUMNS: Final = 12  # of a page, and of a group that does not say
+SCREEN: Final = r"^[1-9][0-9]{2,3}x[1-9][0-9]{2,3}$"
+Placed = Iterator[tuple[str, BaseWidget]]
+
+Theme = Literal["light", "dark", "contrast"]
+TextSize = Literal["normal", "large"]
+Hand = Literal["right", "left"]
+Screen = Annotated[str, Field(pattern=SCREEN)]
+
+
+def _check_screens(given: tuple[str, ...]) -> tuple[str, ...]:
+    for i, one in enumerate(given):
+        if one in given[:i]:
+            raise ValueError(f"names {format_value(one)} twice")
+    return given
+
+
+Screens = Annotated[tuple[Screen, ...], Field(strict=False), AfterValidator(_check_screens)]
+
+
+class Group(Description):
+    """A part of a page with a heading and a grid of `columns`; `span` is its width in twelfths of the
+    page. Without `columns` its widgets' spans are twelfths of the group."""
+
+    title: Label | None = None
+    note: Label | None = None
+    columns: Annotated[int, Field(ge=1, le=COLUMNS)] | None = None
+    span: Span = COLUMNS
+    widgets: Annotated[tuple[Widget, ...], Field(strict=False)] = Field((), alias="widget")
+
+    @property
+    def grid(self) -> int:
+        """The columns of its grid."""
+        return self.columns or COLUMNS
+
+    def span_of(self, widget: BaseWidget) -> int:
+        """The columns that a widget takes: one, where the group says how many it has and the widget
+        does not."""
+        if self.columns is not None and "span" not in widget.model_fields_set:
+            return 1
+        return min(widget.span, self.grid)
+
+
+class Page(Description):
+    """A page of the panel; with `fit` it never scrolls."""
+
+    id: Id
+    title: Label
+    icon: Icon | None = None
+    fit: bool = False
+    own: Annotated[tuple[Widget, ...], Field(strict=False)] = Field((), alias="widget")
+    groups: Annotated[tuple[Group, ...], Field(strict=False)] = Field((), alias="group")
+
+    @cached_property
+    def widgets(self) -> tuple[BaseWidget, ...]:
+        """All its widgets: those of no group first."""
+        return (*self.own, *(widget for group in self.groups for widget in group.widgets))
+
+    @cached_property
+    def parts(self) -> tuple[Group, ...]:
+        """Its groups; the widgets of none are the first."""
+        return (*([Group(widget=self.own)] if self.own else []), *self.groups)
+
+    def placed(self) -> Placed:
+        """(place in the page's table, widget) of every widget: ("group[0].widget[2]", …)."""
+        yield from ((f"widget[{w}]", widget) for w, widget in enumerate(self.own))
+        for g, group in enumerate(self.groups):
+            yield from ((f"group[{g}].widget[{w}]", widget) for w, widget in enumerate(group.widgets))
+
+
+class Frame(Description):
+    """What stands on every page: keys that need no input, such as Stop."""
+
+    widgets: Annotated[tuple[Widget, ...], Field(strict=False, max_length=3)] = Field(
+        (), alias="widget"
+    )

@@ -1,0 +1,64 @@
+"""How a browser's pages look: what was chosen in it, else what the panel file says."""
+
+from typing import Final, NamedTuple, TypedDict, get_args
+
+from starlette.requests import HTTPConnection
+
+from app.i18n import TextLike, say
+from app.panel.layout import Hand, TextSize, Theme
+from app.panel.model import Panel
+
+# Each choice by its name, which is the key of the panel file: its cookie is kiosk_<name>.
+CHOICES: Final = {"theme": get_args(Theme), "text_size": get_args(TextSize), "hand": get_args(Hand)}
+COOKIE: Final = "kiosk_{}"
+KEPT_S: Final = 400 * 86400  # as long as browsers keep a cookie
+
+
+class Display(NamedTuple):
+    """The values of a page's root element."""
+
+    theme: str
+    text_size: str
+    hand: str
+
+
+class Option(TypedDict):
+    """One value of a choice, in the menu."""
+
+    value: str
+    label: TextLike
+    chosen: bool
+
+
+class Choice(TypedDict):
+    """A choice, in the menu."""
+
+    name: str
+    label: TextLike
+    options: list[Option]
+
+
+def display_of(connection: HTTPConnection, panel: Panel) -> Display:
+    """How the pages of this browser look."""
+    return Display(*(_chosen(connection, panel, name) for name in Display._fields))
+
+
+def _chosen(connection: HTTPConnection, panel: Panel, name: str) -> str:
+    given = connection.cookies.get(COOKIE.format(name), "")
+    usual: str = getattr(panel, name)
+    return given if given in CHOICES[name] else usual
+
+
+def choices(now: Display) -> list[Choice]:
+    """The choices of the menu, with what is chosen."""
+    return [
+        Choice(
+            name=name,
+            label=say(f"display_{name}"),
+            options=[
+                Option(value=one, label=say(f"display_{name}_{one}"), chosen=one == getattr(now, name))
+                for one in values
+            ],
+        )
+        for name, values in CHOICES.items()
+    ]

@@ -1,0 +1,43 @@
+"""How the pages look in one browser: a choice from the menu, kept in a cookie."""
+
+import re
+from typing import Final
+
+from fastapi import APIRouter, Request
+from fastapi.responses import RedirectResponse, Response
+
+from app.web.described import TEXT, described_body, errors
+from app.web.display_choice import CHOICES, COOKIE, KEPT_S
+from app.web.request_body import body_of, form_of
+
+router = APIRouter()
+
+OWN_PAGE: Final = re.compile(r"(/robots/[a-z0-9_]+)?/pages/[a-z0-9_]+")
+# What is none of these is ignored: a page that is still open may be of another version.
+BODY: Final = {
+    "type": "object",
+    "properties": {
+        "page": {**TEXT, "description": "the path of the panel's page to go back to; without one, /"},
+        **{name: {**TEXT, "description": f"one of {', '.join(of)}"} for name, of in CHOICES.items()},
+    },
+    "additionalProperties": TEXT,
+}
+
+
+@router.post(
+    "/display",
+    status_code=303,
+    response_class=RedirectResponse,
+    summary="Choose how the pages look in this browser",
+    responses=errors(403, 408, 413, 422),
+    openapi_extra=described_body(None, BODY, required=False),
+)
+async def choose(request: Request) -> Response:
+    """Keeps each choice that the form has; the others stay. Back to the form's `page`."""
+    given = form_of(await body_of(request))
+    page = given.get("page", "")
+    answer = RedirectResponse(page if OWN_PAGE.fullmatch(page) else "/", status_code=303)
+    for name, values in CHOICES.items():
+        if given.get(name) in values:
+            answer.set_cookie(COOKIE.format(name), given[name], max_age=KEPT_S, samesite="strict")
+    return answer

@@ -1,0 +1,111 @@
+"""What `app.check` computes of pages that fit, held against a browser."""
+
+from collections.abc import Iterator
+from typing import Any, Final
+
+import pytest
+from playwright.sync_api import Locator, Page, expect
+
+from app.panel import Panel, load_panel
+from app.panel.checks.fit import group_width, page_height, page_width, reason, row_heights
+from app.panel.checks.tile_sizes import LOW_SCREEN, Screen
+from tests.support.parts import ROOT, Server, until
+
+PALLETIZER: Final = ROOT / "docs/examples/palletizer.toml"
+SCREENS: Final = ("1920x1080", "1280x800", "1024x600", "800x480", "800x1280")
+MEASURE: Final = """() => {
+  const inside = (e) => {
+    const style = getComputedStyle(e);
+    return {
+      width: e.clientWidth - 2 * parseFloat(style.paddingLeft),
+      height: e.clientHeight - 2 * parseFloat(style.paddingTop),
+    };
+  };
+  const groups = [...document.querySelectorAll(".group")].filter((g) => g.checkVisibility());
+  return {
+    main: inside(document.querySelector("main")),
+    groups: groups.map((g) => ({ number: Number(g.dataset.group), width: inside(g).width })),
+    outside: [...document.querySelectorAll("main, .group, .grid, .cell, header, .pages")]
+      .filter((e) => e.scrollWidth > e.clientWidth + 1 || e.scrollHeight > e.clientHeight + 1)
+      .map((e) => e.className || e.tagName),
+  };
+}"""
+# The heights that the rows need: without the room that is left over.
+ROWS: Final = """(number) => {
+  const grid = document.querySelector(`[data-group="${number}"] > .grid`);
+  grid.style.alignContent = "start";
+  const rows = getComputedStyle(grid).gridTemplateRows;
+  grid.style.alignContent = "";
+  return rows.split(" ").map(parseFloat);
+}"""
+
+
+@pytest.fixture(scope="module")
+def panel() -> Panel:
+    return load_panel(PALLETIZER)
+
+
+@pytest.fixture(scope="module")
+def demo() -> Iterator[Server]:
+    mine = Server(ROOT, KIOSK_PANEL=str(PALLETIZER))
+    until(mine.ready, "ready")
+    yield mine
+    mine.end()
+
+
+def box_of(key: Locator) -> Any:
+    found = key.bounding_box()
+    assert found is not None
+    return found
+
+
+@pytest.mark.parametrize("size", SCREENS)
+def test_sizes_are_those_of_the_browser(demo: Server, panel: Panel, page: Page, size: str) -> None:
+    screen = Screen.of(size, panel.mm_per_px)
+    page.set_viewport_size({"width": screen.width, "height": screen.height})
+    page.goto(demo.url)
+    expect(page.locator('[data-widget="permission"]')).to_be_visible()
+    cell = panel.pages[0]
+    assert reason(panel, cell, screen) == ""
+    found: Any = page.evaluate(MEASURE)
+    assert found["outside"] == []
+    assert found["main"]["height"] == pytest.approx(page_height(panel, cell, screen), abs=1)
+    width = page_width(panel, screen)
+    assert found["main"]["width"] == pytest.approx(width, abs=1)
+    for group in found["groups"]:
+        described = cell.parts[group["number"]]
+        assert group["width"] == pytest.approx(group_width(described, cell, screen, width), abs=1)
+        rows = page.evaluate(ROWS, group["number"])
+        assert rows == pytest.approx(row_heights(described, screen), abs=1)
+
+
+def test_keys_are_20_mm_high_and_5_mm_apart_on_every_screen(
+    demo: Server, panel: Panel, page: Page
+) -> None:
+    for size in SCREENS:
+        screen = Screen.of(size, panel.mm_per_px)
+        page.set_viewport_size({"width": screen.width, "height": screen.height})
+        page.goto(demo.url)
+        boxes = [
+            box_of(key)
+            for key in page.locator(".cell > .key > button:visible, .action button:visible").all()
+        ]
+        least = 14 if screen.height <= LOW_SCREEN else 20  # beside a key that cancels
+        assert len(boxes) >= 2
+        assert all(box["height"] >= least * screen.mm - 0.5 for box in boxes), size
+        start, reset = (
+            box_of(page.locator(f"[data-widget={of}] > button")) for of in ("start", "reset")
+        )
+        assert min(start["width"], reset["width"]) >= 20 * screen.mm - 0.5
+        assert reset["x"] - start["x"] - start["width"] >= 5 * screen.mm - 0.5, size
+
+
+def test_stop_is_on_every_page_and_tab(demo: Server, page: Page) -> None:
+    page.set_viewport_size({"width": 800, "height": 480})
+    stop = page.get_by_role("button", name="Stop", exact=True)
+    for path in ("/pages/cell", "/pages/setup"):
+        page.goto(demo.url + path)
+        expect(stop).to_be_visible()
+        for tab in page.locator(".pages .group-tab:visible").all():
+            tab.click()
+            expect(stop).to_be_in_viewport()

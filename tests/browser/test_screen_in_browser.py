@@ -1,0 +1,328 @@
+"""The frame and the groups on the screens that there are: nothing overflows, each group can be reached,
+a key's whole text can be read, the menu works, and keys of the frame come back to their page."""
+
+from collections.abc import Iterator
+from typing import Final
+
+import pytest
+from playwright.sync_api import Browser, Locator, Page, expect
+
+from tests.browser.test_layout_in_browser import PANEL
+from tests.support.parts import ROOT, TAP_AGAIN_MS, Server, until
+
+PALLETIZER: Final = ROOT / "docs/examples/palletizer.toml"
+SCREENS: Final = ((1280, 800), (1024, 600), (800, 480), (800, 1280), (390, 844))
+# What is wider than its place, or beyond the screen: the page may only scroll down, inside the frame.
+OVERFLOWS: Final = """() => {
+  const root = document.documentElement, found = [];
+  const seen = (names) => [...document.querySelectorAll(names)].filter((one) => one.checkVisibility());
+  const name = (one) => one.className || one.tagName;
+  if (root.scrollWidth > innerWidth || root.scrollHeight > innerHeight) found.push("the page");
+  for (const one of seen("header, main, .group, .grid, .cell, .face, .pages, .frame-keys")) {
+    if (one.scrollWidth > one.clientWidth + 1) found.push(name(one));
+  }
+  for (const one of seen("header > *, .pages > *, .frame-keys > *, .cell > *")) {
+    const { left, right } = one.getBoundingClientRect();
+    if (left < -1 || right > innerWidth + 1) found.push(`${name(one)}: ${left} to ${right}`);
+  }
+  return found;
+}"""
+# Numbers and words that are cut without a sign of it.
+CUT: Final = """() => {
+  const texts = document.querySelectorAll("h1 b, .robot-state b, .banner, #clock, .label, .value");
+  const cut = (one) => one.scrollWidth > one.clientWidth + 1;
+  const unsigned = ({ textOverflow, webkitLineClamp, display }) =>
+    textOverflow !== "ellipsis" && webkitLineClamp === "none" && display !== "inline";
+  return [...texts]
+    .filter((one) => one.checkVisibility() && cut(one) && unsigned(getComputedStyle(one)))
+    .map((one) => one.textContent);
+}"""
+LONG: Final = (
+    "A text that has much more to say than two lines of a key on a small screen can hold, to its end"
+)
+DOORS: Final = "/cell/infeed/guard_doors_are_closed/and_are_locked/by_the_controller/of_this_robot"
+HOLDS_MORE: Final = f"""
+title = "Long texts"
+mode = "demo"
+[[interlock]]
+id = "operation"
+topic = "{DOORS}"
+[[page]]
+id = "one"
+title = "One"
+[[page.group]]
+columns = 6
+[[page.group.widget]]
+id = "locked"
+kind = "publish"
+label = "Locked"
+topic = "/operation1"
+type = "std_msgs/msg/String"
+message = {{ data = "" }}
+interlock = "operation"
+[[page.group.widget]]
+id = "go"
+kind = "publish"
+label = "Go"
+topic = "/operation"
+type = "std_msgs/msg/String"
+message = {{ data = "" }}
+[[page.group.widget]]
+id = "reset"
+kind = "call"
+label = "Reset"
+service = "/reset"
+type = "std_srvs/srv/Trigger"
+answer = "{LONG}"
+[demo."{DOORS}"]
+silent = true
+"""
+
+
+@pytest.fixture(scope="module")
+def cell() -> Iterator[Server]:
+    """The demo robot with the palletizer's panel: groups, a frame with Stop, two pages."""
+    mine = Server(ROOT, KIOSK_PANEL=str(PALLETIZER))
+    until(mine.ready, "ready")
+    yield mine
+    mine.end()
+
+
+@pytest.fixture(scope="module")
+def several(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    """Several robots, control and long labels."""
+    panel = tmp_path_factory.mktemp("panel") / "all.toml"
+    panel.write_text(PANEL)
+    mine = Server(ROOT, KIOSK_PANEL=str(panel), KIOSK_MODE="demo")
+    until(mine.ready, "ready")
+    yield mine
+    mine.end()
+
+
+@pytest.fixture(scope="module")
+def long(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    panel = tmp_path_factory.mktemp("panel") / "long.toml"
+    panel.write_text(HOLDS_MORE)
+    mine = Server(ROOT, KIOSK_PANEL=str(panel))
+    until(lambda: mine.widget("go")["enabled"], "the robot is there")
+    yield mine
+    mine.end()
+
+
+@pytest.fixture
+def without_scripts(chromium: Browser) -> Iterator[Page]:
+    context = chromium.new_context(java_script_enabled=False)
+    yield context.new_page()
+    context.close()
+
+
+def sized(page: Page, width: int, height: int) -> Page:
+    page.set_viewport_size({"width": width, "height": height})
+    return page
+
+
+def button(page: Page, name: str) -> Locator:
+    return page.get_by_role("button", name=name, exact=True)
+
+
+@pytest.mark.parametrize(("width", "height"), SCREENS)
+def test_nothing_overflows_on_any_screen(
+    cell: Server, several: Server, page: Page, width: int, height: int
+) -> None:
+    sized(page, width, height)
+    for url in (f"{cell.url}/pages/cell", f"{cell.url}/pages/setup", several.url):
+        for look in ("normal", "large"):
+            page.context.add_cookies([{"name": "kiosk_text_size", "value": look, "url": url}])
+            page.goto(url)
+            expect(page.locator("#clock")).not_to_be_empty()
+            assert page.evaluate(OVERFLOWS) == [], f"{url}, {look}"
+            assert page.evaluate(CUT) == [], f"{url}, {look}"
+
+
+@pytest.mark.parametrize(("width", "height"), SCREENS)
+def test_the_frame_stays_where_it_is_when_the_page_scrolls(
+    several: Server, page: Page, width: int, height: int
+) -> None:
+    sized(page, width, height).goto(several.url)
+    header = page.locator("header").bounding_box()
+    page.locator("main").evaluate("(main) => main.scrollTo(0, main.scrollHeight)")
+    assert page.locator("header").bounding_box() == header
+    last = page.locator(".cell:visible").last
+    expect(last).to_be_in_viewport()
+
+
+def shown_groups(page: Page) -> list[str]:
+    return [str(one.get_attribute("aria-label")) for one in page.locator(".group:visible").all()]
+
+
+@pytest.mark.parametrize(
+    ("width", "height", "at_first", "then"),
+    [
+        (1280, 800, ["Production", "Belt", "Cell"], None),
+        (1024, 600, ["Production", "Belt"], ["Production", "Cell"]),
+        (800, 1280, ["Production", "Belt"], ["Production", "Cell"]),
+        (800, 480, ["Production"], ["Cell"]),
+    ],
+)
+def test_groups_that_have_no_room_side_by_side_take_turns(
+    cell: Server, page: Page, width: int, height: int, at_first: list[str], then: list[str] | None
+) -> None:
+    sized(page, width, height).goto(f"{cell.url}/pages/cell")
+    expect(page.locator("#clock")).not_to_be_empty()
+    assert shown_groups(page) == at_first
+    tab = page.locator(".group-tab:visible", has_text="Cell")
+    if then is None:
+        expect(tab).to_have_count(0)
+        return
+    box = tab.bounding_box()
+    assert box is not None
+    assert min(box["width"], box["height"]) >= 44
+    stop = button(page, "Stop").bounding_box()
+    tab.click()
+    expect(tab).to_have_attribute("aria-pressed", "true")
+    assert shown_groups(page) == then
+    assert button(page, "Stop").bounding_box() == stop
+    assert page.evaluate(OVERFLOWS) == []
+
+
+@pytest.mark.parametrize(("width", "height"), SCREENS[:4])
+def test_without_scripts_all_groups_are_there(
+    cell: Server, without_scripts: Page, width: int, height: int
+) -> None:
+    sized(without_scripts, width, height).goto(f"{cell.url}/pages/cell")
+    assert shown_groups(without_scripts) == ["Production", "Belt", "Cell"]
+    expect(without_scripts.locator(".group-tab:visible")).to_have_count(0)
+
+
+def test_a_phone_only_shows(cell: Server, page: Page) -> None:
+    sized(page, 390, 844).goto(f"{cell.url}/pages/cell")
+    expect(page.locator("form.page").locator("button, input").locator("visible=true")).to_have_count(0)
+    for widget in ("heard", "permission", "speed"):
+        expect(page.locator(f"[data-widget={widget}] .value")).to_be_visible()
+    expect(page.get_by_text("View only")).to_be_visible()
+
+
+def test_a_key_of_the_frame_comes_back_to_the_page_where_it_was_pressed(
+    cell: Server, page: Page, without_scripts: Page
+) -> None:
+    for shown in (page, without_scripts):
+        shown.goto(f"{cell.url}/pages/setup")
+        expect(button(shown, "Stop")).to_be_enabled()
+        shown.wait_for_timeout(TAP_AGAIN_MS)
+        button(shown, "Stop").click()
+        expect(shown.locator("#receipt-stop")).to_contain_text("Sent on /operation at")
+        assert shown.url.partition("?")[0] == f"{cell.url}/pages/setup"
+        expect(shown.locator("#receipt-stop")).to_be_visible()
+
+
+@pytest.mark.parametrize("page_id", ["", "nothing", "../../log"])
+def test_a_form_of_the_frame_that_names_no_page_goes_to_the_first(cell: Server, page_id: str) -> None:
+    answer = cell.http.post("/widgets/stop", data={"_page": page_id})
+    assert answer.status_code == 303
+    assert answer.headers["location"].partition("?")[0] == "/pages/cell"
+
+
+def test_a_touch_on_a_locked_key_shows_its_whole_reason(long: Server, page: Page) -> None:
+    sized(page, 1024, 600).goto(long.url)
+    key, whole = page.locator("[data-widget=locked]"), page.locator("#whole")
+    why = page.locator("#why-locked")
+    expect(why).to_contain_text(DOORS)
+    assert why.evaluate("(why) => why.scrollHeight > why.clientHeight")
+    key.click()
+    expect(whole.get_by_role("heading")).to_have_text("Locked")
+    expect(whole.locator("p")).to_have_text(why.text_content() or "")
+    assert whole.locator("p").evaluate("(p) => p.scrollHeight <= p.clientHeight + 1")
+    page.keyboard.press("Escape")
+    expect(whole).to_be_hidden()
+
+
+def test_a_keyboard_reaches_the_whole_reason(long: Server, page: Page) -> None:
+    sized(page, 1024, 600).goto(long.url)
+    more = page.locator("[data-widget=locked]").get_by_role("button", name="Show the whole text")
+    expect(more).to_be_visible()
+    more.press("Enter")
+    expect(page.locator("#whole p")).to_contain_text(DOORS)
+
+
+def test_what_a_key_was_answered_is_shown_whole_and_presses_nothing(long: Server, page: Page) -> None:
+    sized(page, 1024, 600).goto(long.url)
+    key = page.locator("[data-widget=reset]")
+    more = key.get_by_role("button", name="Show the whole text")
+    expect(button(page, "Reset")).to_be_enabled()
+    expect(more).to_be_hidden()
+    button(page, "Reset").click()
+    expect(key.locator(".result")).to_contain_text(LONG)
+    answered = key.locator(".result").text_content() or ""
+    more.click()
+    expect(page.locator("#whole p")).to_contain_text(LONG)
+    assert key.locator(".result").text_content() == answered
+
+
+def test_an_open_sheet_follows_its_key(long: Server, page: Page) -> None:
+    """What is no longer so is not read on."""
+    sized(page, 1024, 600).goto(long.url)
+    page.locator("[data-widget=locked]").click()
+    expect(page.locator("#whole p")).to_contain_text(DOORS)
+    page.locator("#why-locked [data-text=reason]").evaluate(
+        "(one) => { one.textContent = 'Another.'; }"
+    )
+    expect(page.locator("#whole p")).to_have_text("Another.")
+    page.locator("[data-widget=locked] > button").evaluate("(one) => { one.disabled = false; }")
+    expect(page.locator("#whole")).to_be_hidden()
+
+
+@pytest.mark.parametrize("scripts", [True, False])
+@pytest.mark.parametrize(("width", "height"), SCREENS[:4])
+def test_the_menu_leads_to_the_log_and_changes_the_look(
+    cell: Server, chromium: Browser, width: int, height: int, scripts: bool
+) -> None:
+    context = chromium.new_context(
+        viewport={"width": width, "height": height}, java_script_enabled=scripts
+    )
+    page = context.new_page()
+    page.goto(f"{cell.url}/pages/setup")
+    menu, root = page.locator("#menu"), page.locator("html")
+    expect(menu).to_be_hidden()
+    button(page, "Menu").click()
+    expect(menu).to_be_visible()
+    for one in menu.locator("a, button").all():
+        box = one.bounding_box()
+        assert box is not None
+        assert box["height"] >= 44
+        assert box["x"] + box["width"] <= width
+    button(page, "Dark").click()
+    expect(root).to_have_attribute("data-theme", "dark")
+    assert page.url == f"{cell.url}/pages/setup"
+    button(page, "Menu").click()
+    expect(button(page, "Dark")).to_have_attribute("aria-pressed", "true")
+    menu.get_by_role("link").click()
+    expect(page.get_by_role("heading", name="Operator's log")).to_be_visible()
+    expect(root).to_have_attribute("data-theme", "dark")
+    context.close()
+
+
+def test_the_tabs_change_sides(cell: Server, page: Page) -> None:
+    sized(page, 1280, 800).goto(f"{cell.url}/pages/cell")
+    tabs = page.locator("nav.pages")
+    left = tabs.bounding_box()
+    button(page, "Menu").click()
+    button(page, "On the right").click()
+    expect(page.locator("html")).to_have_attribute("data-hand", "left")
+    moved = tabs.bounding_box()
+    assert left is not None
+    assert moved is not None
+    assert left["x"] == 0
+    assert moved["x"] + moved["width"] == 1280
+
+
+def test_the_state_of_the_robot_is_a_word_in_the_header(cell: Server, page: Page) -> None:
+    page.goto(f"{cell.url}/pages/setup")
+    state = page.locator("#state")
+    for permitted, word in ((True, "READY"), (False, "LOCKED")):
+        until(lambda p=permitted: cell.widget("start")["enabled"] is p, word, within_s=40)  # type: ignore[misc]
+        expect(state).to_have_text(word)
+        expect(state.locator("svg:visible")).to_have_count(1)
+    page.route("**/events*", lambda route: route.abort())
+    page.reload()
+    expect(state).to_have_text("no connection")
+    expect(state).to_have_attribute("data-state", "lost")
