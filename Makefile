@@ -3,6 +3,7 @@
 # make check types and style
 # make docs  the documentation as a site, in build/docs; a dead link fails
 # make faults every fault in its long form, and what was measured as a table in docs/reliability.md
+# make screenshots  every page at every size and theme, in build/screenshots; the README's pictures
 # make soak  an ordinary day for SOAK_S seconds (an hour)
 # make bench  this panel and its rivals side by side (25 minutes); QUICK=1 only shows that it works
 # make bench-setup  what the benchmark's rivals need, into the cache
@@ -17,7 +18,7 @@ export BENCH_CACHE := $(BENCH)
 export TEST_BRIDGE := $(CACHE)/bridge/release/test-bridge
 export TEST_ROS_PYTHON := $(CURDIR)/.venv-ros/bin/python
 
-.PHONY: run test check dev docs wheel faults soak bench bench-setup test-parts bridge lock clean
+.PHONY: run test check dev docs wheel faults screenshots soak bench bench-setup test-parts bridge lock clean
 .DELETE_ON_ERROR:
 
 run: .venv/run
@@ -67,6 +68,9 @@ faults: test-parts
 	rm -f $(FAULTS_RESULTS)
 	FAULTS=$(FORM) FAULTS_RESULTS=$(FAULTS_RESULTS) .venv/bin/pytest --timeout 0 $(FAULTS_TESTS) $(ARGS)
 	FAULTS=$(FORM) .venv/bin/python -m tests.faults.results $(FAULTS_RESULTS) docs/reliability.md
+
+screenshots: system .venv/test
+	.venv/bin/python -m tests.screenshots
 
 soak: test-parts
 	.venv/bin/python -m tests.faults.soak

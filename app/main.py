@@ -17,6 +17,7 @@ from app import ros_logging
 from app.commands.press_limits import PressLimits
 from app.errors import KioskError, PanelError
 from app.panel import Panel, load_panel
+from app.panel.widgets.kinds import KINDS
 from app.process import listen_sockets
 from app.process.sd_notify import ServiceManager
 from app.process.shutdown import graceful_shutdown
@@ -117,6 +118,10 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         app.include_router(routes.router, prefix="/robots/{robot}", dependencies=[Depends(named_robot)])
     for common in (static, health, display):
         app.include_router(common.router)
+    if settings.dev:
+        from app.web.routes import gallery
+
+        app.include_router(gallery.router)
     app.include_router(log_routes.router, responses=errors(403, 404, 422, 503))
     return app
 
@@ -128,9 +133,11 @@ async def _app_state(
     """Opens everything that requests need, and closes it at the end."""
     async with open_log(settings, panel) as oplog:
         check_port(server)
-        kinds: set[str] = {widget.kind for widget in panel.widgets()}
+        # In development the gallery shows all kinds.
+        kinds = {*KINDS} if settings.dev else {widget.kind for widget in panel.widgets()}
         static_files, templates = shipped_path("static"), shipped_path("templates")
-        assets = load_assets(static_files, templates, panel.mm_per_px, kinds, panel.picture_files)
+        own = (panel.picture_files, panel.styles, panel.templates)
+        assets = load_assets(static_files, templates, panel.mm_per_px, kinds, *own)
         revision = f"{panel.revision}-{assets.revision}"
         if settings.dev:
             revision += f"-{secrets.token_hex(4)}"  # open pages reload after every restart
@@ -138,7 +145,8 @@ async def _app_state(
         metrics = Metrics(lambda: oplog.left_out, lambda: limits.refused)
         async with open_fleet(settings, panel, revision, oplog, in_process) as fleet:
             metrics.follow(fleet)
-            yield AppState(fleet, assets, PageTemplates(templates), metrics, oplog, limits)
+            made = PageTemplates(templates, panel.templates)
+            yield AppState(fleet, assets, made, metrics, oplog, limits)
 
 
 async def _log_urls(server: ServerConfig | None, ports: set[int], hosts: Sequence[str]) -> None:

@@ -1,53 +1,104 @@
-"""The pictures of the README, of the demo robot with docs/examples/palletizer.toml:
-`python -m tests.screenshots` writes them to docs/images."""
+"""`make screenshots`: the examples, the shipped panel and the gallery at all sizes and in all themes,
+into build/screenshots; the README's pictures into docs/images. All of the demo robot."""
 
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Final
 
-from playwright.sync_api import Locator, expect, sync_playwright
+from playwright.sync_api import Browser, Locator, Page, expect, sync_playwright
 
-from tests.support.parts import CHROMIUM, CHROMIUM_FLAGS, ROOT, Server, until
+from app.panel import load_panel
+from app.settings import PACKAGE
+from app.web.display_choice import CHOICES, COOKIE
+from tests.support.parts import CHROMIUM_FLAGS, HEADLESS, ROOT, Server, until
 
-PANEL = ROOT / "docs/examples/palletizer.toml"
-IMAGES = ROOT / "docs/images"
-CYCLE_MS = 60_000  # the demo robot permits for 20 s and forbids for 8 s
-SETTLED_S = 0.8  # a press is acknowledged and its highlight gone
+EXAMPLE: Final = ROOT / "docs/examples/palletizer.toml"
+PANELS: Final = {
+    "example": EXAMPLE,
+    "shipped": PACKAGE / "panel.toml",
+    "plan": ROOT / "docs/examples/plan/panel.toml",
+}
+SIZES: Final = ((1920, 1080), (1280, 800), (1024, 600), (800, 480), (800, 1280), (390, 844))
+ALL: Final = ROOT / "build/screenshots"
+IMAGES: Final = ROOT / "docs/images"
+CYCLE_MS: Final = 60_000  # the demo robot permits for 20 s and forbids for 8 s
+LOADED_MS: Final = 200  # scripts and values are there
+SETTLED_S: Final = 0.8  # a press is acknowledged and its highlight gone
 
 
 def main() -> None:
-    server = Server(ROOT, KIOSK_PANEL=str(PANEL))
+    ALL.mkdir(parents=True, exist_ok=True)
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=HEADLESS, args=CHROMIUM_FLAGS)
+        for name, panel in PANELS.items():
+            with running(panel) as server:
+                paths = {page.id: f"/pages/{page.id}" for page in load_panel(panel).pages}
+                take_all(browser, server.url, name, paths)
+                if panel == EXAMPLE:
+                    take_all(browser, server.url, "gallery", {"": "/gallery"})
+                    take_for_readme(browser, server.url)
+        browser.close()
+
+
+@contextmanager
+def running(panel: Path) -> Iterator[Server]:
+    """A demo of a panel, with the gallery."""
+    server = Server(ROOT, KIOSK_PANEL=str(panel), KIOSK_MODE="demo", KIOSK_DEV="1")
     try:
         until(server.ready, "ready")
-        take(server.url)
+        yield server
     finally:
         server.end()
 
 
-def take(url: str) -> None:
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=CHROMIUM_FLAGS)
-        page = browser.new_page(viewport={"width": 1280, "height": 800})
-        page.goto(f"{url}/pages/setup")
+def take_all(browser: Browser, url: str, name: str, paths: dict[str, str]) -> None:
+    """Every page at every size in every theme: example-cell-dark-1280x800.png."""
+    for theme in CHOICES["theme"]:
+        context = browser.new_context()
+        context.add_cookies([{"name": COOKIE.format("theme"), "value": theme, "url": url}])
+        page = context.new_page()
+        for width, height in SIZES:
+            page.set_viewport_size({"width": width, "height": height})
+            for part, path in paths.items():
+                page.goto(url + path)
+                page.wait_for_timeout(LOADED_MS)
+                file = f"{'-'.join(filter(None, (name, part)))}-{theme}-{width}x{height}"
+                page.screenshot(path=ALL / f"{file}.png", full_page=name == "gallery" or width < 600)
+                take_tabs(page, file)
+        context.close()
 
-        def button(name: str) -> Locator:
-            return page.get_by_role("button", name=name, exact=True)
 
-        # The beginning of the time in which the robot permits.
-        expect(button("Load program")).to_be_disabled(timeout=CYCLE_MS)
-        expect(button("Load program")).to_be_enabled(timeout=CYCLE_MS)
-        button("Load program").click()
-        expect(page.locator("[data-widget=load]")).to_contain_text("/operation2")
-        page.goto(url)
-        button("Work light on").click()
-        expect(page.locator("[data-widget=light_on]")).to_contain_text("the light is on")
-        button("Start pallet").click()
-        expect(page.locator("[data-widget=pallet]")).to_contain_text("EXECUTING")
-        time.sleep(SETTLED_S)
-        page.screenshot(path=IMAGES / "production.png")
-        page.goto(f"{url}/pages/setup")
-        expect(button("Load program")).to_be_disabled(timeout=CYCLE_MS)
-        time.sleep(SETTLED_S)
-        page.screenshot(path=IMAGES / "locked.png")
-        browser.close()
+def take_tabs(page: Page, file: str) -> None:
+    """The groups that take turns."""
+    for number, tab in enumerate(page.locator(".group-tab:visible").all()):
+        tab.click()
+        page.screenshot(path=ALL / f"{file}-tab{number}.png")
+
+
+def take_for_readme(browser: Browser, url: str) -> None:
+    page = browser.new_page(viewport={"width": 1280, "height": 800})
+    page.goto(url)
+
+    def key(name: str) -> Locator:
+        return page.get_by_role("button", name=name, exact=True)
+
+    # The beginning of the time in which the robot permits.
+    expect(key("Start")).to_be_disabled(timeout=CYCLE_MS)
+    expect(key("Start")).to_be_enabled(timeout=CYCLE_MS)
+    key("Start").click()
+    expect(page.locator("[data-widget=boxes]")).to_have_attribute("data-state", "live")
+    key("Work light on").click()
+    expect(page.locator("[data-widget=light_on]")).to_contain_text("the light is on")
+    key("Pallet out").click()
+    expect(page.locator("[data-widget=pallet]")).to_contain_text("EXECUTING")
+    time.sleep(SETTLED_S)
+    page.screenshot(path=IMAGES / "production.png")
+    expect(key("Start")).to_be_disabled(timeout=CYCLE_MS)
+    time.sleep(SETTLED_S)
+    page.screenshot(path=IMAGES / "locked.png")
+    page.close()
 
 
 if __name__ == "__main__":

@@ -85,6 +85,16 @@ def _resolve_folder(given: Any, info: ValidationInfo) -> Path:
     return folder
 
 
+def _resolve_file(given: Any, info: ValidationInfo) -> Path:
+    """The file's path, relative to the panel file's folder, which is the validation context."""
+    if not isinstance(given, str) or not given:
+        raise ValueError(f"must be the path of a file, not {format_value(given)}")
+    file = Path(info.context or "") / given
+    if not file.is_file():
+        raise ValueError(f"{file} is not a file: the path is relative to the panel file")
+    return file
+
+
 def _check_field_path(given: str) -> str:
     try:
         path_steps(given)
@@ -145,6 +155,7 @@ FieldPath = Annotated[str, AfterValidator(_check_field_path)]
 WrittenField = Annotated[str, AfterValidator(_check_written_field)]  # without keys
 Endpoint = Annotated[str, AfterValidator(_check_endpoint)]
 Folder = Annotated[Path, BeforeValidator(_resolve_folder)]
+File = Annotated[Path, BeforeValidator(_resolve_file)]
 Seconds = Annotated[float, Field(gt=0, le=86400, allow_inf_nan=False)]
 
 

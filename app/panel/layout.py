@@ -7,7 +7,7 @@ from typing import Annotated, Final, Literal
 from pydantic import AfterValidator, Field
 
 from app.interfaces.validation import format_value
-from app.panel.base import Description, Id, Label, Span
+from app.panel.base import Description, File, Id, Label, Span
 from app.panel.icons import Icon
 from app.panel.widgets.families import BaseWidget
 from app.panel.widgets.kinds import Widget
@@ -56,12 +56,15 @@ class Group(Description):
 
 
 class Page(Description):
-    """A page of the panel; with `fit` it never scrolls."""
+    """A page of the panel; with `fit` it never scrolls. With a `template` (Jinja) that one places the
+    widgets; `styles` is appended to the panel's stylesheet."""
 
     id: Id
     title: Label
     icon: Icon | None = None
     fit: bool = False
+    template: File | None = None
+    styles: File | None = None
     own: Annotated[tuple[Widget, ...], Field(strict=False)] = Field((), alias="widget")
     groups: Annotated[tuple[Group, ...], Field(strict=False)] = Field((), alias="group")
 

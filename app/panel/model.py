@@ -67,6 +67,16 @@ class Panel(Description):
         files = sorted(self.pictures.iterdir()) if self.pictures else []
         return {file.name: file for file in files if re.fullmatch(PICTURE, file.name)}
 
+    @cached_property
+    def styles(self) -> tuple[Path, ...]:
+        """The stylesheets of its pages, each once."""
+        return tuple(dict.fromkeys(page.styles for page in self.pages if page.styles))
+
+    @cached_property
+    def templates(self) -> tuple[Path, ...]:
+        """The templates of its pages, each once."""
+        return tuple(dict.fromkeys(page.template for page in self.pages if page.template))
+
     def widgets(self) -> Iterator[BaseWidget]:
         for page in self.pages:
             yield from page.widgets

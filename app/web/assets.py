@@ -60,6 +60,14 @@ class Assets:
     scripts: frozenset[str] = frozenset()  # the kinds of widgets that have a script of their own
 
 
+def _with_styles(sheet: Asset, styles: Collection[Path]) -> Asset:
+    """A stylesheet with others at its end."""
+    if not styles:
+        return sheet
+    content = b"\n".join([sheet.content, *(file.read_bytes() for file in styles)])
+    return Asset(content, sheet.media_type, gzip.compress(content, mtime=0))
+
+
 def picture(file: Path) -> Asset:
     """A picture of the panel; of these kinds only SVG is worth packing, and the others are sent as they
     are."""
@@ -73,18 +81,22 @@ def load_assets(
     mm_per_px: float,
     kinds: Collection[str],
     pictures: Mapping[str, Path] = NO_PICTURES,
+    styles: Collection[Path] = (),
+    own_templates: Collection[Path] = (),
 ) -> Assets:
-    """Reads `static`, and `templates` for the revision only.
+    """Reads `static`, and the templates for the revision only.
 
     `mm_per_px` (millimetres per CSS pixel) gives the sizes of buttons; `kinds` are those of the panel's
-    widgets.
+    widgets. `pictures`, `styles` and `own_templates` are the panel's files. Its styles come last, in no
+    layer, so that they win, and as they are written.
     """
     needed = [name for name, of in OF_KINDS.items() if not of.isdisjoint(kinds)]
     layers = [(static / "css" / f"{name}.css").read_bytes() for name in (*LAYERS, *needed)]
     of_kinds = [static / "css/kinds" / f"{kind}.css" for kind in sorted(kinds)]
     layers += [file.read_bytes() for file in of_kinds if file.is_file()]
     millimetre = f":root{{--mm:{1 / mm_per_px:.4f}px}}\n".encode()
-    files = {"kiosk.css": asset(b"".join([*layers, millimetre]), ".css")}
+    sheet = asset(b"".join([*layers, millimetre]), ".css")
+    files = {"kiosk.css": _with_styles(sheet, styles)}
     own = (static / "css" / f"{OWN_PAGE}.css").read_bytes()
     files[f"{OWN_PAGE}.css"] = asset(own, ".css")
     scripts = static / "js"
@@ -94,7 +106,7 @@ def load_assets(
     digest = hashlib.sha256()
     for name, file in sorted(files.items()):
         digest.update(name.encode() + b"\0" + file.content + b"\0")
-    for template in sorted(templates.rglob("*.html")):
+    for template in (*sorted(templates.rglob("*.html")), *own_templates):
         digest.update(template.read_bytes() + b"\0")
     own_scripts = {script.stem for script in (scripts / "kinds").glob("*.js")}
     return Assets(files, digest.hexdigest()[:12], frozenset(own_scripts))

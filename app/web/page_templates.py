@@ -1,25 +1,26 @@
-"""The templates of the pages, each with the texts in them rendered in one language."""
+"""The templates of the pages, each with the texts in them rendered in one language.
 
+A page with a template of its own is rendered in two steps: that one is made in its sandbox, with the
+widgets from the same macros as everywhere, then put into the frame.
+"""
+
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 from markupsafe import Markup
 
 from app.i18n import Text, render
-from app.icons import icons
-
-
-def icon(name: str) -> Markup:
-    """An icon as an element. It says nothing that the text beside it does not."""
-    inside = Markup(icons()[name])
-    return Markup('<svg class="icon" viewBox="0 0 24 24" aria-hidden="true">{}</svg>').format(inside)
+from app.icons import icon
+from app.panel.layout import Page
 
 
 class PageTemplates:
     """An environment for each language in use; a template is compiled when it is first needed."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, own: Collection[Path] = ()) -> None:
+        """`own` are the templates of the panel's pages."""
         self._base = Environment(
             loader=FileSystemLoader(folder),
             autoescape=True,
@@ -29,19 +30,42 @@ class PageTemplates:
             lstrip_blocks=True,
         )
         self._base.globals["icon"] = icon
-        self._own: dict[str, Environment] = {}
+        self._environments: dict[str, Environment] = {}
+        self._own: dict[Path, Template] = {}
+        if own:
+            from app.panel.page_template import compile_template  # its sandbox is not needed otherwise
+
+            self._own = {path: compile_template(path) for path in own}
 
     def environment(self, language: str) -> Environment:
         """That of a language with a catalogue."""
-        if language not in self._own:
+        if language not in self._environments:
 
             def shown(value: Any) -> Any:
                 return render(value, language) if isinstance(value, Text) else value
 
-            self._own[language] = self._base.overlay(finalize=shown)
-        return self._own[language]
+            self._environments[language] = self._base.overlay(finalize=shown)
+        return self._environments[language]
 
     def render(self, name: str, language: str, **context: Any) -> str:
         """A page for a reader of this language."""
         template = self.environment(language).get_template(name)
         return template.render(language=language, **context)
+
+    def inside(
+        self, page: Page, pictures: Collection[str], language: str, **context: Any
+    ) -> Markup | None:
+        """What a page's own template makes; None where it has none. `context` is what a widget's macro
+        takes (`_cell.html`)."""
+        if page.template is None:
+            return None
+        from app.panel.page_template import render_page
+
+        widgets = {widget.id: widget for widget in page.widgets}
+        cell = self.environment(language).get_template("_cell.html")
+
+        def show(name: str) -> Markup:
+            return Markup(cell.render(widget=widgets[name], placed="", **context))
+
+        folder = context["words"]["pictures"]
+        return render_page(self._own[page.template], page, pictures, show, folder)

@@ -39,6 +39,8 @@ FORMATS: Final[Mapping[str, tuple[str, str]]] = {
     "interfaces": ("folder", ""),
     "screens": ("width x height", ""),
     "icon": ("name of an icon", ""),
+    "template": ("file", ""),
+    "styles": ("file", ""),
     "field": ("field path", ""),
     "success": ("field path", ""),
     "call.message": ("field path", ""),

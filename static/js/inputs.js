@@ -36,7 +36,6 @@ function equip(input) {
   const show = () => output && (output.value = input.value);
   if (output) {
     input.type = "range";
-    output.hidden = false;
     setWidth(output, input);
     input.addEventListener("input", () => {
       if (input.step === "any") input.value = nearestStep(input, Number(input.value));
@@ -44,7 +43,6 @@ function equip(input) {
     });
   }
   for (const button of root.querySelectorAll("[data-step]")) {
-    button.hidden = false;
     button.addEventListener("click", () => {
       step(input, Number(button.dataset.step));
       input.dispatchEvent(new Event("input", { bubbles: true }));

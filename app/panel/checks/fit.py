@@ -25,12 +25,13 @@ from app.panel.widgets.families import BaseWidget
 GAP: Final = 12.0  # between groups, and between the rows of a group
 HEAD: Final = 48.0  # of a group
 TABS_OF_GROUPS: Final = 48.0
+TAB_MM: Final = 12.0
 
 
 def fit_notes(panel: Panel) -> Iterator[Note]:
     """For each page that must fit: which of the panel's screens it fits, and why not the others."""
     for p, page in enumerate(panel.pages):
-        if not page.fit or not panel.screens:
+        if not page.fit or not panel.screens or page.template:  # its template says how high things are
             continue
         short = {size: reason(panel, page, Screen.of(size, panel.mm_per_px)) for size in panel.screens}
         fitting = [size for size, why in short.items() if not why]
@@ -62,7 +63,7 @@ def page_height(panel: Panel, page: Page, screen: Screen) -> float:
     """What the frame leaves for the groups."""
     header = 56.0 if screen.is_wide else 48.0 if screen.width >= MIDDLE else 46.0
     robots = max(TOUCH, 11 * screen.mm) + 13 if panel.robots else 0.0
-    tabs = 60.0 if screen.width >= MIDDLE else 52.0
+    tabs = max(60.0 if screen.width >= MIDDLE else 52.0, TAB_MM * screen.mm)
     has_tabs = len(panel.pages) > 1 or len(page.parts) > 1 or bool(panel.frame.widgets)
     below = 0.0 if screen.is_wide or not has_tabs else tabs + 1
     return screen.height - header - robots - below - 2 * screen.pad

@@ -7,6 +7,7 @@ from itertools import islice
 from app.errors import Fault, InterfaceError
 from app.interfaces import Interfaces
 from app.panel.checks.interlocks import interlock_faults
+from app.panel.checks.page_templates import page_template_faults
 from app.panel.checks.templates import NOW_RULE
 from app.panel.checks.types import ROSOUT
 from app.panel.faults.wording import list_names
@@ -51,6 +52,7 @@ def find_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = 
     yield from _topic_conflicts(panel, [fault.place for fault in found])
     yield from type_faults((at, w) for at, w in _widgets_with_places(panel) if isinstance(w, Parameter))
     yield from _record_faults(panel)
+    yield from page_template_faults(panel)
     if not (found or ids or inputs or faulty):  # else they may be consequences
         yield from _demo_faults(panel, interfaces)
 

@@ -10,6 +10,7 @@ from urllib.parse import urlencode
 from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse, RedirectResponse, Response
 from jinja2 import Environment
+from markupsafe import Markup
 
 from app import clock
 from app.clock import format_datetime, format_time
@@ -71,7 +72,7 @@ CONTROL_ACTS = ("take", "ask", "give", "keep", "release", "withdraw")
 # settles, which is waiting. Otherwise the first page takes that time.
 # Small ones: what a compiler takes for one, the next takes again, and the loop turns in between.
 COMPILED_AFTER_S = 0.1
-OTHER_PAGES = ("ask.html", "error.html", "log.html")
+OTHER_PAGES = ("ask.html", "error.html", "gallery.html", "log.html")
 
 
 class PageContext(TypedDict):
@@ -82,6 +83,7 @@ class PageContext(TypedDict):
     choices: Sequence[Choice]
     panel: Panel
     page: Page
+    inside: Markup | None
     base: str
     robot: str
     view: View
@@ -166,8 +168,11 @@ def _render(request: Request, state: AppState, page: Page) -> Response:
     if session.control.rules.required:
         session.control.loaded(who, refresh_s + GRACE_S, by_hand(request))
         session.show()
-    context = _context(request, state, session, page, who, refresh_s)
-    html = state.templates.render("screen.html", language_of(request), **context)
+    context, language = _context(request, state, session, page, who, refresh_s), language_of(request)
+    widgets = {name: context[name] for name in ("view", "inputs", "receipt", "words")}
+    pictures = state.fleet.panel.picture_files
+    context["inside"] = state.templates.inside(page, pictures, language, **widgets)
+    html = state.templates.render("screen.html", language, **context)
     return keep(HTMLResponse(html, headers={"cache-control": "no-store"}), request, token)
 
 
@@ -185,6 +190,7 @@ def _context(
         choices=choices(display),
         panel=state.fleet.panel,
         page=page,
+        inside=None,
         base=session.base,
         robot=session.entry.id if session.entry else "",
         view=board.seen_as(role(board.view["control"], who, rules)),

@@ -1,0 +1,90 @@
+"""In development: a page with every widget in every state, in each theme. It needs no robot."""
+
+from collections.abc import Mapping
+from itertools import count
+from typing import Any, Final
+from urllib.parse import urlencode
+
+from fastapi import APIRouter, Request
+from fastapi.responses import HTMLResponse, Response
+from jinja2 import Template
+from markupsafe import Markup
+
+from app.i18n import say
+from app.web.app_state import CurrentState
+from app.web.display_choice import CHOICES, Choice, Display, choices, display_of
+from app.web.gallery import PARTS, PICTURE, Example
+from app.web.language import language_of
+from app.web.routes.pages import WORDS
+
+router = APIRouter(include_in_schema=False)
+
+STATES: Final = ("ready", "locked", "unknown", "lost")
+LINKS: Final = (("server", "ok", "ok"), ("bridge", "wait", "pending"), ("robot", "bad", "lost"))
+
+
+@router.get("/gallery", response_class=HTMLResponse)
+async def gallery(request: Request, state: CurrentState) -> Response:
+    """The query may have a `theme`, a `text_size` and a `hand`, as the menu has them."""
+    given = {
+        name: value for name, value in request.query_params.items() if value in CHOICES.get(name, ())
+    }
+    display = display_of(request, state.fleet.panel)._replace(**given)
+    language = language_of(request)
+    cell = state.templates.environment(language).get_template("_cell.html")
+    numbers, words = count(), _words()
+    html = state.templates.render(
+        "gallery.html",
+        language,
+        site=state,
+        panel=state.fleet.panel,
+        display=display,
+        switches=[(choice, _urls(choice, display)) for choice in choices(display)],
+        parts=[
+            (
+                part.title,
+                part.columns,
+                [(one.title, _html(one, next(numbers), cell, words)) for one in part.examples],
+            )
+            for part in PARTS
+        ],
+        states=[{"state": one, "text": say(f"state_{one}")} for one in STATES],
+        links={name: {"name": say(name), "state": of, "text": say(text)} for name, of, text in LINKS},
+        words=words,
+    )
+    return HTMLResponse(html, headers={"cache-control": "no-store"})
+
+
+@router.get("/gallery/box.svg")
+async def box() -> Response:
+    """The picture of the gallery's `image`."""
+    return Response(PICTURE, media_type="image/svg+xml")
+
+
+def _words() -> dict[str, Any]:
+    """The words of a page that its widgets use."""
+    return {word: say(word) for word in WORDS} | {"base": "", "pictures": "/gallery", "asks": {}}
+
+
+def _html(example: Example, number: int, cell: Template, words: Mapping[str, Any]) -> Markup:
+    """One widget, by the macro of its kind."""
+    widget = example.widget(number)
+    inputs = {} if example.entered is None else {widget.id: example.entered}
+    html = cell.render(
+        widget=widget,
+        view={"widgets": {widget.id: example.shown}},
+        inputs=inputs,
+        receipt=example.receipt_of(widget),
+        words=words,
+        placed="",
+    )
+    for part, made in example.marks.items():
+        assert part in html, (example.title, part)
+        html = html.replace(part, made, 1)
+    return Markup(html)
+
+
+def _urls(choice: Choice, display: Display) -> list[str]:
+    """The address of each option of a choice, with the others as they are."""
+    now = display._asdict()
+    return [f"?{urlencode(now | {choice['name']: one['value']})}" for one in choice["options"]]

@@ -1,0 +1,123 @@
+"""A page's own template: what it may do, and each fault with its line in the template."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final
+
+import pytest
+
+from app.errors import Fault, PanelError
+from app.panel import check_panel, load_panel
+from tests.support.parts import ROOT
+
+EXAMPLE: Final = ROOT / "docs/examples/plan/panel.toml"
+PANEL: Final = """\
+title = "Cell"
+pictures = "pictures"
+[[page]]
+id = "plan"
+title = "Plan"
+template = "plan.html"
+[[page.widget]]
+id = "speed"
+kind = "readout"
+label = "Speed"
+topic = "/speed"
+type = "std_msgs/msg/Float64"
+[[page.widget]]
+id = "heard"
+kind = "readout"
+label = "Heard"
+topic = "/heard"
+type = "std_msgs/msg/String"
+"""
+BOTH: Final = '{{ widget("speed") }}\n{{ widget("heard") }}\n'
+Write = Callable[..., Path]
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Write:
+    """The panel file, beside its template and a picture."""
+    (tmp_path / "pictures").mkdir()
+    (tmp_path / "pictures/cell.svg").write_text('<svg xmlns="http://www.w3.org/2000/svg"/>')
+
+    def written(template: str | bytes, panel: str = PANEL) -> Path:
+        content = template.encode() if isinstance(template, str) else template
+        (tmp_path / "plan.html").write_bytes(content)
+        (tmp_path / "cell.toml").write_text(panel)
+        return tmp_path / "cell.toml"
+
+    return written
+
+
+def the_fault(path: Path) -> Fault:
+    with pytest.raises(PanelError) as caught:
+        load_panel(path)
+    (fault,) = caught.value.faults
+    assert fault.place.startswith("page[0].")
+    return fault
+
+
+def test_the_example_is_good_and_places_all_its_widgets() -> None:
+    checked = check_panel(EXAMPLE)
+    assert checked.notes == ()
+    assert checked.panel.pages[0].template == EXAMPLE.parent / "plan.html"
+
+
+@pytest.mark.parametrize(
+    ("template", "message"),
+    [
+        (BOTH + "{% if %}", "plan.html: line 3: Expected an expression, got 'end of statement block'"),
+        (BOTH + "{% for a in [1] %}", "plan.html: line 3: Unexpected end of template."),
+        (
+            BOTH + '<b>{{ widget("sped") }}</b>',
+            'plan.html: line 3: no widget "sped" on this page; did you mean "speed"?',
+        ),
+        (BOTH + '\n{{ widget("speed") }}', 'plan.html: line 4: the widget "speed" is placed twice'),
+        (
+            BOTH + '{{ picture("plan.svg") }}',
+            'plan.html: line 3: no picture "plan.svg"; there is cell.svg',
+        ),
+        (BOTH + '{{ icon("no such icon") }}', 'plan.html: line 3: no icon "no such icon"; there is '),
+        (BOTH + "{{ robot }}", "plan.html: line 3: 'robot' is undefined"),
+        (BOTH + "{{ 1 / 0 }}", "plan.html: line 3: ZeroDivisionError: division by zero"),
+        (BOTH + '{% include "more.html" %}', "plan.html: line 3: include, import and extends are not "),
+        (
+            BOTH + "{{ widget.__globals__ }}",
+            "plan.html: line 3: access to attribute '__globals__' of 'function' object is unsafe.",
+        ),
+        (b"\xff", "plan.html: is not UTF-8"),
+    ],
+)
+def test_each_fault_has_its_line_in_the_template(
+    write: Write, template: str | bytes, message: str
+) -> None:
+    fault = the_fault(write(template))
+    assert fault.place == "page[0].template"
+    assert fault.line == PANEL.splitlines().index('template = "plan.html"') + 1
+    assert fault.message.startswith(message)
+
+
+@pytest.mark.parametrize("key", ["template", "styles"])
+def test_a_file_that_is_not_there_is_a_fault_of_its_key(write: Write, key: str) -> None:
+    path = write(BOTH, PANEL.replace('template = "plan.html"', f'{key} = "gone.file"'))
+    fault = the_fault(path)
+    assert fault.place == f"page[0].{key}"
+    assert "gone.file is not a file" in fault.message
+
+
+def test_a_widget_with_a_faulty_id_is_one_fault(write: Write) -> None:
+    fault = the_fault(write(BOTH, PANEL.replace('id = "speed"', 'id = "Speed"')))
+    assert fault.place == "page[0].widget[0].id"
+
+
+def test_a_page_has_groups_or_a_template(write: Write) -> None:
+    fault = the_fault(write(BOTH, PANEL + '[[page.group]]\ntitle = "More"\n'))
+    assert fault.message.startswith("a page with a template has no groups")
+
+
+def test_what_is_never_placed_is_a_note(write: Write) -> None:
+    notes = check_panel(write('{{ widget("heard") }}')).notes
+    assert [note.message for note in notes] == [
+        'plan.html never places "speed": no one sees what is not placed'
+    ]

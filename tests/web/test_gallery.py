@@ -1,0 +1,58 @@
+"""The gallery: in development, with every kind of widget; not there otherwise."""
+
+import re
+from collections.abc import Iterator
+from typing import get_args
+
+import pytest
+
+from app.panel.widgets.displays import Indicator
+from app.panel.widgets.kinds import KINDS
+from app.panel.widgets.roles import KeyRole
+from app.view.display_values import State
+from app.web.gallery import PARTS
+from tests.support.parts import ROOT, Server
+
+EXAMPLES = [example for part in PARTS for example in part.examples]
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[Server]:
+    mine = Server(ROOT, KIOSK_MODE="demo", KIOSK_DEV="1")
+    yield mine
+    mine.end()
+
+
+def test_every_kind_is_in_it() -> None:
+    assert {example.kind for example in EXAMPLES} == set(KINDS)
+
+
+def test_roles_states_shapes_and_colours_are_in_it() -> None:
+    """What a role, a lamp or a display may be has an example."""
+    assert {one.table.get("role", "neutral") for one in EXAMPLES} | {"hold"} == {*get_args(KeyRole)}
+    lamp = KINDS["indicator"].model_fields["states"].annotation
+    (state,) = {one for one in get_args(lamp) if one is not Ellipsis}
+    lamps = [one.shown for one in EXAMPLES if one.kind == "indicator"]
+    for key in ("shape", "colour"):
+        assert {*get_args(state.model_fields[key].annotation)} <= {one[key] for one in lamps}
+    for kind in ("readout", "indicator"):
+        assert {one.shown["state"] for one in EXAMPLES if one.kind == kind} == {*get_args(State)}
+    assert Indicator in KINDS.values()
+
+
+def test_it_is_a_page_in_each_theme_and_text_size(server: Server) -> None:
+    plain = server.http.get("/gallery")
+    assert plain.status_code == 200
+    assert len(re.findall("data-widget=", plain.text)) == len(EXAMPLES)
+    assert 'data-theme="light" data-text-size="normal"' in plain.text
+    large = server.http.get("/gallery?theme=dark&text_size=large&hand=none").text
+    assert 'data-theme="dark" data-text-size="large" data-hand="right"' in large
+    assert 'href="?theme=contrast&amp;text_size=large&amp;hand=right"' in large
+
+
+def test_there_is_none_without_development() -> None:
+    server = Server(ROOT, KIOSK_MODE="demo")
+    try:
+        assert server.http.get("/gallery").status_code == 404
+    finally:
+        server.end()
