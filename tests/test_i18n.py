@@ -19,6 +19,7 @@ PREFIXES = (
     "control_",
     "display_",
     "display_hand_",
+    "display_sounds_",
     "display_text_size_",
     "display_theme_",
     "lamp_",

@@ -13,6 +13,7 @@ from app.panel.demo import DemoEntry
 from app.panel.interlock import Interlock
 from app.panel.layout import Frame, Hand, Page, Screens, TextSize, Theme
 from app.panel.rules import ControlRules, LogRules, RecordRules
+from app.panel.screen import Keyboard, ScreenRules
 from app.panel.widgets.families import BaseWidget, Command, Display, PublishCommand, TopicWidget
 from app.panel.widgets.parameter import EVENT_TYPE, EVENTS, Parameter
 from app.panel.widgets.publish import Confirm, SinglePublish
@@ -50,6 +51,8 @@ class Panel(Description):
     hand: Hand = "right"
     screens: Screens = ()
     pictures: Folder | None = None
+    keyboard: Keyboard = "auto"
+    screen: ScreenRules = ScreenRules()
     frame: Frame = Frame.model_validate({})
     control: ControlRules = ControlRules(required=False)
     record: RecordRules | None = None

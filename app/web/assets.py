@@ -1,7 +1,8 @@
 """The static files, in memory and packed, under a name that changes with their content.
 
 The stylesheet is the layers of `static/css` in their order, with what the panel's kinds of widgets need
-and its millimetres: one request instead of five; what only the log's page needs is a file of its own.
+and its millimetres: one request instead of five; what only the log's page, or a keypad that opens,
+needs is a file of its own.
 Scripts keep their names, so that modules find each other, and their lines. A kind of widgets may have
 `css/kinds/<kind>.css` and `js/kinds/<kind>.js`. Comments, what lines are indented by and what only sets
 styles apart stay here.
@@ -15,11 +16,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-LAYERS: Final = ("tokens", "base", "layout", "widgets", "keys")
+LAYERS: Final = ("tokens", "base", "layout", "widgets", "keys", "floor")
 OF_KINDS: Final = {
     "entries": frozenset({"text", "number", "slider", "select", "toggle", "parameter"}),
 }
 OWN_PAGE: Final = "log"
+LATER: Final = "keypad"  # comes with the script that needs it
 LEFT_OUT: Final = {
     ".css": re.compile(rb"/\*.*?\*/|^\s+|(?<=[:;,{}])\s+|\s+(?=[{}])", re.DOTALL | re.MULTILINE),
     ".js": re.compile(rb"^[ \t]*(//.*)?", re.MULTILINE),
@@ -97,8 +99,8 @@ def load_assets(
     millimetre = f":root{{--mm:{1 / mm_per_px:.4f}px}}\n".encode()
     sheet = asset(b"".join([*layers, millimetre]), ".css")
     files = {"kiosk.css": _with_styles(sheet, styles)}
-    own = (static / "css" / f"{OWN_PAGE}.css").read_bytes()
-    files[f"{OWN_PAGE}.css"] = asset(own, ".css")
+    for name in (OWN_PAGE, LATER):
+        files[f"{name}.css"] = asset((static / "css" / f"{name}.css").read_bytes(), ".css")
     scripts = static / "js"
     for script in sorted(scripts.rglob("*.js")):
         files[script.relative_to(scripts).as_posix()] = asset(script.read_bytes(), ".js")

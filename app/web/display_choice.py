@@ -8,8 +8,13 @@ from app.i18n import TextLike, say
 from app.panel.layout import Hand, TextSize, Theme
 from app.panel.model import Panel
 
-# Each choice by its name, which is the key of the panel file: its cookie is kiosk_<name>.
-CHOICES: Final = {"theme": get_args(Theme), "text_size": get_args(TextSize), "hand": get_args(Hand)}
+# Each choice by its name, a key of the panel file or of its [screen]: its cookie is kiosk_<name>.
+CHOICES: Final = {
+    "theme": get_args(Theme),
+    "text_size": get_args(TextSize),
+    "hand": get_args(Hand),
+    "sounds": ("off", "on"),
+}
 COOKIE: Final = "kiosk_{}"
 KEPT_S: Final = 400 * 86400  # as long as browsers keep a cookie
 
@@ -20,6 +25,7 @@ class Display(NamedTuple):
     theme: str
     text_size: str
     hand: str
+    sounds: str
 
 
 class Option(TypedDict):
@@ -45,8 +51,14 @@ def display_of(connection: HTTPConnection, panel: Panel) -> Display:
 
 def _chosen(connection: HTTPConnection, panel: Panel, name: str) -> str:
     given = connection.cookies.get(COOKIE.format(name), "")
+    return given if given in CHOICES[name] else _usual(panel, name)
+
+
+def _usual(panel: Panel, name: str) -> str:
+    if name == "sounds":
+        return "on" if panel.screen.sounds else "off"
     usual: str = getattr(panel, name)
-    return given if given in CHOICES[name] else usual
+    return usual
 
 
 def choices(now: Display) -> list[Choice]:

@@ -14,6 +14,7 @@ from markupsafe import Markup
 from app.i18n import Text, render
 from app.icons import icon
 from app.panel.layout import Page
+from app.panel.screen import CLEANING_S
 
 
 class PageTemplates:
@@ -30,6 +31,7 @@ class PageTemplates:
             lstrip_blocks=True,
         )
         self._base.globals["icon"] = icon
+        self._base.globals["cleaning_s"] = CLEANING_S
         self._environments: dict[str, Environment] = {}
         self._own: dict[Path, Template] = {}
         if own:

@@ -21,6 +21,11 @@ export function enteredValues() {
 // The input of a parameter shows the robot's value until it is touched. Then it keeps what was entered
 // until that is set.
 const touched = new WeakSet();
+// Whether what was entered is kept; else the input follows the robot's value.
+export function isTouched(input) {
+  return !input.matches("[data-entry]") || touched.has(input);
+}
+
 const robotValues = new WeakMap(); // the robot's values since the last press
 
 function entryOf(root) {

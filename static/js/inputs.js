@@ -37,8 +37,9 @@ function equip(input) {
   if (output) {
     input.type = "range";
     setWidth(output, input);
-    input.addEventListener("input", () => {
-      if (input.step === "any") input.value = nearestStep(input, Number(input.value));
+    input.addEventListener("input", (event) => {
+      // A value of the keypad is exact; a finger on a slider is not.
+      if (input.step === "any" && !event.inputType) input.value = nearestStep(input, Number(input.value));
       show();
     });
   }

@@ -88,7 +88,7 @@ function lockWidget(root) {
   const buttons = root.querySelectorAll("button[type=submit], .hold");
   for (const button of buttons) button.disabled = true;
   root.querySelector("dialog.ask")?.close();
-  if (buttons.length) showWidget(root.dataset.widget, { reason: lost, reasons: lost, more: "" });
+  if (buttons.length) showWidget(root.dataset.widget, { reason: lost, reasons: lost, more: "", enabled: false });
   if (!root.dataset.state) return;
   root.dataset.state = "old"; // its note keeps the time of the value
   if (!root.dataset.shape) return;
@@ -141,5 +141,16 @@ for (const kind of body.dataset.scripts.split(" ").filter(Boolean)) {
 }
 if (document.querySelector(".group-tab")) source.load("./tabs.js", () => {});
 source.load("./whole.js", () => {});
+// What is not there when these fail to load is the browser's own.
+const absent = () => {};
+const coarse = matchMedia("(pointer: coarse)");
+const openEntry = () => import("./touch-entry.js").catch(absent);
+if (document.querySelector("template:is(#keypad, #keyboard)")) {
+  if (body.dataset.keyboard === "on" || coarse.matches) openEntry();
+  else coarse.addEventListener("change", openEntry, { once: true });
+}
+if (document.querySelector("[data-scan]")) import("./scan.js").catch(absent);
+if (body.dataset.sounds === "on") import("./sound.js").catch(absent);
+import("./floor.js").catch(absent);
 const presser = new Presser(widgets, source, { unsure: body.dataset.unsure });
 source.start();

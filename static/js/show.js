@@ -54,7 +54,35 @@ export function addShow(functions) {
   Object.assign(SHOW, functions);
 }
 
+// Widgets that this page itself locks, while something lies over it, with what the server says of them.
+const barred = new WeakMap();
+const LOCK = ["enabled", "reason", "reasons", "more"];
+
+// Locks the key of a widget for a reason of this page's own.
+export function bar(root, reason) {
+  if (barred.has(root)) {
+    barred.get(root).times += 1;
+    return;
+  }
+  const text = (name) => root.querySelector(`[data-text="${name}"]`)?.textContent;
+  const said = { enabled: !root.querySelector("button[type=submit], .hold").disabled, reason: text("reason"), reasons: text("reasons"), more: text("more") };
+  for (const [name, value] of Object.entries({ enabled: false, reason, reasons: reason, more: "" })) showAttribute(root, name, value);
+  barred.set(root, { said, times: 1 });
+}
+
+// Once for each time that it was locked: then what the server says by now shows again.
+export function unbar(root) {
+  const lock = barred.get(root);
+  if (!lock || --lock.times) return;
+  barred.delete(root);
+  for (const [name, value] of Object.entries(lock.said)) showAttribute(root, name, value);
+}
+
 export function showAttribute(root, name, value) {
+  if (barred.has(root) && LOCK.includes(name)) {
+    barred.get(root).said[name] = value;
+    return;
+  }
   if (name in SHOW) SHOW[name](root, value);
   else showInPlace(root, name, value);
 }

@@ -118,7 +118,10 @@ def test_it_tells_how_it_is_used(capsys: pytest.CaptureFixture[str]) -> None:
 def test_a_note_is_no_fault_and_has_its_place(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    noted = [Note("interlock[0]", "is worth a look"), Note("page[0].group[0].widget[1].span", "is large")]
+    noted = [
+        Note("interlock[0]", "is worth a look"),
+        Note("page[0].group[0].widget[1].span", "is large"),
+    ]
     monkeypatch.setattr("app.panel.checks.notes.find_notes", lambda *_: noted)
     assert main([str(SHIPPED)]) == 0
     said = capsys.readouterr()

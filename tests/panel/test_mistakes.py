@@ -205,9 +205,9 @@ def test_a_mistake_is_one_fault_in_words(told: Told, mistake: Mapping[str, str])
 def test_it_is_not_toml(told: Told) -> None:
     for old, new, line in (
         ('title = "Robot cell 1"', "title = Robot cell 1", 2),
-        ('label = "Speed"', 'label = "Speed', 95),
-        ('kind = "slider"', 'kind = "slider"\nkind = "number"', 95),
-        ("min = -1.0", "min : -1.0", 98),
+        ('label = "Speed"', 'label = "Speed', 102),
+        ('kind = "slider"', 'kind = "slider"\nkind = "number"', 102),
+        ("min = -1.0", "min : -1.0", 105),
     ):
         fault = the_one(told, changed(old, new))
         assert (fault.place, fault.line) == ("", line)

@@ -477,7 +477,8 @@ def test_keys_that_are_unknown_in_a_widget_are_told_together(load: Load) -> None
     page = {"id": "one", "title": "One", "widget": [text]}
     assert faults(load, tables(page=[page])) == {
         "page[0].widget[0].scale": (
-            'unknown key, as "offset"; known here: id, label, span, rows, kind, max_length, default'
+            'unknown key, as "offset"; known here: '
+            "id, label, span, rows, kind, max_length, default, scan"
         )
     }
 

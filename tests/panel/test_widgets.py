@@ -378,3 +378,11 @@ def test_a_panel_with_parameters_listens_to_their_events() -> None:
     assert panel.subscriptions()["/parameter_events"] == "rcl_interfaces/msg/ParameterEvent"
     assert panel.qos("/parameter_events") == TopicQos(durability="volatile", depth=1000)
     assert "/parameter_events" not in panel_of(FREE).subscriptions()
+
+
+def test_a_bar_code_goes_to_one_input_of_a_page() -> None:
+    first, second = ({**MESSAGE, "id": name, "scan": True} for name in ("order", "pallet"))
+    assert faults(first, {**second, "scan": False}) == []
+    assert faults(first, second) == [
+        'page[0].widget[1].scan: "order" has it already: a bar code goes to one input of a page'
+    ]

@@ -7,7 +7,7 @@ import pytest
 
 from app.panel.widgets.kinds import KINDS
 from app.settings import shipped_path
-from app.web.assets import LAYERS, OF_KINDS, OWN_PAGE, Assets, load_assets
+from app.web.assets import LATER, LAYERS, OF_KINDS, OWN_PAGE, Assets, load_assets
 from tests.support.parts import ROOT
 
 
@@ -16,7 +16,7 @@ def static(tmp_path: Path) -> Path:
     folder = tmp_path / "static"
     for part in ("css", "js"):
         (folder / part).mkdir(parents=True)
-    for layer in (*LAYERS, *OF_KINDS, OWN_PAGE):
+    for layer in (*LAYERS, *OF_KINDS, OWN_PAGE, LATER):
         style = f".{layer} a :is(b, i) {{\n    top: 0;\n  }}\n"
         (folder / "css" / f"{layer}.css").write_text(f"/* Why. */\n  {style}")
     (folder / "js/main.js").write_text("main();\n")
@@ -71,7 +71,7 @@ def test_a_kind_may_have_styles_and_a_script_of_its_name(static: Path, templates
 
 def test_scripts_keep_their_names(static: Path, templates: Path) -> None:
     files = loaded(static, templates).files
-    assert set(files) == {"kiosk.css", "log.css", "main.js", "press.js"}
+    assert set(files) == {"kiosk.css", "log.css", "keypad.css", "main.js", "press.js"}
     assert files["main.js"].content == b"main();\n"
     assert files["log.css"].content == b"\n.log a :is(b,i){top:0;}"
 

@@ -22,6 +22,7 @@ from app.panel.widgets.families import (
     KeyCommand,
     TopicWidget,
 )
+from app.panel.widgets.inputs import TextInput
 from app.panel.widgets.parameter import Parameter, type_faults
 from app.panel.widgets.publish import Confirm, SinglePublish
 from app.panel.widgets.service_action import Action
@@ -53,6 +54,7 @@ def find_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = 
     yield from type_faults((at, w) for at, w in _widgets_with_places(panel) if isinstance(w, Parameter))
     yield from _record_faults(panel)
     yield from page_template_faults(panel)
+    yield from _scan_faults(panel)
     if not (found or ids or inputs or faulty):  # else they may be consequences
         yield from _demo_faults(panel, interfaces)
 
@@ -64,6 +66,15 @@ def _id_faults(panel: Panel) -> Iterator[Fault]:
     for place, widget in _widgets_with_places(panel):
         if isinstance(widget, EntryWidget) and widget.id == NOW:
             yield Fault(f"{place}.id", f'"{NOW}" is reserved, as {NOW_RULE}: choose another id')
+
+
+def _scan_faults(panel: Panel) -> Iterator[Fault]:
+    """A bar code goes to one input of the page that is open."""
+    for p, page in enumerate(panel.pages):
+        asking = [(at, w) for at, w in page.placed() if isinstance(w, TextInput) and w.scan]
+        for place, _ in asking[1:]:
+            what = f'"{asking[0][1].id}" has it already: a bar code goes to one input of a page'
+            yield Fault(f"page[{p}].{place}.scan", what)
 
 
 def _contains_any(place: str, places: Iterable[str]) -> bool:

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import AfterValidator, Field
 
 from app.errors import Fault, InputError
-from app.i18n import say
+from app.i18n import Text, say
 from app.interfaces.validation import format_value
 from app.panel.base import Description, Label, SaidLabel, Span, catalogue_default, non_empty
 from app.panel.values import same_value
@@ -17,9 +17,12 @@ BOOL_TEXTS: Final = {"true": True, "false": False}
 
 
 class TextInput(Input):
+    """With `scan`, what a bar code reader types while no input has the focus goes here."""
+
     kind: Literal["text"]
     max_length: Annotated[int, Field(ge=1, le=1000)] = 80
     default: Annotated[str, Field(pattern=r"^[^\x00]*$")] = ""
+    scan: bool = False
 
     @property
     def value_description(self) -> str:
@@ -31,6 +34,11 @@ class TextInput(Input):
     @property
     def comment(self) -> str:
         return f"text, {format_value(self.default)} at first"
+
+    @property
+    def too_long(self) -> Text:
+        """What is shown for a code that is longer than the input."""
+        return say("scan_too_long", max=self.max_length)
 
     @property
     def default_value(self) -> str | None:

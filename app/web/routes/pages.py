@@ -32,6 +32,7 @@ from app.web.assets import PICTURES
 from app.web.client_cookie import by_hand, keep, welcomed
 from app.web.described import PAGE, Described, errors
 from app.web.display_choice import Choice, Display, choices, display_of
+from app.web.entry_words import ENTRY_WORDS
 from app.web.language import language_of
 
 router = APIRouter(include_in_schema=True)
@@ -63,6 +64,8 @@ WORDS = (
     "empty",
     "hold_cut",
     "hold_scripts",
+    "clean",
+    "cleaning",
 )
 LINK_WORDS = ("links", "link_state", "link_since", "link_locks")
 CONTROL_ACTS = ("take", "ask", "give", "keep", "release", "withdraw")
@@ -230,7 +233,7 @@ def _words(session: RobotSession, page: Page, pictures: str) -> dict[str, Any]:
     """The words of a page by their names in its templates, and what it asks before a press."""
     own = {"base": session.base, "pictures": pictures, "log": say("log_link")}
     own |= {"asks": asks_of(session, page)}
-    plain = {word: say(word) for word in (*WORDS, *LINK_WORDS)}
+    plain = {word: say(word) for word in (*WORDS, *LINK_WORDS, *ENTRY_WORDS)}
     return own | plain | {act: say(f"control_{act}") for act in CONTROL_ACTS}
 
 

@@ -1,0 +1,50 @@
+// The screen is locked so that it can be cleaned. It unlocks by itself only, also when the page is loaded again.
+import { shield } from "./shield.js";
+import { bar, unbar } from "./show.js";
+
+const UNTIL = "cleaning-until"; // in this tab: when it unlocks, by Date.now()
+const COUNT_MS = 100;
+const HOLDS = '[data-kind="hold"]';
+
+const over = document.getElementById("cleaning");
+const totalMs = () => 1000 * over.dataset.seconds;
+
+export class Cleaning {
+  #endsAt = 0; // by performance.now(): a clock that is set changes nothing
+
+  constructor() {
+    const left = Number(sessionStorage.getItem(UNTIL)) - Date.now();
+    if (left > 0 && left <= totalMs()) this.#begin(left);
+  }
+
+  start() {
+    if (over.matches(":popover-open")) return;
+    sessionStorage.setItem(UNTIL, Date.now() + totalMs());
+    this.#begin(totalMs());
+  }
+
+  #begin(ms) {
+    this.#endsAt = performance.now() + ms;
+    shield.raise();
+    // A hold that goes on ends with its lock.
+    for (const hold of document.querySelectorAll(HOLDS)) bar(hold, over.querySelector("p").textContent.trim());
+    document.activeElement?.blur();
+    document.getElementById("menu").hidePopover();
+    over.showPopover();
+    this.#count();
+  }
+
+  #count() {
+    const left = this.#endsAt - performance.now();
+    if (left <= 0) return this.#end();
+    over.querySelector("[role=timer]").textContent = Math.ceil(left / 1000);
+    setTimeout(() => this.#count(), COUNT_MS);
+  }
+
+  #end() {
+    sessionStorage.removeItem(UNTIL);
+    over.hidePopover();
+    for (const hold of document.querySelectorAll(HOLDS)) unbar(hold);
+    shield.lower();
+  }
+}

@@ -1,0 +1,49 @@
+// The page gets dark when it is not touched for long. The touch that wakes it presses nothing.
+import { shield } from "./shield.js";
+
+const MOVES = ["pointerdown", "pointermove", "pointerup", "pointercancel", "keydown", "wheel"];
+
+const dark = document.getElementById("dark");
+
+export class Dimming {
+  #afterMs;
+  #timer = 0;
+  #pressed = new Set(); // pointers that are down: a page that is held is touched
+
+  constructor(afterMs) {
+    this.#afterMs = afterMs;
+    for (const name of MOVES) addEventListener(name, (event) => this.#touched(event), true);
+    shield.touched = (event) => MOVES.includes(event.type) && this.#touched(event);
+    // What the operator must see: the state of the robot, and what is wrong with the panel.
+    const seen = new MutationObserver(() => this.wake());
+    seen.observe(document.getElementById("state"), { attributeFilter: ["data-state"] });
+    seen.observe(document.getElementById("fault"), { attributeFilter: ["hidden"] });
+    this.#wait();
+  }
+
+  wake() {
+    if (dark.matches(":popover-open")) {
+      dark.hidePopover();
+      shield.lower();
+    }
+    this.#wait();
+  }
+
+  #touched({ type, pointerId, movementX, movementY }) {
+    if (type === "pointermove" && !movementX && !movementY) return; // the page moved, not the mouse
+    if (type === "pointerdown") this.#pressed.add(pointerId);
+    if (type === "pointerup" || type === "pointercancel") this.#pressed.delete(pointerId);
+    this.wake();
+  }
+
+  #wait() {
+    clearTimeout(this.#timer);
+    this.#timer = setTimeout(() => this.#dim(), this.#afterMs);
+  }
+
+  #dim() {
+    if (this.#pressed.size || document.querySelector("#cleaning:popover-open")) return this.#wait();
+    shield.raise();
+    dark.showPopover();
+  }
+}

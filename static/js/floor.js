@@ -1,0 +1,32 @@
+// The page as a machine's screen: cleaning, dimming, and none of a browser's own gestures.
+const ZOOM_KEYS = ["+", "-", "=", "0"];
+const coarse = matchMedia("(pointer: coarse)");
+
+// Where a finger is the main pointer: a developer's browser keeps its own. The rest is in floor.css.
+function isKiosk() {
+  return "kiosk" in document.documentElement.dataset && coarse.matches;
+}
+
+function refuse(name, isGesture = () => true) {
+  const listener = (event) => isKiosk() && isGesture(event) && event.preventDefault();
+  addEventListener(name, listener, { capture: true, passive: false });
+}
+
+refuse("contextmenu");
+refuse("dragstart");
+refuse("gesturestart"); // a pinch in WebKit
+refuse("wheel", ({ ctrlKey }) => ctrlKey);
+refuse("keydown", ({ key, ctrlKey, metaKey }) => (ctrlKey || metaKey) && ZOOM_KEYS.includes(key));
+
+const afterMs = 1000 * (document.body.dataset.dimAfterS ?? 0);
+if (afterMs) import("./dim.js").then(({ Dimming }) => new Dimming(afterMs));
+
+// Loaded with the menu, and where the page was loaded again while it was cleaned.
+let cleaning = null;
+const loaded = () => (cleaning ??= import("./clean.js").then(({ Cleaning }) => new Cleaning()));
+if (sessionStorage.getItem("cleaning-until")) loaded();
+document.getElementById("menu").addEventListener("toggle", loaded, { once: true });
+const key = document.querySelector(".menu .clean");
+key.hidden = false;
+key.addEventListener("click", () => loaded().then((one) => one.start()));
+document.documentElement.dataset.floor = ""; // all of this is in force

@@ -1,0 +1,131 @@
+// The keyboard: types into its text field, in which the caret is seen. Cancel gives back what was there.
+import { isTouched, releaseEntry } from "./entries.js";
+import { capital, layoutOf, SIGNS } from "./layouts.js";
+import { Sheet } from "./sheet.js";
+
+const SHAPES = ["keys"];
+const SHIFTS = ["off", "once", "lock"];
+
+export class Entry {
+  input;
+  #sheet = new Sheet("keyboard", SHAPES, () => this.cancel());
+  #closed;
+  #before;
+  #wasTouched;
+  #shift = "off";
+  #signs = false;
+  #typed = (event) => this.#key(event);
+  #changed = () => this.#limit();
+
+  constructor(input, closed) {
+    this.input = input;
+    this.#closed = closed;
+    this.#before = input.value;
+    this.#wasTouched = isTouched(input);
+    this.#draw();
+    this.#sheet.root.addEventListener("click", ({ target }) => this.#clicked(target.closest("button")));
+    addEventListener("keydown", this.#typed, true);
+    input.addEventListener("input", this.#changed);
+    document.addEventListener("selectionchange", this.#changed);
+    const named = input.labels[0] ?? document.getElementById(input.getAttribute("aria-labelledby"));
+    this.#sheet.open(input, named.textContent);
+    input.focus();
+  }
+
+  cancel() {
+    if (this.input.value !== this.#before) {
+      this.input.value = this.#before;
+      this.#say("input");
+    }
+    if (!this.#wasTouched) releaseEntry(this.input.closest("[data-widget]"));
+    this.#close();
+  }
+
+  #done() {
+    if (this.input.value !== this.#before) this.#say("change");
+    this.#close();
+  }
+
+  #close() {
+    removeEventListener("keydown", this.#typed, true);
+    this.input.removeEventListener("input", this.#changed);
+    document.removeEventListener("selectionchange", this.#changed);
+    this.#sheet.close();
+    this.#closed();
+  }
+
+  // A real keyboard types into the field by itself. Its Enter is Done: it presses nothing.
+  #key(event) {
+    if (event.target !== this.input || !["Enter", "Escape"].includes(event.key)) return;
+    event.preventDefault();
+    if (event.key === "Enter") this.#done();
+    else this.cancel();
+  }
+
+  #clicked(button) {
+    if (!button || button.disabled) return;
+    const { key } = button.dataset;
+    if (button.matches(".cancel-entry")) this.cancel();
+    else if (button.matches(".set-entry")) this.#done();
+    else if (key === "shift") this.#turn({ shift: SHIFTS[(SHIFTS.indexOf(this.#shift) + 1) % SHIFTS.length] });
+    else if (key === "signs") this.#turn({ signs: !this.#signs });
+    else this.#edit(key);
+  }
+
+  #edit(key) {
+    const { selectionStart: start, selectionEnd: end, value } = this.input;
+    if (key === "left" || key === "right") {
+      const to = key === "left" ? Math.max(0, start - 1) : Math.min(value.length, end + 1);
+      return this.input.setSelectionRange(to, to);
+    }
+    const from = key === "delete" && start === end ? Math.max(0, start - 1) : start;
+    this.input.setRangeText(key === "delete" ? "" : key, from, end, "end");
+    this.#say("input");
+    if (this.#shift === "once" && key !== "delete") this.#turn({ shift: "off" });
+  }
+
+  #say(name) {
+    this.input.dispatchEvent(new Event(name, { bubbles: true }));
+  }
+
+  #turn({ shift = this.#shift, signs = this.#signs }) {
+    this.#shift = shift;
+    this.#signs = signs;
+    this.#draw();
+  }
+
+  #draw() {
+    const { root } = this.#sheet;
+    const [shift, erase] = ["shift", "delete"].map((key) => root.querySelector(`[data-key=${key}]`));
+    shift.setAttribute("aria-pressed", String(this.#shift !== "off"));
+    shift.dataset.shift = this.#shift;
+    shift.disabled = this.#signs;
+    root.querySelector("[data-key=signs]").setAttribute("aria-pressed", String(this.#signs));
+    const letters = this.#signs ? SIGNS : layoutOf(document.documentElement.lang);
+    const rows = letters.map((row) => [...row].map((one) => keyOf(this.#shift === "off" || this.#signs ? one : capital(one))));
+    rows[0].push(erase);
+    rows.at(-1).unshift(shift);
+    root.querySelector(".rows").replaceChildren(...rows.map(rowOf));
+    this.#limit();
+  }
+
+  // A text of the greatest length takes no more.
+  #limit() {
+    const { value, maxLength, selectionStart, selectionEnd } = this.input;
+    const isFull = maxLength >= 0 && value.length >= maxLength && selectionStart === selectionEnd;
+    for (const key of this.#sheet.root.querySelectorAll("[data-key]:not(.fn)")) key.disabled = isFull;
+  }
+}
+
+function keyOf(letter) {
+  const key = Object.assign(document.createElement("button"), { type: "button", textContent: letter });
+  key.dataset.key = letter;
+  return key;
+}
+
+function rowOf(keys) {
+  const row = document.createElement("div");
+  row.className = "row";
+  row.append(...keys);
+  return row;
+}

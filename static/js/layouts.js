@@ -1,0 +1,20 @@
+// The keyboard's letters, in a table for each language; a language without one has the English.
+const DIGITS = "1234567890";
+
+export const LAYOUTS = {
+  en: [DIGITS, "qwertyuiop", "asdfghjkl", "zxcvbnm,.-"],
+  de: [`${DIGITS}ß`, "qwertzuiopü", "asdfghjklöä", "yxcvbnm,.-"],
+};
+
+export const SIGNS = [DIGITS, "!\"#$%&/()=", "+*'~^@€°<>", "?:;_|\\[]{}"];
+
+// Capitals that are no capital letter of the same key.
+const CAPITALS = { ß: "ẞ", ",": ";", ".": ":", "-": "_" };
+
+export function capital(letter) {
+  return CAPITALS[letter] ?? letter.toUpperCase();
+}
+
+export function layoutOf(language) {
+  return LAYOUTS[language] ?? LAYOUTS[language.split("-")[0]] ?? LAYOUTS.en;
+}

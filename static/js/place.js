@@ -1,0 +1,92 @@
+// Where a sheet lies: beside its field, never over it, the header or the keys of the frame.
+const GAP_PX = 8;
+
+const rect = (selector) => document.querySelector(selector)?.getBoundingClientRect();
+
+// What is kept free: the field with its name, a slider with its value; where there is less room, the field alone.
+function fieldsOf(input) {
+  const field = input.closest(".entry") ?? input;
+  const whole = input.matches("[data-entry]") ? field : input.closest("[data-widget]");
+  return [whole, field].map((one) => one.getBoundingClientRect());
+}
+
+// The page, and where that is too small what is below it too, beside the keys of the frame.
+function areas() {
+  const { left, right, top, bottom } = rect("main");
+  const page = { left, right, top, bottom };
+  const tabs = rect(".pages");
+  const keys = rect(".frame-keys");
+  if (tabs?.top >= bottom - 1) return [page, { top, left: tabs.left, right: tabs.right, bottom: tabs.bottom }];
+  if (keys?.top >= bottom - 1) return [page, { top, left, right: keys.left, bottom: keys.bottom }];
+  return [page];
+}
+
+function measure(sheet, shape, area) {
+  sheet.dataset.shape = shape;
+  sheet.style.setProperty("--most", `${area.right - area.left - 2 * GAP_PX}px`);
+  const { width, height } = sheet.getBoundingClientRect();
+  return { width, height };
+}
+
+// Beside the field, as high as the page: null without room.
+function aside(sheet, field, area) {
+  const { width, height } = measure(sheet, "tall", area);
+  const room = area.bottom - area.top - 2 * GAP_PX;
+  if (height > room) return null;
+  const right = area.right - field.right >= width + 2 * GAP_PX;
+  if (!right && field.left - area.left < width + 2 * GAP_PX) return null;
+  const left = right ? field.right + 2 * GAP_PX : field.left - 2 * GAP_PX - width;
+  const middle = (field.top + field.bottom - height) / 2;
+  const top = Math.max(area.top + GAP_PX, Math.min(middle, area.bottom - GAP_PX - height));
+  return { left, top, lift: 0, side: right ? "left" : "right", point: (field.top + field.bottom) / 2 - top };
+}
+
+// Below or above the field over the width of the page; without room there the page is lifted.
+function across(sheet, field, area, shape) {
+  const { width, height } = measure(sheet, shape, area);
+  if (width > area.right - area.left) return null;
+  const middle = (field.left + field.right - width) / 2;
+  const left = Math.max(area.left + GAP_PX, Math.min(middle, area.right - GAP_PX - width));
+  const bottom = area.bottom - GAP_PX - height;
+  const point = (field.left + field.right) / 2 - left;
+  const hidden = field.top < area.top;
+  if (!hidden && field.bottom + GAP_PX <= bottom) return { left, top: bottom, lift: 0, side: "top", point };
+  const above = area.top + GAP_PX;
+  const seen = field.bottom <= area.bottom;
+  if (seen && above + height + GAP_PX <= field.top) return { left, top: above, lift: 0, side: "bottom", point };
+  const free = bottom - area.top - GAP_PX;
+  if (free < field.bottom - field.top) return null;
+  const target = hidden ? area.top + GAP_PX - field.top : bottom - GAP_PX - field.bottom;
+  return { left, top: bottom, lift: target, side: "top", point };
+}
+
+// Places the sheet for an input; returns by how many pixels the page is lifted.
+export function place(sheet, input, shapes) {
+  const main = document.querySelector("main");
+  main.toggleAttribute("data-lifted", false);
+  const spot = spotOf(sheet, fieldsOf(input), shapes);
+  sheet.dataset.side = spot.side;
+  for (const name of ["left", "top", "point"]) sheet.style.setProperty(`--${name}`, `${Math.round(spot[name])}px`);
+  main.style.setProperty("--lift", `${Math.round(spot.lift)}px`);
+  main.toggleAttribute("data-lifted", spot.lift !== 0);
+  return spot.lift;
+}
+
+function spotOf(sheet, fields, shapes) {
+  for (const area of areas()) {
+    for (const field of fields) {
+      for (const shape of shapes) {
+        const spot = shape === "tall" ? aside(sheet, field, area) : across(sheet, field, area, shape);
+        if (spot) return spot;
+      }
+    }
+  }
+  return lowest(sheet, fields.at(-1), areas().at(-1));
+}
+
+// A screen that is too low for both: the end of the field is seen, and the sheet in its last shape.
+function lowest(sheet, field, area) {
+  const { height } = sheet.getBoundingClientRect();
+  const top = Math.max(area.top, area.bottom - height);
+  return { left: area.left, top, lift: top - GAP_PX - field.bottom, side: "top", point: (field.left + field.right) / 2 - area.left };
+}

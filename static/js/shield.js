@@ -1,0 +1,49 @@
+// Takes every touch and key away from the page: while it is cleaned, and where a touch only wakes it.
+import { TAP_AGAIN_MS } from "./press.js";
+
+const POINTERS = ["pointerdown", "pointerup", "pointercancel", "pointermove"];
+const OTHERS = [
+  "touchstart", "touchmove", "touchend", "mousedown", "mouseup", "click", "dblclick", "auxclick", "contextmenu", "wheel",
+  "keydown", "keyup", "beforeinput", "dragstart", "submit",
+];
+
+class Shield {
+  // Called with each event that is swallowed.
+  touched = () => {};
+  #up = false;
+  #down = new Set(); // the pointers and keys that went down under it
+  #timer = 0;
+
+  constructor() {
+    // Listeners that the window has already still get what is swallowed.
+    for (const name of [...POINTERS, ...OTHERS]) addEventListener(name, (event) => this.#swallow(event), { capture: true, passive: false });
+  }
+
+  get up() {
+    return this.#up;
+  }
+
+  raise() {
+    clearTimeout(this.#timer);
+    this.#up = true;
+  }
+
+  // When what went down has gone up, and a second tap would have come.
+  lower() {
+    clearTimeout(this.#timer);
+    this.#timer = setTimeout(() => (this.#down.size ? this.lower() : (this.#up = false)), TAP_AGAIN_MS);
+  }
+
+  #swallow(event) {
+    if (!this.#up) return;
+    const what = event.pointerId ?? event.code;
+    if (event.type === "pointerdown" || event.type === "keydown") this.#down.add(what);
+    if (["pointerup", "pointercancel", "keyup"].includes(event.type)) this.#down.delete(what);
+    this.touched(event);
+    event.stopImmediatePropagation();
+    if (event.cancelable) event.preventDefault();
+  }
+}
+
+// One for the page: events are swallowed from its loading on.
+export const shield = new Shield();

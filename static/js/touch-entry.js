@@ -1,0 +1,40 @@
+// Opens the keypad or the keyboard on the screen at a touch in an input. With panel key `keyboard = "auto"` only
+// where a finger is the main pointer.
+const coarse = matchMedia("(pointer: coarse)");
+const always = document.body.dataset.keyboard === "on";
+const TOUCHED = ":is(input[type=number], input[type=text], output)";
+const KINDS = { keypad: () => import("./keypad.js"), keyboard: () => import("./keyboard.js") };
+
+let open = null; // what is open now
+let turn = 0; // counts touches: a module that comes late opens nothing
+
+// Without a system keyboard, where there is one of the page's own.
+function prepare() {
+  const active = always || coarse.matches;
+  for (const input of document.querySelectorAll("[data-widget] :is(input[type=number], input[type=text])")) {
+    input.dataset.inputmode ??= input.inputMode;
+    input.inputMode = active ? "none" : input.dataset.inputmode;
+  }
+  document.body.toggleAttribute("data-touch-entry", active);
+}
+
+async function openFor(place) {
+  const input = place.matches("output") ? place.parentElement.querySelector("input") : place;
+  if (open?.input === input) return;
+  open?.cancel();
+  const mine = ++turn;
+  try {
+    const module = await KINDS[input.type === "text" ? "keyboard" : "keypad"]();
+    if (mine !== turn) return;
+    open = new module.Entry(input, () => (open = null));
+  } catch {
+    input.inputMode = input.dataset.inputmode ?? ""; // the next touch has the browser's own
+  }
+}
+
+document.addEventListener("click", ({ target }) => {
+  const place = target.closest?.(`[data-widget] ${TOUCHED}`);
+  if (place && (always || coarse.matches)) openFor(place);
+});
+coarse.addEventListener("change", prepare);
+prepare();

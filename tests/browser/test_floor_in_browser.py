@@ -1,0 +1,334 @@
+"""The page as a machine's screen: cleaned, dark when it is not touched, and no browser's gestures."""
+
+from collections.abc import Callable, Iterator
+from typing import Any, Final
+
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from tests.support.parts import Server, until
+from tests.support.touch import HALT, SIZES, opened, permit, settled, touched, touched_server
+
+DIM_S: Final = 1.0
+SENT: Final = "[data-widget=heard] .value"
+COUNTS: Final = """() => {
+  window.arrived = [];
+  for (const name of ["pointerdown", "touchstart", "mousedown", "click", "keydown"]) {
+    document.addEventListener(name, () => arrived.push(name), true);
+  }
+}"""
+SECONDS: Final = "(over, seconds) => (over.dataset.seconds = seconds)"
+
+
+@pytest.fixture(scope="module")
+def kiosk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    mine = touched_server(tmp_path_factory.mktemp("panel"))
+    yield mine
+    mine.end()
+
+
+@pytest.fixture(scope="module")
+def dimming(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    mine = touched_server(
+        tmp_path_factory.mktemp("dim"), screen=f"dim_after_s = {DIM_S}\nsounds = true"
+    )
+    yield mine
+    mine.end()
+
+
+@pytest.fixture
+def screen(chromium: Browser, kiosk: Server) -> Iterator[Page]:
+    permit(kiosk)
+    with touched(chromium, kiosk) as page:
+        yield page
+
+
+@pytest.fixture
+def sleepy(chromium: Browser, dimming: Server) -> Iterator[Page]:
+    permit(dimming)
+    with touched(chromium, dimming) as page:
+        yield page
+
+
+def presses(server: Server) -> int:
+    """How many presses came from browsers."""
+    return server.process.text.count(" by browser ")
+
+
+def clean(page: Page, seconds: float) -> None:
+    page.locator("#cleaning").evaluate(SECONDS, seconds)
+    page.get_by_role("button", name="Menu").tap()
+    page.get_by_role("button", name="Clean the screen").tap()
+    expect(page.locator("#cleaning")).to_be_visible()
+
+
+def unlocked(page: Page) -> None:
+    """The lock is over, and what a second tap would have hit can be pressed."""
+    expect(page.locator("#cleaning")).to_be_hidden()
+    until(lambda: taps_arrive(page), "a tap arrives")
+
+
+def taps_arrive(page: Page) -> bool:
+    """A key of the page that presses nothing gets a tap."""
+    page.evaluate(
+        "window.got ??= (addEventListener('click', () => (window.taps = (window.taps ?? 0) + 1)), 1)"
+    )
+    before = page.evaluate("window.taps ?? 0")
+    page.locator("#clock").dispatch_event("click")
+    return bool(page.evaluate("window.taps ?? 0") > before)
+
+
+def middle(page: Page, selector: str) -> tuple[float, float]:
+    box = page.locator(selector).bounding_box()
+    assert box is not None
+    return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+
+def test_it_takes_thirty_seconds(screen: Page) -> None:
+    screen.get_by_role("button", name="Menu").tap()
+    screen.get_by_role("button", name="Clean the screen").tap()
+    expect(screen.locator("#cleaning [role=timer]")).to_have_text("30")
+    expect(screen.locator("#cleaning [role=timer]")).to_have_text("29")
+
+
+@pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
+def test_while_it_is_cleaned_only_the_state_is_seen_and_nothing_is_pressed(
+    chromium: Browser, kiosk: Server, size: tuple[int, int]
+) -> None:
+    with touched(chromium, kiosk, size) as page:
+        points = [middle(page, one) for one in ("[data-widget=load] > [type=submit]", ".menu-key")]
+        points.append(middle(page, ".frame-keys [type=submit]"))
+        before = presses(kiosk)
+        clean(page, 30)
+        page.evaluate(COUNTS)
+        for x, y in points:
+            page.touchscreen.tap(x, y)
+            page.mouse.click(x, y)
+        for key in ("Tab", "Enter", " ", "Escape", "F5"):
+            page.keyboard.press(key)
+        expect(page.locator("#cleaning")).to_be_visible()
+        assert float(page.locator("#cleaning b").evaluate("(b) => b.offsetHeight")) >= 120
+        expect(page.locator("#state")).to_be_in_viewport(ratio=1)
+        x, y = middle(page, "#state")
+        inside = "([x, y]) => document.elementFromPoint(x, y).closest('#cleaning') === null"
+        assert page.evaluate(inside, [x, y])
+        expect(page.locator(".sheet")).to_have_count(0)
+        expect(page.locator("#menu")).to_be_hidden()
+        assert page.evaluate("arrived") == []
+        permit(kiosk, HALT)
+        expect(page.locator("#state b")).to_have_text("LOCKED")
+        permit(kiosk)
+        assert presses(kiosk) == before
+
+
+def test_it_ends_by_itself_and_then_keys_work(screen: Page) -> None:
+    clean(screen, 1)
+    unlocked(screen)
+    screen.get_by_role("button", name="Stop").tap()
+    expect(screen.locator(SENT)).to_have_text("stop (/operation)")
+
+
+def test_it_goes_on_when_the_page_is_loaded_again(screen: Page) -> None:
+    clean(screen, 30)
+    screen.reload()
+    expect(screen.locator("#cleaning")).to_be_visible()
+    expect(screen.locator("[data-widget=jog] .hold")).to_be_disabled()
+
+
+def test_a_hold_ends_when_it_starts(screen: Page) -> None:
+    screen.locator(".hold").focus()
+    screen.keyboard.down(" ")
+    expect(screen.locator("[data-widget=jog][data-hold]")).to_be_attached()
+    # Without a second touch, which would end the hold too.
+    screen.locator(".clean").evaluate("(key) => key.click()")
+    expect(screen.locator("#cleaning")).to_be_visible()
+    expect(screen.locator("[data-widget=jog][data-hold]")).to_have_count(0)
+    screen.keyboard.up(" ")
+
+
+def test_a_cloth_on_the_screen_at_its_end_presses_nothing(screen: Page, kiosk: Server) -> None:
+    x, y = middle(screen, ".frame-keys [type=submit]")
+    before = presses(kiosk)
+    clean(screen, 1)
+    screen.mouse.move(x, y)
+    screen.mouse.down()
+    expect(screen.locator("#cleaning")).to_be_hidden()
+    screen.mouse.up()
+    unlocked(screen)
+    screen.get_by_role("button", name="Send order").tap()
+    expect(screen.locator(SENT)).to_have_text("4711 (/operation2)")
+    until(lambda: presses(kiosk) > before, "its press is logged")
+    assert presses(kiosk) == before + 1
+
+
+def test_it_gets_dark_and_the_touch_that_wakes_it_presses_nothing(
+    sleepy: Page, dimming: Server
+) -> None:
+    before = presses(dimming)
+    expect(sleepy.locator("#dark")).to_be_visible()
+    sleepy.touchscreen.tap(*middle(sleepy, "[data-widget=load] > [type=submit]"))
+    expect(sleepy.locator("#dark")).to_be_hidden()
+    expect(sleepy.locator("#dark")).to_be_visible()
+    sleepy.touchscreen.tap(*middle(sleepy, "#input-speed"))
+    expect(sleepy.locator("#dark")).to_be_hidden()
+    expect(sleepy.locator("#dark")).to_be_visible()
+    expect(sleepy.locator(".sheet")).to_have_count(0)
+    sleepy.touchscreen.tap(*middle(sleepy, ".hold"))
+    expect(sleepy.locator("#dark")).to_be_hidden()
+    expect(sleepy.locator("#dark")).to_be_visible()
+    sleepy.keyboard.press(" ")
+    expect(sleepy.locator("#dark")).to_be_hidden()
+    assert presses(dimming) == before
+    assert "jog" not in dimming.process.text
+
+
+def test_the_touch_after_it_presses(sleepy: Page) -> None:
+    expect(sleepy.locator("#dark")).to_be_visible()
+    stop = middle(sleepy, ".frame-keys [type=submit]")
+    sleepy.touchscreen.tap(*stop)
+    expect(sleepy.locator("#dark")).to_be_hidden()
+
+    def pressed() -> bool:
+        sleepy.touchscreen.tap(*stop)
+        return sleepy.locator(SENT).inner_text() == "stop (/operation)"
+
+    until(pressed, "a later touch presses", every_s=0.2)
+
+
+def test_a_state_that_changes_wakes_it(sleepy: Page, dimming: Server) -> None:
+    expect(sleepy.locator("#dark")).to_be_visible()
+    sleepy.evaluate("""() => document.getElementById("dark").addEventListener("toggle", () => {
+      document.documentElement.dataset.woken = "";
+    })""")
+    permit(dimming, HALT)
+    expect(sleepy.locator("html[data-woken]")).to_be_attached()
+    permit(dimming)
+
+
+def test_a_page_that_is_held_does_not_get_dark(sleepy: Page) -> None:
+    x, y = middle(sleepy, "header")
+    sleepy.mouse.move(x, y)
+    sleepy.mouse.down()
+    watched = """(ms) => new Promise((resolve) => {
+      const dark = document.getElementById("dark");
+      dark.addEventListener("toggle", () => resolve("dark"));
+      setTimeout(() => resolve("light"), ms);
+    })"""
+    assert sleepy.evaluate(watched, 2500 * DIM_S) == "light"
+    sleepy.mouse.up()
+    expect(sleepy.locator("#dark")).to_be_visible()
+
+
+def test_without_the_key_it_never_gets_dark(screen: Page) -> None:
+    expect(screen.locator("#dark")).to_have_count(0)
+
+
+GESTURES: Final = """() => {
+  const kept = (event, target = document.querySelector("main")) => target.dispatchEvent(event);
+  const about = { bubbles: true, cancelable: true };
+  const input = document.getElementById("input-note");
+  const style = (element) => getComputedStyle(element);
+  return {
+    menu: kept(new MouseEvent("contextmenu", about)),
+    inputMenu: kept(new MouseEvent("contextmenu", about), input),
+    drag: kept(new DragEvent("dragstart", about), document.querySelector(".pages a")),
+    zoomWheel: kept(new WheelEvent("wheel", { ...about, ctrlKey: true })),
+    zoomKey: kept(new KeyboardEvent("keydown", { ...about, ctrlKey: true, key: "+" })),
+    scroll: kept(new WheelEvent("wheel", about)),
+    key: kept(new KeyboardEvent("keydown", { ...about, key: "+" })),
+    select: style(document.querySelector("main h2")).userSelect !== "none",
+    inputSelect: style(input).userSelect !== "none",
+    pinch: style(document.querySelector("main")).touchAction !== "pan-x pan-y",
+    overscroll: style(document.documentElement).overscrollBehaviorY !== "none",
+  };
+}"""
+OWN: Final = {"scroll", "key", "inputSelect"}  # what a page on a machine keeps too
+
+
+def test_a_touched_screen_has_none_of_the_browsers_gestures(screen: Page) -> None:
+    found = screen.evaluate(GESTURES)
+    assert {name for name, kept in found.items() if kept} == OWN
+    assert screen.locator(".hold").evaluate("(key) => getComputedStyle(key).touchAction") == "none"
+
+
+def test_a_developers_browser_keeps_them(chromium: Browser, kiosk: Server) -> None:
+    with opened(chromium.new_context(), kiosk) as page:
+        assert all(page.evaluate(GESTURES).values())
+
+
+def test_a_panel_may_leave_them(
+    chromium: Browser, servers: Callable[[Server], Server], tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    server = servers(touched_server(tmp_path_factory.mktemp("panel"), screen="kiosk = false"))
+    with touched(chromium, server) as page:
+        assert all(page.evaluate(GESTURES).values())
+
+
+TONES: Final = """
+  window.tones = [];
+  window.OscillatorNode = class extends OscillatorNode {
+    constructor(context, about) { super(context, about); tones.push(about.frequency); }
+  };
+"""
+
+
+def refused(page: Page) -> None:
+    """Presses what the server refuses: a number is missing."""
+    page.locator("#input-speed").evaluate("(input) => (input.value = '')")
+    page.get_by_role("button", name="Load", exact=True).click()
+    expect(page.locator("#receipt-load")).to_have_attribute("data-outcome", "refused")
+
+
+def sent(page: Page) -> None:
+    page.get_by_role("button", name="Stop").click()
+    expect(page.locator(SENT)).to_have_text("stop (/operation)")
+
+
+def sounding(chromium: Browser, **cookies: str) -> Any:
+    context = chromium.new_context()
+    context.add_init_script(TONES)
+    return context
+
+
+def test_a_refused_press_sounds_low_and_no_other(chromium: Browser, dimming: Server) -> None:
+    with opened(sounding(chromium), dimming) as page:
+        page.locator("html[data-sound]").wait_for(state="attached")
+        sent(page)
+        assert page.evaluate("tones") == []
+        refused(page)
+        until(lambda: page.evaluate("tones.length"), "it sounds")
+        assert page.evaluate("tones.length") == 1
+        assert page.evaluate("tones[0]") < 400
+
+
+def test_sounds_are_off_unless_the_panel_or_the_browser_says_so(
+    chromium: Browser, kiosk: Server
+) -> None:
+    with opened(sounding(chromium), kiosk) as page:
+        refused(page)
+        assert page.evaluate("tones") == []
+        page.get_by_role("button", name="Menu").click()
+        page.get_by_role("group", name="Sound of a refused press").get_by_text("On").click()
+        page.locator("html[data-sound]").wait_for(state="attached")
+        refused(page)
+        until(lambda: page.evaluate("tones.length"), "it sounds")
+
+
+def test_a_browser_may_turn_the_panels_sounds_off(chromium: Browser, dimming: Server) -> None:
+    context = sounding(chromium)
+    context.add_cookies([{"name": "kiosk_sounds", "value": "off", "url": dimming.url}])
+    with opened(context, dimming) as page:
+        refused(page)
+        assert page.evaluate("tones") == []
+        settled(page)
+
+
+def test_holds_stay_locked_after_it_while_a_keypad_is_open(screen: Page) -> None:
+    screen.locator("#input-speed").tap()
+    expect(screen.locator(".sheet")).to_be_visible()
+    clean(screen, 1)
+    unlocked(screen)
+    expect(screen.locator(".sheet")).to_be_visible()
+    expect(screen.locator(".hold")).to_be_disabled()
+    screen.locator(".cancel-entry").tap()
+    expect(screen.locator(".hold")).to_be_enabled()

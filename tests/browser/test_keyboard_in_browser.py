@@ -1,0 +1,207 @@
+"""Text on a touched screen: the page's keyboard, a real one and a bar code reader."""
+
+from collections.abc import Iterator
+from typing import Final
+
+import pytest
+from playwright.sync_api import Browser, Locator, Page, expect
+
+from tests.support.parts import Server
+from tests.support.touch import SIZES, Keys, opened, overlap, permit, settled, touched, touched_server
+
+HUMAN_S: Final = 0.2
+READER_S: Final = 0.01
+FIELDS: Final = ("#input-order", "#input-note")
+SENT: Final = "[data-widget=heard] .value"
+
+
+@pytest.fixture(scope="module")
+def kiosk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    mine = touched_server(tmp_path_factory.mktemp("panel"))
+    yield mine
+    mine.end()
+
+
+@pytest.fixture
+def screen(chromium: Browser, kiosk: Server) -> Iterator[Page]:
+    permit(kiosk)
+    with touched(chromium, kiosk) as page:
+        yield page
+
+
+@pytest.fixture
+def desk(chromium: Browser, kiosk: Server) -> Iterator[Page]:
+    """A page with a mouse and a real keyboard."""
+    permit(kiosk)
+    with opened(chromium.new_context(), kiosk) as page:
+        expect(page.locator("html[data-scans]")).to_be_attached()
+        yield page
+
+
+def keyboard_for(page: Page, field: str) -> Locator:
+    page.locator(field).tap()
+    expect(page.locator(".sheet.keyboard")).to_be_visible()
+    return page.locator(".sheet.keyboard")
+
+
+def press(page: Page, *keys: str) -> None:
+    for key in keys:
+        page.locator(f'.keyboard [data-key="{key}"]').tap()
+
+
+def test_letters_capitals_and_signs(screen: Page) -> None:
+    keyboard_for(screen, "#input-note")
+    press(screen, "a", "shift", "B", "c")
+    expect(screen.locator("#input-note")).to_have_value("aBc")  # one capital
+    press(screen, "shift", "shift", "D", "E", "shift", "f", " ", "7")
+    press(screen, "signs", "€", "signs", "g")
+    expect(screen.locator("#input-note")).to_have_value("aBcDEf 7€g")
+
+
+def test_it_edits_where_the_caret_is(screen: Page) -> None:
+    keyboard_for(screen, "#input-note")
+    press(screen, "a", "c", "left", "b")
+    expect(screen.locator("#input-note")).to_have_value("abc")
+    press(screen, "right", "d", "delete", "delete")
+    expect(screen.locator("#input-note")).to_have_value("ab")
+    expect(screen.locator("#input-note")).to_be_focused()
+    screen.locator("#input-note").evaluate("(input) => input.setSelectionRange(0, 2)")
+    press(screen, "x")
+    expect(screen.locator("#input-note")).to_have_value("x")
+
+
+def test_it_takes_no_more_than_the_field(screen: Page) -> None:
+    keyboard_for(screen, "#input-order")
+    screen.locator("#input-order").evaluate("(input) => input.setSelectionRange(4, 4)")
+    press(screen, *"12345678")
+    expect(screen.locator("#input-order")).to_have_value("471112345678")
+    expect(screen.locator('.keyboard [data-key="a"]')).to_be_disabled()
+    press(screen, "delete")
+    expect(screen.locator('.keyboard [data-key="a"]')).to_be_enabled()
+
+
+def test_done_keeps_and_cancel_gives_back(screen: Page) -> None:
+    changes = """() => {
+      window.changes = [];
+      document.addEventListener("change", ({ target }) => changes.push(target.value));
+    }"""
+    screen.evaluate(changes)
+    keyboard_for(screen, "#input-note")
+    press(screen, "a")
+    screen.get_by_role("button", name="Done").tap()
+    expect(screen.locator(".sheet")).to_have_count(0)
+    expect(screen.locator("#input-note")).to_have_value("a")
+    settled(screen)
+    keyboard_for(screen, "#input-note")
+    press(screen, "b", "c")
+    screen.locator(".cancel-entry").tap()
+    expect(screen.locator("#input-note")).to_have_value("a")
+    assert screen.evaluate("changes") == ["a"]
+
+
+def test_hold_keys_are_locked_while_it_is_open(screen: Page) -> None:
+    keyboard_for(screen, "#input-note")
+    expect(screen.locator("#why-jog")).to_have_text("The keyboard is open. Close it first.")
+    expect(screen.locator(".hold")).to_be_disabled()
+
+
+@pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
+@pytest.mark.parametrize("field", FIELDS)
+def test_it_never_covers_its_field_nor_stop_nor_the_header(
+    chromium: Browser, kiosk: Server, size: tuple[int, int], field: str
+) -> None:
+    with touched(chromium, kiosk, size) as page:
+        sheet = keyboard_for(page, field)
+        expect(page.locator(field)).to_be_in_viewport(ratio=1)
+        expect(sheet).to_be_in_viewport(ratio=1)
+        for other in (field, ".frame-keys", "header"):
+            assert not overlap(page, ".sheet", other), other
+        assert not overlap(page, field, "header")
+        for key in page.locator(".keyboard button:visible").all():
+            box = key.bounding_box()
+            assert box is not None
+            assert min(box["width"], box["height"]) >= 44, key.inner_text()
+
+
+def test_german_has_its_own_letters(screen: Page) -> None:
+    screen.evaluate("document.documentElement.lang = 'de-AT'")
+    keyboard_for(screen, "#input-note")
+    expect(screen.locator(".keyboard .row").nth(1)).to_have_text("qwertzuiopü")
+    press(screen, "ö", "shift", "Ü", "ß")
+    expect(screen.locator("#input-note")).to_have_value("öÜß")
+
+
+def test_a_real_keyboard_types_into_the_field_and_its_enter_closes(screen: Page) -> None:
+    keyboard_for(screen, "#input-note")
+    press(screen, "a")
+    Keys(screen, HUMAN_S).type("bc")
+    press(screen, "d")
+    expect(screen.locator("#input-note")).to_have_value("abcd")
+    screen.keyboard.press("Enter")
+    expect(screen.locator(".sheet")).to_have_count(0)
+    expect(screen.locator("#input-note")).to_have_value("abcd")
+    settled(screen)
+    keyboard_for(screen, "#input-note")
+    screen.keyboard.press("e")
+    screen.keyboard.press("Escape")
+    expect(screen.locator("#input-note")).to_have_value("abcd")
+
+
+def test_a_bar_code_replaces_what_the_field_that_asks_for_it_has(desk: Page) -> None:
+    Keys(desk, READER_S).type("AB 12-3\n")
+    expect(desk.locator("#input-order")).to_have_value("AB 12-3")
+    Keys(desk, READER_S).type("999\n")
+    expect(desk.locator("#input-order")).to_have_value("999")
+    expect(desk.locator("#input-order")).not_to_be_focused()
+
+
+def test_a_bar_code_into_the_field_itself_replaces_too(desk: Page) -> None:
+    desk.locator("#input-order").click()
+    Keys(desk, READER_S).type("999\n")
+    expect(desk.locator("#input-order")).to_have_value("999")
+
+
+def test_a_bar_code_stays_in_another_field_that_is_focused(desk: Page) -> None:
+    desk.locator("#input-note").click()
+    Keys(desk, READER_S).type("999\n")
+    expect(desk.locator("#input-note")).to_have_value("999")
+    expect(desk.locator("#input-order")).to_have_value("4711")
+
+
+def test_a_code_that_is_too_long_is_not_cut(desk: Page) -> None:
+    Keys(desk, READER_S).type("1234567890123\n")
+    text = "The bar code has more than 12 characters. Nothing was entered."
+    expect(desk.locator("#scan-order")).to_have_text(text)
+    expect(desk.locator("#input-order")).to_have_value("4711")
+    Keys(desk, READER_S).type("12345\n")
+    expect(desk.locator("#scan-order")).to_be_empty()
+
+
+def test_what_a_hand_types_is_no_bar_code(desk: Page) -> None:
+    Keys(desk, HUMAN_S).type("999\n")
+    Keys(desk, READER_S).type("88\n")  # two keys together
+    expect(desk.locator("#input-order")).to_have_value("4711")
+    Keys(desk, READER_S).type("777\n")
+    expect(desk.locator("#input-order")).to_have_value("777")
+
+
+@pytest.mark.parametrize("apart_s", [READER_S, HUMAN_S])
+def test_a_reader_presses_nothing_that_has_the_focus(desk: Page, kiosk: Server, apart_s: float) -> None:
+    """Neither its Enter nor, of a fast one, a space in its code: a pressed key keeps the focus."""
+    posts: list[str] = []
+    desk.on("websocket", lambda one: one.on("framesent", lambda sent: posts.append(str(sent))))
+    key = desk.locator("[data-widget=send] > [type=submit]")
+    key.focus()
+    Keys(desk, apart_s).type("12 34\n" if apart_s == READER_S else "1234\n")
+    desk.locator("#input-order").fill("after")
+    desk.keyboard.press("Enter")  # in the field: nothing either
+    desk.get_by_role("button", name="Stop").click()
+    expect(desk.locator(SENT)).to_have_text("stop (/operation)")
+    assert kiosk.process.count("press ") >= 1
+    assert "of send by browser" not in kiosk.process.text
+
+
+def test_space_still_presses_a_key_that_has_the_focus(desk: Page) -> None:
+    desk.get_by_role("button", name="Stop").focus()
+    desk.keyboard.press(" ")
+    expect(desk.locator(SENT)).to_have_text("stop (/operation)")

@@ -1,0 +1,235 @@
+"""A panel with every input, and pages on screens that are touched."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Final
+
+from playwright.sync_api import Browser, BrowserContext, Page, expect
+
+from tests.support.parts import ENOUGH_S, ROOT, Server, until
+
+SIZES: Final = ((1280, 800), (1024, 600), (800, 480), (800, 1280))
+MM_PER_PX: Final = 0.22
+HALT: Final = "halt"  # the order that the interlock forbids
+# The demo robot says on /last_heard what it heard: a press sets the interlock.
+PANEL: Final = f"""
+title = "Palletizing cell 2"
+mode = "demo"
+mm_per_px = {MM_PER_PX}
+%s
+
+[[interlock]]
+id = "order"
+label = "order"
+topic = "/last_heard"
+type = "std_msgs/msg/String"
+field = "data"
+not_equals = "{HALT} (/operation2)"
+
+[[frame.widget]]
+id = "stop"
+kind = "publish"
+role = "stop"
+label = "Stop"
+topic = "/operation"
+type = "std_msgs/msg/String"
+message = {{ data = "stop" }}
+
+[[page]]
+id = "setup"
+title = "Setup"
+
+[[page.group]]
+title = "Program"
+columns = 3
+span = 7
+
+[[page.group.widget]]
+id = "speed"
+kind = "number"
+label = "Jog speed"
+unit = "mm/s"
+min = 10
+max = 250
+step = 10
+default = 120
+span = 2
+
+[[page.group.widget]]
+id = "jog"
+kind = "hold"
+label = "Left"
+topic = "/operation1"
+type = "std_msgs/msg/String"
+message = {{ data = "left" }}
+release = {{ data = "stopped" }}
+rate_hz = 20
+interlock = "order"
+
+[[page.group.widget]]
+id = "height"
+kind = "slider"
+label = "Box height"
+min = 0.0
+max = 400.0
+default = 210.0
+span = 2
+
+[[page.group.widget]]
+id = "load"
+kind = "publish"
+label = "Load"
+topic = "/operation2"
+type = "std_msgs/msg/String"
+message = {{ data = "{{order}} {{speed}} {{height}} {{offset}}" }}
+
+[[page.group.widget]]
+id = "send"
+kind = "publish"
+label = "Send order"
+topic = "/operation2"
+type = "std_msgs/msg/String"
+message = {{ data = "{{order}}" }}
+
+[[page.group.widget]]
+id = "order"
+kind = "text"
+label = "Order"
+default = "4711"
+max_length = 12
+scan = true
+span = 2
+
+[[page.group]]
+title = "Belt"
+columns = 2
+span = 5
+
+[[page.group.widget]]
+id = "belt"
+kind = "parameter"
+label = "Belt speed"
+node = "/system_controller"
+parameter = "speed"
+type = "double"
+unit = "mm/s"
+span = 2
+
+[[page.group.widget]]
+id = "heard"
+kind = "readout"
+label = "Robot heard"
+topic = "/last_heard"
+type = "std_msgs/msg/String"
+field = "data"
+span = 2
+
+[[page.group.widget]]
+id = "offset"
+kind = "number"
+label = "Offset"
+min = -2.5
+max = 2.5
+default = 0
+span = 2
+
+[[page.group.widget]]
+id = "note"
+kind = "text"
+label = "Note"
+span = 2
+
+[[page]]
+id = "other"
+title = "Other"
+"""
+
+
+def touched_server(folder: Path, above: str = "", screen: str = "") -> Server:
+    """A server with this panel; `above` are keys of the file, `screen` those of its table [screen]."""
+    panel = folder / "panel.toml"
+    panel.write_text(PANEL % (above + (f"\n[screen]\n{screen}" if screen else "")))
+    server = Server(ROOT, KIOSK_PANEL=str(panel), KIOSK_MODE="demo")
+    until(server.ready, "ready")
+    permit(server)
+    return server
+
+
+def permit(server: Server, order: str = "4711") -> None:
+    """Presses so that the interlock permits, or with HALT forbids."""
+    server.http.post("/widgets/send", json={"inputs": {"order": order}})
+    word = "locked" if order == HALT else "ready"
+    until(lambda: server.snapshot()["state"]["state"] == word, word)
+
+
+@contextmanager
+def opened(context: BrowserContext, server: Server, path: str = "/") -> Iterator[Page]:
+    """A page of the server with its scripts; an error on its console fails the test."""
+    context.set_default_timeout(1000 * ENOUGH_S)
+    page = context.new_page()
+    errors: list[str] = []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.goto(server.url + path)
+    expect(page.locator("html[data-floor]")).to_be_attached()
+    yield page
+    context.close()
+    assert errors == []
+
+
+@contextmanager
+def touched(
+    chromium: Browser, server: Server, size: tuple[int, int] = SIZES[0], **options: Any
+) -> Iterator[Page]:
+    """A page on a screen that is touched, with the page's scripts ready."""
+    width, height = size
+    context = chromium.new_context(
+        viewport={"width": width, "height": height}, has_touch=True, **options
+    )
+    with opened(context, server) as page:
+        if page.locator("template:is(#keypad, #keyboard)").count():
+            expect(page.locator("body[data-touch-entry]")).to_be_attached()
+        yield page
+
+
+class Keys:
+    """A keyboard, or a bar code reader, whose keys come as far apart as `apart_s` says."""
+
+    def __init__(self, page: Page, apart_s: float) -> None:
+        self._session = page.context.new_cdp_session(page)
+        self._apart_s = apart_s
+        self._now = float(page.evaluate("performance.timeOrigin + performance.now()")) / 1000
+
+    def type(self, text: str) -> None:
+        """Each character; a line feed is Enter."""
+        for one in text:
+            self._now += self._apart_s
+            enter = {"key": "Enter", "code": "Enter", "text": "\r", "windowsVirtualKeyCode": 13}
+            code = "Space" if one == " " else f"Key{one.upper()}"
+            about: dict[str, Any] = enter if one == "\n" else {"key": one, "code": code, "text": one}
+            if one == " ":
+                about["windowsVirtualKeyCode"] = 32
+            for kind in ("keyDown", "keyUp"):
+                up = {} if kind == "keyDown" else {"text": ""}
+                self._session.send(
+                    "Input.dispatchKeyEvent", {"type": kind, "timestamp": self._now, **about, **up}
+                )
+
+
+def overlap(page: Page, one: str, other: str) -> bool:
+    """Whether two visible elements share a part of the screen."""
+    first, second = page.locator(one).bounding_box(), page.locator(other).bounding_box()
+    assert first is not None, one
+    assert second is not None, other
+    return (
+        min(first["x"] + first["width"], second["x"] + second["width"]) - max(first["x"], second["x"])
+        > 1
+        and min(first["y"] + first["height"], second["y"] + second["height"])
+        - max(first["y"], second["y"])
+        > 1
+    )
+
+
+def settled(page: Page) -> None:
+    """What lies below a sheet can be pressed again."""
+    expect(page.locator("body:not([data-settling])")).to_be_attached()
