@@ -280,6 +280,7 @@ def test_the_page_works_without_scripts(
     try:
         page = context.new_page()
         page.goto(demo.url)
+        page.get_by_role("button", name="Menu").click()
         page.get_by_role("link", name="Log").click()
         expect(page.get_by_role("heading", name="Operator's log")).to_be_visible()
         page.get_by_text("Filter", exact=True).click()

@@ -404,7 +404,7 @@ def test_the_first_page_is_small_and_asks_nobody_else(demo: Server, chromium: Br
 
     until(all_came, "all has come")
     urls = asked()
-    assert len(urls) <= 10, urls
+    assert len(urls) <= 11, urls
     assert all(url.startswith(demo.url) for url in urls)
     assert len(received) == len(urls)
     assert received.total() < 30_000

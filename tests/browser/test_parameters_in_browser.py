@@ -178,7 +178,9 @@ def test_targets_fit_gloves_and_nothing_moves_when_a_lock_comes(
     page = context.new_page()
     page.goto(kiosk.url)
     expect(page.get_by_role("button", name="Set Speed", exact=True)).to_be_enabled()
-    places = """() => [...document.querySelectorAll("[data-widget] button:not(.more), [data-entry]")].map(e => {
+    places = """() => [
+      ...document.querySelectorAll("[data-widget] button:not(.more), [data-entry]"),
+    ].map(e => {
       const { x, y, width, height } = e.getBoundingClientRect(); return [x, y, width, height];
     })"""
     before = page.evaluate(places)

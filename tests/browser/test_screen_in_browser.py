@@ -285,7 +285,7 @@ def test_the_menu_leads_to_the_log_and_changes_the_look(
     expect(menu).to_be_hidden()
     button(page, "Menu").click()
     expect(menu).to_be_visible()
-    for one in menu.locator("a, button").all():
+    for one in menu.locator("a:visible, button:visible").all():
         box = one.bounding_box()
         assert box is not None
         assert box["height"] >= 44

@@ -24,6 +24,7 @@ def everything(tmp_path: Path) -> Path:
     messages = tmp_path / "msgs/cell_msgs/msg"
     messages.mkdir(parents=True)
     (messages / "Jog.msg").write_text("float64 speed\nuint32 valid_ms\nuint16 number\n")
+    (tmp_path / "msgs/plan.svg").write_text("<svg/>")
     return Path(shutil.copy(TESTS / "everything.toml", tmp_path))
 
 

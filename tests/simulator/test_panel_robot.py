@@ -631,6 +631,7 @@ def test_everything_is_simulated_in_each_distribution(tmp_path: Path, distro: st
     messages = tmp_path / "msgs/cell_msgs/msg"
     messages.mkdir(parents=True)
     (messages / "Jog.msg").write_text("float64 speed\nuint32 valid_ms\nuint16 number\n")
+    (tmp_path / "msgs/plan.svg").write_text("<svg/>")
     path = tmp_path / "cell.toml"
     text = (TESTS / "everything.toml").read_text()
     path.write_text(text.replace('distro = "jazzy"', f'distro = "{distro}"'))

@@ -11,7 +11,7 @@ from tests.support.parts import ROOT, Server, until
 
 HTML: Final = {"accept": "text/html"}
 LOOK: Final = re.compile(
-    r'<html lang="en" data-theme="(\w+)" data-text-size="(\w+)" data-hand="(\w+)">'
+    r'<html lang="en" data-theme="(\w+)" data-text-size="(\w+)" data-hand="(\w+)"[ >]'
 )
 PAGES: Final = ("/", "/pages/operation", "/log", "/nothing")
 
@@ -101,5 +101,10 @@ def test_what_is_no_form_is_refused(kiosk: Server) -> None:
 def test_the_menu_shows_what_is_chosen(kiosk: Server) -> None:
     html = kiosk.http.get("/pages/operation", headers={"cookie": "kiosk_hand=left"}).text
     pressed = re.findall(r'<button name="(\w+)" value="(\w+)" aria-pressed="true">', html)
-    assert pressed == [("theme", "dark"), ("text_size", "normal"), ("hand", "left")]
+    assert pressed == [
+        ("theme", "dark"),
+        ("text_size", "normal"),
+        ("hand", "left"),
+        ("sounds", "off"),
+    ]
     assert '<input type="hidden" name="page" value="/pages/operation">' in html

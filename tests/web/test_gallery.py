@@ -47,7 +47,7 @@ def test_it_is_a_page_in_each_theme_and_text_size(server: Server) -> None:
     assert 'data-theme="light" data-text-size="normal"' in plain.text
     large = server.http.get("/gallery?theme=dark&text_size=large&hand=none").text
     assert 'data-theme="dark" data-text-size="large" data-hand="right"' in large
-    assert 'href="?theme=contrast&amp;text_size=large&amp;hand=right"' in large
+    assert 'href="?theme=contrast&amp;text_size=large&amp;hand=right&amp;sounds=off"' in large
 
 
 def test_there_is_none_without_development() -> None:
