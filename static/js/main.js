@@ -1,7 +1,7 @@
 // Connects the event stream to the page: each event updates its section of the markup.
 import { Source } from "./source.js";
 import { Presser } from "./press.js";
-import { addShow, setText, showAttribute } from "./show.js";
+import { addShow, lockWidget, setText, showAttribute } from "./show.js";
 
 const body = document.body;
 const clock = document.getElementById("clock"); // shows the time of the last heartbeat
@@ -79,21 +79,7 @@ function lockAll() {
     tab.dataset.state = "wait";
     setText(tab.querySelector("b"), unknown);
   }
-  for (const root of widgets.values()) lockWidget(root);
-}
-
-function lockWidget(root) {
-  const { lost, unknown } = body.dataset;
-  if (root.querySelector(".cancel:enabled")) setText(root.querySelector('[data-text="goal"]'), unknown);
-  const buttons = root.querySelectorAll("button[type=submit], .hold");
-  for (const button of buttons) button.disabled = true;
-  root.querySelector("dialog.ask")?.close();
-  if (buttons.length) showWidget(root.dataset.widget, { reason: lost, reasons: lost, more: "", enabled: false });
-  if (!root.dataset.state) return;
-  root.dataset.state = "old"; // its note keeps the time of the value
-  if (!root.dataset.shape) return;
-  Object.assign(root.dataset, { shape: "old", colour: "none" });
-  setText(root.querySelector('[data-text="text"]'), unknown);
+  for (const root of widgets.values()) lockWidget(root, lost, unknown);
 }
 
 // The sections of a snapshot, in the order in which they are shown. Each is an event by itself when it changes.

@@ -94,6 +94,21 @@ function showInPlace(root, name, value) {
   if (root.hasAttribute(`data-${name}`)) root.setAttribute(`data-${name}`, value ?? "");
 }
 
+// Without a connection no permission is known and each value is old. Its note keeps the time of the value.
+export function lockWidget(root, lost, unknown) {
+  if (root.querySelector(".cancel:enabled")) setText(root.querySelector('[data-text="goal"]'), unknown);
+  const buttons = root.querySelectorAll("button[type=submit], .hold");
+  for (const button of buttons) button.disabled = true;
+  root.querySelector("dialog.ask")?.close();
+  const locks = { reason: lost, reasons: lost, more: "", enabled: false };
+  if (buttons.length) for (const [name, value] of Object.entries(locks)) showAttribute(root, name, value);
+  if (!root.dataset.state) return;
+  root.dataset.state = "old";
+  if (!root.dataset.shape) return;
+  Object.assign(root.dataset, { shape: "old", colour: "none" });
+  setText(root.querySelector('[data-text="text"]'), unknown);
+}
+
 // Shows the receipt of a press at its widget, and none at the others.
 export function showReceipt(widgets, root, { id, outcome, reason }) {
   if (outcome === "succeeded") releaseEntry(root);
