@@ -67,8 +67,8 @@ def _simulated(panel: Panel, namespace: str) -> "Mapping[str, SimulatedRobot]":
 
 def _replayed(given: Any, panel: Panel, ends: threading.Event, stack: ExitStack) -> "SimulatedRobot":
     """A recording. If a panel file was given, prints what the recording lacks for it."""
-    from app.simulator.recording import Recording
-    from app.simulator.replay import ReplayedRobot, missing
+    from app.simulator.bag.recording import Recording
+    from app.simulator.bag.replay import ReplayedRobot, missing
 
     recording = stack.enter_context(closing(Recording(given.bag)))
     robot = ReplayedRobot(recording, given.rate, given.loop, ends.set)

@@ -6,10 +6,10 @@ from typing import Any, Final
 
 from app.interfaces import INTEGER_RANGES, PLACEHOLDER, Interfaces, Structure
 from app.interfaces.definitions import FLOAT_TYPES, STRING_TYPES, Field
-from app.simulator.guesses import NEGATIVE, span_of
-from app.simulator.known_types import KNOWN, Moment
-from app.simulator.messages import DEEPEST, plausible
-from app.simulator.paths import Fields, merged, put
+from app.simulator.values.guesses import NEGATIVE, span_of
+from app.simulator.values.known_types import KNOWN, Moment
+from app.simulator.values.messages import DEEPEST, plausible
+from app.simulator.values.paths import Fields, merged, put
 
 DONE: Final = "done"
 # Whole numbers for a status: zero is success.

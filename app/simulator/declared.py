@@ -6,8 +6,8 @@ from typing import Any, Final
 from app.panel.demo import NO_ENTRY, DemoEntry
 from app.panel.number_range import Range
 from app.panel.widgets import parameter as widgets
-from app.simulator.guesses import span_of
 from app.simulator.parameters import Parameter
+from app.simulator.values.guesses import span_of
 
 # The numbers of rcl_interfaces/msg/ParameterType.
 TYPES: Final[Mapping[str, int]] = {

@@ -7,8 +7,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final, Protocol
 
-from app.simulator.known_types import Moment
-from app.simulator.paths import Fields
 from app.simulator.robot import (
     CANCEL_OK,
     CANCEL_TOO_LATE,
@@ -19,6 +17,8 @@ from app.simulator.robot import (
     SUCCEEDED,
     DemoRobot,
 )
+from app.simulator.values.known_types import Moment
+from app.simulator.values.paths import Fields
 
 DURATION_S: Final = 8.0
 FEEDBACK_S: Final = 0.4

@@ -9,7 +9,7 @@ from app.interfaces.definitions import FLOAT_TYPES
 from app.panel.interlock import Interlock
 from app.panel.values import same_value
 from app.simulator import robot
-from app.simulator.signals import Signal, as_type, swing
+from app.simulator.values.signals import Signal, as_type, swing
 
 APART_S: Final = 3.0  # by which each interlock drops later than the one before
 SPREAD_S: Final = 8.0  # all of them together: so that there is time in which all permit

@@ -18,7 +18,6 @@ from app.simulator.answers import DONE, feedback_at, good_response
 from app.simulator.declared import declared_by
 from app.simulator.goals import ActionServer, CountAction, SimulatedAction
 from app.simulator.kinds import Acted, Declared, Need, Published, Served, Shown, needs_of
-from app.simulator.known_types import Moment
 from app.simulator.parameters import EVENT_TYPE, EVENTS, NODE, SERVICES, NodeParameters
 from app.simulator.presses import effects
 from app.simulator.robot import (
@@ -34,6 +33,7 @@ from app.simulator.robot import (
 )
 from app.simulator.simulated import Topic
 from app.simulator.topics import simulated_topics
+from app.simulator.values.known_types import Moment
 
 log = logging.getLogger("kiosk.simulator")
 

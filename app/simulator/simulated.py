@@ -6,7 +6,7 @@ from typing import Protocol
 
 from app.interfaces.names import Qos
 from app.simulator.goals import ActionServer
-from app.simulator.known_types import Moment
+from app.simulator.values.known_types import Moment
 
 
 @dataclass(frozen=True, slots=True)

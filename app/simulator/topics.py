@@ -8,11 +8,11 @@ from app.interfaces import Interfaces
 from app.interfaces.field_path import Key, path_steps
 from app.panel.demo import NO_ENTRY
 from app.panel.model import Panel
-from app.simulator.fields import FieldSignal, PanelFields
 from app.simulator.kinds import Shown
-from app.simulator.known_types import Moment
-from app.simulator.messages import Message, plausible
-from app.simulator.paths import merged, put
+from app.simulator.values.fields import FieldSignal, PanelFields
+from app.simulator.values.known_types import Moment
+from app.simulator.values.messages import Message, plausible
+from app.simulator.values.paths import merged, put
 
 MOVING_HZ: Final = 5.0  # of numbers
 OTHERS_HZ: Final = 1.0

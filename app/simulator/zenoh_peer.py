@@ -17,8 +17,8 @@ from app.dialect import bridge_dialect
 from app.dialect.endpoint import DEMO_VERSION
 from app.errors import KioskError, LinkError
 from app.interfaces import Interfaces
-from app.simulator.known_types import Moment
 from app.simulator.simulated import SimulatedRobot
+from app.simulator.values.known_types import Moment
 from app.simulator.zenoh_action import served
 from app.simulator.zenoh_robot import PlayedRobot
 

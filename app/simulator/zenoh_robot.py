@@ -9,8 +9,8 @@ from zenoh.handlers import Callback
 
 from app.dialect import bridge_dialect
 from app.interfaces import Interfaces, names
-from app.simulator.known_types import Moment
 from app.simulator.simulated import SimulatedRobot, Topic
+from app.simulator.values.known_types import Moment
 from app.simulator.zenoh_action import Answer, PlayedAction, latched, served
 
 

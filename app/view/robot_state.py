@@ -1,6 +1,6 @@
 """The state of the robot in one word, as the frame shows it: pure, from the verdicts."""
 
-from collections.abc import Iterable
+from collections.abc import Collection
 from typing import Final, Literal, TypedDict
 
 from app.i18n import TextLike, say
@@ -9,18 +9,18 @@ from app.permission.interlocks import Verdict
 FORBIDDEN: Final = frozenset({"forbidden", "unmet"})
 
 
-State = Literal["ready", "locked", "unknown", "lost"]
+State = Literal["ready", "online", "locked", "unknown", "lost"]
 
 
 class RobotWord(TypedDict):
-    """`state` is "ready" where all interlocks permit, "locked" where one forbids, "unknown" where one
-    is not known now, "lost" where nothing reaches the robot."""
+    """`state` is "ready" where all interlocks permit, "online" where the panel has none, "locked"
+    where one forbids, "unknown" where one is not known now, "lost" where nothing reaches the robot."""
 
     state: State
     text: TextLike
 
 
-def robot_word(passable: Verdict, interlocks: Iterable[Verdict]) -> RobotWord:
+def robot_word(passable: Verdict, interlocks: Collection[Verdict]) -> RobotWord:
     """The word for the link's verdict and those of all interlocks. What forbids counts before what is
     unknown: it is known to lock."""
     refused = [one for one in interlocks if not one.permitted]
@@ -28,6 +28,8 @@ def robot_word(passable: Verdict, interlocks: Iterable[Verdict]) -> RobotWord:
         return _word("unknown" if passable.code in ("joining", "catching_up") else "lost")
     if any(one.code in FORBIDDEN for one in refused):
         return _word("locked")
+    if not interlocks:
+        return _word("online")
     return _word("unknown" if refused else "ready")
 
 

@@ -40,7 +40,8 @@ PICTURE_TYPES: Final = {
 
 @dataclass(frozen=True, slots=True)
 class Asset:
-    """`packed` is the content by gzip, packed once and not for each who asks."""
+    """`packed` is the content by gzip, packed once and not for each who asks; empty where that is not
+    smaller."""
 
     content: bytes
     media_type: str
@@ -71,10 +72,10 @@ def _with_styles(sheet: Asset, styles: Collection[Path]) -> Asset:
 
 
 def picture(file: Path) -> Asset:
-    """A picture of the panel; of these kinds only SVG is worth packing, and the others are sent as they
-    are."""
+    """A picture of the panel."""
     content = file.read_bytes()
-    return Asset(content, PICTURE_TYPES[file.suffix], gzip.compress(content, mtime=0))
+    packed = gzip.compress(content, mtime=0) if file.suffix == ".svg" else b""
+    return Asset(content, PICTURE_TYPES[file.suffix], packed)
 
 
 def load_assets(

@@ -53,13 +53,8 @@ def demo(panel: str) -> Iterator[Server]:
 def themed(request: pytest.FixtureRequest, chromium: Browser) -> Iterator[Page]:
     """A page of a browser that has chosen a theme; axe may be added to it."""
     context = chromium.new_context(bypass_csp=True, viewport={"width": 1280, "height": 800})
-    cookie = {
-        "name": COOKIE.format("theme"),
-        "value": request.param,
-        "domain": "127.0.0.1",
-        "path": "/",
-    }
-    context.add_cookies([cookie])  # type: ignore[list-item]
+    name = COOKIE.format("theme")
+    context.add_cookies([{"name": name, "value": request.param, "domain": "127.0.0.1", "path": "/"}])
     yield context.new_page()
     context.close()
 

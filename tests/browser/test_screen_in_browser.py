@@ -318,9 +318,9 @@ def test_the_tabs_change_sides(cell: Server, page: Page) -> None:
 def test_the_state_of_the_robot_is_a_word_in_the_header(cell: Server, page: Page) -> None:
     page.goto(f"{cell.url}/pages/setup")
     state = page.locator("#state")
-    for permitted, word in ((True, "READY"), (False, "LOCKED")):
-        until(lambda p=permitted: cell.widget("start")["enabled"] is p, word, within_s=40)  # type: ignore[misc]
-        expect(state).to_have_text(word)
+    for word in ("READY", "LOCKED"):
+        expect(state).to_have_text(word, timeout=40_000)
+        expect(page.locator('[data-widget="load"] > button')).to_be_enabled(enabled=word == "READY")
         expect(state.locator("svg:visible")).to_have_count(1)
     page.route("**/events*", lambda route: route.abort())
     page.reload()

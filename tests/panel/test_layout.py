@@ -10,6 +10,7 @@ import pytest
 from app.errors import PanelError
 from app.icons import icons
 from app.panel import Panel, Publish, load_panel
+from app.panel.widgets.displays import Indicator
 from app.panel.widgets.roles import COLOURS, ICONS, OWN_COLOURS
 from tests.panel.test_panel import toml
 from tests.support.builders import FREE, GUARDED, HEARD, INTERLOCK, MESSAGE, Table
@@ -98,7 +99,9 @@ def test_values_and_conditions_of_groups_are_resolved_like_those_of_pages(tmp_pa
         "states": [{"value": "POWER_SUPPLY_HEALTH_GOOD", "text": "Good", "shape": "circle"}],
     }  # fmt: skip
     panel = loaded(tmp_path, tables({"widget": [lamp]}))
-    assert panel.pages[0].groups[0].widgets[0].states[0].value == 1  # type: ignore[attr-defined]
+    (widget,) = panel.pages[0].groups[0].widgets
+    assert isinstance(widget, Indicator)
+    assert widget.states[0].value == 1
 
 
 @pytest.mark.parametrize(

@@ -7,11 +7,11 @@ from typing import Any, Final
 import pytest
 
 from app.interfaces.field_path import path_steps
-from app.simulator.guesses import ANYTHING, span_of
-from app.simulator.known_types import IMAGE, KNOWN, Fields, Moment
-from app.simulator.messages import plausible
-from app.simulator.paths import get, put
-from app.simulator.signals import as_type, battery_level, count, cycle, swing
+from app.simulator.values.guesses import ANYTHING, span_of
+from app.simulator.values.known_types import IMAGE, KNOWN, Fields, Moment
+from app.simulator.values.messages import plausible
+from app.simulator.values.paths import get, put
+from app.simulator.values.signals import as_type, battery_level, count, cycle, swing
 from tests.support.builders import INTERFACES
 
 NOON_NS: Final = 1_700_000_000 * 10**9

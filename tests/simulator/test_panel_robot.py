@@ -18,10 +18,10 @@ from app.permission.conditions import permits
 from app.robot.parameter_state import EMPTY_VALUE
 from app.simulator.interlocks import APART_S
 from app.simulator.kinds import SIMULATED, Published, Shown, needs_of
-from app.simulator.known_types import Moment
 from app.simulator.panel_robot import PanelRobot
 from app.simulator.parameters import EVENTS
 from app.simulator.robot import FORBIDDEN_S, PERMITTED_S
+from app.simulator.values.known_types import Moment
 from tests.support.builders import INTERFACES
 from tests.support.parts import TESTS
 
@@ -370,12 +370,12 @@ def test_an_action_tells_its_progress_and_ends_with_a_result(loaded: Loaded) -> 
     action = robot.run(1).robot.actions["/go"]
     assert action.begin(b"a" * 16, SimpleNamespace())
     assert not action.begin(b"a" * 16, SimpleNamespace())
-    told = []
+    numbers = []
     while action.result(b"a" * 16) is None:
         robot.run(STEP_S)
-        told += [fields["sequence"][0] for _, fields in action.feedback()]
-    assert told == sorted(told)
-    assert (told[0] < 10, told[-1] > 40, len(told) > 5) == (True, True, True)
+        numbers += [fields["sequence"][0] for _, fields in action.feedback()]
+    assert numbers == sorted(numbers)
+    assert (numbers[0] < 10, numbers[-1] > 40, len(numbers) > 5) == (True, True, True)
     assert robot.now == pytest.approx(5.0, abs=0.2)
     assert action.result(b"a" * 16) == (4, {"sequence": [5]})
     assert action.states() == [(b"a" * 16, 4)]

@@ -17,9 +17,9 @@ from mcap.writer import Writer
 from app.errors import RecordingError
 from app.interfaces.names import Qos
 from app.panel import load_panel
-from app.simulator.known_types import Moment
-from app.simulator.recording import Recording
-from app.simulator.replay import PAUSE_S, ReplayedRobot, missing
+from app.simulator.bag.recording import Recording
+from app.simulator.bag.replay import PAUSE_S, ReplayedRobot, missing
+from app.simulator.values.known_types import Moment
 from app.simulator.zenoh_peer import ANY_PORT, serve
 from tests.support.builders import BOOL, INTERFACES, TEXT
 from tests.support.parts import ROOT, Process, Server, free_port, until, zenoh_file

@@ -17,7 +17,7 @@ OLD: Final = Verdict(False, "stale")
 @pytest.mark.parametrize(
     ("link", "interlocks", "state"),
     [
-        (PERMITTED, [], "ready"),
+        (PERMITTED, [], "online"),
         (PERMITTED, [PERMITTED, PERMITTED], "ready"),
         (PERMITTED, [PERMITTED, FORBIDS], "locked"),
         (PERMITTED, [UNMET], "locked"),
@@ -39,5 +39,5 @@ def test_it_is_ready_only_where_all_is_known_to_permit(
 
 def test_it_is_a_word_of_the_catalogue() -> None:
     words = [robot_word(PERMITTED, [one])["text"] for one in (PERMITTED, FORBIDS, WAITS)]
-    words.append(robot_word(Verdict(False, "no_link"), [])["text"])
-    assert [english(word) for word in words] == ["READY", "LOCKED", "UNKNOWN", "NO LINK"]
+    words += [robot_word(one, [])["text"] for one in (PERMITTED, Verdict(False, "no_link"))]
+    assert [english(word) for word in words] == ["READY", "LOCKED", "UNKNOWN", "ONLINE", "NO LINK"]

@@ -19,7 +19,7 @@ from app.web.routes.pages import WORDS
 
 router = APIRouter(include_in_schema=False)
 
-STATES: Final = ("ready", "locked", "unknown", "lost")
+STATES: Final = ("ready", "online", "locked", "unknown", "lost")
 LINKS: Final = (("server", "ok", "ok"), ("bridge", "wait", "pending"), ("robot", "bad", "lost"))
 
 

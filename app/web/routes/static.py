@@ -17,7 +17,7 @@ async def static(revision: str, name: str, request: Request, state: CurrentState
     fits = revision == state.assets.revision
     caching = "public, max-age=31536000, immutable" if fits else "no-store"
     headers = {"cache-control": caching}
-    if "gzip" not in request.headers.get("accept-encoding", ""):
+    if not asset.packed or "gzip" not in request.headers.get("accept-encoding", ""):
         return Response(asset.content, media_type=asset.media_type, headers=headers)
     headers |= {"content-encoding": "gzip", "vary": "Accept-Encoding"}
     return Response(asset.packed, media_type=asset.media_type, headers=headers)

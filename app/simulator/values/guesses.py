@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 from app.interfaces.definitions import FLOAT_TYPES, INTEGER_RANGES, STRING_TYPES
-from app.simulator.signals import (
+from app.simulator.values.signals import (
     BATTERY_S,
     SWING_S,
     Signal,

@@ -11,13 +11,13 @@ from app.interfaces.field_path import field_name, path_steps
 from app.panel.demo import NO_ENTRY, DemoEntry
 from app.panel.interlock import Interlock
 from app.panel.model import Panel
-from app.simulator.guesses import Span, guessed, moving, span_of
 from app.simulator.interlocks import offset_of, permitting
 from app.simulator.kinds import Shown
-from app.simulator.known_types import KNOWN, Moment
-from app.simulator.messages import Message, field_constants
-from app.simulator.paths import get
-from app.simulator.signals import OTHER_S, Signal, cycle, fixed, phase_of
+from app.simulator.values.guesses import Span, guessed, moving, span_of
+from app.simulator.values.known_types import KNOWN, Moment
+from app.simulator.values.messages import Message, field_constants
+from app.simulator.values.paths import get
+from app.simulator.values.signals import OTHER_S, Signal, cycle, fixed, phase_of
 
 SAMPLES_S: Final = (0.0, 40.0, 120.0, 230.0)  # times at which a field of a type has its values
 

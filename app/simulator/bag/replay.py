@@ -4,10 +4,10 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Final
 
 from app.panel.model import Panel
+from app.simulator.bag.recording import Message, Recording
 from app.simulator.goals import ActionServer
-from app.simulator.known_types import Moment
-from app.simulator.recording import Message, Recording
 from app.simulator.simulated import Topic
+from app.simulator.values.known_types import Moment
 
 STEP_S: Final = 0.01
 PAUSE_S: Final = 1.0  # between the last message and the first one of the next round, or the end

@@ -10,7 +10,7 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-from app.simulator.signals import battery_level, is_charging, phase_of
+from app.simulator.values.signals import battery_level, is_charging, phase_of
 
 Fields = dict[str, Any]
 NS_PER_S: Final = 10**9

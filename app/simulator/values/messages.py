@@ -8,9 +8,9 @@ from typing import Any, Final
 
 from app.interfaces import INTEGER_RANGES, PLACEHOLDER, Interfaces, Structure, Type
 from app.interfaces.definitions import FLOAT_TYPES, Field
-from app.simulator.guesses import PHRASES, guessed
-from app.simulator.known_types import KNOWN, Fields, Moment
-from app.simulator.signals import Signal, cycle, phase_of, swing
+from app.simulator.values.guesses import PHRASES, guessed
+from app.simulator.values.known_types import KNOWN, Fields, Moment
+from app.simulator.values.signals import Signal, cycle, phase_of, swing
 
 Message = Callable[[Moment], Fields]
 Part = Callable[[Moment], Any]

@@ -1,0 +1,1 @@
+"""Recordings that are played in place of a simulated robot."""
