@@ -14,7 +14,14 @@ from app.panel.interlock import Interlock
 from app.panel.layout import Frame, Hand, Page, Screens, TextSize, Theme
 from app.panel.rules import ControlRules, LogRules, RecordRules
 from app.panel.screen import Keyboard, ScreenRules
-from app.panel.widgets.families import BaseWidget, Command, Display, PublishCommand, TopicWidget
+from app.panel.widgets.families import (
+    BaseWidget,
+    Command,
+    DisplayWidget,
+    PublishCommand,
+    TopicSource,
+    TopicWidget,
+)
 from app.panel.widgets.parameter import EVENT_TYPE, EVENTS, Parameter
 from app.panel.widgets.publish import Confirm, SinglePublish
 from app.panel.widgets.service_action import Action
@@ -91,8 +98,9 @@ class Panel(Description):
         return tuple(w for w in self.widgets() if isinstance(w, Command))
 
     @cached_property
-    def displays(self) -> tuple[Display, ...]:
-        return tuple(w for w in self.widgets() if isinstance(w, Display))
+    def displays(self) -> tuple[DisplayWidget, ...]:
+        """The widgets that show topics."""
+        return tuple(w for w in self.widgets() if isinstance(w, DisplayWidget))
 
     def page(self, page_id: str) -> Page | None:
         return next((page for page in self.pages if page.id == page_id), None)
@@ -115,7 +123,7 @@ class Panel(Description):
         """Topic → paths of the fields that the panel reads."""
         found: dict[str, list[str]] = {}
         for of in self.monitored():
-            found.setdefault(of.topic, []).append(of.field)
+            found.setdefault(of.topic, []).extend(of.fields)
         for confirm in self.confirmations():
             found.setdefault(confirm.topic, []).append(confirm.field)
         return found
@@ -126,10 +134,12 @@ class Panel(Description):
             if isinstance(widget, SinglePublish) and widget.confirm is not None:
                 yield widget.confirm
 
-    def monitored(self) -> Iterator[Interlock | Display]:
-        """The interlocks and displays: everything with a subscription to a field."""
-        yield from self.interlocks
-        yield from self.displays
+    def monitored(self) -> Iterator[TopicSource]:
+        """What interlocks and displays listen to."""
+        for one in self.interlocks:
+            yield TopicSource(one.topic, one.type, one.qos, (one.field,))
+        for display in self.displays:
+            yield from display.sources()
 
     def actions(self) -> dict[str, str]:
         """Action → type of all actions that the panel may send goals to."""
@@ -145,5 +155,5 @@ class Panel(Description):
     def qos(self, topic: str) -> TopicQos:
         """A topic's QoS, which is the same in all places of the panel file."""
         named = {w.topic: w.qos for w in self.widgets() if isinstance(w, TopicWidget)}
-        named |= {one.topic: one.qos for one in self.interlocks}
+        named |= {source.topic: source.qos for source in self.monitored()}
         return named.get(topic, EVENTS_QOS if topic == EVENTS else TopicQos())

@@ -5,9 +5,9 @@ Holds, confirmations and the view follow in `turn`.
 
 import logging
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal
+from typing import Literal, Protocol
 
 from app.commands.actions.goals import GoalTracker
 from app.commands.confirmations import Confirmations
@@ -20,9 +20,6 @@ from app.permission.interlocks import Verdict, interlock_verdict
 from app.robot.state import Reading, RobotState, Sample
 from app.ros_logging import RobotLog
 from app.transport.inbox import Changes, Token
-
-if TYPE_CHECKING:
-    from app.recording import Recorder
 
 log = logging.getLogger("kiosk")
 
@@ -54,6 +51,17 @@ class Updates:
         return Updates(urgent=True, readings=readings)
 
 
+class SampleListener(Protocol):
+    """Gets every sample of its topics in their order, also those that were replaced within one turn."""
+
+    @property
+    def keys(self) -> frozenset[str]:
+        """The keys of its topics."""
+
+    def record_sample(self, key: str, sample: Sample) -> None:
+        """A sample was received. Called on the event loop; it must take microseconds."""
+
+
 class Ingest:
     """Ingests the data of one robot. Used on the event loop only."""
 
@@ -64,13 +72,13 @@ class Ingest:
         actions: GoalTracker,
         confirmations: Confirmations,
         parameters: ParameterSync,
-        recorder: "Recorder | None",
+        listeners: Collection[SampleListener] = (),
     ) -> None:
         self._robot = robot
         self._actions = actions
         self._confirmations = confirmations
         self._parameters = parameters
-        self._recorder = recorder
+        self._listeners = listeners
         self._log = RobotLog(log, robot.name)
         goals = {robot.key(one): one for one in panel.actions()}
         self._feedback = {names.feedback(key): one for key, one in goals.items()}
@@ -83,7 +91,7 @@ class Ingest:
         # Every message of these topics counts, also values that were replaced within one turn.
         self.watched = self._interlocks.keys() | {robot.key(one.topic) for one in panel.confirmations()}
         self.prompt = self.watched | self._status.keys() | {self._events}
-        self.whole = frozenset() if recorder is None else recorder.keys
+        self.whole = frozenset().union(*(listener.keys for listener in listeners))
 
     def steps(self, changes: Changes) -> Iterator[Updates]:
         """Ingests changes step by step: yields after each intermediate value that changed a permission,
@@ -106,7 +114,7 @@ class Ingest:
                 updates.other = True
             else:
                 updates.values.add(key)
-        self._record(changes)
+        self._notify(changes)
         self._apply_tokens(changes.tokens, updates)
         yield updates
 
@@ -127,10 +135,11 @@ class Ingest:
         """The verdicts of the interlocks on a topic."""
         return [interlock_verdict(one, self._robot, now) for one in self._interlocks.get(key, ())]
 
-    def _record(self, changes: Changes) -> None:
-        if self._recorder is not None:
+    def _notify(self, changes: Changes) -> None:
+        for listener in self._listeners:
             for key, sample in changes.kept:
-                self._guarded(key, sample, self._recorder.record_sample)
+                if key in listener.keys:
+                    self._guarded(key, sample, listener.record_sample)
 
     def _guarded(self, key: str, sample: Sample, take: Callable[[str, Sample], None]) -> None:
         try:

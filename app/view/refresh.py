@@ -14,7 +14,7 @@ from typing import Final, Protocol
 from app.audit.press_record import Log
 from app.i18n import TextLike, joined, say
 from app.panel.model import Panel
-from app.panel.widgets.families import Display
+from app.panel.widgets.families import DisplayWidget
 from app.permission.control_authority import ControlAuthority
 from app.robot.state import RobotState
 from app.ros_logging import RobotLog
@@ -82,7 +82,9 @@ class ViewRefresher:
         self._log = RobotLog(log, robot.name)
         self._since = Since()
         self._frame_s = 1 / panel.display_hz
-        self._displays = [(robot.key(w.topic), w) for w in panel.displays]
+        self._displays = [
+            (frozenset(robot.key(source.topic) for source in w.sources()), w) for w in panel.displays
+        ]
         self._seen = self._sight()
         self.lamp = self._seen.robot
         self.publisher = ViewPublisher(self._seen.view, revision, self._seen.without_control)
@@ -149,10 +151,10 @@ class ViewRefresher:
         else:
             self._seen = update_displays(self._seen, self._stale(now), self._robot, now)
 
-    def _stale(self, now: float) -> list[Display]:
+    def _stale(self, now: float) -> list[DisplayWidget]:
         """The displays that a topic or time has changed."""
         untils, spoke = self._seen.displays, self._spoke
-        return [w for key, w in self._displays if key in spoke or untils[w.id] <= now]
+        return [w for keys, w in self._displays if not keys.isdisjoint(spoke) or untils[w.id] <= now]
 
     def _look(self) -> None:
         """Builds the whole view."""

@@ -12,7 +12,7 @@ from typing import Any, Final, NamedTuple, TypedDict
 
 from app.i18n import Text, TextLike, say
 from app.panel.model import Panel
-from app.panel.widgets.families import Display
+from app.panel.widgets.families import DisplayWidget
 from app.permission.control_authority_view import IN_CONTROL, NO_CONTROL, ControlView, Role
 from app.permission.control_authority_view import seen_as as control_seen_as
 from app.permission.interlocks import PERMITTED, Verdict, interlock_verdict, link_verdict
@@ -131,7 +131,7 @@ def lock_all(seen: ViewWithDeadlines, reason: Text) -> ViewWithDeadlines:
 
 
 def update_displays(
-    seen: ViewWithDeadlines, displays: Iterable[Display], robot: RobotState, now: float
+    seen: ViewWithDeadlines, displays: Iterable[DisplayWidget], robot: RobotState, now: float
 ) -> ViewWithDeadlines:
     """The same with these displays as of `now`, where nothing else has changed."""
     widgets, untils = dict(seen.view["widgets"]), dict(seen.displays)

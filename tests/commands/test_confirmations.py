@@ -99,7 +99,6 @@ def test_what_came_unseen_confirms_by_when_it_came() -> None:
             deaf,
             desk.confirmations,
             deaf,
-            None,
         )
         press = asyncio.create_task(desk.press())
         await asyncio.sleep(0)

@@ -202,7 +202,7 @@ def test_a_value_that_only_changes_the_reason_waits_for_the_next_frame(tmp_path:
     panel = load_panel(path)
     robot = robot_there(panel)
     deaf: Any = Deaf()
-    intake = Ingest(panel, robot, deaf, deaf, deaf, None)
+    intake = Ingest(panel, robot, deaf, deaf, deaf)
     shows: list[float] = []
 
     def take(value: float, *between: float) -> tuple[bool, bool]:

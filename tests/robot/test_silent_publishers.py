@@ -180,7 +180,6 @@ async def made() -> Incoming:
         GoalTracker(INTERFACES, robot, services, lambda: None),
         Confirmations(robot, lambda: None),
         ParameterSync(panel, INTERFACES, robot, services, calls, lambda: None),
-        None,
     )
     return Incoming(inbox, intake, robot)
 

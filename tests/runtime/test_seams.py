@@ -74,7 +74,7 @@ class Deaf:
 
 def intake_of(panel: Panel, robot: RobotState, actions: Any) -> Ingest:
     deaf: Any = Deaf()
-    return Ingest(panel, robot, actions, deaf, deaf, None)
+    return Ingest(panel, robot, actions, deaf, deaf)
 
 
 def session_of(panel: Panel, endpoint: str) -> RobotSession:
@@ -189,7 +189,7 @@ def test_each_sample_that_is_kept_whole_is_recorded_and_no_other() -> None:
     tape: Any = Tape()
     deaf: Any = Deaf()
     robot = robot_there(panel)
-    intake = Ingest(panel, robot, deaf, deaf, deaf, tape)
+    intake = Ingest(panel, robot, deaf, deaf, deaf, [tape])
     assert intake.whole == tape.keys
     kept = [("heard", sample(said)) for said in (b"1", b"2", b"3")]
     page = Page(panel, robot)

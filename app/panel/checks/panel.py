@@ -17,9 +17,11 @@ from app.panel.template import NOW
 from app.panel.widgets.families import (
     BaseWidget,
     CheckContext,
+    DisplayWidget,
     EntryWidget,
     Input,
     KeyCommand,
+    TopicSource,
     TopicWidget,
 )
 from app.panel.widgets.inputs import TextInput
@@ -220,15 +222,18 @@ def _duplicate_widget_ids(panel: Panel) -> Iterator[Fault]:
 def _topic_conflicts(panel: Panel, reported: Sequence[str]) -> Iterator[Fault]:
     """Faults of topics with several types or QoS in the panel. Places that are `reported` already are
     skipped: their type may be the mistake."""
-    places: list[tuple[str, Interlock | TopicWidget | Confirm]] = []
+    places: list[tuple[str, Interlock | TopicWidget | TopicSource | Confirm]] = []
     confirms: list[tuple[str, Confirm]] = []
     places += [(f"interlock[{i}]", one) for i, one in enumerate(panel.interlocks)]
     for place, widget in _widgets_with_places(panel):
-        if isinstance(widget, TopicWidget):
+        if isinstance(widget, DisplayWidget):
+            at = ((f"{place}.{source.place}".rstrip("."), source) for source in widget.sources())
+            places.extend(at)
+        elif isinstance(widget, TopicWidget):
             places.append((place, widget))
         if isinstance(widget, SinglePublish) and widget.confirm and widget.confirm.type:
             confirms.append((f"{place}.confirm", widget.confirm))
-    firsts: dict[str, tuple[str, Interlock | TopicWidget | Confirm]] = {}
+    firsts: dict[str, tuple[str, Interlock | TopicWidget | TopicSource | Confirm]] = {}
     for place, one in (*places, *confirms):
         above, first = firsts.setdefault(one.topic, (place, one))
         if one.type != first.type:

@@ -51,6 +51,17 @@ class CheckContext:
     pictures: Collection[str] = ()
 
 
+class TopicSource(NamedTuple):
+    """A topic that a widget listens to, with the paths of the `fields` that it reads; `place` is the
+    table with the topic's keys, below the widget's ("pen[0]"; "" for the widget's own)."""
+
+    topic: str
+    type: str
+    qos: TopicQos
+    fields: tuple[str, ...]
+    place: str = ""
+
+
 class BaseWidget(Description):
     """The keys of every widget; `span` is its width in columns of its group, which are twelfths of the
     page where the group does not say, and `rows` its height in rows of its group."""
@@ -127,14 +138,26 @@ class TopicWidget(BaseWidget):
     qos: TopicQos = TopicQos()
 
 
-class Display(TopicWidget):
+class DisplayWidget(BaseWidget):
+    """A widget that shows what topics say, of one robot."""
+
+    @abstractmethod
+    def sources(self) -> Iterator[TopicSource]:
+        """The topics that it shows."""
+
+    def endpoints(self) -> Iterator[tuple[Role, str]]:
+        for topic in dict.fromkeys(source.topic for source in self.sources()):
+            yield "MP", topic
+
+
+class Display(TopicWidget, DisplayWidget):
     """A field of a topic that is shown; a value older than `max_age_s` is marked as old."""
 
     field: FieldPath = "data"
     max_age_s: Seconds | None = None
 
-    def endpoints(self) -> Iterator[tuple[Role, str]]:
-        yield "MP", self.topic
+    def sources(self) -> Iterator[TopicSource]:
+        yield TopicSource(self.topic, self.type, self.qos, (self.field,))
 
     def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
         interfaces = checking.interfaces
