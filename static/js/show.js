@@ -2,18 +2,26 @@
 import { releaseEntry, showBounds, showEntry } from "./entries.js";
 
 export function setText(element, text) {
-  if (!element || element.textContent === text) return;
+  if (!element) return;
   if (element.dataset.unit) setValue(element, text);
-  else element.textContent = text;
+  else setOnlyText(element, text);
 }
 
 // A number and, smaller, its unit; another text, such as that there is no value, has none.
 function setValue(element, text) {
-  const [number, unit] = element.children;
+  const [number, unit] = element.firstElementChild.children;
   const ending = ` ${element.dataset.unit}`;
   const hasUnit = text.endsWith(ending);
-  number.textContent = hasUnit ? text.slice(0, -ending.length) : text;
-  unit.textContent = hasUnit ? ending : "";
+  setOnlyText(number, hasUnit ? text.slice(0, -ending.length) : text);
+  setOnlyText(unit, hasUnit ? ending : "");
+}
+
+// A text node that is there stays: a new one would cost the page its style and layout as well.
+function setOnlyText(element, text) {
+  const node = element.firstChild;
+  if (node?.nodeType === Node.TEXT_NODE && !node.nextSibling) {
+    if (node.data !== text) node.data = text;
+  } else if (node || text) element.textContent = text;
 }
 
 // How an attribute is shown. One that is not here has a place in the markup: `data-text` for a text,
