@@ -61,7 +61,9 @@ docs: .venv-docs/ready
 # FORM=short: as in `make test`.
 FORM ?= long
 FAULTS_TESTS := tests/faults/test_faults_of_*.py tests/permission/test_at_random.py tests/audit/test_killed.py \
-	tests/bridge/test_publishers_on_bridge.py tests/bridge/test_reference_system.py
+	tests/bridge/test_publishers_on_bridge.py tests/bridge/test_reference_system.py \
+	tests/runtime/test_nothing_grows.py tests/commands/test_holds.py tests/permission/test_control_authority.py \
+	tests/interfaces/test_fields.py tests/panel/test_toml_lines.py tests/panel/test_mistakes.py tests/web/test_openapi.py
 FAULTS_RESULTS := $(CACHE)/faults.jsonl
 faults: test-parts
 	mkdir -p $(CACHE)

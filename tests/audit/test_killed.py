@@ -12,7 +12,7 @@ from app.audit import Entry, Filter
 from app.audit.queries import rows
 from app.audit.verify import verify
 from app.i18n import say
-from tests.faults.rig import several
+from tests.support.form import several
 from tests.support.parts import Bridge, RosNode, Server, http_client, live, until
 
 KILLS = several(8, 60)

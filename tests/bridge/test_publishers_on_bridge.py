@@ -7,14 +7,14 @@ from pathlib import Path
 import pytest
 
 from tests.faults.publishers import KINDS, Kind, Publishers
-from tests.faults.rig import several
+from tests.support.form import several
 from tests.support.parts import Bridge, RosNode, Server, live, until
 
-TRIALS = several(2, 50)  # of each of two kinds
+TRIALS = several(1, 50)  # of each of two kinds
 ONCE = KINDS[0]
 AT_ONCE = next(kind for kind in KINDS if not kind.matched and kind.durability == "volatile")
 LATCHED = next(kind for kind in KINDS if kind.durability == "transient_local")
-CLOSED_BY = several(2, 20)
+CLOSED_BY = several(1, 20)
 
 
 PANEL = """

@@ -10,7 +10,7 @@ from socket import create_connection
 import pytest
 import zenoh
 
-from tests.faults.rig import several
+from tests.support.form import several
 from tests.support.parts import ROOT, Bridge, RosNode, Server, has_heard, live, until
 
 TEXTS = [

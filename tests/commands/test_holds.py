@@ -38,6 +38,7 @@ from tests.support.builders import (
     robot_there,
     sending_of,
 )
+from tests.support.form import several
 
 POINT: Final = "geometry_msgs/msg/Point"
 SPEED: Final[Table] = {
@@ -607,7 +608,7 @@ def _split(points: list[tuple[float, float, float]]) -> list[list[tuple[float, f
 
 TestOrders = Orders.TestCase
 TestOrders.settings = settings(
-    max_examples=300,
+    max_examples=several(80, 300),
     stateful_step_count=40,
     deadline=None,
     database=None,

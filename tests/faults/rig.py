@@ -4,15 +4,14 @@
 keeps running.
 """
 
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
 
+from tests.support.form import LONG
 from tests.support.parts import ENOUGH_S, ROOT, Bridge, RosNode, Server, until, zenoh_file
 
-LONG: Final = os.environ.get("FAULTS") == "long"
 BOOL: Final = "std_msgs/msg/Bool"
 TEXT: Final = "std_msgs/msg/String"
 PULSE_S: Final = 0.1
@@ -83,11 +82,6 @@ type = "std_msgs/msg/String"
 """
 SENT_ON: Final = {"free": "/free", "guarded": "/guarded", "paced": "/paced"}
 LISTENED_TO: Final = ("kept", "pulsed", "heard")
-
-
-def several(short: int, long: int) -> int:
-    """A count or a time, by the form of the suite."""
-    return long if LONG else short
 
 
 def limit(seconds: float) -> float:

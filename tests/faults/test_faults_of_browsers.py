@@ -8,9 +8,10 @@ from tests.faults import fixtures
 from tests.faults.browsers import Browsers, asking, storm, unread
 from tests.faults.presser import Presser, accounted
 from tests.faults.results import ms, record
-from tests.faults.rig import TEXT, Rig, limit, several
+from tests.faults.rig import TEXT, Rig, limit
 from tests.faults.trial import presses_work
 from tests.faults.watch import Watch, answering, resources, until_released
+from tests.support.form import several
 from tests.support.parts import ENOUGH_S, Server, until
 
 rig = fixtures.rig

@@ -8,8 +8,9 @@ from tests.faults import fixtures
 from tests.faults.kills import Life, kill_at_random_moments
 from tests.faults.presser import accounted
 from tests.faults.results import ms, record
-from tests.faults.rig import Rig, kiosk, limit, several
+from tests.faults.rig import Rig, kiosk, limit
 from tests.faults.trial import UNDER_WAY_S
+from tests.support.form import several
 from tests.support.parts import free_port
 
 rig = fixtures.rig

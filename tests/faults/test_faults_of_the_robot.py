@@ -15,9 +15,10 @@ import zenoh
 from tests.faults import fixtures
 from tests.faults.presser import Account, Presser, accounted
 from tests.faults.results import ms, record
-from tests.faults.rig import BOOL, LISTENED_TO, MAX_AGE_S, TEXT, Rig, limit, permitting, several
+from tests.faults.rig import BOOL, LISTENED_TO, MAX_AGE_S, TEXT, Rig, limit, permitting
 from tests.faults.trial import presses_work, recorded, try_fault
 from tests.faults.watch import Resources, Watch, answering, resources, until_released
+from tests.support.form import several
 from tests.support.parts import ENOUGH_S, RosNode, Server, until
 
 rig = fixtures.rig

@@ -12,9 +12,10 @@ from tests.faults import fixtures
 from tests.faults.net import ROBOT_IP, Cable
 from tests.faults.presser import Account, Presser, accounted
 from tests.faults.results import ms, record
-from tests.faults.rig import LONG, Rig, limit, several
+from tests.faults.rig import Rig, limit
 from tests.faults.trial import UNDER_WAY_S, presses_work, recorded, try_fault
 from tests.faults.watch import Watch, answering
+from tests.support.form import LONG, several
 from tests.support.parts import TESTS, Server, free_port, until
 
 rig = fixtures.rig

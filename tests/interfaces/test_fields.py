@@ -13,6 +13,7 @@ from app.interfaces import Fields, Interfaces, load_interfaces, to_plain
 from app.interfaces.definitions import FLOAT_TYPES, Structure, Type
 from tests.interfaces.test_interfaces import garbage
 from tests.interfaces.test_values import FIELDS
+from tests.support.form import several
 from tests.support.samples import Samples
 
 JAZZY: Final = load_interfaces("jazzy")
@@ -197,7 +198,7 @@ def test_damage_raises_nothing_but_a_decode_error(cell: Interfaces) -> None:
     walker = Walker(cell, 1)
     reader = cell.field_reader(store, {written(walker.steps(store, fields)) for _ in range(40)})
     chance = random.Random(2)
-    for _ in range(4000):
+    for _ in range(several(800, 4000)):
         at, byte = chance.randrange(len(whole)), chance.choice((0, 1, 0x7F, 0xFF))
         readable(reader, whole[:at] + bytes((byte,)) + whole[at + 1 :])
     for seed, name in enumerate(cell.structures):

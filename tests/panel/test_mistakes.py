@@ -18,6 +18,7 @@ from app.panel.interlock import CONDITIONS
 from app.panel.layout import Page
 from app.panel.model import Panel
 from app.panel.widgets.kinds import KINDS
+from tests.support.form import several
 from tests.support.parts import TESTS
 
 GOOD: Final = (TESTS / "everything.toml").read_text()
@@ -227,7 +228,11 @@ DAMAGE: Final = st.one_of(
 
 
 @given(st.lists(DAMAGE, min_size=1, max_size=4))
-@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=several(60, 200),
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
 def test_whatever_is_wrong_is_told_in_words(told: Told, damages: list[tuple[Any, ...]]) -> None:
     lines = list(LINES)
     for what, at, *more in damages:

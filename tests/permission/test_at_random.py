@@ -36,6 +36,7 @@ from tests.support.builders import (
     panel_of,
     presses_of,
 )
+from tests.support.form import several
 
 MAX_AGE_S: Final = 2.0
 TIMEOUT_S: Final = 0.01
@@ -56,7 +57,7 @@ BUTTONS: Final = some.sampled_from(["guarded", "add"])
 GARBAGE: Final = some.binary(max_size=4) | some.binary().map(lambda data: b"\xff" + data)
 CORRECTED: Final = frozenset({"timed_out", "unknown"})
 FEW: Final = settings(
-    max_examples=200,
+    max_examples=several(60, 200),
     stateful_step_count=40,
     deadline=None,
     derandomize=True,

@@ -17,6 +17,7 @@ from app.permission.control_authority import ASK_AGAIN_S, LIFE_S, ControlAuthori
 from app.permission.control_authority_view import Role, role
 from app.permission.principal import Principal
 from tests.support.builders import faults_text
+from tests.support.form import several
 from tests.support.words import english
 
 RULES = ControlRules(required=True)
@@ -610,5 +611,9 @@ class Everybody(RuleBasedStateMachine):
 
 TestEverybody = Everybody.TestCase
 TestEverybody.settings = settings(
-    max_examples=150, stateful_step_count=60, deadline=None, database=None, derandomize=True
+    max_examples=several(50, 150),
+    stateful_step_count=60,
+    deadline=None,
+    database=None,
+    derandomize=True,
 )

@@ -8,10 +8,11 @@ from typing import Any
 
 import pytest
 
+from tests.support.form import several
 from tests.support.parts import ROOT, Server, until
 
 CONTROL = "\n[control]\nrequired = true\n"
-EXAMPLES = "20"  # of each operation
+EXAMPLES = several(8, 20)  # of each operation
 SEED = "20261122"
 
 
