@@ -1,7 +1,10 @@
 """The server's clock, and times and ages as text."""
 
 import time
+from functools import lru_cache
 from typing import Final
+
+from app.i18n import Text, date_and_time, say, time_of_day
 
 _START_WALL: Final = time.time()
 _START_BOOTTIME: Final = time.clock_gettime(time.CLOCK_BOOTTIME)
@@ -13,20 +16,26 @@ def server_now() -> float:
     return _START_WALL + time.clock_gettime(time.CLOCK_BOOTTIME) - _START_BOOTTIME
 
 
-def format_age(seconds: float) -> str:
-    """An age as text: "4 s", "12 min", "3 h"."""
+def format_age(seconds: float) -> Text:
+    """An age: "4 s", "12 min", "3 h"."""
     if seconds < 60:
-        return f"{int(seconds)} s"
+        return say("age_seconds", number=int(seconds))
     if seconds < 3600:
-        return f"{int(seconds // 60)} min"
-    return f"{int(seconds // 3600)} h"
+        return say("age_minutes", number=int(seconds // 60))
+    return say("age_hours", number=int(seconds // 3600))
 
 
-def format_datetime(wall: float) -> str:
+def format_datetime(wall: float) -> Text:
     """Date and time of `wall` (seconds since the epoch) in the server's time zone."""
-    return time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(wall))
+    return date_and_time(time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(wall)))
 
 
-def format_time(wall: float) -> str:
+def format_time(wall: float) -> Text:
     """Time of day of `wall` (seconds since the epoch) in the server's time zone."""
-    return time.strftime("%H:%M:%S", time.localtime(wall))
+    return _time(int(wall), time.timezone)
+
+
+@lru_cache(maxsize=1000)
+def _time(second: int, _: int) -> Text:
+    """What is shown at a time has the same one many times over."""
+    return time_of_day(time.strftime("%H:%M:%S", time.localtime(second)))

@@ -30,6 +30,7 @@ from app.web.asgi import Application, StartErrorsInWords
 from app.web.assets import load_assets
 from app.web.described import errors
 from app.web.error_pages import HANDLERS, on_error_in_development
+from app.web.language import LanguageHeaders
 from app.web.metrics import Metrics
 from app.web.page_templates import PageTemplates
 from app.web.proxies import Proxies
@@ -108,6 +109,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     )
     if settings.dev:
         app.add_exception_handler(Exception, on_error_in_development)
+    app.add_middleware(LanguageHeaders)
     app.add_middleware(GZipMiddleware, minimum_size=500)
     app.add_middleware(RequestGuard, hosts=settings.hosts)
     if settings.proxies:

@@ -159,7 +159,7 @@ def test_every_catalogue_is_whole() -> None:
     ],
 )
 def test_a_fault_of_a_translation_is_named(tmp_path: Path, changed: dict[str, str], fault: str) -> None:
-    path = catalogue(tmp_path, "de", {**SENTENCES, **changed})
+    path = catalogue(tmp_path, "de", {**SENTENCES, "keypad_decimal": ",", **changed})
     assert list(faults({ENGLISH: files()[ENGLISH], "de": path})) == [f"de.po: {fault}"]
 
 
@@ -193,4 +193,4 @@ def test_each_language_has_its_sentences_and_what_it_lacks_in_english(tmp_path: 
     ],
 )
 def test_an_age_reads_as_an_operator_says_it(seconds: float, text: str) -> None:
-    assert format_age(seconds) == text
+    assert render(format_age(seconds)) == text

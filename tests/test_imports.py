@@ -38,8 +38,10 @@ COMMON = {
     "app.i18n",
     "app.i18n.__main__",
     "app.i18n.catalogue",
-    "app.icons",
+    "app.i18n.locales",
     "app.i18n.text",
+    "app.i18n.values",
+    "app.icons",
     "app.printable",
     "app.rate_limit",
     "app.ros_logging",
@@ -66,6 +68,7 @@ KNOWN_TO_THE_SIMULATOR = (
     "app.dialect",
     "app.panel",  # descriptions: what a robot has to have
     "app.errors",
+    "app.i18n",
 )
 
 

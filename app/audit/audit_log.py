@@ -25,7 +25,7 @@ from app.audit.refusal_quota import SUMMARY_INTERVAL_S, RefusalQuota
 from app.audit.ticket import Limits, Results, Ticket
 from app.audit.writer_thread import WriterThread
 from app.errors import LogError
-from app.i18n import ENGLISH, TextLike, say
+from app.i18n import ENGLISH, TextLike, number, say
 
 log = logging.getLogger("kiosk.log")
 
@@ -97,7 +97,7 @@ class OperatorLog:
     @property
     def _fault_reason(self) -> TextLike:
         if self._stuck and not self._writer.fault:
-            return say("log_slow", seconds=f"{PRESSED_WITHIN_S:g}")
+            return say("log_slow", seconds=number(f"{PRESSED_WITHIN_S:g}"))
         return self._writer.fault
 
     @property
@@ -219,7 +219,7 @@ class OperatorLog:
         if ticket.result is None:
             self._stuck.add(ticket)
             self._notify_listeners()
-            raise LogError(say("log_slow", seconds=f"{seconds:g}"))
+            raise LogError(say("log_slow", seconds=number(f"{seconds:g}")))
         if isinstance(ticket.result, Entry):
             return ticket.result
         raise ticket.result

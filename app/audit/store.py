@@ -14,7 +14,7 @@ from typing import Final, Literal
 from app.audit.database import BUSY_TIMEOUT_S, NAME, Files, Head, as_log_error, open_database
 from app.audit.entry import FIELDS, Entry, new_entry
 from app.errors import LogError
-from app.i18n import TextLike, say
+from app.i18n import TextLike, number, say
 
 COLUMNS: Final = ", ".join(f'"{name}"' for name in FIELDS)
 INSERT: Final = f"INSERT INTO entry ({COLUMNS}) VALUES ({', '.join('?' * len(FIELDS))})"
@@ -107,9 +107,9 @@ class Store:
         """
         with as_log_error():
             if last := self._last_older(now_ms - days * DAY_MS):
-                return self._remove(last, "days", say("log_removed_days", days=f"{days:g}"))
+                return self._remove(last, "days", say("log_removed_days", days=number(f"{days:g}")))
             if last := self._last_beyond(size_mb * 1_000_000):
-                return self._remove(last, "size", say("log_removed_size", size=f"{size_mb:g}"))
+                return self._remove(last, "size", say("log_removed_size", size=number(f"{size_mb:g}")))
         return False
 
     def _last_older(self, limit_ms: float) -> int:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from app.clock import format_time
-from app.i18n import TextLike, joined, say
+from app.i18n import TextLike, joined, number, say
 from app.panel.values import same_value
 from app.panel.widgets.publish import Confirm, SinglePublish
 from app.robot.command_status import CommandStatus, OnCorrection, Outcome
@@ -86,7 +86,7 @@ class Confirmations:
         waiting.late = True
         waiting.confirmed.add_done_callback(lambda _: self._confirm_late(waiting, corrected))
         asyncio.get_running_loop().call_later(LATE_S, self._forget, waiting)
-        limit = f"{confirm.within_s:g}"
+        limit = number(f"{confirm.within_s:g}")
         missed = say("no_effect", topic=confirm.topic, seconds=limit)
         return Outcome("unknown", joined([sent, missed]))
 

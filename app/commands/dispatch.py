@@ -10,7 +10,8 @@ from app.commands.confirmations import Confirmations
 from app.commands.parameters.sync import ParameterSync
 from app.commands.service_calls import ServiceCalls
 from app.errors import InputError, NotFound
-from app.i18n import TextLike, say
+from app.i18n import ENGLISH, TextLike, say
+from app.i18n.locales import number_from
 from app.interfaces import Interfaces
 from app.panel.model import Panel
 from app.panel.template import add_now, fill, input_ids
@@ -108,13 +109,16 @@ class Dispatcher:
             raise NotFound(f'there is no widget "{widget_id}" that can be pressed')
         return widget
 
-    def parse_form(self, form: Mapping[str, str]) -> dict[str, Any]:
-        """The texts of a form as input values, by input id."""
-        return {name: self._parse_field(name, text) for name, text in form.items()}
+    def parse_form(self, form: Mapping[str, str], language: str = ENGLISH) -> dict[str, Any]:
+        """The texts of a form as input values, by input id. A number may have the decimal sign of the
+        reader's language."""
+        return {name: self._parse_field(name, text, language) for name, text in form.items()}
 
-    def _parse_field(self, name: str, text: str) -> Any:
+    def _parse_field(self, name: str, text: str, language: str) -> Any:
         field = self._widgets.get(name)
-        return field.parse_text(text) if isinstance(field, EntryWidget) else text
+        if not isinstance(field, EntryWidget):
+            return text
+        return field.parse_text(number_from(text, language) if field.is_number_entry else text)
 
     def needed_inputs(self, widget: PressCommand, inputs: Mapping[str, Any]) -> dict[str, Any]:
         """The inputs of a press that its widget uses."""

@@ -12,7 +12,7 @@ from app import clock
 from app.audit import Origin
 from app.audit.press_record import Log, origin_of
 from app.errors import InputError
-from app.i18n import TextLike, say
+from app.i18n import TextLike, number, say
 from app.permission.control_authority import ControlAuthority
 from app.permission.interlocks import PERMITTED, Verdict, locked
 from app.permission.press_permission import NO_GROUNDS, Grounds
@@ -97,7 +97,7 @@ class PressGuard:
         """Why a touch at this time (in the server's time) is too old or in the future, else ""."""
         age = clock.server_now() - at
         if age > self._expires_s:
-            return say("expired", seconds=f"{age:.1f}")
+            return say("expired", seconds=number(f"{age:.1f}"))
         return say("ahead") if age < -MAX_AHEAD_S else ""
 
     def _check(self, seen: str) -> None:

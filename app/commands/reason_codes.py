@@ -20,7 +20,7 @@ ADVICE: Final = frozenset({"cyclone_hint"})  # follows a reason and is none itse
 def reason_code(reason: TextLike) -> str | None:
     """The code of the innermost sentence: "Not sent at 10:04:32: Locked: …" has that of the lock. Of
     several sentences the last one counts. None for a reason without a sentence of the catalogue."""
-    if not isinstance(reason, Text):
+    if not isinstance(reason, Text) or not reason.is_sentence:
         return None
     about = dict(reason.params)
     if reason.code in BETWEEN:

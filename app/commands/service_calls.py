@@ -15,9 +15,10 @@ from typing import Any, Final, Protocol
 from app.clock import format_time
 from app.concurrency import spawn_logged
 from app.errors import DecodeError
-from app.i18n import Text, TextLike, joined, say
+from app.i18n import PanelText, Text, TextLike, joined, number, say
+from app.i18n.values import filled_in, together
 from app.interfaces import Fields, Interfaces, plain_text
-from app.panel.template import RESPONSE_PLACEHOLDER
+from app.panel.template import RESPONSE_PLACEHOLDER, response_paths
 from app.panel.widgets.service_action import Call
 from app.printable import printable
 from app.robot.command_status import CommandStatus, FinalCheck, OnCorrection, Outcome, no_check
@@ -114,7 +115,7 @@ class ServiceCalls:
         _, response_type = self._interfaces.service_types(widget.type)
         success = field_of(self._interfaces, response_type, widget.success, "success", "bool")
         message = field_of(self._interfaces, response_type, widget.message, "message", "string")
-        paths = (*filter(None, (success, message)), *RESPONSE_PLACEHOLDER.findall(widget.answer))
+        paths = (*filter(None, (success, message)), *response_paths(widget.answer))
         read = partial(_read_call, widget, success, message)
         to = (widget.id, widget.service, widget.type)
         request = Request(*to, payload, widget.timeout_s, paths, read)
@@ -161,7 +162,7 @@ class ServiceCalls:
         if waiting.answered.done():
             return Outcome("unknown", say("call_dropped", service=request.service))
         hint = "" if request.service in self._answering else say("cyclone_hint")
-        sentence = say("timed_out", seconds=f"{request.timeout_s:g}")
+        sentence = say("timed_out", seconds=number(f"{request.timeout_s:g}"))
         return Outcome("timed_out", joined([sentence, hint]))
 
     def _on_late_response(
@@ -213,24 +214,34 @@ def _read_call(widget: Call, success: str | None, message: str | None, fields: F
     without."""
     words = [with_fields(f"{{{message}}}", fields)] if message else []
     words += [with_fields(widget.answer, fields)] if widget.answer else []
-    reply = " – ".join(word for word in words if word)
+    several = [part for word in words if word for part in (" – ", word)]
+    reply = together(several[1:])
     now = format_time(time.time())
     if success is None or fields.get(success):
         return Outcome("succeeded", with_reply(say("answered", time=now), reply))
     return Outcome("rejected", with_reply(say("said_no", time=now), reply))
 
 
-def with_reply(said: Text, reply: str) -> Text:
+def with_reply(said: Text, reply: TextLike) -> Text:
     """A sentence, followed by the robot's own text if there is one."""
     return say("with_reply", said=said, reply=reply) if reply else say("with_stop", said=said)
 
 
-def with_fields(template: str, fields: Fields, within: str = "") -> str:
+def with_fields(template: str | PanelText, fields: Fields, within: str = "") -> TextLike:
     """The template with each `{path}` (relative to `within`) replaced by the field's value, shortened
     if it is long, "—" if the message has no such element."""
 
-    def shown(path: str) -> str:
+    def shown(path: str) -> TextLike:
         value = fields.get(within + path)
-        return NO_VALUE if value is None else printable(plain_text(value, MAX_VALUE_CHARS))
+        if value is None:
+            return NO_VALUE
+        text = printable(plain_text(value, MAX_VALUE_CHARS))
+        return number(text) if isinstance(value, float) else text
 
-    return RESPONSE_PLACEHOLDER.sub(lambda found: shown(found[1]), template)
+    def filled(one: str) -> TextLike:
+        pieces = RESPONSE_PLACEHOLDER.split(one)  # text, path, text, …
+        return together(shown(piece) if n % 2 else piece for n, piece in enumerate(pieces))
+
+    if isinstance(template, str):
+        return filled(template)
+    return filled_in(template, filled)

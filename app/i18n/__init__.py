@@ -5,17 +5,22 @@ Codes are stable names for tests and logs; `catalogue` has the sentences of each
 
 from app.i18n.catalogue import ENGLISH, sentences
 from app.i18n.text import BETWEEN, Param, Text, TextLike, joined, localized, render, say, text_in
+from app.i18n.values import PanelText, date_and_time, number, time_of_day
 
 __all__ = [
     "BETWEEN",
     "ENGLISH",
+    "PanelText",
     "Param",
     "Text",
     "TextLike",
+    "date_and_time",
     "joined",
     "localized",
+    "number",
     "render",
     "say",
     "sentences",
     "text_in",
+    "time_of_day",
 ]

@@ -1,4 +1,5 @@
 """`python -m app.i18n`: is each catalogue whole, and does each translation fill in what English does?
+Has its language a name, and the keypad the decimal sign of its numbers?
 
 Exit status: 0 they are, 1 they are not, with a line for each fault.
 """
@@ -7,25 +8,38 @@ import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from string import Formatter
+from typing import Final
 
 from babel.messages.pofile import PoFileError
 
 from app.i18n.catalogue import ENGLISH, files, translations
+from app.i18n.locales import own_name, symbols
+
+DECIMAL: Final = "keypad_decimal"
 
 
 def faults(catalogues: Mapping[str, Path]) -> Iterator[str]:
     """What is wrong with catalogues, each by its language; English is the measure."""
     english = translations(catalogues[ENGLISH])
-    for path in catalogues.values():
+    for language, path in catalogues.items():
         try:
             found = translations(path)
         except (PoFileError, UnicodeDecodeError) as error:
             yield f"{path.name}: {error}"
             continue
         yield from (f"{path.name}: {code} is not translated" for code in english if code not in found)
+        yield from (f"{path.name}: {fault}" for fault in _language_faults(language, found))
         for code, sentence in found.items():
             if fault := _fault(english.get(code), sentence):
                 yield f"{path.name}: {code} {fault}"
+
+
+def _language_faults(language: str, found: Mapping[str, str]) -> Iterator[str]:
+    if own_name(language) == language:
+        yield f'"{language}" has no name: it must be a tag of BCP 47 that CLDR knows, like pt-BR'
+    sign, decimal = found.get(DECIMAL), symbols(language).decimal
+    if sign is not None and sign != decimal:
+        yield f'{DECIMAL} is "{sign}", and numbers in this language have "{decimal}"'
 
 
 def _fault(english: str | None, sentence: str) -> str:

@@ -35,9 +35,9 @@ def _forget() -> None:
 
 @cache
 def files() -> Mapping[str, Path]:
-    """The catalogue of each language."""
-    found = [path for folder in _folders for path in folder.glob(f"*{SUFFIX}")]
-    return {path.stem: path for path in sorted(found)}
+    """The catalogue of each language, in their order; that of the folder added last counts."""
+    found = {path.stem: path for folder in _folders for path in folder.glob(f"*{SUFFIX}")}
+    return dict(sorted(found.items()))
 
 
 @cache

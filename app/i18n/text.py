@@ -1,13 +1,16 @@
 """A sentence as a value: its code and parameters. State holds these; an edge renders them.
 
 An edge is where something leaves for a reader: a page, an event, an answer, a terminal, a log of ROS.
+Texts of the panel file in several languages, numbers and times are such values too (`app.i18n.values`):
+their codes are in no catalogue, and each language writes them in its own way.
 """
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Final, NoReturn, Union
 
 from app.i18n.catalogue import ENGLISH, sentences
+from app.i18n.locales import date_time_in, number_in, time_in
 from app.printable import printable
 
 # Stands in a sentence: a name or a number, which are in no language; another sentence; or several,
@@ -16,6 +19,8 @@ Param = Union[str, int, float, "Text", tuple["TextLike", ...]]
 
 # Codes of what stands between texts that follow one another, with `parts` as the only parameter.
 BETWEEN: Final = frozenset({"between_sentences", "between_lines", "between_names"})
+# Codes of what is no sentence; none of a catalogue begins so.
+PANEL, PARTS, NUMBER, TIME, DATE_TIME = "=panel", "=parts", "=number", "=time", "=date_time"
 
 
 class Text:
@@ -57,13 +62,18 @@ class Text:
         """In English, for the server's own log."""
         return render(self)
 
+    @property
+    def is_sentence(self) -> bool:
+        """Whether it is one of the catalogue, or several of them."""
+        return self.code not in _WRITERS
+
     def as_json(self) -> dict[str, Any]:
         """As JSON has it: `{"code": …, "params": {…}}`."""
         return {"code": self.code, "params": {name: _as_json(value) for name, value in self.params}}
 
 
-# What a person reads: a sentence, or a text that is in no language, as labels, names and what a robot
-# says are; "" where there is nothing to read.
+# What a person reads: a sentence or another value that each language writes in its own way, or a text
+# that is in no language, as names and what a robot says are; "" where there is nothing to read.
 TextLike = Text | str
 
 
@@ -83,25 +93,53 @@ def joined(parts: Iterable[TextLike], between: str = "between_sentences") -> Tex
 
 def render(text: TextLike, language: str = ENGLISH) -> str:
     """As a reader of this language reads it."""
-    return text if isinstance(text, str) else printable(_filled(text, sentences(language)))
+    return text if isinstance(text, str) else printable(_filled(text, language))
 
 
-def _filled(text: Text, catalogue: Mapping[str, str]) -> str:
+def _filled(text: Text, language: str) -> str:
     """A KeyError is a mistake of the programmer's: a test finds each code that the catalogue lacks."""
-    sentence = catalogue[text.code]
-    if text.code in BETWEEN:
+    code = text.code
+    if code in _WRITERS:
+        return _WRITERS[code](dict(text.params), language)
+    sentence = sentences(language)[code]
+    if code in BETWEEN:
         parts = text.params[0][1]
         assert isinstance(parts, tuple)  # as `joined` makes it
-        return sentence.join(_written(part, catalogue) for part in parts)
-    return sentence.format_map({name: _written(value, catalogue) for name, value in text.params})
+        return sentence.join(str(_written(part, language)) for part in parts)
+    return sentence.format_map({name: _written(value, language) for name, value in text.params})
 
 
-def _written(value: Param, catalogue: Mapping[str, str]) -> Any:
+def _written(value: Param, language: str) -> Any:
     if isinstance(value, Text):
-        return _filled(value, catalogue)
+        return _filled(value, language)
     if isinstance(value, tuple):
-        return catalogue["between_names"].join(str(_written(one, catalogue)) for one in value)
-    return value
+        return sentences(language)["between_names"].join(str(_written(one, language)) for one in value)
+    return number_in(repr(value), language) if isinstance(value, float) else value
+
+
+def _panel_text(params: Mapping[str, Any], language: str) -> str:
+    """In the reader's language, else in the panel's own, whose tag is under ""."""
+    others = (text for tag, text in params.items() if tag)
+    found = params.get(language) or params.get(params[""]) or next(others)
+    return str(_written(found, language))
+
+
+def _parts(params: Mapping[str, Any], language: str) -> str:
+    return "".join(str(_written(part, language)) for part in params["parts"])
+
+
+def _number(params: Mapping[str, Any], language: str) -> str:
+    text = number_in(params["text"], language)
+    return f"{text} {_written(unit, language)}" if (unit := params["unit"]) else text
+
+
+_WRITERS: Final[Mapping[str, Callable[[Mapping[str, Any], str], str]]] = {
+    PANEL: _panel_text,
+    PARTS: _parts,
+    NUMBER: _number,
+    TIME: lambda params, language: time_in(params["at"], language),
+    DATE_TIME: lambda params, language: date_time_in(params["at"], language),
+}
 
 
 def localized(value: Any, language: str) -> Any:

@@ -2,17 +2,39 @@
 
 import re
 from collections.abc import Mapping
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, NamedTuple, Self
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    TypeAdapter,
+    ValidationInfo,
+    ValidatorFunctionWrapHandler,
+    WithJsonSchema,
+    WrapValidator,
+)
 
 from app.errors import InterfaceError
-from app.i18n import TextLike, render, say
+from app.i18n import ENGLISH, PanelText, TextLike, render, say
 from app.interfaces.field_path import Key, path_steps
 from app.interfaces.names import ACTION_TYPE, MESSAGE_TYPE, NAMESPACE, SERVICE_TYPE, TOPIC, Qos
 from app.interfaces.validation import format_value
+
+
+class FileContext(NamedTuple):
+    """What the values of a panel file are checked with: the file's folder, and the panel's language."""
+
+    folder: Path = Path()
+    language: str = ENGLISH
+
+
+def _context(info: ValidationInfo) -> FileContext:
+    return info.context or FileContext()
 
 
 def _check_topic(given: str) -> str:
@@ -76,20 +98,20 @@ def _check_endpoint(given: str) -> str:
 
 
 def _resolve_folder(given: Any, info: ValidationInfo) -> Path:
-    """The folder's path, relative to the panel file's folder, which is the validation context."""
+    """The folder's path, relative to the panel file's folder."""
     if not isinstance(given, str) or not given:
         raise ValueError(f"must be the path of a folder, not {format_value(given)}")
-    folder = Path(info.context or "") / given
+    folder = _context(info).folder / given
     if not folder.is_dir():
         raise ValueError(f"{folder} is not a folder: it must be a ROS package or have some in it")
     return folder
 
 
 def _resolve_file(given: Any, info: ValidationInfo) -> Path:
-    """The file's path, relative to the panel file's folder, which is the validation context."""
+    """The file's path, relative to the panel file's folder."""
     if not isinstance(given, str) or not given:
         raise ValueError(f"must be the path of a file, not {format_value(given)}")
-    file = Path(info.context or "") / given
+    file = _context(info).folder / given
     if not file.is_file():
         raise ValueError(f"{file} is not a file: the path is relative to the panel file")
     return file
@@ -131,6 +153,35 @@ def non_empty(given: tuple[Any, ...]) -> tuple[Any, ...]:
     return given
 
 
+@cache
+def _texts(least: int, most: int | None) -> TypeAdapter[dict[str, str]]:
+    one = Annotated[str, Field(min_length=least, max_length=most)]
+    table = Annotated[dict[str, one], Field(min_length=1)]
+    return TypeAdapter(table, config=ConfigDict(strict=True))
+
+
+def panel_text(most: int | None = None, least: int = 1) -> Any:
+    """The type of a text that an operator reads, of `least` to `most` characters: a text, or a table of
+    texts by their languages, `{ en = "Start", ja = "始動" }`."""
+
+    def by_language(given: Any, text: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:
+        if not isinstance(given, Mapping):
+            return text(given)
+        return PanelText(_texts(least, most).validate_python(given), _context(info).language)
+
+    limits = {"minLength": least} if least else {}
+    limits |= {} if most is None else {"maxLength": most}
+    one = {"type": "string", **limits}
+    table = {"type": "object", "title": TEXTS, "additionalProperties": one, "minProperties": 1}
+    return Annotated[
+        str,
+        Field(min_length=least, max_length=most),
+        WrapValidator(by_language),
+        WithJsonSchema({"anyOf": [one, table]}),
+    ]
+
+
+TEXTS: Final = "table of texts by language"
 # The protocols are those of Zenoh for Python; metadata and settings follow the address.
 ENDPOINT: Final = re.compile(
     r"(?:(?:tcp|udp|tls|quic|ws)/[^\s/?#]+:(?P<port>[0-9]{1,5})|unixsock-stream/[^\s?#]+)"
@@ -140,12 +191,17 @@ MAX_PORT: Final = 65535
 ID: Final = r"^[a-z][a-z0-9_]{0,63}$"
 Id = Annotated[str, Field(pattern=ID)]
 Interlocks = Annotated[tuple[str, ...], BeforeValidator(_parse_interlocks)]
-Label = Annotated[str, Field(min_length=1, max_length=120)]
-# A label that the panel file may leave to the catalogue: Pydantic knows only of what a file gives.
+# Texts that an operator reads. A `SaidLabel` may be left to the catalogue: Pydantic knows only of what
+# a file gives.
 if TYPE_CHECKING:
+    Label = str | PanelText
+    Note = str | PanelText
+    AnyText = str | PanelText
     SaidLabel = TextLike
 else:
-    SaidLabel = Label
+    Label = SaidLabel = panel_text(120)
+    Note = panel_text(40)
+    AnyText = panel_text(least=0)
 Span = Annotated[int, Field(ge=1, le=12)]
 Topic = Annotated[str, AfterValidator(_check_topic), Field(max_length=255)]
 Type = Annotated[str, AfterValidator(_check_message_type)]

@@ -5,6 +5,7 @@ from typing import Annotated, Any, Final
 
 from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr
 
+from app.i18n import TextLike
 from app.interfaces.validation import format_value
 from app.panel.base import Description, FieldPath, Id, Label, Seconds, Topic, TopicQos, Type
 from app.panel.widgets.numbers import Unit
@@ -53,7 +54,7 @@ class Interlock(Description):
     _constants: Mapping[Any, str] = PrivateAttr(default_factory=dict)
 
     @property
-    def name(self) -> str:
+    def name(self) -> TextLike:
         return self.label or self.id
 
     @property

@@ -7,7 +7,9 @@ from typing import Any, NamedTuple
 from pydantic import ValidationError
 
 from app.errors import Fault, InterfaceError, Note, PanelError, Remark
+from app.i18n import ENGLISH
 from app.interfaces import Interfaces, load_interfaces, read_distribution
+from app.panel.base import FileContext
 from app.panel.checks.panel import find_faults
 from app.panel.constants import resolve_interlock
 from app.panel.faults.toml_file import TomlFile, read_toml
@@ -51,15 +53,21 @@ def _load(file: TomlFile, kept: CacheFolder = lambda _: None) -> Panel:
     tables = {key: value for key, value in file.tables.items() if key != "revision"}
     faults = [] if tables == file.tables else [Fault("revision", "unknown key")]
     try:
-        panel = Panel.model_validate(tables | {"revision": file.revision}, context=file.path.parent)
+        panel = Panel.model_validate(tables | {"revision": file.revision}, context=_context(file))
     except ValidationError as error:
-        faults += _shape_faults(error, tables, file.path.parent)
+        faults += _shape_faults(error, tables, _context(file))
     else:
         read_distribution(panel.distro, kept(panel))
         faults += _type_faults(panel)
     if faults:
         raise PanelError(str(file.path), _sorted_faults(faults, file))
     return _resolve_constants(panel, load_interfaces(panel.distro, panel.interfaces))
+
+
+def _context(file: TomlFile) -> FileContext:
+    """With the panel's language, in which texts are shown that lack the reader's."""
+    given = file.tables.get("language", ENGLISH)
+    return FileContext(file.path.parent, given if isinstance(given, str) else ENGLISH)
 
 
 def _resolve_constants(panel: Panel, interfaces: Interfaces) -> Panel:
@@ -91,13 +99,13 @@ def _type_faults(panel: Panel, faulty: Collection[str] = ()) -> Iterator[Fault]:
 # Modules for panels with faults are imported only when needed, for a faster start.
 
 
-def _shape_faults(error: ValidationError, tables: dict[str, Any], folder: Path) -> list[Fault]:
+def _shape_faults(error: ValidationError, tables: dict[str, Any], context: FileContext) -> list[Fault]:
     """Faults of keys and values, and all others that can still be found."""
     from app.panel.faults.shape import find_shape_faults
     from app.panel.faults.stand_ins import make_stand_ins
 
     shape, rest = find_shape_faults(error, tables), make_stand_ins(tables, error)
-    panel = rest and rest.validate(folder)
+    panel = rest and rest.validate(context)
     if not rest or not panel:
         return shape.faults
     others = filter(rest.is_real, _type_faults(panel, rest.faulty))

@@ -8,12 +8,17 @@ from typing import Annotated, Final, Literal
 
 from pydantic import AfterValidator, Field
 
+from app.i18n import ENGLISH
+from app.i18n.catalogue import files
+from app.interfaces.validation import format_value
 from app.panel.base import Description, Endpoint, Folder, Id, Label, TopicQos, parse_namespace
 from app.panel.demo import DemoEntry
+from app.panel.faults.wording import one_of
 from app.panel.interlock import Interlock
 from app.panel.layout import Frame, Hand, Page, Screens, TextSize, Theme
 from app.panel.rules import ControlRules, LogRules, RecordRules
 from app.panel.screen import Keyboard, ScreenRules
+from app.panel.texts import panel_texts
 from app.panel.widgets.families import (
     BaseWidget,
     Command,
@@ -26,6 +31,25 @@ from app.panel.widgets.parameter import EVENT_TYPE, EVENTS, Parameter
 from app.panel.widgets.publish import Confirm, SinglePublish
 from app.panel.widgets.service_action import Action
 from app.panel.widgets.static import PICTURE
+
+
+def _check_language(given: str) -> str:
+    if given not in files():
+        raise ValueError(one_of([*files()], given))
+    return given
+
+
+def _check_languages(given: tuple[str, ...]) -> tuple[str, ...]:
+    if not given:
+        raise ValueError("is empty: name one language at least, or leave the key out")
+    for i, one in enumerate(given):
+        if one in given[:i]:
+            raise ValueError(f"names {format_value(one)} twice")
+    return given
+
+
+Language = Annotated[str, AfterValidator(_check_language)]
+Languages = Annotated[tuple[Language, ...], Field(strict=False), AfterValidator(_check_languages)]
 
 
 class RobotEntry(Description):
@@ -46,7 +70,8 @@ EVENTS_QOS: Final = TopicQos(durability="volatile", depth=1000)
 class Panel(Description):
     title: Label
     mode: Literal["demo", "live"] = "live"
-    language: Literal["en"] = "en"
+    language: Language = ENGLISH
+    languages: Languages = ()
     distro: Literal["humble", "iron", "jazzy", "kilted", "lyrical", "rolling"] = "jazzy"
     interfaces: Annotated[tuple[Folder, ...], Field(strict=False)] = ()
     namespace: Annotated[str, AfterValidator(parse_namespace)] = ""
@@ -70,6 +95,16 @@ class Panel(Description):
     pages: Annotated[tuple[Page, ...], Field(strict=False)] = Field(alias="page")
     # Computed from the file: differs when loaded pages are out of date.
     revision: Annotated[str, Field(exclude=True)] = ""
+
+    @cached_property
+    def readers_languages(self) -> tuple[str, ...]:
+        """The languages that a reader can choose: those of the file; else those that have a catalogue
+        and, where the panel has texts in several languages, these too."""
+        if self.languages:
+            return self.languages
+        texts = [set(text.texts) for _, text in panel_texts(self)]
+        known = set(files()) & set().union(*texts) if texts else set(files())
+        return tuple(tag for tag in files() if tag in known or tag == self.language)
 
     @cached_property
     def picture_files(self) -> dict[str, Path]:

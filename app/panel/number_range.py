@@ -12,7 +12,8 @@ from fractions import Fraction
 from struct import pack, unpack
 from typing import Final
 
-from app.i18n import TextLike, say
+from app.i18n import PanelText, TextLike, number, say
+from app.i18n.values import after_space
 from app.interfaces import to_plain
 from app.panel.values import number_text
 
@@ -73,9 +74,9 @@ class Range:
         return int(found) if isinstance(self.low, int) else float(found)
 
 
-def range_text(limits: Range, unit: str) -> TextLike:
-    """A range as text: "0 to 1.5 m/s, in steps of 0.1"; "" without limits."""
-    unit = f" {unit}" if unit else ""
+def range_text(limits: Range, given: str | PanelText) -> TextLike:
+    """A range as text, with the `given` unit: "0 to 1.5 m/s, in steps of 0.1"; "" without limits."""
+    unit = after_space(given)
     low, high = _number_text(limits.low), _number_text(limits.high)
     text: TextLike
     if limits.low is not None and limits.high is not None:
@@ -92,11 +93,11 @@ def range_text(limits: Range, unit: str) -> TextLike:
     return say("and_further", first=text, last=steps) if text else steps
 
 
-def decimal_text(number: float) -> str:
+def decimal_text(given: float) -> str:
     """A number exactly, as in HTML; "NaN", "Infinity" or "-Infinity"."""
-    if isinstance(number, int) or not math.isfinite(number):
-        return str(to_plain(number))
-    return number_text(number) if abs(number) < MIN_WITH_EXPONENT else repr(number)
+    if isinstance(given, int) or not math.isfinite(given):
+        return str(to_plain(given))
+    return number_text(given) if abs(given) < MIN_WITH_EXPONENT else repr(given)
 
 
 def to_float32(number: float) -> float:
@@ -116,8 +117,8 @@ def shortest_float(number: float) -> float:
     return next(one for one in written if to_float32(one) == number)
 
 
-def _number_text(number: float | None) -> str:
-    return "" if number is None else decimal_text(number)
+def _number_text(given: float | None) -> TextLike:
+    return "" if given is None else number(decimal_text(given))
 
 
 def _exact(number: float) -> Fraction:

@@ -3,7 +3,8 @@
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Final
 
-from app.i18n import Text, TextLike, render, say
+from app.i18n import PanelText, Text, TextLike, number, render, say
+from app.i18n.values import after_space, with_unit
 from app.panel.interlock import Interlock
 from app.panel.number_range import decimal_text, shortest_float
 from app.panel.values import same_value
@@ -37,39 +38,38 @@ def unmet(interlock: Interlock, value: Any) -> Text:
 
 def _wanted(interlock: Interlock) -> Iterator[TextLike]:
     if interlock.equals is not None:
-        yield _value_text(interlock, interlock.equals)
+        yield _value_text(interlock, interlock.equals, interlock.unit)
     if interlock.one_of is not None:
-        *all_but_last, last = (_value_text(interlock, one) for one in interlock.one_of)
+        *all_but_last, last = (_value_text(interlock, one, interlock.unit) for one in interlock.one_of)
         yield say("either", first=tuple(all_but_last), last=last) if all_but_last else last
     if interlock.min is not None or interlock.max is not None:
         yield _limits(interlock)
     if interlock.not_equals is not None:
-        yield say("not_value", value=_value_text(interlock, interlock.not_equals))
+        yield say("not_value", value=_value_text(interlock, interlock.not_equals, interlock.unit))
 
 
 def _limits(interlock: Interlock) -> Text:
     low, high = (
-        "" if one is None else _written(interlock, one) for one in (interlock.min, interlock.max)
+        "" if one is None else _value_text(interlock, one, "") for one in (interlock.min, interlock.max)
     )
     code = "limits_both" if low and high else "limits_low" if low else "limits_high"
-    return say(code, low=low, high=high, unit=_unit(interlock))
+    return say(code, low=low, high=high, unit=after_space(interlock.unit))
 
 
-def _now(interlock: Interlock, value: Any, must: TextLike) -> str:
+def _now(interlock: Interlock, value: Any, must: TextLike) -> TextLike:
     """What the robot said: in as few digits as tell it from what it must be."""
     if not isinstance(value, float):
-        return _value_text(interlock, value)
-    candidates = (_value_text(interlock, float(f"{value:.{digits}g}")) for digits in DIGITS)
-    written = render(must)  # its numbers are the same in every language
-    return next((text for text in candidates if text not in written), _value_text(interlock, value))
+        return _value_text(interlock, value, interlock.unit)
+    rounded = (float(f"{value:.{digits}g}") for digits in DIGITS)
+    candidates = [_value_text(interlock, one, interlock.unit) for one in (*rounded, value)]
+    written = render(must)  # its numbers have the same digits in every language
+    return next((text for text in candidates if render(text) not in written), candidates[-1])
 
 
-def _value_text(interlock: Interlock, value: Any) -> str:
-    return _written(interlock, value) + _unit(interlock)
-
-
-def _unit(interlock: Interlock) -> str:
-    return f" {interlock.unit}" if interlock.unit else ""
+def _value_text(interlock: Interlock, value: Any, unit: str | PanelText) -> TextLike:
+    text = _written(interlock, value)
+    known = isinstance(value, bool | str) or value in interlock.constants
+    return with_unit(text, unit) if known else number(text, unit)
 
 
 def _written(interlock: Interlock, value: Any) -> str:

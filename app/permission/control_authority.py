@@ -55,7 +55,7 @@ class ControlAuthority:
     def __init__(
         self,
         rules: ControlRules,
-        robot: str,
+        robot: TextLike,
         *,
         monotonic: Callable[[], float] = time.monotonic,
         wall: Callable[[], float] = time.time,

@@ -2,7 +2,7 @@
 
 from typing import Final, Literal, TypedDict
 
-from app.i18n import TextLike, say
+from app.i18n import TextLike, number, say
 from app.panel.rules import ControlRules
 from app.permission.principal import Principal
 
@@ -65,7 +65,7 @@ def control_view(
     if holder:
         view["text"] = say("control_held", name=holder.title, robot=robot)
     if holder and asker:
-        seconds = f"{rules.takeover_after_s:g}"
+        seconds = number(f"{rules.takeover_after_s:g}")
         view["holder_text"] = say("control_asks", name=asker.title, robot=robot, seconds=seconds)
         view["asker_text"] = say("control_asked", name=holder.title, seconds=seconds)
     return view

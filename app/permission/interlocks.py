@@ -12,7 +12,7 @@ from functools import lru_cache
 from typing import Any, Final
 
 from app.dialect.endpoint import TopicRole
-from app.i18n import TextLike, joined, say
+from app.i18n import TextLike, joined, number, say
 from app.interfaces.names import Qos
 from app.panel.interlock import Interlock
 from app.panel.widgets.families import Command, PublishCommand, TopicWidget
@@ -71,7 +71,7 @@ def link_verdict(robot: RobotState, now: float) -> Verdict:
     if not robot.link_up:
         return _no_link(robot.endpoints)
     if not robot.graph.bridges:
-        return locked("no_bridge_of" if robot.name else "no_bridge", name=robot.name)
+        return locked("no_bridge_of" if robot.name else "no_bridge", name=robot.title)
     if robot.graph.has_silent_bridge:
         return locked("bridge_silent")
     if now < robot.settled_at:
@@ -116,7 +116,7 @@ def interlock_verdict(interlock: Interlock, robot: RobotState, now: float) -> Ve
         return locked("waiting", topic=topic)
     stale_at = reading.at + interlock.max_age_s
     if now >= stale_at:
-        return locked("stale", topic=topic, limit=f"{interlock.max_age_s:g}")
+        return locked("stale", topic=topic, limit=number(f"{interlock.max_age_s:g}"))
     return Verdict(True, until=stale_at)
 
 

@@ -37,8 +37,12 @@ class Recorder:
         self._recordings = recordings
         self._rules = rules
         self._robot_id = robot_id
-        self._metadata = {"panel": panel.title, "robot": robot.name, "before_s": f"{rules.before_s:g}",
-                       "after_s": f"{rules.after_s:g}"}  # fmt: skip
+        self._metadata = {
+            "panel": str(panel.title),
+            "robot": robot.name,
+            "before_s": f"{rules.before_s:g}",
+            "after_s": f"{rules.after_s:g}",
+        }
         types = panel.subscriptions()
         self._channels = {
             robot.key(topic): Channel(

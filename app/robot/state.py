@@ -13,7 +13,7 @@ from typing import Any
 
 from app.dialect.dialect import Dialect
 from app.errors import DecodeError
-from app.i18n import Text
+from app.i18n import Text, TextLike
 from app.interfaces import Interfaces
 from app.interfaces.names import ROSOUT_TOPIC, key_of
 from app.panel.constants import parent_type
@@ -53,7 +53,8 @@ class RobotState:
         """`own_zid` is that of the panel's session. `entry` is this robot's entry if the panel has
         several robots. `slices` is shared by everything that is decoded on one event loop."""
         self.dialect = dialect
-        self.name = entry.name if entry else ""
+        self.title: TextLike = entry.name if entry else ""
+        self.name = str(self.title)  # for the server's log
         self.namespace = entry.namespace if entry else panel.namespace
         self.link_up = False
         self.endpoints: tuple[str, ...] = ()  # the bridge's, as Zenoh names them

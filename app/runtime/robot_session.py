@@ -87,7 +87,7 @@ class RobotSession:
         )
         self.control = ControlAuthority(
             panel.control,
-            self.robot.name,
+            self.robot.title,
             tell=self._log.info,
             passed=lambda passing: self.control_acts.log_passing(passing),
         )

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
+from app.i18n import render
 from app.panel.demo import NO_ENTRY, DemoEntry
 from app.panel.number_range import Range
 from app.panel.widgets import parameter as widgets
@@ -73,7 +74,7 @@ def _single(widget: widgets.Parameter, limits: Range | None) -> Any:
             return False
         case "string":
             return "demo"
-    span = span_of(widget.unit, widget.parameter, widget.label)
+    span = span_of(render(widget.unit), widget.parameter, render(widget.label))
     middle = (span.low + span.high) / 2
     if limits is not None:
         middle = _inside(limits, middle)

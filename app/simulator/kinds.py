@@ -8,10 +8,11 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
+from app.i18n import render
 from app.interfaces import Interfaces
 from app.panel.base import TopicQos
 from app.panel.constants import parent_type
-from app.panel.template import RESPONSE_PLACEHOLDER
+from app.panel.template import response_paths
 from app.panel.widgets.displays import Indicator, Readout
 from app.panel.widgets.families import BaseWidget, Display, PublishCommand
 from app.panel.widgets.kinds import find_row
@@ -98,8 +99,8 @@ def _shown(display: Display, values: tuple[Any, ...] = ()) -> Iterator[Need]:
         topic=display.topic,
         type=display.type,
         field=display.field,
-        label=display.label,
-        unit=getattr(display, "unit", ""),
+        label=render(display.label),
+        unit=render(getattr(display, "unit", "")),
         scale=scale,
         offset=offset,
         low=low,
@@ -152,7 +153,7 @@ def _action(action: Action, _: Interfaces) -> Iterator[Need]:
         type=action.type,
         progress=action.progress,
         most=action.progress_max,
-        shown=tuple(RESPONSE_PLACEHOLDER.findall(action.feedback)),
+        shown=tuple(response_paths(action.feedback)),
     )
 
 

@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 from typing import Any, Final, Literal
 
 from app.clock import format_age, format_time
-from app.i18n import TextLike, say
+from app.i18n import PanelText, TextLike, number, say
+from app.i18n.values import with_unit
 from app.panel.values import same_value
 from app.panel.widgets.displays import Indicator, Readout
 from app.panel.widgets.families import Display
@@ -65,7 +66,7 @@ def value(widget: Display, robot: RobotState, now: float) -> tuple[dict[str, Any
     """Attributes of any display: `state`, `text` (its value as it is) and `note`; and when they
     change."""
     seen = field_state(widget, robot, now)
-    return {"state": seen.state, "text": written(seen.value), "note": seen.note}, seen.until
+    return {"state": seen.state, "text": shown_value(seen.value), "note": seen.note}, seen.until
 
 
 def readout(widget: Readout, robot: RobotState, now: float) -> tuple[dict[str, Any], float]:
@@ -95,20 +96,20 @@ def _lamp(widget: Indicator, value: Any) -> tuple[TextLike, str, str]:
     for state in widget.states:
         if same_value(state.value, value):
             return state.text, state.shape, state.colour
-    return say("lamp_unknown", value=written(value)), "unknown", "none"
+    return say("lamp_unknown", value=shown_value(value)), "unknown", "none"
 
 
-def _value(widget: Readout, value: Any, robot: RobotState) -> str:
+def _value(widget: Readout, value: Any, robot: RobotState) -> TextLike:
     if widget.constants is not None:
         return _constant(widget.constants, robot.constants(widget), value)
-    if isinstance(value, bool) or not isinstance(value, int | float):
+    if not is_number(value):
         return written(value)
     if (widget.scale, widget.offset) != (1.0, 0.0):
         value = value * widget.scale + widget.offset
     text = written(value)
     if widget.format is not None and math.isfinite(value):
         text = _formatted(value, widget.format)
-    return f"{text} {widget.unit}" if widget.unit else text
+    return number(text, widget.unit)
 
 
 def _formatted(value: float, given: str) -> str:
@@ -131,8 +132,20 @@ def _without(prefix: str, name: str) -> str:
     return rest.lstrip("_") if whole and rest.strip("_") else name
 
 
+def shown_value(value: Any, unit: str | PanelText = "") -> TextLike:
+    """A field's value as its reader's language writes it, cut to what a readout can show."""
+    text = written(value)
+    return number(text, unit) if is_number(value) else with_unit(text, unit)
+
+
+def is_number(value: Any) -> bool:
+    """Whether a field's value is a number."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
 def written(value: Any) -> str:
-    """A field's value as text, cut to what a readout can show; None is a value that is not there."""
+    """A field's value as Python and ROS write it, cut to what a readout can show; None is a value that
+    is not there."""
     if value is None:
         return NOTHING
     if isinstance(value, bool):

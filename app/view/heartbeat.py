@@ -9,6 +9,7 @@ from typing import Final
 
 from app import clock
 from app.clock import format_time
+from app.i18n import ENGLISH, render
 
 BEAT_S: Final = 0.5  # a page locks itself after 1.75 s without any event
 # A beat that is so nearly due goes with what is sent anyway: more than the pause of what is sent ten
@@ -22,7 +23,7 @@ class Heartbeat:
     def __init__(self, wake: Callable[[], None]) -> None:
         """`wake` is called when a beat is due, and is to be sent."""
         self.count = 0
-        self.event = b""
+        self._events: dict[str, bytes] = {}
         self._wake = wake
         self._hearing = 0
         self._timer: asyncio.TimerHandle | None = None
@@ -48,12 +49,18 @@ class Heartbeat:
             timer.cancel()
             self._beat()
 
+    def event(self, language: str = ENGLISH) -> bytes:
+        """The event of the last beat, the same for all readers of a language."""
+        if language not in self._events:
+            self._events[language] = beat(language)
+        return self._events[language]
+
     def _due(self) -> None:
         self._beat()
         self._wake()
 
     def _beat(self) -> None:
-        self.event = beat()
+        self._events.clear()
         self.count += 1
         self._plan()
 
@@ -61,10 +68,13 @@ class Heartbeat:
         self._timer = asyncio.get_running_loop().call_later(BEAT_S, self._due)
 
 
-def beat() -> bytes:
+def beat(language: str = ENGLISH) -> bytes:
     """The event: a page that misses it locks itself. It has no id: nothing has changed.
 
     `clock` is to be shown; `now` is the server's own time, in milliseconds.
     """
-    data = {"clock": format_time(time.time()), "now": round(clock.server_now() * 1000)}
+    data = {
+        "clock": render(format_time(time.time()), language),
+        "now": round(clock.server_now() * 1000),
+    }
     return f"event: beat\ndata: {json.dumps(data)}\n\n".encode()

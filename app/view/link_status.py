@@ -11,7 +11,8 @@ from functools import lru_cache
 from typing import Final, Literal, TypedDict
 
 from app.clock import format_datetime
-from app.i18n import Text, TextLike, say
+from app.i18n import Text, TextLike, number, say
+from app.i18n.values import longest
 from app.panel.model import Panel
 from app.permission.interlocks import NO_WAY, PERMITTED, Verdict, topic_mismatch
 from app.robot.state import RobotState
@@ -64,7 +65,7 @@ class LinkStatus(Lamp):
     """A link: `since` is when it came to this state, "" where that is not known; `locks` says which
     controls it locks, `reason` why it is as it is and what helps, "" where there is nothing to say."""
 
-    since: str
+    since: TextLike
     locks: TextLike
     reason: TextLike
 
@@ -86,14 +87,14 @@ def link_statuses(
     return links, until
 
 
-def summary(name: str, link: Mapping[str, Lamp]) -> Lamp:
+def summary(name: TextLike, link: Mapping[str, Lamp]) -> Lamp:
     """One light for a robot: what is wrong on the way to it, or how its nodes are."""
     shown = link["node"] if link["bridge"]["state"] == "ok" else link["bridge"]
     return Lamp(name=name, state=shown["state"], text=shown["text"])
 
 
 @lru_cache(maxsize=64)
-def _link(name: str, state: State, text: str, reason: TextLike, *locked: str) -> LinkStatus:
+def _link(name: str, state: State, text: str, reason: TextLike, *locked: TextLike) -> LinkStatus:
     """The same object for the same lamp. It must not be changed."""
     return LinkStatus(
         name=say(name), state=state, text=say(text), since="", locks=locks(locked), reason=reason
@@ -132,12 +133,12 @@ def silent(panel: Panel, robot: RobotState, now: float) -> tuple[TextLike, float
             continue
         stale_at = reading.at + of.max_age_s
         if now >= stale_at:
-            return say("node_stale", topic=of.topic, limit=f"{of.max_age_s:g}"), math.inf
+            return say("node_stale", topic=of.topic, limit=number(f"{of.max_age_s:g}")), math.inf
         until = min(until, stale_at)
     return "", until
 
 
-def labels(panel: Panel, verdicts: Mapping[str, Verdict], codes: frozenset[str]) -> list[str]:
+def labels(panel: Panel, verdicts: Mapping[str, Verdict], codes: frozenset[str]) -> list[TextLike]:
     """The labels of the controls that are locked for one of these codes."""
     locked = {
         name for name, verdict in verdicts.items() if any(one.code in codes for one in _all(verdict))
@@ -145,12 +146,13 @@ def labels(panel: Panel, verdicts: Mapping[str, Verdict], codes: frozenset[str])
     return [w.label for w in panel.commands if w.id in locked]
 
 
-def locks(names: Sequence[str]) -> Text:
+def locks(names: Sequence[TextLike]) -> Text:
     """Which controls a link locks, in words; of a long list the rest is counted."""
     if not names:
         return say("locks_nothing")
+    lengths = [longest(name) + len(", ") for name in names]
     count = 1
-    while count < len(names) and len(", ".join(names[: count + 1])) <= LONGEST_LIST:
+    while count < len(names) and sum(lengths[: count + 1]) - len(", ") <= LONGEST_LIST:
         count += 1
     shown = tuple(names[:count])
     if count == len(names):
@@ -182,7 +184,7 @@ class Since:
     def __init__(self, wall: Callable[[], float] = time.time) -> None:
         """`wall` gives seconds since the epoch."""
         self._wall = wall
-        self._began: dict[str, tuple[tuple[str, TextLike], str]] = {}
+        self._began: dict[str, tuple[tuple[str, TextLike], TextLike]] = {}
         self._seen: Mapping[str, LinkStatus] = {}
         self._dated: dict[str, LinkStatus] = {}
 

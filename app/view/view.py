@@ -104,7 +104,7 @@ def build_view(
     judged = (passable, *interlocks.values(), *verdicts.values())
     rest = min(until, control_until, *others, *(verdict.until for verdict in judged))
     without = {} if control_lock.permitted else _without_control(questions, control_lock)
-    return ViewWithDeadlines(view, summary(robot.name, link), rest, untils, without)
+    return ViewWithDeadlines(view, summary(robot.title, link), rest, untils, without)
 
 
 def _without_control(questions: Iterable[Question], lock: Verdict) -> dict[str, Attributes]:

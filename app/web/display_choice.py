@@ -5,6 +5,7 @@ from typing import Final, NamedTuple, TypedDict, get_args
 from starlette.requests import HTTPConnection
 
 from app.i18n import TextLike, say
+from app.i18n.locales import own_name
 from app.panel.layout import Hand, TextSize, Theme
 from app.panel.model import Panel
 
@@ -16,6 +17,7 @@ CHOICES: Final = {
     "sounds": ("off", "on"),
 }
 COOKIE: Final = "kiosk_{}"
+LANGUAGE: Final = "language"
 KEPT_S: Final = 400 * 86400  # as long as browsers keep a cookie
 
 
@@ -29,11 +31,12 @@ class Display(NamedTuple):
 
 
 class Option(TypedDict):
-    """One value of a choice, in the menu."""
+    """One value of a choice, in the menu; `lang` is the language of its label, "" for the page's."""
 
     value: str
     label: TextLike
     chosen: bool
+    lang: str
 
 
 class Choice(TypedDict):
@@ -61,6 +64,13 @@ def _usual(panel: Panel, name: str) -> str:
     return usual
 
 
+def language_choice(panel: Panel, now: str) -> list[Choice]:
+    """The choice of a language, each named in itself; none where there is one only."""
+    tags = panel.readers_languages
+    options = [Option(value=tag, label=own_name(tag), chosen=tag == now, lang=tag) for tag in tags]
+    return [Choice(name=LANGUAGE, label=say("display_language"), options=options)] if tags[1:] else []
+
+
 def choices(now: Display) -> list[Choice]:
     """The choices of the menu, with what is chosen."""
     return [
@@ -68,7 +78,12 @@ def choices(now: Display) -> list[Choice]:
             name=name,
             label=say(f"display_{name}"),
             options=[
-                Option(value=one, label=say(f"display_{name}_{one}"), chosen=one == getattr(now, name))
+                Option(
+                    value=one,
+                    label=say(f"display_{name}_{one}"),
+                    chosen=one == getattr(now, name),
+                    lang="",
+                )
                 for one in values
             ],
         )

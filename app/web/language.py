@@ -1,7 +1,7 @@
 """In which language a reader is answered: the one place for this.
 
 The browser's cookie, which a choice on the page sets, counts before its settings (Accept-Language, RFC
-9110, 12.5.4), and these before the panel file's `language`. Only a language with a catalogue counts.
+9110, 12.5.4), and these before the panel file's `language`. Only a language that the panel has counts.
 """
 
 import re
@@ -9,11 +9,14 @@ from functools import lru_cache
 from typing import Final
 
 from babel.core import negotiate_locale
+from starlette.datastructures import MutableHeaders
 from starlette.requests import HTTPConnection
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from app.i18n.catalogue import files
 from app.web.app_state import site_of
 
+SCOPE: Final = "panel.language"  # of the answer, in its scope
+STARTS: Final = frozenset({"http.response.start"})
 COOKIE: Final = "kiosk_language"
 MOST_ACCEPTED: Final = 500  # characters of the header
 _accepted: Final = re.compile(
@@ -22,17 +25,38 @@ _accepted: Final = re.compile(
 
 
 def language_of(connection: HTTPConnection) -> str:
-    """The language of who reads the answer: that of a catalogue."""
-    usual = site_of(connection).fleet.panel.language
-    if len(files()) == 1:
-        return usual
-    given = connection.headers.get("accept-language", "")[:MOST_ACCEPTED]
-    return negotiated(connection.cookies.get(COOKIE, ""), given, tuple(files())) or usual
+    """The language of who reads the answer: one of the panel's."""
+    panel = site_of(connection).fleet.panel
+    available = panel.readers_languages
+    found = panel.language
+    if len(available) > 1:
+        given = connection.headers.get("accept-language", "")[:MOST_ACCEPTED]
+        found = negotiated(connection.cookies.get(COOKIE, ""), given, available) or found
+    connection.scope[SCOPE] = found
+    return found
+
+
+class LanguageHeaders:
+    """Says of each answer in a reader's language which that is, and what it was chosen by (RFC 9110,
+    8.5 and 12.5.5)."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        async def said(message: Message) -> None:
+            if message["type"] in STARTS and SCOPE in scope:
+                headers = MutableHeaders(scope=message)
+                headers["content-language"] = scope[SCOPE]
+                headers.add_vary_header("Accept-Language, Cookie")
+            await send(message)
+
+        await self._app(scope, receive, said if scope["type"] == "http" else send)
 
 
 @lru_cache(maxsize=256)
 def negotiated(chosen: str, accepted: str, available: tuple[str, ...]) -> str:
-    """The language with a catalogue that suits best; "" where none does."""
+    """The available language that suits best; "" where none does."""
     by_name = {tag.lower(): tag for tag in available}
     preferred = [*([chosen] if chosen else []), *_preferred(accepted)]
     found = negotiate_locale(preferred, available, sep="-")

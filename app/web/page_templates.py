@@ -12,6 +12,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 from markupsafe import Markup
 
 from app.i18n import Text, render
+from app.i18n.locales import number_in, symbols
 from app.icons import icon
 from app.panel.layout import Page
 from app.panel.screen import CLEANING_S
@@ -46,7 +47,13 @@ class PageTemplates:
             def shown(value: Any) -> Any:
                 return render(value, language) if isinstance(value, Text) else value
 
-            self._environments[language] = self._base.overlay(finalize=shown)
+            made = self._environments[language] = self._base.overlay(finalize=shown)
+            own = {
+                "said": shown,
+                "number": lambda text: number_in(f"{text}", language),
+                "decimal": symbols(language).decimal,
+            }
+            made.globals = {**self._base.globals, **own}
         return self._environments[language]
 
     def render(self, name: str, language: str, **context: Any) -> str:

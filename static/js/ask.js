@@ -37,5 +37,7 @@ function shownText(input) {
     return entry.parentElement.querySelector(entry.checked ? ".on" : ".off").textContent;
   }
   if (entry.value === "") return "";
-  return entry.selectedOptions ? entry.selectedOptions[0].textContent : entry.value;
+  if (entry.selectedOptions) return entry.selectedOptions[0].textContent;
+  const isNumber = entry.type === "number" || entry.type === "range";
+  return isNumber ? entry.value.replace(".", document.documentElement.dataset.decimal ?? ".") : entry.value;
 }

@@ -1,6 +1,19 @@
 // Sliders with their values, and step buttons for gloves. Without this script the same inputs are number
 // fields.
 
+// Of the page's language. What an input holds has a point.
+const decimal = document.documentElement.dataset.decimal ?? ".";
+
+// A browser in another language would leave out the comma, and take 1,5 for 15.
+const isOwnComma = new Intl.NumberFormat(navigator.language).format(0.5).includes(",");
+if (decimal === "," && !isOwnComma) {
+  addEventListener("beforeinput", (event) => {
+    if (event.data !== "," || event.target.type !== "number") return;
+    event.preventDefault();
+    document.execCommand("insertText", false, ".");
+  });
+}
+
 // The step of a slider and its buttons where the input has none: 1, 2 or 5 of a decimal place, and a hundredth
 // of the range at most.
 function stepSize(input) {
@@ -33,7 +46,7 @@ function step(input, times) {
 function equip(input) {
   const root = input.closest("[data-widget]");
   const output = root.querySelector("output");
-  const show = () => output && (output.value = input.value);
+  const show = () => output && (output.value = input.value.replace(".", decimal));
   if (output) {
     input.type = "range";
     setWidth(output, input);

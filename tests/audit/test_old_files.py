@@ -14,7 +14,7 @@ from app.audit.database import NAME
 from app.audit.export import csv_chunks
 from app.audit.queries import open_presses, rows
 from app.audit.verify import verify
-from app.i18n import Text, say
+from app.i18n import PanelText, Text, number, say, time_of_day
 from app.i18n.catalogue import catalogues_in
 
 # As that version made its file.
@@ -65,7 +65,10 @@ def folder(tmp_path: Path) -> Path:
     return data
 
 
-def continued(folder: Path, press_id: str = "p3") -> None:
+PUBLISHED: Final = say("published", topic="/say", time="11:00:00")
+
+
+def continued(folder: Path, press_id: str = "p3", reason: Text = PUBLISHED) -> None:
     """By this version: a press and its end, with a reason of the catalogue."""
 
     async def work() -> None:
@@ -79,7 +82,6 @@ def continued(folder: Path, press_id: str = "p3") -> None:
                 )
             )
             assert press is not None
-            reason = say("published", topic="/say", time="11:00:00")
             assert await log.closed(press.follow_up("closed", "published", reason)) == ""
         finally:
             await log.stop()
@@ -140,6 +142,29 @@ def test_a_reader_has_new_entries_in_their_language_and_old_ones_as_they_are(
     assert german[0].endswith(",reason,prev,hash,text")
     assert "Gesendet auf /say, 11:00:00." in german[1]
     assert [line for line in german if SENT in line] == [line for line in english if SENT in line]
+
+
+def test_texts_of_the_panel_numbers_and_times_are_in_the_language_of_who_reads_an_entry(
+    folder: Path, tmp_path: Path
+) -> None:
+    label = PanelText({"en": "Limit", "de": "Grenze"}, "en")
+    why = say("off_limits", label=label, given=number("7.5", "m"), limits=number("1,234.5"))
+    continued(folder, reason=say("refused", why=why, time=time_of_day("11:00:00")))
+    (tmp_path / "de.po").write_text(
+        'msgid "refused"\nmsgstr "Nicht gesendet um {time}: {why}"\n'
+        'msgid "off_limits"\nmsgstr "{label} ist {given}: erlaubt ist {limits}"\n'
+    )
+    with catalogues_in(tmp_path):
+        last = entries(folder)[-1]
+        assert last.reason == last.reason_in("en")
+        assert last.reason == "Not sent at 11:00:00: Limit is 7.5 m: it must be 1,234.5"
+        assert (
+            last.reason_in("de") == "Nicht gesendet um 11:00:00: Grenze ist 7,5 m: erlaubt ist 1.234,5"
+        )
+        assert last.reason_in("fr") == last.reason
+        csv = b"".join(csv_chunks(folder, Filter(), None, "de")).decode("utf-8-sig")
+        assert "Grenze ist 7,5 m: erlaubt ist 1.234,5" in csv
+    assert (verify(folder).count, verify(folder).fault) == (len(entries(folder)), "")
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from app.clock import format_time
+from app.i18n import render
 from app.panel import load_panel
 from app.robot.state import RobotState, Sample
 from app.view.view import build_view
@@ -64,7 +65,7 @@ def shown(
 )
 def test_a_readout_writes_a_number(kind: str, data: Any, more: Any, text: str) -> None:
     view = shown(HEARD, f"std_msgs/msg/{kind}", {"data": data}, **more)
-    assert (view["text"], view["state"]) == (text, "live")
+    assert (render(view["text"]), view["state"]) == (text, "live")
 
 
 @pytest.mark.parametrize(("status", "text"), [(0, "FIX"), (-1, "NO_FIX"), (2, "GBAS_FIX"), (77, "77")])

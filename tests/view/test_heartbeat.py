@@ -63,7 +63,7 @@ def test_all_who_hear_it_get_the_same_bytes_of_one_timer(monkeypatch: pytest.Mon
         with beating.heart.heard(), beating.heart.heard(), beating.heart.heard():
             await beating.next()
             assert beating.heart.count == 1
-            assert events_in(beating.heart.event.decode())[0][0] == "beat"
+            assert events_in(beating.heart.event().decode())[0][0] == "beat"
 
     run(work)
 

@@ -3,6 +3,7 @@
 import pytest
 
 from app.dialect.bridge_dialect import bridge_token
+from app.i18n import render
 from app.view.link_status import Since
 from app.view.view import build_view
 from tests.support.builders import BRIDGE, NOW, TEXT, endpoint, robot_there, small_panel
@@ -26,7 +27,7 @@ class Seen:
         """`since` of server, bridge and node at a time of the wall clock."""
         self.wall = wall
         link = self._since.dated(build_view(self.panel, self.robot, NOW).view["link"])
-        server, bridge, node = (lamp["since"] for lamp in link.values())
+        server, bridge, node = (render(lamp["since"]) for lamp in link.values())
         return server, bridge, node
 
 

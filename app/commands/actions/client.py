@@ -13,10 +13,10 @@ from app.clock import format_time
 from app.commands.actions.goal import Goal
 from app.commands.service_calls import BRIDGE_LOSS_DELAY_S, QueryClient
 from app.errors import DecodeError
-from app.i18n import Text, joined, say
+from app.i18n import Text, joined, number, say
 from app.interfaces import Fields, Interfaces
 from app.interfaces.names import of_action
-from app.panel.template import RESPONSE_PLACEHOLDER
+from app.panel.template import response_paths
 from app.panel.widgets.service_action import Action
 from app.robot.command_status import Outcome
 from app.robot.state import RobotState
@@ -96,7 +96,7 @@ class ActionClient:
             return Outcome("rejected", say("goal_rejected", time=now))
         if goal.cut.done():
             return Outcome("unknown", goal.cut.result() or say("call_cut"))
-        sentence = say("timed_out", seconds=f"{widget.timeout_s:g}")
+        sentence = say("timed_out", seconds=number(f"{widget.timeout_s:g}"))
         return Outcome("timed_out", joined([sentence, say("cyclone_hint")]))
 
     def cancel_response(self, widget: Action, reply: bytes) -> Any:
@@ -106,12 +106,12 @@ class ActionClient:
     def no_response_reason(self, widget: Action) -> Text:
         """Why `cancel_goal` did not respond."""
         if self.is_offered(widget):
-            return say("timed_out", seconds=f"{widget.timeout_s:g}")
+            return say("timed_out", seconds=number(f"{widget.timeout_s:g}"))
         return say("cancel_unheard", name=widget.action)
 
     async def result(self, widget: Action, reply: bytes) -> Fields | None:
         """The response of `get_result`: the status, and the result fields that the widget shows."""
-        paths = (STATUS, *(RESULT + path for path in RESPONSE_PLACEHOLDER.findall(widget.result)))
+        paths = (STATUS, *(RESULT + path for path in response_paths(widget.result)))
         response = self._interfaces.action_types(widget.type).get_result_response
         try:
             return await self._robot.slices.read_all(

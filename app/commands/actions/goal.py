@@ -54,7 +54,7 @@ class Goal:
     state: int | None = None
     known: bool = False
     doubt: TextLike = ""
-    feedback_text: str = ""
+    feedback_text: TextLike = ""
     fraction: float | None = None
 
     def advance(self, state: int) -> bool:
@@ -82,7 +82,8 @@ class Goal:
     @property
     def running_status(self) -> CommandStatus:
         sentence = say("goal_canceling" if self.state == CANCELING else "goal_executing")
-        text = joined([sentence, self.feedback_text.rstrip()])
+        said = self.feedback_text
+        text = joined([sentence, said.rstrip() if isinstance(said, str) else said])
         return CommandStatus(True, "accepted", text, self.fraction, True, self._name, self.press_id)
 
     @property

@@ -18,7 +18,7 @@ from app.commands.service_calls import MAX_UNANSWERED, QueryClient
 from app.errors import DecodeError
 from app.i18n import TextLike, say
 from app.interfaces import Fields, Interfaces, names
-from app.panel.template import RESPONSE_PLACEHOLDER
+from app.panel.template import response_paths
 from app.panel.widgets.service_action import Action
 from app.robot.command_status import IDLE, CommandStatus, FinalCheck, OnCorrection, Outcome, no_check
 from app.robot.state import Reading, RobotState, Sample
@@ -179,7 +179,7 @@ class GoalTracker:
         """The feedback topic of an action, with the fields that its widget shows."""
         if widget.id not in self._feedback:
             message = self._interfaces.action_types(widget.type).feedback_message
-            shown = [*RESPONSE_PLACEHOLDER.findall(widget.feedback), *filter(None, [widget.progress])]
+            shown = [*response_paths(widget.feedback), *filter(None, [widget.progress])]
             self._feedback[widget.id] = Topic(
                 self._interfaces.field_reader(message, [GOAL_ID, *(FEEDBACK + path for path in shown)]),
                 self._robot.slices,

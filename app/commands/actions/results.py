@@ -12,7 +12,7 @@ from app.commands.actions.goal import ENDS, UNKNOWN, Goal
 from app.commands.service_calls import LATE_S, with_fields, with_reply
 from app.concurrency import spawn_logged
 from app.errors import LinkError
-from app.i18n import TextLike, say
+from app.i18n import TextLike, number, say
 from app.permission.interlocks import SERVER_SETTLE_S
 from app.robot.command_status import Outcome
 from app.robot.state import RobotState
@@ -83,7 +83,7 @@ class ResultWaiter:
             if not (goal.known or goal.cut.done()):
                 if not goal.doubt:
                     return  # the robot never reported it: the receipt stays as it is
-                answer = Outcome("unknown", say("goal_silent", seconds=f"{LATE_S:g}"))
+                answer = Outcome("unknown", say("goal_silent", seconds=number(f"{LATE_S:g}")))
                 break
             await asyncio.wait({goal.cut}, timeout=ASK_AGAIN_S)
         self._log.info("press %s: goal %s: %s: %s", goal.press_id, goal.id, answer.outcome, answer.text)

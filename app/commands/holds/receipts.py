@@ -20,7 +20,7 @@ from app.commands.receipts import (
     receipt_of,
 )
 from app.errors import Cause
-from app.i18n import Text, TextLike, joined, say
+from app.i18n import Text, TextLike, joined, number, say
 from app.panel.template import needed_inputs
 from app.panel.widgets.hold import Hold
 from app.robot.command_status import Outcome, OutcomeCode
@@ -83,7 +83,7 @@ class HoldReceipts:
         is why its stop message was not sent, "" if it was."""
         widget, lease = holding.widget, holding.lease
         sentence = RELEASED if code == RELEASED else "hold_ended"
-        end = say(sentence, time=format_time(time.time()), seconds=f"{seconds:.1f}", why=why)
+        end = say(sentence, time=format_time(time.time()), seconds=number(f"{seconds:.1f}"), why=why)
         text = joined([end, say("hold_unsaid", why=unsaid) if unsaid else ""])
         outcome: OutcomeCode = "unknown" if unsaid else "published" if code == RELEASED else "aborted"
         level = logging.INFO if outcome == "published" else logging.WARNING

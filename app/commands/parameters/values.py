@@ -5,7 +5,8 @@ import re
 from typing import Any, Final
 
 from app.errors import InputError
-from app.i18n import TextLike, render, say
+from app.i18n import TextLike, say
+from app.i18n.values import each_language
 from app.interfaces import INTEGER_RANGES
 from app.interfaces.validation import format_value
 from app.panel.list_text import split_list
@@ -68,20 +69,17 @@ def _several(parameter: Parameter, known: ParameterState, given: Any) -> list[An
 def _entered(parameter: Parameter, text: str) -> Any:
     match parameter.element_type:
         case "bool":
-            words = {
-                "true": True,
-                "false": False,
-                _lower(parameter.on): True,
-                _lower(parameter.off): False,
-            }
+            words = {"true": True, "false": False}
+            words |= dict.fromkeys(_words(parameter.on), True)
+            words |= dict.fromkeys(_words(parameter.off), False)
             return words.get(text.lower(), text)
         case "double":
             return float(text) if DECIMAL.fullmatch(text) else text
     return text
 
 
-def _lower(text: TextLike) -> str:
-    return render(text).lower()
+def _words(text: TextLike) -> list[str]:
+    return [one.lower() for one in each_language(text).values()]
 
 
 def _one(parameter: Parameter, known: ParameterState, label: TextLike, given: Any) -> Scalar:

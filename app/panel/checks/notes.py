@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from app.errors import Note
 from app.interfaces import Interfaces
 from app.panel.checks.fit import fit_notes
+from app.panel.checks.languages import untranslated_notes
 from app.panel.checks.page_templates import unplaced_notes
 from app.panel.model import Panel
 
@@ -16,6 +17,7 @@ def find_notes(panel: Panel, interfaces: Interfaces) -> Iterator[Note]:
     yield from _unusable_type_notes(panel, interfaces)
     yield from fit_notes(panel)
     yield from unplaced_notes(panel)
+    yield from untranslated_notes(panel)
 
 
 def _unbounded_trust_notes(panel: Panel) -> Iterator[Note]:

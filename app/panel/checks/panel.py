@@ -5,8 +5,10 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 from itertools import islice
 
 from app.errors import Fault, InterfaceError
+from app.i18n.values import alike
 from app.interfaces import Interfaces
 from app.panel.checks.interlocks import interlock_faults
+from app.panel.checks.languages import language_faults
 from app.panel.checks.page_templates import page_template_faults
 from app.panel.checks.templates import NOW_RULE
 from app.panel.checks.types import ROSOUT
@@ -57,6 +59,7 @@ def find_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = 
     yield from _record_faults(panel)
     yield from page_template_faults(panel)
     yield from _scan_faults(panel)
+    yield from language_faults(panel)
     if not (found or ids or inputs or faulty):  # else they may be consequences
         yield from _demo_faults(panel, interfaces)
 
@@ -190,7 +193,7 @@ def _duplicate_robot_faults(
     """Faults of a robot with the name or the address of another one. An equal id is reported
     elsewhere."""
     for a, above in enumerate(others if robot.id not in [one.id for one in others] else ()):
-        if robot.name == above.name:
+        if alike(robot.name, above.name):
             yield Fault(f"{place}.name", f'"{robot.name}" is already the name of robot[{a}]')
         if (robot.namespace, robot.connect) == (above.namespace, above.connect):
             same = f"robot[{a}] has the same namespace and endpoints: it would be the same robot"

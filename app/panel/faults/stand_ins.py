@@ -3,13 +3,12 @@
 import copy
 import re
 from dataclasses import dataclass, field
-from pathlib import Path as FilePath
 from typing import Any, Final
 
 from pydantic import ValidationError
 
 from app.errors import Fault
-from app.panel.base import ID
+from app.panel.base import ID, FileContext
 from app.panel.faults.table_keys import widget_path
 from app.panel.faults.toml_lines import Path
 from app.panel.faults.wording import closest_name
@@ -28,10 +27,10 @@ class StandIns:
     faulty: set[str] = field(default_factory=set)
     undecidable: set[str] = field(default_factory=set)
 
-    def validate(self, folder: FilePath) -> Panel | None:
+    def validate(self, context: FileContext) -> Panel | None:
         """The panel; None if it still has faults of shape."""
         try:
-            return Panel.model_validate(self.tables, context=folder)
+            return Panel.model_validate(self.tables, context=context)
         except ValidationError:
             return None
 

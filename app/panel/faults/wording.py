@@ -50,7 +50,7 @@ def describe_error(error: Mapping[str, Any], key: str) -> str:
         case "string_pattern_mismatch":
             return f"{given} {PATTERNS.get(key, 'is not written as it must be')}"
         case "literal_error":
-            return _one_of(re.findall("'([^']*)'", about["expected"]), error["input"])
+            return one_of(re.findall("'([^']*)'", about["expected"]), error["input"])
         case "tuple_type":
             return f"must be a list of {LIST_WORDS.get(key, 'values')}, not {given}"
         case "dict_type":
@@ -78,7 +78,8 @@ def list_names(names: Iterable[str]) -> str:
     return ", ".join(every[:MAX_LISTED]) + more or "none"
 
 
-def _one_of(known: list[str], given: Any) -> str:
+def one_of(known: list[str], given: Any) -> str:
+    """The message about a value that is none of the known ones."""
     *others, last = (f'"{one}"' for one in known)
     listed = f"{', '.join(others)} or {last}" if others else last
     meant = closest_name(str(given).lower(), known)

@@ -6,6 +6,8 @@ from typing import Annotated, Any, Final, Literal, Self
 from pydantic import AfterValidator, BeforeValidator, Field
 
 from app.errors import Fault
+from app.i18n import TextLike
+from app.i18n.values import alike
 from app.interfaces import INTEGER_RANGES, Interfaces
 from app.interfaces.validation import format_value
 from app.panel.base import Description, Label, Span, non_empty
@@ -80,6 +82,10 @@ def resolve_state_value(given: bool | int | str, kind: str, constants: Mapping[s
     return constants.get(str(given), given) if named else given
 
 
+def _same_look(one: tuple[str, TextLike], other: tuple[str, TextLike]) -> bool:
+    return one[0] == other[0] and alike(one[1], other[1])
+
+
 def _number_faults(place: str, readout: Readout, kind: str) -> Iterator[Fault]:
     scaled = (readout.scale, readout.offset) != (1.0, 0.0)
     for key, given in (("format", readout.format), ("scale", scaled), ("unit", readout.unit)):
@@ -138,10 +144,9 @@ def _state_faults(
             yield Fault(f"{at}.value", fault, cause=f"state {place}")
             continue
         if values[i] in values[:i]:
-            first = values.index(values[i])
+            above = values.index(values[i])
             yield Fault(
-                f"{at}.value", f"{format_value(state.value)} is already the value of states[{first}]"
+                f"{at}.value", f"{format_value(state.value)} is already the value of states[{above}]"
             )
-        if looks[i] in looks[:i]:
-            first = looks.index(looks[i])
+        if (first := next((n for n in range(i) if _same_look(looks[n], looks[i])), None)) is not None:
             yield Fault(at, f"has the shape and text of states[{first}]: {SHAPE_AND_TEXT}")

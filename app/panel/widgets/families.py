@@ -22,6 +22,7 @@ from app.panel.base import (
     Id,
     Interlocks,
     Label,
+    Note,
     Seconds,
     Span,
     Topic,
@@ -92,6 +93,11 @@ class BaseWidget(Description):
 
 class EntryWidget(BaseWidget):
     """A widget in which a value is entered; a press has it under the widget's id."""
+
+    @property
+    def is_number_entry(self) -> bool:
+        """Whether it is entered as a number."""
+        return False
 
     @property
     def default_value(self) -> Any:
@@ -215,7 +221,7 @@ class KeyCommand(Command):
     role: KeyRole = "neutral"
     colour: KeyColour | None = None
     icon: Icon | None = None
-    note: Annotated[str, Field(min_length=1, max_length=40)] | None = None
+    note: Note | None = None
 
     @property
     def shown_colour(self) -> str:

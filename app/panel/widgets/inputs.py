@@ -8,6 +8,7 @@ from pydantic import AfterValidator, Field
 
 from app.errors import Fault, InputError
 from app.i18n import Text, say
+from app.i18n.values import alike
 from app.interfaces.validation import format_value
 from app.panel.base import Description, Label, SaidLabel, Span, catalogue_default, non_empty
 from app.panel.values import same_value
@@ -50,10 +51,11 @@ class TextInput(Input):
     def check_value(self, given: Any) -> str:
         """The text; lengths are in characters."""
         if not isinstance(given, str):
-            raise InputError(f'{self.label} ("{self.id}") must be text, not {format_value(given)}')
+            raise InputError(say("not_text", label=self.label, id=self.id, given=format_value(given)))
         if len(given) > self.max_length:
-            what = f"is {len(given)} characters long; {self.max_length} are allowed"
-            raise InputError(f"{self.label} {what}")
+            raise InputError(
+                say("text_too_long", label=self.label, count=len(given), most=self.max_length)
+            )
         return given
 
     def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
@@ -169,6 +171,6 @@ def option_faults(place: str, options: Sequence[Option]) -> Iterator[Fault]:
     for i, (key, label) in enumerate(zip(keys, labels, strict=True)):
         if key in keys[:i]:
             yield Fault(f"{place}.options[{i}].value", f"{key} is already options[{keys.index(key)}]")
-        if label in labels[:i]:
-            what = f'"{label}" is already the label of options[{labels.index(label)}]'
+        if (first := next((n for n in range(i) if alike(labels[n], label)), None)) is not None:
+            what = f'"{label}" is already the label of options[{first}]'
             yield Fault(f"{place}.options[{i}].label", what)

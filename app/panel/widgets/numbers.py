@@ -3,14 +3,15 @@
 import re
 from collections.abc import Iterator, Mapping
 from fractions import Fraction
-from typing import Annotated, Any, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 from pydantic import Field, model_validator
 
 from app.errors import Fault, InputError
-from app.i18n import Text, say
+from app.i18n import PanelText, Text, number, say
+from app.i18n.values import after_space
 from app.interfaces.validation import format_value
-from app.panel.base import Span
+from app.panel.base import Span, panel_text
 from app.panel.values import number_text
 from app.panel.widgets.families import BaseWidget, CheckContext, Input
 
@@ -19,7 +20,10 @@ MAX_EXACT_NUMBER: Final = 2.0**53  # beyond this, numbers of a browser are not e
 DECIMAL: Final = re.compile(r"\s*[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?\s*", re.ASCII)
 
 Number = Annotated[float, Field(ge=-MAX_EXACT_NUMBER, le=MAX_EXACT_NUMBER)]
-Unit = Annotated[str, Field(max_length=20)]
+if TYPE_CHECKING:
+    Unit = str | PanelText
+else:
+    Unit = panel_text(20, least=0)
 
 
 class SteppedWidget(BaseWidget):
@@ -57,6 +61,10 @@ class Numeric(SteppedWidget, Input):
         return {"step": 1, **given} if whole else given
 
     @property
+    def is_number_entry(self) -> bool:
+        return True
+
+    @property
     def initial_text(self) -> str:
         """The initial text of its entry."""
         return "" if self.default is None else number_text(self.default)
@@ -84,11 +92,11 @@ class Numeric(SteppedWidget, Input):
     @property
     def limits_text(self) -> Text:
         """The limits as text: "0 to 1.5 m/s, in steps of 0.1"."""
-        low, high = number_text(self.min), number_text(self.max)
-        unit = f" {self.unit}" if self.unit else ""
+        low, high = number(number_text(self.min)), number(number_text(self.max))
+        unit = after_space(self.unit)
         if self.step is None:
             return say("limits_both", low=low, high=high, unit=unit)
-        return say("limits", low=low, high=high, unit=unit, step=number_text(self.step))
+        return say("limits", low=low, high=high, unit=unit, step=number(number_text(self.step)))
 
     @property
     def default_value(self) -> int | float | None:
@@ -123,7 +131,7 @@ class Numeric(SteppedWidget, Input):
         # Limits first: a value beyond them may be no float, or take long to divide.
         if not self.min <= given <= self.max or not self.is_on_step(float(given)):
             small = isinstance(given, float) and abs(given) <= MAX_EXACT_NUMBER
-            text = number_text(given) if small else format_value(given)
+            text = number(number_text(given) if small else format_value(given))
             raise InputError(say("off_limits", label=label, limits=allowed, given=text))
         return self.to_type(float(given))
 

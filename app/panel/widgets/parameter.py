@@ -8,7 +8,8 @@ from pydantic import AfterValidator, Field
 
 from app.dialect.endpoint import Role
 from app.errors import Fault
-from app.i18n import Text, TextLike, render, say
+from app.i18n import Text, TextLike, number, say
+from app.i18n.values import with_unit
 from app.interfaces import INTEGER_RANGES, Interfaces
 from app.interfaces.names import TOPIC
 from app.interfaces.validation import format_value
@@ -91,7 +92,6 @@ class Parameter(SteppedWidget, EntryWidget, PressCommand):
 
     @property
     def is_number_entry(self) -> bool:
-        """Whether it is entered as a number."""
         return self.has_numbers and not self.is_list and not self.options
 
     @property
@@ -158,11 +158,12 @@ class Parameter(SteppedWidget, EntryWidget, PressCommand):
         if isinstance(value, bool):
             return self.on if value else self.off
         text = self.entry_text(value)
-        return f"{text} {self.unit}" if self.unit else text
+        several = isinstance(value, tuple | str)  # a list is shown as it is entered
+        return with_unit(text, self.unit) if several else number(text, self.unit)
 
     def entry_text(self, value: Value) -> str:
         """A value as the text of its entry. True and false are entered in lists only:
-        as the panel file calls them, or in English."""
+        as the panel file calls them, in the panel's language, or in English."""
         if isinstance(value, tuple):
             return join_list(
                 quote_element(one) if isinstance(one, str) else self._element_text(one) for one in value
@@ -171,7 +172,7 @@ class Parameter(SteppedWidget, EntryWidget, PressCommand):
 
     def _element_text(self, value: bool | float | str) -> str:
         if isinstance(value, bool):
-            return render(self.on if value else self.off)
+            return str(self.on if value else self.off)
         return decimal_text(value) if isinstance(value, float) else f"{value}"
 
 

@@ -9,9 +9,10 @@ from pydantic import Field
 
 from app.dialect.endpoint import Role, ServerRole
 from app.errors import Fault, InterfaceError
+from app.i18n import TextLike
 from app.interfaces import Interfaces
-from app.panel.base import ActionType, FieldPath, Seconds, ServiceType, Span, Topic
-from app.panel.template import RESPONSE_PLACEHOLDER
+from app.panel.base import ActionType, AnyText, FieldPath, Seconds, ServiceType, Span, Topic
+from app.panel.template import response_paths
 from app.panel.widgets.families import CheckContext
 from app.panel.widgets.templated import TemplateCommand
 
@@ -47,7 +48,7 @@ class Call(ServerCommand):
     request: dict[str, Any] = Field(default_factory=dict)
     success: FieldPath | None = None
     message: FieldPath | None = None
-    answer: str = ""
+    answer: AnyText = ""
     span: Span = 4
 
     template_key: ClassVar[str] = "request"
@@ -86,8 +87,8 @@ class Action(ServerCommand):
     goal: dict[str, Any] = Field(default_factory=dict)
     progress: FieldPath | None = None
     progress_max: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 100.0
-    feedback: str = ""
-    result: str = ""
+    feedback: AnyText = ""
+    result: AnyText = ""
     span: Span = 6
 
     template_key: ClassVar[str] = "goal"
@@ -120,8 +121,10 @@ class Action(ServerCommand):
         yield from _text_faults(f"{place}.result", types.result, self.result, interfaces)
 
 
-def _text_faults(place: str, type_name: str, template: str, interfaces: Interfaces) -> Iterator[Fault]:
-    for path in RESPONSE_PLACEHOLDER.findall(template):
+def _text_faults(
+    place: str, type_name: str, template: TextLike, interfaces: Interfaces
+) -> Iterator[Fault]:
+    for path in response_paths(template):
         yield from _path_faults(place, type_name, path, ".*", interfaces)
 
 

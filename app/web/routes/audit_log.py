@@ -6,6 +6,7 @@ import logging
 from contextlib import AsyncExitStack
 from dataclasses import replace
 from datetime import datetime
+from functools import partial
 from typing import Annotated, Final, TypedDict
 from urllib.parse import urlencode
 
@@ -18,6 +19,7 @@ from app.audit import Entry, Filter, OperatorLog, ReaderProcess, Row
 from app.commands.control_acts import ACTS
 from app.errors import InputError, LogError, NotFound
 from app.i18n import Param, Text, TextLike, say
+from app.i18n.locales import date_in, number_in, time_in
 from app.panel.model import Panel
 from app.panel.widgets.families import Command, EntryWidget
 from app.printable import printable, printable_texts
@@ -95,8 +97,8 @@ class LogContext(TypedDict):
     wanted: Wanted
     typed: dict[str, str]
     rows: list[Row]
-    labels: dict[str, str]
-    inputs: dict[str, str]
+    labels: dict[str, TextLike]
+    inputs: dict[str, TextLike]
     acts: dict[str, Text]
     outcomes: tuple[str, ...]
     off: TextLike
@@ -140,7 +142,13 @@ async def page(request: Request, state: CurrentState, wanted: Annotated[Wanted, 
         csv=wanted.query(),
     )
     html = state.templates.render(
-        "log.html", language, **context, clock_of=_clock_of, values_of=_values_of, word=_word
+        "log.html",
+        language,
+        **context,
+        time_of=partial(_time_of, language=language),
+        date_of=partial(_date_of, language=language),
+        values_of=_values_of,
+        word=_word,
     )
     return HTMLResponse(html, headers={"cache-control": "no-store"})
 
@@ -220,8 +228,14 @@ def _time(ms: int) -> datetime:
     return datetime.fromtimestamp(ms // 1000).replace(microsecond=ms % 1000 * 1000).astimezone()
 
 
-def _clock_of(ms: int) -> str:
-    return _time(ms).strftime("%Y-%m-%d %H:%M:%S.%f")[:-3]
+def _time_of(ms: int, language: str) -> str:
+    """With milliseconds, by the language's own sign."""
+    at = _time(ms)
+    return f"{time_in(at.strftime('%H:%M:%S'), language)}{number_in(at.strftime('.%f')[:-3], language)}"
+
+
+def _date_of(ms: int, language: str) -> str:
+    return date_in(_time(ms).strftime("%Y-%m-%d"), language)
 
 
 def _word(name: str, **about: Param) -> Text:

@@ -6,8 +6,9 @@ from typing import Final
 from fastapi import APIRouter, Request
 from fastapi.responses import RedirectResponse, Response
 
+from app.web.app_state import CurrentState
 from app.web.described import TEXT, described_body, errors
-from app.web.display_choice import CHOICES, COOKIE, KEPT_S
+from app.web.display_choice import CHOICES, COOKIE, KEPT_S, LANGUAGE
 from app.web.request_body import body_of, form_of
 
 router = APIRouter()
@@ -19,6 +20,7 @@ BODY: Final = {
     "properties": {
         "page": {**TEXT, "description": "the path of the panel's page to go back to; without one, /"},
         **{name: {**TEXT, "description": f"one of {', '.join(of)}"} for name, of in CHOICES.items()},
+        LANGUAGE: {**TEXT, "description": "one of the panel's languages, such as en"},
     },
     "additionalProperties": TEXT,
 }
@@ -32,12 +34,13 @@ BODY: Final = {
     responses=errors(403, 408, 413, 422),
     openapi_extra=described_body(None, BODY, required=False),
 )
-async def choose(request: Request) -> Response:
+async def choose(request: Request, state: CurrentState) -> Response:
     """Keeps each choice that the form has; the others stay. Back to the form's `page`."""
     given = form_of(await body_of(request))
     page = given.get("page", "")
     answer = RedirectResponse(page if OWN_PAGE.fullmatch(page) else "/", status_code=303)
-    for name, values in CHOICES.items():
+    known = {**CHOICES, LANGUAGE: state.fleet.panel.readers_languages}
+    for name, values in known.items():
         if given.get(name) in values:
             answer.set_cookie(COOKIE.format(name), given[name], max_age=KEPT_S, samesite="strict")
     return answer

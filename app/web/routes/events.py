@@ -47,7 +47,7 @@ async def events(
     answer: Response
     language = language_of(request)
     if once:
-        all_of_it = board.snapshot(language, role_now()) + first + beat()
+        all_of_it = board.snapshot(language, role_now()) + first + beat(language)
         answer = Response(all_of_it, media_type=MEDIA_TYPE, headers=HEADERS)
     else:
         answer = EventStream(board, first, state.metrics.streams, language, role_now)
@@ -99,14 +99,14 @@ class EventStream(Response):
         now = self._role()
         version, view, beats = board.version, board.seen_as(now), heartbeat.count
         retry = f"retry: {RECONNECT_MS}\n\n".encode()
-        await send(_body(retry + board.snapshot(language, now) + self._first + beat()))
+        await send(_body(retry + board.snapshot(language, now) + self._first + beat(language)))
         while not board.closed:
             await board.news(version, beats)
             was, now = now, self._role()
             newer = board.version > version
             chunk = board.since(version, view, language, was, now) if newer else b""
             if heartbeat.count > beats:
-                chunk += heartbeat.event
+                chunk += heartbeat.event(language)
             version, view, beats = board.version, board.seen_as(now), heartbeat.count
             if chunk:
                 await send(_body(chunk))

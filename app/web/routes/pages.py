@@ -31,7 +31,7 @@ from app.web.app_state import AppState, CurrentState
 from app.web.assets import PICTURES
 from app.web.client_cookie import by_hand, keep, welcomed
 from app.web.described import PAGE, Described, errors
-from app.web.display_choice import Choice, Display, choices, display_of
+from app.web.display_choice import Choice, Display, choices, display_of, language_choice
 from app.web.entry_words import ENTRY_WORDS
 from app.web.language import language_of
 
@@ -93,8 +93,8 @@ class PageContext(TypedDict):
     sections: Sequence[Section]
     event_id: str
     revision: str
-    clock: str
-    loaded: str
+    clock: Text
+    loaded: Text
     press_id: str
     receipt: Receipt | None
     inputs: dict[str, Any]
@@ -190,7 +190,7 @@ def _context(
     return PageContext(
         site=state,
         display=display,
-        choices=choices(display),
+        choices=[*language_choice(state.fleet.panel, language_of(request)), *choices(display)],
         panel=state.fleet.panel,
         page=page,
         inside=None,

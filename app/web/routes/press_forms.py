@@ -53,7 +53,7 @@ async def pressed_by_form(
         raise InputError(f'_id: "{page_id:.40}" is not the id of a press')
     press_id = f"{page_id}.{widget}"
     seen, until = inputs.pop("_seen", ""), _until(inputs)
-    typed = session.dispatcher.parse_form(inputs)
+    typed = session.dispatcher.parse_form(inputs, reader.language)
     if not state.limits.admit(who):
         receipt = session.presses.early_refusals.limited(widget, typed, press_id, shown=True)
         return RedirectResponse(page_after(session, widget, receipt.id, shown_on), status_code=303)

@@ -1,0 +1,72 @@
+"""Languages in a real browser: chosen in the menu, for this browser alone."""
+
+from collections.abc import Iterator
+
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from tests.browser.test_pages import TAP_AGAIN_MS
+from tests.support.parts import ROOT, Server, until
+from tests.web.test_panel_languages import APP, PANEL
+
+
+@pytest.fixture(scope="module")
+def kiosk() -> Iterator[Server]:
+    mine = Server(ROOT, app=APP, KIOSK_PANEL=str(PANEL))
+    until(mine.ready, "ready")
+    yield mine
+    mine.end()
+
+
+def choose(page: Page, language: str) -> None:
+    page.locator(".menu-key").click()
+    page.get_by_role("button", name=language, exact=True).click()
+
+
+def test_a_browser_changes_its_language_and_no_other_ones(
+    chromium: Browser, page: Page, kiosk: Server
+) -> None:
+    other = chromium.new_page()
+    for one in (page, other):
+        one.goto(kiosk.url)
+        expect(one.locator('[data-widget="speed"] .value')).to_have_text("-1,234.5 mm/s")
+    choose(page, "Deutsch")
+    expect(page.locator("html")).to_have_attribute("lang", "de")
+    expect(page.locator('[data-widget="speed"] .value')).to_have_text("-1.234,5 mm/s")
+    expect(page.locator('[data-widget="locked"] .why')).to_contain_text("erlaubt die Tür nicht")
+    page.locator('[data-widget="set_limit"] button[type=submit]').click()
+    expect(page.locator("#receipt-set_limit")).to_contain_text("Gesendet auf /limit um")
+    other.locator('[data-widget="set_limit"] button[type=submit]').click()
+    expect(other.locator("#receipt-set_limit")).to_contain_text("Sent on /limit at")
+    choose(page, "日本語")
+    expect(page.locator("#label-speed")).to_have_text("速度")
+    expect(page.locator("h1")).to_have_text("セル1")
+    page.locator('[data-widget="limit"] input').fill("7.5")
+    page.locator('[data-widget="set_limit"] button[type=submit]').click()
+    expect(page.locator("#receipt-set_limit")).to_contain_text("上限は7.5です")
+    expect(other.locator("#label-speed")).to_have_text("Speed")
+    other.close()
+
+
+def test_a_comma_is_typed_where_the_language_has_it(page: Page, kiosk: Server) -> None:
+    page.goto(kiosk.url)
+    choose(page, "Deutsch")
+    entry = page.locator('[data-widget="limit"] input')
+    entry.fill("")
+    entry.press_sequentially("0,5")
+    expect(entry).to_have_value("0.5")
+    page.locator('[data-widget="asked"] button[type=submit]').click()
+    expect(page.locator('dialog [data-value-of="limit"]')).to_have_text("0,5")
+
+
+def test_without_scripts_the_language_changes_too(chromium: Browser, kiosk: Server) -> None:
+    context = chromium.new_context(java_script_enabled=False)
+    page = context.new_page()
+    page.goto(kiosk.url)
+    choose(page, "日本語")
+    expect(page.locator("html")).to_have_attribute("lang", "ja")
+    page.wait_for_timeout(TAP_AGAIN_MS)
+    page.locator('[data-widget="limit"] input').fill("7.5")
+    page.locator('[data-widget="set_limit"] button[type=submit]').click()
+    expect(page.locator("#receipt-set_limit")).to_contain_text("上限は7.5です")
+    context.close()

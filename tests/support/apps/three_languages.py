@@ -1,0 +1,44 @@
+"""The application with short catalogues of German and Japanese, in place of those of the project."""
+
+import tempfile
+from pathlib import Path
+
+from app.i18n.catalogue import catalogues_in
+from tests.support.catalogues import write_catalogue
+
+GERMAN = {
+    "published": "Gesendet auf {topic} um {time}.",
+    "sent_to_nobody": "Gesendet auf {topic} um {time}, aber kein Node empfängt es.",
+    "refused": "Nicht gesendet um {time}: {why}",
+    "off_limits": "{label} ist {given}: erlaubt ist {limits}",
+    "no_number": "{label} muss eine Zahl sein, {limits}, nicht {given}",
+    "limits_both": "{low} bis {high}{unit}",
+    "limits": "{low} bis {high}{unit}, in Schritten von {step}",
+    "forbidden": "Der Roboter erlaubt {name} nicht.",
+    "waiting": "Gesperrt: warte auf {topic}.",
+    "keypad_decimal": ",",
+    "display_language": "Sprache",
+    "log_page_title": "Bedienprotokoll",
+}
+JAPANESE = {
+    "published": "{time} に {topic} へ送信しました。",
+    "sent_to_nobody": "{time} に {topic} へ送信しましたが、受信するノードがありません。",
+    "refused": "{time} 送信していません：{why}",
+    "off_limits": "{label}は{given}です。{limits}でなければなりません",
+    "limits_both": "{low}～{high}{unit}",
+    "forbidden": "ロボットが「{name}」を許可していません。",
+    "display_language": "言語",
+    "log_page_title": "操作ログ",
+    "between_names": "、",
+}
+
+
+_folder = tempfile.TemporaryDirectory()
+write_catalogue(Path(_folder.name), "de", GERMAN)
+write_catalogue(Path(_folder.name), "ja", JAPANESE)
+_catalogues = catalogues_in(Path(_folder.name))
+_catalogues.__enter__()
+
+from app.main import app  # noqa: E402
+
+__all__ = ["app"]
