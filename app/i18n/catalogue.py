@@ -18,7 +18,8 @@ _folders: list[Path] = [Path(__file__).parent]
 
 @contextmanager
 def catalogues_in(folder: Path) -> Iterator[None]:
-    """The catalogues of one more folder count too, while this lasts."""
+    """The catalogues of one more folder count too, before others of the same language, while this
+    lasts."""
     _folders.append(folder)
     _forget()
     try:
@@ -35,7 +36,7 @@ def _forget() -> None:
 
 @cache
 def files() -> Mapping[str, Path]:
-    """The catalogue of each language, in their order; that of the folder added last counts."""
+    """The catalogue of each language."""
     found = {path.stem: path for folder in _folders for path in folder.glob(f"*{SUFFIX}")}
     return dict(sorted(found.items()))
 

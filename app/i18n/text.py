@@ -17,7 +17,9 @@ from app.printable import printable
 # which are listed.
 Param = Union[str, int, float, "Text", tuple["TextLike", ...]]
 
-# Codes of what stands between texts that follow one another, with `parts` as the only parameter.
+# Codes of how two texts that follow one another are written, such as "{first}, {last}"; a Text of them
+# has `parts` as its only parameter. A pattern, because Japanese has nothing between sentences, and
+# gettext takes an empty sentence for a missing one.
 BETWEEN: Final = frozenset({"between_sentences", "between_lines", "between_names"})
 # Codes of what is no sentence; none of a catalogue begins so.
 PANEL, PARTS, NUMBER, TIME, DATE_TIME = "=panel", "=parts", "=number", "=time", "=date_time"
@@ -105,7 +107,7 @@ def _filled(text: Text, language: str) -> str:
     if code in BETWEEN:
         parts = text.params[0][1]
         assert isinstance(parts, tuple)  # as `joined` makes it
-        return sentence.join(str(_written(part, language)) for part in parts)
+        return _in_a_row(parts, sentence, language)
     return sentence.format_map({name: _written(value, language) for name, value in text.params})
 
 
@@ -113,8 +115,13 @@ def _written(value: Param, language: str) -> Any:
     if isinstance(value, Text):
         return _filled(value, language)
     if isinstance(value, tuple):
-        return sentences(language)["between_names"].join(str(_written(one, language)) for one in value)
+        return _in_a_row(value, sentences(language)["between_names"], language)
     return number_in(repr(value), language) if isinstance(value, float) else value
+
+
+def _in_a_row(parts: Iterable[Param], pattern: str, language: str) -> str:
+    between = pattern.format(first="", last="")
+    return between.join(str(_written(one, language)) for one in parts)
 
 
 def _panel_text(params: Mapping[str, Any], language: str) -> str:

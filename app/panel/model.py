@@ -6,7 +6,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Final, Literal
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, WithJsonSchema
 
 from app.i18n import ENGLISH
 from app.i18n.catalogue import files
@@ -48,7 +48,9 @@ def _check_languages(given: tuple[str, ...]) -> tuple[str, ...]:
     return given
 
 
-Language = Annotated[str, AfterValidator(_check_language)]
+Language = Annotated[
+    str, AfterValidator(_check_language), WithJsonSchema({"type": "string", "enum": [*files()]})
+]
 Languages = Annotated[tuple[Language, ...], Field(strict=False), AfterValidator(_check_languages)]
 
 

@@ -1,9 +1,11 @@
 """A page's own template: Jinja in a sandbox, which places the widgets of its page and pictures.
 
-It has `title` (the page's), `widget(id)`, `picture(name, alt)` and `icon(name)`, and knows nothing of
-the robot. What it places is the same in every request, and is tried once when the panel is loaded.
+It has `title` (the page's), `language` (the reader's), `widget(id)`, `picture(name, alt)` and
+`icon(name)`, and knows nothing of the robot. What it places in a language is the same in every request,
+and is tried once when the panel is loaded.
 """
 
+from collections import Counter
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from functools import cache
@@ -14,6 +16,7 @@ from jinja2 import StrictUndefined, Template, TemplateError
 from jinja2.sandbox import ImmutableSandboxedEnvironment
 from markupsafe import Markup
 
+from app.i18n import ENGLISH, render
 from app.icons import icon, icons
 from app.panel.faults.wording import closest_name, list_names
 from app.panel.layout import Page
@@ -68,8 +71,10 @@ def render_page(
     pictures: Collection[str],
     show: Callable[[str], Markup],
     folder: str = "",
+    language: str = ENGLISH,
 ) -> Markup:
-    """The inside of a page. `show` makes the widget with an id, `folder` is the path of the pictures.
+    """The inside of a page. `show` makes the widget with an id, `folder` is the path of the pictures,
+    `language` that of the reader.
     Raises PlacementError, or what else a template may raise."""
     known = {widget.id for widget in page.widgets}
     placed: set[str] = set()
@@ -88,7 +93,8 @@ def render_page(
             raise PlacementError(_unknown("picture", name, pictures))
         return PICTURE.format(folder, name, alt)
 
-    return Markup(template.render(title=page.title, widget=widget, picture=picture))
+    given = {"title": render(page.title, language), "language": language}
+    return Markup(template.render(**given, widget=widget, picture=picture))
 
 
 def _unknown(what: str, name: Any, known: Collection[str]) -> str:
@@ -98,21 +104,26 @@ def _unknown(what: str, name: Any, known: Collection[str]) -> str:
     return f'no {what} "{name}"{where}; {hint}'
 
 
-def try_template(path: Path, page: Page, pictures: Collection[str]) -> TemplateFault | list[str]:
-    """The first fault of a page's template, else the ids of the widgets that it never places."""
-    placed: set[str] = set()
+def try_template(
+    path: Path, page: Page, pictures: Collection[str], languages: Collection[str] = (ENGLISH,)
+) -> TemplateFault | list[str]:
+    """The first fault of a page's template for readers of these languages, else the ids of the widgets
+    that it does not place for all of them."""
+    placed: Counter[str] = Counter()
 
     def show(name: str) -> Markup:
-        placed.add(name)
+        placed[name] += 1
         return Markup()
 
     try:
-        render_page(compile_template(path), page, pictures, show)
+        template = compile_template(path)
+        for language in languages:
+            render_page(template, page, pictures, show, language=language)
     except UnicodeDecodeError:
         return TemplateFault(0, "is not UTF-8")
     except Exception as error:  # a template may raise anything: 1 / 0, None.upper()
         return TemplateFault(_line(error, path), _message(error), getattr(error, "cause", ""))
-    return [widget.id for widget in page.widgets if widget.id not in placed]
+    return [widget.id for widget in page.widgets if placed[widget.id] < len(languages)]
 
 
 def _message(error: Exception) -> str:

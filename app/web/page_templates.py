@@ -77,4 +77,4 @@ class PageTemplates:
             return Markup(cell.render(widget=widgets[name], placed="", **context))
 
         folder = context["words"]["pictures"]
-        return render_page(self._own[page.template], page, pictures, show, folder)
+        return render_page(self._own[page.template], page, pictures, show, folder, language)

@@ -41,4 +41,4 @@ def _try(panel: Panel, number: int) -> "TemplateFault | list[str]":
 
     page = panel.pages[number]
     assert page.template is not None
-    return try_template(page.template, page, panel.picture_files)
+    return try_template(page.template, page, panel.picture_files, panel.readers_languages)

@@ -5,8 +5,7 @@ from collections.abc import Iterator
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from tests.browser.test_pages import TAP_AGAIN_MS
-from tests.support.parts import ROOT, Server, until
+from tests.support.parts import ROOT, TAP_AGAIN_MS, Server, until
 from tests.web.test_panel_languages import APP, PANEL
 
 
