@@ -51,6 +51,7 @@ check: .venv/test
 	.venv/bin/ruff format --check app tests bench docs
 	.venv/bin/mypy
 	.venv/bin/python -m app.i18n
+	.venv/bin/python -m docs._generate --check
 
 # Warnings are errors. What the pages take from the code is written first.
 docs: .venv-docs/ready

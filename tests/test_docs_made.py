@@ -3,7 +3,7 @@
 import json
 import re
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -11,6 +11,7 @@ import pytest
 from jsonschema_rs import Draft7Validator
 
 from app.i18n import BETWEEN, ENGLISH, sentences
+from app.i18n.catalogue import catalogues_in
 from app.settings import VARIABLES
 from docs._generate import locks, places, schema
 from docs._generate import settings as variables
@@ -197,3 +198,26 @@ def test_a_page_without_the_faults_stays_as_it_is(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="has no section"):
         results.write("| what breaks |", page)
     assert page.read_text() == "nothing here\n"
+
+
+def test_the_page_of_locks_in_another_language_is_whole(tmp_path: Path) -> None:
+    def toml(advice: Mapping[str, Mapping[str, str]]) -> Path:
+        path = tmp_path / "locks.ja.toml"
+        lines = [f"[{g}]\n" + "".join(f'{c} = "対処"\n' for c in codes) for g, codes in advice.items()]
+        path.write_text("\n".join(lines), encoding="utf-8")
+        return path
+
+    (tmp_path / "ja.po").write_text('msgid "waiting"\nmsgstr "{topic} を待っています。"\n')
+    advice = locks.groups(locks.ADVICE)
+    with catalogues_in(tmp_path):
+        page = locks.translated_page("ja", toml(advice))
+        assert page.startswith("---\norphan: true\n---\n# 操作不可と拒否の理由\n")
+        assert "| *{topic}* を待っています。 | `waiting` | 対処 |" in page
+        assert page.count("\n## ") == len(advice)
+        fewer = {**advice, "link": {**advice["link"], "on_fire": ""}}
+        del fewer["link"]["no_link"]
+        with pytest.raises(ValueError, match=r"locks.ja.toml: \[link\] .*: no_link, on_fire"):
+            locks.translated_page("ja", toml(fewer))
+    assert locks.translations(tmp_path) == {"ja": tmp_path / "locks.ja.toml"}
+    with pytest.raises(ValueError, match=r"no \[fr\]"):
+        locks.translated_page("fr", tmp_path / "locks.ja.toml")

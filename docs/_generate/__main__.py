@@ -12,7 +12,7 @@ from typing import Final
 
 from docs._generate.icon_names import icon_list
 from docs._generate.keys import key_tables
-from docs._generate.locks import lock_tables
+from docs._generate.locks import lock_tables, translated_page, translations
 from docs._generate.places import models_table, paths_table, sentences_table
 from docs._generate.schema import FILE as SCHEMA
 from docs._generate.schema import panel_schema
@@ -35,6 +35,8 @@ def files() -> Iterator[tuple[Path, str]]:
     for name, parts in pages.items():
         page = DOCS / name
         yield page, filled(page.read_text(encoding="utf-8"), parts, name)
+    for language, advice in translations().items():
+        yield DOCS / f"reference/locks.{language}.md", translated_page(language, advice)
 
 
 def filled(text: str, parts: Mapping[str, str], name: str) -> str:
@@ -51,7 +53,11 @@ def filled(text: str, parts: Mapping[str, str], name: str) -> str:
 
 def out_of_date() -> list[str]:
     """The files that are not as the code is."""
-    return [path.name for path, text in files() if path.read_text(encoding="utf-8") != text]
+    return [
+        path.name
+        for path, text in files()
+        if not path.exists() or path.read_text(encoding="utf-8") != text
+    ]
 
 
 def main(arguments: list[str]) -> int:
