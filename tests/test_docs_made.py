@@ -214,8 +214,8 @@ def test_the_page_of_locks_in_another_language_is_whole(tmp_path: Path) -> None:
         assert page.startswith("---\norphan: true\n---\n# 操作不可と拒否の理由\n")
         assert "| *{topic}* を待っています。 | `waiting` | 対処 |" in page
         assert page.count("\n## ") == len(advice)
-        fewer = {**advice, "link": {**advice["link"], "on_fire": ""}}
-        del fewer["link"]["no_link"]
+        links = {code: one for code, one in advice["link"].items() if code != "no_link"}
+        fewer = {**advice, "link": {**links, "on_fire": ""}}
         with pytest.raises(ValueError, match=r"locks.ja.toml: \[link\] .*: no_link, on_fire"):
             locks.translated_page("ja", toml(fewer))
     assert locks.translations(tmp_path) == {"ja": tmp_path / "locks.ja.toml"}
