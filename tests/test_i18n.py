@@ -26,6 +26,7 @@ PREFIXES = (
     "log_",
     "log_done_",
     "log_page_",
+    "log_outcome_",
     "log_page_control_",
     "state_",
 )  # of codes that are put together

@@ -128,6 +128,10 @@ def test_the_log_has_each_entry_in_the_language_of_who_reads_it(kiosk: Server) -
         row = next(row for row in html.split("<tr ") if sentence in row)
         assert f"<td>{title}</td>" in row
         assert re.search(rf"<time>\d\d:\d\d:\d\d[.,]\d\d\d</time><br><small>{day}<", row)
+        if language == "de":
+            assert '<p class="outcome">abgelehnt</p>' in row
+            assert "<td>ein Programm</td>" in row
+            assert "<small>Grenze</small> 9,5" in html
         csv = kiosk.http.get("/log.csv", headers=read_by(language))
         assert csv.headers["content-language"] == language
 

@@ -1,7 +1,6 @@
 """The operator's log, to read, to filter and to take away as CSV."""
 
 import asyncio
-import json
 import logging
 from contextlib import AsyncExitStack
 from dataclasses import replace
@@ -18,8 +17,7 @@ from starlette.types import Message, Receive, Scope, Send
 from app.audit import Entry, Filter, OperatorLog, ReaderProcess, Row
 from app.commands.control_acts import ACTS
 from app.errors import InputError, LogError, NotFound
-from app.i18n import Param, Text, TextLike, say
-from app.i18n.locales import date_in, number_in, time_in
+from app.i18n import Text, TextLike, say
 from app.panel.model import Panel
 from app.panel.widgets.families import Command, EntryWidget
 from app.printable import printable, printable_texts
@@ -27,16 +25,13 @@ from app.web.app_state import AppState, CurrentState
 from app.web.described import TEXT, errors
 from app.web.display_choice import Display, display_of
 from app.web.language import language_of
+from app.web.log_words import OUTCOMES, date_of, outcome_of, time_of, values_of, who_of, word
 
 log = logging.getLogger("kiosk.log")
 
 router = APIRouter()
 
 ROWS_ON_PAGE: Final = 50
-OUTCOMES: Final = (
-    "published", "confirmed", "accepted", "succeeded", "rejected", "canceled", "aborted", "timed_out",
-    "refused", "unknown", "pressed", "control", "began", "resumed", "removed",
-)  # fmt: skip
 # Entries of the kind "control": acts, and changes that no act made.
 CONTROL_ACTIONS: Final = (
     *(f"control_{act}" for act in ACTS),
@@ -99,6 +94,7 @@ class LogContext(TypedDict):
     rows: list[Row]
     labels: dict[str, TextLike]
     inputs: dict[str, TextLike]
+    robots: dict[str, TextLike]
     acts: dict[str, Text]
     outcomes: tuple[str, ...]
     off: TextLike
@@ -132,7 +128,8 @@ async def page(request: Request, state: CurrentState, wanted: Annotated[Wanted, 
         rows=rows,
         labels={w.id: w.label for w in panel.widgets() if isinstance(w, Command)},
         inputs={w.id: w.label for w in panel.widgets() if isinstance(w, EntryWidget)},
-        acts={action: _word(action) for action in CONTROL_ACTIONS},
+        robots={str(robot.name): robot.name for robot in panel.robots},
+        acts={action: word(action) for action in CONTROL_ACTIONS},
         outcomes=OUTCOMES,
         off="" if state.log.enabled else say("log_off"),
         banner=state.banner,
@@ -145,10 +142,12 @@ async def page(request: Request, state: CurrentState, wanted: Annotated[Wanted, 
         "log.html",
         language,
         **context,
-        time_of=partial(_time_of, language=language),
-        date_of=partial(_date_of, language=language),
-        values_of=_values_of,
-        word=_word,
+        time_of=partial(time_of, language=language),
+        date_of=partial(date_of, language=language),
+        values_of=partial(values_of, language=language),
+        outcome_of=outcome_of,
+        who_of=who_of,
+        word=word,
     )
     return HTMLResponse(html, headers={"cache-control": "no-store"})
 
@@ -224,24 +223,6 @@ async def _taken(send: Send, message: Message) -> None:
         await send(message)
 
 
-def _time(ms: int) -> datetime:
-    return datetime.fromtimestamp(ms // 1000).replace(microsecond=ms % 1000 * 1000).astimezone()
-
-
-def _time_of(ms: int, language: str) -> str:
-    """With milliseconds, by the language's own sign."""
-    at = _time(ms)
-    return f"{time_in(at.strftime('%H:%M:%S'), language)}{number_in(at.strftime('.%f')[:-3], language)}"
-
-
-def _date_of(ms: int, language: str) -> str:
-    return date_in(_time(ms).strftime("%Y-%m-%d"), language)
-
-
-def _word(name: str, **about: Param) -> Text:
-    return say(f"log_page_{name}", **about)
-
-
 def _shown(row: Row, language: str) -> Row:
     """With its texts as a page shows them, but its values: those are JSON still."""
     entry = row.entry._replace(reason=row.entry.reason_in(language))
@@ -250,18 +231,6 @@ def _shown(row: Row, language: str) -> Row:
         for name, cell in entry._asdict().items()
     )
     return replace(row, entry=Entry._make(cells))
-
-
-def _values_of(text: str) -> list[tuple[str, str]]:
-    """The values of an entry as (name, text), but those that are empty."""
-    return [
-        (
-            printable(name),
-            printable(value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)),
-        )
-        for name, value in json.loads(text).items()
-        if value != ""
-    ]
 
 
 def _ms(name: str, given: str) -> int | None:

@@ -19,6 +19,8 @@ GERMAN = {
     "keypad_decimal": ",",
     "display_language": "Sprache",
     "log_page_title": "Bedienprotokoll",
+    "log_outcome_refused": "abgelehnt",
+    "browser_unknown": "ein Programm",
 }
 JAPANESE = {
     "published": "{time} に {topic} へ送信しました。",

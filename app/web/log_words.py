@@ -1,0 +1,68 @@
+"""What the page of the operator's log shows of an entry, in the language of who reads it."""
+
+import json
+import re
+from datetime import datetime
+from functools import cache
+from typing import Any, Final
+
+from app.i18n import Param, Text, TextLike, render, say
+from app.i18n.locales import date_in, number_in, time_in
+from app.printable import printable
+
+OUTCOMES: Final = (
+    "published", "confirmed", "accepted", "succeeded", "rejected", "canceled", "aborted", "timed_out",
+    "refused", "unknown", "pressed", "control", "began", "resumed", "removed",
+)  # fmt: skip
+NAMES: Final = ("browser", "browser_local", "browser_more", "browser_unknown", "others", "unknown")
+
+
+def _time(ms: int) -> datetime:
+    return datetime.fromtimestamp(ms // 1000).replace(microsecond=ms % 1000 * 1000).astimezone()
+
+
+def time_of(ms: int, language: str) -> str:
+    """With milliseconds, by the language's own sign."""
+    at = _time(ms)
+    return f"{time_in(at.strftime('%H:%M:%S'), language)}{number_in(at.strftime('.%f')[:-3], language)}"
+
+
+def date_of(ms: int, language: str) -> str:
+    return date_in(_time(ms).strftime("%Y-%m-%d"), language)
+
+
+def word(name: str, **about: Param) -> Text:
+    return say(f"log_page_{name}", **about)
+
+
+def outcome_of(outcome: str) -> TextLike:
+    """An outcome, or a kind of entries, as a word; one of another version as it is."""
+    return say(f"log_outcome_{outcome}") if outcome in OUTCOMES else outcome
+
+
+def who_of(who: str) -> TextLike:
+    """A client's name, which entries have in English."""
+    for name, code in _names():
+        if found := name.fullmatch(who):
+            return say(code, **found.groupdict())
+    return who
+
+
+@cache
+def _names() -> list[tuple[re.Pattern[str], str]]:
+    """How English writes the names of clients without users."""
+    written = [(re.escape(render(say(code, number="0"))), code) for code in NAMES]
+    return [(re.compile(text.replace("0", "(?P<number>[0-9]+)")), code) for text, code in written]
+
+
+def values_of(text: str, language: str) -> list[tuple[str, str]]:
+    """The values of an entry as (name, text), but those that are empty."""
+    values = json.loads(text).items()
+    return [(printable(name), _value_of(value, language)) for name, value in values if value != ""]
+
+
+def _value_of(value: Any, language: str) -> str:
+    if isinstance(value, str):
+        return printable(value)
+    text = json.dumps(value, ensure_ascii=False)
+    return number_in(text, language) if isinstance(value, float) else printable(text)
