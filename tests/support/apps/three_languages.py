@@ -21,6 +21,8 @@ GERMAN = {
     "log_page_title": "Bedienprotokoll",
     "log_outcome_refused": "abgelehnt",
     "browser_unknown": "ein Programm",
+    "browser_local": "das Panel an der Zelle",
+    "browser_more": "Browser {number} an der Zelle",
 }
 JAPANESE = {
     "published": "{time} に {topic} へ送信しました。",
