@@ -150,6 +150,18 @@ def test_what_the_code_locks_by_has_advice() -> None:
     assert codes <= told
 
 
+def test_the_japanese_advice_is_for_the_same_sentences_and_names_keys_as_they_are() -> None:
+    path = locks.FILE.with_name("locks.ja.toml")
+    advice = tomllib.loads(path.read_text(encoding="utf-8"))
+    english = {group: list(codes) for group, codes in locks.ADVICE.items() if group != locks.OTHERS}
+    assert {group: list(codes) for group, codes in advice.items()} == english
+    keys = set(
+        re.findall("「(.+?)」", "".join(one for codes in advice.values() for one in codes.values()))
+    )
+    assert keys
+    assert keys <= set(sentences("ja").values())
+
+
 def test_each_sentence_leads_to_the_modules_that_say_it() -> None:
     rows = [row.split(" | ") for row in places.sentences_table().splitlines()[2:]]
     assert len(rows) == len(SENTENCES.keys() - BETWEEN)

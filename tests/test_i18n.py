@@ -172,13 +172,65 @@ def test_a_catalogue_that_cannot_be_read_is_named(tmp_path: Path) -> None:
 
 
 def test_each_language_has_its_sentences_and_what_it_lacks_in_english(tmp_path: Path) -> None:
-    catalogue(tmp_path, "de", {"waiting": "Gesperrt: warte auf {topic}.", "between_names": " / "})
+    shipped = list(files())
+    own = {"waiting": "Gesperrt: warte auf {topic}.", "between_names": "{first} / {last}"}
+    catalogue(tmp_path, "qps", own)
     with catalogues_in(tmp_path):
-        assert render(say("waiting", topic="/a"), "de") == "Gesperrt: warte auf /a."
-        assert render(say("waiting", topic=("/a", "/b")), "de") == "Gesperrt: warte auf /a / /b."
-        assert render(say("stopping"), "de") == SENTENCES["stopping"]
+        assert render(say("waiting", topic="/a"), "qps") == "Gesperrt: warte auf /a."
+        assert render(say("waiting", topic=("/a", "/b")), "qps") == "Gesperrt: warte auf /a / /b."
+        assert render(say("stopping"), "qps") == SENTENCES["stopping"]
         assert render(say("waiting", topic="/a")) == "Locked: waiting for /a."
-    assert list(files()) == [ENGLISH]
+    assert list(files()) == shipped
+
+
+def test_a_catalogue_of_one_more_folder_counts_before_the_shipped_one(tmp_path: Path) -> None:
+    for folder in (tmp_path, tmp_path / "~"):  # neither by the order of their names
+        folder.mkdir(exist_ok=True)
+        catalogue(folder, "de", {"stopping": str(folder)})
+        with catalogues_in(folder):
+            assert render(say("stopping"), "de") == str(folder)
+    assert render(say("stopping"), "de") == "Wird beendet."
+
+
+def test_english_japanese_and_german_are_shipped() -> None:
+    assert set(files()) == {"de", "en", "ja"}
+
+
+def test_sentences_and_names_follow_one_another_as_the_language_has_it() -> None:
+    stopped = joined([say("log_began"), say("log_lost", first=1, last=2)])
+    assert [render(stopped, one) for one in ("ja", "de")] == [
+        "パネルサーバーが起動しました。No. 1～2 の記録がディスクから失われました。",
+        "Der Panel-Server wurde gestartet. "
+        "Die Einträge 1 bis 2 sind auf dem Datenträger verloren gegangen.",
+    ]
+    locked = say("locks_more", names=("起動", "払出し"), number=2)
+    assert render(locked, "ja") == "操作不可：起動、払出し、ほか 2 件。"
+
+
+def test_a_sentence_in_another_one_ends_as_the_language_has_it() -> None:
+    why = say(
+        "off_limits", label="速度", given="400 mm/s", limits=say("limits_low", low=0, unit=" mm/s")
+    )
+    assert render(say("not_encoded", why=why, time="10:04:32"), "ja") == (
+        "未送信（10:04:32）：「速度」に 400 mm/s は入力できません（入力できる値：0 mm/s 以上）。"
+    )
+    ended = say("hold_ended", time="10:04:32", seconds="3.2", why=say("hold_by_sliding"))
+    assert render(ended, "ja") == (
+        "終了しました（10:04:32、3.2 秒間）：指がボタンから外れました。"
+        "いったん離してから、もう一度押してください。"
+    )
+
+
+@pytest.mark.parametrize("language", sorted({*files()} - {ENGLISH}))
+def test_a_translation_ends_as_its_english_does(language: str) -> None:
+    """What is put into another sentence must not bring a full stop of its own, nor lack one."""
+    stops = (".", ".)", "。", "。）")
+    own = sentences(language)
+    assert [
+        code
+        for code, english in SENTENCES.items()
+        if len(english) > 1 and english.endswith(stops) != own[code].endswith(stops)
+    ] == []
 
 
 @pytest.mark.parametrize(

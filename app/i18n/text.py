@@ -86,7 +86,7 @@ def say(code: str, **about: Param) -> Text:
 
 def joined(parts: Iterable[TextLike], between: str = "between_sentences") -> TextLike:
     """Several texts, one after the other, without those that are ""; one alone is itself. `between` is
-    the code of what stands between them."""
+    the code of how two of them are written."""
     given = tuple(part for part in parts if part != "")
     if len(given) > 1:
         return Text(between, (("parts", given),))

@@ -54,9 +54,10 @@ export class Entry {
     this.#closed();
   }
 
-  // A real keyboard types into the field by itself. Its Enter is Done: it presses nothing.
+  // A real keyboard types into the field by itself. Its Enter is Done: it presses nothing. Enter and Escape
+  // of an input method's conversion are its own.
   #key(event) {
-    if (event.target !== this.input || !["Enter", "Escape"].includes(event.key)) return;
+    if (event.target !== this.input || event.isComposing || !["Enter", "Escape"].includes(event.key)) return;
     event.preventDefault();
     if (event.key === "Enter") this.#done();
     else this.cancel();

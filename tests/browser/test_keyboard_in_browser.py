@@ -147,6 +147,21 @@ def test_a_real_keyboard_types_into_the_field_and_its_enter_closes(screen: Page)
     expect(screen.locator("#input-note")).to_have_value("abcd")
 
 
+def test_enter_and_escape_that_end_a_conversion_close_nothing(screen: Page) -> None:
+    sheet = keyboard_for(screen, "#input-note")
+    input_method = screen.context.new_cdp_session(screen)
+    reading = {"text": "せいばん", "selectionStart": 4, "selectionEnd": 4}
+    for key in ("Escape", "Enter"):
+        input_method.send("Input.imeSetComposition", reading)
+        expect(screen.locator("#input-note")).to_have_value("せいばん")
+        screen.keyboard.press(key)
+        expect(sheet).to_be_visible()
+    input_method.send("Input.insertText", {"text": "製番"})
+    expect(screen.locator("#input-note")).to_have_value("製番")
+    screen.keyboard.press("Enter")
+    expect(screen.locator(".sheet")).to_have_count(0)
+
+
 def test_a_bar_code_replaces_what_the_field_that_asks_for_it_has(desk: Page) -> None:
     Keys(desk, READER_S).type("AB 12-3\n")
     expect(desk.locator("#input-order")).to_have_value("AB 12-3")

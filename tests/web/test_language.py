@@ -25,6 +25,7 @@ BRACKETED = re.compile("⟦.*⟧", re.DOTALL)
         ("", "fr, de;q=0.1", "de"),
         ("", "pt-br", "pt-BR"),
         ("", "de;q=0, en;q=0.1", "en"),
+        ("", "en-US,en;q=0.9", "en"),
         ("de", "en", "de"),
         ("fr", "en", "en"),
         ("../../etc", "de", "de"),
