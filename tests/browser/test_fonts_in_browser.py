@@ -77,6 +77,7 @@ def test_beside_the_banner_the_lamps_keep_their_place_whatever_they_say(
     page.set_viewport_size({"width": width, "height": height})
     page.goto(servers(Server(ROOT)).url)
     expect(page.locator("#banner")).to_be_visible()
+    expect(page.locator('.lamps > :not([data-state="ok"])')).to_have_count(0)
     left, then_left, right, then_right, end = page.evaluate(LONGEST)
     assert (left, right) == (then_left, then_right)
     assert end <= width
