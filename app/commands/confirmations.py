@@ -14,7 +14,7 @@ from typing import Any, Final
 from app.clock import format_time
 from app.i18n import TextLike, joined, number, say
 from app.panel.values import same_value
-from app.panel.widgets.publish import Confirm, SinglePublish
+from app.panel.widgets.publish import Confirm, PublishPress
 from app.robot.command_status import CommandStatus, OnCorrection, Outcome
 from app.robot.state import Reading, RobotState
 from app.ros_logging import RobotLog
@@ -30,7 +30,7 @@ class _Waiting:
     """An unconfirmed command, sent at `since` (monotonic seconds). `confirmed` is done with the wall
     time of the confirmation; `late` is true after the time limit."""
 
-    widget: SinglePublish
+    widget: PublishPress
     confirm: Confirm
     equals: Any
     press_id: str
@@ -52,7 +52,7 @@ class Confirmations:
 
     async def wait(
         self,
-        widget: SinglePublish,
+        widget: PublishPress,
         equals: Any,
         press_id: str,
         since: float,
@@ -128,7 +128,7 @@ class Confirmations:
         if self._latest.get(waiting.widget.id) == waiting.press_id:
             self._show(waiting.widget, CommandStatus(outcome=answer.outcome, text=answer.text))
 
-    def _show(self, widget: SinglePublish, progress: CommandStatus) -> None:
+    def _show(self, widget: PublishPress, progress: CommandStatus) -> None:
         self._robot.command_status[widget.id] = progress
         self._changed()
 

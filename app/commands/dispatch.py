@@ -6,11 +6,11 @@ from typing import Any, NamedTuple, Protocol
 
 from app.clock import format_time
 from app.commands.actions.goals import GoalTracker
-from app.commands.confirmations import Confirmations
+from app.commands.confirmations import Confirmations, equal
 from app.commands.parameters.sync import ParameterSync
 from app.commands.service_calls import ServiceCalls
 from app.errors import InputError, NotFound
-from app.i18n import ENGLISH, TextLike, say
+from app.i18n import ENGLISH, TextLike, number, say
 from app.i18n.locales import number_from
 from app.interfaces import Interfaces
 from app.panel.model import Panel
@@ -18,8 +18,10 @@ from app.panel.template import add_now, fill, input_ids
 from app.panel.widgets.families import Command, EntryWidget, Input, PressCommand
 from app.panel.widgets.kinds import find_row
 from app.panel.widgets.parameter import SET, Parameter
-from app.panel.widgets.publish import SinglePublish
+from app.panel.widgets.publish import PublishPress
 from app.panel.widgets.service_action import Action, Call
+from app.panel.widgets.step import Step
+from app.permission.interlocks import reported_value
 from app.robot.command_status import FinalCheck, OnCorrection, Outcome, no_check
 from app.robot.state import RobotState
 
@@ -85,14 +87,14 @@ class Dispatcher:
         self._parameters = trackers.parameters
         self._monotonic = monotonic
         # By kind or family of widgets: how to send it, why it would be refused, how to check an entry.
-        self.senders: Mapping[type[PressCommand], Callable[[Any, Outgoing], Awaitable[Outcome]]] = {
-            SinglePublish: self._publish,
+        self.senders: Mapping[type[Any], Callable[[Any, Outgoing], Awaitable[Outcome]]] = {
+            PublishPress: self._publish,
             Call: self._call,
             Action: self._start,
             Parameter: self._set,
         }
-        self.refusals: Mapping[type[PressCommand], Callable[[Any, dict[str, Any]], TextLike]] = {
-            SinglePublish: self._check_message,
+        self.refusals: Mapping[type[Any], Callable[[Any, dict[str, Any]], TextLike]] = {
+            PublishPress: self._check_message,
             Call: self._check_call,
             Action: lambda widget, _: self._actions.full(widget.action),
             Parameter: lambda widget, _: self._calls.full(f"{widget.node}/{SET[0]}"),
@@ -100,7 +102,19 @@ class Dispatcher:
         self.checks: Mapping[type[EntryWidget], Callable[[Any, Any], Any]] = {
             Input: lambda widget, given: widget.check_value(given),
             Parameter: self._parameters.check_value,
+            Step: self._check_step,
         }
+
+    def _check_step(self, widget: Step, given: Any) -> float:
+        """The value of a press, which is one step from the one that the robot reports now: what the
+        operator saw has not changed. InputError otherwise."""
+        base, _ = reported_value(widget, self._robot, self._monotonic())
+        if isinstance(given, int | float) and not isinstance(given, bool) and base is not None:
+            for target in (widget.target(base, 1), widget.target(base, -1)):
+                if target is not None and equal(float(target), given):
+                    return target
+        known = "?" if base is None else number(f"{base:g}")
+        raise InputError(say("step_moved", label=widget.label, value=known))
 
     def widget(self, widget_id: str) -> PressCommand:
         """The command widget with this id; NotFound for every other id."""
@@ -158,7 +172,7 @@ class Dispatcher:
         values = self.check_inputs(self._input_ids[widget.id], inputs)
         return find_row(self.refusals, widget)(widget, fill(widget.template, add_now(values)))
 
-    async def _publish(self, widget: SinglePublish, going: Outgoing) -> Outcome:
+    async def _publish(self, widget: PublishPress, going: Outgoing) -> Outcome:
         if widget.confirm is None:
             return await self._until_reached(widget, self._put(widget, going.fields, going.final_check))
         equals = fill(widget.confirm.equals, going.values)
@@ -168,7 +182,7 @@ class Dispatcher:
             widget, equals, going.press_id, since, answer.text, going.correct
         )
 
-    def _check_message(self, widget: SinglePublish, fields: dict[str, Any]) -> str:
+    def _check_message(self, widget: PublishPress, fields: dict[str, Any]) -> str:
         self._interfaces.encode(widget.type, fields)
         return ""
 
@@ -192,7 +206,7 @@ class Dispatcher:
             widget, value, going.press_id, going.correct, going.final_check
         )
 
-    def _put(self, widget: SinglePublish, fields: dict[str, Any], final_check: FinalCheck) -> Outcome:
+    def _put(self, widget: PublishPress, fields: dict[str, Any], final_check: FinalCheck) -> Outcome:
         payload = self._interfaces.encode(widget.type, fields)
         key = self._robot.key(widget.topic)
         has_reader = self._transport.has_reader(key)
@@ -202,7 +216,7 @@ class Dispatcher:
         text = say(sentence, topic=widget.topic, time=format_time(time.time()))
         return Outcome("published" if has_reader else "unknown", text)
 
-    async def _until_reached(self, widget: SinglePublish, answer: Outcome) -> Outcome:
+    async def _until_reached(self, widget: PublishPress, answer: Outcome) -> Outcome:
         """Waits for the bridge's response: until then a published message may still be lost."""
         at = format_time(time.time())
         if answer.outcome != "published" or await self._reached():

@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping
 from functools import cache, cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, NamedTuple, Self
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, NamedTuple, Protocol, Self
 
 from pydantic import (
     AfterValidator,
@@ -237,3 +237,14 @@ class TopicQos(Description):
     @cached_property
     def wire_qos(self) -> Qos:
         return Qos(self.reliability == "reliable", self.durability == "transient_local", self.depth)
+
+
+class HasTopic(Protocol):
+    """Whatever names a topic with its type and QoS."""
+
+    @property
+    def topic(self) -> str: ...
+    @property
+    def type(self) -> str: ...
+    @property
+    def qos(self) -> TopicQos: ...

@@ -28,7 +28,7 @@ from app.panel.widgets.families import (
     TopicWidget,
 )
 from app.panel.widgets.parameter import EVENT_TYPE, EVENTS, Parameter
-from app.panel.widgets.publish import Confirm, SinglePublish
+from app.panel.widgets.publish import Confirm, PublishPress
 from app.panel.widgets.service_action import Action
 from app.panel.widgets.static import PICTURE
 
@@ -168,7 +168,7 @@ class Panel(Description):
     def confirmations(self) -> Iterator[Confirm]:
         """The topics that confirm commands."""
         for widget in self.widgets():
-            if isinstance(widget, SinglePublish) and widget.confirm is not None:
+            if isinstance(widget, PublishPress) and widget.confirm is not None:
                 yield widget.confirm
 
     def monitored(self) -> Iterator[TopicSource]:
@@ -177,6 +177,8 @@ class Panel(Description):
             yield TopicSource(one.topic, one.type, one.qos, (one.field,))
         for display in self.displays:
             yield from display.sources()
+        for command in self.commands:
+            yield from command.sources()
 
     def actions(self) -> dict[str, str]:
         """Action → type of all actions that the panel may send goals to."""

@@ -14,11 +14,14 @@ from typing import Any, Final
 from app.dialect.endpoint import TopicRole
 from app.i18n import TextLike, joined, number, say
 from app.interfaces.names import Qos
+from app.panel.base import HasTopic
 from app.panel.interlock import Interlock
-from app.panel.widgets.families import Command, PublishCommand, TopicWidget
+from app.panel.values import number_text
+from app.panel.widgets.families import Command, PublishCommand
 from app.panel.widgets.kinds import find_row
 from app.panel.widgets.parameter import DESCRIBE, GET, SET, Parameter
 from app.panel.widgets.service_action import ServerCommand
+from app.panel.widgets.step import Step
 from app.permission.conditions import permits, unmet
 from app.robot.command_status import IDLE
 from app.robot.graph import Graph, cached_until_change
@@ -153,6 +156,35 @@ def publish_blocked(of: PublishCommand, robot: RobotState) -> Verdict | None:
     return None
 
 
+def reported_value(step: Step, robot: RobotState, now: float) -> tuple[float | None, Verdict]:
+    """The value from which a step is made, None where it is not known now; and why that locks, or until
+    when it counts."""
+    of = step.value
+    if doubt := topic_mismatch("MS", of, robot):
+        return None, doubt
+    reading = robot.reading(of.topic)
+    if reading.status != "message":
+        return None, locked(reading.status, topic=of.topic, wanted=of.type)
+    value = reading.value(of.field)
+    if value is None or not math.isfinite(value):
+        return None, locked("missing", field=of.field, topic=of.topic)
+    stale_at = math.inf if of.max_age_s is None else reading.at + of.max_age_s
+    if now >= stale_at:
+        return None, locked("stale", topic=of.topic, limit=f"{of.max_age_s:g}")
+    return value, PERMITTED if stale_at == math.inf else Verdict(True, until=stale_at)
+
+
+def step_blocked(step: Step, robot: RobotState, now: float) -> Verdict | None:
+    """Why no step may be made: the value is not known, or beyond the limits."""
+    if (blocked := publish_blocked(step, robot)) is not None:
+        return blocked
+    value, verdict = reported_value(step, robot, now)
+    if value is not None and not step.min <= value <= step.max:
+        low, high = number(number_text(step.min)), number(number_text(step.max))
+        return locked("step_outside", value=number(f"{value:g}"), low=low, high=high)
+    return verdict
+
+
 def call_blocked(call: ServerCommand, robot: RobotState, now: float) -> Verdict | None:
     """Why a service may not be called or a goal not be sent: its server is not there with its type,
     or an answer is awaited."""
@@ -222,19 +254,17 @@ def _silent_parameter(node: str, name: str) -> TextLike:
     return joined([say("parameter_silent", node=node, name=name), say("cyclone_hint")])
 
 
-def topic_mismatch(
-    role: TopicRole, interlock: Interlock | TopicWidget, robot: RobotState
-) -> Verdict | None:
+def topic_mismatch(role: TopicRole, of: HasTopic, robot: RobotState) -> Verdict | None:
     """Why a topic can't be trusted, by what the graph shows: another type, a QoS that DDS would
     not match, a bridge that does not pass it on. `role` is what the panel does with it: publish ("MP")
     or listen ("MS")."""
     return _misfit(
         robot.graph,
         role,
-        robot.key(interlock.topic),
-        interlock.topic,
-        interlock.type,
-        interlock.qos.wire_qos,
+        robot.key(of.topic),
+        of.topic,
+        of.type,
+        of.qos.wire_qos,
     )
 
 
@@ -258,6 +288,7 @@ def locked(code: str, **about: TextLike) -> Verdict:
 # What the robot may have against a command, beside the way to it and its interlocks: by family.
 AGAINST: Final[Mapping[type[Any], Callable[[Any, RobotState, float], Verdict | None]]] = {
     PublishCommand: lambda of, robot, _: publish_blocked(of, robot),
+    Step: step_blocked,
     ServerCommand: call_blocked,
     Parameter: lambda of, robot, _: set_blocked(of, robot),
 }

@@ -16,11 +16,11 @@ from app.errors import DecodeError
 from app.i18n import Text, TextLike
 from app.interfaces import Interfaces
 from app.interfaces.names import ROSOUT_TOPIC, key_of
-from app.panel.constants import parent_type
+from app.panel.constants import HasField, parent_type
 from app.panel.model import Panel, RobotEntry
-from app.panel.widgets.families import Display
 from app.robot.command_status import CommandStatus
 from app.robot.graph import Graph
+from app.robot.keyed_entries import KeyedEntries
 from app.robot.parameter_state import ParameterState
 from app.robot.presence import EndpointPresence, required_endpoints
 from app.robot.replayed import ReplayedMessages
@@ -86,6 +86,7 @@ class RobotState:
         self._publisher_required = [self.key(i.topic) for i in panel.interlocks if i.require_publisher]
         self._published: set[str] = set()
         self._topics = dict(self._make_topics(panel))
+        self.keyed_entries = KeyedEntries(panel, interfaces, self.key)
         self._logged_at: dict[str, float] = {}
 
     def _make_topics(self, panel: Panel) -> Iterator[tuple[str, Topic]]:
@@ -171,7 +172,7 @@ class RobotState:
             return found
         return replace(found, status="cut")
 
-    def constants(self, display: Display) -> Mapping[str, Any]:
+    def constants(self, display: HasField) -> Mapping[str, Any]:
         """Name → value of the constants of the message that contains a display's field."""
         return self._interfaces.constants(parent_type(display, self._interfaces))
 

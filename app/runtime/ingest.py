@@ -88,6 +88,8 @@ class Ingest:
             for of in panel.interlocks
         }
         self._events = robot.key(EVENTS)
+        sources = (source for widget in panel.commands for source in widget.sources())
+        self._needed = frozenset(robot.key(source.topic) for source in sources)
         # Every message of these topics counts, also values that were replaced within one turn.
         self.watched = self._interlocks.keys() | {robot.key(one.topic) for one in panel.confirmations()}
         self.prompt = self.watched | self._status.keys() | {self._events}
@@ -110,7 +112,12 @@ class Ingest:
             change = self._ingest(key, sample, updates)
             updates.urgent |= change == "now"
             updates.other |= change == "soon"
-            if key in self._feedback or key in self._status or key == self._events:
+            if (
+                key in self._feedback
+                or key in self._status
+                or key in self._needed
+                or key == self._events
+            ):
                 updates.other = True
             else:
                 updates.values.add(key)

@@ -115,7 +115,7 @@ class RobotSession:
             self._commands.actions,
             self._commands.confirmations,
             self._commands.parameters,
-            [self._recorder] if self._recorder else [],
+            [self.robot.keyed_entries, *([self._recorder] if self._recorder else [])],
         )
         self._turn = Turn(context, self.peer, self._ingest, self._commands, self.refresher)
         self.robot.on_late_reading = self._turn.run_late_reading

@@ -5,7 +5,7 @@ A kind without a row has that of its family. A display with keys `min`, `max`, `
 """
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from app.i18n import render
@@ -15,10 +15,14 @@ from app.panel.constants import parent_type
 from app.panel.template import response_paths
 from app.panel.widgets.displays import Indicator, Readout
 from app.panel.widgets.families import BaseWidget, Display, PublishCommand
+from app.panel.widgets.gauge import Gauge, SetpointField
+from app.panel.widgets.joints import Joints
 from app.panel.widgets.kinds import find_row
 from app.panel.widgets.parameter import Parameter
-from app.panel.widgets.publish import Confirm, SinglePublish
+from app.panel.widgets.publish import Confirm, PublishPress
 from app.panel.widgets.service_action import Action, Call, ServerCommand
+from app.panel.widgets.step import Step
+from app.panel.widgets.table import Table
 
 DEFAULT_QOS: Final = TopicQos()
 
@@ -88,7 +92,7 @@ def needs_of(widget: BaseWidget, interfaces: Interfaces) -> Iterator[Need]:
     yield from find_row(SIMULATED, widget)(widget, interfaces)
 
 
-def _shown(display: Display, values: tuple[Any, ...] = ()) -> Iterator[Need]:
+def _shown(display: Display, values: tuple[Any, ...] = ()) -> Iterator[Shown]:
     limits = {key: getattr(display, key, None) for key in ("min", "max")}
     numbers = {key: one for key, one in limits.items() if isinstance(one, int | float)}
     scale, offset = getattr(display, "scale", 1.0) or 1.0, getattr(display, "offset", 0.0)
@@ -110,7 +114,7 @@ def _shown(display: Display, values: tuple[Any, ...] = ()) -> Iterator[Need]:
     )
 
 
-def _readout(readout: Readout, interfaces: Interfaces) -> Iterator[Need]:
+def _readout(readout: Readout, interfaces: Interfaces) -> Iterator[Shown]:
     if readout.constants is None:
         return _shown(readout)
     constants = interfaces.constants(parent_type(readout, interfaces))
@@ -122,11 +126,42 @@ def _indicator(indicator: Indicator, _: Interfaces) -> Iterator[Need]:
     return _shown(indicator, tuple(state.value for state in indicator.states))
 
 
+def _gauge(gauge: Gauge, _: Interfaces) -> Iterator[Need]:
+    """In its normal range for the most part, and at times beyond the limit above."""
+    low, high = gauge.normal or (gauge.min, gauge.max)
+    if gauge.high is not None:
+        high = (gauge.high + (gauge.high_high or gauge.max)) / 2
+    ends = sorted((end - gauge.offset) / (gauge.scale or 1.0) for end in (low, high))
+    for shown in _shown(gauge):
+        yield replace(shown, low=ends[0], high=ends[1])
+    if isinstance(of := gauge.setpoint, SetpointField):
+        middle = (sum(gauge.normal or ends) / 2 - gauge.offset) / (gauge.scale or 1.0)
+        yield Shown(topic=of.topic, type=of.type, field=of.field, low=middle, high=middle)
+
+
+def _joints(widget: Joints, _: Interfaces) -> Iterator[Need]:
+    """Within the soft limits, and at times a little beyond the one above."""
+    for joint in widget.joints:
+        low, high = joint.low, joint.high
+        low = joint.min if low is None else low
+        high = joint.max if high is None else high + (joint.max - high) / 4
+        room, factor = 0.2 * (high - low), joint.shown_unit.factor
+        yield Shown(
+            topic=widget.topic,
+            type=widget.type,
+            field=widget.path(joint),
+            label=joint.name,
+            low=(low + room) / factor,
+            high=high / factor,
+            max_age_s=widget.max_age_s,
+        )
+
+
 def _published(command: PublishCommand, _: Interfaces) -> Iterator[Need]:
     yield Published(topic=command.topic, type=command.type, qos=command.qos)
 
 
-def _pressed(command: SinglePublish, _: Interfaces) -> Iterator[Need]:
+def _pressed(command: PublishPress, _: Interfaces) -> Iterator[Need]:
     yield Published(
         topic=command.topic,
         type=command.type,
@@ -134,6 +169,12 @@ def _pressed(command: SinglePublish, _: Interfaces) -> Iterator[Need]:
         template=command.template,
         confirm=command.confirm,
     )
+
+
+def _stepped(widget: Step, interfaces: Interfaces) -> Iterator[Need]:
+    yield from _pressed(widget, interfaces)
+    of, middle = widget.value, (widget.min + widget.max) / 2
+    yield Shown(topic=of.topic, type=of.type, field=of.field, low=middle, high=middle)
 
 
 def _server(command: ServerCommand, _: Interfaces) -> Iterator[Need]:
@@ -166,8 +207,12 @@ SIMULATED: Final[Mapping[type[BaseWidget], Callable[[Any, Interfaces], Iterator[
     Display: lambda of, _: _shown(of),
     Readout: _readout,
     Indicator: _indicator,
+    Gauge: _gauge,
+    Joints: _joints,
+    Table: lambda *_: iter(()),
     PublishCommand: _published,
-    SinglePublish: _pressed,
+    PublishPress: _pressed,
+    Step: _stepped,
     ServerCommand: _server,
     Call: _call,
     Action: _action,

@@ -1,26 +1,47 @@
 """What readouts and lamps show: pure, from (widget, robot, time)."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, NamedTuple, Protocol
 
 from app.clock import format_age, format_time
 from app.i18n import PanelText, TextLike, number, say
 from app.i18n.values import with_unit
+from app.panel.base import HasTopic, TopicQos
 from app.panel.values import same_value
-from app.panel.widgets.displays import Indicator, Readout
+from app.panel.widgets.displays import Indicator, LampState, Readout, WrittenNumber
 from app.panel.widgets.families import Display
 from app.permission.interlocks import topic_mismatch
 from app.printable import printable
-from app.robot.state import RobotState
+from app.robot.state import Reading, RobotState
 
 LONGEST_TEXT: Final = 200  # characters of a value that a readout shows
 LONGEST_NUMBER: Final = 32  # a larger one has an exponent, whatever its format
 NOTHING: Final = "—"
+NO_CONSTANTS: Final[Mapping[str, Any]] = {}
 
 State = Literal["waiting", "live", "old", "unreadable", "missing"]
 SHAPES: Final = {"waiting": "waiting", "old": "old", "unreadable": "unreadable", "missing": "waiting"}
+
+
+class ShownField(HasTopic, Protocol):
+    """A field of a topic: that of a display, or one of several that a widget shows."""
+
+    @property
+    def field(self) -> str: ...
+    @property
+    def max_age_s(self) -> float | None: ...
+
+
+class FieldOf(NamedTuple):
+    """One of several fields that a widget shows."""
+
+    topic: str
+    type: str
+    qos: TopicQos
+    field: str
+    max_age_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,8 +55,15 @@ class FieldState:
     until: float = math.inf
 
 
-def field_state(widget: Display, robot: RobotState, now: float) -> FieldState:
-    """What is known of a widget's field at `now`."""
+class ShownTopic(HasTopic, Protocol):
+    """A topic that is shown as a whole."""
+
+    @property
+    def max_age_s(self) -> float | None: ...
+
+
+def topic_state(widget: ShownTopic, robot: RobotState, now: float) -> FieldState:
+    """What is known of a topic at `now`, without a value: a state other than "missing"."""
     topic = widget.topic
     if doubt := topic_mismatch("MS", widget, robot):
         return FieldState("unreadable", doubt.reason or "")
@@ -44,19 +72,37 @@ def field_state(widget: Display, robot: RobotState, now: float) -> FieldState:
         return FieldState("unreadable", say("readout_unreadable", topic=topic, wanted=widget.type))
     if reading.fields is None:
         return FieldState("waiting", say("readout_waiting", topic=topic))
-    time = format_time(reading.wall)
+    return _dated(
+        reading,
+        FieldState("live", say("readout_time", time=format_time(reading.wall))),
+        widget.max_age_s,
+        now,
+    )
+
+
+def field_state(widget: ShownField, robot: RobotState, now: float) -> FieldState:
+    """What is known of a field at `now`; the panel must listen to its topic and read the field."""
+    seen = topic_state(widget, robot, now)
+    if seen.state in ("unreadable", "waiting"):
+        return seen
+    reading = robot.reading(widget.topic)
     value = reading.value(widget.field)
     if value is None:
         code = "readout_several" if reading.is_ambiguous(widget.field) else "readout_missing"
+        time = format_time(reading.wall)
         return FieldState("missing", say(code, field=widget.field, time=time))
-    seen = FieldState("live", say("readout_time", time=time), value)
+    return replace(seen, value=value)
+
+
+def _dated(reading: Reading, seen: FieldState, max_age_s: float | None, now: float) -> FieldState:
+    """What is known of a message that was received, by its age."""
     if reading.status == "cut":
-        return replace(seen, state="old", note=say("readout_cut", time=time))
-    if widget.max_age_s is None:
+        return replace(seen, state="old", note=say("readout_cut", time=format_time(reading.wall)))
+    if max_age_s is None:
         return seen
     old = now - reading.at
-    if old < widget.max_age_s:
-        return replace(seen, until=reading.at + widget.max_age_s)
+    if old < max_age_s:
+        return replace(seen, until=reading.at + max_age_s)
     step = 1 if old < 60 else 60
     until = reading.at + (old // step + 1) * step
     return replace(seen, state="old", note=say("readout_old", age=format_age(old)), until=until)
@@ -82,7 +128,7 @@ def indicator(widget: Indicator, robot: RobotState, now: float) -> tuple[dict[st
     What is not known now has a shape and a text of its own, and never a colour.
     """
     seen = field_state(widget, robot, now)
-    text, shape, colour = _lamp(widget, seen.value)
+    text, shape, colour = lamp_of(widget.states, seen.value)
     note = seen.note
     if seen.state != "live":
         if seen.state == "old":
@@ -92,24 +138,49 @@ def indicator(widget: Indicator, robot: RobotState, now: float) -> tuple[dict[st
     return shown, seen.until
 
 
-def _lamp(widget: Indicator, value: Any) -> tuple[TextLike, str, str]:
-    for state in widget.states:
+def lamp_of(states: Iterable[LampState], value: Any) -> tuple[TextLike, str, str]:
+    """Text, shape and colour of a value."""
+    for state in states:
         if same_value(state.value, value):
             return state.text, state.shape, state.colour
     return say("lamp_unknown", value=shown_value(value)), "unknown", "none"
 
 
 def _value(widget: Readout, value: Any, robot: RobotState) -> TextLike:
+    return cell_text(widget, value, robot.constants(widget) if widget.constants else NO_CONSTANTS)
+
+
+class WrittenValue(WrittenNumber, Protocol):
+    """What is written as a readout writes it."""
+
+    @property
+    def unit(self) -> str | PanelText: ...
+    @property
+    def constants(self) -> str | None: ...
+
+
+def cell_text(widget: WrittenValue, value: Any, constants: Mapping[str, Any]) -> TextLike:
+    """A value in a format and with its unit, or as the name of one of `constants`."""
     if widget.constants is not None:
-        return _constant(widget.constants, robot.constants(widget), value)
+        return _constant(widget.constants, constants, value)
     if not is_number(value):
         return written(value)
+    return written_number(scaled(widget, value), widget.format, widget.unit)
+
+
+def scaled(widget: WrittenNumber, value: float) -> float:
+    """The number that is shown for one in a message."""
     if (widget.scale, widget.offset) != (1.0, 0.0):
-        value = value * widget.scale + widget.offset
+        return value * widget.scale + widget.offset
+    return value
+
+
+def written_number(value: float, style: str | None = None, unit: str | PanelText = "") -> TextLike:
+    """A number that is shown, in a format of the panel file, as its reader's language writes it."""
     text = written(value)
-    if widget.format is not None and math.isfinite(value):
-        text = _formatted(value, widget.format)
-    return number(text, widget.unit)
+    if style is not None and math.isfinite(value):
+        text = _formatted(value, style)
+    return number(text, unit)
 
 
 def _formatted(value: float, given: str) -> str:

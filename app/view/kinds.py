@@ -7,17 +7,25 @@ from typing import Any, Final, TypedDict
 from app.i18n import TextLike, joined, say
 from app.panel.widgets.displays import Indicator, Readout
 from app.panel.widgets.families import BaseWidget, Command, Display, Input, PressCommand
+from app.panel.widgets.gauge import Gauge
 from app.panel.widgets.hold import Hold
+from app.panel.widgets.joints import Joints
 from app.panel.widgets.kinds import find_row
 from app.panel.widgets.numbers import Numeric
 from app.panel.widgets.parameter import Parameter
-from app.panel.widgets.publish import SinglePublish
+from app.panel.widgets.publish import PublishPress
 from app.panel.widgets.static import Static
+from app.panel.widgets.step import Step
+from app.panel.widgets.table import Table
 from app.permission.interlocks import PERMITTED, Verdict
 from app.robot.command_status import IDLE, CommandStatus
 from app.robot.state import RobotState
 from app.view.display_values import indicator, readout, value
+from app.view.gauge_values import gauge
+from app.view.joint_values import joints
 from app.view.parameter_values import parameter
+from app.view.step_values import step
+from app.view.table_values import table
 
 # The attributes of a widget, and when (monotonic seconds) time alone would change them.
 Attributes = dict[str, Any]
@@ -72,7 +80,7 @@ def _pressed(widget: PressCommand, robot: RobotState, verdict: Verdict, _: float
     return {**lock(widget, verdict), **came}, math.inf
 
 
-def _published(widget: SinglePublish, robot: RobotState, verdict: Verdict, now: float) -> Shown:
+def _published(widget: PublishPress, robot: RobotState, verdict: Verdict, now: float) -> Shown:
     if widget.confirm is not None:
         return _pressed(widget, robot, verdict, now)
     return lock(widget, verdict), math.inf
@@ -88,15 +96,25 @@ def _parameter(widget: Parameter, robot: RobotState, verdict: Verdict, now: floa
     return pressed | parameter(widget, robot), until
 
 
+def _stepped(widget: Step, robot: RobotState, verdict: Verdict, now: float) -> Shown:
+    pressed, _ = _pressed(widget, robot, verdict, now)
+    reported, until = step(widget, robot, now)
+    return pressed | reported, until
+
+
 SHOWN: Final[Mapping[type[BaseWidget], Callable[[Any, RobotState, Verdict, float], Shown]]] = {
     Static: lambda of, robot, verdict, now: ({}, math.inf),
     Input: lambda of, robot, verdict, now: ({}, math.inf),
     Numeric: lambda of, robot, verdict, now: ({"limits": of.limits_text}, math.inf),
     PressCommand: _pressed,
-    SinglePublish: _published,
+    PublishPress: _published,
+    Step: _stepped,
     Hold: _held,
     Parameter: _parameter,
     Display: lambda of, robot, verdict, now: value(of, robot, now),
     Readout: lambda of, robot, verdict, now: readout(of, robot, now),
     Indicator: lambda of, robot, verdict, now: indicator(of, robot, now),
+    Gauge: lambda of, robot, verdict, now: gauge(of, robot, now),
+    Joints: lambda of, robot, verdict, now: joints(of, robot, now),
+    Table: lambda of, robot, verdict, now: table(of, robot, now),
 }

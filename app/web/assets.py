@@ -19,6 +19,7 @@ from typing import Final
 LAYERS: Final = ("tokens", "base", "layout", "widgets", "keys", "floor")
 OF_KINDS: Final = {
     "entries": frozenset({"text", "number", "slider", "select", "toggle", "parameter"}),
+    "marks": frozenset({"gauge", "joints"}),
 }
 OWN_PAGE: Final = "log"
 LATER: Final = "keypad"  # comes with the script that needs it

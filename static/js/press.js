@@ -85,6 +85,8 @@ export class Presser {
     const isCancel = button.matches(".cancel");
     if (isCancel) click.press = byPointer ? this.#goal : button.value;
     const inputs = enteredValues(); // of this moment: a dialog confirms these
+    // The key of a step has the value that was shown when the finger went down.
+    if (button.matches(".step-key")) inputs[button.name] = Number(byPointer ? this.#goal : button.value);
     if (isCancel || !root.querySelector("dialog.ask")) this.#press(root, button, inputs, click);
     else this.#confirm(root, button.form, (yes) => this.#press(root, button, inputs, this.#moment(yes)));
   }

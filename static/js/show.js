@@ -24,11 +24,17 @@ function setOnlyText(element, text) {
   } else if (node || text) element.textContent = text;
 }
 
+// What is locked with a widget: its key, or both of a step. It can always be canceled, and read again.
+function keysOf(root) {
+  return [...root.querySelectorAll("button[type=submit]:not(.cancel, .read), .hold")];
+}
+
 // How an attribute is shown. One that is not here has a place in the markup: `data-text` for a text,
 // `data-value` for the value of an element such as a meter, or an attribute of the widget's root.
 const SHOW = {
   enabled: (root, value) => {
-    root.querySelector("button[type=submit], .hold").disabled = !value;
+    root.toggleAttribute("data-locked", !value);
+    for (const key of keysOf(root)) key.disabled = !value || key.hasAttribute("data-end");
     if (!value) root.querySelector("dialog.ask")?.close();
   },
   stoppable: (root, value) => {
@@ -73,7 +79,7 @@ export function bar(root, reason) {
     return;
   }
   const text = (name) => root.querySelector(`[data-text="${name}"]`)?.textContent;
-  const said = { enabled: !root.querySelector("button[type=submit], .hold").disabled, reason: text("reason"), reasons: text("reasons"), more: text("more") };
+  const said = { enabled: keysOf(root).some((key) => !key.disabled), reason: text("reason"), reasons: text("reasons"), more: text("more") };
   for (const [name, value] of Object.entries({ enabled: false, reason, reasons: reason, more: "" })) showAttribute(root, name, value);
   barred.set(root, { said, times: 1 });
 }

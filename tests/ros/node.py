@@ -5,6 +5,7 @@ kept until `heard` asks.
 """
 
 import contextlib
+import re
 import sys
 import threading
 import time
@@ -35,10 +36,23 @@ def fields_of(value: Any) -> Any:
 
 
 def filled(message: Any, fields: dict[str, Any]) -> Any:
+    types = message.get_fields_and_field_types()
     for name, value in fields.items():
-        inner = getattr(message, name)
-        setattr(message, name, filled(inner, value) if isinstance(value, dict) else value)
+        setattr(message, name, made(getattr(message, name), value, types[name]))
     return message
+
+
+def made(inner: Any, value: Any, type_name: str) -> Any:
+    """A field from its JSON value; its type is named as rclpy names it."""
+    if isinstance(value, dict):
+        return filled(inner, value)
+    if type_name == "octet":
+        return bytes([value])
+    if isinstance(value, list) and value and isinstance(value[0], dict):
+        package, _, name = type_name.removeprefix("sequence<").partition("/")
+        element = type_named(f"{package}/msg/{re.split('[,>]', name)[0]}")
+        return [filled(element(), one) for one in value]
+    return value
 
 
 def qos_of(given: dict[str, Any]) -> QoSProfile:

@@ -75,6 +75,7 @@ NO_LINK = frozenset(
     {
         "permitted",
         "forbidden",
+        "step_outside",
         "unmet",
         "busy",
         "perhaps_busy",

@@ -19,6 +19,7 @@ from app.panel.template import NOW
 from app.panel.widgets.families import (
     BaseWidget,
     CheckContext,
+    Command,
     DisplayWidget,
     EntryWidget,
     Input,
@@ -28,7 +29,7 @@ from app.panel.widgets.families import (
 )
 from app.panel.widgets.inputs import TextInput
 from app.panel.widgets.parameter import Parameter, type_faults
-from app.panel.widgets.publish import Confirm, SinglePublish
+from app.panel.widgets.publish import Confirm, PublishPress
 from app.panel.widgets.service_action import Action
 
 
@@ -229,12 +230,12 @@ def _topic_conflicts(panel: Panel, reported: Sequence[str]) -> Iterator[Fault]:
     confirms: list[tuple[str, Confirm]] = []
     places += [(f"interlock[{i}]", one) for i, one in enumerate(panel.interlocks)]
     for place, widget in _widgets_with_places(panel):
-        if isinstance(widget, DisplayWidget):
+        if isinstance(widget, DisplayWidget | Command):
             at = ((f"{place}.{source.place}".rstrip("."), source) for source in widget.sources())
             places.extend(at)
-        elif isinstance(widget, TopicWidget):
+        if isinstance(widget, TopicWidget) and not isinstance(widget, DisplayWidget):
             places.append((place, widget))
-        if isinstance(widget, SinglePublish) and widget.confirm and widget.confirm.type:
+        if isinstance(widget, PublishPress) and widget.confirm and widget.confirm.type:
             confirms.append((f"{place}.confirm", widget.confirm))
     firsts: dict[str, tuple[str, Interlock | TopicWidget | TopicSource | Confirm]] = {}
     for place, one in (*places, *confirms):

@@ -5,11 +5,15 @@ from dataclasses import dataclass
 from typing import Any, Final, Self
 
 from app.panel.widgets.families import BaseWidget, Display, Input, KeyCommand
+from app.panel.widgets.gauge import Gauge
+from app.panel.widgets.joints import Joints
 from app.panel.widgets.kinds import find_row
 from app.panel.widgets.numbers import NumberInput, SliderInput
 from app.panel.widgets.parameter import Parameter
 from app.panel.widgets.service_action import Action
 from app.panel.widgets.static import PageLink, TextLabel
+from app.panel.widgets.step import Step
+from app.panel.widgets.table import Table
 
 WIDE, MIDDLE, NARROW = 1200, 900, 600  # from these widths on a page has all columns, two, one
 KEY_MM, ENTRY_MM, GAP_MM = 20.0, 14.0, 5.0
@@ -24,6 +28,15 @@ PARAMETER_WIDTH: Final = 314.0  # its entry and its key side by side
 SLIDER_WIDTH: Final = 200.0
 NUMBER_WIDTH: Final = 100.0
 DISPLAY_WIDTH: Final = 80.0
+UPRIGHT_GAUGE, LOW_UPRIGHT_GAUGE, LYING_GAUGE = 124.0, 108.0, 92.0
+GAUGE_WIDTH: Final = 130.0
+JOINTS_FRAME: Final = 41.0  # name and note
+JOINT, LOW_JOINT = 34.0, 25.0
+JOINTS_WIDTH: Final = 220.0
+TABLE_FRAME: Final = 69.0  # name, heads of the columns and note
+ROW, LOW_ROW = 36.0, 30.0
+TABLE_WIDTH: Final = 280.0
+STEP_VALUE: Final = 116.0  # the value between the keys
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +75,8 @@ class Screen:
 
 def height_of(widget: BaseWidget, screen: Screen) -> float:
     """The height of one widget, with what stands above and below it."""
-    return find_row(SIZES, widget)[0](screen)
+    own = OWN_HEIGHTS.get(type(widget))
+    return find_row(SIZES, widget)[0](screen) if own is None else own(widget, screen)
 
 
 def width_needed(widget: BaseWidget, screen: Screen) -> float:
@@ -100,4 +114,28 @@ SIZES: Final[Mapping[type[Any], tuple[Size, Size]]] = {
     NumberInput: (_entry, lambda of: NUMBER_WIDTH),
     SliderInput: (_entry, lambda of: SLIDER_WIDTH),
     Parameter: (lambda of: PARAMETER + of.touch(ENTRY_MM), lambda of: PARAMETER_WIDTH),
+    Gauge: (lambda of: UPRIGHT_GAUGE, lambda of: GAUGE_WIDTH),
+    Joints: (lambda of: JOINTS_FRAME, lambda of: JOINTS_WIDTH),
+    Step: (_key, lambda of: 2 * KEY_MM * of.mm + STEP_VALUE),
+    Table: (lambda of: TABLE_FRAME, lambda of: TABLE_WIDTH),
+}
+
+
+def _gauge(gauge: Gauge, screen: Screen) -> float:
+    if gauge.orientation == "horizontal":
+        return LYING_GAUGE
+    return LOW_UPRIGHT_GAUGE if screen.height <= LOW_SCREEN else UPRIGHT_GAUGE
+
+
+def _joints(widget: Joints, screen: Screen) -> float:
+    return JOINTS_FRAME + len(widget.joints) * (LOW_JOINT if screen.height <= LOW_SCREEN else JOINT)
+
+
+# Heights of the kinds in which they depend on the widget's keys.
+OWN_HEIGHTS: Final[Mapping[type[Any], Callable[[Any, Screen], float]]] = {
+    Gauge: _gauge,
+    Joints: _joints,
+    Table: lambda of, screen: (
+        TABLE_FRAME + of.rows_shown * (LOW_ROW if screen.height <= LOW_SCREEN else ROW)
+    ),
 }

@@ -16,6 +16,8 @@ PATTERNS: Final[Mapping[str, str]] = {
     "format": 'is not a format: it must be like ".1f", "+.2e" or ",d"',
     "constants": "is not how names of constants start: it must be like STATUS_",
     "parameter": "is not the name of a parameter: it has no spaces",
+    "name": "is not a name that a message can have: it has control characters",
+    "names": 'is not the name of a field: it has a-z, 0-9 and "_"',
     "default": "has a NUL character, at which a ROS string ends",
 }
 # The elements of a list, by its key.
@@ -25,6 +27,8 @@ LIST_WORDS: Final[Mapping[str, str]] = {
     "topics": 'topics: write ["/battery"]',
     "options": 'tables, like [{ value = 1, label = "One" }]',
     "states": 'tables, like [{ value = 0, text = "Idle", shape = "circle" }]',
+    "joint": "tables: write [[page.widget.joint]]",
+    "column": "tables: write [[page.widget.column]]",
     "page": "tables: write [[page]]",
     "group": "tables: write [[page.group]]",
     "widget": "tables: write [[page.widget]]",

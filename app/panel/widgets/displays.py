@@ -1,7 +1,7 @@
 """The descriptions of displays: readouts and lamps."""
 
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, Final, Literal, Self
+from typing import Annotated, Any, Final, Literal, Protocol, Self
 
 from pydantic import AfterValidator, BeforeValidator, Field
 
@@ -11,7 +11,7 @@ from app.i18n.values import alike
 from app.interfaces import INTEGER_RANGES, Interfaces
 from app.interfaces.validation import format_value
 from app.panel.base import Description, Label, Span, non_empty
-from app.panel.constants import NUMBERS, parent_type, unknown_constant, value_mismatch
+from app.panel.constants import NUMBERS, HasField, parent_type, unknown_constant, value_mismatch
 from app.panel.faults.wording import list_names
 from app.panel.widgets.families import Display
 from app.panel.widgets.numbers import Unit
@@ -35,7 +35,7 @@ class Readout(Display):
 
     def value_faults(self, place: str, field_type: str, interfaces: Interfaces) -> Iterator[Fault]:
         yield from _number_faults(place, self, field_type)
-        yield from _constant_faults(place, self, interfaces)
+        yield from constant_faults(place, self, interfaces)
 
 
 def _check_state_value(given: Any) -> Any:
@@ -62,7 +62,7 @@ class Indicator(Display):
     span: Span = 4
 
     def value_faults(self, place: str, field_type: str, interfaces: Interfaces) -> Iterator[Fault]:
-        yield from _state_faults(place, self, field_type, interfaces)
+        yield from state_faults(place, self, field_type, interfaces, "an indicator")
 
     def with_constants(self, interfaces: Interfaces) -> Self:
         kind = interfaces.field_type(self.type, self.field)
@@ -95,17 +95,42 @@ def _number_faults(place: str, readout: Readout, kind: str) -> Iterator[Fault]:
         elif given and readout.constants is not None:
             what = "is for numbers; constants are shown by their names"
             yield Fault(f"{place}.{key}", what, cause=f"number {place}")
+    yield from format_fault(place, readout, kind)
+
+
+class WrittenNumber(Protocol):
+    """What is written with a format."""
+
+    @property
+    def format(self) -> str | None: ...
+    @property
+    def scale(self) -> float: ...
+    @property
+    def offset(self) -> float: ...
+
+
+def format_fault(place: str, widget: WrittenNumber, kind: str) -> Iterator[Fault]:
+    """A fault of a format for whole numbers, where the number is none."""
+    scaled = (widget.scale, widget.offset) != (1.0, 0.0)
     if (
-        readout.format
-        and readout.format.endswith("d")
+        widget.format
+        and widget.format.endswith("d")
         and kind in NUMBERS
         and (scaled or kind not in INTEGER_RANGES)
     ):
         what = "a scaled number" if scaled else kind
-        yield Fault(f"{place}.format", f'"{readout.format}" is for whole numbers; this is {what}')
+        yield Fault(f"{place}.format", f'"{widget.format}" is for whole numbers; this is {what}')
 
 
-def _constant_faults(place: str, readout: Readout, interfaces: Interfaces) -> Iterator[Fault]:
+class NamedByConstants(HasField, Protocol):
+    """What shows a number by the name of a constant."""
+
+    @property
+    def constants(self) -> str | None: ...
+
+
+def constant_faults(place: str, readout: NamedByConstants, interfaces: Interfaces) -> Iterator[Fault]:
+    """Faults of a prefix of constants."""
     if readout.constants is None:
         return
     type_name = parent_type(readout, interfaces)
@@ -122,11 +147,19 @@ def _constant_faults(place: str, readout: Readout, interfaces: Interfaces) -> It
             return
 
 
-def _state_faults(
-    place: str, indicator: Indicator, kind: str, interfaces: Interfaces
+class HasStates(HasField, Protocol):
+    """What tells values apart by lamps."""
+
+    @property
+    def states(self) -> tuple[LampState, ...]: ...
+
+
+def state_faults(
+    place: str, indicator: HasStates, kind: str, interfaces: Interfaces, who: str
 ) -> Iterator[Fault]:
+    """Faults of states for a field of this type; `who` has them."""
     if kind in ("float32", "float64"):
-        what = "an indicator is for whole numbers, bools and texts"
+        what = f"{who} is for whole numbers, bools and texts"
         yield Fault(f"{place}.field", f'"{indicator.field}" is {kind}: {what}')
         return
     looks = [(state.shape, state.text) for state in indicator.states]

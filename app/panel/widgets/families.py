@@ -144,6 +144,20 @@ class TopicWidget(BaseWidget):
     qos: TopicQos = TopicQos()
 
 
+class TopicField(Description):
+    """A field of a topic of its own, which a widget reads beside or instead of its topic."""
+
+    topic: Topic
+    type: Type
+    field: FieldPath = "data"
+    max_age_s: Seconds | None = None
+    qos: TopicQos = TopicQos()
+
+    def source(self, place: str) -> TopicSource:
+        """Its topic; `place` is its table below the widget's."""
+        return TopicSource(self.topic, self.type, self.qos, (self.field,), place)
+
+
 class DisplayWidget(BaseWidget):
     """A widget that shows what topics say, of one robot."""
 
@@ -198,6 +212,10 @@ class Command(BaseWidget):
     """A widget that sends commands to the robot while its interlocks permit."""
 
     interlocks: Interlocks = Field(default=(), alias="interlock")
+
+    def sources(self) -> Iterator[TopicSource]:
+        """The topics whose values it needs, beside its interlocks'."""
+        yield from ()
 
     @abstractmethod
     def templates(self) -> list[Any]:

@@ -7,13 +7,17 @@ from pydantic import Field
 
 from app.panel.widgets.displays import Indicator, Readout
 from app.panel.widgets.families import BaseWidget
+from app.panel.widgets.gauge import Gauge
 from app.panel.widgets.hold import Hold
 from app.panel.widgets.inputs import SelectInput, TextInput, ToggleInput
+from app.panel.widgets.joints import Joints
 from app.panel.widgets.numbers import NumberInput, SliderInput
 from app.panel.widgets.parameter import Parameter
 from app.panel.widgets.publish import Publish
 from app.panel.widgets.service_action import Action, Call
 from app.panel.widgets.static import PageLink, Picture, TextLabel
+from app.panel.widgets.step import Step
+from app.panel.widgets.table import Table
 
 KINDS: Final[Mapping[str, type[BaseWidget]]] = {
     "text": TextInput,
@@ -23,11 +27,15 @@ KINDS: Final[Mapping[str, type[BaseWidget]]] = {
     "toggle": ToggleInput,
     "publish": Publish,
     "hold": Hold,
+    "step": Step,
     "call": Call,
     "action": Action,
     "parameter": Parameter,
     "readout": Readout,
     "indicator": Indicator,
+    "gauge": Gauge,
+    "joints": Joints,
+    "table": Table,
     "label": TextLabel,
     "image": Picture,
     "link": PageLink,

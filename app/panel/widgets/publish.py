@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterator
-from typing import Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from app.errors import Fault, FieldError
 from app.interfaces import Interfaces
@@ -26,20 +26,18 @@ class Confirm(Description):
     within_s: Seconds = 2.0
 
 
-class SinglePublish(TemplateCommand, PublishCommand):
-    """A press that publishes a message. With `one_shot` it is locked until its effect is confirmed, or
-    the time for that is over."""
-
-    message: dict[str, Any]
-    confirm: Confirm | None = None
-    one_shot: bool = False
-    span: Span = 4
+class PublishPress(TemplateCommand, PublishCommand):
+    """A press that publishes one message. With `one_shot` it is locked until its effect is confirmed,
+    or the time for that is over."""
 
     template_key: ClassVar[str] = "message"
 
-    @property
-    def template(self) -> dict[str, Any]:
-        return self.message
+    if TYPE_CHECKING:
+
+        @property
+        def confirm(self) -> Confirm | None: ...
+        @property
+        def one_shot(self) -> bool: ...
 
     @property
     def one_at_a_time(self) -> bool:
@@ -55,6 +53,19 @@ class SinglePublish(TemplateCommand, PublishCommand):
 
     def templates(self) -> list[Any]:
         return [self.template, *([self.confirm.equals] if self.confirm else [])]
+
+
+class SinglePublish(PublishPress):
+    """A press that publishes a message of the panel file."""
+
+    message: dict[str, Any]
+    confirm: Confirm | None = None
+    one_shot: bool = False
+    span: Span = 4
+
+    @property
+    def template(self) -> dict[str, Any]:
+        return self.message
 
     def response_faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
         if self.confirm is not None:

@@ -1,0 +1,192 @@
+"""A table of the entries of a list: diagnostics, a queue."""
+
+from collections.abc import Iterator
+from typing import Annotated, Final, Literal, NamedTuple, Self
+
+from pydantic import AfterValidator, Field
+
+from app.errors import Fault
+from app.i18n import PanelText
+from app.interfaces import Interfaces
+from app.panel.base import Description, FieldPath, Label, Seconds, Span, non_empty
+from app.panel.checks.types import field_faults
+from app.panel.constants import NUMBERS, parent_type
+from app.panel.widgets.displays import (
+    FORMAT,
+    LampState,
+    constant_faults,
+    format_fault,
+    resolve_state_value,
+    state_faults,
+)
+from app.panel.widgets.families import CheckContext, DisplayWidget, TopicSource, TopicWidget
+from app.panel.widgets.numbers import Unit
+
+MAX_COLUMNS: Final = 8
+MAX_ROWS: Final = 20
+MAX_ENTRIES: Final = 200
+
+ListPath = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]*(\.[a-z][a-z0-9_]*)*$", max_length=200)]
+
+
+class Column(Description):
+    """One column: a field of each entry, or the entry itself where that is a single value."""
+
+    label: Label
+    field: FieldPath | None = None
+    format: Annotated[str, Field(pattern=FORMAT)] | None = None
+    unit: Unit = ""
+    constants: Annotated[str, Field(pattern=r"^[A-Z][A-Z0-9_]*$")] | None = None
+    states: Annotated[tuple[LampState, ...], Field(strict=False)] = ()
+    width: Annotated[int, Field(ge=1, le=12)] = 1
+
+
+class Sort(Description):
+    """Which entries come first: by a field of theirs, or those that were received last."""
+
+    first: Literal["largest", "smallest", "newest"]
+    by: FieldPath | None = None
+
+
+class ColumnField(NamedTuple):
+    """A column's field of one entry, as a readout or a lamp has its field."""
+
+    type: str
+    field: str
+    format: str | None
+    unit: str | PanelText
+    constants: str | None
+    states: tuple[LampState, ...]
+    scale: float = 1.0
+    offset: float = 0.0
+
+
+class Table(TopicWidget, DisplayWidget):
+    """Shows the first `rows_shown` entries of a list. With a `key`, the latest entry for each of its
+    values is kept, as several messages bring them."""
+
+    kind: Literal["table"]
+    field: ListPath
+    columns: Annotated[
+        tuple[Column, ...],
+        Field(strict=False, alias="column", max_length=MAX_COLUMNS),
+        AfterValidator(non_empty),
+    ]
+    rows_shown: Annotated[int, Field(ge=1, le=MAX_ROWS)] = 5
+    entries_read: Annotated[int, Field(ge=1, le=MAX_ENTRIES)] = 50
+    sort: Sort | None = None
+    key: FieldPath | None = None
+    max_age_s: Seconds | None = None
+    span: Span = 12
+
+    def path(self, entry: int, field: str | None) -> str:
+        """The path of a field of one entry."""
+        return f"{self.field}[{entry}].{field}" if field else f"{self.field}[{entry}]"
+
+    @property
+    def own_fields(self) -> tuple[str | None, ...]:
+        """The fields of an entry that are read: those of the columns, then those of sort and key."""
+        by = None if self.sort is None else self.sort.by
+        others = [field for field in (by, self.key) if field is not None]
+        return tuple(dict.fromkeys([*(column.field for column in self.columns), *others]))
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """The paths of these fields of all entries that are read."""
+        entries = range(self.entries_read)
+        return tuple(self.path(entry, field) for entry in entries for field in self.own_fields)
+
+    @property
+    def widths(self) -> list[float]:
+        """The widths of the columns, in percent."""
+        whole = sum(column.width for column in self.columns)
+        return [round(100 * column.width / whole, 2) for column in self.columns]
+
+    def column_field(self, column: Column) -> ColumnField:
+        """A column's field, of the first entry."""
+        path = self.path(0, column.field)
+        keys = (column.format, column.unit, column.constants, column.states)
+        return ColumnField(self.type, path, *keys)
+
+    def sources(self) -> Iterator[TopicSource]:
+        yield TopicSource(self.topic, self.type, self.qos, () if self.key else self.paths)
+
+    def with_constants(self, interfaces: Interfaces) -> Self:
+        columns = tuple(self._resolved(column, interfaces) for column in self.columns)
+        return self.model_copy(update={"columns": columns})
+
+    def _resolved(self, column: Column, interfaces: Interfaces) -> Column:
+        if not column.states:
+            return column
+        of = self.column_field(column)
+        kind = interfaces.field_type(of.type, of.field)
+        constants = interfaces.constants(parent_type(of, interfaces))
+        states = [
+            one.model_copy(update={"value": resolve_state_value(one.value, kind, constants)})
+            for one in column.states
+        ]
+        return column.model_copy(update={"states": tuple(states)})
+
+    def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
+        interfaces = checking.interfaces
+        faults = list(field_faults(place, self.type, self.field, interfaces))
+        yield from faults
+        if faults:
+            return
+        kind = interfaces.type_at(self.type, self.field)
+        if kind.container != "sequence":
+            what = f'"{self.field}" is {kind}: a table is for a list of any length'
+            yield Fault(f"{place}.field", what)
+            return
+        if kind.size and self.entries_read > kind.size:
+            what = f'"{self.field}" has {kind.size} entries at most: read no more'
+            yield Fault(f"{place}.entries_read", what)
+            return
+        for c, column in enumerate(self.columns):
+            yield from self._column_faults(f"{place}.column[{c}]", column, interfaces)
+        yield from self._order_faults(place, interfaces)
+
+    def _column_faults(self, place: str, column: Column, interfaces: Interfaces) -> Iterator[Fault]:
+        of = self.column_field(column)
+        faults = list(self._entry_faults(f"{place}.field", column.field, interfaces))
+        yield from faults
+        if faults:
+            return
+        kind = interfaces.field_type(of.type, of.field)
+        if column.states:
+            yield from state_faults(place, of, kind, interfaces, "a column with states")
+            for key in ("format", "unit", "constants"):
+                if getattr(column, key):
+                    yield Fault(f"{place}.{key}", "is not for a column with states: they are its texts")
+            return
+        for key in ("format", "unit"):
+            if getattr(column, key) and kind not in NUMBERS:
+                yield Fault(
+                    f"{place}.{key}", f'is for numbers; "{column.field or self.field}" is {kind}'
+                )
+                return
+        yield from format_fault(place, of, kind)
+        yield from constant_faults(place, of, interfaces)
+
+    def _entry_faults(self, place: str, field: str | None, interfaces: Interfaces) -> Iterator[Fault]:
+        """Faults of a field of each entry, which must be a single value."""
+        path = self.path(0, field)
+        for fault in field_faults("", self.type, path, interfaces):
+            yield Fault(place, fault.message)
+            return
+        kind = interfaces.type_at(self.type, path)
+        if kind.is_nested or kind.container != "one":
+            named = f'"{field}" of an entry' if field else "an entry"
+            yield Fault(place, f"{named} is {kind}: a cell shows one value of it, not all")
+
+    def _order_faults(self, place: str, interfaces: Interfaces) -> Iterator[Fault]:
+        if self.key is not None:
+            yield from self._entry_faults(f"{place}.key", self.key, interfaces)
+        sort = self.sort
+        if sort is None:
+            return
+        if (sort.first == "newest") != (sort.by is None):
+            what = "is for the largest or smallest" if sort.by else "is missing: the field that tells"
+            yield Fault(f"{place}.sort.by", what)
+        elif sort.by is not None:
+            yield from self._entry_faults(f"{place}.sort.by", sort.by, interfaces)

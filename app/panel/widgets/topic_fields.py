@@ -1,0 +1,19 @@
+"""Checks of fields that a widget reads beside its own."""
+
+from collections.abc import Iterator
+
+from app.errors import Fault
+from app.interfaces import Interfaces
+from app.panel.checks.types import field_faults
+from app.panel.constants import NUMBERS
+from app.panel.widgets.families import TopicField
+
+
+def number_field_faults(
+    place: str, of: TopicField, what: str, interfaces: Interfaces
+) -> Iterator[Fault]:
+    """Faults of a field that must be one number; `what` is it, with its article."""
+    faults = list(field_faults(place, of.type, of.field, interfaces))
+    yield from faults
+    if not faults and (found := interfaces.field_type(of.type, of.field)) not in NUMBERS:
+        yield Fault(f"{place}.field", f'"{of.field}" is {found}: {what} is a number')

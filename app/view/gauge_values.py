@@ -1,0 +1,84 @@
+"""What a gauge shows: pure, from (widget, robot, time)."""
+
+import math
+from typing import Any, Final
+
+from app.i18n import TextLike, say
+from app.panel.widgets.gauge import Gauge, SetpointField
+from app.robot.state import RobotState
+from app.view.display_values import NOTHING, FieldState, field_state, scaled, written_number
+
+NEAR: Final = 1e-6  # relative: a float32 is the nearest to a limit, not the limit itself
+HARDEST_FIRST: Final = ("low_low", "high_high", "low", "high")
+
+Attributes = dict[str, Any]
+
+
+def gauge(widget: Gauge, robot: RobotState, now: float) -> tuple[Attributes, float]:
+    """Attributes of a gauge, and when they change.
+
+    `state`, `text` (the number) and `note`; `level` is the limit that it is beyond, "abnormal" outside
+    the normal range, or "normal"; `said` names that limit, `target` the set-point. `pointer` and
+    `setpoint` are in percent of the scale, None where they are unknown; `beyond` is "below" or "above"
+    for a value beyond the scale.
+    """
+    seen = field_state(widget, robot, now)
+    target, set_at, until = _setpoint(widget, robot, now)
+    shown = _shown(widget, seen) | {"target": target, "setpoint": set_at}
+    return shown, min(seen.until, until)
+
+
+def _shown(widget: Gauge, seen: FieldState) -> Attributes:
+    shown: Attributes = {"state": seen.state, "note": seen.note, "text": NOTHING, "said": ""}
+    shown |= {"level": "", "pointer": None, "beyond": ""}
+    if seen.value is None:
+        return shown
+    value = scaled(widget, seen.value)
+    if math.isnan(value):
+        return shown | {"state": "unreadable", "note": say("gauge_no_number")}
+    shown |= {"text": written_number(value, widget.format), "pointer": widget.percent(value)}
+    if value < widget.min or value > widget.max:
+        shown["beyond"] = "below" if value < widget.min else "above"
+    if seen.state == "live":
+        shown["level"], shown["said"] = _level(widget, value)
+        if shown["beyond"] and shown["level"] in ("normal", "abnormal"):
+            shown["level"], shown["said"] = "abnormal", say(f"gauge_{shown['beyond']}")
+    return shown
+
+
+def _level(widget: Gauge, value: float) -> tuple[str, TextLike]:
+    """The hardest limit that a value is beyond, and what is said of it."""
+    for name in HARDEST_FIRST:
+        limit = getattr(widget, name)
+        if limit is not None and is_beyond(value, limit, below=name.startswith("low")):
+            return name, say(f"gauge_{name}", limit=written_number(limit, widget.format))
+    low, high = widget.normal or (-math.inf, math.inf)
+    for limit, below in ((low, True), (high, False)):
+        if is_beyond(value, limit, below=below):
+            code = "gauge_below_normal" if below else "gauge_above_normal"
+            return "abnormal", say(code, limit=written_number(limit, widget.format))
+    return "normal", ""
+
+
+def is_beyond(value: float, limit: float, *, below: bool) -> bool:
+    """Whether a value is on the wrong side of a limit; at the limit it is not."""
+    if math.isclose(value, limit, rel_tol=NEAR, abs_tol=0.0):
+        return False
+    return value < limit if below else value > limit
+
+
+def _setpoint(widget: Gauge, robot: RobotState, now: float) -> tuple[TextLike, float | None, float]:
+    """What is said of the set-point, where it is on the scale, and when that changes."""
+    if widget.setpoint is None:
+        return "", None, math.inf
+    if not isinstance(widget.setpoint, SetpointField):
+        written = written_number(widget.setpoint, widget.format)
+        return say("gauge_setpoint", value=written), widget.percent(widget.setpoint), math.inf
+    seen = field_state(widget.setpoint, robot, now)
+    value = math.nan if seen.value is None else scaled(widget, seen.value)
+    if math.isnan(value):
+        return say("gauge_setpoint_unknown"), None, seen.until
+    written = written_number(value, widget.format)
+    if seen.state != "live":
+        return say("gauge_setpoint_old", value=written), None, seen.until
+    return say("gauge_setpoint", value=written), widget.percent(value), seen.until

@@ -1,0 +1,89 @@
+"""What bars of joints show: pure, from (widget, robot, time)."""
+
+import math
+from typing import Any, Final
+
+from app.i18n import TextLike, number, say
+from app.panel.values import number_text
+from app.panel.widgets.joints import Joint, Joints
+from app.robot.state import RobotState
+from app.view.display_values import NOTHING, FieldOf, FieldState, field_state, written_number
+from app.view.gauge_values import is_beyond
+
+# From the hardest: beyond the mechanical range, beyond a soft limit, near one.
+LEVELS: Final = ("low_low", "high_high", "low", "high", "missing", "near")
+
+
+def joints(widget: Joints, robot: RobotState, now: float) -> tuple[dict[str, Any], float]:
+    """Attributes of bars, and when they change.
+
+    `state` and `note` are of the message; `said` names the joint with the hardest level, and how many
+    more have one. Of each joint in their order: `joint_values` (texts without unit), `joint_bars`
+    (percent of the range, None where unknown) and `joint_levels` ("normal", "near", "low" and "high"
+    beyond a soft limit, "low_low" and "high_high" beyond the range, "missing", "" where unknown).
+    """
+    seen = [field_state(_field(widget, joint), robot, now) for joint in widget.joints]
+    whole = next((one for one in seen if one.state != "missing"), seen[0])
+    shown = [_joint(widget, *pair) for pair in zip(widget.joints, seen, strict=True)]
+    values, bars, levels, words = zip(*shown, strict=True)
+    attributes = {
+        "state": whole.state,
+        "note": whole.note if whole.state != "missing" else say("joint_none"),
+        "said": _hardest(levels, words),
+        "joint_values": list(values),
+        "joint_bars": list(bars),
+        "joint_levels": list(levels),
+    }
+    return attributes, min(one.until for one in seen)
+
+
+def _field(widget: Joints, joint: Joint) -> FieldOf:
+    return FieldOf(widget.topic, widget.type, widget.qos, widget.path(joint), widget.max_age_s)
+
+
+def _joint(
+    widget: Joints, joint: Joint, seen: FieldState
+) -> tuple[TextLike, float | None, str, TextLike]:
+    """Its value, its bar, its level and what is said of that."""
+    label = joint.shown_label
+    if seen.state == "missing":
+        return say("joint_missing"), None, "missing", say("joint_is_missing", joint=label)
+    if seen.value is None:
+        return NOTHING, None, "", ""
+    value = seen.value * joint.shown_unit.factor
+    text = written_number(value, widget.format)
+    if math.isnan(value):
+        return text, None, "missing", say("joint_is_missing", joint=label)
+    if seen.state != "live":
+        return text, joint.percent(value), "", ""
+    level, limit = _level(joint, value)
+    words = (
+        say(f"joint_{level}", joint=label, limit=number(number_text(limit)))
+        if level != "normal"
+        else ""
+    )
+    return text, joint.percent(value), level, words
+
+
+def _level(joint: Joint, value: float) -> tuple[str, float]:
+    """The hardest level of a value, and the limit that it is beyond or near."""
+    for level, limit in (("low_low", joint.min), ("high_high", joint.max)):
+        if is_beyond(value, limit, below=level == "low_low"):
+            return level, limit
+    for level, soft in (("low", joint.low), ("high", joint.high)):
+        if soft is not None and is_beyond(value, soft, below=level == "low"):
+            return level, soft
+    for soft in (joint.low, joint.high):
+        if soft is not None and abs(value - soft) < joint.near:
+            return "near", soft
+    return "normal", 0.0
+
+
+def _hardest(levels: tuple[str, ...], words: tuple[TextLike, ...]) -> TextLike:
+    found = sorted(
+        (LEVELS.index(level), number) for number, level in enumerate(levels) if level in LEVELS
+    )
+    if not found:
+        return ""
+    first = words[found[0][1]]
+    return first if len(found) == 1 else say("joint_more", first=first, number=len(found) - 1)

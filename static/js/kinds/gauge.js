@@ -1,0 +1,14 @@
+// Moves what stands on the scale of a gauge.
+export const show = {
+  pointer: (root, value) => place(root, ".pointer", value),
+  setpoint: (root, value) => place(root, ".setpoint", value),
+};
+
+// `percent` is from the lower end of the scale, null where it is unknown.
+function place(root, mark, percent) {
+  const element = root.querySelector(mark);
+  element.toggleAttribute("hidden", percent === null);
+  if (percent === null) return;
+  if (root.classList.contains("vertical")) element.setAttribute("y", `${100 - percent}%`);
+  else element.setAttribute("x", `${percent}%`);
+}

@@ -1,0 +1,161 @@
+"""Steps: made from the value that the robot reports, one at a time, and only where that is known."""
+
+import asyncio
+import itertools
+from typing import Any, Final
+
+import pytest
+
+from app.commands.confirmations import Confirmations
+from app.commands.receipts import Receipt
+from app.errors import PanelError
+from app.panel import load_panel
+from app.panel.model import Panel
+from app.panel.widgets.step import Step
+from app.permission.press_permission import judged
+from app.robot.state import RobotState
+from app.view.view import build_view
+from tests.commands.test_presses import Way
+from tests.support.builders import (
+    FROM,
+    INTERFACES,
+    faults_text,
+    panel_of,
+    presses_of,
+    robot_there,
+    says,
+)
+from tests.support.words import english
+
+FLOAT: Final = "std_msgs/msg/Float32"
+STEP: Final = {
+    "id": "speed",
+    "kind": "step",
+    "label": "Speed",
+    "topic": "/set_speed",
+    "type": FLOAT,
+    "message": {"data": "{value}"},
+    "value": {"topic": "/speed", "type": FLOAT, "max_age_s": 5.0},
+    "min": 0,
+    "max": 100,
+    "step": 10,
+    "unit": "mm/s",
+    "within_s": 0.2,
+}
+
+
+class Desk:
+    """Presses on a robot that reports its speed."""
+
+    def __init__(self, **more: Any) -> None:
+        self.now = 100.0
+        self.panel: Panel = panel_of({**STEP, **more})
+        self.robot: RobotState = robot_there(self.panel)
+        self.way = Way()
+        self.confirmations = Confirmations(self.robot, lambda: None)
+        self.presses = presses_of(
+            self.panel,
+            self.robot,
+            self.way,
+            confirmations=self.confirmations,
+            monotonic=lambda: self.now,
+        )
+        self._seq = itertools.count(1)
+
+    def reports(self, speed: float) -> None:
+        says(self.robot, "/speed", speed, FLOAT, at=self.now, seq=next(self._seq))
+        self.confirmations.update(self.robot.key("/speed"), self.robot.reading("/speed"))
+
+    def shown(self) -> Any:
+        return english(build_view(self.panel, self.robot, self.now).view["widgets"]["speed"])
+
+    def press(self, value: Any, press_id: str = "p1") -> Receipt:
+        return asyncio.run(self.presses.press("speed", {"speed": value}, press_id, FROM))
+
+    def sent(self) -> list[float]:
+        return [INTERFACES.decode(FLOAT, payload).data for _, payload in self.way.sent]
+
+
+def test_the_keys_have_the_values_next_to_the_reported_one() -> None:
+    desk = Desk()
+    desk.reports(40.0)
+    view = desk.shown()
+    assert (view["enabled"], view["text"]) == (True, "40")
+    assert (view["step_down"], view["step_up"]) == ("30", "50")
+
+
+@pytest.mark.parametrize(
+    ("speed", "down", "up"),
+    [(0.0, "", "10"), (4.0, "0", "14"), (95.0, "85", "100"), (100.0, "90", ""), (0.1, "0", "10.1")],
+)
+def test_steps_end_at_the_limits(speed: float, down: str, up: str) -> None:
+    desk = Desk()
+    desk.reports(speed)
+    assert (desk.shown()["step_down"], desk.shown()["step_up"]) == (down, up)
+
+
+def test_without_a_known_value_it_is_locked_with_a_reason() -> None:
+    desk = Desk()
+    assert (desk.shown()["enabled"], desk.shown()["reason"]) == (False, "Locked: waiting for /speed.")
+    assert (desk.shown()["step_down"], desk.shown()["step_up"]) == ("", "")
+    desk.reports(float("nan"))
+    assert desk.shown()["reason"] == "Locked: the last /speed has no data."
+    desk.reports(120.0)
+    assert desk.shown()["reason"] == "Locked: the value is 120, which is not from 0 to 100."
+    desk.reports(40.0)
+    step = next(w for w in desk.panel.commands if isinstance(w, Step))
+    assert judged(step, (), desk.robot, desk.now).until == desk.now + 5
+    desk.now += 6
+    assert desk.shown()["reason"] == "Locked: the last /speed is older than 5 s."
+    assert desk.press(50).outcome == "refused"
+    assert desk.sent() == []
+
+
+def test_a_press_publishes_the_value_that_was_shown_and_waits_until_it_is_reported() -> None:
+    async def pressed(desk: Desk) -> tuple[Receipt, Receipt]:
+        first = asyncio.create_task(desk.presses.press("speed", {"speed": 50}, "p1", FROM))
+        while not desk.sent():
+            await asyncio.sleep(0)
+        view = desk.shown()
+        assert (view["enabled"], view["reason"]) == (False, "In progress: waiting for the robot.")
+        second = await desk.presses.press("speed", {"speed": 50}, "p2", FROM)
+        desk.reports(50.0)
+        return await first, second
+
+    desk = Desk()
+    desk.reports(40.0)
+    first, second = asyncio.run(pressed(desk))
+    assert (first.outcome, second.outcome) == ("confirmed", "refused")
+    assert desk.sent() == [50.0]
+    assert (desk.shown()["step_down"], desk.shown()["step_up"]) == ("40", "60")
+
+
+@pytest.mark.parametrize("given", [40, 41, 60, "50", None, True])
+def test_a_press_that_is_no_step_from_the_reported_value_sends_nothing(given: Any) -> None:
+    desk = Desk()
+    desk.reports(40.0)
+    receipt = desk.press(given)
+    assert receipt.outcome == "refused"
+    assert "Speed is 40 by now. Press again for a step from there." in str(receipt.reason)
+    assert desk.sent() == []
+
+
+def test_the_value_stands_in_a_text_too_and_as_a_whole_number() -> None:
+    text = "std_msgs/msg/String"
+    desk = Desk(type=text, message={"data": "speed={value}"})
+    desk.reports(40.0)
+    desk.press(50)
+    ((_, payload),) = desk.way.sent
+    assert INTERFACES.decode(text, payload).data == "speed=50"
+
+
+def test_a_step_has_faults_of_its_own(tmp_path: Any) -> None:
+    path = tmp_path / "cell.toml"
+    path.write_text(
+        'title = "T"\n[[page]]\nid = "p"\ntitle = "P"\n[[page.widget]]\nid = "speed"\nkind = "step"\n'
+        'label = "Speed"\ntopic = "/a"\ntype = "std_msgs/msg/UInt8"\nmessage = { data = "{value}" }\n'
+        'value = { topic = "/b", type = "std_msgs/msg/UInt8" }\nmin = 0\nmax = 300\nstep = 10\n'
+    )
+    with pytest.raises(PanelError) as caught:
+        load_panel(path)
+    assert 'message.data: input "speed" gives 300; the field is uint8' in faults_text(caught.value)
