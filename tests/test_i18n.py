@@ -16,6 +16,8 @@ from app.settings import PACKAGE, shipped_path
 
 SPEAKERS = ("say", "said", "locked", "refused")  # functions whose first argument is a code
 PREFIXES = (
+    "gauge_",
+    "joint_",
     "control_",
     "display_",
     "display_hand_",
