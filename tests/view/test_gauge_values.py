@@ -71,7 +71,7 @@ def test_the_hardest_limit_that_a_value_is_beyond_is_named(
 
 
 def test_beyond_the_scale_is_abnormal_also_without_limits() -> None:
-    bare = dict.fromkeys(("normal", "low_low", "low", "high", "high_high"))
+    bare: Any = dict.fromkeys(("normal", "low_low", "low", "high", "high_high"))
     view = shown(12.5, **bare)
     assert (view["level"], view["said"], view["text"]) == ("abnormal", "above the scale", "12.5")
 

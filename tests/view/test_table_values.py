@@ -166,7 +166,7 @@ def test_a_list_of_single_values() -> None:
     }
     panel = panel_of(table)
     robot = robot_there(panel)
-    payload = INTERFACES.encode(table["type"], {"cell_voltage": [3.5, 3.625]})
+    payload = INTERFACES.encode("sensor_msgs/msg/BatteryState", {"cell_voltage": [3.5, 3.625]})
     robot.update("cells", Sample(payload, 1, NOW, NOW, BRIDGE))
     view: Any = english(build_view(panel, robot, NOW).view["widgets"]["parts"])
     rows = view["table_rows"]
