@@ -38,6 +38,12 @@ def status(name: str, level: int = 0, **values: str) -> dict[str, Any]:
     return {"level": level, "name": name, "message": "", "hardware_id": "", "values": listed}
 
 
+@pytest.fixture(autouse=True)
+def unhurried(monkeypatch: pytest.MonkeyPatch) -> None:
+    """All that is queued is decoded at once, however busy the machine is."""
+    monkeypatch.setattr("app.robot.keyed_entries.SHARE_S", 60.0)
+
+
 class Robot:
     """A robot with the table, which hears messages one by one."""
 
