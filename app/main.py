@@ -40,8 +40,10 @@ from app.web.routes import (
     control,
     display,
     events,
+    frames,
     health,
     hold_socket,
+    log_lines,
     pages,
     parameters,
     press_socket,
@@ -115,7 +117,17 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     if settings.proxies:
         app.add_middleware(Proxies, named=settings.proxies)
     app.add_middleware(StartErrorsInWords)
-    for routes in (pages, events, presses, press_socket, control, hold_socket, parameters):
+    for routes in (
+        pages,
+        events,
+        presses,
+        press_socket,
+        control,
+        hold_socket,
+        parameters,
+        frames,
+        log_lines,
+    ):
         app.include_router(routes.router)
         app.include_router(routes.router, prefix="/robots/{robot}", dependencies=[Depends(named_robot)])
     for common in (static, health, display):

@@ -27,6 +27,7 @@ from app.panel.widgets.families import (
     TopicSource,
     TopicWidget,
 )
+from app.panel.widgets.log_view import LogView
 from app.panel.widgets.parameter import EVENT_TYPE, EVENTS, Parameter
 from app.panel.widgets.publish import Confirm, PublishPress
 from app.panel.widgets.service_action import Action
@@ -154,13 +155,22 @@ class Panel(Description):
         """Topic → type of all subscriptions."""
         own = {one.topic: one.type for one in self.confirmations() if one.type is not None}
         events = {EVENTS: EVENT_TYPE} if any(self.parameters()) else {}
-        return own | {of.topic: of.type for of in self.monitored()} | events
+        return own | {of.topic: of.type for of in self.monitored() if not of.on_demand} | events
+
+    def on_demand(self) -> dict[str, str]:
+        """Topic → type of all topics that are subscribed to only while somebody looks."""
+        return {of.topic: of.type for of in self.monitored() if of.on_demand}
+
+    def listened(self) -> dict[str, str]:
+        """Topic → type of all subscriptions, also of those that are there only at times."""
+        return self.subscriptions() | self.on_demand()
 
     def subscribed_fields(self) -> dict[str, list[str]]:
         """Topic → paths of the fields that the panel reads."""
         found: dict[str, list[str]] = {}
         for of in self.monitored():
-            found.setdefault(of.topic, []).extend(of.fields)
+            if not of.on_demand:
+                found.setdefault(of.topic, []).extend(of.fields)
         for confirm in self.confirmations():
             found.setdefault(confirm.topic, []).append(confirm.field)
         return found
@@ -186,6 +196,14 @@ class Panel(Description):
 
     def parameters(self) -> Iterator[Parameter]:
         yield from (w for w in self.widgets() if isinstance(w, Parameter))
+
+    def logs(self) -> dict[str, int]:
+        """Topic → number of lines to keep, of all logs that the panel shows."""
+        found: dict[str, int] = {}
+        for w in self.widgets():
+            if isinstance(w, LogView):
+                found[w.topic] = max(w.keep, found.get(w.topic, 0))
+        return found
 
     def publications(self) -> dict[str, str]:
         """Topic → type of all topics that the panel publishes."""

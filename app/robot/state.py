@@ -21,6 +21,8 @@ from app.panel.model import Panel, RobotEntry
 from app.robot.command_status import CommandStatus
 from app.robot.graph import Graph
 from app.robot.keyed_entries import KeyedEntries
+from app.robot.log_lines import LogLines
+from app.robot.looked_at import LookedAt
 from app.robot.parameter_state import ParameterState
 from app.robot.presence import EndpointPresence, required_endpoints
 from app.robot.replayed import ReplayedMessages
@@ -62,7 +64,7 @@ class RobotState:
         self._keys: dict[str, str] = {}  # ROS name → key expression
         self._own_namespace = entry.namespace if entry else None
         needed = list(required_endpoints(panel))
-        named = (*panel.subscriptions(), *panel.publications(), *(n for _, n in needed), ROSOUT_TOPIC)
+        named = (*panel.listened(), *panel.publications(), *(n for _, n in needed), ROSOUT_TOPIC)
         self._required_keys = frozenset(map(self.key, named))
         self.graph = Graph(dialect, own_zid, self._own_namespace, self._required_keys)
         self._interlock_keys = frozenset(self.key(interlock.topic) for interlock in panel.interlocks)
@@ -71,6 +73,7 @@ class RobotState:
         self.command_status: dict[str, CommandStatus] = {}  # by widget id
         self.parameters: dict[str, ParameterState] = {}  # by widget id
         self.querying: set[str] = set()  # ids of parameter widgets whose nodes are being queried
+        self.looked_at: dict[str, LookedAt] = {}  # by the key of a camera's topic
         self.held_since: dict[str, Text] = {}  # by hold widget id: the sentence with the time
         self._log = RobotLog(log, self.name)
         self.is_responding = True  # False: its bridges do not respond
@@ -87,6 +90,9 @@ class RobotState:
         self._published: set[str] = set()
         self._topics = dict(self._make_topics(panel))
         self.keyed_entries = KeyedEntries(panel, interfaces, self.key)
+        self.log_lines = {
+            self.key(topic): LogLines(interfaces, keep) for topic, keep in panel.logs().items()
+        }
         self._logged_at: dict[str, float] = {}
 
     def _make_topics(self, panel: Panel) -> Iterator[tuple[str, Topic]]:

@@ -16,6 +16,7 @@ from app.commands.press_context import PressGuard
 from app.errors import LinkError, NotFound
 from app.i18n import TextLike
 from app.interfaces import load_interfaces
+from app.interfaces.names import ROSOUT_TOPIC
 from app.panel.model import Panel, RobotEntry
 from app.panel.widgets.parameter import Parameter
 from app.permission.control_authority import ControlAuthority
@@ -23,7 +24,9 @@ from app.permission.interlocks import Verdict, link_verdict, locked
 from app.robot.slices import Slices
 from app.robot.state import RobotState
 from app.ros_logging import RobotLog
+from app.runtime.frames import Frames
 from app.runtime.ingest import Ingest
+from app.runtime.log_listener import LogListener
 from app.runtime.renewal import Renewal
 from app.runtime.robot_commands import RobotCommands
 from app.runtime.turn import Turn
@@ -115,11 +118,25 @@ class RobotSession:
             self._commands.actions,
             self._commands.confirmations,
             self._commands.parameters,
-            [self.robot.keyed_entries, *([self._recorder] if self._recorder else [])],
+            [
+                self.robot.keyed_entries,
+                LogListener(self.robot),
+                *([self._recorder] if self._recorder else []),
+            ],
         )
         self._turn = Turn(context, self.peer, self._ingest, self._commands, self.refresher)
         self.robot.on_late_reading = self._turn.run_late_reading
-        self._rosout = Rosout(self.robot, self.interfaces, self.link, asyncio.get_running_loop())
+        self.frames = Frames(
+            panel,
+            self.robot,
+            self.interfaces,
+            self.link,
+            self.show,
+            lambda: self.peer.follow(False),
+        )
+        self._rosout = Rosout(
+            self.robot, self.interfaces, self.link, asyncio.get_running_loop(), self._own_line
+        )
 
     async def start(self) -> None:
         """Declares subscribers, publishers and queries. Does not wait for the robot."""
@@ -139,6 +156,7 @@ class RobotSession:
     async def stop(self) -> None:
         """Ends the streams, all tasks and the Zenoh session."""
         self.close()
+        self.frames.close()
         self._turn.stop()
         self._listeners.close()
         self._rosout.stop()
@@ -169,6 +187,13 @@ class RobotSession:
         name = self.entry.id if self.entry else ""
         rules = self.panel.record
         return Recorder(self.panel, rules, self.interfaces, self.robot, name, recordings)
+
+    def _own_line(self, payload: bytes) -> None:
+        """The panel's own line in the robot's log: Zenoh does not bring it back."""
+        key = self.robot.key(ROSOUT_TOPIC)
+        if (lines := self.robot.log_lines.get(key)) is not None:
+            lines.add(payload)
+            self.refresher.values({key})
 
     def show(self) -> None:
         """Updates holds and the view. Call it after a change of a permission or of anything shown."""

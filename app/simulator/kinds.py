@@ -13,6 +13,7 @@ from app.interfaces import Interfaces
 from app.panel.base import TopicQos
 from app.panel.constants import parent_type
 from app.panel.template import response_paths
+from app.panel.widgets.camera import Camera
 from app.panel.widgets.displays import Indicator, Readout
 from app.panel.widgets.families import BaseWidget, Display, PublishCommand
 from app.panel.widgets.gauge import Gauge, SetpointField
@@ -157,6 +158,16 @@ def _joints(widget: Joints, _: Interfaces) -> Iterator[Need]:
         )
 
 
+def _camera(camera: Camera, _: Interfaces) -> Iterator[Need]:
+    yield Shown(
+        topic=camera.topic,
+        type=camera.type,
+        field="",
+        label=render(camera.label),
+        max_age_s=camera.max_age_s,
+    )
+
+
 def _published(command: PublishCommand, _: Interfaces) -> Iterator[Need]:
     yield Published(topic=command.topic, type=command.type, qos=command.qos)
 
@@ -210,6 +221,7 @@ SIMULATED: Final[Mapping[type[BaseWidget], Callable[[Any, Interfaces], Iterator[
     Gauge: _gauge,
     Joints: _joints,
     Table: lambda *_: iter(()),
+    Camera: _camera,
     PublishCommand: _published,
     PublishPress: _pressed,
     Step: _stepped,

@@ -101,7 +101,7 @@ def simulated_topics(
         by_topic.setdefault(one.topic, []).append(one)
     fields = PanelFields(panel, interfaces, phase)
     found = {}
-    for topic, type_name in panel.subscriptions().items():
+    for topic, type_name in panel.listened().items():
         if topic in skipped or panel.demo.get(topic, NO_ENTRY).silent:
             continue
         found[topic] = _topic(fields, topic, type_name, by_topic.get(topic, []))

@@ -8,6 +8,7 @@ stays when the publisher goes: a route that ends and begins again delivers each 
 """
 
 import logging
+from collections.abc import Iterator
 from dataclasses import replace
 
 from app.dialect.endpoint import OwnEndpoint, TopicRole
@@ -45,7 +46,7 @@ class LivelinessTokens:
             *(("MP", t, n, self._qos(t)) for t, n in self._panel.publications().items()),
             *(
                 ("MS", topic, name, qos)
-                for topic, name in self._panel.subscriptions().items()
+                for topic, name in self._listened_to()
                 if (qos := self._listening(topic)) is not None
             ),
             ("MP", ROSOUT_TOPIC, LOG_TYPE, ROSOUT),
@@ -63,6 +64,13 @@ class LivelinessTokens:
         for action, type_name in self._panel.actions().items():
             own.append(OwnEndpoint("AC", self._robot.key(action), type_name))
         return self._robot.dialect.own_tokens(zid, own)
+
+    def _listened_to(self) -> Iterator[tuple[str, str]]:
+        """(topic, type) of what the panel listens to now."""
+        yield from self._panel.subscriptions().items()
+        for topic, name in self._panel.on_demand().items():
+            if self._robot.key(topic) in self._robot.looked_at:
+                yield topic, name
 
     def _qos(self, topic: str) -> Qos:
         return self._panel.qos(topic).wire_qos

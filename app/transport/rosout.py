@@ -2,7 +2,7 @@
 
 import asyncio
 import logging
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from typing import Any, Final, Protocol
 
@@ -32,11 +32,14 @@ class Rosout:
         interfaces: Interfaces,
         link: Putter,
         loop: asyncio.AbstractEventLoop,
+        own: Callable[[bytes], None] = lambda _: None,
     ) -> None:
+        """`own` gets each line too."""
         self._robot = robot
         self._interfaces = interfaces
         self._link = link
         self._loop = loop
+        self._own = own
         self._handler = RosoutHandler(self._publish, robot.name)
         self._stopped = False
 
@@ -56,4 +59,5 @@ class Rosout:
     def _put(self, payload: bytes) -> None:
         with suppress(LinkError):  # a log that can't be sent must not become one more log
             if not self._stopped:
+                self._own(payload)
                 self._link.put(self._robot.key(ROSOUT_TOPIC), payload)

@@ -56,6 +56,8 @@ class ZenohSession:
         self._inbox = Inbox(wake)
         self._declared: Declarations = NOTHING
         self._sent: Counter[str] = Counter()  # messages and queries, by key expression
+        self._looked: dict[str, tuple[str, Callable[[Any], None]]] = {}
+        self._looking: dict[str, zenoh.Subscriber[None]] = {}
         self._held: dict[str, zenoh.LivelinessToken] | None = {}  # None: between two sessions
         self._open()
 
@@ -114,6 +116,7 @@ class ZenohSession:
                 for key, expression in self._declared.subscribe.items()
                 for declared in self._subscriptions(key, expression)
             ]
+            self._looking = {key: self._look(*looked) for key, looked in dict(self._looked).items()}
 
     def _publisher(self, expression: str) -> zenoh.Publisher:
         return self._session.declare_publisher(
@@ -134,6 +137,27 @@ class ZenohSession:
         )
         yield self._session.liveliness().declare_subscriber(
             caches(expression), self._direct(lambda sample: self._on_cache(key, sample)), history=True
+        )
+
+    def look(self, key: str, expression: str, take: Callable[[bytes | zenoh.ZBytes], None]) -> None:
+        """Subscribes to a topic until `look_away`, in this session and those after it. `take` gets each
+        payload on a thread of Zenoh's, under the inbox's lock: it must not wait."""
+        self._looked[key] = expression, take
+        if self._held is None:
+            return  # the new session subscribes
+        with _translated(f"can't subscribe to {key}"):
+            self._looking[key] = self._look(expression, take)
+
+    def look_away(self, key: str) -> None:
+        """Ends what `look` began."""
+        self._looked.pop(key, None)
+        if (declared := self._looking.pop(key, None)) is not None:
+            with _translated(f"can't unsubscribe from {key}"):
+                declared.undeclare()
+
+    def _look(self, expression: str, take: Callable[[Any], None]) -> "zenoh.Subscriber[None]":
+        return self._session.declare_subscriber(
+            expression, self._direct(lambda sample: take(_own(sample.payload)))
         )
 
     def _ask_cache(self, key: str, token: str) -> None:

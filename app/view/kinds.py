@@ -5,12 +5,14 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final, TypedDict
 
 from app.i18n import TextLike, joined, say
+from app.panel.widgets.camera import Camera
 from app.panel.widgets.displays import Indicator, Readout
 from app.panel.widgets.families import BaseWidget, Command, Display, Input, PressCommand
 from app.panel.widgets.gauge import Gauge
-from app.panel.widgets.hold import Hold
+from app.panel.widgets.hold import HoldCommand
 from app.panel.widgets.joints import Joints
 from app.panel.widgets.kinds import find_row
+from app.panel.widgets.log_view import LogView
 from app.panel.widgets.numbers import Numeric
 from app.panel.widgets.parameter import Parameter
 from app.panel.widgets.publish import PublishPress
@@ -20,9 +22,11 @@ from app.panel.widgets.table import Table
 from app.permission.interlocks import PERMITTED, Verdict
 from app.robot.command_status import IDLE, CommandStatus
 from app.robot.state import RobotState
+from app.view.camera_values import camera
 from app.view.display_values import indicator, readout, value
 from app.view.gauge_values import gauge
 from app.view.joint_values import joints
+from app.view.log_values import log
 from app.view.parameter_values import parameter
 from app.view.step_values import step
 from app.view.table_values import table
@@ -86,7 +90,7 @@ def _published(widget: PublishPress, robot: RobotState, verdict: Verdict, now: f
     return lock(widget, verdict), math.inf
 
 
-def _held(widget: Hold, robot: RobotState, verdict: Verdict, _: float) -> Shown:
+def _held(widget: HoldCommand, robot: RobotState, verdict: Verdict, _: float) -> Shown:
     holding = robot.held_since.get(widget.id, "")
     return {**lock(widget, verdict), "held": bool(holding), "holding": holding}, math.inf
 
@@ -109,10 +113,12 @@ SHOWN: Final[Mapping[type[BaseWidget], Callable[[Any, RobotState, Verdict, float
     PressCommand: _pressed,
     PublishPress: _published,
     Step: _stepped,
-    Hold: _held,
+    HoldCommand: _held,
     Parameter: _parameter,
     Display: lambda of, robot, verdict, now: value(of, robot, now),
     Readout: lambda of, robot, verdict, now: readout(of, robot, now),
+    Camera: lambda of, robot, verdict, now: camera(of, robot, now),
+    LogView: lambda of, robot, verdict, now: log(of, robot),
     Indicator: lambda of, robot, verdict, now: indicator(of, robot, now),
     Gauge: lambda of, robot, verdict, now: gauge(of, robot, now),
     Joints: lambda of, robot, verdict, now: joints(of, robot, now),

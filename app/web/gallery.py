@@ -6,6 +6,7 @@ from typing import Any, Final, NamedTuple
 from app.commands.receipts import Receipt
 from app.panel.widgets.families import BaseWidget
 from app.panel.widgets.kinds import KINDS
+from app.panel.widgets.log_view import LEVELS as LOG_LEVELS
 from app.robot.command_status import OutcomeCode
 
 Table = dict[str, Any]
@@ -432,6 +433,62 @@ STATIC: Final = (
     Example("link", "link", {"label": "Setup", "page": "setup", "icon": "settings"}),
     Example("image", "image", {"label": "A box", "src": "box.svg"}),
 )
+JOYSTICK: Final[Table] = {
+    "label": "Drive",
+    "topic": "/cmd_vel",
+    "type": "geometry_msgs/msg/Twist",
+    "interlock": "automatic",
+}
+STICK: Final[Texts] = ENABLED | {'data-kind="joystick"': 'data-kind="joystick" data-hold="held"'}
+MOVES: Final[Texts] = {
+    'data-axis="y">': 'data-axis="y">0.25 m/s',
+    'data-axis="x">': 'data-axis="x">−0.40 rad/s',
+}
+JOYSTICKS: Final = (
+    Example("free", "joystick", JOYSTICK, FREE | LET_GO, marks=ENABLED),
+    Example("held", "joystick", JOYSTICK, FREE | {"held": True, "holding": ""}, marks=STICK | MOVES),
+    Example("square", "joystick", JOYSTICK | {"shape": "square"}, FREE | LET_GO, marks=ENABLED),
+    Example("locked", "joystick", JOYSTICK, LOCKED | LET_GO),
+)
+CAMERA: Final[Table] = {"label": "Camera 1", "topic": "/camera"}
+CAMERAS: Final = (
+    Example("waiting", "camera", CAMERA, {"state": "waiting", "note": "waiting for /camera"}),
+    Example("live", "camera", CAMERA, {"state": "live", "note": ""}),
+    Example("old", "camera", CAMERA, {"state": "old", "note": "12 s old, received 14:31:52"}),
+    Example(
+        "unreadable",
+        "camera",
+        CAMERA,
+        {"state": "unreadable", "note": "The encoding mono16 cannot be shown: it must have 8 bits"},
+    ),
+    Example(
+        "none reaches this screen",
+        "camera",
+        CAMERA,
+        {"state": "live", "note": ""},
+        marks={'data-kind="camera"': 'data-kind="camera" data-late'},
+    ),
+)
+LOG: Final[Table] = {"label": "Log of the robot", "lines": 10}
+LOGS: Final = (
+    Example("lines", "log", LOG, {"state": "live", "note": "", "count": "5"}),
+    Example("waiting", "log", LOG, {"state": "waiting", "note": "waiting for /rosout", "count": "0"}),
+    Example("cut off", "log", LOG, {"state": "old", "note": "The connection was lost", "count": "5"}),
+)
+
+
+class Everyones(dict[str, list[Texts]]):
+    """The same lines, whoever asks."""
+
+    def __missing__(self, _: str) -> list[Texts]:
+        texts = ("moves", "cycle started", "the gripper is slow", "no part gripped", "axis 3 stands")
+        return [
+            {"time": "14:31:58", "level": level, "word": level.title(), "node": "cell", "text": text}
+            for level, text in zip(LOG_LEVELS, texts, strict=True)
+        ]
+
+
+LINES: Final = Everyones()
 PARTS: Final = (
     Part("Keys by role", 6, ROLES),
     Part("Keys by state", 6, KEYS),
@@ -444,6 +501,9 @@ PARTS: Final = (
     Part("Inputs", 3, INPUTS),
     Part("Parameters", 3, PARAMETERS),
     Part("Steps", 3, STEPS),
+    Part("Joysticks", 4, JOYSTICKS),
+    Part("Cameras", 3, CAMERAS),
+    Part("Logs", 2, LOGS),
     Part("Static", 5, STATIC),
 )
 PICTURE: Final = (

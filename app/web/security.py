@@ -16,7 +16,8 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.printable import printable
 
-GUARDED: Final = re.compile(r"(/robots/[^/]+)?/events/?")  # read by the panel's own pages only
+# Read by the panel's own pages only.
+GUARDED: Final = re.compile(r"(/robots/[^/]+)?/(events|widgets/[^/]+/(frame|lines))/?")
 STARTS: Final = frozenset({"http.response.start", "websocket.http.response.start"})
 POLICY_VIOLATION: Final = 1008
 READING: Final = frozenset({"GET", "HEAD"})

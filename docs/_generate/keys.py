@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
 
-from docs._generate.schema import REF, ROOT, WIDGET, WORDS, Schema, panel_schema
+from docs._generate.schema import REF, ROOT, WIDGET, WORDS, Schema, of_kind, panel_schema
 
 EVERYTHING: Final = Path(__file__).parents[2] / "tests/everything.toml"
 EXACT: Final = 2**53  # the limit of every number in a browser: it is told once, not at each key
@@ -40,7 +40,7 @@ def examples_of(tables: Mapping[str, Schema]) -> dict[str, Any]:
             if _by_name(tables[name]["properties"].get(key, {})):
                 inner = list(value.values())
             for one in inner:
-                if isinstance(one, dict) and (part := one.get("kind", key)) in tables:
+                if isinstance(one, dict) and (part := of_kind(one.get("kind")) or key) in tables:
                     walk(part, one)
 
     walk(ROOT, tomllib.loads(EVERYTHING.read_text(encoding="utf-8")))

@@ -17,7 +17,7 @@ from app import i18n
 from app.i18n import BETWEEN, ENGLISH, sentences
 from app.panel import Panel
 from docs._generate.locks import shown
-from docs._generate.schema import ROOT
+from docs._generate.schema import ROOT, of_kind
 
 SENTENCES: Final = sentences(ENGLISH)
 PROJECT: Final = Path(__file__).parents[2]
@@ -69,7 +69,7 @@ def models_table() -> str:
 
 
 def _slug(name: str) -> str:
-    return "top-level" if name == ROOT else name
+    return "top-level" if name == ROOT else name.replace("_widget", "-widget")
 
 
 def models() -> dict[str, type[BaseModel]]:
@@ -80,7 +80,7 @@ def models() -> dict[str, type[BaseModel]]:
         for key, field in model.model_fields.items():
             for inner in _models_in(field.annotation):
                 kind = inner.model_fields.get("kind")
-                name = get_args(kind.annotation)[0] if kind else field.alias or key
+                name = of_kind(get_args(kind.annotation)[0] if kind else None) or field.alias or key
                 if name not in found:
                     found[name] = inner
                     walk(inner)

@@ -34,6 +34,7 @@ FORMATS: Final[Mapping[str, tuple[str, str]]] = {
     "call.type": ("service type", SERVICE_TYPE.pattern),
     "action.type": ("action type", ACTION_TYPE.pattern),
     "parameter.type": ("", ""),
+    "log_widget.node": ("", ""),
     "namespace": ("namespace", ""),
     "connect": ("Zenoh endpoint", ""),
     "interfaces": ("folder", ""),
@@ -81,7 +82,7 @@ def named_tables(root: Schema, definitions: Mapping[str, Schema]) -> dict[str, S
         for key, prop in table["properties"].items():
             for ref in _refs(prop):
                 inner = definitions[ref.removeprefix(REF)]
-                name = inner["properties"].get("kind", {}).get("const", key)
+                name = of_kind(inner["properties"].get("kind", {}).get("const")) or key
                 if name not in found:
                     found[name] = inner
                     walk(inner)
@@ -90,6 +91,11 @@ def named_tables(root: Schema, definitions: Mapping[str, Schema]) -> dict[str, S
 
     walk(root)
     return found
+
+
+def of_kind(kind: str | None) -> str | None:
+    """The name of a widget's table: its kind, unless another table has that name."""
+    return f"{kind}_{WIDGET}" if kind == "log" else kind
 
 
 def kinds_of(tables: Mapping[str, Schema]) -> dict[str, Schema]:
@@ -163,10 +169,11 @@ def _widget(kinds: Mapping[str, Schema]) -> Schema:
             if _bare(prop) not in map(_bare, known):
                 known.append(prop)
     properties = {key: _any_of(props) for key, props in keys.items()}
-    properties["kind"] = {"enum": list(kinds), "description": about(WIDGET, "kind")}
+    said = {name: table["properties"]["kind"]["const"] for name, table in kinds.items()}
+    properties["kind"] = {"enum": list(said.values()), "description": about(WIDGET, "kind")}
     chosen = [
-        {"if": {"properties": {"kind": {"const": kind}}}, "then": {"$ref": REF + kind}}
-        for kind in kinds
+        {"if": {"properties": {"kind": {"const": kind}}}, "then": {"$ref": REF + name}}
+        for name, kind in said.items()
     ]
     return {
         "title": WIDGET,

@@ -11,7 +11,7 @@ function valueOf(input) {
 }
 
 // Inputs stay in place: none is added or removed while the page is open.
-const entries = [...document.querySelectorAll("[data-widget] :is(input:not([type=hidden]), select)")];
+const entries = [...document.querySelectorAll("[data-widget] :is(input:not([type=hidden]), select)[name]")];
 
 // All values on the page, by the names of the inputs.
 export function enteredValues() {

@@ -5,6 +5,7 @@ kept until `heard` asks.
 """
 
 import contextlib
+import itertools
 import re
 import sys
 import threading
@@ -141,6 +142,21 @@ class Commands:
 
     def every(self, topic: str, fields: dict[str, Any], period_s: float) -> None:
         self.timers[topic] = self.node.create_timer(period_s, lambda: self.publish(topic, fields))
+
+    def film(self, topic: str, width: int, height: int, hz: float) -> None:
+        """A raw colour picture, made once; each one that goes out has its number in the first bytes."""
+        publisher = self.publishers[topic]
+        message = publisher.msg_type()
+        message.width, message.height, message.encoding = width, height, "rgb8"
+        message.step = 3 * width
+        message.data = bytes(at % 251 for at in range(3 * width * height))
+        numbers = itertools.count()
+
+        def take() -> None:
+            message.data[0] = next(numbers) % 256
+            publisher.publish(message)
+
+        self.timers[topic] = self.node.create_timer(1 / hz, take)
 
     def once(self, topic: str, type: str, fields: dict[str, Any], timeout_s: float = 15) -> None:
         """`ros2 topic pub --once`: advertise, wait for a subscriber, publish, go away.

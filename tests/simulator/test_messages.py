@@ -7,8 +7,9 @@ from typing import Any, Final
 import pytest
 
 from app.interfaces.field_path import path_steps
+from app.simulator.values.clock_picture import SIZE
 from app.simulator.values.guesses import ANYTHING, span_of
-from app.simulator.values.known_types import IMAGE, KNOWN, Fields, Moment
+from app.simulator.values.known_types import KNOWN, Fields, Moment
 from app.simulator.values.messages import plausible
 from app.simulator.values.paths import get, put
 from app.simulator.values.signals import as_type, battery_level, count, cycle, swing
@@ -62,9 +63,9 @@ def test_a_battery_empties_and_is_charged() -> None:
 def test_a_picture_is_a_png_that_moves() -> None:
     data: bytes = made("sensor_msgs/msg/CompressedImage", 1.0)["data"]
     assert data.startswith(b"\x89PNG\r\n\x1a\n")
-    assert struct.unpack(">II", data[16:24]) == IMAGE
+    assert struct.unpack(">II", data[16:24]) == SIZE
     length = struct.unpack(">I", data[33:37])[0]
-    assert len(zlib.decompress(data[41 : 41 + length])) == (IMAGE[0] + 1) * IMAGE[1]
+    assert len(zlib.decompress(data[41 : 41 + length])) == (SIZE[0] + 1) * SIZE[1]
     assert data != made("sensor_msgs/msg/CompressedImage", 2.0)["data"]
 
 

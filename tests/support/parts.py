@@ -267,6 +267,7 @@ ORDERS: Mapping[str, tuple[str, ...]] = {
     "advertise": ("topic", "type"),
     "publish": ("topic", "fields"),
     "every": ("topic", "fields", "period_s"),
+    "film": ("topic",),
     "once": ("topic", "type", "fields"),
     "withdraw": ("topic",),
     "subscribers": ("topic",),

@@ -128,6 +128,15 @@ def test_a_hold_is_begun_kept_and_let_go(demo: Server) -> None:
     assert {"pressed", "closed"} == {entry["kind"] for entry in log if entry["press"] == said["id"]}
 
 
+@pytest.mark.parametrize(
+    "deflection", [{"x": 1.1, "y": 0}, {"x": float("nan"), "y": 0}, {"x": "far", "y": 0}]
+)
+def test_a_deflection_out_of_its_limits_is_nonsense(demo: Server, deflection: dict[str, Any]) -> None:
+    with held(demo) as socket:
+        said = socket.beat(**deflection)
+        assert (said["state"], said["code"]) == ("ended", "hold_by_nonsense")
+
+
 def test_an_input_with_a_default_may_be_left_out(demo: Server) -> None:
     with opened(demo) as socket:
         said = socket.begin(inputs={})

@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
 from app.clock import format_time
+from app.commands.holds.deflection import Deflection, moved
 from app.commands.holds.lease import LEASE_S, Lease
 from app.commands.holds.messages import HoldMessages, Values
 from app.commands.holds.receipts import RELEASED, ActiveHold, HoldReceipts, Refusal, refused
@@ -23,7 +24,8 @@ from app.errors import Cause, FieldError, InputError, LinkError, NotFound, Press
 from app.i18n import TextLike, say
 from app.panel.model import Panel
 from app.panel.template import needed_inputs
-from app.panel.widgets.hold import Hold
+from app.panel.widgets.hold import HoldCommand
+from app.panel.widgets.joystick import Joystick
 from app.permission.interlocks import Verdict
 from app.permission.press_permission import cause_of, judged
 from app.robot.state import RobotState
@@ -58,7 +60,7 @@ class HoldController:
         self._receipts = HoldReceipts(robot.name, recorder)
         self._arrivals = latest
         self._changed = changed
-        self._widgets = {w.id: w for w in panel.widgets() if isinstance(w, Hold)}
+        self._widgets = {w.id: w for w in panel.widgets() if isinstance(w, HoldCommand)}
         self._held: dict[str, ActiveHold] = {}
         self._timer: asyncio.TimerHandle | None = None
         self._closed = False
@@ -67,7 +69,7 @@ class HoldController:
         """The receipt of a hold whose stop message may not have reached the bridge."""
         return self._receipts.unconfirmed(receipt)
 
-    def widget(self, widget_id: str) -> Hold:
+    def widget(self, widget_id: str) -> HoldCommand:
         """The hold widget with this id; NotFound for every other id."""
         if widget_id not in self._widgets:
             raise NotFound(f'there is no widget "{widget_id}" that can be held')
@@ -131,7 +133,12 @@ class HoldController:
         return refused(widget, inputs, ready) if isinstance(ready, Refusal) else None
 
     def _prepare(
-        self, widget: Hold, inputs: Mapping[str, Any], sent: float, context: PressContext, now: float
+        self,
+        widget: HoldCommand,
+        inputs: Mapping[str, Any],
+        sent: float,
+        context: PressContext,
+        now: float,
     ) -> Values | Refusal:
         """The values to publish, or the reason why the hold may not begin now."""
         why, cause = self._refusal_reason(widget, sent, context, now)
@@ -143,7 +150,7 @@ class HoldController:
             return Refusal(say("with_stop", said=error.text), "input")
 
     def _refusal_reason(
-        self, widget: Hold, sent: float, context: PressContext, now: float
+        self, widget: HoldCommand, sent: float, context: PressContext, now: float
     ) -> tuple[TextLike, Cause]:
         """Why the hold may not begin now ("" if it may), and the receipt's cause."""
         if self._closed:
@@ -159,11 +166,17 @@ class HoldController:
             return verdict.reason or "", cause_of(verdict.code)
         return context.stale_reason(), "interlock"
 
-    def beat(self, holding: ActiveHold, number: int, sent: float) -> bool:
-        """Processes a heartbeat; returns whether the hold continues."""
+    def beat(
+        self, holding: ActiveHold, number: int, sent: float, deflection: Deflection | None = None
+    ) -> bool:
+        """Processes a heartbeat, with a joystick's deflection; returns whether the hold continues. A
+        deflection that is older than another one, or than a lease, counts for nothing."""
         self.judge()
-        if not self._is_active(holding) or not holding.lease.beat(number, sent, self._loop.time()):
+        now, newest = self._loop.time(), number > holding.lease.last
+        if not self._is_active(holding) or not holding.lease.beat(number, sent, now):
             return False
+        if deflection is not None and newest and now < sent + LEASE_S:
+            holding.deflection = deflection
         self._schedule()
         return True
 
@@ -208,7 +221,7 @@ class HoldController:
     def _is_active(self, holding: ActiveHold) -> bool:
         return self._held.get(holding.widget.id) is holding
 
-    def _verdict(self, widget: Hold, context: PressContext, now: float) -> Verdict:
+    def _verdict(self, widget: HoldCommand, context: PressContext, now: float) -> Verdict:
         interlocks = self._panel.interlocks_of(widget)
         return judged(widget, interlocks, self._robot, now, context.grounds())
 
@@ -225,8 +238,12 @@ class HoldController:
             self._timer = self._loop.call_at(min(whens), self.step)
 
     def _send(self, holding: ActiveHold) -> None:
+        widget, axes = holding.widget, (0.0, 0.0)
+        if isinstance(widget, Joystick):
+            holding.moved = moved(widget, holding.moved, holding.deflection)
+            axes = widget.axes_at(*holding.moved)
         try:
-            self._messages.put(holding.widget, holding.values, lambda: self._final_check(holding))
+            self._messages.put(widget, holding.values, lambda: self._final_check(holding), axes)
         except LinkError as error:
             self._end(holding, "link", say("with_stop", said=error.text))
         except PressRefused:

@@ -8,7 +8,7 @@ from app.errors import LinkError
 from app.i18n import TextLike, say
 from app.interfaces import INTEGER_RANGES, Interfaces
 from app.panel.template import add_now, fill, input_ids
-from app.panel.widgets.hold import Hold, fill_own_fields
+from app.panel.widgets.hold import HoldCommand, fill_own_fields
 from app.permission.interlocks import link_verdict
 from app.robot.command_status import FinalCheck, no_check
 from app.robot.state import RobotState
@@ -36,32 +36,39 @@ class HoldMessages:
         self._checked = checked
         self._counts: dict[str, int] = {}
 
-    def values(self, widget: Hold, inputs: Mapping[str, Any]) -> Values:
+    def values(self, widget: HoldCommand, inputs: Mapping[str, Any]) -> Values:
         """The checked values for both messages; FieldError or InputError for bad input."""
         values = self._checked(input_ids(widget), inputs)
-        for template in (widget.message, widget.release):
+        for template in widget.templates():
             fields = fill(template, add_now(values))
             self._interfaces.encode(widget.type, fill_own_fields(widget, fields, 0, 0))
         return values
 
-    def put(self, widget: Hold, values: Values, final_check: FinalCheck) -> None:
-        """Publishes one message; LinkError if it could not be sent, PressRefused from `final_check`."""
-        self._put(widget, widget.message, values, widget.deadline_ms, final_check)
+    def put(
+        self,
+        widget: HoldCommand,
+        values: Values,
+        final_check: FinalCheck,
+        axes: tuple[float, float] = (0.0, 0.0),
+    ) -> None:
+        """Publishes one message, with the values of a joystick's axes; LinkError if it could not be
+        sent, PressRefused from `final_check`."""
+        self._put(widget, widget.moving(*axes), values, widget.deadline_ms, final_check)
 
-    def put_last(self, widget: Hold, values: Values, now: float) -> TextLike:
+    def put_last(self, widget: HoldCommand, values: Values, now: float) -> TextLike:
         """Publishes the stop message if the link is up, even without permission: an extra stop does no
         harm. Returns why it was not sent, else ""."""
         if not self._robot.link_up or not self._robot.graph.bridges:
             return link_verdict(self._robot, now).reason or ""
         try:
-            self._put(widget, widget.release, values, 0, no_check)
+            self._put(widget, widget.stopping(), values, 0, no_check)
         except LinkError as error:
             return say("with_stop", said=error.text)
         return ""
 
     def _put(
         self,
-        widget: Hold,
+        widget: HoldCommand,
         template: Mapping[str, Any],
         values: Values,
         deadline_ms: int,

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Final, NamedTuple
 
 from app.clock import format_time
+from app.commands.holds.deflection import CENTRE, Deflection
 from app.commands.holds.lease import Lease
 from app.commands.holds.messages import Values
 from app.commands.press_context import PressContext
@@ -22,7 +23,7 @@ from app.commands.receipts import (
 from app.errors import Cause
 from app.i18n import Text, TextLike, joined, number, say
 from app.panel.template import needed_inputs
-from app.panel.widgets.hold import Hold
+from app.panel.widgets.hold import HoldCommand
 from app.robot.command_status import Outcome, OutcomeCode
 from app.ros_logging import RobotLog, rosout_extra
 
@@ -35,7 +36,7 @@ RELEASED: Final = "hold_released"
 class ActiveHold:
     """An active hold. `on_end` is called with its receipt when it ends, for any reason."""
 
-    widget: Hold
+    widget: HoldCommand
     lease: Lease
     context: PressContext
     inputs: Mapping[str, Any]
@@ -43,6 +44,8 @@ class ActiveHold:
     on_end: Callable[[Receipt], None]
     since: Text
     sent: int = 0
+    deflection: Deflection = CENTRE
+    moved: Deflection = CENTRE  # what was sent of it
 
 
 class Refusal(NamedTuple):
@@ -52,7 +55,9 @@ class Refusal(NamedTuple):
     cause: Cause
 
 
-def refused(widget: Hold, inputs: Mapping[str, Any], refusal: Refusal, hold_id: str = "") -> Receipt:
+def refused(
+    widget: HoldCommand, inputs: Mapping[str, Any], refusal: Refusal, hold_id: str = ""
+) -> Receipt:
     """The receipt of a hold that may not begin. A hold without an id gets one."""
     text = say("refused", why=refusal.why, time=format_time(time.time()))
     own = needed_inputs(widget, inputs)
@@ -94,7 +99,7 @@ class HoldReceipts:
 
     def record_refusal(
         self,
-        widget: Hold,
+        widget: HoldCommand,
         inputs: Mapping[str, Any],
         context: PressContext,
         refusal: Refusal,

@@ -73,7 +73,7 @@ def _entry_faults(panel: Panel, interfaces: Interfaces) -> Iterator[Fault]:
 def _names(panel: Panel) -> _Names:
     servers = [widget for widget in panel.widgets() if isinstance(widget, ServerCommand)]
     types: dict[Use, Mapping[str, str]] = {
-        "topic": panel.subscriptions(),
+        "topic": panel.listened(),
         "publication": panel.publications(),
         "service": {one.server_name: one.type for one in servers if one.server_role == "SS"},
         "action": {one.server_name: one.type for one in servers if one.server_role == "AS"},
@@ -135,7 +135,7 @@ def _field_faults(
     place: str, name: str, entry: DemoEntry, panel: Panel, interfaces: Interfaces
 ) -> Iterator[Fault]:
     """Faults of `range`, `ranges` and `values`."""
-    type_name = panel.subscriptions()[name]
+    type_name = panel.listened()[name]
     paths = dict.fromkeys(panel.subscribed_fields().get(name, ()))
     kinds = {path: interfaces.type_at(type_name, path).name for path in paths}
     numbers = {path: kind for path, kind in kinds.items() if kind in NUMBERS}

@@ -4,10 +4,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Self
 
+from app.panel.widgets.camera import Camera
 from app.panel.widgets.families import BaseWidget, Display, Input, KeyCommand
 from app.panel.widgets.gauge import Gauge
 from app.panel.widgets.joints import Joints
+from app.panel.widgets.joystick import Joystick
 from app.panel.widgets.kinds import find_row
+from app.panel.widgets.log_view import LogView
 from app.panel.widgets.numbers import NumberInput, SliderInput
 from app.panel.widgets.parameter import Parameter
 from app.panel.widgets.service_action import Action
@@ -37,6 +40,9 @@ TABLE_FRAME: Final = 69.0  # name, heads of the columns and note
 ROW, LOW_ROW = 36.0, 30.0
 TABLE_WIDTH: Final = 280.0
 STEP_VALUE: Final = 116.0  # the value between the keys
+PAD_MM: Final = 60.0
+LOG: Final = (100.0, 300.0)  # some lines, and the width of what is wanted of them
+PICTURE: Final = (120.0, 160.0)  # the least height and width in which a picture tells something
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,6 +119,9 @@ SIZES: Final[Mapping[type[Any], tuple[Size, Size]]] = {
     Input: (_entry, lambda of: KEY_MM * of.mm),
     NumberInput: (_entry, lambda of: NUMBER_WIDTH),
     SliderInput: (_entry, lambda of: SLIDER_WIDTH),
+    LogView: (lambda of: of.touch(10) + LABEL + LOG[0], lambda of: LOG[1]),
+    Joystick: (lambda of: of.touch(PAD_MM), lambda of: PAD_MM * of.mm),
+    Camera: (lambda of: PICTURE[0], lambda of: PICTURE[1]),
     Parameter: (lambda of: PARAMETER + of.touch(ENTRY_MM), lambda of: PARAMETER_WIDTH),
     Gauge: (lambda of: UPRIGHT_GAUGE, lambda of: GAUGE_WIDTH),
     Joints: (lambda of: JOINTS_FRAME, lambda of: JOINTS_WIDTH),

@@ -54,13 +54,15 @@ class CheckContext:
 
 class TopicSource(NamedTuple):
     """A topic that a widget listens to, with the paths of the `fields` that it reads; `place` is the
-    table with the topic's keys, below the widget's ("pen[0]"; "" for the widget's own)."""
+    table with the topic's keys, below the widget's ("pen[0]"; "" for the widget's own). `on_demand`:
+    the topic is subscribed to only while somebody looks."""
 
     topic: str
     type: str
     qos: TopicQos
     fields: tuple[str, ...]
     place: str = ""
+    on_demand: bool = False
 
 
 class BaseWidget(Description):

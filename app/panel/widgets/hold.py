@@ -1,6 +1,7 @@
 """Hold-to-run commands, with the fields that the server fills in."""
 
 import re
+from abc import abstractmethod
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, ClassVar, Final, Literal
 
@@ -20,17 +21,14 @@ DEADLINE_TYPES: Final = (r"uint(16|32|64)|float(32|64)", "uint16, uint32, uint64
 COUNTER_TYPES: Final = (r"uint(8|16|32|64)", "uint8, uint16, uint32 or uint64")
 
 
-class Hold(KeyCommand, PublishCommand):
-    """Publishes `message` `rate_hz` times a second while its button is held, and `release` once after.
+class HoldCommand(KeyCommand, PublishCommand):
+    """Publishes a message `rate_hz` times a second while its key is held, and another one once after.
 
     `deadline_field` gets the milliseconds within which the next message arrives, 0 in the last one;
     `counter_field` counts the messages.
     """
 
-    kind: Literal["hold"]
     role: KeyRole = "hold"
-    message: dict[str, Any]
-    release: dict[str, Any]
     interlocks: Interlocks = Field(alias="interlock")
     rate_hz: Annotated[float, Field(ge=1, le=100)] = 20.0
     deadline_field: WrittenField | None = None
@@ -51,8 +49,33 @@ class Hold(KeyCommand, PublishCommand):
         """Three periods, at least 100 ms: two messages may be late or lost before the robot stops."""
         return max(100, round(3000 / self.rate_hz))
 
+    @abstractmethod
+    def moving(self, x: float, y: float) -> Mapping[str, Any]:
+        """The template of the message while it is held; `x` and `y` are the values of a joystick's
+        axes, 0 of a key."""
+
+    @abstractmethod
+    def stopping(self) -> Mapping[str, Any]:
+        """The template of the message when it ends."""
+
+    @property
+    def previewed(self) -> Mapping[str, Any]:
+        """The template of the message while it is held, as a preview shows it."""
+        return self.moving(0.0, 0.0)
+
+    @property
+    def own_comments(self) -> Mapping[str, str]:
+        """Further comments of a preview."""
+        return {}
+
+    @property
+    def checked(self) -> Iterator[tuple[str, Mapping[str, Any]]]:
+        """(key, template) of all that is checked, at its limits."""
+        yield "message", self.moving(0.0, 0.0)
+        yield "release", self.stopping()
+
     def templates(self) -> list[Any]:
-        return [self.message, self.release]
+        return [self.moving(0.0, 0.0), self.stopping()]
 
     def sent_messages(self, interfaces: Interfaces) -> Iterator[SentMessage]:
         own = {
@@ -60,9 +83,10 @@ class Hold(KeyCommand, PublishCommand):
             f".{self.counter_field}": "counts the messages",
         }
         often = f"{number_text(self.rate_hz)} times a second while it is held"
-        first = fill_own_fields(self, self.message, self.deadline_ms, 1)
-        yield SentMessage(f"publishes {self.topic} ({self.type}) {often}", self.type, first, own)
-        last = fill_own_fields(self, self.release, 0, 1)
+        first = fill_own_fields(self, self.previewed, self.deadline_ms, 1)
+        what = f"publishes {self.topic} ({self.type}) {often}"
+        yield SentMessage(what, self.type, first, {**own, **self.own_comments})
+        last = fill_own_fields(self, self.stopping(), 0, 1)
         yield SentMessage("and once when it ends", self.type, last, own)
 
     def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
@@ -76,7 +100,7 @@ class Hold(KeyCommand, PublishCommand):
         yield from fields or self._message_faults(place, checking)
 
     def _message_faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
-        for part, template in (("message", self.message), ("release", self.release)):
+        for part, template in self.checked:
             try:
                 whole = fill_own_fields(self, template, 0, 0)
             except FieldError as error:
@@ -85,7 +109,21 @@ class Hold(KeyCommand, PublishCommand):
             yield from template_faults(f"{place}.{part}", whole, self.type, checking)
 
 
-def fill_own_fields(hold: Hold, fields: Mapping[str, Any], deadline_ms: int, count: int) -> Any:
+class Hold(HoldCommand):
+    """Publishes `message` while its button is held, and `release` once after."""
+
+    kind: Literal["hold"]
+    message: dict[str, Any]
+    release: dict[str, Any]
+
+    def moving(self, x: float, y: float) -> Mapping[str, Any]:
+        return self.message
+
+    def stopping(self) -> Mapping[str, Any]:
+        return self.release
+
+
+def fill_own_fields(hold: HoldCommand, fields: Mapping[str, Any], deadline_ms: int, count: int) -> Any:
     """The fields of a message with its deadline and its number, if the hold has fields for them."""
     whole: Any = fields
     if hold.deadline_field is not None:
@@ -95,7 +133,7 @@ def fill_own_fields(hold: Hold, fields: Mapping[str, Any], deadline_ms: int, cou
     return whole
 
 
-def _own_field_faults(place: str, hold: Hold, interfaces: Interfaces) -> Iterator[Fault]:
+def _own_field_faults(place: str, hold: HoldCommand, interfaces: Interfaces) -> Iterator[Fault]:
     own = (
         ("deadline_field", hold.deadline_field, DEADLINE_TYPES),
         ("counter_field", hold.counter_field, COUNTER_TYPES),
@@ -111,7 +149,7 @@ def _own_field_faults(place: str, hold: Hold, interfaces: Interfaces) -> Iterato
         if not re.fullmatch(kinds, found):
             yield Fault(f"{place}.{key}", f'"{path}" is {found}: it must be {words}')
             continue
-        for part, template in (("message", hold.message), ("release", hold.release)):
+        for part, template in hold.checked:
             if _has_field(template, path):
                 what = f"is filled in by the kiosk: it is the {key}"
                 yield Fault(f"{place}.{part}.{path}", what, cause=f"own {place} {key}")

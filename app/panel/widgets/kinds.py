@@ -5,12 +5,15 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, TypeVar, Union
 
 from pydantic import Field
 
+from app.panel.widgets.camera import Camera
 from app.panel.widgets.displays import Indicator, Readout
 from app.panel.widgets.families import BaseWidget
 from app.panel.widgets.gauge import Gauge
 from app.panel.widgets.hold import Hold
 from app.panel.widgets.inputs import SelectInput, TextInput, ToggleInput
 from app.panel.widgets.joints import Joints
+from app.panel.widgets.joystick import Joystick
+from app.panel.widgets.log_view import LogView
 from app.panel.widgets.numbers import NumberInput, SliderInput
 from app.panel.widgets.parameter import Parameter
 from app.panel.widgets.publish import Publish
@@ -28,6 +31,7 @@ KINDS: Final[Mapping[str, type[BaseWidget]]] = {
     "publish": Publish,
     "hold": Hold,
     "step": Step,
+    "joystick": Joystick,
     "call": Call,
     "action": Action,
     "parameter": Parameter,
@@ -36,6 +40,8 @@ KINDS: Final[Mapping[str, type[BaseWidget]]] = {
     "gauge": Gauge,
     "joints": Joints,
     "table": Table,
+    "camera": Camera,
+    "log": LogView,
     "label": TextLabel,
     "image": Picture,
     "link": PageLink,

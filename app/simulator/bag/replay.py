@@ -73,7 +73,7 @@ class ReplayedRobot:
 
 def missing(panel: Panel, topics: Mapping[str, Topic]) -> Iterator[str]:
     """What a panel needs and a recording does not have, a sentence each."""
-    for topic, name in panel.subscriptions().items():
+    for topic, name in panel.listened().items():
         if topic not in topics:
             yield f"the recording has no {topic} ({name}), which the panel listens to"
         elif topics[topic].type != name:

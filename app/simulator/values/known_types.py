@@ -4,12 +4,11 @@ Types that are not here are made field by field: see `messages.py`.
 """
 
 import math
-import struct
-import zlib
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
+from app.simulator.values.clock_picture import SIZE, grey_pixels, png
 from app.simulator.values.signals import battery_level, is_charging, phase_of
 
 Fields = dict[str, Any]
@@ -19,7 +18,6 @@ JOINTS: Final = tuple(f"joint_{number}" for number in range(1, 7))
 PARTS: Final = ("drive", "gripper", "safety controller")
 TURN_S: Final = 40.0  # a round of a mobile robot
 BEAMS: Final = 180
-IMAGE: Final = (96, 64)  # pixels
 MAP: Final = (48, 32)  # cells
 
 
@@ -155,35 +153,22 @@ def _fix(moment: Moment, _: Collection[str]) -> Fields:
     return {"header": header(moment), **place, "altitude": 519.0}
 
 
-def _pixels(moment: Moment) -> bytes:
-    """A grey picture in which a bright square moves."""
-    width, height = IMAGE
-    left = int(moment.t * 12) % (width - 16)
-    row = bytes(40 + column * 80 // width for column in range(width))
-    marked = row[:left] + bytes([230]) * 16 + row[left + 16 :]
-    return b"".join(marked if height // 3 <= y < 2 * height // 3 else row for y in range(height))
-
-
 def _image(moment: Moment, _: Collection[str]) -> Fields:
-    width, height = IMAGE
+    width, height = SIZE
     shape = {"width": width, "height": height, "encoding": "mono8", "step": width}
-    return {"header": header(moment), **shape, "data": _pixels(moment)}
+    return {"header": header(moment), **shape, "data": grey_pixels(moment.t, moment.wall_ns)}
+
+
+def _png(moment: Moment) -> bytes:
+    return png(grey_pixels(moment.t, moment.wall_ns))
 
 
 def _compressed(moment: Moment, _: Collection[str]) -> Fields:
-    return {"header": header(moment), "format": "png", "data": png(_pixels(moment), *IMAGE)}
-
-
-def png(grey: bytes, width: int, height: int) -> bytes:
-    """A picture of 8-bit grey as a PNG file (ISO/IEC 15948)."""
-
-    def chunk(name: bytes, data: bytes) -> bytes:
-        return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
-
-    rows = b"".join(b"\0" + grey[y * width : (y + 1) * width] for y in range(height))
-    about = struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
-    parts = chunk(b"IHDR", about) + chunk(b"IDAT", zlib.compress(rows, 1)) + chunk(b"IEND", b"")
-    return b"\x89PNG\r\n\x1a\n" + parts
+    return {
+        "header": header(moment),
+        "format": "png",
+        "data": png(grey_pixels(moment.t, moment.wall_ns)),
+    }
 
 
 def _map(moment: Moment, _: Collection[str]) -> Fields:

@@ -13,7 +13,7 @@ from markupsafe import Markup
 from app.i18n import say
 from app.web.app_state import CurrentState
 from app.web.display_choice import CHOICES, Choice, Display, choices, display_of
-from app.web.gallery import PARTS, PICTURE, Example
+from app.web.gallery import LINES, PARTS, PICTURE, Example
 from app.web.language import language_of
 from app.web.routes.pages import WORDS
 
@@ -63,7 +63,12 @@ async def box() -> Response:
 
 def _words() -> dict[str, Any]:
     """The words of a page that its widgets use."""
-    return {word: say(word) for word in WORDS} | {"base": "", "pictures": "/gallery", "asks": {}}
+    return {word: say(word) for word in WORDS} | {
+        "base": "",
+        "pictures": "/gallery",
+        "asks": {},
+        "lines": LINES,
+    }
 
 
 def _html(example: Example, number: int, cell: Template, words: Mapping[str, Any]) -> Markup:

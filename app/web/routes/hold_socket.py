@@ -12,6 +12,9 @@ had it: so each one's age is known. Without an answer no browser shows that some
     browser  {"do": "end", "why": "released", "lease": "…", "stamp": 83.0, "after": 12}
     server   {"stamp": 96.4, "state": "ended", "outcome": "published", "code": "hold_released", …}
 
+A joystick's beats have its deflection, `x` to the right and `y` to the front, each from -1 to 1; the
+answer has `moves`, what was sent of it. One out of these limits is no message, and ends the hold.
+
 An end without a lease is that of a browser which has no answer to its begin yet; it may come instead of
 a begin, too, and is answered as any other.
 """
@@ -30,6 +33,7 @@ from pydantic import BaseModel, ConfigDict, Field, JsonValue, TypeAdapter, Valid
 from starlette.types import Message
 
 from app.audit.press_record import PendingEntry
+from app.commands.holds.deflection import Deflection
 from app.commands.holds.lease import sent_at
 from app.commands.holds.receipts import RELEASED, ActiveHold
 from app.commands.press_context import EVENT_ID, PressContext
@@ -37,6 +41,7 @@ from app.commands.receipts import Receipt, with_log_fault
 from app.errors import InputError, LogError
 from app.i18n import localized, say
 from app.panel.template import needed_inputs
+from app.panel.widgets.joystick import Joystick
 from app.runtime.robot_session import RobotSession
 from app.web.app_state import AppState, CurrentSession, CurrentState
 from app.web.client_cookie import visitor
@@ -70,6 +75,7 @@ WHYS: Final[Mapping[str, str]] = {
     "escape": "hold_by_escape",
     "silence": "hold_by_silence",
 }
+Deflected = Annotated[float, Field(ge=-1, le=1, allow_inf_nan=False)]
 Milliseconds = Annotated[float, Field(ge=0, le=1e12, allow_inf_nan=False)]
 
 
@@ -92,6 +98,13 @@ class Beat(Said):
     do: Literal["beat"]
     lease: str
     number: Annotated[int, Field(ge=1)]
+    x: Deflected | None = None
+    y: Deflected | None = None
+
+    @property
+    def deflection(self) -> Deflection | None:
+        """A joystick's, where both axes are given."""
+        return None if self.x is None or self.y is None else (self.x, self.y)
 
 
 class End(Said):
@@ -223,7 +236,7 @@ class _HoldSocket:
                     said = await self._read()
                 if self._hear(said, holding):
                     self._session.control.touch(self._who)
-                    await self._say(state="held")
+                    await self._say(state="held", **_moves(holding))
                 elif isinstance(said, Beat) and self._receipt is not None:
                     await self._say(state="ended", **self._receipt.as_json())
         await self._close(1000)
@@ -237,7 +250,7 @@ class _HoldSocket:
         if not isinstance(said, Beat) or said.lease != holding.lease.id:
             holds.end(holding, "hold_by_nonsense")
             return False
-        return holds.beat(holding, said.number, self._sent(said))
+        return holds.beat(holding, said.number, self._sent(said), said.deflection)
 
     async def _received(self) -> Message:
         return await received(self._socket)
@@ -272,6 +285,12 @@ class _HoldSocket:
     async def _close(self, code: int) -> None:
         with suppress(WebSocketDisconnect, RuntimeError):  # the browser was faster
             await self._socket.close(code)
+
+
+def _moves(holding: ActiveHold) -> dict[str, Any]:
+    """What was sent of a joystick's deflection, as texts."""
+    widget = holding.widget
+    return {"moves": widget.texts_at(*holding.moved)} if isinstance(widget, Joystick) else {}
 
 
 def _read(text: str) -> Begin | Beat | End | None:

@@ -21,6 +21,7 @@ from app.panel.layout import Page
 from app.panel.model import Panel
 from app.panel.template import input_ids
 from app.panel.widgets.families import EntryWidget, PressCommand
+from app.panel.widgets.log_view import LogView
 from app.permission.control_authority_view import role
 from app.permission.principal import Principal
 from app.printable import printable_texts
@@ -34,6 +35,8 @@ from app.web.described import PAGE, Described, errors
 from app.web.display_choice import Choice, Display, choices, display_of, language_choice
 from app.web.entry_words import ENTRY_WORDS
 from app.web.language import language_of
+from app.web.routes.log_lines import WORDS as LEVEL_WORDS
+from app.web.routes.log_lines import rendered
 
 router = APIRouter(include_in_schema=True)
 
@@ -64,6 +67,14 @@ WORDS = (
     "empty",
     "hold_cut",
     "hold_scripts",
+    "camera_none",
+    "camera_late",
+    "camera_undrawn",
+    "rosout_level",
+    "rosout_node",
+    "rosout_search",
+    "rosout_pause",
+    *(word.code for word in LEVEL_WORDS.values()),
     "clean",
     "cleaning",
 )
@@ -205,7 +216,12 @@ def _context(
         press_id=secrets.token_hex(8),
         receipt=receipt,
         inputs=dict(receipt.entered) | printable_texts(receipt.entered) if receipt else {},
-        words=_words(session, page, f"/static/{state.assets.revision}/{PICTURES}"),
+        words=_words(
+            session,
+            page,
+            f"/static/{state.assets.revision}/{PICTURES}",
+            language_of(request),
+        ),
         lost=say("server_lost"),
         lost_short=say("lost"),
         locks_all=say("locks_all"),
@@ -229,10 +245,13 @@ def _refused(session: RobotSession, query: str) -> TextLike:
     return receipt.reason if receipt else ""
 
 
-def _words(session: RobotSession, page: Page, pictures: str) -> dict[str, Any]:
+def _words(session: RobotSession, page: Page, pictures: str, language: str) -> dict[str, Any]:
     """The words of a page by their names in its templates, and what it asks before a press."""
     own = {"base": session.base, "pictures": pictures, "log": say("log_link")}
     own |= {"asks": asks_of(session, page)}
+    own |= {
+        "lines": {w.id: rendered(session, w, language) for w in page.widgets if isinstance(w, LogView)}
+    }
     plain = {word: say(word) for word in (*WORDS, *LINK_WORDS, *ENTRY_WORDS)}
     return own | plain | {act: say(f"control_{act}") for act in CONTROL_ACTS}
 

@@ -1,150 +1,31 @@
-// Hold-to-run: a button that acts while it is held. Every event that may mean a release ends the hold, and only
-// a new press starts another one. The page shows the server's response, nothing else.
-import { enteredValues } from "../entries.js";
-import { onEnd } from "../hold-end.js";
+// A hold: a button, by a finger, a mouse button, Space or Enter.
+import { Holding } from "../holding.js";
 
-// On the page's own thread on purpose: a page that stalls must not keep a hold alive.
-const BEAT_MS = 80;
-// Without a response for so long the server has ended the hold.
-const SILENCE_MS = 500;
-// The last response waits for the disk.
-const LAST_RESPONSE_MS = 3000;
 const KEYS = [" ", "Enter"];
 
 // Called for each widget of this kind.
 export const equip = (root, source) => new Hold(root, source);
 
-class Hold {
-  #root;
-  #button;
-  #source;
-  #socket = null; // of the current hold; null without one
-  #lease = "";
-  #stamp = 0; // the server's last stamp, and when it arrived
-  #stampedAt = 0;
-  #number = 0;
-  #timer = 0;
-  #pointer = null;
-  #key = null;
-  #ending = new Map(); // socket → reason, of ended holds without their last response
-
+class Hold extends Holding {
   constructor(root, source) {
-    this.#root = root;
-    this.#button = root.querySelector("button");
-    this.#source = source;
-    const button = this.#button;
-    button.addEventListener("pointerdown", (event) => this.#down(event));
-    // A long touch must not open a menu; pointer events arrive all the same.
-    button.addEventListener("touchstart", (event) => event.preventDefault(), { passive: false });
-    button.addEventListener("keydown", (event) => this.#keyDown(event));
-    button.addEventListener("dragstart", (event) => event.preventDefault());
-    onEnd(button, () => this.#pointer, () => this.#key, (why) => this.#end(why));
+    super(root, source);
+    this.button.addEventListener("pointerdown", (event) => this.#down(event));
+    this.button.addEventListener("keydown", (event) => this.#keyDown(event));
   }
 
   #down(event) {
-    if (!event.isPrimary || event.button !== 0 || this.#busy) return;
+    if (!event.isPrimary || event.button !== 0 || this.busy) return;
     // A finger's pointer stays with the button by itself: it must be seen to slide off.
-    if (this.#button.hasPointerCapture(event.pointerId)) this.#button.releasePointerCapture(event.pointerId);
-    this.#pointer = event.pointerId;
-    this.#begin();
+    if (this.button.hasPointerCapture(event.pointerId)) this.button.releasePointerCapture(event.pointerId);
+    this.pointer = event.pointerId;
+    this.begin();
   }
 
   #keyDown(event) {
     if (!KEYS.includes(event.key)) return;
     event.preventDefault();
-    if (event.repeat || this.#busy) return;
-    this.#key = event.key;
-    this.#begin();
-  }
-
-  get #busy() {
-    return this.#socket !== null || this.#button.disabled || document.hidden;
-  }
-
-  #begin() {
-    this.#root.dataset.hold = "asked";
-    this.#show("", "");
-    this.#lease = "";
-    this.#number = 0;
-    const path = `${document.body.dataset.base}/widgets/${this.#root.dataset.widget}/hold`;
-    const socket = new WebSocket(new URL(path, location).href.replace(/^http/, "ws"));
-    this.#socket = socket;
-    this.#stampedAt = performance.now();
-    let begun = false;
-    socket.onmessage = ({ data }) => {
-      const isCurrent = socket === this.#socket;
-      if (!isCurrent && !this.#ending.has(socket)) return;
-      const message = JSON.parse(data);
-      this.#stamp = message.stamp;
-      this.#stampedAt = performance.now();
-      if (!begun && isCurrent) this.#send(socket, { do: "begin", inputs: enteredValues(), seen: this.#source.seen });
-      else if (!begun) this.#send(socket, { do: "end", why: this.#ending.get(socket) });
-      begun = true;
-      if (message.state === "held") isCurrent && this.#held(socket, message);
-      else if (message.state) this.#ended(socket, message);
-    };
-    socket.onclose = () => this.#lost(socket);
-    this.#timer = setInterval(() => this.#beat(socket), BEAT_MS);
-  }
-
-  #send(socket, message) {
-    if (socket.readyState !== WebSocket.OPEN) return;
-    socket.send(JSON.stringify({ ...message, stamp: this.#stamp, after: performance.now() - this.#stampedAt }));
-  }
-
-  #beat(socket) {
-    if (performance.now() - this.#stampedAt > SILENCE_MS) this.#end("silence");
-    else if (this.#lease) this.#send(socket, { do: "beat", number: ++this.#number, lease: this.#lease });
-  }
-
-  #held(socket, { lease }) {
-    if (!lease) return;
-    this.#lease = lease;
-    this.#beat(socket); // on a slow network the next one may be too late
-    this.#root.dataset.hold = "held";
-    this.#button.setAttribute("aria-pressed", "true");
-  }
-
-  // Ends the hold on this page at once; the server's response is shown after.
-  #end(why) {
-    const socket = this.#socket;
-    if (!socket) return;
-    this.#reset();
-    this.#send(socket, { do: "end", why, lease: this.#lease });
-    if (why === "silence" || why === "leaving") {
-      socket.close();
-      if (why === "silence") this.#show("unknown", this.#root.dataset.cut);
-    } else {
-      this.#ending.set(socket, why);
-      setTimeout(() => socket.close(), LAST_RESPONSE_MS);
-    }
-  }
-
-  #ended(socket, { outcome, reason }) {
-    this.#ending.delete(socket);
-    if (socket === this.#socket) this.#reset();
-    else if (this.#socket) return;
-    this.#show(outcome, reason);
-    socket.close();
-  }
-
-  #lost(socket) {
-    const unanswered = this.#ending.delete(socket);
-    if (socket === this.#socket) this.#reset();
-    else if (!unanswered || this.#socket) return;
-    this.#show("unknown", this.#root.dataset.cut);
-  }
-
-  #reset() {
-    clearInterval(this.#timer);
-    this.#socket = this.#pointer = this.#key = null;
-    delete this.#root.dataset.hold;
-    this.#button.setAttribute("aria-pressed", "false");
-  }
-
-  #show(outcome, reason) {
-    const receipt = this.#root.querySelector(".receipt");
-    receipt.dataset.outcome = outcome;
-    receipt.textContent = reason;
+    if (event.repeat || this.busy) return;
+    this.key = event.key;
+    this.begin();
   }
 }

@@ -1,0 +1,47 @@
+"""What is sent of a joystick's deflection: pure.
+
+A deflection is (x, y), each from -1 to 1: x to the right, y to the front, as the finger is.
+"""
+
+import math
+from typing import Final
+
+from app.panel.widgets.joystick import Joystick
+
+Deflection = tuple[float, float]
+
+CENTRE: Final[Deflection] = (0.0, 0.0)
+
+
+def moved(of: Joystick, before: Deflection, deflection: Deflection) -> Deflection:
+    """What the next message has of a deflection, when the last one had `before`."""
+    x, y = shaped(of, deflection)
+    step = of.period_s / of.ramp_s if of.ramp_s else math.inf
+    return ramped(before[0], x, step), ramped(before[1], y, step)
+
+
+def shaped(of: Joystick, deflection: Deflection) -> Deflection:
+    """Within the shape, and without the dead zone: what is outside of it begins with zero."""
+    x, y = (max(-1.0, min(1.0, one)) for one in deflection)
+    if of.shape == "square":
+        return _beyond(x, of.dead_zone), _beyond(y, of.dead_zone)
+    far = math.hypot(x, y)
+    if far <= of.dead_zone:
+        return CENTRE
+    factor = _beyond(min(far, 1.0), of.dead_zone) / far
+    return x * factor, y * factor
+
+
+def ramped(before: float, wanted: float, step: float) -> float:
+    """Faster by `step` at most; slower, and to a stop, at once."""
+    if before * wanted <= 0:
+        before = 0.0
+    if abs(wanted) <= abs(before) + step:
+        return wanted
+    return math.copysign(abs(before) + step, wanted)
+
+
+def _beyond(one: float, dead_zone: float) -> float:
+    if abs(one) <= dead_zone:
+        return 0.0
+    return math.copysign((abs(one) - dead_zone) / (1 - dead_zone), one)

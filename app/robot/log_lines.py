@@ -1,0 +1,139 @@
+"""The newest lines of a topic of `rcl_interfaces/msg/Log`: kept as they came, decoded when somebody
+reads them."""
+
+import asyncio
+from bisect import bisect_left
+from collections import deque
+from collections.abc import Iterator
+from itertools import islice
+from typing import Final, NamedTuple
+
+from app.errors import DecodeError
+from app.interfaces import Interfaces
+from app.printable import printable
+from app.robot.sample import Buffer
+
+LOG_TYPE: Final = "rcl_interfaces/msg/Log"
+KEPT_BYTES: Final = 4_000_000
+LONGEST_LINE: Final = 100_000  # bytes of a message; a longer one is counted, and not kept
+LONGEST_TEXT: Final = 1_000  # characters of a line that are shown
+LONGEST_NAME: Final = 100
+SLICE: Final = 50  # lines that are decoded in one turn of the event loop: some milliseconds
+# From the severity's number on; ROS 2 has 10, 20, 30, 40 and 50.
+SEVERITIES: Final = ((50, "fatal"), (40, "error"), (30, "warn"), (20, "info"))
+
+
+class Line(NamedTuple):
+    """`severity` is ROS 2's number; `stamp` is the sender's time, in seconds since the epoch."""
+
+    severity: int
+    stamp: float
+    node: str
+    text: str
+
+    @property
+    def level(self) -> str:
+        return next((name for least, name in SEVERITIES if self.severity >= least), "debug")
+
+
+class Found(NamedTuple):
+    """`lines` are (number, line), the newest last; `left_out` is how many more of those that were asked
+    for there are, or were, and `last` the number of the newest line of all."""
+
+    lines: list[tuple[int, Line]]
+    left_out: int
+    last: int
+
+
+class Wanted(NamedTuple):
+    """Lines of at least a severity with these texts in the node's name and in the text, in any case."""
+
+    severity: int = 0
+    node: str = ""
+    search: str = ""
+    without: str = ""  # the node of this name
+
+    def has(self, line: Line) -> bool:
+        return (
+            line.severity >= self.severity
+            and line.node != (self.without or None)
+            and self.node.lower() in line.node.lower()
+            and self.search.lower() in line.text.lower()
+        )
+
+
+class _Kept:
+    """One line, decoded at its first reading."""
+
+    __slots__ = ("line", "number", "payload", "size")
+
+    def __init__(self, number: int, payload: bytes) -> None:
+        self.number = number
+        self.payload: bytes | None = payload
+        self.size = len(payload)
+        self.line: Line | None = None  # also where the payload is no line
+
+
+class LogLines:
+    """The lines of one topic, bounded in number and in bytes."""
+
+    def __init__(self, interfaces: Interfaces, keep: int) -> None:
+        self._interfaces = interfaces
+        self._keep = keep
+        self._kept: deque[_Kept] = deque()
+        self._bytes = 0
+        self.count = 0  # of all that came
+
+    def add(self, payload: Buffer) -> None:
+        """A message came; it is not decoded."""
+        self.count += 1
+        if len(payload) > LONGEST_LINE:
+            return
+        kept = _Kept(self.count, bytes(payload))
+        self._kept.append(kept)
+        self._bytes += kept.size
+        while len(self._kept) > self._keep or self._bytes > KEPT_BYTES:
+            self._bytes -= self._kept.popleft().size
+
+    async def find(self, wanted: Wanted, after: int, most: int) -> Found:
+        """The newest lines with a number above `after`, over as many turns as decoding takes."""
+        for number, kept in enumerate(self._since(after)):
+            if kept.payload is not None:
+                self._decode(kept)
+            if number % SLICE == SLICE - 1:
+                await asyncio.sleep(0)
+        return self._found(wanted, after, most)
+
+    def newest(self, wanted: Wanted, most: int) -> Found:
+        """The newest of the last few lines at once, for a page that is rendered."""
+        after = self._kept[-1].number - SLICE if self._kept else 0
+        for kept in self._since(after):
+            self._decode(kept)
+        return self._found(wanted, after, most)
+
+    def _found(self, wanted: Wanted, after: int, most: int) -> Found:
+        read = (kept for kept in self._since(after) if kept.line is not None)
+        fitting = [(kept.number, kept.line) for kept in read if kept.line and wanted.has(kept.line)]
+        first = self._kept[0].number if self._kept else self.count + 1
+        gone = max(0, first - after - 1) if after else 0
+        shown = fitting[-most:]
+        return Found(shown, len(fitting) - len(shown) + gone, self.count)
+
+    def _since(self, after: int) -> Iterator[_Kept]:
+        """A copy: more may come while they are read."""
+        numbers = [kept.number for kept in self._kept]
+        return iter(list(islice(self._kept, bisect_left(numbers, after + 1), None)))
+
+    def _decode(self, kept: _Kept) -> None:
+        payload, kept.payload = kept.payload, None
+        if payload is None:
+            return
+        try:
+            message = self._interfaces.decode(LOG_TYPE, payload)
+        except DecodeError:
+            return
+        stamp = message.stamp.sec + message.stamp.nanosec / 1e9
+        text = printable(message.msg[: LONGEST_TEXT + 1])
+        if len(text) > LONGEST_TEXT:
+            text = text[: LONGEST_TEXT - 1] + "…"
+        kept.line = Line(message.level, stamp, printable(message.name[:LONGEST_NAME]), text)

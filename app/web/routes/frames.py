@@ -1,0 +1,132 @@
+"""The pictures of cameras: a WebSocket for each camera that is seen, and one picture by itself.
+
+A browser asks for the next picture once it has drawn the last: so nothing piles up, however slow it is,
+and nothing is sent to a page that is hidden. Not a request for each, nor a stream: a browser has six
+connections to one host for all its pages, and each page's events take one; sockets are not counted.
+
+    browser  {"next": true}
+    server   {"number": 41, "type": "image/jpeg", "time": "10:00:00"}, and then its bytes
+    browser  {"next": true}
+
+A picture that can't be shown is none: the events say why, and the next one is waited for.
+"""
+
+import asyncio
+import json
+from contextlib import suppress
+from typing import Annotated, Any, Final
+
+from fastapi import APIRouter, Query, WebSocket, WebSocketDisconnect
+from fastapi.responses import Response
+
+from app.clock import format_time
+from app.errors import NotFound, TooMany
+from app.i18n import say
+from app.panel.widgets.camera import Camera
+from app.robot.pictures import NoPicture, Picture
+from app.runtime.frames import Feed, Frame
+from app.web.app_state import CurrentSession, CurrentState
+from app.web.described import Described, errors
+from app.web.request_body import received
+
+router = APIRouter()
+
+FIRST_WITHIN_S: Final = 2.0  # until a topic that is looked at anew is heard of
+AFTER_WITHIN_S: Final = 10.0
+BAD_PAUSE_S: Final = 0.2  # between two pictures that can't be shown
+TRY_AGAIN_LATER: Final = 4429  # 4000 + HTTP's
+IMAGES: Final[Described] = {
+    200: {
+        "content": {
+            kind: {"schema": {"type": "string", "format": "binary"}}
+            for kind in ("image/jpeg", "image/png", "image/webp", "image/bmp")
+        }
+    }
+}
+
+
+@router.get(
+    "/widgets/{widget}/frame",
+    response_class=Response,
+    summary="The newest picture of a camera; with `after`, the next one after that number",
+    responses=errors(403, 404, 422, 429) | IMAGES,
+)
+async def frame(
+    widget: str, session: CurrentSession, after: Annotated[int, Query(ge=0)] = 0
+) -> Response:
+    camera = session.frames.widget(widget)
+    feed = session.frames.feed(camera)
+    with feed.looked_at():
+        try:
+            async with asyncio.timeout(AFTER_WITHIN_S if after else FIRST_WITHIN_S):
+                shown, picture = await _next(feed, camera, after)
+        except TimeoutError:
+            raise NotFound(say("camera_none")) from None
+    headers = {
+        "cache-control": "no-store",
+        "x-frame": str(shown.number),
+        "x-frame-time": f"{shown.wall:.3f}",
+        "content-encoding": "identity",  # to pack it would stop the event loop, for next to nothing
+    }
+    return Response(picture.data, media_type=picture.media_type, headers=headers)
+
+
+@router.websocket("/widgets/{widget}/frames")
+async def frames(socket: WebSocket, widget: str, state: CurrentState, session: CurrentSession) -> None:
+    camera = session.frames.widget(widget)
+    await socket.accept()
+    with suppress(WebSocketDisconnect):
+        try:
+            await _FrameSocket(socket, session.frames.feed(camera), camera).run()
+        except TooMany:
+            await socket.close(TRY_AGAIN_LATER)
+
+
+async def _next(feed: Feed, camera: Camera, after: int) -> tuple[Frame, Picture]:
+    """The next frame that can be shown."""
+    while True:
+        found = await feed.newer(after)
+        try:
+            return found, await feed.picture(found, camera)
+        except NoPicture:
+            after = found.number
+            await asyncio.sleep(BAD_PAUSE_S)
+
+
+class _FrameSocket:
+    """One browser that looks at one camera."""
+
+    def __init__(self, socket: WebSocket, feed: Feed, camera: Camera) -> None:
+        self._socket = socket
+        self._feed = feed
+        self._camera = camera
+        self._asked = asyncio.Event()
+
+    async def run(self) -> None:
+        """Until the browser closes it."""
+        with self._feed.looked_at():
+            writing = asyncio.create_task(self._write())
+            try:
+                while (message := await received(self._socket))["type"] == "websocket.receive":
+                    if message.get("text"):
+                        self._asked.set()
+            finally:
+                writing.cancel()
+                await asyncio.gather(writing, return_exceptions=True)
+
+    async def _write(self) -> None:
+        """Sends the newest picture each time that one is asked for, not too often."""
+        loop, number = asyncio.get_running_loop(), 0
+        while True:
+            await self._asked.wait()
+            self._asked.clear()
+            shown, picture = await _next(self._feed, self._camera, number)
+            due, number = loop.time() + 1 / self._camera.max_hz, shown.number
+            about: dict[str, Any] = {
+                "number": number,
+                "type": picture.media_type,
+                "time": format_time(shown.wall),
+            }
+            await self._socket.send_text(json.dumps(about))
+            await self._socket.send_bytes(picture.data)
+            await asyncio.sleep(due - loop.time())

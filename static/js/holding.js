@@ -1,0 +1,144 @@
+// Hold-to-run, of a key or a joystick: what acts while it is held. Every event that may mean a release ends the hold, and only
+// a new press starts another one. The page shows the server's response, nothing else.
+import { enteredValues } from "./entries.js";
+import { onEnd } from "./hold-end.js";
+
+// On the page's own thread on purpose: a page that stalls must not keep a hold alive.
+const BEAT_MS = 80;
+// Without a response for so long the server has ended the hold.
+const SILENCE_MS = 500;
+// The last response waits for the disk.
+const LAST_RESPONSE_MS = 3000;
+export class Holding {
+  root;
+  button;
+  #source;
+  #socket = null; // of the current hold; null without one
+  #lease = "";
+  #stamp = 0; // the server's last stamp, and when it arrived
+  #stampedAt = 0;
+  #number = 0;
+  #timer = 0;
+  pointer = null; // the pointer or the key that holds it
+  key = null;
+  #ending = new Map(); // socket → reason, of ended holds without their last response
+
+  constructor(root, source) {
+    this.root = root;
+    this.button = root.querySelector(".hold");
+    this.#source = source;
+    // A long touch must not open a menu; pointer events arrive all the same.
+    this.button.addEventListener("touchstart", (event) => event.preventDefault(), { passive: false });
+    this.button.addEventListener("dragstart", (event) => event.preventDefault());
+    onEnd(this.button, () => this.pointer, () => this.key, (why) => this.end(why));
+  }
+
+  // What each heartbeat has in it; a joystick has its deflection.
+  said() {
+    return {};
+  }
+
+  // What the server says of each heartbeat.
+  answered() {}
+
+  // It is not held any more.
+  released() {}
+
+  get busy() {
+    return this.#socket !== null || this.button.disabled || document.hidden;
+  }
+
+  get isHeld() {
+    return this.#socket !== null;
+  }
+
+  begin() {
+    this.root.dataset.hold = "asked";
+    this.#show("", "");
+    this.#lease = "";
+    this.#number = 0;
+    const path = `${document.body.dataset.base}/widgets/${this.root.dataset.widget}/hold`;
+    const socket = new WebSocket(new URL(path, location).href.replace(/^http/, "ws"));
+    this.#socket = socket;
+    this.#stampedAt = performance.now();
+    let begun = false;
+    socket.onmessage = ({ data }) => {
+      const isCurrent = socket === this.#socket;
+      if (!isCurrent && !this.#ending.has(socket)) return;
+      const message = JSON.parse(data);
+      this.#stamp = message.stamp;
+      this.#stampedAt = performance.now();
+      if (!begun && isCurrent) this.#send(socket, { do: "begin", inputs: enteredValues(), seen: this.#source.seen });
+      else if (!begun) this.#send(socket, { do: "end", why: this.#ending.get(socket) });
+      begun = true;
+      if (message.state === "held") isCurrent && this.#held(socket, message);
+      else if (message.state) this.#ended(socket, message);
+    };
+    socket.onclose = () => this.#lost(socket);
+    this.#timer = setInterval(() => this.beat(socket), BEAT_MS);
+  }
+
+  #send(socket, message) {
+    if (socket.readyState !== WebSocket.OPEN) return;
+    socket.send(JSON.stringify({ ...message, stamp: this.#stamp, after: performance.now() - this.#stampedAt }));
+  }
+
+  // Between the regular ones too, where there is news.
+  beat(socket = this.#socket) {
+    if (performance.now() - this.#stampedAt > SILENCE_MS) this.end("silence");
+    else if (this.#lease) this.#send(socket, { do: "beat", number: ++this.#number, lease: this.#lease, ...this.said() });
+  }
+
+  #held(socket, { lease, moves }) {
+    if (moves) this.answered(moves);
+    if (!lease) return;
+    this.#lease = lease;
+    this.beat(socket); // on a slow network the next one may be too late
+    this.root.dataset.hold = "held";
+    this.button.setAttribute("aria-pressed", "true");
+  }
+
+  // Ends the hold on this page at once; the server's response is shown after.
+  end(why) {
+    const socket = this.#socket;
+    if (!socket) return;
+    this.#reset();
+    this.#send(socket, { do: "end", why, lease: this.#lease });
+    if (why === "silence" || why === "leaving") {
+      socket.close();
+      if (why === "silence") this.#show("unknown", this.root.dataset.cut);
+    } else {
+      this.#ending.set(socket, why);
+      setTimeout(() => socket.close(), LAST_RESPONSE_MS);
+    }
+  }
+
+  #ended(socket, { outcome, reason }) {
+    this.#ending.delete(socket);
+    if (socket === this.#socket) this.#reset();
+    else if (this.#socket) return;
+    this.#show(outcome, reason);
+    socket.close();
+  }
+
+  #lost(socket) {
+    const unanswered = this.#ending.delete(socket);
+    if (socket === this.#socket) this.#reset();
+    else if (!unanswered || this.#socket) return;
+    this.#show("unknown", this.root.dataset.cut);
+  }
+
+  #reset() {
+    clearInterval(this.#timer);
+    this.#socket = this.pointer = this.key = null;
+    delete this.root.dataset.hold;
+    this.button.setAttribute("aria-pressed", "false");
+    this.released();
+  }
+
+  #show(outcome, reason) {
+    const receipt = this.root.querySelector(".receipt");
+    receipt.dataset.outcome = outcome;
+    receipt.textContent = reason;
+  }
+}

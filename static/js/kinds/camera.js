@@ -1,0 +1,93 @@
+// A camera: asks for the next picture once the last is drawn, and only while it is seen.
+
+const RETRY_MS = 1000;
+const WATCH_MS = 100;
+
+// Called for each widget of this kind.
+export const equip = (root) => new Camera(root);
+
+class Camera {
+  #root;
+  #canvas;
+  #socket = null;
+  #onScreen = false;
+  #retry = 0;
+  #about = null; // of the bytes that come next
+  #drawnAt = 0;
+
+  constructor(root) {
+    this.#root = root;
+    this.#canvas = root.querySelector("canvas");
+    new IntersectionObserver((entries) => {
+      this.#onScreen = entries.at(-1).isIntersecting;
+      this.#follow();
+    }).observe(root);
+    document.addEventListener("visibilitychange", () => this.#follow());
+    addEventListener("pagehide", () => this.#close());
+    addEventListener("pageshow", () => this.#follow());
+    setInterval(() => this.#watch(), WATCH_MS);
+  }
+
+  #follow() {
+    if (this.#onScreen && !document.hidden) this.#open();
+    else this.#close();
+  }
+
+  #open() {
+    if (this.#socket) return;
+    clearTimeout(this.#retry);
+    const path = `${document.body.dataset.base}/widgets/${this.#root.dataset.widget}/frames`;
+    const socket = new WebSocket(new URL(path, location).href.replace(/^http/, "ws"));
+    socket.binaryType = "blob";
+    this.#socket = socket;
+    this.#drawnAt = performance.now();
+    socket.onopen = () => this.#ask(socket);
+    socket.onmessage = ({ data }) => {
+      if (typeof data === "string") this.#about = JSON.parse(data);
+      else this.#draw(socket, data, this.#about);
+    };
+    socket.onclose = () => {
+      if (socket !== this.#socket) return;
+      this.#socket = null;
+      this.#retry = setTimeout(() => this.#follow(), RETRY_MS);
+    };
+  }
+
+  #close() {
+    clearTimeout(this.#retry);
+    this.#socket?.close();
+    this.#socket = null;
+  }
+
+  #ask(socket) {
+    if (socket.readyState === WebSocket.OPEN) socket.send('{"next": true}');
+  }
+
+  async #draw(socket, bytes, { type, number, time }) {
+    try {
+      const picture = await createImageBitmap(new Blob([bytes], { type }));
+      if (socket !== this.#socket) return picture.close();
+      const { width, height } = picture;
+      if (this.#canvas.width !== width) this.#canvas.width = width;
+      if (this.#canvas.height !== height) this.#canvas.height = height;
+      this.#canvas.getContext("2d").drawImage(picture, 0, 0);
+      picture.close();
+      this.#root.querySelector(".taken").textContent = time;
+      this.#root.dataset.frame = number;
+      this.#drawnAt = performance.now();
+      delete this.#root.dataset.broken;
+      delete this.#root.dataset.late;
+    } catch {
+      this.#root.dataset.broken = "";
+    }
+    // The next one with the next frame of the screen, which a hidden page does not have.
+    requestAnimationFrame(() => this.#ask(socket));
+  }
+
+  // The robot may send, and this browser get nothing: then its picture is old all the same.
+  #watch() {
+    if (!this.#socket || this.#root.dataset.state !== "live") return;
+    const late = performance.now() - this.#drawnAt > Number(this.#root.dataset.maxAge) + RETRY_MS;
+    this.#root.toggleAttribute("data-late", late);
+  }
+}

@@ -1,0 +1,92 @@
+// A joystick: a hold whose heartbeats have the deflection. It follows one finger, wherever that goes, and shows what
+// the server has sent of it.
+import { Holding } from "../holding.js";
+
+const APART_MS = 40; // between two heartbeats of a finger that moves
+const ARROWS = { ArrowUp: [0, 1], ArrowDown: [0, -1], ArrowLeft: [-1, 0], ArrowRight: [1, 0] };
+
+// Called for each widget of this kind.
+export const equip = (root, source) => new Joystick(root, source);
+
+class Joystick extends Holding {
+  #knob;
+  #x = 0;
+  #y = 0;
+  #arrows = new Set(); // those that are held
+  #beatAt = 0;
+
+  constructor(root, source) {
+    super(root, source);
+    this.#knob = root.querySelector(".knob");
+    this.button.addEventListener("pointerdown", (event) => this.#down(event));
+    this.button.addEventListener("pointermove", (event) => event.pointerId === this.pointer && this.#follow(event));
+    this.button.addEventListener("keydown", (event) => this.#keyDown(event));
+    window.addEventListener("keyup", (event) => this.#keyUp(event), { capture: true });
+  }
+
+  said() {
+    return { x: this.#x, y: this.#y };
+  }
+
+  answered(moves) {
+    for (const [axis, text] of Object.entries(moves)) this.root.querySelector(`[data-axis="${axis}"]`).textContent = text;
+  }
+
+  released() {
+    this.#arrows.clear();
+    this.#deflect(0, 0);
+    for (const value of this.root.querySelectorAll("[data-axis]")) value.textContent = "";
+  }
+
+  #down(event) {
+    if (!event.isPrimary || event.button !== 0 || this.busy) return;
+    this.button.setPointerCapture(event.pointerId);
+    this.pointer = event.pointerId;
+    this.begin();
+    this.#follow(event);
+  }
+
+  // From the middle of the pad, as far as the knob goes.
+  #follow({ clientX, clientY }) {
+    const { left, top, width, height } = this.root.querySelector(".pad").getBoundingClientRect();
+    const reach = (Math.min(width, height) - this.#knob.offsetWidth) / 2;
+    this.#deflect((clientX - left - width / 2) / reach, (top + height / 2 - clientY) / reach);
+    if (performance.now() - this.#beatAt < APART_MS) return;
+    this.#beatAt = performance.now();
+    this.beat();
+  }
+
+  #deflect(x, y) {
+    const inside = (value) => Math.max(-1, Math.min(1, value));
+    const far = this.root.dataset.shape === "circle" ? Math.max(1, Math.hypot(x, y)) : 1;
+    this.#x = inside(x / far);
+    this.#y = inside(y / far);
+    this.#knob.style.setProperty("--x", this.#x);
+    this.#knob.style.setProperty("--y", this.#y);
+  }
+
+  #keyDown(event) {
+    if (!(event.key in ARROWS)) return;
+    event.preventDefault();
+    if (event.repeat || this.pointer !== null) return;
+    if (!this.isHeld) {
+      if (this.busy) return;
+      this.begin();
+    }
+    this.#arrows.add(event.key);
+    this.#push();
+  }
+
+  #keyUp(event) {
+    if (!this.#arrows.delete(event.key)) return;
+    if (this.#arrows.size) this.#push();
+    else this.end("released");
+  }
+
+  #push() {
+    const held = [...this.#arrows].map((key) => ARROWS[key]);
+    const sum = (axis) => held.reduce((all, arrow) => all + arrow[axis], 0);
+    this.#deflect(sum(0), sum(1));
+    this.beat();
+  }
+}

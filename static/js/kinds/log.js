@@ -1,0 +1,105 @@
+// A log: asks for its lines while it is seen, when more have come, and when other lines are wanted.
+import { setText } from "../show.js";
+
+const APART_MS = 250;
+const SETTLE_MS = 300; // from the last letter typed
+
+const logs = new WeakMap();
+
+// Called for each widget of this kind.
+export const equip = (root) => logs.set(root, new Log(root));
+
+export const show = {
+  count(root, value) {
+    root.dataset.count = value;
+    logs.get(root)?.follow();
+  },
+};
+
+class Log {
+  #root;
+  #lines;
+  #last = 0; // the number of the newest line that was asked for
+  #askedAt = -Infinity;
+  #timer = 0;
+  #asking = null; // the request under way
+  #onScreen = false;
+  #paused = false;
+
+  constructor(root) {
+    this.#root = root;
+    this.#lines = root.querySelector(".lines");
+    const wanted = root.querySelector(".wanted");
+    wanted.hidden = false;
+    wanted.querySelector(".level").addEventListener("change", () => this.#again());
+    for (const input of wanted.querySelectorAll("input")) {
+      input.addEventListener("input", () => this.#again(SETTLE_MS));
+      input.addEventListener("keydown", (event) => event.key === "Enter" && event.preventDefault()); // no press
+    }
+    const pause = wanted.querySelector(".pause");
+    pause.addEventListener("click", () => {
+      this.#paused = !this.#paused;
+      pause.setAttribute("aria-pressed", this.#paused);
+      this.follow();
+    });
+    new IntersectionObserver((entries) => {
+      this.#onScreen = entries.at(-1).isIntersecting;
+      this.follow();
+    }).observe(root);
+    document.addEventListener("visibilitychange", () => this.follow());
+    this.#again();
+  }
+
+  // Asks when there is more than what was asked for, not too often, and one request at a time.
+  follow() {
+    const more = Number(this.#root.dataset.count) !== this.#last;
+    if (!more || this.#paused || this.#asking || this.#timer || !this.#onScreen || document.hidden) return;
+    const wait = Math.max(0, this.#askedAt + APART_MS - performance.now());
+    this.#timer = setTimeout(() => this.#ask(), wait);
+  }
+
+  // From the first line on, as other lines are wanted.
+  #again(wait = 0) {
+    this.#asking?.abort();
+    this.#asking = null;
+    clearTimeout(this.#timer);
+    this.#timer = setTimeout(() => this.#ask(true), wait);
+  }
+
+  async #ask(anew = false) {
+    this.#timer = 0;
+    this.#askedAt = performance.now();
+    const asking = (this.#asking = new AbortController());
+    const of = (name) => this.#root.querySelector(`.wanted .${name}`).value;
+    const query = new URLSearchParams({ level: of("level"), node: of("node"), search: of("search"), after: anew ? 0 : this.#last });
+    try {
+      const path = `${document.body.dataset.base}/widgets/${this.#root.dataset.widget}/lines?${query}`;
+      const answer = await fetch(path, { signal: asking.signal });
+      if (answer.ok && asking === this.#asking) this.#show(await answer.json(), anew);
+    } catch {
+      // The connection is lost: the page shows that.
+    }
+    if (asking !== this.#asking) return;
+    this.#asking = null;
+    this.follow();
+  }
+
+  #show({ lines, note, last }, anew) {
+    const template = this.#root.querySelector("template");
+    const top = this.#lines.scrollTop;
+    const before = this.#lines.scrollHeight;
+    const rows = lines.reverse().map((line) => {
+      const row = template.content.firstElementChild.cloneNode(true);
+      row.dataset.level = line.level;
+      for (const name of ["time", "word", "node", "text"]) row.querySelector(`.${name}`).textContent = line[name];
+      return row;
+    });
+    if (anew) this.#lines.replaceChildren(...rows);
+    else this.#lines.prepend(...rows);
+    while (this.#lines.children.length > Number(this.#root.dataset.lines)) this.#lines.lastElementChild.remove();
+    // Who reads further down stays there.
+    if (top > 0 && !anew) this.#lines.scrollTop = top + this.#lines.scrollHeight - before;
+    setText(this.#root.querySelector(".left-out"), note);
+    this.#last = last;
+  }
+}

@@ -1,0 +1,202 @@
+"""Cameras: rclpy nodes, the real bridge, Chromium. Each browser gets as many pictures as it takes."""
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+import zenoh
+from playwright.sync_api import Browser, Page, expect
+from websockets.sync.client import ClientConnection, connect
+
+from app.simulator.values.clock_picture import SIZE, grey_pixels, png
+from tests.support.parts import Bridge, RosNode, Server, live, until
+
+PANEL = """
+title = "Robot cell 1"
+
+[[page]]
+id = "one"
+title = "One"
+
+[[page.widget]]
+id = "packed"
+kind = "camera"
+label = "Packed"
+topic = "/test_packed"
+
+[[page.widget]]
+id = "raw"
+kind = "camera"
+label = "Raw"
+topic = "/test_raw"
+type = "sensor_msgs/msg/Image"
+max_bytes = 50000
+
+[[page]]
+id = "two"
+title = "Two"
+
+[[page.widget]]
+id = "note"
+kind = "label"
+label = "Nothing to see"
+"""
+PACKED, RAW = "sensor_msgs/msg/CompressedImage", "sensor_msgs/msg/Image"
+BEST_EFFORT = {"reliability": "best_effort", "depth": 1}
+HIDE = """(hidden) => {
+  Object.defineProperty(document, "hidden", { value: hidden, configurable: true });
+  document.dispatchEvent(new Event("visibilitychange"));
+}"""
+
+
+@pytest.fixture(scope="module")
+def kiosk(bridge: Bridge, node: RosNode, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    folder = tmp_path_factory.mktemp("cell")
+    panel = folder / "cell.toml"
+    panel.write_text(PANEL)
+    node.advertise("/test_packed", PACKED, **BEST_EFFORT)
+    node.every("/test_packed", {"format": "png", "data": [*png(grey_pixels(0, 0))]}, 0.1)
+    node.advertise("/test_raw", RAW, **BEST_EFFORT)
+    node.every("/test_raw", image("rgb8", 3), 0.1)
+    mine = live(bridge.endpoint, folder, KIOSK_PANEL=str(panel))
+    until(mine.ready, "ready")
+    yield mine
+    mine.end()
+    for topic in ("/test_packed", "/test_raw"):
+        node.withdraw(topic)
+
+
+def image(encoding: str, size: int, width: int = 20, height: int = 10) -> dict[str, Any]:
+    data = [90, 200, 40, 255][:size] * (width * height)
+    shape = {"width": width, "height": height, "step": width * size}
+    return {**shape, "encoding": encoding, "data": data}
+
+
+def camera(page: Page, name: str) -> Any:
+    return page.locator(f'[data-widget="{name}"]')
+
+
+@contextmanager
+def looking(kiosk: Server, name: str) -> Iterator[ClientConnection]:
+    url = kiosk.url.replace("http", "ws")
+    with connect(f"{url}/widgets/{name}/frames", proxy=None, max_size=None) as socket:
+        yield socket
+
+
+@pytest.fixture(scope="module")
+def session(bridge: Bridge) -> Iterator[zenoh.Session]:
+    config = zenoh.Config()
+    config.insert_json5("mode", '"client"')
+    config.insert_json5("connect/endpoints", json.dumps([bridge.endpoint]))
+    with zenoh.open(config) as opened:
+        yield opened
+
+
+def is_read(session: zenoh.Session, topic: str) -> bool:
+    """Whether the bridge has a DDS reader of a topic."""
+    replies = session.get(f"@/*/ros2/route/topic/pub{topic}")
+    routes = [json.loads(reply.ok.payload.to_string()) for reply in replies if reply.ok]
+    return any(route["dds_reader"] for route in routes)
+
+
+def ask(socket: ClientConnection) -> dict[str, Any]:
+    socket.send('{"next": true}')
+    about: dict[str, Any] = json.loads(socket.recv(30))
+    about["bytes"] = socket.recv(30)
+    return about
+
+
+def test_both_kinds_of_pictures_are_drawn(kiosk: Server, page: Page) -> None:
+    page.goto(kiosk.url)
+    for name, size in (("packed", list(SIZE)), ("raw", [20, 10])):
+        expect(camera(page, name)).to_have_attribute("data-state", "live", timeout=20_000)
+        canvas = camera(page, name).locator("canvas")
+        expect(canvas).to_have_attribute("width", str(size[0]), timeout=20_000)
+        expect(canvas).to_have_attribute("height", str(size[1]))
+        expect(camera(page, name).locator(".sign")).to_be_hidden()
+    pixel = "(c) => [...c.getContext('2d').getImageData(2, 2, 1, 1).data]"
+    assert camera(page, "raw").locator("canvas").evaluate(pixel) == [90, 200, 40, 255]
+
+
+def test_what_nobody_looks_at_is_not_subscribed_to(
+    kiosk: Server, session: zenoh.Session, page: Page
+) -> None:
+    """Neither a hidden page nor one without the camera: then the bridge reads nothing of it."""
+    page.goto(kiosk.url)
+    expect(camera(page, "packed")).to_have_attribute("data-state", "live", timeout=20_000)
+    assert is_read(session, "/test_packed")
+    page.evaluate(HIDE, True)
+    until(lambda: not is_read(session, "/test_packed"), "nobody reads it")
+    assert kiosk.widget("packed")["state"] == "waiting"
+    page.evaluate(HIDE, False)
+    expect(camera(page, "packed")).to_have_attribute("data-state", "live", timeout=20_000)
+    page.goto(f"{kiosk.url}/pages/two")
+    until(lambda: not is_read(session, "/test_packed"), "nobody reads it")
+
+
+def test_a_slow_browser_gets_the_newest_and_holds_nobody_up(kiosk: Server) -> None:
+    with looking(kiosk, "packed") as slow, looking(kiosk, "packed") as quick:
+        first = ask(slow)
+        for _ in range(10):
+            last = ask(quick)
+        assert last["number"] >= first["number"] + 9
+        assert last["type"] == "image/png"
+        after = ask(slow)
+        assert after["number"] >= last["number"]
+        with pytest.raises(TimeoutError):
+            slow.recv(0.3)  # nothing that was not asked for
+
+
+def test_a_picture_that_stays_out_is_old_and_says_so(kiosk: Server, node: RosNode, page: Page) -> None:
+    page.goto(kiosk.url)
+    expect(camera(page, "packed")).to_have_attribute("data-state", "live", timeout=20_000)
+    node.withdraw("/test_packed")
+    expect(camera(page, "packed")).to_have_attribute("data-state", "old", timeout=20_000)
+    expect(camera(page, "packed").locator(".sign")).to_contain_text(" s old, received ")
+    node.advertise("/test_packed", PACKED, **BEST_EFFORT)
+    node.every("/test_packed", {"format": "png", "data": [*png(grey_pixels(0, 0))]}, 0.1)
+    expect(camera(page, "packed")).to_have_attribute("data-state", "live", timeout=40_000)
+
+
+@pytest.mark.parametrize(
+    ("fields", "said"),
+    [
+        (image("mono16", 2), "The encoding mono16 cannot be shown"),
+        (image("rgb8", 3, 200, 100), "The picture has 600"),
+        (image("rgb8", 3) | {"height": 11}, "not a whole sensor_msgs/msg/Image"),
+    ],
+)
+def test_what_can_not_be_shown_says_why(
+    kiosk: Server, node: RosNode, page: Page, fields: dict[str, Any], said: str
+) -> None:
+    node.advertise("/test_raw", RAW, **BEST_EFFORT)
+    node.every("/test_raw", fields, 0.1)
+    page.goto(kiosk.url)
+    expect(camera(page, "raw").locator(".sign")).to_contain_text(said, timeout=40_000)
+    node.advertise("/test_raw", RAW, **BEST_EFFORT)
+    node.every("/test_raw", image("rgb8", 3), 0.1)
+    expect(camera(page, "raw")).to_have_attribute("data-state", "live", timeout=40_000)
+
+
+def test_without_scripts_the_newest_picture_is_on_the_page(kiosk: Server, chromium: Browser) -> None:
+    with chromium.new_context(java_script_enabled=False) as context:
+        page = context.new_page()
+        page.goto(kiosk.url)
+        picture = camera(page, "packed").locator("img")
+        expect(picture).to_be_visible()
+        with page.expect_response(lambda answer: answer.url.endswith("/packed/frame")) as found:
+            page.reload()
+        assert found.value.headers["content-type"] == "image/png"
+        assert found.value.headers["x-content-type-options"] == "nosniff"
+
+
+def test_a_picture_is_for_the_panels_own_pages(kiosk: Server) -> None:
+    found = kiosk.http.get("/widgets/packed/frame")
+    assert found.content == png(grey_pixels(0, 0))
+    later = kiosk.http.get("/widgets/packed/frame", params={"after": found.headers["x-frame"]})
+    assert int(later.headers["x-frame"]) > int(found.headers["x-frame"])
+    other = kiosk.http.get("/widgets/packed/frame", headers={"Sec-Fetch-Site": "cross-site"})
+    assert other.status_code == 403
+    assert kiosk.http.get("/widgets/note/frame").status_code == 404

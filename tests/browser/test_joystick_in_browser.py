@@ -1,0 +1,365 @@
+"""A joystick with a finger on Chromium and a real node behind the real bridge: what it sends, and each
+way in which it ends, with zeros and nothing after."""
+
+import os
+import re
+import signal
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from functools import partial
+from pathlib import Path
+from typing import Any, Final
+
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from tests.browser.test_holds_in_browser import BREAKABLE, SCRIPTS, own_chromium
+from tests.support.parts import Bridge, RosNode, Server, live, until
+
+pytestmark = pytest.mark.real_time
+
+PANEL: Final = """
+title = "Drive"
+[[interlock]]
+id = "operation"
+topic = "/stick_enabled"
+[[page]]
+id = "one"
+title = "One"
+[[page.widget]]
+id = "stick"
+kind = "joystick"
+label = "Drive"
+topic = "/stick"
+type = "geometry_msgs/msg/Twist"
+rate_hz = 50
+interlock = "operation"
+y_axis = { max = 0.5, unit = "m/s" }
+x_axis = { max = -1.0, unit = "rad/s" }
+[[page.widget]]
+id = "stamped"
+kind = "joystick"
+label = "Stamped"
+topic = "/stamped"
+type = "geometry_msgs/msg/TwistStamped"
+frame_id = "tool"
+interlock = "operation"
+shape = "square"
+"""
+TOPIC: Final = "/stick"
+TRIES: Final = 5
+QUIET_S: Final = 0.4
+ENDED: Final = re.compile(r"hold \w+ of (?:stick|stamped) by .* ended after .* \((\w+)\): ")
+Twist = tuple[float, float]
+
+
+@pytest.fixture(scope="module")
+def robot(node: RosNode) -> Iterator[RosNode]:
+    node.subscribe(TOPIC, "geometry_msgs/msg/Twist", depth=1000)
+    node.subscribe("/stamped", "geometry_msgs/msg/TwistStamped", depth=1000)
+    node.advertise("/stick_enabled", "std_msgs/msg/Bool")
+    yield node
+    node.withdraw("/stick_enabled")
+
+
+@pytest.fixture(scope="module")
+def running(
+    bridge: Bridge, robot: RosNode, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Callable[[], Server]]:
+    """Gives the kiosk of this file, and another one where a test ended that."""
+    servers: list[Server] = []
+
+    def one() -> Server:
+        if not servers or not servers[-1].process.running:
+            panel = tmp_path_factory.mktemp("stick") / "stick.toml"
+            panel.write_text(PANEL)
+            servers.append(live(bridge.endpoint, panel.parent, KIOSK_PANEL=str(panel)))
+            until(servers[-1].ready, "ready")
+        return servers[-1]
+
+    yield one
+    for server in servers:
+        server.end()
+
+
+@pytest.fixture
+def kiosk(running: Callable[[], Server], robot: RosNode) -> Server:
+    mine = running()
+    permit(mine, robot, True)
+    return mine
+
+
+def permit(server: Server, robot: RosNode, permitted: bool) -> None:
+    def says() -> bool:
+        robot.publish("/stick_enabled", {"data": permitted})
+        return bool(server.widget("stick")["enabled"]) is permitted
+
+    until(says, f"permitted: {permitted}", every_s=0.2)
+
+
+@pytest.fixture
+def thumb(chromium: Browser, kiosk: Server) -> Iterator["Thumb"]:
+    context = chromium.new_context(viewport={"width": 1280, "height": 800}, has_touch=True)
+    context.set_default_timeout(10_000)
+    yield Thumb(context.new_page(), kiosk)
+    context.close()
+
+
+class Thumb:
+    """A page with joysticks, and a finger on one of them."""
+
+    def __init__(self, page: Page, server: Server, widget: str = "stick") -> None:
+        self.page = page
+        self.server = server
+        self.root = page.locator(f'[data-widget="{widget}"]')
+        self.button = self.root.locator(".hold")
+        self._touch = page.context.new_cdp_session(page)
+        self._touches = False
+        page.add_init_script(BREAKABLE)
+        self.opens()
+
+    def opens(self) -> None:
+        self.up()
+        self.page.goto(self.server.url)
+        expect(self.button).to_be_enabled()
+        self.root.scroll_into_view_if_needed()
+        box = self.root.locator(".pad").bounding_box()
+        assert box is not None
+        self.x, self.y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+        self.far = box["width"] / 2
+
+    def _send(self, kind: str, *points: tuple[float, float]) -> None:
+        touches = [{"x": x, "y": y, "id": n} for n, (x, y) in enumerate(points)]
+        self._touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": touches})
+
+    def at(self, x: float, y: float) -> tuple[float, float]:
+        return self.x + x * self.far, self.y - y * self.far
+
+    def down(self, x: float = 0.0, y: float = 0.0) -> None:
+        self._send("touchStart", self.at(x, y))
+        self._touches = True
+
+    def move(self, x: float, y: float) -> None:
+        self._send("touchMove", self.at(x, y))
+
+    def up(self) -> None:
+        if self._touches:
+            self._touches = False
+            self._send("touchEnd")
+
+    def cancel(self) -> None:
+        self._touches = False
+        self._send("touchCancel")
+
+    def second(self) -> None:
+        self._send("touchStart", self.at(0, 1), (5, 5))
+
+    def does(self, script: str) -> None:
+        self.page.evaluate(script)
+
+    @property
+    def knob(self) -> tuple[float, float]:
+        style = "(knob) => ['--x', '--y'].map((name) => Number(knob.style.getPropertyValue(name)))"
+        x, y = self.root.locator(".knob").evaluate(style)
+        return x, y
+
+
+def heard(robot: RosNode, before: int = 0) -> list[Twist]:
+    """(forward, turn) of what was heard."""
+    return [(one["linear"]["x"], one["angular"]["z"]) for one in robot.heard(TOPIC)[before:]]
+
+
+def ends_of(server: Server) -> list[str]:
+    return [one[1] for one in map(ENDED.search, list(server.process.lines)) if one]
+
+
+def has_ended(server: Server, ends: int) -> bool:
+    return len(ends_of(server)) > ends
+
+
+def drives(robot: RosNode, before: int) -> bool:
+    return (0.5, 0.0) in heard(robot, before)
+
+
+def driving(thumb: Thumb, robot: RosNode) -> tuple[int, int]:
+    """Holds until the robot drives: how much was heard before, and how many holds had ended."""
+    for _ in range(TRIES):
+        before, ends = len(robot.heard(TOPIC)), len(ends_of(thumb.server))
+        thumb.down()
+        thumb.move(0, 2)  # further than the pad: the finger stays with it
+        with suppress(AssertionError):
+            until(partial(drives, robot, before), "it drives", within_s=3)
+            return before, ends
+        thumb.up()
+    raise AssertionError(f"it never drove: {thumb.server.process.text}")
+
+
+def ended_by(
+    thumb: Thumb, robot: RosNode, cause: Callable[[], Any], code: str, lift: bool = True
+) -> None:
+    """Drives, lets the cause happen: for that reason it ends, with zeros, and nothing comes after."""
+    found: list[str] = []
+    for attempt in range(TRIES):
+        if attempt:
+            thumb.opens()
+        before, ends = driving(thumb, robot)
+        cause()
+        until(partial(has_ended, thumb.server, ends), "it ends")
+        until(lambda: heard(robot)[-1] == (0.0, 0.0), "it stops")
+        time.sleep(QUIET_S)  # longer than a lease: what comes after it would show
+        if lift:
+            thumb.up()
+        found = ends_of(thumb.server)[ends:]
+        if found == [code]:
+            sent = heard(robot, before)
+            drove = sent.index((0.5, 0.0))
+            assert sent[drove:] == [(0.5, 0.0)] * (len(sent) - drove - 1) + [(0.0, 0.0)]
+            return
+    raise AssertionError(f"it ended otherwise: {found}")
+
+
+TOUCHES: Final = {
+    "released": ("up", "hold_released"),
+    "pointer cancelled": ("cancel", "hold_by_cancel"),
+    "second finger": ("second", "hold_by_second"),
+}
+
+
+@pytest.mark.parametrize("cause", TOUCHES)
+def test_a_finger_that_goes_ends_it(thumb: Thumb, robot: RosNode, cause: str) -> None:
+    name, code = TOUCHES[cause]
+    ended_by(thumb, robot, getattr(thumb, name), code)
+    assert thumb.knob == (0.0, 0.0)
+    expect(thumb.root.locator('[data-axis="y"]')).to_have_text("")
+
+
+@pytest.mark.parametrize("cause", SCRIPTS)
+def test_a_page_that_goes_ends_it(thumb: Thumb, robot: RosNode, cause: str) -> None:
+    script, code = SCRIPTS[cause]
+    ended_by(thumb, robot, partial(thumb.does, script), code)
+
+
+def test_lost_permission_ends_it(thumb: Thumb, robot: RosNode) -> None:
+    def forbid() -> None:
+        robot.publish("/stick_enabled", {"data": False})
+
+    ended_by(thumb, robot, forbid, "forbidden", lift=False)
+    expect(thumb.button).to_be_disabled()
+    expect(thumb.root.locator('[data-text="reason"]')).to_contain_text("does not permit operation")
+    count = len(robot.heard(TOPIC))
+    permit(thumb.server, robot, True)
+    expect(thumb.button).to_be_enabled()
+    thumb.move(0, -1)  # the finger rests on it, and moves
+    time.sleep(QUIET_S)
+    assert len(robot.heard(TOPIC)) == count
+
+
+@pytest.mark.parametrize(
+    ("number", "code"),
+    [(signal.SIGSTOP, "hold_by_heartbeat"), (signal.SIGKILL, "hold_by_closing")],
+)
+def test_a_browser_that_goes_ends_it(
+    chromium: Browser,
+    kiosk: Server,
+    robot: RosNode,
+    tmp_path: Path,
+    number: signal.Signals,
+    code: str,
+) -> None:
+    found: list[str] = []
+    for attempt in range(TRIES):
+        with own_chromium(chromium, tmp_path / str(attempt)) as (browser, group):
+            thumb = Thumb(browser.new_context(has_touch=True).new_page(), kiosk)
+            _, ends = driving(thumb, robot)
+            os.killpg(group, number)
+            until(partial(has_ended, kiosk, ends), "it ends")
+            until(lambda: heard(robot)[-1] == (0.0, 0.0), "it stops")
+        found = ends_of(kiosk)[ends:]
+        if found == [code]:
+            return
+    raise AssertionError(f"it ended otherwise: {found}")
+
+
+def test_the_servers_end_stops_the_robot_first(thumb: Thumb, robot: RosNode) -> None:
+    _, ends = driving(thumb, robot)
+    thumb.server.process.send(signal.SIGTERM)
+    thumb.server.process.wait(10)
+    until(lambda: heard(robot)[-1] == (0.0, 0.0), "it stops")
+    assert ends_of(thumb.server)[ends:] == ["hold_by_stopping"]
+
+
+def test_the_knob_follows_the_finger_and_the_server_says_what_it_sent(
+    thumb: Thumb, robot: RosNode
+) -> None:
+    before = len(robot.heard(TOPIC))
+    thumb.down()
+    thumb.move(3, 0)
+    until(lambda: (0.0, -1.0) in heard(robot, before), "to the right is a negative turn")
+    assert thumb.knob == (1.0, 0.0)
+    expect(thumb.root.locator('[data-axis="x"]')).to_have_text("−1.00 rad/s")
+    expect(thumb.root.locator('[data-axis="y"]')).to_have_text("0.00 m/s")
+    thumb.move(0.04, 0.0)
+    until(lambda: heard(robot)[-1] == (0.0, 0.0), "the dead zone is zero")
+    thumb.up()
+    assert thumb.knob == (0.0, 0.0)
+    assert all(abs(drive) <= 0.5 and abs(turn) <= 1.0 for drive, turn in heard(robot, before))
+
+
+def test_arrow_keys_deflect_it(thumb: Thumb, robot: RosNode) -> None:
+    before = len(robot.heard(TOPIC))
+    thumb.button.focus()
+    thumb.page.keyboard.down("ArrowUp")
+    until(lambda: (0.5, 0.0) in heard(robot, before), "it drives")
+    thumb.page.keyboard.down("ArrowLeft")
+    until(lambda: heard(robot)[-1][1] > 0.7, "it turns to the left as well")
+    thumb.page.keyboard.up("ArrowUp")
+    until(lambda: heard(robot)[-1] == (0.0, 1.0), "it turns only")
+    thumb.page.keyboard.up("ArrowLeft")
+    until(lambda: heard(robot)[-1] == (0.0, 0.0), "it stops")
+    until(lambda: ends_of(thumb.server)[-1:] == ["hold_released"], "released")
+
+
+def test_a_stamped_twist_has_its_time_and_frame(thumb: Thumb, robot: RosNode) -> None:
+    stamped = Thumb(thumb.page, thumb.server, "stamped")
+    before = len(robot.heard("/stamped"))
+    stamped.down()
+    stamped.move(2, 2)
+
+    def full() -> list[dict[str, Any]]:
+        found: list[dict[str, Any]] = robot.heard("/stamped")[before:]
+        return [one for one in found if one["twist"]["linear"]["x"] == 1.0]
+
+    until(full, "a square goes to the full value of both")
+    message = full()[0]
+    assert message["twist"]["angular"]["z"] == -1.0
+    assert message["header"]["frame_id"] == "tool"
+    assert abs(message["header"]["stamp"]["sec"] - time.time()) < 60
+    stamped.up()
+    until(lambda: robot.heard("/stamped")[-1]["twist"]["linear"]["x"] == 0.0, "it stops")
+
+
+def test_a_finger_elsewhere_does_not_move_it(thumb: Thumb, robot: RosNode) -> None:
+    """It ends, as with any hold; and a finger that is first elsewhere begins nothing."""
+    before = len(robot.heard(TOPIC))
+    thumb._send("touchStart", (5, 5))
+    thumb._send("touchStart", (5, 5), thumb.at(0, 1))
+    thumb._send("touchMove", (60, 60), thumb.at(1, 0))
+    time.sleep(QUIET_S)
+    assert len(robot.heard(TOPIC)) == before
+    thumb._send("touchEnd")
+
+
+def test_without_scripts_it_is_locked_and_says_why(chromium: Browser, kiosk: Server) -> None:
+    with chromium.new_context(java_script_enabled=False) as context:
+        page = context.new_page()
+        page.goto(kiosk.url)
+        expect(page.locator('[data-widget="stick"] button')).to_be_disabled()
+        reason = page.locator('[data-widget="stick"] [data-text="reason"]')
+        expect(reason).to_contain_text("needs JavaScript")
+
+
+def test_it_is_large_enough_for_a_glove(thumb: Thumb) -> None:
+    box = thumb.button.bounding_box()
+    assert box is not None
+    assert min(box["width"], box["height"]) * 0.22 >= 59.9

@@ -1,0 +1,183 @@
+"""Joysticks: holds whose heartbeats have a deflection. What is sent of it, and each end with zeros."""
+
+import math
+from collections.abc import Callable
+from typing import Any, Final
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from app.commands.holds.deflection import moved, ramped, shaped
+from app.commands.holds.lease import LEASE_S
+from app.commands.holds.receipts import RELEASED, ActiveHold
+from app.panel.widgets.joystick import Joystick
+from app.web.routes.hold_socket import WHYS
+from tests.commands.test_holds import POINT, STOPS, Bench
+from tests.support.builders import BRIDGE, TEXT, endpoint, permits
+
+STICK: Final[dict[str, Any]] = {
+    "id": "stick",
+    "kind": "joystick",
+    "label": "Stick",
+    "topic": "/jog",
+    "type": POINT,
+    "message": {"x": "{x}", "y": "{y}", "z": 0},
+    "interlock": "operation",
+    "x_axis": {"max": 2.0},
+    "y_axis": {"max": -4.0},
+    "shape": "square",
+    "dead_zone": 0.0,
+}
+UNIT = st.floats(-1, 1)
+
+
+def bench_of(**more: Any) -> Bench:
+    return Bench(STICK | more)
+
+
+def held(bench: Bench, x: float = 1.0, y: float = 0.5) -> ActiveHold:
+    """A hold that has sent its deflection."""
+    holding = bench.begun("stick")
+    assert bench.holds.beat(holding, 1, bench.loop.now, (x, y))
+    bench.loop.pass_time(0.06)
+    return holding
+
+
+def stick(**more: Any) -> Joystick:
+    return Joystick.model_validate(STICK | more)
+
+
+def test_it_begins_in_the_middle_and_sends_what_the_newest_beat_has() -> None:
+    bench = bench_of()
+    holding = held(bench)
+    assert bench.points == [STOPS, (2.0, -2.0, 0.0)]
+    bench.holds.beat(holding, 3, bench.loop.now, (-1.0, 0.0))
+    bench.holds.beat(holding, 2, bench.loop.now, (0.3, 0.3))  # it was overtaken
+    bench.loop.pass_time(0.05)
+    assert bench.points[-1] == (-2.0, 0.0, 0.0)
+    bench.holds.beat(holding, 4, bench.loop.now)  # a program that says nothing of it
+    bench.loop.pass_time(0.05)
+    assert bench.points[-1] == (-2.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("code", sorted({*WHYS.values(), "hold_by_closing", "hold_by_renewal"}))
+def test_whatever_ends_a_hold_ends_it_with_zeros(code: str) -> None:
+    bench = bench_of()
+    holding = held(bench)
+    bench.holds.end(holding, code)
+    sent = list(bench.points)
+    assert sent[-2:] == [(2.0, -2.0, 0.0), STOPS]
+    assert bench.receipts[0].outcome == ("published" if code == RELEASED else "aborted")
+    assert bench.holds.beat(holding, 9, bench.loop.now, (1.0, 1.0)) is False
+    bench.loop.pass_time(10)
+    assert bench.points == sent
+
+
+def forbidden(bench: Bench) -> None:
+    permits(bench.robot, False, at=bench.loop.now)
+    bench.holds.judge()
+
+
+def other_type(bench: Bench) -> None:
+    endpoint(bench.robot, "MS", "/jog", TEXT)
+    bench.holds.judge()
+
+
+def stalled(bench: Bench) -> None:
+    bench.loop.stall(1.0)
+    bench.holds.judge()
+
+
+ENDS: Final[dict[str, Callable[[Bench], None]]] = {
+    "the interlock forbids": forbidden,
+    "the topic gets another type": other_type,
+    "no beat comes": lambda bench: bench.loop.pass_time(LEASE_S),
+    "the server stalls": stalled,
+    "the server ends": lambda bench: bench.holds.close(),
+}
+
+
+@pytest.mark.parametrize("cause", ENDS)
+def test_a_doubt_ends_it_with_zeros(cause: str) -> None:
+    bench = bench_of()
+    held(bench)
+    ENDS[cause](bench)
+    assert bench.points[-1] == STOPS
+    count = len(bench.points)
+    bench.loop.pass_time(10)
+    assert (len(bench.points), len(bench.receipts)) == (count, 1)
+
+
+def test_what_zenoh_refuses_ends_it_and_nothing_is_said_later() -> None:
+    bench = bench_of()
+    held(bench)
+    bench.way.fails = "gone"
+    bench.loop.pass_time(0.1)
+    assert bench.receipts[0].outcome == "unknown"
+    bench.way.fails = ""
+    bench.loop.pass_time(10)
+    assert bench.points[-1] == (2.0, -2.0, 0.0)  # the robot's own deadline has to act
+
+
+def test_without_a_bridge_nothing_is_said() -> None:
+    bench = bench_of()
+    held(bench)
+    bench.robot.graph.apply_token(f"@/{BRIDGE}/@ros2_lv", False)
+    bench.holds.judge()
+    assert bench.receipts[0].outcome == "unknown"
+
+
+def test_a_deflection_as_old_as_a_lease_counts_for_nothing() -> None:
+    bench = bench_of()
+    holding = held(bench)
+    bench.holds.beat(holding, 2, bench.loop.now - LEASE_S, (-1.0, -1.0))
+    bench.loop.pass_time(0.05)
+    assert bench.points[-1] == (2.0, -2.0, 0.0)
+
+
+def test_no_two_holds_send_on_its_topic() -> None:
+    bench = Bench(STICK, STICK | {"id": "other", "label": "Other"})
+    held(bench)
+    assert bench.refused("other")[0] == "interlock"
+
+
+@given(UNIT, UNIT, st.floats(0, 0.9), st.sampled_from(["circle", "square"]))
+def test_what_is_sent_is_within_the_limits(x: float, y: float, dead: float, shape: str) -> None:
+    found = shaped(stick(dead_zone=dead, shape=shape), (x, y))
+    assert all(abs(sent) <= abs(given) + 1e-12 for sent, given in zip(found, (x, y), strict=True))
+    assert all(sent * given >= 0 for sent, given in zip(found, (x, y), strict=True))
+    if shape == "circle":
+        assert math.hypot(*found) <= 1 + 1e-9
+        if math.hypot(x, y) <= dead:
+            assert found == (0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("shape", "given", "sent"),
+    [
+        ("square", (1.0, 1.0), (1.0, 1.0)),
+        ("square", (0.2, -0.6), (0.0, -0.5)),
+        ("circle", (0.2, 0.0), (0.0, 0.0)),
+        ("circle", (0.6, 0.0), (0.5, 0.0)),
+        ("circle", (0.0, -1.0), (0.0, -1.0)),
+    ],
+)
+def test_the_dead_zone_is_zero_and_begins_with_zero(
+    shape: str, given: tuple[float, float], sent: tuple[float, float]
+) -> None:
+    assert shaped(stick(dead_zone=0.2, shape=shape), given) == pytest.approx(sent)
+
+
+def test_a_ramp_limits_how_fast_it_gets_and_never_how_it_stops() -> None:
+    of = stick(ramp_s=0.5, rate_hz=20)  # a tenth with each message
+    assert moved(of, (0.0, 0.0), (1.0, -1.0)) == pytest.approx((0.1, -0.1))
+    assert moved(of, (0.8, -0.8), (0.2, 0.0)) == (0.2, 0.0)
+    assert moved(of, (0.8, 0.0), (-1.0, 0.0)) == pytest.approx((-0.1, 0.0))
+
+
+@given(UNIT, UNIT, st.floats(0.001, 1))
+def test_a_ramp_never_passes_what_is_wanted(before: float, wanted: float, step: float) -> None:
+    found = ramped(before, wanted, step)
+    assert abs(found) <= max(abs(wanted), 0.0) + 1e-12
+    assert found * wanted >= 0

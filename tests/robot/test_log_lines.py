@@ -1,0 +1,115 @@
+"""The lines of a log, bounded and decoded when they are read."""
+
+import asyncio
+from collections.abc import Sequence
+
+import pytest
+
+from app.interfaces import load_interfaces
+from app.robot import log_lines
+from app.robot.log_lines import LOG_TYPE, Found, LogLines, Wanted
+
+INTERFACES = load_interfaces("jazzy", ())
+
+
+def line(number: int, level: int = 20, node: str = "arm", text: str = "moves") -> bytes:
+    fields = {"stamp": {"sec": number}, "level": level, "name": node, "msg": f"{text} {number}"}
+    return INTERFACES.encode(LOG_TYPE, fields)
+
+
+def filled(payloads: Sequence[bytes], keep: int = 100) -> LogLines:
+    lines = LogLines(INTERFACES, keep)
+    for payload in payloads:
+        lines.add(payload)
+    return lines
+
+
+def find(lines: LogLines, wanted: Wanted | None = None, after: int = 0, most: int = 50) -> Found:
+    return asyncio.run(lines.find(wanted or Wanted(), after, most))
+
+
+def numbers(found: Found) -> list[int]:
+    return [number for number, _ in found.lines]
+
+
+def test_only_the_newest_are_kept() -> None:
+    lines = filled([line(n) for n in range(1, 151)])
+    found = find(lines, most=200)
+    assert (numbers(found), found.last) == (list(range(51, 151)), 150)
+
+
+def test_their_bytes_are_bounded_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    one = line(1, text="x" * 900)
+    monkeypatch.setattr(log_lines, "KEPT_BYTES", 3 * len(one))
+    lines = filled([one] * 10)
+    assert numbers(find(lines)) == [8, 9, 10]
+
+
+def test_a_line_that_is_too_long_is_counted_and_not_kept() -> None:
+    lines = filled([line(1), line(2, text="x" * 100_000), line(3)])
+    found = find(lines)
+    assert (numbers(found), found.last) == ([1, 3], 3)
+
+
+def test_of_too_many_the_newest_are_found_and_the_others_counted() -> None:
+    lines = filled([line(n) for n in range(1, 101)])
+    found = find(lines, most=10)
+    assert (numbers(found), found.left_out) == (list(range(91, 101)), 90)
+    later = find(lines, after=95, most=3)
+    assert (numbers(later), later.left_out) == ([98, 99, 100], 2)
+
+
+def test_those_that_are_not_kept_any_more_are_counted() -> None:
+    lines = filled([line(n) for n in range(1, 201)])
+    assert find(lines, after=20, most=100).left_out == 80
+
+
+@pytest.mark.parametrize(
+    ("wanted", "fitting"),
+    [
+        (Wanted(severity=30), [2, 3]),
+        (Wanted(node="GRIP"), [3]),
+        (Wanted(search="Slow"), [2]),
+        (Wanted(without="web_ui"), [1, 2, 3]),
+        (Wanted(severity=30, node="arm", search="slow"), [2]),
+    ],
+)
+def test_lines_are_chosen(wanted: Wanted, fitting: list[int]) -> None:
+    payloads = [
+        line(1),
+        line(2, 30, text="slow"),
+        line(3, 50, node="gripper"),
+        line(4, 10, node="web_ui"),
+    ]
+    assert numbers(find(filled(payloads), wanted)) == fitting
+
+
+def test_what_is_no_line_is_passed_over_and_text_can_not_hide() -> None:
+    payloads = [b"\0\1\0\0nonsense", line(2, text="a\u202eb")]
+    ((number, found),) = find(filled(payloads)).lines
+    assert (number, found.text) == (2, "a\\u202eb 2")
+
+
+@pytest.mark.parametrize(
+    ("level", "word"),
+    [(0, "debug"), (10, "debug"), (20, "info"), (30, "warn"), (40, "error"), (50, "fatal")],
+)
+def test_a_severity_has_its_word(level: int, word: str) -> None:
+    ((_, found),) = find(filled([line(1, level)])).lines
+    assert found.level == word
+
+
+def test_nothing_is_decoded_until_somebody_reads(monkeypatch: pytest.MonkeyPatch) -> None:
+    decoded: list[bytes] = []
+    lines = filled([line(n) for n in range(1, 101)])
+    real = INTERFACES.decode
+
+    def decode(type_name: str, payload: bytes) -> object:
+        decoded.append(payload)
+        return real(type_name, payload)
+
+    monkeypatch.setattr(INTERFACES, "decode", decode)
+    assert not decoded
+    find(lines)
+    find(lines, Wanted(search="moves"))
+    assert len(decoded) == 100  # each once

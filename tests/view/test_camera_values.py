@@ -1,0 +1,56 @@
+"""What a camera shows beside its picture."""
+
+from app.i18n import Text
+from app.panel.widgets.camera import Camera
+from app.robot.looked_at import LookedAt
+from app.robot.state import RobotState
+from app.view.camera_values import camera
+from tests.support.builders import endpoint, panel_of, robot_there
+
+CAMERA = {"id": "cam", "kind": "camera", "label": "Camera", "topic": "/cam"}
+RECEIVED = 100.0
+
+
+def shown(robot: RobotState, widget: Camera, now: float) -> tuple[str, str, float]:
+    attributes, until = camera(widget, robot, now)
+    note = attributes["note"]
+    return attributes["state"], note.code if isinstance(note, Text) else note, until
+
+
+def looked() -> tuple[RobotState, Camera, LookedAt]:
+    panel = panel_of(CAMERA)
+    robot = robot_there(panel)
+    (widget,) = (w for w in panel.widgets() if isinstance(w, Camera))
+    seen = robot.looked_at[robot.key("/cam")] = LookedAt(RECEIVED, 0.0)
+    return robot, widget, seen
+
+
+def test_nothing_is_known_while_nobody_looks() -> None:
+    robot, widget, _ = looked()
+    robot.looked_at.clear()
+    assert shown(robot, widget, RECEIVED) == ("waiting", "camera_waiting", float("inf"))
+
+
+def test_a_picture_is_old_after_a_second_and_its_age_counts() -> None:
+    robot, widget, _ = looked()
+    assert shown(robot, widget, RECEIVED + 0.9) == ("live", "", RECEIVED + 1)
+    assert shown(robot, widget, RECEIVED + 1.5) == ("old", "camera_old", RECEIVED + 2)
+    assert shown(robot, widget, RECEIVED + 130) == ("old", "camera_old", RECEIVED + 180)
+
+
+def test_a_picture_that_can_not_be_shown_says_why() -> None:
+    robot, widget, seen = looked()
+    seen.problem = "broken"
+    assert shown(robot, widget, RECEIVED)[:2] == ("unreadable", "broken")
+
+
+def test_a_topic_of_another_type_says_so() -> None:
+    robot, widget, _ = looked()
+    endpoint(robot, "MP", "/cam", "sensor_msgs/msg/Image")
+    assert shown(robot, widget, RECEIVED)[:2] == ("unreadable", "wrong_type")
+
+
+def test_a_cameras_topic_is_subscribed_to_on_demand_only() -> None:
+    panel = panel_of(CAMERA)
+    assert "/cam" not in panel.subscriptions()
+    assert panel.on_demand() == {"/cam": "sensor_msgs/msg/CompressedImage"}
