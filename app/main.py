@@ -49,6 +49,7 @@ from app.web.routes import (
     press_socket,
     presses,
     static,
+    trends,
 )
 from app.web.security import RequestGuard
 from app.web.serving import check_port, urls
@@ -127,6 +128,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         parameters,
         frames,
         log_lines,
+        trends,
     ):
         app.include_router(routes.router)
         app.include_router(routes.router, prefix="/robots/{robot}", dependencies=[Depends(named_robot)])

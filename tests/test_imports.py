@@ -20,6 +20,7 @@ ROOMS = (
     "robot",
     "permission",
     "audit",
+    "trends",
     "view",
     "commands",
     "recording",

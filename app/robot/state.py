@@ -5,6 +5,7 @@ Keeps the latest sample of each topic as raw bytes, and decodes it at the first 
 
 import logging
 import math
+import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
@@ -20,6 +21,7 @@ from app.panel.constants import HasField, parent_type
 from app.panel.model import Panel, RobotEntry
 from app.robot.command_status import CommandStatus
 from app.robot.graph import Graph
+from app.robot.history import History
 from app.robot.keyed_entries import KeyedEntries
 from app.robot.log_lines import LogLines
 from app.robot.looked_at import LookedAt
@@ -94,6 +96,7 @@ class RobotState:
             self.key(topic): LogLines(interfaces, keep) for topic, keep in panel.logs().items()
         }
         self._logged_at: dict[str, float] = {}
+        self.history = History(time.monotonic(), time.time())
 
     def _make_topics(self, panel: Panel) -> Iterator[tuple[str, Topic]]:
         """(key, topic) of each topic that the panel subscribes to."""
@@ -177,6 +180,11 @@ class RobotState:
         if sample is None or sample.source is None or sample.source in self.graph.bridges:
             return found
         return replace(found, status="cut")
+
+    def cuts(self, key: str) -> int:
+        """How often a topic's last value was no longer valid: its bridge, its publisher or the link was
+        lost."""
+        return self._topics[key].cuts
 
     def constants(self, display: HasField) -> Mapping[str, Any]:
         """Name → value of the constants of the message that contains a display's field."""

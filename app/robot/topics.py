@@ -68,6 +68,7 @@ class Topic:
         self._deferred = False
         self._last_reading = WAITING
         self.sample: Sample | None = None  # the newest
+        self.cuts = 0  # how often the value before was no longer valid
 
     def update(self, sample: Sample) -> None:
         """Adds a newer message."""
@@ -88,6 +89,7 @@ class Topic:
     def invalidate(self) -> None:
         """The last value is no longer valid."""
         if self.sample is not None:
+            self.cuts += 1
             self._last_reading = replace(self.reading(), status="cut")
             self._unread.clear()
             self._walk = None

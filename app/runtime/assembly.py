@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING
 from app.audit import Limits, NullLog, OperatorLog
 from app.panel import Panel
 from app.panel.model import RobotEntry
+from app.panel.widgets.trend import trends_of
 from app.runtime.fleet import Fleet
 from app.settings import Mode, Settings
 from app.transport.zenoh_config import Config, config_from, config_to
 
 if TYPE_CHECKING:
     from app.recording import Recordings
+    from app.trends.disk import TrendDisk
 
 log = logging.getLogger("kiosk")
 
@@ -69,9 +71,12 @@ async def open_fleet(
 
         recordings = _recordings(settings, panel)
         fleet = Fleet(panel, config_of, revision, oplog, recordings=recordings, simulated=demo)
+        trends = _trend_disk(settings, panel, fleet)
         try:
             if recordings is not None:
                 recordings.start()
+            if trends is not None:
+                await trends.start()
             await fleet.start()
             by = "simulated" if demo else f"live by {settings.zenoh}"
             folder = settings.data_folder(mode_of(settings, panel))
@@ -79,6 +84,8 @@ async def open_fleet(
             yield fleet
         finally:
             await fleet.stop()
+            if trends is not None:
+                await trends.stop()
             if recordings is not None:
                 await asyncio.to_thread(recordings.stop)
 
@@ -91,3 +98,15 @@ def _recordings(settings: Settings, panel: Panel) -> "Recordings | None":
 
     folder = settings.data_folder(mode_of(settings, panel)) / "recordings"
     return Recordings(folder, panel.record.max_mb, len(panel.robots) or 1)
+
+
+def _trend_disk(settings: Settings, panel: Panel, fleet: Fleet) -> "TrendDisk | None":
+    """The histories on disk, if a trend of the panel is kept there."""
+    if not any(trend.disk for trend in trends_of(panel)):
+        return None
+    from app.trends.disk import TrendDisk
+
+    disk = TrendDisk(settings.data_folder(mode_of(settings, panel)), panel)
+    for session in fleet.sessions:
+        disk.add(session.entry.id if session.entry else "", session.robot, session.show)
+    return disk

@@ -19,6 +19,7 @@ from app.interfaces import load_interfaces
 from app.interfaces.names import ROSOUT_TOPIC
 from app.panel.model import Panel, RobotEntry
 from app.panel.widgets.parameter import Parameter
+from app.panel.widgets.trend import trends_of
 from app.permission.control_authority import ControlAuthority
 from app.permission.interlocks import Verdict, link_verdict, locked
 from app.robot.slices import Slices
@@ -40,6 +41,7 @@ from app.view.refresh import NoOtherRobots, OtherRobots, ViewRefresher, ViewSour
 
 if TYPE_CHECKING:
     from app.recording import Recorder, Recordings
+    from app.trends.recorder import TrendRecorder
 
 log = logging.getLogger("kiosk")
 
@@ -98,6 +100,7 @@ class RobotSession:
         self.refresher = ViewRefresher(panel, self.robot, server.revision, sources)
         self.publisher = self.refresher.publisher
         self._recorder = self._recording(server.recordings)
+        self._trends = self._trend_recorders()
         self.press_guard = PressGuard(
             self.publisher, self.control, operators_log, panel.press_expires_s, others.boots
         )
@@ -122,6 +125,7 @@ class RobotSession:
                 self.robot.keyed_entries,
                 LogListener(self.robot),
                 *([self._recorder] if self._recorder else []),
+                *self._trends,
             ],
         )
         self._turn = Turn(context, self.peer, self._ingest, self._commands, self.refresher)
@@ -167,6 +171,8 @@ class RobotSession:
         await self._commands.stop()
         if self._recorder is not None:
             self._recorder.stop()
+        for recorder in self._trends:
+            recorder.stop()
         try:
             await asyncio.to_thread(self.link.close)
         except LinkError as error:
@@ -194,6 +200,14 @@ class RobotSession:
         if (lines := self.robot.log_lines.get(key)) is not None:
             lines.add(payload)
             self.refresher.values({key})
+
+    def _trend_recorders(self) -> "list[TrendRecorder]":
+        """The recorder of what trends show, if the panel has one."""
+        if not trends_of(self.panel):
+            return []
+        from app.trends.recorder import TrendRecorder
+
+        return [TrendRecorder(self.panel, self.interfaces, self.robot)]
 
     def show(self) -> None:
         """Updates holds and the view. Call it after a change of a permission or of anything shown."""

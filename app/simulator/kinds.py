@@ -24,6 +24,7 @@ from app.panel.widgets.publish import Confirm, PublishPress
 from app.panel.widgets.service_action import Action, Call, ServerCommand
 from app.panel.widgets.step import Step
 from app.panel.widgets.table import Table
+from app.panel.widgets.trend import Trend
 
 DEFAULT_QOS: Final = TopicQos()
 
@@ -168,6 +169,11 @@ def _camera(camera: Camera, _: Interfaces) -> Iterator[Need]:
     )
 
 
+def _trend(trend: Trend, _: Interfaces) -> Iterator[Need]:
+    for one in trend.readouts:
+        yield from _shown(one)
+
+
 def _published(command: PublishCommand, _: Interfaces) -> Iterator[Need]:
     yield Published(topic=command.topic, type=command.type, qos=command.qos)
 
@@ -222,6 +228,7 @@ SIMULATED: Final[Mapping[type[BaseWidget], Callable[[Any, Interfaces], Iterator[
     Joints: _joints,
     Table: lambda *_: iter(()),
     Camera: _camera,
+    Trend: _trend,
     PublishCommand: _published,
     PublishPress: _pressed,
     Step: _stepped,

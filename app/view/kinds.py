@@ -19,6 +19,7 @@ from app.panel.widgets.publish import PublishPress
 from app.panel.widgets.static import Static
 from app.panel.widgets.step import Step
 from app.panel.widgets.table import Table
+from app.panel.widgets.trend import Trend
 from app.permission.interlocks import PERMITTED, Verdict
 from app.robot.command_status import IDLE, CommandStatus
 from app.robot.state import RobotState
@@ -30,6 +31,7 @@ from app.view.log_values import log
 from app.view.parameter_values import parameter
 from app.view.step_values import step
 from app.view.table_values import table
+from app.view.trend_values import trend
 
 # The attributes of a widget, and when (monotonic seconds) time alone would change them.
 Attributes = dict[str, Any]
@@ -123,4 +125,5 @@ SHOWN: Final[Mapping[type[BaseWidget], Callable[[Any, RobotState, Verdict, float
     Gauge: lambda of, robot, verdict, now: gauge(of, robot, now),
     Joints: lambda of, robot, verdict, now: joints(of, robot, now),
     Table: lambda of, robot, verdict, now: table(of, robot, now),
+    Trend: lambda of, robot, verdict, now: trend(of, robot, now),
 }

@@ -11,6 +11,7 @@ from typing import Any, Final
 
 from app.interfaces.names import ACTION_TYPE, MESSAGE_TYPE, SERVICE_TYPE, TOPIC
 from app.panel import Panel
+from app.panel.widgets.trend import DURATION
 
 Schema = dict[str, Any]
 
@@ -40,6 +41,9 @@ FORMATS: Final[Mapping[str, tuple[str, str]]] = {
     "interfaces": ("folder", ""),
     "screens": ("width x height", ""),
     "icon": ("name of an icon", ""),
+    "window": ("duration", DURATION),
+    "windows": ("duration", DURATION),
+    "keep": ("duration", DURATION),
     "template": ("file", ""),
     "styles": ("file", ""),
     "field": ("field path", ""),
@@ -149,7 +153,7 @@ def _plain(table: str, key: str, prop: Schema) -> Schema:
         text["title"] = title
     if pattern:
         text["pattern"] = f"^{pattern}$"
-    if (table, key) in (("select", "options"), ("indicator", "states")):
+    if (table, key) in (("select", "options"), ("indicator", "states"), ("trend", "pen")):
         made["minItems"] = 1
     return made
 

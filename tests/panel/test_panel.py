@@ -78,7 +78,7 @@ def test_the_shipped_panel_is_good_and_a_demo() -> None:
     assert [w.id for w in panel.pages[0].widgets] == [
         "enabled", "last_heard", "message", "operation", "operation1", "operation2",
     ]  # fmt: skip
-    assert {w.kind for w in panel.widgets()} == set(KINDS) - {"image"}  # it has no picture
+    assert {w.kind for w in panel.widgets()} == set(KINDS) - {"image", "trend"}  # it has no picture
     assert [i.id for i in panel.interlocks] == ["operation"]
 
 
@@ -473,11 +473,11 @@ def test_a_key_that_stands_too_far_below_is_one_fault(
 
 
 def test_keys_that_are_unknown_in_a_widget_are_told_together(load: Load) -> None:
-    text = {**MESSAGE, "scale": 1, "offset": 2}
+    text = {**MESSAGE, "constants": "A", "order": 2}
     page = {"id": "one", "title": "One", "widget": [text]}
     assert faults(load, tables(page=[page])) == {
-        "page[0].widget[0].scale": (
-            'unknown key, as "offset"; known here: '
+        "page[0].widget[0].constants": (
+            'unknown key, as "order"; known here: '
             "id, label, span, rows, kind, max_length, default, scan"
         )
     }

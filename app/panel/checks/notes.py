@@ -8,6 +8,7 @@ from app.panel.checks.fit import fit_notes
 from app.panel.checks.languages import untranslated_notes
 from app.panel.checks.page_templates import unplaced_notes
 from app.panel.model import Panel
+from app.panel.widgets.trend import Trend, history_bytes
 
 
 def find_notes(panel: Panel, interfaces: Interfaces) -> Iterator[Note]:
@@ -15,6 +16,7 @@ def find_notes(panel: Panel, interfaces: Interfaces) -> Iterator[Note]:
     yield from _unbounded_trust_notes(panel)
     yield from _unused_interlock_notes(panel)
     yield from _unusable_type_notes(panel, interfaces)
+    yield from _trend_notes(panel)
     yield from fit_notes(panel)
     yield from unplaced_notes(panel)
     yield from untranslated_notes(panel)
@@ -51,3 +53,15 @@ def _unusable_type_notes(panel: Panel, interfaces: Interfaces) -> Iterator[Note]
             more = f"; {len(own) - 1} more can't be used either" if len(own) > 1 else ""
             what = f"{name} can't be used, and this panel does not need it: {why}{more}"
             yield Note(f"interfaces[{f}]", what)
+
+
+def _trend_notes(panel: Panel) -> Iterator[Note]:
+    """The memory that the history of each trend takes, and on disk."""
+    robots = len(panel.robots) or 1
+    for p, page in enumerate(panel.pages):
+        for place, widget in page.placed():
+            if isinstance(widget, Trend):
+                size = robots * len(widget.pens) * history_bytes(widget.keep_s) / 1e6
+                where = "memory, and as much on disk" if widget.disk else "memory"
+                what = f"keeps {widget.keep} of {len(widget.pens)} pens: {size:.1f} MB of {where}"
+                yield Note(f"page[{p}].{place}", what)

@@ -31,6 +31,7 @@ from app.panel.widgets.inputs import TextInput
 from app.panel.widgets.parameter import Parameter, type_faults
 from app.panel.widgets.publish import Confirm, PublishPress
 from app.panel.widgets.service_action import Action
+from app.panel.widgets.trend import MAX_BYTES, Trend, memory_of, trends_of
 
 
 def find_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = ()) -> Iterator[Fault]:
@@ -58,6 +59,7 @@ def find_faults(panel: Panel, interfaces: Interfaces, faulty: Collection[str] = 
     yield from _topic_conflicts(panel, [fault.place for fault in found])
     yield from type_faults((at, w) for at, w in _widgets_with_places(panel) if isinstance(w, Parameter))
     yield from _record_faults(panel)
+    yield from _trend_faults(panel)
     yield from page_template_faults(panel)
     yield from _scan_faults(panel)
     yield from language_faults(panel)
@@ -160,6 +162,16 @@ def _frame_faults(panel: Panel, checking: CheckContext, faulty: Collection[str])
                 f'"{widget.kind}" is not for the frame: it has keys of the kinds publish, call and hold'
             )
             yield Fault(f"{place}.kind", what)
+
+
+def _trend_faults(panel: Panel) -> Iterator[Fault]:
+    """The histories of all trends have a limit together."""
+    size = memory_of(trends_of(panel), len(panel.robots) or 1)
+    for place, widget in _widgets_with_places(panel):
+        if isinstance(widget, Trend) and size > MAX_BYTES:
+            what = f"all trends together would take {size / 1e6:.0f} MB of memory"
+            yield Fault(f"{place}.keep", f"{what}, and may take {MAX_BYTES / 1e6:.0f}: keep less")
+            return
 
 
 def _record_faults(panel: Panel) -> Iterator[Fault]:

@@ -17,6 +17,7 @@ from app.panel.widgets.service_action import Action
 from app.panel.widgets.static import PageLink, TextLabel
 from app.panel.widgets.step import Step
 from app.panel.widgets.table import Table
+from app.panel.widgets.trend import Trend
 
 WIDE, MIDDLE, NARROW = 1200, 900, 600  # from these widths on a page has all columns, two, one
 KEY_MM, ENTRY_MM, GAP_MM = 20.0, 14.0, 5.0
@@ -43,6 +44,9 @@ STEP_VALUE: Final = 116.0  # the value between the keys
 PAD_MM: Final = 60.0
 LOG: Final = (100.0, 300.0)  # some lines, and the width of what is wanted of them
 PICTURE: Final = (120.0, 160.0)  # the least height and width in which a picture tells something
+TREND: Final = 150.0  # names and values of the pens, plot and time axis
+TREND_WIDTH: Final = 240.0
+TREND_KEYS: Final = 5
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,6 +91,8 @@ def height_of(widget: BaseWidget, screen: Screen) -> float:
 
 def width_needed(widget: BaseWidget, screen: Screen) -> float:
     """The least width in which a widget can be used."""
+    if isinstance(widget, Trend) and widget.keys:
+        return (TREND_KEYS * KEY_MM + (TREND_KEYS - 1) * GAP_MM) * screen.mm
     return find_row(SIZES, widget)[1](screen)
 
 
@@ -101,6 +107,10 @@ def _action(screen: Screen) -> float:
 
 def _display(screen: Screen) -> float:
     return LOW_DISPLAY if screen.height <= LOW_SCREEN else DISPLAY
+
+
+def _trend_keys(screen: Screen) -> float:
+    return screen.touch(KEY_MM) + 8
 
 
 def _entry(screen: Screen) -> float:
@@ -122,6 +132,7 @@ SIZES: Final[Mapping[type[Any], tuple[Size, Size]]] = {
     LogView: (lambda of: of.touch(10) + LABEL + LOG[0], lambda of: LOG[1]),
     Joystick: (lambda of: of.touch(PAD_MM), lambda of: PAD_MM * of.mm),
     Camera: (lambda of: PICTURE[0], lambda of: PICTURE[1]),
+    Trend: (lambda of: TREND, lambda of: TREND_WIDTH),
     Parameter: (lambda of: PARAMETER + of.touch(ENTRY_MM), lambda of: PARAMETER_WIDTH),
     Gauge: (lambda of: UPRIGHT_GAUGE, lambda of: GAUGE_WIDTH),
     Joints: (lambda of: JOINTS_FRAME, lambda of: JOINTS_WIDTH),
@@ -142,6 +153,7 @@ def _joints(widget: Joints, screen: Screen) -> float:
 
 # Heights of the kinds in which they depend on the widget's keys.
 OWN_HEIGHTS: Final[Mapping[type[Any], Callable[[Any, Screen], float]]] = {
+    Trend: lambda of, screen: TREND + (_trend_keys(screen) if of.keys else 0.0),
     Gauge: _gauge,
     Joints: _joints,
     Table: lambda of, screen: (

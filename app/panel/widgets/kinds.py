@@ -21,6 +21,7 @@ from app.panel.widgets.service_action import Action, Call
 from app.panel.widgets.static import PageLink, Picture, TextLabel
 from app.panel.widgets.step import Step
 from app.panel.widgets.table import Table
+from app.panel.widgets.trend import Trend
 
 KINDS: Final[Mapping[str, type[BaseWidget]]] = {
     "text": TextInput,
@@ -42,6 +43,7 @@ KINDS: Final[Mapping[str, type[BaseWidget]]] = {
     "table": Table,
     "camera": Camera,
     "log": LogView,
+    "trend": Trend,
     "label": TextLabel,
     "image": Picture,
     "link": PageLink,

@@ -1,6 +1,5 @@
 """In development: a page with every widget in every state, in each theme. It needs no robot."""
 
-from collections.abc import Mapping
 from itertools import count
 from typing import Any, Final
 from urllib.parse import urlencode
@@ -13,9 +12,9 @@ from markupsafe import Markup
 from app.i18n import say
 from app.web.app_state import CurrentState
 from app.web.display_choice import CHOICES, Choice, Display, choices, display_of
-from app.web.gallery import LINES, PARTS, PICTURE, Example
+from app.web.gallery import LINES, PARTS, PICTURE, Example, sample_plot
 from app.web.language import language_of
-from app.web.routes.pages import WORDS
+from app.web.routes.pages import TREND_WORDS, WORDS
 
 router = APIRouter(include_in_schema=False)
 
@@ -63,7 +62,7 @@ async def box() -> Response:
 
 def _words() -> dict[str, Any]:
     """The words of a page that its widgets use."""
-    return {word: say(word) for word in WORDS} | {
+    return {word: say(word) for word in (*WORDS, *TREND_WORDS)} | {
         "base": "",
         "pictures": "/gallery",
         "asks": {},
@@ -71,7 +70,7 @@ def _words() -> dict[str, Any]:
     }
 
 
-def _html(example: Example, number: int, cell: Template, words: Mapping[str, Any]) -> Markup:
+def _html(example: Example, number: int, cell: Template, words: dict[str, Any]) -> Markup:
     """One widget, by the macro of its kind."""
     widget = example.widget(number)
     inputs = {} if example.entered is None else {widget.id: example.entered}
@@ -80,7 +79,7 @@ def _html(example: Example, number: int, cell: Template, words: Mapping[str, Any
         view={"widgets": {widget.id: example.shown}},
         inputs=inputs,
         receipt=example.receipt_of(widget),
-        words=words,
+        words=words | {"trends": {widget.id: sample_plot(widget)}},
         placed="",
     )
     for part, made in example.marks.items():

@@ -22,11 +22,13 @@ from app.panel.model import Panel
 from app.panel.template import input_ids
 from app.panel.widgets.families import EntryWidget, PressCommand
 from app.panel.widgets.log_view import LogView
+from app.panel.widgets.trend import Trend
 from app.permission.control_authority_view import role
 from app.permission.principal import Principal
 from app.printable import printable_texts
 from app.runtime.robot_session import RobotSession
 from app.view.sections import SECTIONS, Section
+from app.view.trend_plot import Plot, plot
 from app.view.view import View
 from app.web.app_state import AppState, CurrentState
 from app.web.assets import PICTURES
@@ -77,6 +79,15 @@ WORDS = (
     *(word.code for word in LEVEL_WORDS.values()),
     "clean",
     "cleaning",
+)
+TREND_WORDS = (
+    "trend_earlier",
+    "trend_later",
+    "trend_longer",
+    "trend_shorter",
+    "trend_pause",
+    "trend_live",
+    "trend_paused",
 )
 LINK_WORDS = ("links", "link_state", "link_since", "link_locks")
 CONTROL_ACTS = ("take", "ask", "give", "keep", "release", "withdraw")
@@ -248,12 +259,19 @@ def _refused(session: RobotSession, query: str) -> TextLike:
 def _words(session: RobotSession, page: Page, pictures: str, language: str) -> dict[str, Any]:
     """The words of a page by their names in its templates, and what it asks before a press."""
     own = {"base": session.base, "pictures": pictures, "log": say("log_link")}
-    own |= {"asks": asks_of(session, page)}
+    own |= {"asks": asks_of(session, page), "trends": trends_on(session, page)}
     own |= {
         "lines": {w.id: rendered(session, w, language) for w in page.widgets if isinstance(w, LogView)}
     }
-    plain = {word: say(word) for word in (*WORDS, *LINK_WORDS, *ENTRY_WORDS)}
+    plain = {word: say(word) for word in (*WORDS, *LINK_WORDS, *ENTRY_WORDS, *TREND_WORDS)}
     return own | plain | {act: say(f"control_{act}") for act in CONTROL_ACTS}
+
+
+def trends_on(session: RobotSession, page: Page) -> dict[str, Plot]:
+    """The plots of the trends of a page, by the ids of their widgets."""
+    now, wall = time.monotonic(), time.time()
+    shown = (widget for widget in page.widgets if isinstance(widget, Trend))
+    return {widget.id: plot(widget, session.robot, now, wall) for widget in shown}
 
 
 def asks_of(session: RobotSession, page: Page) -> dict[str, Ask]:

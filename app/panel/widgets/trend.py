@@ -1,0 +1,201 @@
+"""The description of a trend: numeric fields over time, and the memory that its history takes."""
+
+import re
+from collections.abc import Iterable, Iterator
+from functools import cached_property
+from math import ceil
+from typing import Annotated, Final, Literal, Protocol
+
+from pydantic import AfterValidator, Field
+
+from app.errors import Fault
+from app.interfaces.validation import format_value
+from app.panel.base import (
+    Description,
+    FieldPath,
+    Label,
+    Seconds,
+    Span,
+    Topic,
+    TopicQos,
+    Type,
+    non_empty,
+)
+from app.panel.checks.types import field_faults
+from app.panel.constants import NUMBERS
+from app.panel.widgets.displays import FORMAT, Factor, Readout
+from app.panel.widgets.families import CheckContext, DisplayWidget, TopicSource
+from app.panel.widgets.numbers import Unit
+
+MAX_PENS: Final = 8
+OF_READOUTS: Final = ("topic", "type", "qos", "field", "label", "unit", "scale", "offset", "format")
+UNITS: Final = {"s": 1, "m": 60, "h": 3600, "d": 86_400}
+DURATION: Final = "[1-9][0-9]{0,5}[smhd]"
+LONGEST_S: Final = 31 * UNITS["d"]
+SHORTEST_S: Final = 10
+
+# The newest samples are kept as they are; older ones as buckets (width in seconds, how many).
+RAW_SAMPLES: Final = 12_000
+RAW_S: Final = 120.0
+BUCKETS: Final = ((1.0, 7_200), (10.0, 8_640), (60.0, 10_080), (600.0, 4_464))
+RAW_BYTES: Final = 17  # time, value, gap
+BUCKET_BYTES: Final = 33  # time, lowest, highest, last, gap
+SLACK: Final = 1.25  # what is not removed yet, and what the lists reserve
+MAX_BYTES: Final = 128_000_000  # the histories of all trends of a panel
+
+
+def _check_duration(given: str) -> str:
+    if not re.fullmatch(DURATION, given):
+        raise ValueError(
+            f'{format_value(given)} is not a duration: it must be like "90s", "10m" or "24h"'
+        )
+    if not SHORTEST_S <= seconds_of(given) <= LONGEST_S:
+        raise ValueError(f'{format_value(given)} is out of range: durations go from "10s" to "31d"')
+    return given
+
+
+def seconds_of(duration: str) -> int:
+    """The seconds of "90s", "10m", "24h" or "7d"."""
+    return int(duration[:-1]) * UNITS[duration[-1]]
+
+
+def bucket_counts(keep_s: float) -> list[tuple[float, int]]:
+    """(width in seconds, how many) of the buckets that a field kept for `keep_s` has."""
+    return [(width, min(most, ceil(keep_s / width) + 1)) for width, most in BUCKETS]
+
+
+def history_bytes(keep_s: float) -> int:
+    """The most memory that the history of one field takes."""
+    buckets = sum(count for _, count in bucket_counts(keep_s))
+    return round((RAW_SAMPLES * RAW_BYTES + buckets * BUCKET_BYTES) * SLACK)
+
+
+Duration = Annotated[str, AfterValidator(_check_duration)]
+
+
+class Pen(Description):
+    """One line of a trend: a field as `value * scale + offset`. `normal` is the lowest and the highest
+    normal value."""
+
+    topic: Topic
+    type: Type
+    qos: TopicQos = TopicQos()
+    field: FieldPath = "data"
+    label: Label
+    unit: Unit = ""
+    scale: Factor = 1.0
+    offset: Factor = 0.0
+    format: Annotated[str, Field(pattern=FORMAT)] | None = None
+    low: Factor | None = None
+    high: Factor | None = None
+    normal: Annotated[tuple[Factor, ...], Field(strict=False, min_length=2, max_length=2)] | None = None
+
+    def shown(self, value: float) -> float:
+        """A value of the field as the trend has it."""
+        return value * self.scale + self.offset
+
+    def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
+        found = list(field_faults(place, self.type, self.field, checking.interfaces))
+        yield from found
+        if not found:
+            field_type = checking.interfaces.type_at(self.type, self.field)
+            if field_type.container != "one" or field_type.name not in NUMBERS:
+                yield Fault(f"{place}.field", f'"{self.field}" is {field_type}: a pen is for a number')
+        if self.scale == 0:
+            yield Fault(f"{place}.scale", "is 0: every value would be the same")
+        if self.low is not None and self.high is not None and self.low >= self.high:
+            yield Fault(f"{place}.low", f"{self.low:g} is not below high, which is {self.high:g}")
+        if self.normal is not None and self.normal[0] >= self.normal[1]:
+            yield Fault(f"{place}.normal", "the first number must be below the second")
+
+
+class Trend(DisplayWidget):
+    """Fields over the time of `window`, of which the server keeps `keep`. A silence longer than
+    `max_age_s` is a gap."""
+
+    kind: Literal["trend"]
+    pens: Annotated[
+        tuple[Pen, ...], Field(strict=False, max_length=MAX_PENS), AfterValidator(non_empty)
+    ] = Field(alias="pen")
+    window: Duration = "10m"
+    windows: Annotated[tuple[Duration, ...], Field(strict=False, max_length=12)] = ()
+    keep: Duration = "24h"
+    disk: bool = False
+    max_age_s: Seconds = 5.0
+    min: Factor | None = None
+    max: Factor | None = None
+    keys: bool = True
+    span: Span = 12
+
+    @property
+    def choices(self) -> list[int]:
+        """The windows to choose from, in seconds, the shortest first."""
+        return sorted({seconds_of(one) for one in (*self.windows, self.window)})
+
+    @property
+    def keep_s(self) -> int:
+        return seconds_of(self.keep)
+
+    @property
+    def window_s(self) -> int:
+        return seconds_of(self.window)
+
+    @cached_property
+    def readouts(self) -> tuple[Readout, ...]:
+        """The value of each pen, as a readout has it."""
+        return tuple(
+            Readout.model_construct(
+                None,
+                id=self.id,
+                kind="readout",
+                max_age_s=self.max_age_s,
+                **{name: getattr(pen, name) for name in OF_READOUTS},
+            )
+            for pen in self.pens
+        )
+
+    def sources(self) -> Iterator[TopicSource]:
+        for number, pen in enumerate(self.pens):
+            yield TopicSource(pen.topic, pen.type, pen.qos, (pen.field,), f"pen[{number}]")
+
+    def faults(self, place: str, checking: CheckContext) -> Iterator[Fault]:
+        for number, pen in enumerate(self.pens):
+            yield from pen.faults(f"{place}.pen[{number}]", checking)
+        windows = {"window": self.window} | {f"windows[{i}]": w for i, w in enumerate(self.windows)}
+        for key, given in windows.items():
+            if seconds_of(given) > self.keep_s:
+                what = f'"{given}" is longer than what is kept, which is "{self.keep}"'
+                yield Fault(f"{place}.{key}", what)
+        if self.min is not None and self.max is not None and self.min >= self.max:
+            yield Fault(f"{place}.min", f"{self.min:g} is not below max, which is {self.max:g}")
+
+
+def kept_fields(trends: Iterable[Trend]) -> dict[tuple[str, str], Trend]:
+    """(topic, field) → the trend that keeps it for the longest time, of each field with a history."""
+    found: dict[tuple[str, str], Trend] = {}
+    for trend in sorted(trends, key=lambda one: one.keep_s):
+        for pen in trend.pens:
+            found[pen.topic, pen.field] = trend
+    return found
+
+
+def disk_fields(trends: Iterable[Trend]) -> set[tuple[str, str]]:
+    """(topic, field) of each history that is kept on disk."""
+    return {(pen.topic, pen.field) for trend in trends if trend.disk for pen in trend.pens}
+
+
+def memory_of(trends: Iterable[Trend], robots: int) -> int:
+    """The most memory that the histories of all trends take, in bytes; `robots` is their number."""
+    return robots * sum(history_bytes(one.keep_s) for one in kept_fields(trends).values())
+
+
+class HasDisplays(Protocol):
+    """A panel."""
+
+    @property
+    def displays(self) -> tuple[DisplayWidget, ...]: ...
+
+
+def trends_of(panel: HasDisplays) -> list[Trend]:
+    """The trends of a panel."""
+    return [widget for widget in panel.displays if isinstance(widget, Trend)]

@@ -1,0 +1,136 @@
+"""Records the fields that trends show, from each sample. Used on the event loop only.
+
+Samples are kept undecoded for a moment, and decoded in slices of some milliseconds: whatever a robot
+publishes delays no press and no hold by more than a slice.
+"""
+
+import asyncio
+import math
+import time
+from collections import deque
+from typing import Any, Final, NamedTuple
+
+from app.errors import DecodeError
+from app.interfaces import FieldReader, Interfaces
+from app.panel.model import Panel
+from app.panel.widgets.trend import kept_fields, trends_of
+from app.robot.history import FieldHistory
+from app.robot.sample import Sample
+from app.robot.slices import Slices
+from app.robot.state import RobotState
+
+DECODE_AFTER_S: Final = 0.2
+MAX_PENDING: Final = 4_000  # samples that are not decoded yet
+MAX_PENDING_BYTES: Final = 16_000_000
+FORGET_EVERY: Final = 300  # decoded batches
+BETWEEN_CLOCK: Final = 32  # samples that are decoded between two looks at the clock
+
+
+class Pending(NamedTuple):
+    """A sample that is not decoded yet; `whole` is false where the one before is not continued."""
+
+    key: str
+    at: float
+    data: bytes
+    whole: bool
+
+
+class TrendRecorder:
+    """The `SampleListener` of a robot's history."""
+
+    def __init__(
+        self, panel: Panel, interfaces: Interfaces, robot: RobotState, slices: Slices | None = None
+    ) -> None:
+        self._robot = robot
+        self._slices = slices or robot.slices
+        self._readers: dict[str, FieldReader] = {}
+        self._fields: dict[str, list[tuple[str, FieldHistory]]] = {}
+        self._origins: dict[str, tuple[str | None, int]] = {}
+        self._pending: deque[Pending] = deque()
+        self._pending_bytes = 0
+        self._timer: asyncio.TimerHandle | None = None
+        self._batches = 0
+        types = panel.subscriptions()
+        by_topic: dict[str, list[str]] = {}
+        for (topic, field), trend in kept_fields(trends_of(panel)).items():
+            by_topic.setdefault(topic, []).append(field)
+            history = FieldHistory(trend.keep_s, trend.max_age_s)
+            robot.history.fields[robot.key(topic), field] = history
+            self._fields.setdefault(robot.key(topic), []).append((field, history))
+        for topic, fields in by_topic.items():
+            self._readers[robot.key(topic)] = interfaces.field_reader(types[topic], fields)
+
+    @property
+    def keys(self) -> frozenset[str]:
+        return frozenset(self._readers)
+
+    def record_sample(self, key: str, sample: Sample) -> None:
+        """A sample was received: it is decoded within a moment."""
+        origin = sample.source, self._robot.cuts(key)
+        whole = self._origins.get(key) == origin
+        self._origins[key] = origin
+        one = Pending(key, sample.at, bytes(sample.payload), whole)
+        self._pending.append(one)
+        self._pending_bytes += len(one.data)
+        while len(self._pending) > MAX_PENDING or self._pending_bytes > MAX_PENDING_BYTES:
+            self._interrupt(self._taken().key)
+        if self._timer is None:
+            loop = asyncio.get_running_loop()
+            self._timer = loop.call_later(DECODE_AFTER_S, self._begin)
+
+    def stop(self) -> None:
+        """Decodes what is pending."""
+        if self._timer is not None:
+            self._timer.cancel()
+        self.decode(math.inf)
+
+    def decode(self, until: float) -> bool:
+        """Decodes until a time (monotonic seconds); returns whether nothing is left."""
+        while self._pending:
+            for _ in range(min(BETWEEN_CLOCK, len(self._pending))):
+                self._record(self._taken())
+                if self._pending and len(self._pending[0].data) > 2_000:
+                    break
+            if time.monotonic() >= until:
+                break
+        if self._pending:
+            return False
+        self._timer = None
+        self._batches += 1
+        if self._batches % FORGET_EVERY == 0:
+            now = self._robot.history.time(time.monotonic())
+            for history in self._robot.history.fields.values():
+                history.forget_old(now)
+        return True
+
+    def _begin(self) -> None:
+        self._slices.schedule(self.decode)
+
+    def _taken(self) -> Pending:
+        one = self._pending.popleft()
+        self._pending_bytes -= len(one.data)
+        return one
+
+    def _interrupt(self, key: str) -> None:
+        for _, history in self._fields[key]:
+            history.interrupt()
+
+    def _record(self, one: Pending) -> None:
+        if not one.whole:
+            self._interrupt(one.key)
+        try:
+            values = self._readers[one.key].read(one.data)
+        except DecodeError:  # the topic's state counts and logs it
+            self._interrupt(one.key)
+            return
+        at = self._robot.history.time(one.at)
+        for field, history in self._fields[one.key]:
+            history.add(at, _number(values.get(field)))
+
+
+def _number(value: Any) -> float:
+    """NaN for an element that is not there, or a number beyond all floats."""
+    try:
+        return math.nan if value is None else float(value)
+    except OverflowError:
+        return math.nan

@@ -1,0 +1,192 @@
+"""The plot of a trend as paths, marks and texts of an SVG: pure, from (widget, history, time).
+
+The plot is a square of `SIZE` units a side, stretched to its box; texts and marks stand at percentages.
+`static/js/kinds/trend.js` draws the same in the browser.
+"""
+
+import math
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+from app.panel.widgets.trend import Pen, Trend
+from app.robot.history import Column, History
+from app.robot.state import RobotState
+
+SIZE: Final = 1000
+COLUMNS: Final = 240
+VALUE_TICKS: Final = 4
+TIME_TICKS: Final = 5
+# Seconds between two ticks.
+STEPS: Final = (
+    *(1, 2, 5, 10, 15, 30),
+    *(60, 120, 300, 600, 900, 1800),
+    *(3600, 7200, 10_800, 21_600, 43_200, 86_400, 172_800, 604_800),
+)
+DAY: Final = 86_400
+
+Place = Callable[[float], float]
+
+
+class Tick(NamedTuple):
+    """A line of the grid: its place in percent of the plot, and its text."""
+
+    place: float
+    text: str
+
+
+class Limit(NamedTuple):
+    """A limit of a pen, "H" or "L"."""
+
+    pen: int
+    place: float
+    text: str
+    letter: str
+
+
+class Band(NamedTuple):
+    """The normal values of a pen."""
+
+    pen: int
+    top: float
+    height: float
+
+
+class Line(NamedTuple):
+    """A pen's line, and where its newest value stands; None without one in the plot."""
+
+    path: str
+    x: float | None
+    y: float
+
+
+@dataclass(frozen=True, slots=True)
+class Plot:
+    """What is drawn."""
+
+    lines: Sequence[Line]
+    values: Sequence[Tick]
+    times: Sequence[Tick]
+    limits: Sequence[Limit]
+    bands: Sequence[Band]
+
+
+def plot(widget: Trend, robot: RobotState, monotonic: float, wall: float) -> Plot:
+    """The plot of a trend's own window until now."""
+    history = robot.history
+    history.set_clock(monotonic, wall)
+    begin = wall - widget.window_s
+    columns = [pen_columns(robot, pen, begin, wall, widget.window_s / COLUMNS) for pen in widget.pens]
+    return draw(widget, columns, begin, wall)
+
+
+def pen_columns(
+    robot: RobotState, pen: Pen, begin: float, end: float, width: float
+) -> Sequence[Column]:
+    """The columns of a pen, in its unit."""
+    history: History = robot.history
+    field = history.fields[robot.key(pen.topic), pen.field]
+    found = history.columns(field, begin, end, width)
+    if (pen.scale, pen.offset) == (1.0, 0.0):
+        return found
+    return [_scaled(one, pen) for one in found]
+
+
+def _scaled(column: Column, pen: Pen) -> Column:
+    low, high = sorted((pen.shown(column.low), pen.shown(column.high)))
+    return column._replace(low=low, high=high, last=pen.shown(column.last))
+
+
+def draw(widget: Trend, columns: Sequence[Sequence[Column]], begin: float, end: float) -> Plot:
+    """The plot of columns from `begin` to `end`, which are seconds of the wall clock."""
+    low, high = value_range(widget, columns)
+
+    def place(value: float) -> float:
+        return round(min(max((high - value) / (high - low), -0.5), 1.5) * 100, 2)
+
+    width = (end - begin) / COLUMNS
+    pens = list(enumerate(widget.pens))
+    bands = [
+        Band(i, place(pen.normal[1]), round(place(pen.normal[0]) - place(pen.normal[1]), 2))
+        for i, pen in pens
+        if pen.normal
+    ]
+    limits = [
+        Limit(i, place(value), f"{letter} {value:g}", letter)
+        for i, pen in pens
+        for value, letter in ((pen.high, "H"), (pen.low, "L"))
+        if value is not None
+    ]
+    lines = [_line(one, begin, end, width, place) for one in columns]
+    ticks = [Tick(place(value), text) for value, text in value_ticks(low, high)]
+    return Plot(lines, ticks, list(time_ticks(begin, end)), limits, bands)
+
+
+def value_range(widget: Trend, columns: Sequence[Sequence[Column]]) -> tuple[float, float]:
+    """The lowest and highest value of the axis: as the panel file says, else of all that is drawn."""
+    fixed = [
+        v for pen in widget.pens for v in (pen.low, pen.high, *(pen.normal or ())) if v is not None
+    ]
+    lows = [one.low for of in columns for one in of] + fixed
+    highs = [one.high for of in columns for one in of] + fixed
+    low = widget.min if widget.min is not None else min(lows, default=0.0)
+    high = widget.max if widget.max is not None else max(highs, default=1.0)
+    if low >= high:
+        middle = widget.min if widget.min is not None else low
+        margin = abs(middle) * 0.05 or 1.0
+        low, high = (low, low + margin) if widget.min is not None else (high - margin, high + margin)
+    margin = (high - low) * 0.05
+    return (
+        low if widget.min is not None else low - margin,
+        high if widget.max is not None else high + margin,
+    )
+
+
+def value_ticks(low: float, high: float) -> Iterator[tuple[float, str]]:
+    """(value, text) of the lines of the grid."""
+    least = (high - low) / VALUE_TICKS
+    power = 10.0 ** math.floor(math.log10(least))
+    step = next(power * by for by in (1, 2, 2.5, 5, 10) if power * by >= least * 0.999)
+    digits = max(0, -math.floor(math.log10(step) + 1e-9) + (step / power == 2.5))
+    for number in range(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1):
+        value = number * step
+        text = f"{value:.{digits}f}" if max(abs(low), abs(high)) < 1e6 else f"{value:.4g}"
+        yield value, text.replace("-", "\N{MINUS SIGN}")
+
+
+def time_ticks(begin: float, end: float) -> Iterator[Tick]:
+    """The lines of the grid at whole times of day in the server's time zone."""
+    zone = time.localtime(end).tm_gmtoff
+    step = next((s for s in STEPS if s >= (end - begin) / TIME_TICKS), STEPS[-1])
+    number = math.ceil((begin + zone) / step)
+    while (at := number * step - zone) <= end:
+        yield Tick(round((at - begin) / (end - begin) * 100, 2), _time_text(at, step))
+        number += 1
+
+
+def _time_text(at: float, step: int) -> str:
+    form = "%H:%M:%S" if step < 60 else "%H:%M" if step < DAY else "%m-%d"
+    return time.strftime(form, time.localtime(at))
+
+
+def _line(columns: Sequence[Column], begin: float, end: float, width: float, place: Place) -> Line:
+    """A path through the lowest and highest value of each column, so that no peak is lost."""
+    parts: list[str] = []
+    last = 0.0
+    x = y = None
+    for one in columns:
+        at = ((one.number + 0.5) * width - begin) / (end - begin)
+        x = round(min(at, 1.0) * SIZE, 1)
+        values = (
+            [one.low, one.high] if abs(last - one.low) <= abs(last - one.high) else [one.high, one.low]
+        )
+        if one.low == one.high:
+            values = [one.low]
+        elif values[-1] != one.last:
+            values.append(one.last)
+        points = [f"{x:g} {place(value) * SIZE / 100:g}" for value in values]
+        parts.append(f"M{points[0]}h0" if one.gap or not parts else f"L{points[0]}")
+        parts += [f"L{point}" for point in points[1:]]
+        last = y = one.last
+    return Line("".join(parts), None if x is None else x / SIZE * 100, 0.0 if y is None else place(y))

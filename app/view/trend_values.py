@@ -1,0 +1,38 @@
+"""The newest values of a trend's pens: pure, from (widget, robot, time)."""
+
+import math
+from typing import Any
+
+from app.i18n import TextLike, joined, say
+from app.panel.widgets.trend import Pen, Trend
+from app.robot.state import RobotState
+from app.view.display_values import FieldState, field_state, readout
+
+
+def trend(widget: Trend, robot: RobotState, now: float) -> tuple[dict[str, Any], float]:
+    """Attributes: `state` and `note`, those of the pens that are not live; `text0`, `state0` and so on
+    of each pen, where a value beyond its limits is "low" or "high"; `fault` of the disk. And when they
+    change."""
+    shown: dict[str, Any] = {}
+    state, until = "live", math.inf
+    notes: list[TextLike] = []
+    for number, (pen, one) in enumerate(zip(widget.pens, widget.readouts, strict=True)):
+        seen = field_state(one, robot, now)
+        until = min(until, seen.until)
+        if seen.state != "live":
+            state = seen.state if state == "live" else state
+            notes.append(say("trend_pen", label=pen.label, note=seen.note))
+        shown[f"text{number}"] = readout(one, robot, now)[0]["text"]
+        shown[f"state{number}"] = _state(pen, seen)
+    note = joined(dict.fromkeys(notes))
+    fault = robot.history.fault if widget.disk else ""
+    return {"state": state, "note": note, "fault": fault, **shown}, until
+
+
+def _state(pen: Pen, seen: FieldState) -> str:
+    if seen.state != "live" or not isinstance(seen.value, int | float):
+        return seen.state
+    value = pen.shown(seen.value)
+    if pen.low is not None and value < pen.low:
+        return "low"
+    return "high" if pen.high is not None and value > pen.high else "live"

@@ -1,0 +1,115 @@
+"""The history of a trend's pens, thinned to columns without losing a peak."""
+
+import asyncio
+import gzip
+import json
+import time
+from collections.abc import Iterator, Sequence
+from typing import Annotated, Final
+
+from fastapi import APIRouter, Query, Request
+from fastapi.responses import Response
+from pydantic import BaseModel, Field
+
+from app.errors import InputError, NotFound
+from app.panel.widgets.trend import Trend, trends_of
+from app.robot.history import Column
+from app.runtime.robot_session import RobotSession
+from app.view.trend_plot import pen_columns
+from app.web.app_state import CurrentSession
+from app.web.described import JSON, errors
+
+router = APIRouter()
+
+SHORTEST_S: Final = 1.0
+PACKED_BYTES: Final = 4_000
+
+Number = Annotated[int, Field(description="its time is the number times `width_s`, since the epoch")]
+Value = float
+
+
+class TrendAnswer(BaseModel):
+    """The columns of each pen from `since` on. A column is `[number, value]`, or `[number, lowest,
+    highest, last]` where it has several values; `null` stands before one that does not continue the
+    one before: no line is drawn there."""
+
+    end: Annotated[float, Field(description="the end of the time, in seconds since the epoch")]
+    now: Annotated[float, Field(description="the server's clock")]
+    width_s: Annotated[float, Field(description="the time of a column: `span_s / points`")]
+    shift: Annotated[float, Field(description="differs when the clock was set: ask for all again")]
+    zone_s: Annotated[int, Field(description="the server's time zone, east of UTC")]
+    pens: list[list[tuple[Number, Value] | tuple[Number, Value, Value, Value] | None]]
+
+
+@router.get(
+    "/widgets/{widget}/trend",
+    response_model=TrendAnswer,
+    summary="Read the history of a trend",
+    responses=errors(403, 404, 422),
+)
+async def trend(
+    widget: str,
+    request: Request,
+    session: CurrentSession,
+    span_s: Annotated[float, Query(ge=SHORTEST_S, allow_inf_nan=False, description="how long")],
+    end: Annotated[
+        float | None,
+        Query(ge=0, le=1e11, description="in seconds since the epoch; without it, now"),
+    ] = None,
+    points: Annotated[int, Query(ge=10, le=1000, description="how many columns")] = 300,
+    since: Annotated[int, Query(ge=0, le=2**53, description="the first column that is asked for")] = 0,
+) -> Response:
+    found = _trend(session, widget)
+    if span_s > found.keep_s:
+        raise InputError(f"span_s is {span_s:g}: this trend keeps {found.keep_s} s")
+    now = time.time()
+    history = session.robot.history
+    history.set_clock(time.monotonic(), now)
+    until = now if end is None else min(end, now)
+    width = span_s / points
+    begin = max(until - span_s, since * width)
+    about = {
+        "end": round(until, 3),
+        "now": round(now, 3),
+        "width_s": width,
+        "shift": round(history.shift, 3),
+        "zone_s": time.localtime(until).tm_gmtoff,
+    }
+    pens = []
+    for pen in found.pens:
+        columns = pen_columns(session.robot, pen, begin, until, width)
+        pens.append(json.dumps(list(_compact(columns)), separators=(",", ":")))
+        await asyncio.sleep(0)  # each pen takes some milliseconds
+    text = json.dumps(about, separators=(",", ":")).removesuffix("}") + f',"pens":[{",".join(pens)}]}}'
+    return await _packed(text.encode(), "gzip" in request.headers.get("accept-encoding", ""))
+
+
+async def _packed(body: bytes, gzipped: bool) -> Response:
+    """The answer; what is long is packed in a thread, quickly."""
+    headers = {"cache-control": "no-store", "vary": "accept-encoding"}
+    if gzipped and len(body) > PACKED_BYTES:
+        body = await asyncio.to_thread(gzip.compress, body, 1)
+        headers["content-encoding"] = "gzip"
+    return Response(body, media_type=JSON, headers=headers)
+
+
+def _trend(session: RobotSession, widget: str) -> Trend:
+    for one in trends_of(session.panel):
+        if one.id == widget:
+            return one
+    raise NotFound(f'"{widget:.64}" is no trend of this panel')
+
+
+def _compact(columns: Sequence[Column]) -> Iterator[list[float] | None]:
+    for one in columns:
+        if one.gap:
+            yield None
+        if one.low == one.high:
+            yield [one.number, _short(one.last)]
+        else:
+            yield [one.number, _short(one.low), _short(one.high), _short(one.last)]
+
+
+def _short(value: float) -> float:
+    """Seven digits: more than a screen shows."""
+    return float(f"{value:.7g}")

@@ -1,0 +1,127 @@
+// Draws a trend's columns into the elements that the server has rendered (templates/widgets/trend.html); the same as
+// app/view/trend_plot.py.
+const SIZE = 1000;
+const VALUE_TICK_PX = 45;
+const TIME_TICK_PX = 90;
+const STEPS = [1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 10800, 21600, 43200, 86400, 172800, 604800];
+
+const numberOr = (text, other) => (text === undefined ? other : Number(text));
+
+export class Plot {
+  #root;
+  #area;
+  #view; // {begin, end, width, zone}: from when to when, the time of a column, the time zone, in seconds
+
+  constructor(root) {
+    this.#root = root;
+    this.#area = root.querySelector(".area");
+    this.pens = [...root.querySelectorAll(".legend .pen")].map((pen, i) => ({
+      name: pen.querySelector('[role="rowheader"]').textContent,
+      unit: pen.dataset.unit,
+      digits: /\.(\d+)f$/.exec(pen.dataset.format)?.[1],
+      low: numberOr(pen.dataset.low),
+      high: numberOr(pen.dataset.high),
+      normal: pen.dataset.normal?.split(" ").map(Number),
+      line: root.querySelectorAll(".pens > .line")[i],
+      mark: root.querySelectorAll(".end")[i],
+    }));
+  }
+
+  get width() {
+    return this.#area.clientWidth;
+  }
+
+  // `columns` of each pen are [number, lowest, highest, last, whether it begins a line].
+  draw(view, columns) {
+    this.#view = view;
+    const { begin, end } = view;
+    const [low, high] = this.#range(columns);
+    const x = (time) => ((time - begin) / (end - begin)) * SIZE;
+    const y = (value) => Math.min(Math.max((high - value) / (high - low), -0.5), 1.5) * SIZE;
+    const part = (name) => this.#root.querySelector(name);
+    const values = [...valueTicks(low, high, Math.max(2, Math.floor(this.#area.clientHeight / VALUE_TICK_PX)))];
+    const times = [...this.#timeTicks()];
+    part(".grid-lines").innerHTML = values.map(([value]) => `<path d="M0 ${y(value)}h${SIZE}"/>`).join("") + times.map(([time]) => `<path d="M${x(time)} 0v${SIZE}"/>`).join("");
+    part(".values").innerHTML = values.map(([value, text]) => `<text x="0" dx="-6" dy="5" y="${y(value) / 10}%">${text}</text>`).join("");
+    part(".times").innerHTML = times.map(([time, text]) => `<text x="${x(time) / 10}%" y="100%" dy="18">${text}</text>`).join("");
+    const limits = this.pens.flatMap((pen, i) => [["H", pen.high], ["L", pen.low]].filter(([, at]) => at !== undefined).map(([letter, at]) => ({ letter, at, i })));
+    part(".limits").innerHTML = limits.map(({ at, i }) => `<path class="pen-${i}" d="M0 ${y(at)}h${SIZE}"/>`).join("");
+    part(".limit-names").innerHTML = limits.map(({ letter, at }) => `<text x="6" y="${y(at) / 10}%" dy="${letter === "H" ? -5 : 15}">${letter} ${at}</text>`).join("");
+    part(".bands").innerHTML = this.pens.filter((pen) => pen.normal).map(({ normal: [from, to] }) => `<rect class="band" x="0" width="${SIZE}" y="${y(to)}" height="${y(from) - y(to)}"/>`).join("");
+    for (const [i, pen] of this.pens.entries()) this.#drawPen(pen, columns[i], x, y);
+  }
+
+  // Through the lowest and the highest value of each column: no peak is lost.
+  #drawPen(pen, columns, x, y) {
+    const path = [];
+    let before = 0;
+    for (const [number, low, high, last, starts] of columns) {
+      const values = Math.abs(before - low) <= Math.abs(before - high) ? [low, high] : [high, low];
+      if (low === high) values.pop();
+      else if (values[1] !== last) values.push(last);
+      const at = Math.min(x(this.timeOf(number)), SIZE).toFixed(1);
+      for (const [i, value] of values.entries()) {
+        const isFirst = i === 0 && (starts || !path.length);
+        path.push(`${isFirst ? "M" : "L"}${at} ${y(value).toFixed(1)}${isFirst ? "h0" : ""}`);
+      }
+      before = last;
+    }
+    pen.line.setAttribute("d", path.join(""));
+    const newest = columns.at(-1);
+    pen.mark.setAttribute("visibility", newest && x(this.timeOf(newest[0])) >= 0 ? "visible" : "hidden");
+    if (!newest) return;
+    pen.mark.setAttribute("x", `${Math.min(x(this.timeOf(newest[0])), SIZE) / 10}%`);
+    pen.mark.setAttribute("y", `${y(newest[3]) / 10}%`);
+  }
+
+  // The time in the middle of a column.
+  timeOf(number) {
+    return (number + 0.5) * this.#view.width;
+  }
+
+  #range(columns) {
+    const fixed = this.pens.flatMap((pen) => [pen.low, pen.high, ...(pen.normal ?? [])]).filter((value) => value !== undefined);
+    const { min, max } = this.#root.dataset;
+    let low = numberOr(min, [...columns.flat().map((one) => one[1]), ...fixed].reduce((a, b) => Math.min(a, b), Infinity));
+    let high = numberOr(max, [...columns.flat().map((one) => one[2]), ...fixed].reduce((a, b) => Math.max(a, b), -Infinity));
+    if (!Number.isFinite(low)) low = Number.isFinite(high) ? high - 1 : 0;
+    if (!Number.isFinite(high)) high = low + 1;
+    if (low >= high) {
+      const margin = Math.abs(low) * 0.05 || 1;
+      if (min === undefined) low = high - margin;
+      if (max === undefined) high = low + 2 * margin;
+    }
+    const margin = (high - low) * 0.05;
+    return [min === undefined ? low - margin : low, max === undefined ? high + margin : high];
+  }
+
+  *#timeTicks() {
+    const { begin, end, zone } = this.#view;
+    const step = STEPS.find((one) => one >= (end - begin) / Math.max(2, this.#area.clientWidth / TIME_TICK_PX)) ?? STEPS.at(-1);
+    for (let number = Math.ceil((begin + zone) / step); number * step - zone <= end; number++) {
+      const time = number * step - zone;
+      yield [time, step < 60 ? this.clockOf(time) : step < 86400 ? this.clockOf(time).slice(0, 5) : this.#local(time).slice(5, 10)];
+    }
+  }
+
+  #local(time) {
+    return new Date((time + this.#view.zone) * 1000).toISOString();
+  }
+
+  clockOf(time) {
+    return this.#local(time).slice(11, 19);
+  }
+}
+
+function* valueTicks(low, high, most) {
+  const least = (high - low) / most;
+  const power = 10 ** Math.floor(Math.log10(least));
+  const by = [1, 2, 2.5, 5, 10].find((one) => power * one >= least * 0.999);
+  const step = power * by;
+  const digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9) + (by === 2.5 ? 1 : 0));
+  for (let number = Math.ceil(low / step - 1e-9); number <= high / step + 1e-9; number++) {
+    const value = number * step;
+    const text = Math.max(Math.abs(low), Math.abs(high)) < 1e6 ? value.toFixed(Math.min(digits, 20)) : Number(value.toPrecision(4)).toString();
+    yield [value, text.replace("-", "−")];
+  }
+}

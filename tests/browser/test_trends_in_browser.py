@@ -1,0 +1,304 @@
+"""A trend as an operator uses it: Chromium, the real bridge, an rclpy node that publishes."""
+
+import math
+import re
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Browser, Page, Response, expect
+
+from tests.support.parts import ENOUGH_S, Bridge, RosNode, Server, live, until
+
+PANEL = """
+title = "Trends"
+
+[[page]]
+id = "one"
+title = "One"
+
+[[page.widget]]
+id = "course"
+kind = "trend"
+label = "Air pressure"
+window = "1m"
+windows = ["10s", "10m"]
+max_age_s = 60.0
+
+[[page.widget.pen]]
+topic = "/test_inlet"
+type = "std_msgs/msg/Float64"
+label = "Inlet"
+unit = "bar"
+low = 4.0
+normal = [4.0, 6.0]
+format = ".2f"
+
+[[page.widget.pen]]
+topic = "/test_joints"
+type = "sensor_msgs/msg/JointState"
+field = "position[1]"
+label = "J2"
+
+[[page]]
+id = "two"
+title = "Two"
+
+[[page.widget]]
+id = "plain"
+kind = "label"
+label = "Nothing"
+"""
+PEAK = 97.25
+TREND = '[data-widget="course"]'
+
+
+@pytest.fixture(scope="module")
+def cell(bridge: Bridge, node: RosNode, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    folder = tmp_path_factory.mktemp("trends")
+    panel = folder / "trends.toml"
+    panel.write_text(PANEL)
+    node.advertise("/test_inlet", "std_msgs/msg/Float64")
+    node.advertise("/test_joints", "sensor_msgs/msg/JointState")
+    mine = live(bridge.endpoint, folder, KIOSK_PANEL=str(panel))
+    until(mine.ready, "ready")
+
+    def arrives() -> bool:
+        says(node, 5.0)
+        return bool(mine.widget("course")["state"] == "live")
+
+    until(arrives, "the robot's values arrive", every_s=0.1)
+    yield mine
+    mine.end()
+
+
+def says(node: RosNode, value: float) -> None:
+    node.publish("/test_inlet", {"data": value})
+    joints = {"name": ["a", "b"], "position": [0.0, value / 2], "velocity": [], "effort": []}
+    node.publish("/test_joints", joints)
+
+
+def highest(server: Server) -> float:
+    found = server.http.get("/widgets/course/trend", params={"span_s": 60}).json()
+    return float(max(value for one in found["pens"][0] if one for value in one[1:]))
+
+
+def time_passes(server: Server, page: Page, seconds: float) -> None:
+    """By the server's clock; the page's events are taken meanwhile."""
+
+    def now() -> float:
+        page.evaluate("0")
+        found = server.http.get("/widgets/course/trend", params={"span_s": 10, "points": 10}).json()
+        return float(found["now"])
+
+    end = now() + seconds
+    until(lambda: now() >= end, "time passes", every_s=0.1)
+
+
+def line(page: Page, pen: int = 0) -> str:
+    return page.locator(f"{TREND} .pens > .line").nth(pen).get_attribute("d") or ""
+
+
+def is_drawn(page: Page) -> bool:
+    return "L" in line(page)
+
+
+def opened(page: Page, cell: Server) -> None:
+    """The page with the trend, drawn by its script."""
+    page.goto(cell.url)
+    expect(page.locator(".trend-keys")).to_be_visible()
+    expect(page.locator('[data-do="forward"]')).to_be_disabled()
+
+
+def key(page: Page, what: str) -> Any:
+    return page.locator(f'[data-do="{what}"]')
+
+
+def test_every_sample_of_a_real_node_is_in_the_line_and_the_text(
+    cell: Server, node: RosNode, page: Page
+) -> None:
+    """A single peak among many values is drawn, live, without a reload."""
+    opened(page, cell)
+    says(node, PEAK)
+    for number in range(100):
+        says(node, 5.0 + math.sin(number / 10))
+    says(node, 4.5)
+    expect(page.locator(f"{TREND} .pen-0 > b")).to_have_text("4.50 bar")
+    expect(page.locator(f"{TREND} .pen-1 > b")).to_have_text("2.25")
+    until(lambda: highest(cell) == PEAK, "the history has the peak")
+    expect(page.locator(f"{TREND} .values text").last).to_have_text(re.compile("[89]0|100"))
+    ys = [float(y) for y in re.findall(r"[ML][\d.-]+ ([\d.-]+)", line(page))]
+    assert min(ys) < 100
+    assert max(ys) > 850
+    assert line(page, 1)
+
+
+def test_a_value_beyond_its_limit_is_marked(cell: Server, node: RosNode, page: Page) -> None:
+    opened(page, cell)
+    says(node, 3.0)
+    expect(page.locator(TREND)).to_have_attribute("data-state0", "low")
+    says(node, 5.0)
+    expect(page.locator(TREND)).to_have_attribute("data-state0", "live")
+
+
+def test_a_pause_keeps_the_picture_while_the_server_goes_on(
+    cell: Server, node: RosNode, page: Page
+) -> None:
+    opened(page, cell)
+    says(node, 5.5)
+    until(lambda: line(page), "a line is drawn")
+    key(page, "pause").click()
+    expect(page.locator(".paused")).to_have_text(re.compile(r"^Paused −00:00:\d\d$"))
+    expect(key(page, "live")).to_be_focused()
+    before, asked = line(page), []
+    page.on("request", lambda request: asked.append(request.url))
+    says(node, PEAK)
+    expect(page.locator(f"{TREND} .pen-0 > b")).to_have_text("97.25 bar")
+    expect(page.locator(".paused")).to_have_text(re.compile(r"−00:00:0[3-9]"))
+    assert line(page) == before
+    assert not [url for url in asked if "/trend?" in url]
+    key(page, "live").click()
+    expect(page.locator(".paused")).to_be_hidden()
+    until(lambda: line(page) != before, "it follows again")
+    expect(key(page, "pause")).to_be_visible()
+
+
+def test_looking_back_and_zooming(cell: Server, node: RosNode, page: Page) -> None:
+    opened(page, cell)
+    says(node, 5.0)
+    until(lambda: line(page), "a line is drawn")
+    times = page.locator(f"{TREND} .times text")
+    key(page, "back").click()
+    expect(page.locator(".paused")).to_have_text(re.compile(r"−00:00:[23]\d"))
+    key(page, "longer").click()
+    expect(key(page, "longer")).to_be_disabled()
+    expect(times.first).to_have_text(re.compile(r"^\d\d:\d\d$"))
+    key(page, "shorter").click()
+    key(page, "shorter").click()
+    expect(key(page, "shorter")).to_be_disabled()
+    expect(times.first).to_have_text(re.compile(r"^\d\d:\d\d:\d\d$"))
+    for _ in range(12):
+        if key(page, "forward").is_enabled():
+            key(page, "forward").click()
+    expect(page.locator(".paused")).to_be_hidden()
+
+
+def test_a_touch_shows_the_values_at_a_time(cell: Server, node: RosNode, chromium: Browser) -> None:
+    says(node, 5.0)
+    context = chromium.new_context(viewport={"width": 1024, "height": 600}, has_touch=True)
+    page = context.new_page()
+    opened(page, cell)
+    until(lambda: line(page), "a line is drawn")
+    key(page, "pause").tap()
+    x = re.findall(r"[ML]([\d.]+) ", line(page))[-1]
+    box = page.locator(f"{TREND} .area").bounding_box()
+    assert box is not None
+    at = box["x"] + float(x) / 1000 * box["width"]
+    page.touchscreen.tap(at, box["y"] + box["height"] / 2)
+    values = page.locator(".cursor-values")
+    expect(values).to_be_visible()
+    assert re.match(r"\d\d:\d\d:\d\dInlet.*bar", values.inner_text().replace("\n", ""))
+    assert "J2" in values.inner_text()
+    assert page.locator(f"{TREND} .cursor").get_attribute("visibility") == "visible"
+    context.close()
+
+
+def test_the_cursor_goes_by_keys(cell: Server, node: RosNode, page: Page) -> None:
+    opened(page, cell)
+    says(node, 5.0)
+    until(lambda: line(page), "a line is drawn")
+    page.locator(f"{TREND} .area").focus()
+    page.keyboard.press("ArrowLeft")
+    values = page.locator(".cursor-values")
+    expect(values).to_be_visible()
+    before = values.locator("b").inner_text()
+    for _ in range(3):
+        page.keyboard.press("ArrowLeft")
+    assert values.locator("b").inner_text() < before
+    page.keyboard.press("Escape")
+    expect(values).to_be_hidden()
+
+
+def test_a_reload_and_another_browser_show_what_was(
+    cell: Server, node: RosNode, chromium: Browser
+) -> None:
+    """The history is the server's: two browsers have the same, and a reload loses nothing."""
+    says(node, PEAK)
+    says(node, 5.0)
+    until(lambda: highest(cell) == PEAK, "the history has the peak")
+    contexts = [chromium.new_context() for _ in range(2)]
+    pages = [context.new_page() for context in contexts]
+    for page in (*pages, pages[0]):
+        opened(page, cell)
+        until(partial(is_drawn, page), "a line is drawn")
+        top = min(float(y) for y in re.findall(r"[ML][\d.]+ ([\d.-]+)", line(page)))
+        assert top < 100, "the peak is drawn"
+    for context in contexts:
+        context.close()
+
+
+def test_what_nobody_sees_is_not_asked_for(cell: Server, page: Page) -> None:
+    asked: list[str] = []
+    page.on("request", lambda request: asked.append(request.url))
+    opened(page, cell)
+
+    def count() -> int:
+        page.evaluate("0")
+        return len([url for url in asked if "/trend?" in url])
+
+    until(lambda: count() >= 2, "it asks")
+    # A page behind another tab, as Chromium tells it.
+    hide = """(hidden) => {
+      Object.defineProperty(document, "hidden", { value: hidden, configurable: true });
+      document.dispatchEvent(new Event("visibilitychange"));
+    }"""
+    page.evaluate(hide, True)
+    before = count()
+    time_passes(cell, page, 2.5)
+    assert count() - before <= 1, "one may have been under way"
+    page.evaluate(hide, False)
+    until(lambda: count() > before + 1, "it asks again")
+    page.goto(f"{cell.url}/pages/two")
+    before = count()
+    time_passes(cell, page, 1.5)
+    assert count() == before
+
+
+def test_requests_are_at_most_two_a_second_and_small(cell: Server, page: Page) -> None:
+    sizes: list[tuple[str, int]] = []
+
+    def answered(response: Response) -> None:
+        if "/trend?" in response.url:
+            sizes.append((response.url, len(response.body())))
+
+    page.on("response", answered)
+    opened(page, cell)
+    time_passes(cell, page, 3.0)
+    assert 2 <= len(sizes) <= 8
+    assert "since=" not in sizes[0][0]
+    assert all("since=" in url and size < 600 for url, size in sizes[1:])
+
+
+def test_a_lost_server_marks_values_as_old_and_keeps_the_picture(
+    bridge: Bridge, node: RosNode, page: Page, tmp_path: Path
+) -> None:
+    panel = tmp_path / "trends.toml"
+    panel.write_text(PANEL)
+    mine = live(bridge.endpoint, tmp_path, KIOSK_PANEL=str(panel))
+    until(mine.ready, "ready")
+
+    def arrives() -> bool:
+        says(node, 5.0)
+        return bool(mine.widget("course")["state"] == "live")
+
+    until(arrives, "the robot's values arrive", every_s=0.1)
+    opened(page, mine)
+    until(lambda: line(page), "a line is drawn")
+    drawn = line(page)
+    mine.end()
+    expect(page.locator(TREND)).to_have_attribute("data-state", "old", timeout=1000 * ENOUGH_S)
+    decoration = "e => getComputedStyle(e).textDecorationStyle"
+    assert page.locator(f"{TREND} .pen-0 > b").evaluate(decoration) == "dotted"
+    assert line(page).count("L") >= drawn.count("L") - 1

@@ -1,0 +1,176 @@
+"""Trends of a whole server: over HTTP, in the page without scripts, over SIGKILL, on a full disk."""
+
+import re
+import signal
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.audit.test_on_server import MOUNT, SMALL_DISK, fill, inside
+from tests.support.parts import ROOT, Server, until
+
+PANEL = """
+title = "Trends"
+mode = "demo"
+[[page]]
+id = "one"
+title = "One"
+[[page.widget]]
+id = "course"
+kind = "trend"
+label = "Air pressure"
+window = "1m"
+windows = ["10m"]
+disk = true
+[[page.widget.pen]]
+topic = "/inlet"
+type = "std_msgs/msg/Float64"
+label = "Inlet"
+unit = "bar"
+[[page.widget.pen]]
+topic = "/gripper"
+type = "std_msgs/msg/Float64"
+label = "Gripper"
+unit = "bar"
+[[page.widget]]
+id = "battery"
+kind = "readout"
+label = "Battery"
+topic = "/inlet"
+type = "std_msgs/msg/Float64"
+"""
+PATH = "/widgets/course/trend"
+
+
+def panel_file(folder: Path) -> str:
+    path = folder / "trends.toml"
+    path.write_text(PANEL)
+    return str(path)
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    mine = Server(ROOT, KIOSK_PANEL=panel_file(tmp_path_factory.mktemp("trends")))
+    yield mine
+    mine.end()
+
+
+def history(server: Server, **query: Any) -> dict[str, Any]:
+    answer = server.http.get(PATH, params={"span_s": 60, **query})
+    assert answer.status_code == 200, answer.text
+    found: dict[str, Any] = answer.json()
+    return found
+
+
+def columns(server: Server, pen: int = 0, **query: Any) -> list[list[float]]:
+    return [one for one in history(server, **query)["pens"][pen] if one]
+
+
+def test_the_history_of_each_pen_is_read(server: Server) -> None:
+    until(lambda: all(len(columns(server, pen)) > 5 for pen in (0, 1)), "both pens have values")
+    answer = history(server, points=100)
+    assert answer["width_s"] == 0.6
+    assert abs(answer["now"] - answer["end"]) < 1
+    numbers = [one[0] for one in answer["pens"][0] if one]
+    assert numbers == sorted(set(numbers))
+    assert (numbers[-1] + 1) * 0.6 > answer["end"] - 5
+    assert answer["pens"][0][0] is None
+
+
+def test_who_follows_gets_what_is_new(server: Server) -> None:
+    until(lambda: len(columns(server)) > 5, "there are values")
+    last = columns(server)[-1][0]
+    found = until(
+        lambda: [one for one in columns(server, since=last + 1) if one[0] > last], "there are new ones"
+    )
+    assert len(found) < 50
+
+
+def test_a_time_that_is_over_does_not_change(server: Server) -> None:
+    until(lambda: len(columns(server)) > 20, "there are values")
+    end = history(server)["end"] - 2.0
+    first = columns(server, end=end)
+    until(lambda: history(server)["end"] > end + 3.0, "time passes")
+    assert [one for one in columns(server, end=end) if one in first] == first
+    assert history(server, end=4e9)["end"] < 4e9
+
+
+@pytest.mark.parametrize(
+    ("path", "query", "status"),
+    [
+        ("/widgets/battery/trend", {"span_s": 60}, 404),
+        ("/widgets/other/trend", {"span_s": 60}, 404),
+        (PATH, {}, 422),
+        (PATH, {"span_s": 0.5}, 422),
+        (PATH, {"span_s": 86_401}, 422),
+        (PATH, {"span_s": "nan"}, 422),
+        (PATH, {"span_s": "inf"}, 422),
+        (PATH, {"span_s": 60, "points": 5}, 422),
+        (PATH, {"span_s": 60, "points": 100_000}, 422),
+        (PATH, {"span_s": 60, "since": -1}, 422),
+        (PATH, {"span_s": 60, "end": "today"}, 422),
+    ],
+)
+def test_what_is_no_question_is_refused(
+    server: Server, path: str, query: dict[str, Any], status: int
+) -> None:
+    answer = server.http.get(path, params=query)
+    assert answer.status_code == status
+    assert answer.json()["error"]
+
+
+def test_without_scripts_a_trend_is_a_picture(server: Server) -> None:
+    until(lambda: len(columns(server)) > 20, "there are values")
+    page = server.http.get("/").text
+    paths = re.findall(r'<path class="line pen-(\d)" d="(M[^"]+)"', page)
+    assert [number for number, _ in paths] == ["0", "1"]
+    assert all(path.count("L") > 10 for _, path in paths)
+    assert re.search(r'<text x="[\d.]+%" y="100%" dy="18">\d\d:\d\d:\d\d</text>', page)
+    assert re.search(r'data-text="text0">[−\d.]+ bar</b>', page)
+
+
+def kept(server: Server) -> int:
+    return len(columns(server, span_s=600, points=600))
+
+
+def test_a_killed_server_has_the_values_from_before(
+    tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    """SIGKILL while it records; the next one shows what was written, then a gap, then what is new."""
+    panel, data = panel_file(tmp_path), str(tmp_path / "data")
+    first = servers(Server(ROOT, KIOSK_PANEL=panel, KIOSK_DATA=data))
+    until(lambda: kept(first) >= 8, "some seconds are recorded", within_s=60)
+    before = columns(first, span_s=600, points=600)
+    first.end(signal.SIGKILL)
+    second = servers(Server(ROOT, KIOSK_PANEL=panel, KIOSK_DATA=data))
+    until(lambda: columns(second, span_s=600, points=600)[-1][0] > before[-1][0] + 1, "it records")
+    answer = history(second, span_s=600, points=600)["pens"][0]
+    after = {one[0]: one for one in answer if one}
+    # What is written every 5 s is there, as it was; columns begin a little elsewhere after a restart.
+    found = [one for one in before if one[0] in after]
+    assert len(found) >= 2
+    assert found[0][0] <= before[1][0]
+    assert all(len(one) == 2 or abs(after[one[0]][-1] - one[-1]) < 5 for one in found)
+    begins = [answer[i + 1][0] for i, one in enumerate(answer[:-1]) if one is None]
+    assert begins[-1] >= before[-1][0], "the time without a server is a gap"
+
+
+def test_a_full_disk_is_told_and_trends_go_on(
+    tmp_path: Path, servers: Callable[[Server], Server]
+) -> None:
+    text = Path(panel_file(tmp_path)).read_text()
+    panel = tmp_path / "quiet.toml"
+    panel.write_text(text.replace("[[page]]", "[log]\nenabled = false\n[[page]]", 1))
+    kiosk = servers(Server(ROOT, before=[*SMALL_DISK, MOUNT, "sh"], KIOSK_PANEL=str(panel)))
+    until(lambda: kept(kiosk) >= 3, "it records")
+    filler = fill(inside(kiosk))
+    note = "Not kept on disk: no space left on device"
+    until(lambda: kiosk.widget("course")["fault"] == note, "the widget says so", within_s=60)
+    assert note in kiosk.http.get("/").text
+    before = columns(kiosk)[-1][0]
+    until(lambda: columns(kiosk)[-1][0] > before, "it goes on")
+    assert kiosk.process.count("trends are not written") == 1
+    filler.unlink()
+    until(lambda: kiosk.widget("course")["fault"] == "", "it is written again", within_s=60)

@@ -1,0 +1,146 @@
+"""The attributes of a trend and its plot, without a browser."""
+
+import math
+from typing import Any, Final
+
+import pytest
+
+from app.i18n import render
+from app.panel.widgets.trend import Trend
+from app.robot.history import Column
+from app.robot.state import RobotState
+from app.trends.recorder import TrendRecorder
+from app.view.kinds import show
+from app.view.trend_plot import COLUMNS, draw, plot, time_ticks, value_ticks
+from tests.support.builders import INTERFACES, NOW, Table, panel_of, robot_there, says
+
+FLOAT: Final = "std_msgs/msg/Float64"
+PENS: Final[list[Table]] = [
+    {"topic": "/inlet", "type": FLOAT, "label": "Inlet", "unit": "bar", "low": 5.0, "high": 6.5},
+    {"topic": "/gripper", "type": FLOAT, "label": "Gripper", "format": ".1f", "scale": 10.0},
+]
+TREND: Final[Table] = {"id": "course", "kind": "trend", "label": "Course", "pen": PENS}
+
+
+def cell(**more: Any) -> tuple[Trend, RobotState]:
+    panel = panel_of({**TREND, **more})
+    robot = robot_there(panel)
+    TrendRecorder(panel, INTERFACES, robot)
+    (widget,) = panel.displays
+    assert isinstance(widget, Trend)
+    return widget, robot
+
+
+def test_the_newest_values_are_shown_and_those_beyond_a_limit_marked() -> None:
+    widget, robot = cell()
+    says(robot, "/inlet", 4.9, FLOAT)
+    says(robot, "/gripper", 0.46, FLOAT)
+    shown, until = show(widget, robot, NOW)
+    assert [render(shown[name]) for name in ("text0", "text1")] == ["4.9 bar", "4.6"]
+    assert (shown["state"], shown["state0"], shown["state1"]) == ("live", "low", "live")
+    assert until == NOW + 5.0
+    says(robot, "/inlet", 6.6, FLOAT)
+    assert show(widget, robot, NOW)[0]["state0"] == "high"
+
+
+def test_each_pen_that_is_not_live_is_named() -> None:
+    widget, robot = cell()
+    says(robot, "/inlet", 6.0, FLOAT)
+    shown, _ = show(widget, robot, NOW)
+    assert (shown["state"], shown["state0"], shown["state1"]) == ("waiting", "live", "waiting")
+    assert str(shown["note"]) == "Gripper: waiting for /gripper"
+    shown, until = show(widget, robot, NOW + 7)
+    assert str(shown["note"]) == "Inlet: 7 s old Gripper: waiting for /gripper"
+    assert (shown["state0"], until) == ("old", NOW + 8)
+
+
+def test_a_lost_bridge_makes_values_old() -> None:
+    widget, robot = cell()
+    says(robot, "/inlet", 6.0, FLOAT)
+    robot.mark_link_lost()
+    assert show(widget, robot, NOW)[0]["state0"] == "old"
+
+
+def test_a_fault_of_the_disk_is_shown_where_the_disk_is_used() -> None:
+    for disk in (True, False):
+        widget, robot = cell(disk=disk)
+        robot.history.fault = "full"
+        assert show(widget, robot, NOW)[0]["fault"] == ("full" if disk else "")
+
+
+def columns(*items: tuple[int, float, float, float] | None) -> list[Column]:
+    made, gap = [], True
+    for item in items:
+        if item is not None:
+            made.append(Column(*item, gap=gap))
+        gap = item is None
+    return made
+
+
+def test_a_line_goes_through_both_ends_of_each_column_and_over_no_gap() -> None:
+    widget, _ = cell(min=0.0, max=10.0, window="240s")
+    pen = columns((0, 1.0, 1.0, 1.0), (1, 2.0, 9.0, 3.0), None, (3, 8.0, 9.0, 8.0))
+    drawn = draw(widget, [pen, []], 0.0, 240.0)
+    assert drawn.lines[0].path == "M2.1 900h0L6.2 800L6.2 100L6.2 700M14.6 200h0L14.6 100L14.6 200"
+    assert drawn.lines[0].x == pytest.approx(1.46)
+    assert drawn.lines[0].y == 20.0
+    assert drawn.lines[1].x is None
+    assert drawn.lines[1].path == ""
+
+
+def test_the_axis_holds_all_values_and_limits() -> None:
+    widget, _ = cell()
+    drawn = draw(widget, [columns((0, 4.0, 7.0, 5.0)), []], 0.0, 600.0)
+    assert [limit.text for limit in drawn.limits] == ["H 6.5", "L 5"]
+    assert all(0 < limit.place < 100 for limit in drawn.limits)
+    assert all(0 <= tick.place <= 100 for tick in (*drawn.values, *drawn.times))
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "texts"),
+    [
+        (3.85, 7.15, ["4", "5", "6", "7"]),
+        (0.0, 1.0, ["0.00", "0.25", "0.50", "0.75", "1.00"]),
+        (-20.0, 20.0, ["−20", "−10", "0", "10", "20"]),
+        (0.0, 4e9, ["0", "1e+09", "2e+09", "3e+09", "4e+09"]),
+    ],
+)
+def test_lines_of_the_grid_are_at_round_values(low: float, high: float, texts: list[str]) -> None:
+    assert [text for _, text in value_ticks(low, high)] == texts
+
+
+@pytest.mark.parametrize("value", [0.0, 5.0, -3e-7, 1e12])
+@pytest.mark.parametrize("fixed", [{}, {"min": 4.0}, {"max": 4.0}])
+def test_a_value_that_does_not_change_is_drawn(value: float, fixed: Table) -> None:
+    widget, _ = cell(pen=[PENS[1]], **fixed)
+    drawn = draw(widget, [columns((0, value, value, value), (1, value, value, value))], 0.0, 600.0)
+    assert drawn.values
+    assert math.isfinite(drawn.lines[0].y)
+
+
+@pytest.mark.usefixtures("utc")
+@pytest.mark.parametrize(
+    ("span", "texts"),
+    [
+        (60, ["10:05:00", "10:05:15", "10:05:30", "10:05:45", "10:06:00"]),
+        (600, ["09:56", "09:58", "10:00", "10:02", "10:04", "10:06"]),
+        (86_400, ["12:00", "18:00", "00:00", "06:00"]),
+        (31 * 86_400, ["12-25", "01-01", "01-08", "01-15", "01-22"]),
+    ],
+)
+def test_lines_of_the_grid_are_at_round_times(span: int, texts: list[str]) -> None:
+    end = 1_769_162_760.0  # 2026-01-23 10:06 UTC
+    ticks = list(time_ticks(end - span, end))
+    assert [tick.text for tick in ticks] == texts
+
+
+def test_the_plot_of_a_page_has_the_window_until_now() -> None:
+    widget, robot = cell()
+    history = robot.history
+    start = history.start
+    for second in range(700):
+        history.fields["gripper", "data"].add(start + second, second / 10.0)
+    shown = plot(widget, robot, start + 700 - history.time(0.0), start + 700)
+    assert len(shown.lines[1].path.split("L")) >= COLUMNS
+    assert shown.lines[1].x == pytest.approx(100.0, abs=0.5)
+    assert shown.lines[0].path == ""
