@@ -131,6 +131,12 @@ class Panel(Description):
         yield from self.frame.widgets
 
     @cached_property
+    def widgets_by_page(self) -> dict[str, frozenset[str]]:
+        """The ids of the widgets that each page shows, those of the frame too, by the page's id."""
+        frame = {widget.id for widget in self.frame.widgets}
+        return {page.id: frozenset(frame | {w.id for w in page.widgets}) for page in self.pages}
+
+    @cached_property
     def commands(self) -> tuple[Command, ...]:
         """The widgets that can be pressed or held."""
         return tuple(w for w in self.widgets() if isinstance(w, Command))

@@ -4,11 +4,13 @@ There is no queue: a stream remembers the view that it sent last and, whenever i
 the difference to the newest. A client's role in control decides which view that is: there is one for
 each role. What is sent is encoded once for all streams of a language and a role: those that are equally
 far share the same bytes, the others those of each event that says all of something.
+
+A page gets what its own widgets show, and those of the frame; who names no page gets everything.
 """
 
 import asyncio
 import secrets
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any, Final
 
 from pydantic_core import to_json
@@ -21,6 +23,7 @@ from app.view.sections import Events, difference
 from app.view.view import View, seen_as
 
 NOTHING: Final[Mapping[str, Attributes]] = {}
+NO_PAGES: Final[Mapping[str, Collection[str]]] = {}
 # What some readers take for the end of a line, and JSON leaves as it is.
 SEPARATORS: Final = {c.encode(): b"\\u%04x" % ord(c) for c in "\x85\u2028\u2029"}
 
@@ -37,10 +40,16 @@ class ViewPublisher:
     """Where the view is posted; changed on the event loop only."""
 
     def __init__(
-        self, view: View, revision: str, without_control: Mapping[str, Attributes] = NOTHING
+        self,
+        view: View,
+        revision: str,
+        without_control: Mapping[str, Attributes] = NOTHING,
+        pages: Mapping[str, Collection[str]] = NO_PAGES,
     ) -> None:
         """`revision` is of all that a page has loaded: one that differs makes it load again.
-        `without_control` has what is different for clients without control."""
+        `without_control` has what is different for clients without control, `pages` the ids of the
+        widgets that a page shows, by the page's."""
+        self._pages = pages
         self.boot = secrets.token_hex(4)
         self.version = 1
         self.view = view
@@ -49,9 +58,9 @@ class ViewPublisher:
         self._changed = asyncio.Event()
         self._news: Events = {}  # from the view before to this one
         self._without_control = without_control
-        self._seen: dict[Role, View] = {}
-        # By the language, the version before, and the roles then and now.
-        self._prepared: dict[tuple[str, int, Role, Role], bytes] = {}
+        self._seen: dict[tuple[Role, str], View] = {}
+        # By the language, the version before, the roles then and now, and the page.
+        self._prepared: dict[tuple[str, int, Role, Role, str], bytes] = {}
         self._whole: dict[tuple[str, str, int], bytes] = {}  # by the language, the event and its data
         self._turned: dict[str, int] = {}
         self.closed = False
@@ -93,34 +102,57 @@ class ViewPublisher:
         if not self.closed and (self.version, self.heartbeat.count) == (version, beats):
             await self._changed.wait()
 
-    def seen_as(self, role: Role = "") -> View:
-        """The newest view, as clients of this role get it."""
-        if role not in self._seen:
-            self._seen[role] = seen_as(self.view, self._without_control, role)
-        return self._seen[role]
+    def seen_as(self, role: Role = "", page: str = "") -> View:
+        """The newest view, as clients of this role get it on a page; of all pages with "", and with a
+        page that the panel does not have (any more)."""
+        key = role, page
+        if key not in self._seen:
+            whole = seen_as(self.view, self._without_control, role)
+            own = self._of_page(whole["widgets"], page)
+            self._seen[key] = whole if own is whole["widgets"] else {**whole, "widgets": own}
+        return self._seen[key]
 
-    def snapshot(self, language: str = ENGLISH, role: Role = "") -> bytes:
+    def _of_page(self, widgets: dict[str, Any], page: str) -> dict[str, Any]:
+        shown = self._pages.get(page)
+        return widgets if shown is None else {k: v for k, v in widgets.items() if k in shown}
+
+    def snapshot(self, language: str = ENGLISH, role: Role = "", page: str = "") -> bytes:
         """The `snapshot` event: everything that the page shows."""
-        view = self.seen_as(role)
+        view = self.seen_as(role, page)
         about = {"id": self.id, "revision": self.revision}
         return self._all_of("snapshot", view, language, lambda: {**about, **view})
 
     def since(
-        self, version: int, view: View, language: str = ENGLISH, was: Role = "", role: Role = ""
+        self,
+        version: int,
+        view: View,
+        language: str = ENGLISH,
+        was: Role = "",
+        role: Role = "",
+        page: str = "",
     ) -> bytes:
         """The events from a view that was posted as `version`, and sent to those whose role it `was`,
-        to the newest one."""
-        prepared = self._prepared.get((language, version, was, role))
+        to the newest one; both as the page shows them."""
+        key = language, version, was, role, page if page in self._pages else ""
+        prepared = self._prepared.get(key)
         if prepared is None:
             latest = version == self.version - 1 and not (was or role)
-            news = self._news if latest else difference(view, self.seen_as(role))
-            prepared = self._prepared[language, version, was, role] = b"".join(
+            news = self._news_of(page) if latest else difference(view, self.seen_as(role, page))
+            prepared = self._prepared[key] = b"".join(
                 self._event(name, data, language)
                 if name == "update"
                 else self._all_of(name, data, language)
                 for name, data in news.items()
             )
         return prepared
+
+    def _news_of(self, page: str) -> Events:
+        """The events from the view before, as a page gets them."""
+        if "update" not in self._news or page not in self._pages:
+            return self._news
+        rest = {name: data for name, data in self._news.items() if name != "update"}
+        changed = self._of_page(dict(self._news["update"]), page)
+        return {**rest, "update": changed} if changed else rest
 
     def _all_of(
         self,

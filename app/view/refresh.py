@@ -87,7 +87,9 @@ class ViewRefresher:
         ]
         self._seen = self._sight()
         self.lamp = self._seen.robot
-        self.publisher = ViewPublisher(self._seen.view, revision, self._seen.without_control)
+        self.publisher = ViewPublisher(
+            self._seen.view, revision, self._seen.without_control, panel.widgets_by_page
+        )
         self._shown_at = 0.0
         self._spoke: set[str] = set()  # keys of topics that said something since
         self._whole = False  # whether more than values is to be shown

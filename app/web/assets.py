@@ -1,11 +1,11 @@
 """The static files, in memory and packed, under a name that changes with their content.
 
-The stylesheet is the layers of `static/css` in their order, with what the panel's kinds of widgets need
-and its millimetres: one request instead of five; what only the log's page, or a keypad that opens,
+The stylesheet is the layers of `static/css` in their order, with what families of the panel's widgets
+need and its millimetres: one request instead of five; what only the log's page, or a keypad that opens,
 needs is a file of its own.
 Scripts keep their names, so that modules find each other, and their lines. A kind of widgets may have
-`css/kinds/<kind>.css` and `js/kinds/<kind>.js`. Comments, what lines are indented by and what only sets
-styles apart stay here.
+`css/kinds/<kind>.css` and `js/kinds/<kind>.js`, which pages with the kind load. Comments, what lines
+are indented by and what only sets styles apart stay here.
 """
 
 import gzip
@@ -62,6 +62,7 @@ class Assets:
     files: dict[str, Asset]
     revision: str
     scripts: frozenset[str] = frozenset()  # the kinds of widgets that have a script of their own
+    styles: frozenset[str] = frozenset()  # and those that have a stylesheet
 
 
 def _with_styles(sheet: Asset, styles: Collection[Path]) -> Asset:
@@ -96,21 +97,22 @@ def load_assets(
     """
     needed = [name for name, of in OF_KINDS.items() if not of.isdisjoint(kinds)]
     layers = [(static / "css" / f"{name}.css").read_bytes() for name in (*LAYERS, *needed)]
-    of_kinds = [static / "css/kinds" / f"{kind}.css" for kind in sorted(kinds)]
-    layers += [file.read_bytes() for file in of_kinds if file.is_file()]
     millimetre = f":root{{--mm:{1 / mm_per_px:.4f}px}}\n".encode()
     sheet = asset(b"".join([*layers, millimetre]), ".css")
     files = {"kiosk.css": _with_styles(sheet, styles)}
-    for name in (OWN_PAGE, LATER):
-        files[f"{name}.css"] = asset((static / "css" / f"{name}.css").read_bytes(), ".css")
+    of_kinds = {f"kinds/{file.stem}": file for file in sorted((static / "css/kinds").glob("*.css"))}
+    apart = {name: static / "css" / f"{name}.css" for name in (OWN_PAGE, LATER)}
+    for name, file in (apart | of_kinds).items():
+        files[f"{name}.css"] = asset(file.read_bytes(), ".css")
     scripts = static / "js"
     for script in sorted(scripts.rglob("*.js")):
         files[script.relative_to(scripts).as_posix()] = asset(script.read_bytes(), ".js")
     files |= {f"{PICTURES}/{name}": picture(file) for name, file in pictures.items()}
     digest = hashlib.sha256()
-    for name, file in sorted(files.items()):
-        digest.update(name.encode() + b"\0" + file.content + b"\0")
+    for name, sent in sorted(files.items()):
+        digest.update(name.encode() + b"\0" + sent.content + b"\0")
     for template in (*sorted(templates.rglob("*.html")), *own_templates):
         digest.update(template.read_bytes() + b"\0")
     own_scripts = {script.stem for script in (scripts / "kinds").glob("*.js")}
-    return Assets(files, digest.hexdigest()[:12], frozenset(own_scripts))
+    own_styles = {name.removeprefix("kinds/") for name in of_kinds}
+    return Assets(files, digest.hexdigest()[:12], frozenset(own_scripts), frozenset(own_styles))

@@ -2,7 +2,7 @@
 const POLL_MS = 700;
 // A browser opens six connections to one server; pages and presses need some of them.
 const STREAMS_PER_BROWSER = 3;
-const BASE = document.body.dataset.base; // of the robot that this page shows
+const { base: BASE, page: PAGE } = document.body.dataset; // the robot and the widgets that this page shows
 
 // One of the browser's places for a stream, as a function that releases it; null if all are in use.
 // Browsers without locks (a page without HTTPS that is not on localhost) are not limited.
@@ -76,7 +76,7 @@ export class Connection {
   }
 
   #listen() {
-    this.#stream = new EventSource(`${BASE}/events`);
+    this.#stream = new EventSource(`${BASE}/events?page=${PAGE}`);
     for (const name of this.#names) {
       this.#stream.addEventListener(name, ({ data, lastEventId }) => this.#on.streamed(name, JSON.parse(data), lastEventId));
     }
@@ -93,7 +93,7 @@ export class Connection {
     const turn = this.#turn;
     try {
       const signal = AbortSignal.timeout(this.#timeoutMs);
-      const response = await fetch(`${BASE}/events?once=1`, { cache: "no-store", signal });
+      const response = await fetch(`${BASE}/events?once=1&page=${PAGE}`, { cache: "no-store", signal });
       const events = parseEvents(await response.text());
       if (turn !== this.#turn) return;
       if (events[0]?.event !== "snapshot") throw new Error("no snapshot");

@@ -74,7 +74,7 @@ def test_the_main_job(server: Server, node: RosNode, page: Page) -> None:
 
 # What some readers take for the end of a line; in a text of the robot's it is part of it.
 SEPARATED = "one \x85 two \u2028 three \u2029 four"
-SNAPSHOT = "**/events?once=1"
+SNAPSHOT = "**/events?once=1&page=*"
 NO_STREAM_LEFT = """() => {
     const forEver = () => new Promise(() => {});
     for (const place of [0, 1, 2]) navigator.locks.request(`stream-${place}`, forEver);

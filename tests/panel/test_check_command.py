@@ -27,10 +27,11 @@ def test_a_good_panel_is_summed_up(capsys: pytest.CaptureFixture[str]) -> None:
     assert main([str(SHIPPED)]) == 0
     said = capsys.readouterr()
     first, note, *fits = said.out.splitlines()
-    assert first == f'{SHIPPED}: good: "Robot cell 1", 3 page(s), 29 widget(s)'
+    assert first == f'{SHIPPED}: good: "Robot cell 1", 5 page(s), 37 widget(s)'
     assert note.startswith('  note: interlock[0] "operation", line 11: the last value on ')
     screens = "1280x800, 1024x600, 800x480, 800x1280"
-    assert [line.partition("fits ")[2] for line in fits] == [screens, screens]
+    assert [line.partition("fits ")[2] for line in fits] == ["", screens, screens, screens]
+    assert "keeps 24h" in fits[0]
     assert said.err == ""
 
 

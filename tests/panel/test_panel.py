@@ -78,7 +78,7 @@ def test_the_shipped_panel_is_good_and_a_demo() -> None:
     assert [w.id for w in panel.pages[0].widgets] == [
         "enabled", "last_heard", "message", "operation", "operation1", "operation2",
     ]  # fmt: skip
-    assert {w.kind for w in panel.widgets()} == set(KINDS) - {"image", "trend"}  # it has no picture
+    assert {w.kind for w in panel.widgets()} == set(KINDS) - {"image"}  # it has no picture
     assert [i.id for i in panel.interlocks] == ["operation"]
 
 

@@ -90,6 +90,25 @@ def test_of_a_widget_only_what_changed_is_sent(publisher: ViewPublisher, robot: 
     assert events(publisher.since(2, old)) == {"update": {"heard": {"text": "two"}}}
 
 
+def test_a_page_gets_its_own_widgets_only(robot: RobotState) -> None:
+    pages = {"one": {"guarded"}, "two": {"heard"}}
+    publisher = ViewPublisher(view_of(robot), "r1", pages=pages)
+    assert {page: set(publisher.seen_as("", page)["widgets"]) for page in pages} == pages
+    assert publisher.seen_as("", "gone") is publisher.view
+    assert set(events(publisher.snapshot(page="two"))["snapshot"]["widgets"]) == {"heard"}
+    old = {page: publisher.seen_as("", page) for page in ("one", "two", "")}
+    says(robot, "/heard", "one")
+    publisher.post(view_of(robot))
+    sent = {page: events(publisher.since(1, view, page=page)) for page, view in old.items()}
+    assert sent["one"] == {}
+    assert set(sent["two"]["update"]) == set(sent[""]["update"]) == {"heard"}
+    permits(robot)
+    publisher.post(view_of(robot))
+    late = events(publisher.since(1, old["one"], page="one"))
+    assert set(late["update"]) == {"guarded"}
+    assert late["operation-enabled-updated"]["enabled"]
+
+
 def test_a_changed_light_is_sent_with_all_lights(publisher: ViewPublisher, robot: RobotState) -> None:
     old = publisher.view
     robot.graph.update_versions({})

@@ -62,11 +62,12 @@ def test_a_kind_may_have_styles_and_a_script_of_its_name(static: Path, templates
         (static / suffix / "kinds").mkdir()
     (static / "css/kinds/dial.css").write_text(".dial {}\n")
     (static / "js/kinds/dial.js").write_text("dial();\n")
-    with_it, without = loaded(static, templates, 0.25, "dial"), loaded(static, templates, 0.25, "text")
-    assert b".dial" in with_it.files["kiosk.css"].content
-    assert b".dial" not in without.files["kiosk.css"].content
-    assert with_it.files["kinds/dial.js"].content == b"dial();\n"
-    assert with_it.scripts == {"dial"}
+    assets = loaded(static, templates, 0.25, "dial")
+    assert b".dial" not in assets.files["kiosk.css"].content
+    assert assets.files["kinds/dial.css"].content == b".dial{}"
+    assert assets.files["kinds/dial.js"].content == b"dial();\n"
+    assert assets.styles == {"dial"}
+    assert assets.scripts == {"dial"}
 
 
 def test_scripts_keep_their_names(static: Path, templates: Path) -> None:

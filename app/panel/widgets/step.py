@@ -98,10 +98,12 @@ class Step(PublishPress, SteppedWidget, EntryWidget):
         if self.confirm_press:
             what = "is not for a step: each press is one step, from the value that is shown"
             yield Fault(f"{place}.confirm_press", what)
-        if self.template == self.message:
-            yield Fault(f"{place}.message", 'has no "{value}": every press would publish the same')
         own = {**checking.inputs, self.id: self._as_number()}
-        yield from super().faults(place, replace(checking, inputs=own))
+        found = list(super().faults(place, replace(checking, inputs=own)))
+        yield from found
+        message = f"{place}.message"
+        if self.template == self.message and not any(one.place.startswith(message) for one in found):
+            yield Fault(message, 'has no "{value}": every press would publish the same')
         yield from number_field_faults(f"{place}.value", self.value, "a value", checking.interfaces)
 
     def _as_number(self) -> NumberInput:

@@ -34,9 +34,14 @@ MEDIA_TYPE: Final = "text/event-stream"
     summary="Server-sent events: snapshot, <interlock>-enabled-updated, update, link, control, beat",
 )
 async def events(
-    request: Request, state: CurrentState, session: CurrentSession, once: bool = False
+    request: Request,
+    state: CurrentState,
+    session: CurrentSession,
+    once: bool = False,
+    page: str = "",
 ) -> Response:
-    """`once`: the snapshot alone, for a browser that has no stream to spare."""
+    """`once`: the snapshot alone, for a browser that has no stream to spare. `page`: of its widgets
+    only, and those of the frame; without one, or with one that the panel does not have, of all."""
     board, rules = session.publisher, session.control.rules
     who, token = welcomed(request, state) if rules.required else (None, "")
     first = client_id_event(who.client.id) if who else b""
@@ -47,10 +52,10 @@ async def events(
     answer: Response
     language = language_of(request)
     if once:
-        all_of_it = board.snapshot(language, role_now()) + first + beat(language)
+        all_of_it = board.snapshot(language, role_now(), page) + first + beat(language)
         answer = Response(all_of_it, media_type=MEDIA_TYPE, headers=HEADERS)
     else:
-        answer = EventStream(board, first, state.metrics.streams, language, role_now)
+        answer = EventStream(board, first, state.metrics.streams, language, role_now, page)
     return keep(answer, request, token)
 
 
@@ -72,9 +77,11 @@ class EventStream(Response):
         streams: Open,
         language: str = ENGLISH,
         role: Callable[[], Role] = no_role,
+        page: str = "",
     ) -> None:
         """`first` comes with the snapshot; `streams` counts it while it is open; `role` is what its
-        client is to who has control now."""
+        client is to who has control now, `page` the page that it is for."""
+        self._page = page
         self._board = publisher
         self._first = first
         self._streams = streams
@@ -96,18 +103,19 @@ class EventStream(Response):
 
     async def _write(self, send: Send) -> None:
         board, heartbeat, language = self._board, self._board.heartbeat, self._language
+        page = self._page
         now = self._role()
-        version, view, beats = board.version, board.seen_as(now), heartbeat.count
+        version, view, beats = board.version, board.seen_as(now, page), heartbeat.count
         retry = f"retry: {RECONNECT_MS}\n\n".encode()
-        await send(_body(retry + board.snapshot(language, now) + self._first + beat(language)))
+        await send(_body(retry + board.snapshot(language, now, page) + self._first + beat(language)))
         while not board.closed:
             await board.news(version, beats)
             was, now = now, self._role()
             newer = board.version > version
-            chunk = board.since(version, view, language, was, now) if newer else b""
+            chunk = board.since(version, view, language, was, now, page) if newer else b""
             if heartbeat.count > beats:
                 chunk += heartbeat.event(language)
-            version, view, beats = board.version, board.seen_as(now), heartbeat.count
+            version, view, beats = board.version, board.seen_as(now, page), heartbeat.count
             if chunk:
                 await send(_body(chunk))
         await send({"type": "http.response.body", "body": b"", "more_body": False})

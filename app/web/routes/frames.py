@@ -13,6 +13,7 @@ A picture that can't be shown is none: the events say why, and the next one is w
 
 import asyncio
 import json
+import logging
 from contextlib import suppress
 from typing import Annotated, Any, Final
 
@@ -20,14 +21,18 @@ from fastapi import APIRouter, Query, WebSocket, WebSocketDisconnect
 from fastapi.responses import Response
 
 from app.clock import format_time
+from app.concurrency import spawn_logged
 from app.errors import NotFound, TooMany
-from app.i18n import say
+from app.i18n import render, say
 from app.panel.widgets.camera import Camera
 from app.robot.pictures import NoPicture, Picture
 from app.runtime.frames import Feed, Frame
 from app.web.app_state import CurrentSession, CurrentState
 from app.web.described import Described, errors
+from app.web.language import language_of
 from app.web.request_body import received
+
+log = logging.getLogger("kiosk.web")
 
 router = APIRouter()
 
@@ -101,11 +106,12 @@ class _FrameSocket:
         self._feed = feed
         self._camera = camera
         self._asked = asyncio.Event()
+        self._language = language_of(socket)
 
     async def run(self) -> None:
         """Until the browser closes it."""
         with self._feed.looked_at():
-            writing = asyncio.create_task(self._write())
+            writing = spawn_logged(self._write(), log, "sending pictures failed")
             try:
                 while (message := await received(self._socket))["type"] == "websocket.receive":
                     if message.get("text"):
@@ -125,7 +131,7 @@ class _FrameSocket:
             about: dict[str, Any] = {
                 "number": number,
                 "type": picture.media_type,
-                "time": format_time(shown.wall),
+                "time": render(format_time(shown.wall), self._language),
             }
             await self._socket.send_text(json.dumps(about))
             await self._socket.send_bytes(picture.data)

@@ -96,7 +96,7 @@ def _wanted(widget: LogView, level: Level, node: str, search: str) -> Wanted:
 def _said(number: int, line: Line, language: str) -> dict[str, Any]:
     return {
         "number": number,
-        "time": format_time(line.stamp),
+        "time": render(format_time(line.stamp), language),
         "level": line.level,
         "word": render(WORDS[line.level], language),
         "node": line.node,
