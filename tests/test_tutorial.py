@@ -96,6 +96,9 @@ def test_the_demo_robot_hears_the_buttons(panel: Path, servers: Callable[[Server
     answer = mine.http.post(path, content=curl[-1], headers={kind: value})
     assert answer.json()["outcome"] == "published"
     until(lambda: mine.widget("heard")["text"] == "start (/operation)", "the readout shows it")
+    until(lambda: mine.widget("air")["state"] == "live", "the gauge has the air pressure")
+    until(lambda: mine.widget("air_history")["state"] == "live", "the trend has it, too")
+    assert mine.widget("permitted")["text"] in {"Permitted", "Not permitted"}
     until(lambda: loads(mine), "the robot permits", within_s=40, every_s=0.2)
     until(lambda: mine.widget("heard")["text"] == "A-17 (/operation1)", "the readout shows it")
 

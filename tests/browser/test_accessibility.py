@@ -11,6 +11,7 @@ from playwright.sync_api import Browser, Page, expect
 from app.panel import load_panel
 from app.settings import PACKAGE
 from app.web.display_choice import CHOICES, COOKIE
+from app.web.language import COOKIE as LANGUAGE
 from tests.support.parts import ROOT, Server, until
 
 AXE: Final = (files("axe_playwright_python") / "axe.min.js").read_text(encoding="utf-8")
@@ -76,6 +77,16 @@ def test_axe_finds_nothing_on_the_shipped_panel(shipped: Server, themed: Page) -
         themed.goto(f"{shipped.url}/pages/{described.id}")
         expect(themed.locator("#state")).not_to_have_attribute("data-state", "unknown")
         assert violations(themed) == [], described.id
+
+
+def test_axe_finds_nothing_in_japanese(shipped: Server, themed: Page) -> None:
+    """The gallery, the log and each page; they say that they are Japanese."""
+    themed.context.add_cookies([{"name": LANGUAGE, "value": "ja", "url": shipped.url}])
+    pages = [f"/pages/{described.id}" for described in load_panel(PACKAGE / "panel.toml").pages]
+    for path in (*pages, "/gallery", "/log"):
+        themed.goto(shipped.url + path)
+        expect(themed.locator("html")).to_have_attribute("lang", "ja")
+        assert violations(themed) == [], path
 
 
 def test_axe_finds_nothing_on_a_page_with_a_template(plan: Server, themed: Page) -> None:

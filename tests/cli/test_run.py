@@ -34,7 +34,7 @@ def said(*words: str, status: int, env: Mapping[str, str] | None = None) -> str:
 
 def test_a_panel_file_is_all_that_it_needs(tmp_path: Path) -> None:
     panel, port = tmp_path / "cell1.toml", free_port()
-    panel.write_text(SHIPPED.read_text().replace('title = "Robot cell 1"', 'title = "My cell"'))
+    panel.write_text(SHIPPED.read_text().replace('en = "Robot cell 1"', 'en = "My cell"'))
     options = ["--port", str(port), "--data", str(tmp_path / "data"), "--name", "cell1.local"]
     env = {"KIOSK_PANEL": str(SHIPPED)}  # what is said on the command line goes before it
     process = Process([*RUN, str(panel), *options], env, cwd=ROOT)
@@ -85,7 +85,7 @@ def test_a_faulty_panel_file_is_told_with_its_places(tmp_path: Path) -> None:
     panel.write_text(SHIPPED.read_text().replace('kind = "text"', 'kind = "txt"'))
     text = said(str(panel), "--port", str(free_port()), status=1)
     assert text.splitlines()[0] == f"{panel} can't be used:"
-    assert 'page[0].group[0].widget[2].kind "message", line 50: unknown kind "txt"' in text
+    assert 'page[0].group[0].widget[2].kind "message", line 51: unknown kind "txt"' in text
     missing = said(str(tmp_path / "none.toml"), "--port", str(free_port()), status=1)
     assert missing == f"{tmp_path / 'none.toml'} can't be used:\n  No such file or directory\n"
 
