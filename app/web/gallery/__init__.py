@@ -1,0 +1,33 @@
+"""What the gallery shows: each kind of widget in each of its states, with attributes made by hand."""
+
+from typing import Final
+
+from app.web.gallery.controls import ACTIONS, JOYSTICKS, KEYS, ROLES, STEPS
+from app.web.gallery.displays import CAMERAS, LAMPS, LOGS, READOUTS
+from app.web.gallery.examples import Part
+from app.web.gallery.indicators import GAUGES, JOINT_ROWS, TABLES
+from app.web.gallery.inputs import INPUTS, PARAMETERS, STATIC
+from app.web.gallery.trends import TRENDS
+
+PARTS: Final = (
+    Part("Keys by role", 6, ROLES),
+    Part("Keys by state", 6, KEYS),
+    Part("Actions", 3, ACTIONS),
+    Part("Readouts", 6, READOUTS),
+    Part("Lamps", 6, LAMPS),
+    Part("Gauges", 6, GAUGES),
+    Part("Joints", 3, JOINT_ROWS),
+    Part("Tables", 2, TABLES),
+    Part("Inputs", 3, INPUTS),
+    Part("Parameters", 3, PARAMETERS),
+    Part("Steps", 3, STEPS),
+    Part("Joysticks", 4, JOYSTICKS),
+    Part("Cameras", 3, CAMERAS),
+    Part("Logs", 2, LOGS),
+    Part("Trends", 2, TRENDS),
+    Part("Static", 5, STATIC),
+)
+PICTURE: Final = (
+    '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 40 24"><path fill="#b9a17c" stroke="#333" '
+    'd="M2 2h36v20H2z"/></svg>'
+)

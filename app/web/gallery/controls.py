@@ -1,0 +1,119 @@
+"""Keys, holds, calls, actions, steps and joysticks in each of their states."""
+
+from typing import Final
+
+from app.web.gallery.examples import (
+    ACTION,
+    ASKED,
+    CALL,
+    CALLED,
+    DOUBTS,
+    ENABLED,
+    FREE,
+    HELD,
+    HOLD,
+    LET_GO,
+    LOCKED,
+    LOCKED_BY_TWO,
+    LONG,
+    PRESSED,
+    PUBLISH,
+    REST,
+    RUNS,
+    Example,
+    Table,
+    Texts,
+)
+
+ROLES: Final = (
+    Example("start", "publish", PUBLISH | {"label": "Start", "role": "start"}, FREE),
+    Example("stop", "publish", PUBLISH | {"label": "Stop", "role": "stop"}, FREE),
+    Example("reset", "publish", PUBLISH | {"label": "Reset", "role": "reset"}, FREE),
+    Example(
+        "toggle", "publish", PUBLISH | {"label": "Light", "role": "toggle", "icon": "lightbulb"}, FREE
+    ),
+    Example("neutral", "publish", PUBLISH, FREE),
+    Example("hold", "hold", HOLD, FREE | LET_GO, marks=ENABLED),
+)
+KEYS: Final = (
+    Example("pressed", "publish", PUBLISH, FREE, marks=PRESSED),
+    Example("answered", "publish", PUBLISH, FREE, receipt=("published", "Sent at 14:31:58")),
+    Example("refused", "publish", PUBLISH, FREE, receipt=("refused", "Refused: no ribbon")),
+    Example("locked", "publish", PUBLISH, LOCKED),
+    Example("locked by several", "publish", PUBLISH | {"interlock": ["door", "auto"]}, LOCKED_BY_TWO),
+    Example("locked, black", "publish", PUBLISH | {"label": "Stop", "role": "stop"}, LOCKED),
+    Example("called", "call", CALL, CALLED | {"busy": True, "result": "Calling /reset"}, marks=PRESSED),
+    Example("succeeded", "call", CALL, CALLED | {"outcome": "succeeded", "result": "Done 14:31:58"}),
+    Example("rejected, long", "call", CALL, CALLED | {"outcome": "rejected", "result": LONG}),
+    Example("hold asked", "hold", HOLD, FREE | LET_GO, marks=ASKED),
+    Example("held", "hold", HOLD, FREE | {"held": True, "holding": "held 0.8 s"}, marks=HELD),
+    Example("hold locked", "hold", HOLD, LOCKED | LET_GO),
+)
+ACTIONS: Final = (
+    Example("free", "action", ACTION, CALLED),
+    Example("runs", "action", ACTION, LOCKED | REST | RUNS | {"progress": 0.62}),
+    Example("runs, not known how far", "action", ACTION, LOCKED | REST | RUNS),
+    Example(
+        "canceled", "action", ACTION, CALLED | {"outcome": "canceled", "result": "Canceled 14:31:58"}
+    ),
+    Example("locked", "action", ACTION, LOCKED | REST),
+    Example("refused", "action", ACTION, CALLED, receipt=("refused", "Refused: no pallet")),
+)
+STEP: Final[Table] = PUBLISH | {
+    "label": "Belt speed",
+    "message": {"data": "{value}"},
+    "value": {"topic": "/speed", "type": "std_msgs/msg/Float32"},
+    "min": 0,
+    "max": 250,
+    "step": 10,
+    "unit": "mm/s",
+}
+STEPPED: Final[Table] = CALLED | {
+    "state": "live",
+    "text": "120",
+    "note": "",
+    "step_up": "130",
+    "step_down": "110",
+}
+STEPS: Final = (
+    Example("free", "step", STEP, STEPPED),
+    Example("at its limit", "step", STEP, STEPPED | {"text": "250", "step_up": ""}),
+    Example("locked", "step", STEP, STEPPED | LOCKED),
+    Example(
+        "sent, waiting",
+        "step",
+        STEP,
+        STEPPED | {"enabled": False, "reason": "In progress: waiting for the robot."},
+    ),
+    Example("done", "step", STEP, STEPPED | {"outcome": "confirmed", "result": "Done 14:31:58"}),
+    Example("refused", "step", STEP, STEPPED, receipt=("refused", "Refused: it is 130 by now")),
+    *(
+        Example(
+            state,
+            "step",
+            STEP,
+            STEPPED
+            | LOCKED
+            | {"state": state, "reason": note, "note": note, "step_up": "", "step_down": ""}
+            | ({} if state == "old" else {"text": "—"}),
+        )
+        for state, note in DOUBTS.items()
+    ),
+)
+JOYSTICK: Final[Table] = {
+    "label": "Drive",
+    "topic": "/cmd_vel",
+    "type": "geometry_msgs/msg/Twist",
+    "interlock": "automatic",
+}
+STICK: Final[Texts] = ENABLED | {'data-kind="joystick"': 'data-kind="joystick" data-hold="held"'}
+MOVES: Final[Texts] = {
+    'data-axis="y">': 'data-axis="y">0.25 m/s',
+    'data-axis="x">': 'data-axis="x">−0.40 rad/s',
+}
+JOYSTICKS: Final = (
+    Example("free", "joystick", JOYSTICK, FREE | LET_GO, marks=ENABLED),
+    Example("held", "joystick", JOYSTICK, FREE | {"held": True, "holding": ""}, marks=STICK | MOVES),
+    Example("square", "joystick", JOYSTICK | {"shape": "square"}, FREE | LET_GO, marks=ENABLED),
+    Example("locked", "joystick", JOYSTICK, LOCKED | LET_GO),
+)
