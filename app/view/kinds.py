@@ -33,6 +33,13 @@ from app.view.step_values import step
 from app.view.table_values import table
 from app.view.trend_values import trend
 
+# What an operator reads of a goal's state, named as in action_msgs/msg/GoalStatus.
+UNDER_WAY: Final[Mapping[str, str]] = {
+    "ACCEPTED": "goal_state_accepted",
+    "EXECUTING": "goal_state_executing",
+    "CANCELING": "goal_state_canceling",
+}
+
 # The attributes of a widget, and when (monotonic seconds) time alone would change them.
 Attributes = dict[str, Any]
 Shown = tuple[Attributes, float]
@@ -68,7 +75,7 @@ def all_reasons(reasons: Sequence[TextLike]) -> dict[str, TextLike]:
 def progress(of: CommandStatus) -> Attributes:
     """Attributes of a call or an action: `progress` from 0 to 1, None where it is not known; `goal`
     is the state of an action's goal as ROS names it, `press` the id of the press that a cancel is for,
-    both "" where there is none."""
+    both "" where there is none. `doing` says how far a goal is that is under way."""
     return {
         "busy": of.busy,
         "outcome": of.outcome,
@@ -76,8 +83,18 @@ def progress(of: CommandStatus) -> Attributes:
         "progress": of.fraction,
         "stoppable": of.can_cancel,
         "goal": of.goal,
+        "doing": _doing(of),
         "press": of.press,
     }
+
+
+def _doing(of: CommandStatus) -> TextLike:
+    if not of.busy or of.goal not in UNDER_WAY:
+        return ""
+    state = say(UNDER_WAY[of.goal])
+    if of.fraction is None:
+        return state
+    return say("goal_state_percent", state=state, percent=int(100 * of.fraction))
 
 
 def _pressed(widget: PressCommand, robot: RobotState, verdict: Verdict, _: float) -> Shown:

@@ -79,10 +79,17 @@ REST: Final[Table] = {
     "progress": None,
     "stoppable": False,
     "goal": "",
+    "doing": "",
     "press": "",
 }
 CALLED: Final[Table] = FREE | REST
-RUNS: Final[Table] = {"busy": True, "goal": "EXECUTING", "stoppable": True, "result": "Conveyor C3"}
+RUNS: Final[Table] = {
+    "busy": True,
+    "goal": "EXECUTING",
+    "doing": "Running, 60 %",
+    "stoppable": True,
+    "result": "Conveyor C3",
+}
 LONG: Final = "Rejected by the robot at 14:31:58: the gripper still holds a box of the last layer"
 PRESSED: Final[Texts] = {'type="submit"': 'type="submit" aria-busy="true"'}
 ENABLED: Final[Texts] = {" disabled>": ">"}
