@@ -86,7 +86,7 @@ def test_a_panel_with_a_fault_is_a_page_that_says_where_until_it_is_mended(
     page.goto(checkout.server.url)
     expect(page.get_by_role("button", name="Publish1")).to_be_visible()
     checkout.edit("app/panel.toml", 'kind = "readout"', 'kind = "readuot" # <b>')
-    fault = 'page[0].group[0].widget[1].kind "last_heard", line 42: unknown kind "readuot"'
+    fault = 'page[0].group[0].widget[1].kind "last_heard", line 43: unknown kind "readuot"'
     expect(page.locator("li").first).to_contain_text(fault, timeout=STARTED_MS)
     expect(page.locator("h1")).to_contain_text("app/panel.toml can't be used:")
     answer = checkout.server.http.get("/pages/operation")

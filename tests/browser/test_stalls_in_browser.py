@@ -112,7 +112,7 @@ class Line:
     def _carry(self, browser: socket.socket, server: socket.socket) -> None:
         try:
             while data := browser.recv(65_536):
-                self.opened += data.startswith(b"GET /events ")
+                self.opened += data.startswith(b"GET /events?page=")
                 server.sendall(data)
         except OSError:
             pass

@@ -11,6 +11,7 @@ from pydantic import ValidationError
 from app.commands.actions.client import CANCEL
 from app.commands.actions.goals import STATUS
 from app.errors import PanelError
+from app.i18n import render
 from app.interfaces import DISTROS
 from app.panel import Panel, Publish, Readout, TextInput, check_panel, load_panel
 from app.panel.checks.types import ROSOUT
@@ -632,7 +633,7 @@ def test_an_unknown_field_is_no_fault_of_the_input_in_it(load: Load) -> None:
 def test_a_mark_of_the_byte_order_is_no_fault(tmp_path: Path) -> None:
     path = tmp_path / "cell.toml"
     path.write_text((PACKAGE / "panel.toml").read_text(), encoding="utf-8-sig")
-    assert load_panel(path).title == "Robot cell 1"
+    assert render(load_panel(path).title) == "Robot cell 1"
 
 
 @pytest.mark.parametrize(("name", "reason"), [("none.toml", "No such file"), (".", "Is a directory")])

@@ -41,10 +41,17 @@ def test_the_language_is_the_best_that_has_a_catalogue(
     assert negotiated(chosen, accepted, AVAILABLE) == language
 
 
+def translated_panel(folder: Path) -> Path:
+    """The shipped panel, for readers of English and of the other language."""
+    panel = folder / "panel.toml"
+    text = (ROOT / "app/panel.toml").read_text()
+    panel.write_text(f'languages = ["en", "{LANGUAGE}"]\n{text}')
+    return panel
+
+
 @pytest.fixture(scope="module")
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    panel = tmp_path_factory.mktemp("panel") / "panel.toml"
-    panel.write_text((ROOT / "app/panel.toml").read_text())
+    panel = translated_panel(tmp_path_factory.mktemp("panel"))
     mine = Server(ROOT, app="tests.support.apps.translated:app", KIOSK_PANEL=str(panel))
     until(mine.ready, "ready")
     yield mine
@@ -103,7 +110,9 @@ def test_a_message_that_is_no_sentence_of_the_catalogue_stays(server: Server) ->
 
 
 def test_an_unlocked_page_of_a_robot_that_is_away_says_so_in_each_language(tmp_path: Path) -> None:
-    mine = Server(ROOT, app="tests.support.apps.translated:app", KIOSK_MODE="live")
+    panel = str(translated_panel(tmp_path))
+    app = "tests.support.apps.translated:app"
+    mine = Server(ROOT, app=app, KIOSK_MODE="live", KIOSK_PANEL=panel)
     try:
         answer = mine.http.get("/readyz", headers=PSEUDO)
         assert answer.status_code == 503
