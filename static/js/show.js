@@ -110,7 +110,7 @@ function showInPlace(root, name, value) {
 
 // Without a connection no permission is known and each value is old. Its note keeps the time of the value.
 export function lockWidget(root, lost, unknown) {
-  if (root.querySelector(".cancel:enabled")) setText(root.querySelector('[data-text="goal"]'), unknown);
+  if (root.querySelector(".cancel:enabled")) setText(root.querySelector('[data-text="doing"]'), unknown);
   const buttons = root.querySelectorAll("button[type=submit], .hold");
   for (const button of buttons) button.disabled = true;
   root.querySelector("dialog.ask")?.close();

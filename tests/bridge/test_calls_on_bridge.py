@@ -513,15 +513,15 @@ def test_a_goal_of_more_than_five_seconds_survives_a_reload(
     expect(count.locator(".result")).to_contain_text("In progress")
     page.reload()
     expect(count.locator(".result")).to_contain_text("so far [0, 1")
-    expect(count.locator(".goal")).to_have_text("EXECUTING")
+    expect(count.locator(".goal")).to_have_text("Running")
     other = page.context.new_page()
     other.goto(kiosk.url)
     seen_elsewhere = other.locator('[data-widget="count"]')
-    expect(seen_elsewhere.locator(".goal")).to_have_text("EXECUTING")
+    expect(seen_elsewhere.locator(".goal")).to_have_text("Running")
     expect(count.get_by_role("button", name="Cancel")).to_be_enabled()
     expect(count.locator(".result")).to_contain_text("Succeeded", timeout=20_000)
-    expect(count.locator(".goal")).to_have_text("SUCCEEDED")
-    expect(seen_elsewhere.locator(".goal")).to_have_text("SUCCEEDED")
+    expect(count.locator(".goal")).to_be_empty()
+    expect(seen_elsewhere.locator(".goal")).to_be_empty()
     expect(count.get_by_role("button", name="Cancel")).to_be_disabled()
     expect(count.get_by_role("button", name="Count", exact=True)).to_be_enabled()
 
@@ -533,11 +533,11 @@ def test_a_goals_state_is_not_known_while_the_server_is_lost(
     page.goto(kiosk.url)
     count = page.locator('[data-widget="count"]')
     count.get_by_role("button", name="Count", exact=True).click()
-    expect(count.locator(".goal")).to_have_text("EXECUTING")
+    expect(count.locator(".goal")).to_have_text("Running")
     kiosk.process.send(signal.SIGSTOP)
     expect(count.locator(".goal")).to_have_text("unknown")
     kiosk.process.send(signal.SIGCONT)
-    expect(count.locator(".goal")).to_have_text("EXECUTING")
+    expect(count.locator(".goal")).to_have_text("Running")
     expect(count.get_by_role("button", name="Cancel")).to_be_enabled()
 
 
@@ -569,12 +569,12 @@ def test_a_cancel_that_the_robot_refuses_is_told(
     count.get_by_role("button", name="Count", exact=True).click()
     count.get_by_role("button", name="Cancel").click()
     expect(count.locator(".receipt")).to_contain_text("The robot refused to cancel")
-    expect(count.locator(".goal")).to_have_text("EXECUTING")
+    expect(count.locator(".goal")).to_have_text("Running")
     refused = cancel(kiosk)
     assert (refused.status_code, refused.json()["outcome"]) == (200, "rejected")
     assert kiosk.widget("count")["goal"] == "EXECUTING"
     robot.fibonacci(step_s=0.01, refuse_cancels="")
-    expect(count.locator(".goal")).to_have_text("SUCCEEDED")
+    expect(count.locator(".goal")).to_be_empty()
 
 
 def test_calls_and_cancels_work_without_scripts(kiosk: Server, robot: CycloneRobot) -> None:
