@@ -92,7 +92,7 @@ def take_for_readme(browser: Browser, url: str) -> None:
     key("Work light on").click()
     expect(page.locator("[data-widget=light_on]")).to_contain_text("the light is on")
     key("Pallet out").click()
-    expect(page.locator("[data-widget=pallet]")).to_contain_text("EXECUTING")
+    expect(page.locator("[data-widget=pallet]")).to_contain_text("Running")
     time.sleep(SETTLED_S)
     page.screenshot(path=IMAGES / "production.png")
     expect(key("Start")).to_be_disabled(timeout=CYCLE_MS)
