@@ -1,11 +1,10 @@
 """Pictures of `sensor_msgs` messages as files that a browser shows: pure.
 
-A compressed one passes through untouched, and its first bytes say what it is. A raw one becomes a
-bitmap (BMP): a browser shows it, and making one copies bytes and no more. PNG takes the tenfold time
-to pack them.
+A compressed one passes through untouched, and its first bytes say what it is. A raw one becomes a JPEG
+file: 640 x 480 pixels have 900 kB as they are, and 165 kB in 4 ms.
 """
 
-import struct
+import io
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
@@ -14,6 +13,7 @@ from app.i18n import TextLike, say
 from app.interfaces import Interfaces
 
 LARGEST: Final = 16_384  # pixels of a side
+QUALITY: Final = 85
 RAW: Final = "sensor_msgs/msg/Image"
 
 
@@ -32,26 +32,25 @@ class NoPicture(Exception):
 
 
 class Layout(NamedTuple):
-    """Of a raw encoding: bytes of a pixel, and whether red and blue change places in a bitmap."""
+    """Of a raw encoding: bytes of a pixel, and Pillow's name of their order. An alpha channel is left
+    out: nothing lies behind a camera's picture."""
 
-    bytes: int
-    swapped: bool
+    size: int
+    order: str
 
 
 # A mosaic of colours is shown as what it is: grey, each pixel behind its own filter.
 ENCODINGS: Final = {
-    "bgr8": Layout(3, False),
-    "rgb8": Layout(3, True),
-    "bgra8": Layout(4, False),
-    "rgba8": Layout(4, True),
-    "8UC3": Layout(3, False),
-    "8UC4": Layout(4, False),
+    "rgb8": Layout(3, "RGB"),
+    "bgr8": Layout(3, "BGR"),
+    "rgba8": Layout(4, "RGBX"),
+    "bgra8": Layout(4, "BGRX"),
+    "8UC3": Layout(3, "BGR"),
+    "8UC4": Layout(4, "BGRX"),
     **dict.fromkeys(
-        ("mono8", "8UC1", "bayer_rggb8", "bayer_bggr8", "bayer_gbrg8", "bayer_grbg8"),
-        Layout(1, False),
+        ("mono8", "8UC1", "bayer_rggb8", "bayer_bggr8", "bayer_gbrg8", "bayer_grbg8"), Layout(1, "L")
     ),
 }
-GREYS: Final = b"".join(bytes((grey, grey, grey, 0)) for grey in range(256))
 
 
 def picture(interfaces: Interfaces, type_name: str, payload: bytes) -> Picture:
@@ -75,43 +74,26 @@ def compressed(data: bytes) -> Picture:
 
 
 def raw(message: Any) -> Picture:
-    """A raw picture as a bitmap."""
+    """A raw picture as a JPEG file."""
     width, height, step = message.width, message.height, message.step
     layout = ENCODINGS.get(message.encoding)
     if layout is None:
         raise NoPicture(say("camera_encoding", encoding=str(message.encoding)[:40]))
-    row = width * layout.bytes
-    if not (0 < width <= LARGEST and 0 < height <= LARGEST and row <= step):
+    row = width * layout.size
+    fits = 0 < width <= LARGEST and 0 < height <= LARGEST and row <= step
+    if not fits or len(message.data) < step * (height - 1) + row:
         raise NoPicture(say("camera_broken", wanted=RAW))
-    if len(message.data) < step * (height - 1) + row:
-        raise NoPicture(say("camera_broken", wanted=RAW))
-    return Picture("image/bmp", _bitmap(bytes(message.data), width, height, step, layout))
+    return Picture("image/jpeg", _packed(bytes(message.data), width, height, step, layout.order))
 
 
-def _bitmap(data: bytes, width: int, height: int, step: int, layout: Layout) -> bytes:
-    """Rows from the top, each filled up to four bytes."""
-    row = width * layout.bytes
-    padding = bytes(-row % 4)
-    if step == row and not padding:
-        pixels = bytearray(data[: row * height])
-    else:
-        rows = (data[y * step : y * step + row] + padding for y in range(height))
-        pixels = bytearray(b"".join(rows))
-    if layout.swapped:
-        _swap(pixels, row + len(padding), len(padding), layout.bytes)
-    palette = GREYS if layout.bytes == 1 else b""
-    at = 54 + len(palette)
-    bits = 8 * layout.bytes
-    about = struct.pack("<IiiHHIIiiII", 40, width, -height, 1, bits, 0, 0, 2835, 2835, 0, 0)
-    return struct.pack("<2sIHHI", b"BM", at + len(pixels), 0, 0, at) + about + palette + pixels
+def _packed(data: bytes, width: int, height: int, step: int, order: str) -> bytes:
+    """Rows of `step` bytes, the last of which may be shorter."""
+    from PIL import Image  # takes 60 ms to load, and few panels show raw pictures
 
-
-def _swap(pixels: bytearray, row: int, padding: int, size: int) -> None:
-    """Red and blue change places; the padding keeps pixels of one row from those of the next."""
-    if not padding:
-        pixels[0::size], pixels[2::size] = pixels[2::size], pixels[0::size]
-        return
-    for at in range(0, len(pixels), row):
-        end = at + row - padding
-        first, third = pixels[at:end:size], pixels[at + 2 : end : size]
-        pixels[at:end:size], pixels[at + 2 : end : size] = third, first
+    whole = data.ljust(step * height, b"\0")
+    mode = "L" if order == "L" else "RGB"
+    file = io.BytesIO()
+    Image.frombuffer(mode, (width, height), whole, "raw", order, step, 1).save(
+        file, "JPEG", quality=QUALITY
+    )
+    return file.getvalue()
