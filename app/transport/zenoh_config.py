@@ -2,13 +2,14 @@
 
 import json
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
 
 import zenoh
 
-from app.errors import SettingsError
+from app.errors import LinkError, SettingsError
 
 Config = zenoh.Config
 
@@ -72,3 +73,20 @@ def _fit(config: zenoh.Config) -> zenoh.Config:
 def said(error: zenoh.ZError) -> str:
     """What Zenoh says of an error, without where in its source that was."""
     return IN_ITS_SOURCE.sub("", str(error))
+
+
+def endpoints_of(config: zenoh.Config) -> tuple[str, ...]:
+    """Where a session connects; empty where it only looks around."""
+    found = json.loads(config.get_json("connect/endpoints"))
+    if isinstance(found, dict):  # for each mode
+        found = found.get(json.loads(config.get_json("mode")) or "peer", [])
+    return tuple(map(str, found))
+
+
+@contextmanager
+def translated(doing: str) -> Iterator[None]:
+    """Zenoh's errors within the block leave it as LinkError."""
+    try:
+        yield
+    except zenoh.ZError as error:
+        raise LinkError(f"{doing}: {said(error)}") from error

@@ -3,14 +3,11 @@ inbox. Its errors leave here as LinkError."""
 
 import asyncio
 import atexit
-import ctypes
-import json
 import os
-import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from typing import Any, Final
 
 import zenoh
@@ -21,7 +18,8 @@ from app.dialect.latched import caches, newest
 from app.errors import LinkError
 from app.transport.declarations import NOTHING, Declarations
 from app.transport.inbox import Changes, Inbox
-from app.transport.zenoh_config import said
+from app.transport.native_threads import attach
+from app.transport.zenoh_config import endpoints_of, translated
 
 ASK_TIMEOUT_S = 2.0
 CACHE_TIMEOUT_S = 10.0
@@ -30,14 +28,6 @@ COPIED_MOST = 16_384  # bytes of a sample
 # waits for the network wakes another one for each message: where one does both, it costs half.
 RUNTIME: Final = "(rx: (handover: net))"
 os.environ.setdefault("ZENOH_RUNTIME", RUNTIME)
-
-
-@contextmanager
-def _translated(doing: str) -> Iterator[None]:
-    try:
-        yield
-    except zenoh.ZError as error:
-        raise LinkError(f"{doing}: {said(error)}") from error
 
 
 def _own(payload: zenoh.ZBytes) -> bytes | zenoh.ZBytes:
@@ -64,13 +54,10 @@ class ZenohSession:
     @property
     def endpoints(self) -> tuple[str, ...]:
         """Where it connects, as its configuration says; empty where it only looks around."""
-        found = json.loads(self._config.get_json("connect/endpoints"))
-        if isinstance(found, dict):  # for each mode
-            found = found.get(json.loads(self._config.get_json("mode")) or "peer", [])
-        return tuple(map(str, found))
+        return endpoints_of(self._config)
 
     def _open(self) -> None:
-        with _translated("the Zenoh session can't be opened"):
+        with translated("the Zenoh session can't be opened"):
             self._session = zenoh.open(self._config)
         self.zid = str(self._session.zid())
         atexit.register(self._leave)
@@ -99,7 +86,7 @@ class ZenohSession:
         self._held = {}
 
     def _declare(self) -> None:
-        with _translated("the Zenoh session can't be used"):
+        with translated("the Zenoh session can't be used"):
             self._listeners = (
                 self._session.info.declare_transport_events_listener(
                     self._direct(self._on_transport), history=True
@@ -145,14 +132,14 @@ class ZenohSession:
         self._looked[key] = expression, take
         if self._held is None:
             return  # the new session subscribes
-        with _translated(f"can't subscribe to {key}"):
+        with translated(f"can't subscribe to {key}"):
             self._looking[key] = self._look(expression, take)
 
     def look_away(self, key: str) -> None:
         """Ends what `look` began."""
         self._looked.pop(key, None)
         if (declared := self._looking.pop(key, None)) is not None:
-            with _translated(f"can't unsubscribe from {key}"):
+            with translated(f"can't unsubscribe from {key}"):
                 declared.undeclare()
 
     def _look(self, expression: str, take: Callable[[Any], None]) -> "zenoh.Subscriber[None]":
@@ -193,7 +180,7 @@ class ZenohSession:
         wanted, held = set(tokens), self._held
         if held is None:
             return  # the new session is not joined yet
-        with _translated("can't join the ROS graph"):
+        with translated("can't join the ROS graph"):
             for token in held.keys() - wanted:
                 held.pop(token).undeclare()
             for token in wanted - held.keys():
@@ -201,7 +188,7 @@ class ZenohSession:
 
     def put(self, key: str, payload: bytes) -> None:
         """Sends at once or not at all: nothing is kept for later. LinkError if Zenoh refuses."""
-        with _translated(f"can't send on {key}"):
+        with translated(f"can't send on {key}"):
             self._publishers[key].put(payload, attachment=self._attachment(self._declared.publish[key]))
 
     def _attachment(self, expression: str) -> bytes | None:
@@ -211,7 +198,7 @@ class ZenohSession:
 
     def has_reader(self, key: str) -> bool:
         """Whether someone is known to listen; not whether they act on it."""
-        with _translated(f"can't ask who listens on {key}"):
+        with translated(f"can't ask who listens on {key}"):
             status: Any = self._publishers[key].matching_status  # an object, whatever the stub says
             return bool(status.matching)
 
@@ -233,7 +220,7 @@ class ZenohSession:
                 hand_over(reply.ok.payload.to_bytes())
 
         expression = self._declared.query[key]
-        with _translated(f"can't ask {key}"):
+        with translated(f"can't ask {key}"):
             self._session.get(
                 expression,
                 Callback(on_reply, lambda: hand_over(None), indirect=False),
@@ -262,7 +249,7 @@ class ZenohSession:
             with suppress(RuntimeError):  # the loop is closed
                 loop.call_soon_threadsafe(finish)
 
-        with _translated(f"can't ask {selector}"):
+        with translated(f"can't ask {selector}"):
             self._session.get(selector, Callback(on_reply, on_end, indirect=False), timeout=timeout_s)
         with suppress(TimeoutError):
             await asyncio.wait_for(done, timeout_s + 1)
@@ -291,7 +278,7 @@ class ZenohSession:
     def close(self) -> None:
         """Takes everything down; blocks for up to some tenths of a second."""
         atexit.unregister(self._leave)
-        with _translated("the Zenoh session did not close cleanly"):
+        with translated("the Zenoh session did not close cleanly"):
             self._session.close()
 
     def _leave(self) -> None:
@@ -310,15 +297,3 @@ class ZenohSession:
 
     def _on_transport(self, event: zenoh.TransportEvent) -> None:
         self._inbox.transport(str(event.transport.zid), event.kind == zenoh.SampleKind.PUT)
-
-
-_KNOWN: Final[set[int]] = set()
-
-
-def attach() -> None:
-    """Called at every call from such a thread; does its work at the first one."""
-    me = threading.get_ident()
-    if me not in _KNOWN:
-        _KNOWN.add(me)
-        if all(thread.ident != me for thread in threading.enumerate()):  # those have theirs
-            ctypes.pythonapi.PyGILState_Ensure()

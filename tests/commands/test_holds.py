@@ -22,7 +22,7 @@ from app.errors import LinkError, NotFound
 from app.i18n import ENGLISH, sentences
 from app.panel.model import Panel
 from app.view.view import build_view
-from app.web.routes.hold_socket import WHYS
+from app.web.hold_protocol import WHYS
 from tests.support.builders import (
     BOOL,
     BRIDGE,

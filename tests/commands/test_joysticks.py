@@ -12,7 +12,7 @@ from app.commands.holds.deflection import moved, ramped, shaped
 from app.commands.holds.lease import LEASE_S
 from app.commands.holds.receipts import RELEASED, ActiveHold
 from app.panel.widgets.joystick import Joystick
-from app.web.routes.hold_socket import WHYS
+from app.web.hold_protocol import WHYS
 from tests.commands.test_holds import POINT, STOPS, Bench
 from tests.support.builders import BRIDGE, TEXT, endpoint, permits
 

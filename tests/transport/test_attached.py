@@ -9,9 +9,9 @@ import pytest
 import zenoh
 from zenoh.handlers import Callback
 
-from app.transport import zenoh_session
+from app.transport import native_threads
+from app.transport.native_threads import attach
 from app.transport.zenoh_config import config_to
-from app.transport.zenoh_session import attach
 from tests.support.parts import ROOT, until
 
 LEAVING = """
@@ -49,8 +49,8 @@ def test_a_thread_of_pythons_own_is_left_alone(monkeypatch: pytest.MonkeyPatch) 
     """It ends with its state, and would leave it behind."""
     calls: list[int] = []
     api = SimpleNamespace(PyGILState_Ensure=lambda: calls.append(threading.get_ident()))
-    monkeypatch.setattr(zenoh_session, "ctypes", SimpleNamespace(pythonapi=api))
-    monkeypatch.setattr(zenoh_session, "_KNOWN", set())
+    monkeypatch.setattr(native_threads, "ctypes", SimpleNamespace(pythonapi=api))
+    monkeypatch.setattr(native_threads, "_KNOWN", set())
     thread = threading.Thread(target=attach)
     thread.start()
     thread.join(5)

@@ -1,23 +1,5 @@
 """A hold: one WebSocket from the press to its end, because its closing is seen at once.
-
-The server speaks first. Every message of the server's has `stamp`, its own time in ms since the socket
-opened; every message of the browser's has the last `stamp` that it got, and `after`, for how many ms it
-had it: so each one's age is known. Without an answer no browser shows that something is held.
-
-    server   {"stamp": 0.2}
-    browser  {"do": "begin", "inputs": {…}, "seen": "<boot>-<version>", "stamp": 0.2, "after": 0.9}
-    server   {"stamp": 2.1, "state": "held", "lease": "…", "reason": "Held since 10:00:00."}
-    browser  {"do": "beat", "number": 1, "lease": "…", "stamp": 2.1, "after": 80}
-    server   {"stamp": 83.0, "state": "held"}
-    browser  {"do": "end", "why": "released", "lease": "…", "stamp": 83.0, "after": 12}
-    server   {"stamp": 96.4, "state": "ended", "outcome": "published", "code": "hold_released", …}
-
-A joystick's beats have its deflection, `x` to the right and `y` to the front, each from -1 to 1; the
-answer has `moves`, what was sent of it. One out of these limits is no message, and ends the hold.
-
-An end without a lease is that of a browser which has no answer to its begin yet; it may come instead of
-a begin, too, and is answered as any other.
-"""
+`app/web/hold_protocol.py` has what is said on it."""
 
 import asyncio
 import json
@@ -26,17 +8,15 @@ import time
 from collections.abc import Mapping
 from contextlib import suppress
 from functools import partial
-from typing import Annotated, Any, Final, Literal
+from typing import Any, Final
 
 from fastapi import APIRouter, WebSocket, WebSocketDisconnect
-from pydantic import BaseModel, ConfigDict, Field, JsonValue, TypeAdapter, ValidationError
-from starlette.types import Message
+from starlette.types import Message as Received
 
 from app.audit.press_record import PendingEntry
-from app.commands.holds.deflection import Deflection
 from app.commands.holds.lease import sent_at
-from app.commands.holds.receipts import RELEASED, ActiveHold
-from app.commands.press_context import EVENT_ID, PressContext
+from app.commands.holds.receipts import ActiveHold
+from app.commands.press_context import PressContext
 from app.commands.receipts import Receipt, with_log_fault
 from app.errors import InputError, LogError
 from app.i18n import localized, say
@@ -45,8 +25,9 @@ from app.panel.widgets.joystick import Joystick
 from app.runtime.robot_session import RobotSession
 from app.web.app_state import AppState, CurrentSession, CurrentState
 from app.web.client_cookie import visitor
+from app.web.hold_protocol import WHYS, Beat, Begin, End, Message, Said, read_message
 from app.web.language import language_of
-from app.web.request_body import json_of, received
+from app.web.request_body import received
 
 router = APIRouter()
 
@@ -60,62 +41,6 @@ CLOSE: Final[Mapping[str, int]] = {
     "link": 4503,
     "log": 4503,
 }
-
-# What a browser may say of why it ends a hold → the code of the sentence.
-WHYS: Final[Mapping[str, str]] = {
-    "released": RELEASED,
-    "cancel": "hold_by_cancel",
-    "sliding": "hold_by_sliding",
-    "second": "hold_by_second",
-    "menu": "hold_by_menu",
-    "blur": "hold_by_blur",
-    "hiding": "hold_by_hiding",
-    "leaving": "hold_by_leaving",
-    "lock": "hold_by_lock",
-    "escape": "hold_by_escape",
-    "silence": "hold_by_silence",
-}
-Deflected = Annotated[float, Field(ge=-1, le=1, allow_inf_nan=False)]
-Milliseconds = Annotated[float, Field(ge=0, le=1e12, allow_inf_nan=False)]
-
-
-class Said(BaseModel):
-    """What every message of a browser has."""
-
-    model_config = ConfigDict(extra="forbid")
-
-    stamp: Milliseconds
-    after: Milliseconds
-
-
-class Begin(Said):
-    do: Literal["begin"]
-    inputs: dict[str, JsonValue]
-    seen: Annotated[str, Field(pattern=EVENT_ID)]
-
-
-class Beat(Said):
-    do: Literal["beat"]
-    lease: str
-    number: Annotated[int, Field(ge=1)]
-    x: Deflected | None = None
-    y: Deflected | None = None
-
-    @property
-    def deflection(self) -> Deflection | None:
-        """A joystick's, where both axes are given."""
-        return None if self.x is None or self.y is None else (self.x, self.y)
-
-
-class End(Said):
-    do: Literal["end"]
-    lease: str = ""
-    why: str
-
-
-_message: TypeAdapter[Begin | Beat | End] = TypeAdapter(
-    Annotated[Begin | Beat | End, Field(discriminator="do")]
-)
 
 
 @router.websocket("/widgets/{widget}/hold")
@@ -145,7 +70,7 @@ class _HoldSocket:
         self._room = session.press_log.has_room(self._context.origin)
         self._pending: PendingEntry | None = None
         self._receipt: Receipt | None = None  # of its end, when all of it is known
-        self._next: asyncio.Future[Message] | None = None  # what the browser says next
+        self._next: asyncio.Future[Received] | None = None  # what the browser says next
 
     async def run(self, widget: str) -> Receipt:
         """From the first message to the end; the receipt of the hold, of a refusal too."""
@@ -241,7 +166,7 @@ class _HoldSocket:
                     await self._say(state="ended", **self._receipt.as_json())
         await self._close(1000)
 
-    def _hear(self, said: Begin | Beat | End | None, holding: ActiveHold) -> bool:
+    def _hear(self, said: Message | None, holding: ActiveHold) -> bool:
         """Whether the hold goes on after what was said."""
         holds = self._session.holds
         if isinstance(said, End) and said.lease in ("", holding.lease.id):
@@ -252,10 +177,10 @@ class _HoldSocket:
             return False
         return holds.beat(holding, said.number, self._sent(said), said.deflection)
 
-    async def _received(self) -> Message:
+    async def _received(self) -> Received:
         return await received(self._socket)
 
-    async def _read(self) -> Begin | Beat | End | None:
+    async def _read(self) -> Message | None:
         waiting, self._next = self._next or asyncio.ensure_future(self._received()), None
         try:
             message = await waiting
@@ -263,7 +188,7 @@ class _HoldSocket:
             waiting.cancel()
         if message["type"] == "websocket.disconnect":
             raise WebSocketDisconnect(message.get("code", 1000))
-        return _read(message.get("text") or "")
+        return read_message(message.get("text") or "")
 
     def _sent(self, said: Said) -> float:
         return sent_at(self._opened_at, said.stamp, said.after, time.monotonic())
@@ -291,11 +216,3 @@ def _moves(holding: ActiveHold) -> dict[str, Any]:
     """What was sent of a joystick's deflection, as texts."""
     widget = holding.widget
     return {"moves": widget.texts_at(*holding.moved)} if isinstance(widget, Joystick) else {}
-
-
-def _read(text: str) -> Begin | Beat | End | None:
-    """A message of a browser's; None for what is none."""
-    try:
-        return _message.validate_python(json_of(text))
-    except (InputError, ValidationError):
-        return None
