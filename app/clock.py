@@ -25,6 +25,12 @@ def format_age(seconds: float) -> Text:
     return say("age_hours", number=int(seconds // 3600))
 
 
+def age_changes_at(at: float, now: float) -> float:
+    """When the text of the age of what happened at `at` changes next; all in monotonic seconds."""
+    step = 1 if now - at < 60 else 60
+    return at + ((now - at) // step + 1) * step
+
+
 def format_datetime(wall: float) -> Text:
     """Date and time of `wall` (seconds since the epoch) in the server's time zone."""
     return date_and_time(time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(wall)))

@@ -97,7 +97,7 @@ def main() -> None:
 
 @contextmanager
 def after_the_server() -> Iterator[None]:
-    """What is started within the block gets the processor after the server, as the server's unit has it:
+    """What is started within the block gets the processor after the server, as its unit says:
     nodes and browsers that draw without a graphics card take all of two cores."""
     before = os.getpriority(os.PRIO_PROCESS, 0)
     os.setpriority(os.PRIO_PROCESS, 0, before + LOWER)

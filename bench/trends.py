@@ -2,7 +2,7 @@
 
 `python -m bench.trends` writes `bench/trends.md`. The day is fed to the history directly. The server is
 real, behind the real bridge; an rclpy node publishes, a browser's requests are made, and a hold is held
-meanwhile. With QUICK=1 it shows that it works; its figures then mean nothing.
+beside it. With QUICK=1 it shows that it works; its figures then mean nothing.
 """
 
 import json
@@ -225,7 +225,7 @@ def recording() -> dict[str, dict[str, str]]:
             for number in range(PENS):
                 node.every(f"/pen{number}", {"data": float(number)}, 1 / HZ)
             until(lambda: server.widget("course")["state"] == "live", "values arrive")
-            found["4 × 100 Hz, nobody looks"] = measured(server, 0)
+            found["4 × 100 Hz, no page"] = measured(server, 0)
             found["4 × 100 Hz, two pages"] = measured(server, VIEWERS)
             return found
         finally:

@@ -33,6 +33,7 @@ ROOMS = (
 )
 # What every room may import.
 COMMON = {
+    "app.bounded",
     "app.clock",
     "app.concurrency",
     "app.errors",

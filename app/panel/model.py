@@ -4,10 +4,11 @@ import re
 from collections.abc import Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Final, Literal
+from typing import Annotated, Final, Literal, TypeVar
 
 from pydantic import AfterValidator, Field, WithJsonSchema
 
+from app.errors import NotFound
 from app.i18n import ENGLISH
 from app.i18n.catalogue import files
 from app.interfaces.validation import format_value
@@ -64,6 +65,8 @@ class RobotEntry(Description):
     namespace: Annotated[str, AfterValidator(parse_namespace)] = ""
     connect: Annotated[tuple[Endpoint, ...], Field(strict=False)] = ()
 
+
+Kind = TypeVar("Kind", bound=BaseWidget)
 
 # rmw_qos_profile_parameter_events. An explicit durability: the subscription does not wait for the
 # publisher's.
@@ -130,6 +133,13 @@ class Panel(Description):
             yield from page.widgets
         yield from self.frame.widgets
 
+    def widget(self, widget_id: str, kind: type[Kind]) -> Kind:
+        """The widget of a kind with this id; NotFound for every other id."""
+        for widget in self.widgets():
+            if widget.id == widget_id and isinstance(widget, kind):
+                return widget
+        raise NotFound(f'there is no widget "{widget_id:.64}" of the kind {kind.__name__}')
+
     @cached_property
     def widgets_by_page(self) -> dict[str, frozenset[str]]:
         """The ids of the widgets that each page shows, those of the frame too, by the page's id."""
@@ -164,7 +174,7 @@ class Panel(Description):
         return own | {of.topic: of.type for of in self.monitored() if not of.on_demand} | events
 
     def on_demand(self) -> dict[str, str]:
-        """Topic → type of all topics that are subscribed to only while somebody looks."""
+        """Topic → type of all topics that are subscribed to only while a browser shows them."""
         return {of.topic: of.type for of in self.monitored() if of.on_demand}
 
     def listened(self) -> dict[str, str]:

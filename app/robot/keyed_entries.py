@@ -1,25 +1,24 @@
 """The latest entry for each key of a list that several messages bring, as /diagnostics does.
 
-Samples are queued as they arrive, and decoded when the entries are asked for, some milliseconds at a
-time. Queue and entries are bounded: the oldest go first.
+Samples are queued as they arrive, and decoded in slices of some milliseconds. Queue and entries are
+bounded: the oldest go first.
 """
 
-import time
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Final
 
+from app.bounded import BoundedQueue
 from app.errors import DecodeError
 from app.interfaces import FieldReader, Fields, Interfaces, Walk
 from app.panel.model import Panel
 from app.panel.widgets.table import Table
 from app.robot.sample import Sample
+from app.robot.slices import Slices
 
 MAX_KEYS: Final = 200
 MAX_QUEUED: Final = 64
 MAX_QUEUED_BYTES: Final = 4_000_000
-SHARE_S: Final = 0.004  # of decoding for each time that entries are asked for
 LONGEST_KEY: Final = 200
 
 
@@ -37,36 +36,30 @@ class _Keyed:
 
     table: Table
     reader: FieldReader
-    queued: deque[Sample] = field(default_factory=deque)
-    size: int = 0  # of the queued payloads
+    queued: BoundedQueue[Sample] = field(
+        default_factory=lambda: BoundedQueue(MAX_QUEUED, MAX_QUEUED_BYTES)
+    )
     walk: tuple[Walk, Sample] | None = None
     entries: dict[str, Entry] = field(default_factory=dict)
 
-    def add(self, sample: Sample) -> None:
-        self.queued.append(sample)
-        self.size += len(sample.payload)
-        while len(self.queued) > MAX_QUEUED or (self.size > MAX_QUEUED_BYTES and len(self.queued) > 1):
-            self.size -= len(self.queued.popleft().payload)
+    @property
+    def is_pending(self) -> bool:
+        return self.walk is not None or len(self.queued) > 0
 
-    def decode(self, until: float, now: Callable[[], float]) -> bool:
-        """Decodes what is queued; returns whether that was all."""
-        while self.walk or self.queued:
-            if self.walk is None:
-                sample = self.queued.popleft()
-                self.size -= len(sample.payload)
-                self.walk = self.reader.walk(bytes(sample.payload)), sample
-            walk, sample = self.walk
-            try:
-                fields = walk.advance()
-            except DecodeError:
-                self.walk = None  # counted where the topic is read
-                continue
-            if fields is not None:
-                self.walk = None
-                self._keep(fields, sample)
-            if now() >= until:
-                return not (self.walk or self.queued)
-        return True
+    def decode_one(self, slices: Slices, until: float) -> None:
+        """Decodes the oldest message, or as much of it as the time allows."""
+        if self.walk is None:
+            sample = self.queued.take()
+            self.walk = self.reader.walk(bytes(sample.payload)), sample
+        walk, sample = self.walk
+        try:
+            fields = slices.read_until(walk, until)
+        except DecodeError:
+            self.walk = None  # counted where the topic is read
+            return
+        if fields is not None:
+            self.walk = None
+            self._keep(fields, sample)
 
     def _keep(self, fields: Fields, sample: Sample) -> None:
         table = self.table
@@ -84,13 +77,12 @@ class KeyedEntries:
     """The entries of one robot's tables with keys; a `SampleListener`. Used on the event loop only."""
 
     def __init__(
-        self,
-        panel: Panel,
-        interfaces: Interfaces,
-        key_of: Callable[[str], str],
-        now: Callable[[], float] = time.monotonic,
+        self, panel: Panel, interfaces: Interfaces, key_of: Callable[[str], str], slices: Slices
     ) -> None:
-        """`key_of` returns the key expression of a topic."""
+        """`key_of` returns the key of a topic."""
+        self._slices = slices
+        self._scheduled = False
+        self.on_decoded: Callable[[str], None] = lambda _key: None  # called with the topic's key
         tables = [w for w in panel.displays if isinstance(w, Table) and w.key is not None]
         self._tables = {
             table.id: _Keyed(table, interfaces.field_reader(table.type, table.paths))
@@ -99,19 +91,27 @@ class KeyedEntries:
         self._by_key: dict[str, list[_Keyed]] = {}
         for one in self._tables.values():
             self._by_key.setdefault(key_of(one.table.topic), []).append(one)
-        self._now = now
-
-    @property
-    def keys(self) -> frozenset[str]:
-        return frozenset(self._by_key)
+        self.keys = frozenset(self._by_key)
 
     def record_sample(self, key: str, sample: Sample) -> None:
+        """A sample was received: it is decoded in the next turns."""
         for one in self._by_key[key]:
-            one.add(sample)
+            one.queued.add(sample, len(sample.payload))
+        if not self._scheduled:
+            self._scheduled = True
+            self._slices.schedule(self._decode)
 
-    def entries(self, widget_id: str) -> tuple[list[Entry], bool]:
-        """The entries of a table in the order of their first message, and whether all samples that have
-        arrived are in them."""
-        keyed = self._tables[widget_id]
-        is_whole = keyed.decode(self._now() + SHARE_S, self._now)
-        return list(keyed.entries.values()), is_whole
+    def entries(self, widget_id: str) -> list[Entry]:
+        """The entries of a table, in the order of their first message."""
+        return list(self._tables[widget_id].entries.values())
+
+    def _decode(self, until: float) -> bool:
+        """Decodes until a time (monotonic seconds); returns whether nothing is left."""
+        for key, tables in self._by_key.items():
+            pending = [one for one in tables if one.is_pending]
+            for one in pending:
+                one.decode_one(self._slices, until)
+            if pending:
+                self.on_decoded(key)
+        self._scheduled = any(one.is_pending for one in self._tables.values())
+        return not self._scheduled

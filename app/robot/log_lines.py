@@ -1,13 +1,13 @@
-"""The newest lines of a topic of `rcl_interfaces/msg/Log`: kept as they came, decoded when somebody
-reads them."""
+"""The newest lines of a topic of `rcl_interfaces/msg/Log`: kept as they came, decoded at
+their first reading."""
 
 import asyncio
 from bisect import bisect_left
-from collections import deque
 from collections.abc import Iterator
 from itertools import islice
 from typing import Final, NamedTuple
 
+from app.bounded import BoundedQueue
 from app.errors import DecodeError
 from app.interfaces import Interfaces
 from app.printable import printable
@@ -65,12 +65,11 @@ class Wanted(NamedTuple):
 class _Kept:
     """One line, decoded at its first reading."""
 
-    __slots__ = ("line", "number", "payload", "size")
+    __slots__ = ("line", "number", "payload")
 
     def __init__(self, number: int, payload: bytes) -> None:
         self.number = number
         self.payload: bytes | None = payload
-        self.size = len(payload)
         self.line: Line | None = None  # also where the payload is no line
 
 
@@ -79,9 +78,7 @@ class LogLines:
 
     def __init__(self, interfaces: Interfaces, keep: int) -> None:
         self._interfaces = interfaces
-        self._keep = keep
-        self._kept: deque[_Kept] = deque()
-        self._bytes = 0
+        self._kept: BoundedQueue[_Kept] = BoundedQueue(keep, KEPT_BYTES)
         self.count = 0  # of all that came
 
     def add(self, payload: Buffer) -> None:
@@ -89,11 +86,7 @@ class LogLines:
         self.count += 1
         if len(payload) > LONGEST_LINE:
             return
-        kept = _Kept(self.count, bytes(payload))
-        self._kept.append(kept)
-        self._bytes += kept.size
-        while len(self._kept) > self._keep or self._bytes > KEPT_BYTES:
-            self._bytes -= self._kept.popleft().size
+        self._kept.add(_Kept(self.count, bytes(payload)), len(payload))
 
     async def find(self, wanted: Wanted, after: int, most: int) -> Found:
         """The newest lines with a number above `after`, over as many turns as decoding takes."""

@@ -5,6 +5,7 @@ one slice.
 """
 
 import asyncio
+import math
 import time
 from collections import deque
 from collections.abc import Callable
@@ -47,9 +48,15 @@ class Slices:
 
     def schedule(self, go_on: Resume) -> None:
         """Calls it once a turn, from the next turn on, until it returns true."""
+        try:
+            loop = asyncio.get_running_loop()
+        except RuntimeError:
+            while not go_on(math.inf):
+                pass
+            return
         self._pending.append(go_on)
         if len(self._pending) == 1:
-            asyncio.get_running_loop().call_soon(self._resume_next)
+            loop.call_soon(self._resume_next)
 
     async def read_all(self, reader: FieldReader, data: bytes) -> Fields:
         """Decodes a message, over as many turns as needed; DecodeError if the bytes are no such
@@ -77,7 +84,7 @@ class Slices:
             try:
                 asyncio.get_running_loop().call_soon(self._end_turn)
             except RuntimeError:
-                return float("inf")
+                return math.inf
             self._until = self._now() + FIRST_SHARE_S
         return self._until
 

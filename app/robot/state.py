@@ -91,7 +91,7 @@ class RobotState:
         self._publisher_required = [self.key(i.topic) for i in panel.interlocks if i.require_publisher]
         self._published: set[str] = set()
         self._topics = dict(self._make_topics(panel))
-        self.keyed_entries = KeyedEntries(panel, interfaces, self.key)
+        self.keyed_entries = KeyedEntries(panel, interfaces, self.key, self.slices)
         self.log_lines = {
             self.key(topic): LogLines(interfaces, keep) for topic, keep in panel.logs().items()
         }

@@ -1,8 +1,8 @@
-"""The newest picture of each camera's topic, for as long as somebody looks.
+"""The newest picture of each camera's topic, while a browser shows it.
 
-Only then the topic is subscribed to: the bridge reads it for a subscriber, so what nobody looks at
-does not even cross the network. A message is replaced by the next one where it arrives, on the link's
-thread, undecoded; the event loop is woken only where a browser waits for one.
+Only then the topic is subscribed to: the bridge reads a topic for its subscribers, so a camera that no
+browser shows does not even cross the network. A message is replaced by the next one where it arrives,
+on the link's thread, undecoded; the event loop is woken only where a browser waits for one.
 """
 
 import asyncio
@@ -13,7 +13,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Final
 
-from app.errors import LinkError, NotFound, TooMany
+from app.errors import LinkError, TooMany
 from app.i18n import say
 from app.interfaces import Interfaces
 from app.panel.model import Panel
@@ -52,28 +52,18 @@ class Frames:
     ) -> None:
         """`changed` is called when what the view shows of a camera has changed by itself, `tokens` when
         a topic is wanted or not any more."""
-        self._widgets = {w.id: w for w in panel.widgets() if isinstance(w, Camera)}
-        self._feeds = {
-            topic: Feed(topic, name, robot, interfaces, link, changed, tokens, self._freshest(topic))
-            for topic, name in panel.on_demand().items()
-        }
-
-    def widget(self, widget_id: str) -> Camera:
-        """The camera with this id; NotFound for every other id."""
-        if widget_id not in self._widgets:
-            raise NotFound(f'there is no camera "{widget_id}"')
-        return self._widgets[widget_id]
+        cameras = [w for w in panel.widgets() if isinstance(w, Camera)]
+        self._feeds = {}
+        for topic, name in panel.on_demand().items():
+            fresh_s = min(camera.max_age_s for camera in cameras if camera.topic == topic)
+            self._feeds[topic] = Feed(topic, name, robot, interfaces, link, changed, tokens, fresh_s)
 
     def feed(self, widget: Camera) -> "Feed":
         """The topic of a camera."""
         return self._feeds[widget.topic]
 
-    def _freshest(self, topic: str) -> float:
-        """The shortest time after which a picture of a topic is old."""
-        return min(w.max_age_s for w in self._widgets.values() if w.topic == topic)
-
     def close(self) -> None:
-        """Looks nowhere any more."""
+        """Unsubscribes from all topics."""
         for feed in self._feeds.values():
             feed.close()
 
@@ -106,7 +96,7 @@ class Feed:
         self._leaving: asyncio.TimerHandle | None = None
         self._newest: Frame | None = None  # set on the link's thread
         self._seen = LookedAt()
-        self._told_at = -math.inf  # of the frame that the view was told of last
+        self._viewed_at = -math.inf  # of the newest frame that the view knows of
         self._came: asyncio.Future[None] | None = None  # of those who wait for a frame
         self._made: tuple[Frame, asyncio.Task[Picture]] | None = None
 
@@ -131,7 +121,7 @@ class Feed:
                 self._came = self._loop.create_future()
             if self._newest is found:  # none has come in between
                 await asyncio.shield(self._came)
-        self._tell(found)
+        self._show(found)
         return found
 
     async def picture(self, frame: Frame, widget: Camera) -> Picture:
@@ -148,7 +138,7 @@ class Feed:
         return made
 
     def close(self) -> None:
-        """Nobody looks any more: nothing is subscribed to, and nothing kept."""
+        """Unsubscribes, and keeps nothing."""
         if self._leaving is not None:
             self._leaving.cancel()
             self._leaving = None
@@ -165,7 +155,8 @@ class Feed:
         if self._key in self._robot.looked_at:
             return
         self._seen = self._robot.looked_at[self._key] = LookedAt()
-        self._told_at = -math.inf
+        self._viewed_at = -math.inf
+        self._newest = None  # what arrived while the last subscription ended
         expression = self._robot.dialect.topic(self._key, self._type)
         self._tokens()
         with suppress(LinkError):  # the next session has it
@@ -174,8 +165,8 @@ class Feed:
 
     def _take(self, payload: Buffer) -> None:
         """On the link's thread: replaces what was there, and wakes the loop where someone waits."""
-        number = self._newest.number + 1 if self._newest else 1
-        frame = Frame(number, payload, time.monotonic(), time.time())
+        last = self._newest  # the loop may replace it by None
+        frame = Frame(last.number + 1 if last else 1, payload, time.monotonic(), time.time())
         self._newest = frame
         self._seen.at, self._seen.wall = frame.at, frame.wall
         if self._came is not None:
@@ -187,11 +178,11 @@ class Feed:
         if came is not None and not came.done():
             came.set_result(None)
 
-    def _tell(self, frame: Frame) -> None:
-        """The view looks by itself when a frame gets old: it is told of the first one after that."""
-        if frame.at - self._told_at >= self._fresh_s:
+    def _show(self, frame: Frame) -> None:
+        """The view looks by itself when a frame gets old: the first one after that changes it."""
+        if frame.at - self._viewed_at >= self._fresh_s:
             self._changed()
-        self._told_at = frame.at
+        self._viewed_at = frame.at
 
     def _making(self, frame: Frame) -> "asyncio.Task[Picture]":
         if self._made is None or self._made[0] is not frame:

@@ -78,7 +78,6 @@ class Ingest:
         self._actions = actions
         self._confirmations = confirmations
         self._parameters = parameters
-        self._listeners = listeners
         self._log = RobotLog(log, robot.name)
         goals = {robot.key(one): one for one in panel.actions()}
         self._feedback = {names.feedback(key): one for key, one in goals.items()}
@@ -93,7 +92,11 @@ class Ingest:
         # Every message of these topics counts, also values that were replaced within one turn.
         self.watched = self._interlocks.keys() | {robot.key(one.topic) for one in panel.confirmations()}
         self.prompt = self.watched | self._status.keys() | {self._events}
-        self.whole = frozenset().union(*(listener.keys for listener in listeners))
+        self._by_key: dict[str, list[SampleListener]] = {}
+        for listener in listeners:
+            for key in listener.keys:
+                self._by_key.setdefault(key, []).append(listener)
+        self.whole = frozenset(self._by_key)
 
     def steps(self, changes: Changes) -> Iterator[Updates]:
         """Ingests changes step by step: yields after each intermediate value that changed a permission,
@@ -143,10 +146,9 @@ class Ingest:
         return [interlock_verdict(one, self._robot, now) for one in self._interlocks.get(key, ())]
 
     def _notify(self, changes: Changes) -> None:
-        for listener in self._listeners:
-            for key, sample in changes.kept:
-                if key in listener.keys:
-                    self._guarded(key, sample, listener.record_sample)
+        for key, sample in changes.kept:
+            for listener in self._by_key[key]:
+                self._guarded(key, sample, listener.record_sample)
 
     def _guarded(self, key: str, sample: Sample, take: Callable[[str, Sample], None]) -> None:
         try:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Final
 from app.audit.press_record import Log, PressLog
 from app.commands.control_acts import ControlActs
 from app.commands.press_context import PressGuard
-from app.errors import LinkError, NotFound
+from app.errors import LinkError
 from app.i18n import TextLike
 from app.interfaces import load_interfaces
 from app.interfaces.names import ROSOUT_TOPIC
@@ -130,6 +130,7 @@ class RobotSession:
         )
         self._turn = Turn(context, self.peer, self._ingest, self._commands, self.refresher)
         self.robot.on_late_reading = self._turn.run_late_reading
+        self.robot.keyed_entries.on_decoded = lambda key: self.refresher.values({key})
         self.frames = Frames(
             panel,
             self.robot,
@@ -229,10 +230,7 @@ class RobotSession:
     def read_again(self, widget_id: str) -> TextLike:
         """Queries the node of a parameter; returns why it can't be queried, else "". NotFound for other
         ids."""
-        widget = self.dispatcher.widget(widget_id)
-        if not isinstance(widget, Parameter):
-            raise NotFound(f'"{widget_id}" is not a parameter: there is nothing to read')
-        return self._commands.parameters.read_again(widget)
+        return self._commands.parameters.read_again(self.panel.widget(widget_id, Parameter))
 
     def reopen(self) -> None:
         """Replaces a working Zenoh session. The old one still sends the stop messages of holds."""

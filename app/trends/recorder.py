@@ -7,9 +7,9 @@ publishes delays no press and no hold by more than a slice.
 import asyncio
 import math
 import time
-from collections import deque
 from typing import Any, Final, NamedTuple
 
+from app.bounded import BoundedQueue
 from app.errors import DecodeError
 from app.interfaces import FieldReader, Interfaces
 from app.panel.model import Panel
@@ -46,8 +46,7 @@ class TrendRecorder:
         self._readers: dict[str, FieldReader] = {}
         self._fields: dict[str, list[tuple[str, FieldHistory]]] = {}
         self._origins: dict[str, tuple[str | None, int]] = {}
-        self._pending: deque[Pending] = deque()
-        self._pending_bytes = 0
+        self._pending: BoundedQueue[Pending] = BoundedQueue(MAX_PENDING, MAX_PENDING_BYTES)
         self._timer: asyncio.TimerHandle | None = None
         self._batches = 0
         types = panel.subscriptions()
@@ -70,10 +69,8 @@ class TrendRecorder:
         whole = self._origins.get(key) == origin
         self._origins[key] = origin
         one = Pending(key, sample.at, bytes(sample.payload), whole)
-        self._pending.append(one)
-        self._pending_bytes += len(one.data)
-        while len(self._pending) > MAX_PENDING or self._pending_bytes > MAX_PENDING_BYTES:
-            self._interrupt(self._taken().key)
+        for lost in self._pending.add(one, len(one.data)):
+            self._interrupt(lost.key)
         if self._timer is None:
             loop = asyncio.get_running_loop()
             self._timer = loop.call_later(DECODE_AFTER_S, self._begin)
@@ -88,7 +85,7 @@ class TrendRecorder:
         """Decodes until a time (monotonic seconds); returns whether nothing is left."""
         while self._pending:
             for _ in range(min(BETWEEN_CLOCK, len(self._pending))):
-                self._record(self._taken())
+                self._record(self._pending.take())
                 if self._pending and len(self._pending[0].data) > 2_000:
                     break
             if time.monotonic() >= until:
@@ -105,11 +102,6 @@ class TrendRecorder:
 
     def _begin(self) -> None:
         self._slices.schedule(self.decode)
-
-    def _taken(self) -> Pending:
-        one = self._pending.popleft()
-        self._pending_bytes -= len(one.data)
-        return one
 
     def _interrupt(self, key: str) -> None:
         for _, history in self._fields[key]:

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Final, Literal, NamedTuple, Protocol
 
-from app.clock import format_age, format_time
+from app.clock import age_changes_at, format_age, format_time
 from app.i18n import PanelText, TextLike, number, say
 from app.i18n.values import with_unit
 from app.panel.base import HasTopic, TopicQos
@@ -100,12 +100,10 @@ def _dated(reading: Reading, seen: FieldState, max_age_s: float | None, now: flo
         return replace(seen, state="old", note=say("readout_cut", time=format_time(reading.wall)))
     if max_age_s is None:
         return seen
-    old = now - reading.at
-    if old < max_age_s:
+    if now - reading.at < max_age_s:
         return replace(seen, until=reading.at + max_age_s)
-    step = 1 if old < 60 else 60
-    until = reading.at + (old // step + 1) * step
-    return replace(seen, state="old", note=say("readout_old", age=format_age(old)), until=until)
+    note = say("readout_old", age=format_age(now - reading.at))
+    return replace(seen, state="old", note=note, until=age_changes_at(reading.at, now))
 
 
 def value(widget: Display, robot: RobotState, now: float) -> tuple[dict[str, Any], float]:

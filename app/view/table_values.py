@@ -2,16 +2,14 @@
 
 import math
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Any
 
-from app.clock import format_age
+from app.clock import age_changes_at, format_age
 from app.i18n import TextLike, say
 from app.panel.widgets.table import Column, ColumnField, Table
 from app.robot.keyed_entries import Entry
 from app.robot.state import Reading, RobotState
 from app.view.display_values import NOTHING, cell_text, lamp_of, topic_state
-
-AGAIN_S: Final = 0.05  # after which the rest of the queued messages is decoded
 
 
 def table(widget: Table, robot: RobotState, now: float) -> tuple[dict[str, Any], float]:
@@ -21,7 +19,7 @@ def table(widget: Table, robot: RobotState, now: float) -> tuple[dict[str, Any],
     whole = topic_state(widget, robot, now)
     if whole.state in ("waiting", "unreadable"):
         return {"state": whole.state, "note": whole.note, "said": "", "table_rows": []}, whole.until
-    entries, until, is_full = _entries(widget, robot, robot.reading(widget.topic), now)
+    entries, is_full = _entries(widget, robot, robot.reading(widget.topic))
     shown = _sorted(widget, entries)[: widget.rows_shown]
     constants = _constants(widget, robot)
     ages = [_age(widget, entry, now) for entry in shown]
@@ -34,23 +32,20 @@ def table(widget: Table, robot: RobotState, now: float) -> tuple[dict[str, Any],
             for entry, (age, _) in zip(shown, ages, strict=True)
         ],
     }
-    return attributes, min([until, whole.until, *(at for _, at in ages)])
+    return attributes, min([whole.until, *(at for _, at in ages)])
 
 
-def _entries(
-    widget: Table, robot: RobotState, reading: Reading, now: float
-) -> tuple[list[Entry], float, bool]:
-    """The entries, when there may be more by time alone, and whether more may be there unread."""
+def _entries(widget: Table, robot: RobotState, reading: Reading) -> tuple[list[Entry], bool]:
+    """The entries, and whether more may be in the message, unread."""
     if widget.key is not None:
-        found, is_whole = robot.keyed_entries.entries(widget.id)
-        return found, math.inf if is_whole else now + AGAIN_S, False
-    found = []
+        return robot.keyed_entries.entries(widget.id), False
+    found: list[Entry] = []
     for number in range(widget.entries_read):
         values = tuple(reading.value(widget.path(number, of)) for of in widget.own_fields)
         if all(value is None for value in values):
-            return found, math.inf, False
+            return found, False
         found.append(Entry(values, reading.at))
-    return found, math.inf, True
+    return found, True
 
 
 def _sorted(widget: Table, entries: list[Entry]) -> list[Entry]:
@@ -83,12 +78,10 @@ def _age(widget: Table, entry: Entry, now: float) -> tuple[TextLike, float]:
     """How old an entry with a key is, and when that changes; of others the message has an age."""
     if widget.key is None or widget.max_age_s is None:
         return "", math.inf
-    old = now - entry.at
-    if old < widget.max_age_s:
+    if now - entry.at < widget.max_age_s:
         return "", entry.at + widget.max_age_s
-    step = 1 if old < 60 else 60
-    text = say("readout_old", age=format_age(old))
-    return text, entry.at + (old // step + 1) * step
+    text = say("readout_old", age=format_age(now - entry.at))
+    return text, age_changes_at(entry.at, now)
 
 
 def _constants(widget: Table, robot: RobotState) -> list[tuple[Column, ColumnField, Mapping[str, Any]]]:

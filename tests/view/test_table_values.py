@@ -1,5 +1,6 @@
 """What a table shows: rows of the newest message, or the latest entry of each key; sorted, counted."""
 
+import asyncio
 from collections.abc import Mapping
 from typing import Any, Final
 
@@ -36,12 +37,6 @@ TABLE: Final = {
 def status(name: str, level: int = 0, **values: str) -> dict[str, Any]:
     listed = [{"key": key, "value": value} for key, value in values.items()]
     return {"level": level, "name": name, "message": "", "hardware_id": "", "values": listed}
-
-
-@pytest.fixture(autouse=True)
-def unhurried(monkeypatch: pytest.MonkeyPatch) -> None:
-    """All that is queued is decoded at once, however busy the machine is."""
-    monkeypatch.setattr("app.robot.keyed_entries.SHARE_S", 60.0)
 
 
 class Robot:
@@ -139,18 +134,27 @@ def test_what_is_kept_is_bounded() -> None:
     robot = Robot(key="name", entries_read=50, rows_shown=1)
     for first in range(0, 2 * MAX_KEYS, 50):
         robot.says(*(status(f"p{first + number}") for number in range(50)), at=NOW + first)
-        robot.shown()
-    while robot.state.keyed_entries.entries("parts")[1] is False:
-        pass
-    assert len(robot.state.keyed_entries.entries("parts")[0]) == MAX_KEYS
+    assert len(robot.state.keyed_entries.entries("parts")) == MAX_KEYS
     assert robot.names() == [f"p{MAX_KEYS}"]
-    for number in range(3 * MAX_QUEUED):
-        robot.says(status(f"q{number}"), at=NOW + 1000)
-    while robot.state.keyed_entries.entries("parts")[1] is False:
-        pass
-    kept = [entry.values[1] for entry in robot.state.keyed_entries.entries("parts")[0]]
-    assert f"q{3 * MAX_QUEUED - 1}" in kept
-    assert f"q{MAX_QUEUED}" not in kept
+
+
+def test_messages_wait_in_a_bounded_queue_and_the_view_is_told_when_they_are_decoded() -> None:
+    robot = Robot(key="name")
+    entries = robot.state.keyed_entries
+    decoded: list[str] = []
+    entries.on_decoded = decoded.append
+
+    async def flood() -> None:
+        for number in range(3 * MAX_QUEUED):
+            robot.says(status(f"q{number}"))
+        assert (entries.entries("parts"), decoded) == ([], [])
+        while len(entries.entries("parts")) < MAX_QUEUED:
+            await asyncio.sleep(0)
+
+    asyncio.run(asyncio.wait_for(flood(), 10))
+    kept = [entry.values[1] for entry in entries.entries("parts")]
+    assert kept == [f"q{number}" for number in range(2 * MAX_QUEUED, 3 * MAX_QUEUED)]
+    assert set(decoded) == {"diagnostics"}
 
 
 def test_damaged_bytes_take_no_row_away() -> None:

@@ -13,7 +13,7 @@ PictureType = Literal["sensor_msgs/msg/CompressedImage", "sensor_msgs/msg/Image"
 
 
 class Camera(TopicWidget, DisplayWidget):
-    """Shows the newest picture of a topic, which is subscribed to only while somebody looks.
+    """Shows the newest picture of a topic, which is subscribed to only while a browser shows it.
 
     One older than `max_age_s` is marked as old; of one with more than `max_bytes` nothing is shown.
     Each browser gets at most `max_hz` pictures per second, and as few as it takes.

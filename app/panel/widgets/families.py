@@ -55,7 +55,7 @@ class CheckContext:
 class TopicSource(NamedTuple):
     """A topic that a widget listens to, with the paths of the `fields` that it reads; `place` is the
     table with the topic's keys, below the widget's ("pen[0]"; "" for the widget's own). `on_demand`:
-    the topic is subscribed to only while somebody looks."""
+    the topic is subscribed to only while a browser shows it."""
 
     topic: str
     type: str

@@ -80,7 +80,7 @@ LOGS: Final = (
 
 
 class Everyones(dict[str, list[Texts]]):
-    """The same lines, whoever asks."""
+    """The same lines for every question."""
 
     def __missing__(self, _: str) -> list[Texts]:
         texts = ("moves", "cycle started", "the gripper is slow", "no part gripped", "axis 3 stands")

@@ -36,7 +36,7 @@ log = logging.getLogger("kiosk.web")
 
 router = APIRouter()
 
-FIRST_WITHIN_S: Final = 2.0  # until a topic that is looked at anew is heard of
+FIRST_WITHIN_S: Final = 2.0  # for the first picture of a topic that no browser showed
 AFTER_WITHIN_S: Final = 10.0
 BAD_PAUSE_S: Final = 0.2  # between two pictures that can't be shown
 TRY_AGAIN_LATER: Final = 4429  # 4000 + HTTP's
@@ -44,7 +44,7 @@ IMAGES: Final[Described] = {
     200: {
         "content": {
             kind: {"schema": {"type": "string", "format": "binary"}}
-            for kind in ("image/jpeg", "image/png", "image/webp", "image/bmp")
+            for kind in ("image/jpeg", "image/png", "image/webp")
         }
     }
 }
@@ -59,7 +59,7 @@ IMAGES: Final[Described] = {
 async def frame(
     widget: str, session: CurrentSession, after: Annotated[int, Query(ge=0)] = 0
 ) -> Response:
-    camera = session.frames.widget(widget)
+    camera = session.panel.widget(widget, Camera)
     feed = session.frames.feed(camera)
     with feed.looked_at():
         try:
@@ -78,7 +78,7 @@ async def frame(
 
 @router.websocket("/widgets/{widget}/frames")
 async def frames(socket: WebSocket, widget: str, state: CurrentState, session: CurrentSession) -> None:
-    camera = session.frames.widget(widget)
+    camera = session.panel.widget(widget, Camera)
     await socket.accept()
     with suppress(WebSocketDisconnect):
         try:

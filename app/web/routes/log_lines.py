@@ -6,7 +6,6 @@ from fastapi import APIRouter, Query, Request
 from pydantic import BaseModel
 
 from app.clock import format_time
-from app.errors import NotFound
 from app.i18n import render, say
 from app.panel.widgets.log_view import LEVELS, Level, LogView
 from app.robot.log_lines import Line, Wanted
@@ -64,7 +63,7 @@ async def lines(
     search: Text = "",
     after: Annotated[int, Query(ge=0)] = 0,
 ) -> Lines:
-    of = _widget(session, widget)
+    of = session.panel.widget(widget, LogView)
     wanted = _wanted(of, level or of.level, node or of.node, search)
     kept = session.robot.log_lines[session.robot.key(of.topic)]
     found = await kept.find(wanted, after, of.lines)
@@ -79,13 +78,6 @@ def rendered(session: RobotSession, widget: LogView, language: str) -> list[dict
     kept = session.robot.log_lines[session.robot.key(widget.topic)]
     wanted = _wanted(widget, widget.level, widget.node, "")
     return [_said(*one, language) for one in kept.newest(wanted, RENDERED).lines]
-
-
-def _widget(session: RobotSession, widget_id: str) -> LogView:
-    for widget in session.panel.displays:
-        if widget.id == widget_id and isinstance(widget, LogView):
-            return widget
-    raise NotFound(f'there is no log "{widget_id}"')
 
 
 def _wanted(widget: LogView, level: Level, node: str, search: str) -> Wanted:

@@ -11,10 +11,9 @@ from fastapi import APIRouter, Query, Request
 from fastapi.responses import Response
 from pydantic import BaseModel, Field
 
-from app.errors import InputError, NotFound
-from app.panel.widgets.trend import Trend, trends_of
+from app.errors import InputError
+from app.panel.widgets.trend import Trend
 from app.robot.history import Column
-from app.runtime.robot_session import RobotSession
 from app.view.trend_plot import pen_columns
 from app.web.app_state import CurrentSession
 from app.web.described import JSON, errors
@@ -59,7 +58,7 @@ async def trend(
     points: Annotated[int, Query(ge=10, le=1000, description="how many columns")] = 300,
     since: Annotated[int, Query(ge=0, le=2**53, description="the first column that is asked for")] = 0,
 ) -> Response:
-    found = _trend(session, widget)
+    found = session.panel.widget(widget, Trend)
     if span_s > found.keep_s:
         raise InputError(f"span_s is {span_s:g}: this trend keeps {found.keep_s} s")
     now = time.time()
@@ -91,13 +90,6 @@ async def _packed(body: bytes, gzipped: bool) -> Response:
         body = await asyncio.to_thread(gzip.compress, body, 1)
         headers["content-encoding"] = "gzip"
     return Response(body, media_type=JSON, headers=headers)
-
-
-def _trend(session: RobotSession, widget: str) -> Trend:
-    for one in trends_of(session.panel):
-        if one.id == widget:
-            return one
-    raise NotFound(f'"{widget:.64}" is no trend of this panel')
 
 
 def _compact(columns: Sequence[Column]) -> Iterator[list[float] | None]:

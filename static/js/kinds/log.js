@@ -66,16 +66,16 @@ class Log {
     this.#timer = setTimeout(() => this.#ask(true), wait);
   }
 
-  async #ask(anew = false) {
+  async #ask(whole = false) {
     this.#timer = 0;
     this.#askedAt = performance.now();
     const asking = (this.#asking = new AbortController());
     const of = (name) => this.#root.querySelector(`.wanted .${name}`).value;
-    const query = new URLSearchParams({ level: of("level"), node: of("node"), search: of("search"), after: anew ? 0 : this.#last });
+    const query = new URLSearchParams({ level: of("level"), node: of("node"), search: of("search"), after: whole ? 0 : this.#last });
     try {
       const path = `${document.body.dataset.base}/widgets/${this.#root.dataset.widget}/lines?${query}`;
       const answer = await fetch(path, { signal: asking.signal });
-      if (answer.ok && asking === this.#asking) this.#show(await answer.json(), anew);
+      if (answer.ok && asking === this.#asking) this.#show(await answer.json(), whole);
     } catch {
       // The connection is lost: the page shows that.
     }
@@ -84,7 +84,7 @@ class Log {
     this.follow();
   }
 
-  #show({ lines, note, last }, anew) {
+  #show({ lines, note, last }, whole) {
     const template = this.#root.querySelector("template");
     const top = this.#lines.scrollTop;
     const before = this.#lines.scrollHeight;
@@ -94,11 +94,11 @@ class Log {
       for (const name of ["time", "word", "node", "text"]) row.querySelector(`.${name}`).textContent = line[name];
       return row;
     });
-    if (anew) this.#lines.replaceChildren(...rows);
+    if (whole) this.#lines.replaceChildren(...rows);
     else this.#lines.prepend(...rows);
     while (this.#lines.children.length > Number(this.#root.dataset.lines)) this.#lines.lastElementChild.remove();
     // Who reads further down stays there.
-    if (top > 0 && !anew) this.#lines.scrollTop = top + this.#lines.scrollHeight - before;
+    if (top > 0 && !whole) this.#lines.scrollTop = top + this.#lines.scrollHeight - before;
     setText(this.#root.querySelector(".left-out"), note);
     this.#last = last;
   }
