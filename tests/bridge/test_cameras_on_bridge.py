@@ -117,7 +117,8 @@ def test_both_kinds_of_pictures_are_drawn(kiosk: Server, page: Page) -> None:
         expect(canvas).to_have_attribute("height", str(size[1]))
         expect(camera(page, name).locator(".sign")).to_be_hidden()
     pixel = "(c) => [...c.getContext('2d').getImageData(2, 2, 1, 1).data]"
-    assert camera(page, "raw").locator("canvas").evaluate(pixel) == [90, 200, 40, 255]
+    nearly_green = pytest.approx([90, 200, 40, 255], abs=3)  # a JPEG keeps colours nearly
+    assert camera(page, "raw").locator("canvas").evaluate(pixel) == nearly_green
 
 
 def test_what_nobody_looks_at_is_not_subscribed_to(

@@ -195,13 +195,20 @@ SHIFTS: Final = """new PerformanceObserver((list) => {
 }).observe({ type: "layout-shift", buffered: true });"""
 
 
+SLOW: Final = {"offline": False, "latency": 0, "downloadThroughput": 30_000, "uploadThroughput": 30_000}
+
+
 @pytest.mark.parametrize("size", [(1280, 800), (800, 480)])
 def test_nothing_moves_after_the_page_is_there(example: Server, chromium: Browser, size: Any) -> None:
-    """Values come, and locks come and fall: what a key says moves nothing but its own face."""
+    """Values come, and locks come and fall: what a key says moves nothing but its own face. The page
+    comes slowly, as to a busy browser: half of it is not drawn."""
     width, height = size
     context = chromium.new_context(viewport={"width": width, "height": height})
     context.add_init_script(SHIFTS)
     page = context.new_page()
+    network = context.new_cdp_session(page)
+    network.send("Network.enable")
+    network.send("Network.emulateNetworkConditions", SLOW)
     page.goto(f"{example.url}/pages/setup")
     expect(page.locator("#state")).to_have_attribute("data-state", "ready")
     assert page.evaluate("globalThis.shifts ?? []") == []

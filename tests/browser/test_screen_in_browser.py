@@ -200,6 +200,11 @@ def test_a_phone_only_shows(cell: Server, page: Page) -> None:
     for widget in ("boxes", "permission", "speed"):
         expect(page.locator(f"[data-widget={widget}] .value")).to_be_visible()
     expect(page.get_by_text("View only")).to_be_visible()
+    for link in page.locator(".pages a").all():
+        expect(link.locator(".icon")).to_be_visible()
+    page.get_by_role("button", name="Menu").click()
+    page.get_by_role("button", name="Dark").click()
+    expect(page.locator("html")).to_have_attribute("data-theme", "dark")
 
 
 def test_a_key_of_the_frame_comes_back_to_the_page_where_it_was_pressed(
