@@ -10,6 +10,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
+from app.i18n import TextLike, number
+from app.i18n.values import together
 from app.panel.widgets.trend import Pen, Trend
 from app.robot.history import Column, History
 from app.robot.state import RobotState
@@ -33,7 +35,7 @@ class Tick(NamedTuple):
     """A line of the grid: its place in percent of the plot, and its text."""
 
     place: float
-    text: str
+    text: TextLike
 
 
 class Limit(NamedTuple):
@@ -41,7 +43,7 @@ class Limit(NamedTuple):
 
     pen: int
     place: float
-    text: str
+    text: TextLike
     letter: str
 
 
@@ -113,13 +115,13 @@ def draw(widget: Trend, columns: Sequence[Sequence[Column]], begin: float, end: 
         if pen.normal
     ]
     limits = [
-        Limit(i, place(value), f"{letter} {value:g}", letter)
+        Limit(i, place(value), together((f"{letter} ", number(f"{value:g}"))), letter)
         for i, pen in pens
         for value, letter in ((pen.high, "H"), (pen.low, "L"))
         if value is not None
     ]
     lines = [_line(one, begin, end, width, place) for one in columns]
-    ticks = [Tick(place(value), text) for value, text in value_ticks(low, high)]
+    ticks = [Tick(place(value), number(text)) for value, text in value_ticks(low, high)]
     return Plot(lines, ticks, list(time_ticks(begin, end)), limits, bands)
 
 
@@ -149,8 +151,8 @@ def value_ticks(low: float, high: float) -> Iterator[tuple[float, str]]:
     power = 10.0 ** math.floor(math.log10(least))
     step = next(power * by for by in (1, 2, 2.5, 5, 10) if power * by >= least * 0.999)
     digits = max(0, -math.floor(math.log10(step) + 1e-9) + (step / power == 2.5))
-    for number in range(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1):
-        value = number * step
+    for count in range(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1):
+        value = count * step
         text = f"{value:.{digits}f}" if max(abs(low), abs(high)) < 1e6 else f"{value:.4g}"
         yield value, text.replace("-", "\N{MINUS SIGN}")
 

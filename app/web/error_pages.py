@@ -11,7 +11,7 @@ from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 
 from app.errors import KioskError, TooMany, TooSlow
-from app.i18n import TextLike, render
+from app.i18n import TextLike, render, say
 from app.printable import printable
 from app.web.app_state import site_of
 from app.web.display_choice import display_of
@@ -61,7 +61,8 @@ async def on_http_error(request: Request, error: Exception) -> Response:
     """Starlette's own: no such path, wrong method, body too large."""
     if not isinstance(error, HTTPException):
         raise error
-    message = printable(f"{error.detail}: {request.url.path}")
+    code = "path_missing" if error.status_code == 404 else "request_unfit"
+    message = say(code, path=printable(request.url.path)[:200])
     answer = error_answer(request, error.status_code, message)
     answer.headers.update(error.headers or {})
     if answer.headers.get("allow") == "GET":

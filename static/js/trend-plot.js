@@ -46,7 +46,7 @@ export class Plot {
     part(".times").innerHTML = times.map(([time, text]) => `<text x="${x(time) / 10}%" y="100%" dy="18">${text}</text>`).join("");
     const limits = this.pens.flatMap((pen, i) => [["H", pen.high], ["L", pen.low]].filter(([, at]) => at !== undefined).map(([letter, at]) => ({ letter, at, i })));
     part(".limits").innerHTML = limits.map(({ at, i }) => `<path class="pen-${i}" d="M0 ${y(at)}h${SIZE}"/>`).join("");
-    part(".limit-names").innerHTML = limits.map(({ letter, at }) => `<text x="6" y="${y(at) / 10}%" dy="${letter === "H" ? -5 : 15}">${letter} ${at}</text>`).join("");
+    part(".limit-names").innerHTML = limits.map(({ letter, at }) => `<text x="6" y="${y(at) / 10}%" dy="${letter === "H" ? -5 : 15}">${letter} ${written(String(at))}</text>`).join("");
     part(".bands").innerHTML = this.pens.filter((pen) => pen.normal).map(({ normal: [from, to] }) => `<rect class="band" x="0" width="${SIZE}" y="${y(to)}" height="${y(from) - y(to)}"/>`).join("");
     for (const [i, pen] of this.pens.entries()) this.#drawPen(pen, columns[i], x, y);
   }
@@ -122,6 +122,11 @@ function* valueTicks(low, high, most) {
   for (let number = Math.ceil(low / step - 1e-9); number <= high / step + 1e-9; number++) {
     const value = number * step;
     const text = Math.max(Math.abs(low), Math.abs(high)) < 1e6 ? value.toFixed(Math.min(digits, 20)) : Number(value.toPrecision(4)).toString();
-    yield [value, text.replace("-", "−")];
+    yield [value, written(text)];
   }
+}
+
+// A number as the panel's language writes it, with a true minus sign.
+export function written(text) {
+  return text.replace("-", "−").replace(".", document.documentElement.dataset.decimal ?? ".");
 }

@@ -14,6 +14,7 @@ from tests.support.parts import ENOUGH_S, Bridge, RosNode, Server, live, until
 
 PANEL = """
 title = "Trends"
+languages = ["en", "de"]
 
 [[page]]
 id = "one"
@@ -114,6 +115,22 @@ def opened(page: Page, cell: Server) -> None:
 
 def key(page: Page, what: str) -> Any:
     return page.locator(f'[data-do="{what}"]')
+
+
+def test_the_axis_and_the_values_have_the_decimal_sign_of_the_language(
+    cell: Server, node: RosNode, chromium: Browser
+) -> None:
+    says(node, 4.25)
+    says(node, 4.75)
+    context = chromium.new_context()
+    context.add_cookies([{"name": "kiosk_language", "value": "de", "url": cell.url}])
+    page = context.new_page()
+    opened(page, cell)
+    expect(page.locator(f"{TREND} .pen-0 > b")).to_have_text("4,75 bar")
+    page.locator(f"{TREND} .plot-marks").click(position={"x": 300, "y": 40})
+    expect(page.locator(f"{TREND} .cursor-values")).to_be_visible()
+    expect(page.locator(f"{TREND} .cursor-values")).not_to_contain_text(".")
+    context.close()
 
 
 def test_every_sample_of_a_real_node_is_in_the_line_and_the_text(

@@ -91,7 +91,7 @@ def test_a_line_goes_through_both_ends_of_each_column_and_over_no_gap() -> None:
 def test_the_axis_holds_all_values_and_limits() -> None:
     widget, _ = cell()
     drawn = draw(widget, [columns((0, 4.0, 7.0, 5.0)), []], 0.0, 600.0)
-    assert [limit.text for limit in drawn.limits] == ["H 6.5", "L 5"]
+    assert [render(limit.text, "en") for limit in drawn.limits] == ["H 6.5", "L 5"]
     assert all(0 < limit.place < 100 for limit in drawn.limits)
     assert all(0 <= tick.place <= 100 for tick in (*drawn.values, *drawn.times))
 
@@ -107,6 +107,13 @@ def test_the_axis_holds_all_values_and_limits() -> None:
 )
 def test_lines_of_the_grid_are_at_round_values(low: float, high: float, texts: list[str]) -> None:
     assert [text for _, text in value_ticks(low, high)] == texts
+
+
+def test_numbers_of_the_plot_are_in_the_language_of_their_reader() -> None:
+    widget, _ = cell(min=-1.0, max=0.0)
+    drawn = draw(widget, [columns((0, -0.5, -0.5, -0.5)), []], 0.0, 600.0)
+    assert [render(tick.text, "de") for tick in drawn.values][:2] == ["−1,00", "−0,75"]
+    assert render(drawn.limits[0].text, "de") == "H 6,5"
 
 
 @pytest.mark.parametrize("value", [0.0, 5.0, -3e-7, 1e12])

@@ -20,8 +20,9 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
 from app.audit.database import NAME
+from app.web.client_cookie import COOKIE
 from tests.browser.test_holds_in_browser import PANEL, jogging, permit
-from tests.support.parts import ENOUGH_S, ROOT, Bridge, RosNode, Server, until
+from tests.support.parts import ENOUGH_S, ROOT, Bridge, RosNode, Server, events_in, http_client, until
 
 TRIES: Final = 5
 PATIENT: Final = "tests.support.apps.patient:app"
@@ -98,8 +99,12 @@ class Socket:
 
 @contextmanager
 def opened(server: Server, **headers: str) -> Iterator[Socket]:
-    until(lambda: server.widget("jog")["enabled"], "the demo robot permits", within_s=40)
-    seen = server.snapshot()["id"]
+    def snapshot() -> Any:
+        text = server.http.get(f"{server.base}/events?once=1", headers=headers).text
+        return json.loads(events_in(text)[0][1])
+
+    until(lambda: snapshot()["widgets"]["jog"]["enabled"], "the demo robot permits", within_s=40)
+    seen = snapshot()["id"]
     url = f"ws://127.0.0.1:{server.port}{server.base}/widgets/jog/hold"
     with connect(url, additional_headers=headers) as connection:
         yield Socket(connection, seen)
@@ -135,6 +140,44 @@ def test_a_deflection_out_of_its_limits_is_nonsense(demo: Server, deflection: di
     with held(demo) as socket:
         said = socket.beat(**deflection)
         assert (said["state"], said["code"]) == ("ended", "hold_by_nonsense")
+
+
+STICK: Final = """
+id = "jog"
+kind = "joystick"
+label = "Jog"
+topic = "/jog"
+type = "geometry_msgs/msg/Twist"
+interlock = "operation"
+"""
+
+
+@pytest.mark.parametrize("kind", ["hold", "joystick"])
+def test_a_hold_ends_when_another_panel_takes_control(tmp_path: Path, kind: str) -> None:
+    text = PANEL if kind == "hold" else PANEL[: PANEL.index('id = "jog"')] + STICK
+    panel = tmp_path / "jog.toml"
+    panel.write_text(text.replace("[[interlock]]", "[control]\nrequired = true\n[[interlock]]", 1))
+    mine = Server(
+        ROOT, app=PATIENT, KIOSK_PANEL=str(panel), KIOSK_MODE="demo", KIOSK_PROXIES="127.0.0.1"
+    )
+    try:
+        until(mine.ready, "ready")
+        far = {"x-forwarded-for": "192.0.2.1"}
+        with http_client(mine.url, headers=far) as first, http_client(mine.url) as cell:
+            for client in (first, cell):
+                client.get("/pages/one")
+            assert first.post("/control/take", json={}).json()["done"]
+            cookie = f"{COOKIE}={first.cookies[COOKIE]}"
+            with opened(mine, **far, cookie=cookie) as socket:
+                moves = {} if kind == "hold" else {"x": 1.0, "y": 0.0}
+                assert socket.begin(**({} if kind == "hold" else {"inputs": {}}))["state"] == "held"
+                assert socket.beat(**moves)["state"] == "held"
+                assert cell.post("/control/take", json={}).json()["done"]
+                said = socket.hear()
+                assert (said["state"], said["outcome"]) == ("ended", "aborted")
+                assert "The panel at the cell has control of the robot." in said["reason"]
+    finally:
+        mine.end()
 
 
 def test_an_input_with_a_default_may_be_left_out(demo: Server) -> None:

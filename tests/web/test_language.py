@@ -104,9 +104,11 @@ def test_the_log_is_in_the_language_of_its_reader_and_written_in_english(server:
     assert "⟦" not in english
 
 
-def test_a_message_that_is_no_sentence_of_the_catalogue_stays(server: Server) -> None:
+def test_an_error_is_in_the_language_of_its_reader(server: Server) -> None:
     wrong = server.http.get("/pages/none", headers=PSEUDO)
-    assert (wrong.status_code, wrong.json()) == (404, {"error": 'there is no page "none"'})
+    assert (wrong.status_code, wrong.json()) == (404, {"error": '⟦This panel has no page "none".⟧'})
+    wrong = server.http.put("/pages/none", headers=PSEUDO)
+    assert (wrong.status_code, wrong.json()["error"][0]) == (405, "⟦")
 
 
 def test_an_unlocked_page_of_a_robot_that_is_away_says_so_in_each_language(tmp_path: Path) -> None:

@@ -158,7 +158,7 @@ async def named_page(page: str, request: Request, state: CurrentState) -> Respon
         return away
     found = state.fleet.panel.page(page)
     if found is None:
-        raise NotFound(f'there is no page "{page}"')
+        raise NotFound(say("page_missing", page=page[:64]))
     return _render(request, state, found)
 
 

@@ -1,5 +1,5 @@
 // A trend: draws what the server keeps, follows it while the widget can be seen, and looks back.
-import { Plot } from "../trend-plot.js";
+import { Plot, written } from "../trend-plot.js";
 
 const LEAST_MS = 500; // between two requests
 const AGAIN_MS = 2000; // after one that failed
@@ -200,7 +200,7 @@ class Trend {
     const nearest = columns.reduce((best, one) => (best === null || distance(one) < distance(best) ? one : best), null);
     if (!nearest || distance(nearest) > this.#drawn.width + NEAR * this.#span) return "—";
     const [, low, high] = nearest;
-    const written = (value) => (pen.digits === undefined ? Number(value.toPrecision(5)).toString() : value.toFixed(pen.digits)).replace("-", "−");
-    return `${low === high ? written(low) : `${written(low)} … ${written(high)}`} ${pen.unit}`.trim();
+    const text = (value) => written(pen.digits === undefined ? Number(value.toPrecision(5)).toString() : value.toFixed(pen.digits));
+    return `${low === high ? text(low) : `${text(low)} … ${text(high)}`} ${pen.unit}`.trim();
   }
 }
