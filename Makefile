@@ -3,7 +3,7 @@
 # make check types and style
 # make docs  the documentation as a site, in build/docs; a dead link fails
 # make faults every fault in its long form, and what was measured as a table in docs/reliability.md
-# make screenshots  every page at every size and theme, in build/screenshots; the README's pictures
+# make screenshots  every page at every size, theme and language, in build/screenshots; the README's pictures
 # make soak  an ordinary day for SOAK_S seconds (an hour)
 # make bench  this panel and its rivals side by side (25 minutes); QUICK=1 only shows that it works
 # make bench-setup  what the benchmark's rivals need, into the cache

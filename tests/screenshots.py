@@ -1,5 +1,5 @@
-"""`make screenshots`: the examples, the shipped panel and the gallery at all sizes and in all themes,
-into build/screenshots; the README's pictures into docs/images. All of the demo robot."""
+"""`make screenshots`: the examples, the shipped panel and the gallery at all sizes, in all themes and
+languages, into build/screenshots; the README's pictures into docs/images. All of the demo robot."""
 
 import time
 from collections.abc import Iterator
@@ -34,10 +34,13 @@ def main() -> None:
         browser = playwright.chromium.launch(executable_path=HEADLESS, args=CHROMIUM_FLAGS)
         for name, panel in PANELS.items():
             with running(panel) as server:
-                paths = {page.id: f"/pages/{page.id}" for page in load_panel(panel).pages}
-                take_all(browser, server.url, name, paths)
+                loaded = load_panel(panel)
+                paths = {page.id: f"/pages/{page.id}" for page in loaded.pages}
+                looks = [("theme", theme) for theme in CHOICES["theme"]]
+                looks += [("language", one) for one in loaded.languages if one != loaded.language]
+                take_all(browser, server.url, name, paths, looks)
                 if panel == EXAMPLE:
-                    take_all(browser, server.url, "gallery", {"": "/gallery"})
+                    take_all(browser, server.url, "gallery", {"": "/gallery"}, looks)
                     take_for_readme(browser, server.url)
         browser.close()
 
@@ -53,18 +56,20 @@ def running(panel: Path) -> Iterator[Server]:
         server.end()
 
 
-def take_all(browser: Browser, url: str, name: str, paths: dict[str, str]) -> None:
-    """Every page at every size in every theme: example-cell-dark-1280x800.png."""
-    for theme in CHOICES["theme"]:
+def take_all(
+    browser: Browser, url: str, name: str, paths: dict[str, str], looks: list[tuple[str, str]]
+) -> None:
+    """Every page at every size in every theme and language: example-cell-dark-1280x800.png."""
+    for choice, look in looks:
         context = browser.new_context()
-        context.add_cookies([{"name": COOKIE.format("theme"), "value": theme, "url": url}])
+        context.add_cookies([{"name": COOKIE.format(choice), "value": look, "url": url}])
         page = context.new_page()
         for width, height in SIZES:
             page.set_viewport_size({"width": width, "height": height})
             for part, path in paths.items():
                 page.goto(url + path)
                 page.wait_for_timeout(LOADED_MS)
-                file = f"{'-'.join(filter(None, (name, part)))}-{theme}-{width}x{height}"
+                file = f"{'-'.join(filter(None, (name, part)))}-{look}-{width}x{height}"
                 page.screenshot(path=ALL / f"{file}.png", full_page=name == "gallery" or width < 600)
                 take_tabs(page, file)
         context.close()

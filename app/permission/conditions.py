@@ -57,7 +57,7 @@ def _limits(interlock: Interlock) -> Text:
 
 
 def _now(interlock: Interlock, value: Any, must: TextLike) -> TextLike:
-    """What the robot said: in as few digits as tell it from what it must be."""
+    """The value that was received, in as few digits as distinguish it from the one that is needed."""
     if not isinstance(value, float):
         return _value_text(interlock, value, interlock.unit)
     rounded = (float(f"{value:.{digits}g}") for digits in DIGITS)

@@ -31,8 +31,8 @@ Refusal = Literal[
 
 
 class Passing(NamedTuple):
-    """Control changed by no act: `code` says how, `who` had it, took it or asked for it, and `other` is
-    in control now."""
+    """A change of control without an act: `code` says how, `who` had it, took it or requested it, and
+    `other` is in control now."""
 
     code: str
     who: Principal
@@ -168,7 +168,7 @@ class ControlAuthority:
     # Signs of life.
 
     def keepalive(self, who: Principal, touched: bool) -> None:
-        """A page with scripts is there; `touched` by its operator since it said so last."""
+        """A page with scripts is there; `touched` by its operator since the last call."""
         for party in self._parties(who):
             party.scripted = True
             party.alive_until = self._now() + LIFE_S

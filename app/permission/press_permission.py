@@ -57,8 +57,8 @@ class Question(NamedTuple):
 
 
 class Check(NamedTuple):
-    """`judge` gives a verdict, or None. Where a check locks `alone`, no later one is asked; else what
-    they lock is listed beside it."""
+    """`judge` gives a verdict, or None. Where a check locks `alone`, no later one is made; else what
+    later ones lock is listed beside it."""
 
     name: str
     judge: Callable[[Question], Verdict | None]

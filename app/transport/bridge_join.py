@@ -143,7 +143,7 @@ class GraphMembership:
             await asyncio.sleep(ASK_AGAIN_S)
 
     async def _ask_regularly(self) -> None:
-        """Asks as long as it runs: whatever an answer is, the next one is asked for."""
+        """Queries the bridges at intervals; an answer of any kind, or an error, ends nothing."""
         while True:
             await self._pause(ASK_AGAIN_S if self._bridges.missed or self._unheard else ASK_EVERY_S)
             if self._joined:

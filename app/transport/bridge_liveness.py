@@ -1,5 +1,5 @@
-"""Whether a robot's bridges answer, asked again and again: a cut cable and a frozen bridge are seen by
-their silence, long before Zenoh's lease is over, and whatever lease the bridge is configured with.
+"""Whether a robot's bridges answer queries at short intervals: a cut cable and a frozen bridge are seen
+by their silence, long before Zenoh's lease is over, and whatever lease the bridge is configured with.
 
 A question goes the way of a command, behind all that was sent before: its answer shows that this
 reached the bridge. And it comes behind all that the bridge had sent: after a standstill of the event
@@ -51,7 +51,7 @@ class LivenessDetector:
         self._asked.append(now)
 
     def hear(self, asked: float, now: float) -> None:
-        """An answer: what was asked before it and is not answered does not count any more."""
+        """An answer; earlier queries without an answer do not count any more."""
         while self._asked and self._asked[0] <= asked:
             self._asked.popleft()
         in_time = now - asked <= self.limit
@@ -109,8 +109,8 @@ class BridgeLiveness:
         await asyncio.gather(*tasks, return_exceptions=True)
 
     async def flushed(self) -> bool:
-        """Whether all that was sent until now has reached the bridges: they answer what they are asked
-        after it, and there is no silence before. It takes as long as the way there and back."""
+        """Whether all that was sent until now has reached the bridges: they answer a query that is sent
+        after it, and there is no silence before. It takes one round trip."""
         question = self._ask()
         self._awaited.add(question)
         question.add_done_callback(self._awaited.discard)

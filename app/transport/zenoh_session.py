@@ -166,7 +166,7 @@ class ZenohSession:
             )
 
     def _direct(self, function: Callable[[Any], None]) -> "Callback[Any]":
-        """A handler on the receiving thread, with no thread of its own; deaf once renewed."""
+        """A handler on the receiving thread, with no thread of its own; it ends with `renew`."""
         take = self._inbox.guarded(function)
 
         def handle(what: Any) -> None:

@@ -211,7 +211,7 @@ class Exported(Response):
         await _taken(send, {"type": BODY, "body": b"", "more_body": False})
 
     async def _gone(self, receive: Receive) -> None:
-        """Until who asked is gone."""
+        """Returns when the client has disconnected."""
         while (await receive())["type"] != "http.disconnect":
             pass
         self._export.kill()

@@ -47,7 +47,7 @@ class Acting(BaseModel):
 
 
 class Here(BaseModel):
-    """`touched`: the operator touched the page since it said so last."""
+    """`touched`: the operator has touched the page since its last such message."""
 
     model_config = ConfigDict(extra="forbid", strict=True)
 

@@ -64,7 +64,7 @@ async def metrics(state: CurrentState) -> Response:
 
 
 def _exposition() -> Callable[[Metrics], tuple[bytes, str]]:
-    """Read when it is first asked for, on a thread: it is slow to load, and rarely needed."""
+    """Loaded at the first request, on a thread: it is slow to load, and rarely needed."""
     from app.web.prometheus import exposition
 
     return exposition

@@ -275,7 +275,7 @@ def trends_on(session: RobotSession, page: Page) -> dict[str, Plot]:
 
 
 def asks_of(session: RobotSession, page: Page) -> dict[str, Ask]:
-    """What is asked before the presses of a page that ask first."""
+    """The questions before presses of a page, by the widgets that need one."""
     shown = (*page.widgets, *session.panel.frame.widgets)
     pressed = (w for w in shown if isinstance(w, PressCommand) and w.confirm_press)
     return {widget.id: ask_of(session, widget) for widget in pressed}

@@ -1,4 +1,5 @@
-"""Asking a node for its parameters once more: by itself it is asked only until it does not answer."""
+"""Queries a node for its parameters again: without a request this ends at the first query that gets no
+answer."""
 
 from fastapi import APIRouter, Request
 from fastapi.responses import JSONResponse, RedirectResponse, Response
@@ -15,7 +16,7 @@ router = APIRouter()
 
 
 class Asked(BaseModel):
-    """Whether the node is asked; what it answers comes with the events. `reason` is why it is not."""
+    """Whether the node is queried; its answer comes with the events. `reason` is why it is not."""
 
     asked: bool
     reason: str

@@ -1,4 +1,4 @@
-"""Presses by WebSocket: one for each page that someone touches, for all that is pressed there.
+"""Presses by WebSocket: a page opens one at its first touch, and sends all its presses there.
 
 A press is what a post has in its body, with its `widget`; its `id` is needed, for answers come when
 they are there, in any order. `status` is that of the answer to a post, with a receipt or an `error`:
@@ -57,7 +57,7 @@ async def presses(socket: WebSocket, state: CurrentState, session: CurrentSessio
 
 
 class _PressSocket:
-    """One socket and what is pressed on it; it knows no more of the page than each press says."""
+    """One socket and its presses. What is known of the page is what each press has."""
 
     __slots__ = ("_caller", "_language", "_refused", "_socket", "_state", "_under_way")
 
