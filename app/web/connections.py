@@ -28,7 +28,7 @@ class Connection(HttpToolsProtocol):
     _due: asyncio.TimerHandle | None = None  # while a head is waited for
     _head = 0
 
-    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override] # as uvicorn's
         super().connection_made(transport)
         if self._crowded():
             self._tell()

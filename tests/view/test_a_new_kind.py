@@ -24,7 +24,9 @@ def add(path: Path, code: str) -> None:
     if not path.exists():
         path.write_text(code)
         return
-    imports, table, row = re.fullmatch(r"(.*?)\n\n(.*? = \{\n)(.*)", code, re.DOTALL).groups()  # type: ignore[union-attr]
+    parts = re.fullmatch(r"(.*?)\n\n(.*? = \{\n)(.*)", code, re.DOTALL)
+    assert parts is not None, f"no imports, table and row for {path}: {code}"
+    imports, table, row = parts.groups()
     text = path.read_text()
     assert text.count(table) == 1, f"{path} has no {table}"
     text = text.replace(table, table + row).replace("\nfrom app.", f"\n{imports}\nfrom app.", 1)

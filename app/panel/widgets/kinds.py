@@ -53,7 +53,7 @@ KINDS: Final[Mapping[str, type[BaseWidget]]] = {
 if TYPE_CHECKING:
     Widget = BaseWidget
 else:
-    Widget = Annotated[Union[tuple(KINDS.values())], Field(discriminator="kind")]  # noqa: UP007
+    Widget = Annotated[Union[tuple(KINDS.values())], Field(discriminator="kind")]  # noqa: UP007 - no `|` of a table
 
 Row = TypeVar("Row")
 

@@ -43,6 +43,6 @@ write_catalogue(Path(_folder.name), "ja", JAPANESE)
 _catalogues = catalogues_in(Path(_folder.name))
 _catalogues.__enter__()
 
-from app.main import app  # noqa: E402
+from app.main import app  # noqa: E402 - it reads the catalogues above
 
 __all__ = ["app"]
