@@ -15,7 +15,7 @@ from playwright.sync_api import Browser, Page, expect, sync_playwright
 
 from app.i18n import ENGLISH, sentences
 from tests.needs import needs_part, needs_parts
-from tests.support import domains
+from tests.support import domains, holds
 from tests.support.fonts import fonts_file
 from tests.support.parts import (
     BRIDGE,
@@ -116,6 +116,15 @@ def node(domain: int, bridge: Bridge) -> Iterator[RosNode]:
     shared.end()
 
 
+@pytest.fixture(scope="module")
+def jogger(node: RosNode) -> Iterator[RosNode]:
+    """The node of a robot that is jogged: it listens, and says whether operation is permitted."""
+    node.subscribe(holds.TOPIC, "geometry_msgs/msg/Point", depth=1000)
+    node.advertise("/operation_enabled", "std_msgs/msg/Bool")
+    yield node
+    node.withdraw("/operation_enabled")
+
+
 @pytest.fixture
 def own_bridge(domain: int) -> Iterator[Bridge]:
     """A bridge on a domain of its own, to be ended, frozen and started at will."""
@@ -207,6 +216,13 @@ def chromium(fonts: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[B
         browser = playwright.chromium.launch(executable_path=HEADLESS, args=CHROMIUM_FLAGS, env=env)
         yield browser
         browser.close()
+
+
+@pytest.fixture
+def without_scripts(chromium: Browser) -> Iterator[Page]:
+    """A page in a browser that runs no scripts."""
+    with chromium.new_context(java_script_enabled=False) as context:
+        yield context.new_page()
 
 
 @pytest.fixture

@@ -27,12 +27,10 @@ from app.audit.export import FIELDS, csv_chunks
 from app.audit.store import Store
 from app.errors import LogError, TooMany
 from app.web.routes import audit_log as routes
-from tests.browser import test_holds_in_browser
-from tests.browser.test_holds_in_browser import PANEL, permit
-from tests.support.parts import Bridge, RosNode, Server, http_client, live, until
+from tests.support.holds import PANEL, permit
+from tests.support.parts import Bridge, RosNode, Server, http_client, until
+from tests.support.servers import live_server
 from tests.web.test_hold_socket import Socket, opened
-
-jogger = test_holds_in_browser.jogger
 
 ENTRIES = 100_000
 EXPORTERS = 4
@@ -97,9 +95,7 @@ def kiosk(
     tmp_path: Path,
     servers: Callable[[Server], Server],
 ) -> Server:
-    panel = tmp_path / "jog.toml"
-    panel.write_text(PANEL + SAY)
-    mine = servers(live(bridge.endpoint, tmp_path, KIOSK_PANEL=str(panel), KIOSK_DATA=str(data)))
+    mine = servers(live_server(bridge, tmp_path, PANEL + SAY, KIOSK_DATA=str(data)))
     permit(mine, jogger, True)
     return mine
 

@@ -21,8 +21,9 @@ from app.audit.database import NAME
 from app.audit.verify import verify
 from app.permission.clients import new_token, public_id
 from app.web.client_cookie import COOKIE
-from tests.browser.test_holds_in_browser import PANEL as HOLDING
+from tests.support.holds import PANEL as HOLDING
 from tests.support.parts import ROOT, Process, Server, free_port, until
+from tests.support.servers import demo_server
 
 FULL = "The operator's log cannot be written: no space left on device."
 # A data folder on a disk of its own, which only the server and its children see.
@@ -231,14 +232,8 @@ def test_a_filter_narrows_page_and_csv_alike(demo: Server) -> None:
 
 
 def test_holds_can_be_filtered_by_and_have_their_names(tmp_path: Path) -> None:
-    panel = tmp_path / "jog.toml"
-    panel.write_text(HOLDING)
-    server = Server(ROOT, KIOSK_PANEL=str(panel), KIOSK_MODE="demo")
-    try:
-        until(server.ready, "ready")
+    with demo_server(tmp_path, HOLDING) as server:
         assert '<option value="jog">Jog</option>' in server.http.get("/log").text
-    finally:
-        server.end()
 
 
 def test_a_bad_filter_is_named(demo: Server) -> None:

@@ -26,9 +26,10 @@ from app.commands.presses import Presses
 from app.commands.receipts import RECEIPTS_KEPT, Receipt
 from app.errors import LogError
 from app.robot.state import RobotState
-from tests.browser.test_holds_in_browser import PANEL
 from tests.support.builders import COUNT, panel_of, permits, presses_of, robot_there, small_panel
-from tests.support.parts import ROOT, Server, until
+from tests.support.holds import PANEL
+from tests.support.parts import Server, until
+from tests.support.servers import demo_server
 from tests.support.words import english
 from tests.web.test_hold_socket import opened
 
@@ -48,11 +49,8 @@ message = { data = "{speed}" }
 
 @pytest.fixture
 def demo(tmp_path: Path) -> Iterator[Server]:
-    (tmp_path / "jog.toml").write_text(PANEL + DRIVE)
-    mine = Server(ROOT, KIOSK_PANEL=str(tmp_path / "jog.toml"), KIOSK_MODE="demo")
-    until(mine.ready, "ready")
-    yield mine
-    mine.end()
+    with demo_server(tmp_path, PANEL + DRIVE) as mine:
+        yield mine
 
 
 class Counted:

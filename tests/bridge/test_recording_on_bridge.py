@@ -11,9 +11,10 @@ from mcap.reader import make_reader
 from mcap.records import Channel, Message, Schema
 from mcap.stream_reader import StreamReader
 
-from tests.browser.test_holds_in_browser import PANEL
 from tests.interfaces.test_cdr_on_ros import RosCodec
+from tests.support.holds import PANEL
 from tests.support.parts import ROOT, Bridge, RosNode, Server, live, until
+from tests.support.servers import demo_server
 from tests.web.test_hold_socket import held, opened
 
 LOG = "rcl_interfaces/msg/Log"
@@ -129,12 +130,7 @@ def presses(found: Mapping[str, list[Record]]) -> list[tuple[str, str | None, st
 def test_a_hold_is_recorded_from_its_begin_to_its_end(
     tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:
-    (tmp_path / "jog.toml").write_text(PANEL + RECORD)
-    data = str(tmp_path / "data")
-    kiosk = servers(
-        Server(ROOT, KIOSK_PANEL=str(tmp_path / "jog.toml"), KIOSK_MODE="demo", KIOSK_DATA=data)
-    )
-    until(kiosk.ready, "ready")
+    kiosk = servers(demo_server(tmp_path, PANEL + RECORD, KIOSK_DATA=str(tmp_path / "data")))
     with opened(kiosk) as socket:
         assert socket.begin(inputs={"speed": 99})["state"] == "refused"
     with held(kiosk) as socket:

@@ -9,13 +9,9 @@ from typing import Final
 import pytest
 from playwright.sync_api import Browser, Page, Route, expect
 
-from tests.browser import test_holds_in_browser
-from tests.browser.test_holds_in_browser import TOPIC, TRIES, Finger, begun, ended, has_ended, jogging
+from tests.support.finger import Finger, jogged
+from tests.support.holds import PATIENT, TOPIC, TRIES, codes, ended, has_ended, jogging
 from tests.support.parts import Bridge, RosNode, Server, has_heard, until
-from tests.web.test_hold_socket import PATIENT
-
-jogger = test_holds_in_browser.jogger
-touched = test_holds_in_browser.touched
 
 # A network on which each message takes 45 ms.
 SLOW: Final = """
@@ -45,7 +41,7 @@ def test_a_tap_over_a_slow_way_has_its_receipt(
     context.add_init_script(SLOW)
     finger = Finger(context.new_page(), kiosk)
     for _ in range(TRIES):
-        ends = len(ended(kiosk))
+        ends = len(codes(kiosk))
         finger.down()
         finger.page.wait_for_timeout(tap_ms)
         finger.up()
@@ -57,57 +53,52 @@ def test_a_tap_over_a_slow_way_has_its_receipt(
     else:
         raise AssertionError(said)
     until(lambda: not kiosk.widget("jog")["held"], "no longer held")
-    assert [code for code, _ in ended(kiosk)[ends:]] in ([], ["hold_released"])
+    assert codes(kiosk, ends) in ([], ["hold_released"])
     context.close()
 
 
-def test_a_key_that_is_held_is_a_hold_and_its_repeats_are_none(
-    touched: Finger, jogger: RosNode
-) -> None:
+def test_a_key_that_is_held_is_a_hold_and_its_repeats_are_none(finger: Finger, jogger: RosNode) -> None:
     for _ in range(TRIES):
-        ends, before = len(ended(touched.server)), len(jogger.heard(TOPIC))
-        touched.button.focus()
-        touched.page.keyboard.down(" ")
+        ends, before = len(codes(finger.server)), len(jogger.heard(TOPIC))
+        finger.button.focus()
+        finger.page.keyboard.down(" ")
         for _ in range(5):
-            touched.page.keyboard.down(" ")  # what a keyboard repeats
+            finger.page.keyboard.down(" ")  # what a keyboard repeats
         until(partial(has_heard, jogger, TOPIC, before + 5), "it moves")
-        touched.page.keyboard.up(" ")
-        until(partial(has_ended, touched.server, ends), "it ends")
-        if ended(touched.server)[ends:][0][0] == "hold_released":
+        finger.page.keyboard.up(" ")
+        until(partial(has_ended, finger.server, ends), "it ends")
+        if codes(finger.server)[ends] == "hold_released":
             return
-    raise AssertionError(ended(touched.server))
+    raise AssertionError(ended(finger.server))
 
 
 def test_another_browser_sees_it_and_is_refused(
-    touched: Finger, chromium: Browser, jogger: RosNode
+    finger: Finger, chromium: Browser, jogger: RosNode
 ) -> None:
     context = chromium.new_context(has_touch=True)
-    other = Finger(context.new_page(), touched.server)
+    other = Finger(context.new_page(), finger.server)
     holding = other.page.locator('[data-widget="jog"] .holding')
     said = other.page.locator("#receipt-jog")
     for _ in range(TRIES):
-        _, ends = begun(touched, jogger)
+        _, ends = jogged(finger, jogger)
         with suppress(AssertionError):  # it ended before that could be seen
             expect(holding).to_contain_text("Held since")
             other.down()
             expect(said).not_to_be_empty()
         other.up()
-        touched.up()
-        until(partial(has_ended, touched.server, ends), "it ends")
-        if ended(touched.server)[ends][0] == "hold_released":
+        finger.up()
+        until(partial(has_ended, finger.server, ends), "it ends")
+        if codes(finger.server)[ends] == "hold_released":
             break
     expect(said).to_contain_text("held by another browser")
     expect(holding).to_have_text("")
     context.close()
 
 
-def test_without_scripts_it_is_locked_and_says_why(chromium: Browser, kiosk: Server) -> None:
-    context = chromium.new_context(java_script_enabled=False)
-    page = context.new_page()
-    page.goto(kiosk.url)
-    expect(page.get_by_role("button", name="Jog")).to_be_disabled()
-    expect(page.locator("#why-jog")).to_contain_text("hold-to-run needs JavaScript")
-    context.close()
+def test_without_scripts_it_is_locked_and_says_why(without_scripts: Page, kiosk: Server) -> None:
+    without_scripts.goto(kiosk.url)
+    expect(without_scripts.get_by_role("button", name="Jog")).to_be_disabled()
+    expect(without_scripts.locator("#why-jog")).to_contain_text("hold-to-run needs JavaScript")
 
 
 def test_a_page_that_did_not_load_whole_is_loaded_again(kiosk: Server, page: Page) -> None:

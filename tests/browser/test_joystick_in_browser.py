@@ -2,11 +2,9 @@
 way in which it ends, with zeros and nothing after."""
 
 import os
-import re
 import signal
 import time
 from collections.abc import Callable, Iterator
-from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
@@ -14,8 +12,12 @@ from typing import Any, Final
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from tests.browser.test_holds_in_browser import BREAKABLE, SCRIPTS, own_chromium
-from tests.support.parts import Bridge, RosNode, Server, live, until
+from tests.support import holds
+from tests.support.finger import SCRIPTS, Finger, begun, ended_by, own_chromium
+from tests.support.holds import QUIET_S, TRIES, codes, has_ended
+from tests.support.pages import place, widget
+from tests.support.parts import Bridge, RosNode, Server, until
+from tests.support.servers import kept_running, live_server
 
 pytestmark = pytest.mark.real_time
 
@@ -48,9 +50,6 @@ interlock = "operation"
 shape = "square"
 """
 TOPIC: Final = "/stick"
-TRIES: Final = 5
-QUIET_S: Final = 0.4
-ENDED: Final = re.compile(r"hold \w+ of (?:stick|stamped) by .* ended after .* \((\w+)\): ")
 Twist = tuple[float, float]
 
 
@@ -68,19 +67,12 @@ def running(
     bridge: Bridge, robot: RosNode, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[Callable[[], Server]]:
     """Gives the kiosk of this file, and another one where a test ended that."""
-    servers: list[Server] = []
 
-    def one() -> Server:
-        if not servers or not servers[-1].process.running:
-            panel = tmp_path_factory.mktemp("stick") / "stick.toml"
-            panel.write_text(PANEL)
-            servers.append(live(bridge.endpoint, panel.parent, KIOSK_PANEL=str(panel)))
-            until(servers[-1].ready, "ready")
-        return servers[-1]
+    def start() -> Server:
+        return live_server(bridge, tmp_path_factory.mktemp("stick"), PANEL)
 
-    yield one
-    for server in servers:
-        server.end()
+    with kept_running(start) as running:
+        yield running
 
 
 @pytest.fixture
@@ -91,72 +83,38 @@ def kiosk(running: Callable[[], Server], robot: RosNode) -> Server:
 
 
 def permit(server: Server, robot: RosNode, permitted: bool) -> None:
-    def says() -> bool:
-        robot.publish("/stick_enabled", {"data": permitted})
-        return bool(server.widget("stick")["enabled"]) is permitted
-
-    until(says, f"permitted: {permitted}", every_s=0.2)
+    holds.permit(server, robot, permitted, "/stick_enabled", "stick")
 
 
 @pytest.fixture
-def thumb(chromium: Browser, kiosk: Server) -> Iterator["Thumb"]:
-    context = chromium.new_context(viewport={"width": 1280, "height": 800}, has_touch=True)
-    context.set_default_timeout(10_000)
-    yield Thumb(context.new_page(), kiosk)
-    context.close()
+def thumb(touch_page: Page, kiosk: Server) -> "Thumb":
+    return Thumb(touch_page, kiosk)
 
 
-class Thumb:
+class Thumb(Finger):
     """A page with joysticks, and a finger on one of them."""
 
-    def __init__(self, page: Page, server: Server, widget: str = "stick") -> None:
-        self.page = page
-        self.server = server
-        self.root = page.locator(f'[data-widget="{widget}"]')
-        self.button = self.root.locator(".hold")
-        self._touch = page.context.new_cdp_session(page)
-        self._touches = False
-        page.add_init_script(BREAKABLE)
-        self.opens()
+    def __init__(self, page: Page, server: Server, name: str = "stick") -> None:
+        self.root = widget(page, name)
+        self.pad = self.root.locator(".pad")
+        super().__init__(page, server, self.root.locator(".hold"), self.pad)
 
     def opens(self) -> None:
-        self.up()
-        self.page.goto(self.server.url)
-        expect(self.button).to_be_enabled()
-        self.root.scroll_into_view_if_needed()
-        box = self.root.locator(".pad").bounding_box()
-        assert box is not None
-        self.x, self.y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-        self.far = box["width"] / 2
-
-    def _send(self, kind: str, *points: tuple[float, float]) -> None:
-        touches = [{"x": x, "y": y, "id": n} for n, (x, y) in enumerate(points)]
-        self._touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": touches})
+        super().opens()
+        self.far = place(self.pad)["width"] / 2
 
     def at(self, x: float, y: float) -> tuple[float, float]:
         return self.x + x * self.far, self.y - y * self.far
 
-    def down(self, x: float = 0.0, y: float = 0.0) -> None:
-        self._send("touchStart", self.at(x, y))
-        self._touches = True
+    def hold(self) -> None:
+        self.down()
+        self.move(0, 2)  # further than the pad: the finger stays with it
 
     def move(self, x: float, y: float) -> None:
-        self._send("touchMove", self.at(x, y))
-
-    def up(self) -> None:
-        if self._touches:
-            self._touches = False
-            self._send("touchEnd")
-
-    def cancel(self) -> None:
-        self._touches = False
-        self._send("touchCancel")
+        self.touch.send("touchMove", self.at(x, y))
 
     def second(self) -> None:
-        self._send("touchStart", self.at(0, 1), (5, 5))
-
-    def does(self, script: str) -> None:
-        self.page.evaluate(script)
+        self.touch.send("touchStart", self.at(0, 1), (5, 5))
 
     @property
     def knob(self) -> tuple[float, float]:
@@ -170,12 +128,8 @@ def heard(robot: RosNode, before: int = 0) -> list[Twist]:
     return [(one["linear"]["x"], one["angular"]["z"]) for one in robot.heard(TOPIC)[before:]]
 
 
-def ends_of(server: Server) -> list[str]:
-    return [one[1] for one in map(ENDED.search, list(server.process.lines)) if one]
-
-
-def has_ended(server: Server, ends: int) -> bool:
-    return len(ends_of(server)) > ends
+def stopped(robot: RosNode) -> bool:
+    return heard(robot)[-1] == (0.0, 0.0)
 
 
 def drives(robot: RosNode, before: int) -> bool:
@@ -183,40 +137,19 @@ def drives(robot: RosNode, before: int) -> bool:
 
 
 def driving(thumb: Thumb, robot: RosNode) -> tuple[int, int]:
-    """Holds until the robot drives: how much was heard before, and how many holds had ended."""
-    for _ in range(TRIES):
-        before, ends = len(robot.heard(TOPIC)), len(ends_of(thumb.server))
-        thumb.down()
-        thumb.move(0, 2)  # further than the pad: the finger stays with it
-        with suppress(AssertionError):
-            until(partial(drives, robot, before), "it drives", within_s=3)
-            return before, ends
-        thumb.up()
-    raise AssertionError(f"it never drove: {thumb.server.process.text}")
+    """Holds until the robot drives, as `begun`."""
+    return begun(thumb, robot, TOPIC, drives)
 
 
-def ended_by(
+def drive_ended_by(
     thumb: Thumb, robot: RosNode, cause: Callable[[], Any], code: str, lift: bool = True
 ) -> None:
     """Drives, lets the cause happen: for that reason it ends, with zeros, and nothing comes after."""
-    found: list[str] = []
-    for attempt in range(TRIES):
-        if attempt:
-            thumb.opens()
-        before, ends = driving(thumb, robot)
-        cause()
-        until(partial(has_ended, thumb.server, ends), "it ends")
-        until(lambda: heard(robot)[-1] == (0.0, 0.0), "it stops")
-        time.sleep(QUIET_S)  # longer than a lease: what comes after it would show
-        if lift:
-            thumb.up()
-        found = ends_of(thumb.server)[ends:]
-        if found == [code]:
-            sent = heard(robot, before)
-            drove = sent.index((0.5, 0.0))
-            assert sent[drove:] == [(0.5, 0.0)] * (len(sent) - drove - 1) + [(0.0, 0.0)]
-            return
-    raise AssertionError(f"it ended otherwise: {found}")
+    begin, zeros = partial(driving, thumb, robot), partial(stopped, robot)
+    before, _ = ended_by(thumb, begin, cause, code, lift, zeros)
+    sent = heard(robot, before)
+    drove = sent.index((0.5, 0.0))
+    assert sent[drove:] == [(0.5, 0.0)] * (len(sent) - drove - 1) + [(0.0, 0.0)]
 
 
 TOUCHES: Final = {
@@ -229,7 +162,7 @@ TOUCHES: Final = {
 @pytest.mark.parametrize("cause", TOUCHES)
 def test_a_finger_that_goes_ends_it(thumb: Thumb, robot: RosNode, cause: str) -> None:
     name, code = TOUCHES[cause]
-    ended_by(thumb, robot, getattr(thumb, name), code)
+    drive_ended_by(thumb, robot, getattr(thumb, name), code)
     assert thumb.knob == (0.0, 0.0)
     expect(thumb.root.locator('[data-axis="y"]')).to_have_text("")
 
@@ -237,14 +170,14 @@ def test_a_finger_that_goes_ends_it(thumb: Thumb, robot: RosNode, cause: str) ->
 @pytest.mark.parametrize("cause", SCRIPTS)
 def test_a_page_that_goes_ends_it(thumb: Thumb, robot: RosNode, cause: str) -> None:
     script, code = SCRIPTS[cause]
-    ended_by(thumb, robot, partial(thumb.does, script), code)
+    drive_ended_by(thumb, robot, partial(thumb.does, script), code)
 
 
 def test_lost_permission_ends_it(thumb: Thumb, robot: RosNode) -> None:
     def forbid() -> None:
         robot.publish("/stick_enabled", {"data": False})
 
-    ended_by(thumb, robot, forbid, "forbidden", lift=False)
+    drive_ended_by(thumb, robot, forbid, "forbidden", lift=False)
     expect(thumb.button).to_be_disabled()
     expect(thumb.root.locator('[data-text="reason"]')).to_contain_text("does not permit operation")
     count = len(robot.heard(TOPIC))
@@ -274,8 +207,8 @@ def test_a_browser_that_goes_ends_it(
             _, ends = driving(thumb, robot)
             os.killpg(group, number)
             until(partial(has_ended, kiosk, ends), "it ends")
-            until(lambda: heard(robot)[-1] == (0.0, 0.0), "it stops")
-        found = ends_of(kiosk)[ends:]
+            until(partial(stopped, robot), "it stops")
+        found = codes(kiosk, ends)
         if found == [code]:
             return
     raise AssertionError(f"it ended otherwise: {found}")
@@ -285,8 +218,8 @@ def test_the_servers_end_stops_the_robot_first(thumb: Thumb, robot: RosNode) -> 
     _, ends = driving(thumb, robot)
     thumb.server.process.send(signal.SIGTERM)
     thumb.server.process.wait(10)
-    until(lambda: heard(robot)[-1] == (0.0, 0.0), "it stops")
-    assert ends_of(thumb.server)[ends:] == ["hold_by_stopping"]
+    until(partial(stopped, robot), "it stops")
+    assert codes(thumb.server, ends) == ["hold_by_stopping"]
 
 
 def test_the_knob_follows_the_finger_and_the_server_says_what_it_sent(
@@ -300,7 +233,7 @@ def test_the_knob_follows_the_finger_and_the_server_says_what_it_sent(
     expect(thumb.root.locator('[data-axis="x"]')).to_have_text("−1.00 rad/s")
     expect(thumb.root.locator('[data-axis="y"]')).to_have_text("0.00 m/s")
     thumb.move(0.04, 0.0)
-    until(lambda: heard(robot)[-1] == (0.0, 0.0), "the dead zone is zero")
+    until(partial(stopped, robot), "the dead zone is zero")
     thumb.up()
     assert thumb.knob == (0.0, 0.0)
     assert all(abs(drive) <= 0.5 and abs(turn) <= 1.0 for drive, turn in heard(robot, before))
@@ -316,8 +249,8 @@ def test_arrow_keys_deflect_it(thumb: Thumb, robot: RosNode) -> None:
     thumb.page.keyboard.up("ArrowUp")
     until(lambda: heard(robot)[-1] == (0.0, 1.0), "it turns only")
     thumb.page.keyboard.up("ArrowLeft")
-    until(lambda: heard(robot)[-1] == (0.0, 0.0), "it stops")
-    until(lambda: ends_of(thumb.server)[-1:] == ["hold_released"], "released")
+    until(partial(stopped, robot), "it stops")
+    until(lambda: codes(thumb.server)[-1:] == ["hold_released"], "released")
 
 
 def test_a_stamped_twist_has_its_time_and_frame(thumb: Thumb, robot: RosNode) -> None:
@@ -342,24 +275,21 @@ def test_a_stamped_twist_has_its_time_and_frame(thumb: Thumb, robot: RosNode) ->
 def test_a_finger_elsewhere_does_not_move_it(thumb: Thumb, robot: RosNode) -> None:
     """It ends, as with any hold; and a finger that is first elsewhere begins nothing."""
     before = len(robot.heard(TOPIC))
-    thumb._send("touchStart", (5, 5))
-    thumb._send("touchStart", (5, 5), thumb.at(0, 1))
-    thumb._send("touchMove", (60, 60), thumb.at(1, 0))
+    thumb.touch.send("touchStart", (5, 5))
+    thumb.touch.send("touchStart", (5, 5), thumb.at(0, 1))
+    thumb.touch.send("touchMove", (60, 60), thumb.at(1, 0))
     time.sleep(QUIET_S)
     assert len(robot.heard(TOPIC)) == before
-    thumb._send("touchEnd")
+    thumb.touch.send("touchEnd")
 
 
-def test_without_scripts_it_is_locked_and_says_why(chromium: Browser, kiosk: Server) -> None:
-    with chromium.new_context(java_script_enabled=False) as context:
-        page = context.new_page()
-        page.goto(kiosk.url)
-        expect(page.locator('[data-widget="stick"] button')).to_be_disabled()
-        reason = page.locator('[data-widget="stick"] [data-text="reason"]')
-        expect(reason).to_contain_text("needs JavaScript")
+def test_without_scripts_it_is_locked_and_says_why(without_scripts: Page, kiosk: Server) -> None:
+    without_scripts.goto(kiosk.url)
+    stick = widget(without_scripts, "stick")
+    expect(stick.locator("button")).to_be_disabled()
+    expect(stick.locator('[data-text="reason"]')).to_contain_text("needs JavaScript")
 
 
 def test_it_is_large_enough_for_a_glove(thumb: Thumb) -> None:
-    box = thumb.button.bounding_box()
-    assert box is not None
+    box = place(thumb.button)
     assert min(box["width"], box["height"]) * 0.22 >= 59.9

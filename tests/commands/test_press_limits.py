@@ -13,13 +13,14 @@ from typing import Any
 
 import httpx
 import pytest
-from playwright.sync_api import Browser
+from playwright.sync_api import Page
 
 from app.commands.press_limits import CLIENT_QUOTA
 from app.web.routes.press_socket import MOST_REFUSED
-from tests.browser.test_holds_in_browser import PANEL
 from tests.support.apps.small import PRESSES
-from tests.support.parts import ROOT, TAP_AGAIN_MS, Server, until
+from tests.support.holds import PANEL
+from tests.support.parts import TAP_AGAIN_MS, Server, until
+from tests.support.servers import demo_server
 from tests.web.test_hold_socket import opened
 
 FREE = """
@@ -45,17 +46,13 @@ numbers = count()
 
 
 def serving(folder: Path, **more: Any) -> Server:
-    (folder / "free.toml").write_text(PANEL + FREE)
-    mine = Server(ROOT, KIOSK_PANEL=str(folder / "free.toml"), KIOSK_MODE="demo", **more)
-    until(mine.ready, "ready")
-    return mine
+    return demo_server(folder, PANEL + FREE, **more)
 
 
 @pytest.fixture(scope="module")
 def strict(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    mine = serving(tmp_path_factory.mktemp("strict"), app="tests.support.apps.strict:app")
-    yield mine
-    mine.end()
+    with serving(tmp_path_factory.mktemp("strict"), app="tests.support.apps.strict:app") as mine:
+        yield mine
 
 
 def free(server: Server, **more: Any) -> httpx.Response:
@@ -118,9 +115,8 @@ def test_a_form_goes_back_to_its_page_with_the_reason(strict: Server) -> None:
     assert TOO_OFTEN in strict.http.get(until(refused, "a form is one too many")).text
 
 
-def test_a_page_without_scripts_shows_the_reason(strict: Server, chromium: Browser) -> None:
-    context = chromium.new_context(java_script_enabled=False)
-    page = context.new_page()
+def test_a_page_without_scripts_shows_the_reason(strict: Server, without_scripts: Page) -> None:
+    page = without_scripts
 
     def said() -> str:
         page.goto(strict.url)
@@ -131,7 +127,6 @@ def test_a_page_without_scripts_shows_the_reason(strict: Server, chromium: Brows
         return page.locator("#receipt-free").inner_text()
 
     until(lambda: TOO_OFTEN in said(), "it is one too many")
-    context.close()
 
 
 def test_a_press_on_a_socket_is_told_so_and_a_flood_closes_it(strict: Server) -> None:

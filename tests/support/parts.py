@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from copy import copy
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import httpx
 from websockets.exceptions import ConnectionClosed
@@ -376,6 +376,12 @@ class Server:
     def stream(self) -> Iterator["Stream"]:
         with self.http.stream("GET", f"{self.base}/events", timeout=ENOUGH_S) as response:
             yield Stream(response)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.end()
 
     def end(self, number: signal.Signals = signal.SIGTERM, timeout_s: float = 25) -> int:
         self.http.close()

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from socket import create_connection
-from typing import Any, Final
+from typing import Any
 
 import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
@@ -21,36 +21,23 @@ from websockets.sync.client import ClientConnection, connect
 
 from app.audit.database import NAME
 from app.web.client_cookie import COOKIE
-from tests.browser.test_holds_in_browser import PANEL, jogging, permit
-from tests.support.parts import ENOUGH_S, ROOT, Bridge, RosNode, Server, events_in, http_client, until
-
-TRIES: Final = 5
-PATIENT: Final = "tests.support.apps.patient:app"
-SHIPPED: Final = "app.main:app"
-
-
-def in_demo(folder: Path, app: str = PATIENT, **more: Any) -> Server:
-    """A server whose demo robot can be jogged, by the panel `jog.toml`."""
-    panel = folder / "jog.toml"
-    panel.write_text(PANEL)
-    return Server(ROOT, app=app, KIOSK_PANEL=str(panel), KIOSK_MODE="demo", **more)
+from tests.support.holds import PANEL, PATIENT, TRIES, jogging, permit
+from tests.support.parts import ENOUGH_S, Bridge, RosNode, Server, events_in, http_client, until
+from tests.support.servers import demo_server
 
 
 @pytest.fixture(scope="module")
 def demo(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    mine = in_demo(tmp_path_factory.mktemp("panel"))
-    until(mine.ready, "ready")
-    yield mine
-    mine.end()
+    """A server whose demo robot can be jogged."""
+    with demo_server(tmp_path_factory.mktemp("panel"), PANEL, app=PATIENT) as mine:
+        yield mine
 
 
 @pytest.fixture(scope="module")
 def prompt(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     """A server whose leases are as short as they are."""
-    mine = in_demo(tmp_path_factory.mktemp("prompt"), SHIPPED)
-    until(mine.ready, "ready")
-    yield mine
-    mine.end()
+    with demo_server(tmp_path_factory.mktemp("prompt"), PANEL) as mine:
+        yield mine
 
 
 class Socket:
@@ -155,13 +142,8 @@ interlock = "operation"
 @pytest.mark.parametrize("kind", ["hold", "joystick"])
 def test_a_hold_ends_when_another_panel_takes_control(tmp_path: Path, kind: str) -> None:
     text = PANEL if kind == "hold" else PANEL[: PANEL.index('id = "jog"')] + STICK
-    panel = tmp_path / "jog.toml"
-    panel.write_text(text.replace("[[interlock]]", "[control]\nrequired = true\n[[interlock]]", 1))
-    mine = Server(
-        ROOT, app=PATIENT, KIOSK_PANEL=str(panel), KIOSK_MODE="demo", KIOSK_PROXIES="127.0.0.1"
-    )
-    try:
-        until(mine.ready, "ready")
+    panel = text.replace("[[interlock]]", "[control]\nrequired = true\n[[interlock]]", 1)
+    with demo_server(tmp_path, panel, app=PATIENT, KIOSK_PROXIES="127.0.0.1") as mine:
         far = {"x-forwarded-for": "192.0.2.1"}
         with http_client(mine.url, headers=far) as first, http_client(mine.url) as cell:
             for client in (first, cell):
@@ -176,8 +158,6 @@ def test_a_hold_ends_when_another_panel_takes_control(tmp_path: Path, kind: str)
                 said = socket.hear()
                 assert (said["state"], said["outcome"]) == ("ended", "aborted")
                 assert "The panel at the cell has control of the robot." in said["reason"]
-    finally:
-        mine.end()
 
 
 def test_an_input_with_a_default_may_be_left_out(demo: Server) -> None:
@@ -356,11 +336,8 @@ def test_each_of_several_robots_is_held_on_its_own(tmp_path: Path) -> None:
     robots = "".join(
         f'[[robot]]\nid = "{one}"\nname = "{one}"\nnamespace = "/{one}"\n' for one in ("r1", "r2")
     )
-    panel = tmp_path / "two.toml"
-    panel.write_text(PANEL.replace("[[interlock]]", robots + "[[interlock]]"))
-    server = Server(ROOT, app=PATIENT, KIOSK_PANEL=str(panel), KIOSK_MODE="demo")
-    try:
-        until(server.ready, "ready")
+    panel = PANEL.replace("[[interlock]]", robots + "[[interlock]]")
+    with demo_server(tmp_path, panel, app=PATIENT) as server:
         with held(server.robot("r2")) as socket:
             assert server.robot("r1").widget("jog")["held"] is False
             assert server.robot("r2").widget("jog")["held"] is True
@@ -369,8 +346,6 @@ def test_each_of_several_robots_is_held_on_its_own(tmp_path: Path) -> None:
         for path in ("/robots/r3/widgets/jog/hold", "/widgets/jog/hold"):
             with pytest.raises(InvalidStatus), connect(f"ws://127.0.0.1:{server.port}{path}"):
                 raise AssertionError("it opened")
-    finally:
-        server.end()
 
 
 def test_a_lost_bridge_ends_it_and_what_could_not_be_said_is_not_said_later(
@@ -434,11 +409,9 @@ def at_a_terminal() -> Iterator[None]:
 
 @pytest.mark.usefixtures("at_a_terminal")
 def test_a_terminal_that_closes_ends_it_as_any_end_of_the_server(
-    tmp_path: Path, servers: Callable[[Server], Server]
+    tmp_path: Path,
 ) -> None:
-    mine = servers(in_demo(tmp_path))
-    until(mine.ready, "ready")
-    with held(mine) as socket:
+    with demo_server(tmp_path, PANEL, app=PATIENT) as mine, held(mine) as socket:
         mine.process.send(signal.SIGHUP)
         said = socket.beat_until_it_ends()
     assert said["outcome"] == "aborted"
@@ -462,10 +435,9 @@ def test_a_server_that_ends_tells_it_though_the_robot_has_to_be_asked_first(
 
 
 def test_a_server_that_ends_waits_for_no_browser_that_does_not_close(
-    tmp_path: Path, servers: Callable[[Server], Server]
+    tmp_path: Path,
 ) -> None:
-    mine = servers(in_demo(tmp_path))
-    with held(mine) as socket:
+    with demo_server(tmp_path, PANEL, app=PATIENT) as mine, held(mine) as socket:
         mine.process.send(signal.SIGTERM)
         assert socket.beat_until_it_ends()["state"] == "ended"
         assert socket.closed() in (1000, 1012)

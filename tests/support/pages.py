@@ -1,0 +1,29 @@
+"""What tests do with any page."""
+
+from typing import Final
+
+from playwright.sync_api import FloatRect, Locator, Page
+
+# Hides a page as another window in front of it does; with `false` it shows again.
+HIDE: Final = """(hidden) => {
+  Object.defineProperty(document, "hidden", { value: hidden ?? true, configurable: true });
+  document.dispatchEvent(new Event("visibilitychange"));
+}"""
+
+
+def widget(page: Page, name: str) -> Locator:
+    """The element of a widget, by its id."""
+    return page.locator(f'[data-widget="{name}"]')
+
+
+def place(found: Locator) -> FloatRect:
+    """Where a visible element is, in px of the window."""
+    box = found.bounding_box()
+    assert box is not None, f"{found} is not visible"
+    return box
+
+
+def middle(found: Locator) -> tuple[float, float]:
+    """The middle of a visible element, in px of the window."""
+    box = place(found)
+    return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2

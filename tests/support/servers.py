@@ -1,0 +1,52 @@
+"""Servers with a panel of the test's own, ready when they are given."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from tests.support.parts import ROOT, Bridge, Server, live, until
+
+
+def demo_server(folder: Path, panel: str, **more: Any) -> Server:
+    """A server with a panel, by its text, and the robot that it simulates. `more` is for `Server`."""
+    return ready(Server(ROOT, KIOSK_PANEL=panel_file(folder, panel), KIOSK_MODE="demo", **more))
+
+
+def live_server(bridge: Bridge, folder: Path, panel: str, **more: Any) -> Server:
+    """A server with a panel, by its text, behind a bridge. `more` is for `Server`."""
+    return ready(live(bridge.endpoint, folder, KIOSK_PANEL=panel_file(folder, panel), **more))
+
+
+def ready(server: Server) -> Server:
+    """The server, once it is ready; one that does not get so is ended."""
+    try:
+        until(server.ready, "ready")
+    except BaseException:
+        server.end()
+        raise
+    return server
+
+
+@contextmanager
+def kept_running(start: Callable[[], Server]) -> Iterator[Callable[[], Server]]:
+    """Gives a server that runs: another one where a test has ended the one before."""
+    servers: list[Server] = []
+
+    def running() -> Server:
+        if not servers or not servers[-1].process.running:
+            servers.append(start())
+        return servers[-1]
+
+    try:
+        yield running
+    finally:
+        for server in servers:
+            server.end()
+
+
+def panel_file(folder: Path, panel: str) -> str:
+    """The path of a file with this panel."""
+    path = folder / "cell.toml"
+    path.write_text(panel)
+    return str(path)
