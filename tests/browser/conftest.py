@@ -7,6 +7,22 @@ from playwright.sync_api import Browser, Page
 
 from tests.support.finger import Finger
 from tests.support.parts import Server
+from tests.support.touch import permit, touched, touched_server
+
+
+@pytest.fixture(scope="module")
+def kiosk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    """A kiosk with every input; a module with another panel has a kiosk of its own."""
+    with touched_server(tmp_path_factory.mktemp("panel")) as mine:
+        yield mine
+
+
+@pytest.fixture
+def screen(chromium: Browser, kiosk: Server) -> Iterator[Page]:
+    """A page of it on a touched screen, whose interlock permits."""
+    permit(kiosk)
+    with touched(chromium, kiosk) as page:
+        yield page
 
 
 @pytest.fixture

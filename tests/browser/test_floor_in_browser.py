@@ -6,11 +6,20 @@ from typing import Any, Final
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
+from tests.support.pages import middle
 from tests.support.parts import Server, until
-from tests.support.touch import HALT, SIZES, opened, permit, settled, touched, touched_server
+from tests.support.touch import (
+    HALT,
+    HEARD,
+    SIZES,
+    opened,
+    permit,
+    settled,
+    touched,
+    touched_server,
+)
 
 DIM_S: Final = 1.0
-SENT: Final = "[data-widget=heard] .value"
 COUNTS: Final = """() => {
   window.arrived = [];
   for (const name of ["pointerdown", "touchstart", "mousedown", "click", "keydown"]) {
@@ -21,26 +30,10 @@ SECONDS: Final = "(over, seconds) => (over.dataset.seconds = seconds)"
 
 
 @pytest.fixture(scope="module")
-def kiosk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    mine = touched_server(tmp_path_factory.mktemp("panel"))
-    yield mine
-    mine.end()
-
-
-@pytest.fixture(scope="module")
 def dimming(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    mine = touched_server(
-        tmp_path_factory.mktemp("dim"), screen=f"dim_after_s = {DIM_S}\nsounds = true"
-    )
-    yield mine
-    mine.end()
-
-
-@pytest.fixture
-def screen(chromium: Browser, kiosk: Server) -> Iterator[Page]:
-    permit(kiosk)
-    with touched(chromium, kiosk) as page:
-        yield page
+    screen = f"dim_after_s = {DIM_S}\nsounds = true"
+    with touched_server(tmp_path_factory.mktemp("dim"), screen=screen) as mine:
+        yield mine
 
 
 @pytest.fixture
@@ -78,12 +71,6 @@ def taps_arrive(page: Page) -> bool:
     return bool(page.evaluate("window.taps ?? 0") > before)
 
 
-def middle(page: Page, selector: str) -> tuple[float, float]:
-    box = page.locator(selector).bounding_box()
-    assert box is not None
-    return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-
-
 def test_it_takes_thirty_seconds(screen: Page) -> None:
     screen.get_by_role("button", name="Menu").tap()
     screen.get_by_role("button", name="Clean the screen").tap()
@@ -96,8 +83,10 @@ def test_while_it_is_cleaned_only_the_state_is_seen_and_nothing_is_pressed(
     chromium: Browser, kiosk: Server, size: tuple[int, int]
 ) -> None:
     with touched(chromium, kiosk, size) as page:
-        points = [middle(page, one) for one in ("[data-widget=load] > [type=submit]", ".menu-key")]
-        points.append(middle(page, ".frame-keys [type=submit]"))
+        points = [
+            middle(page.locator(one)) for one in ("[data-widget=load] > [type=submit]", ".menu-key")
+        ]
+        points.append(middle(page.locator(".frame-keys [type=submit]")))
         before = presses(kiosk)
         clean(page, 30)
         page.evaluate(COUNTS)
@@ -109,7 +98,7 @@ def test_while_it_is_cleaned_only_the_state_is_seen_and_nothing_is_pressed(
         expect(page.locator("#cleaning")).to_be_visible()
         assert float(page.locator("#cleaning b").evaluate("(b) => b.offsetHeight")) >= 120
         expect(page.locator("#state")).to_be_in_viewport(ratio=1)
-        x, y = middle(page, "#state")
+        x, y = middle(page.locator("#state"))
         inside = "([x, y]) => document.elementFromPoint(x, y).closest('#cleaning') === null"
         assert page.evaluate(inside, [x, y])
         expect(page.locator(".sheet")).to_have_count(0)
@@ -125,7 +114,7 @@ def test_it_ends_by_itself_and_then_keys_work(screen: Page) -> None:
     clean(screen, 1)
     unlocked(screen)
     screen.get_by_role("button", name="Stop").tap()
-    expect(screen.locator(SENT)).to_have_text("stop (/operation)")
+    expect(screen.locator(HEARD)).to_have_text("stop (/operation)")
 
 
 def test_it_goes_on_when_the_page_is_loaded_again(screen: Page) -> None:
@@ -147,7 +136,7 @@ def test_a_hold_ends_when_it_starts(screen: Page) -> None:
 
 
 def test_a_cloth_on_the_screen_at_its_end_presses_nothing(screen: Page, kiosk: Server) -> None:
-    x, y = middle(screen, ".frame-keys [type=submit]")
+    x, y = middle(screen.locator(".frame-keys [type=submit]"))
     before = presses(kiosk)
     clean(screen, 1)
     screen.mouse.move(x, y)
@@ -156,7 +145,7 @@ def test_a_cloth_on_the_screen_at_its_end_presses_nothing(screen: Page, kiosk: S
     screen.mouse.up()
     unlocked(screen)
     screen.get_by_role("button", name="Send order").tap()
-    expect(screen.locator(SENT)).to_have_text("4711 (/operation2)")
+    expect(screen.locator(HEARD)).to_have_text("4711 (/operation2)")
     until(lambda: presses(kiosk) > before, "its press is logged")
     assert presses(kiosk) == before + 1
 
@@ -166,14 +155,14 @@ def test_it_gets_dark_and_the_touch_that_wakes_it_presses_nothing(
 ) -> None:
     before = presses(dimming)
     expect(sleepy.locator("#dark")).to_be_visible()
-    sleepy.touchscreen.tap(*middle(sleepy, "[data-widget=load] > [type=submit]"))
+    sleepy.touchscreen.tap(*middle(sleepy.locator("[data-widget=load] > [type=submit]")))
     expect(sleepy.locator("#dark")).to_be_hidden()
     expect(sleepy.locator("#dark")).to_be_visible()
-    sleepy.touchscreen.tap(*middle(sleepy, "#input-speed"))
+    sleepy.touchscreen.tap(*middle(sleepy.locator("#input-speed")))
     expect(sleepy.locator("#dark")).to_be_hidden()
     expect(sleepy.locator("#dark")).to_be_visible()
     expect(sleepy.locator(".sheet")).to_have_count(0)
-    sleepy.touchscreen.tap(*middle(sleepy, ".hold"))
+    sleepy.touchscreen.tap(*middle(sleepy.locator(".hold")))
     expect(sleepy.locator("#dark")).to_be_hidden()
     expect(sleepy.locator("#dark")).to_be_visible()
     sleepy.keyboard.press(" ")
@@ -184,13 +173,13 @@ def test_it_gets_dark_and_the_touch_that_wakes_it_presses_nothing(
 
 def test_the_touch_after_it_presses(sleepy: Page) -> None:
     expect(sleepy.locator("#dark")).to_be_visible()
-    stop = middle(sleepy, ".frame-keys [type=submit]")
+    stop = middle(sleepy.locator(".frame-keys [type=submit]"))
     sleepy.touchscreen.tap(*stop)
     expect(sleepy.locator("#dark")).to_be_hidden()
 
     def pressed() -> bool:
         sleepy.touchscreen.tap(*stop)
-        return sleepy.locator(SENT).inner_text() == "stop (/operation)"
+        return sleepy.locator(HEARD).inner_text() == "stop (/operation)"
 
     until(pressed, "a later touch presses", every_s=0.2)
 
@@ -206,7 +195,7 @@ def test_a_state_that_changes_wakes_it(sleepy: Page, dimming: Server) -> None:
 
 
 def test_a_page_that_is_held_does_not_get_dark(sleepy: Page) -> None:
-    x, y = middle(sleepy, "header")
+    x, y = middle(sleepy.locator("header"))
     sleepy.mouse.move(x, y)
     sleepy.mouse.down()
     watched = """(ms) => new Promise((resolve) => {
@@ -281,7 +270,7 @@ def refused(page: Page) -> None:
 
 def sent(page: Page) -> None:
     page.get_by_role("button", name="Stop").click()
-    expect(page.locator(SENT)).to_have_text("stop (/operation)")
+    expect(page.locator(HEARD)).to_have_text("stop (/operation)")
 
 
 def sounding(chromium: Browser, **cookies: str) -> Any:

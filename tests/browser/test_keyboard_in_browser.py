@@ -6,27 +6,22 @@ from typing import Final
 import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
 
+from tests.support.pages import place
 from tests.support.parts import Server
-from tests.support.touch import SIZES, Keys, opened, overlap, permit, settled, touched, touched_server
+from tests.support.touch import (
+    HEARD,
+    HUMAN_S,
+    READER_S,
+    SIZES,
+    Keys,
+    opened,
+    overlap,
+    permit,
+    settled,
+    touched,
+)
 
-HUMAN_S: Final = 0.2
-READER_S: Final = 0.01
 FIELDS: Final = ("#input-order", "#input-note")
-SENT: Final = "[data-widget=heard] .value"
-
-
-@pytest.fixture(scope="module")
-def kiosk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    mine = touched_server(tmp_path_factory.mktemp("panel"))
-    yield mine
-    mine.end()
-
-
-@pytest.fixture
-def screen(chromium: Browser, kiosk: Server) -> Iterator[Page]:
-    permit(kiosk)
-    with touched(chromium, kiosk) as page:
-        yield page
 
 
 @pytest.fixture
@@ -118,8 +113,7 @@ def test_it_never_covers_its_field_nor_stop_nor_the_header(
             assert not overlap(page, ".sheet", other), other
         assert not overlap(page, field, "header")
         for key in page.locator(".keyboard button:visible").all():
-            box = key.bounding_box()
-            assert box is not None
+            box = place(key)
             assert min(box["width"], box["height"]) >= 44, key.inner_text()
 
 
@@ -211,7 +205,7 @@ def test_a_reader_presses_nothing_that_has_the_focus(desk: Page, kiosk: Server, 
     desk.locator("#input-order").fill("after")
     desk.keyboard.press("Enter")  # in the field: nothing either
     desk.get_by_role("button", name="Stop").click()
-    expect(desk.locator(SENT)).to_have_text("stop (/operation)")
+    expect(desk.locator(HEARD)).to_have_text("stop (/operation)")
     assert kiosk.process.count("press ") >= 1
     assert "of send by browser" not in kiosk.process.text
 
@@ -219,4 +213,4 @@ def test_a_reader_presses_nothing_that_has_the_focus(desk: Page, kiosk: Server, 
 def test_space_still_presses_a_key_that_has_the_focus(desk: Page) -> None:
     desk.get_by_role("button", name="Stop").focus()
     desk.keyboard.press(" ")
-    expect(desk.locator(SENT)).to_have_text("stop (/operation)")
+    expect(desk.locator(HEARD)).to_have_text("stop (/operation)")

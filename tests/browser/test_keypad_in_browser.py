@@ -1,16 +1,20 @@
 """The keypad on the screen: numbers are entered beside their field, with gloves, within limits."""
 
 import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Final
 
 import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
 
+from tests.support.pages import place
 from tests.support.parts import Server, until
 from tests.support.touch import (
     HALT,
+    HEARD,
+    HUMAN_S,
     MM_PER_PX,
+    READER_S,
     SIZES,
     Keys,
     opened,
@@ -22,22 +26,6 @@ from tests.support.touch import (
 )
 
 FIELDS: Final = ("#input-speed", "[data-widget=height] output", "#input-belt", "#input-offset")
-HUMAN_S: Final = 0.2
-READER_S: Final = 0.01
-
-
-@pytest.fixture(scope="module")
-def kiosk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    mine = touched_server(tmp_path_factory.mktemp("panel"))
-    yield mine
-    mine.end()
-
-
-@pytest.fixture
-def screen(chromium: Browser, kiosk: Server) -> Iterator[Page]:
-    permit(kiosk)
-    with touched(chromium, kiosk) as page:
-        yield page
 
 
 def enter(page: Page, keys: str) -> None:
@@ -75,7 +63,7 @@ def test_what_is_set_is_in_the_field_and_only_a_press_sends_it(screen: Page, kio
     assert sent == []
     settled(screen)
     screen.get_by_role("button", name="Load", exact=True).tap()
-    expect(screen.locator("[data-widget=heard] .value")).to_have_text("4711 80 210.0 0.0 (/operation2)")
+    expect(screen.locator(HEARD)).to_have_text("4711 80 210.0 0.0 (/operation2)")
 
 
 @pytest.mark.parametrize(
@@ -181,15 +169,13 @@ def test_it_never_covers_its_field_nor_stop_nor_the_header(
         for other in (field, ".frame-keys", "header"):
             assert not overlap(page, ".sheet", other), other
         assert not overlap(page, field, "header")
-        box = sheet.bounding_box()
-        assert box is not None
+        box = place(sheet)
         assert box["x"] >= 0
         assert box["y"] >= 0
         assert box["x"] + box["width"] <= size[0]
         assert box["y"] + box["height"] <= size[1]
         for key in "0123456789":
-            digit = page.locator(f'.sheet [data-key="{key}"]').bounding_box()
-            assert digit is not None
+            digit = place(page.locator(f'.sheet [data-key="{key}"]'))
             assert min(digit["width"], digit["height"]) * MM_PER_PX > 13.9
         expect(sheet.locator(".set-entry")).to_be_in_viewport(ratio=1)
 
@@ -205,10 +191,10 @@ def test_it_follows_its_field_when_the_screen_is_turned(screen: Page) -> None:
 
 def test_a_page_that_was_lifted_lies_as_before(chromium: Browser, kiosk: Server) -> None:
     with touched(chromium, kiosk, (800, 480)) as page:
-        place = page.locator("#input-speed").bounding_box()
+        before = page.locator("#input-speed").bounding_box()
         open_for(page, "#input-speed")
         page.locator(".cancel-entry").tap()
-        until(lambda: page.locator("#input-speed").bounding_box() == place, "it is where it was")
+        until(lambda: page.locator("#input-speed").bounding_box() == before, "it is where it was")
 
 
 def test_hold_keys_are_locked_while_it_is_open(screen: Page) -> None:
@@ -258,7 +244,7 @@ def test_a_page_that_was_cut_off_while_it_was_open_is_locked_after_it(
 def test_stop_is_pressed_while_it_is_open(screen: Page) -> None:
     open_for(screen, "#input-speed")
     screen.get_by_role("button", name="Stop").tap()
-    expect(screen.locator("[data-widget=heard] .value")).to_have_text("stop (/operation)")
+    expect(screen.locator(HEARD)).to_have_text("stop (/operation)")
     expect(screen.locator(".sheet")).to_be_visible()
 
 

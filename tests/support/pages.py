@@ -10,6 +10,15 @@ HIDE: Final = """(hidden) => {
   document.dispatchEvent(new Event("visibilitychange"));
 }"""
 
+# The heights that the rows of a group need, without the room that is left over.
+ROWS: Final = """(number) => {
+  const grid = document.querySelector(`[data-group="${number}"] > .grid`);
+  grid.style.alignContent = "start";
+  const rows = getComputedStyle(grid).gridTemplateRows;
+  grid.style.alignContent = "";
+  return rows.split(" ").map(parseFloat);
+}"""
+
 
 def widget(page: Page, name: str) -> Locator:
     """The element of a widget, by its id."""

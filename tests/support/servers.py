@@ -10,12 +10,14 @@ from tests.support.parts import ROOT, Bridge, Server, live, until
 
 def demo_server(folder: Path, panel: str, **more: Any) -> Server:
     """A server with a panel, by its text, and the robot that it simulates. `more` is for `Server`."""
-    return ready(Server(ROOT, KIOSK_PANEL=panel_file(folder, panel), KIOSK_MODE="demo", **more))
+    path = str(panel_file(folder, panel))
+    return ready(Server(ROOT, KIOSK_PANEL=path, KIOSK_MODE="demo", **more))
 
 
 def live_server(bridge: Bridge, folder: Path, panel: str, **more: Any) -> Server:
     """A server with a panel, by its text, behind a bridge. `more` is for `Server`."""
-    return ready(live(bridge.endpoint, folder, KIOSK_PANEL=panel_file(folder, panel), **more))
+    path = str(panel_file(folder, panel))
+    return ready(live(bridge.endpoint, folder, KIOSK_PANEL=path, **more))
 
 
 def ready(server: Server) -> Server:
@@ -45,8 +47,8 @@ def kept_running(start: Callable[[], Server]) -> Iterator[Callable[[], Server]]:
             server.end()
 
 
-def panel_file(folder: Path, panel: str) -> str:
-    """The path of a file with this panel."""
+def panel_file(folder: Path, panel: str) -> Path:
+    """A file with this panel."""
     path = folder / "cell.toml"
     path.write_text(panel)
-    return str(path)
+    return path

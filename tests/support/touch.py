@@ -7,10 +7,15 @@ from typing import Any, Final
 
 from playwright.sync_api import Browser, BrowserContext, Page, expect
 
-from tests.support.parts import ENOUGH_S, ROOT, Server, until
+from tests.support.pages import place
+from tests.support.parts import ENOUGH_S, Server, until
+from tests.support.servers import demo_server
 
 SIZES: Final = ((1280, 800), (1024, 600), (800, 480), (800, 1280))
 MM_PER_PX: Final = 0.22
+HEARD: Final = "[data-widget=heard] .value"  # where the page shows what the robot heard last
+HUMAN_S: Final = 0.2  # between two keys
+READER_S: Final = 0.01  # between two keys of a bar code reader
 HALT: Final = "halt"  # the order that the interlock forbids
 # The demo robot says on /last_heard what it heard: a press sets the interlock.
 PANEL: Final = f"""
@@ -148,10 +153,7 @@ title = "Other"
 
 def touched_server(folder: Path, above: str = "", screen: str = "") -> Server:
     """A server with this panel; `above` are keys of the file, `screen` those of its table [screen]."""
-    panel = folder / "panel.toml"
-    panel.write_text(PANEL % (above + (f"\n[screen]\n{screen}" if screen else "")))
-    server = Server(ROOT, KIOSK_PANEL=str(panel), KIOSK_MODE="demo")
-    until(server.ready, "ready")
+    server = demo_server(folder, PANEL % (above + (f"\n[screen]\n{screen}" if screen else "")))
     permit(server)
     return server
 
@@ -218,9 +220,7 @@ class Keys:
 
 def overlap(page: Page, one: str, other: str) -> bool:
     """Whether two visible elements share a part of the screen."""
-    first, second = page.locator(one).bounding_box(), page.locator(other).bounding_box()
-    assert first is not None, one
-    assert second is not None, other
+    first, second = place(page.locator(one)), place(page.locator(other))
     return (
         min(first["x"] + first["width"], second["x"] + second["width"]) - max(first["x"], second["x"])
         > 1
