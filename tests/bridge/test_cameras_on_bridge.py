@@ -1,17 +1,20 @@
 """Cameras: rclpy nodes, the real bridge, Chromium. Each browser gets as many pictures as it takes."""
 
 import json
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
 import pytest
 import zenoh
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Page, expect
 from websockets.sync.client import ClientConnection, connect
 
 from app.simulator.values.clock_picture import SIZE, grey_pixels, png
-from tests.support.parts import Bridge, RosNode, Server, live, until
+from tests.support.pages import HIDE, widget
+from tests.support.parts import Bridge, RosNode, Server, until
+from tests.support.servers import live_server
 
 PANEL = """
 title = "Robot cell 1"
@@ -45,25 +48,16 @@ label = "Nothing to see"
 """
 PACKED, RAW = "sensor_msgs/msg/CompressedImage", "sensor_msgs/msg/Image"
 BEST_EFFORT = {"reliability": "best_effort", "depth": 1}
-HIDE = """(hidden) => {
-  Object.defineProperty(document, "hidden", { value: hidden, configurable: true });
-  document.dispatchEvent(new Event("visibilitychange"));
-}"""
 
 
 @pytest.fixture(scope="module")
 def kiosk(bridge: Bridge, node: RosNode, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    folder = tmp_path_factory.mktemp("cell")
-    panel = folder / "cell.toml"
-    panel.write_text(PANEL)
     node.advertise("/test_packed", PACKED, **BEST_EFFORT)
     node.every("/test_packed", {"format": "png", "data": [*png(grey_pixels(0, 0))]}, 0.1)
     node.advertise("/test_raw", RAW, **BEST_EFFORT)
     node.every("/test_raw", image("rgb8", 3), 0.1)
-    mine = live(bridge.endpoint, folder, KIOSK_PANEL=str(panel))
-    until(mine.ready, "ready")
-    yield mine
-    mine.end()
+    with live_server(bridge, tmp_path_factory.mktemp("cell"), PANEL) as mine:
+        yield mine
     for topic in ("/test_packed", "/test_raw"):
         node.withdraw(topic)
 
@@ -72,10 +66,6 @@ def image(encoding: str, size: int, width: int = 20, height: int = 10) -> dict[s
     data = [90, 200, 40, 255][:size] * (width * height)
     shape = {"width": width, "height": height, "step": width * size}
     return {**shape, "encoding": encoding, "data": data}
-
-
-def camera(page: Page, name: str) -> Any:
-    return page.locator(f'[data-widget="{name}"]')
 
 
 @contextmanager
@@ -111,14 +101,14 @@ def ask(socket: ClientConnection) -> dict[str, Any]:
 def test_both_kinds_of_pictures_are_drawn(kiosk: Server, page: Page) -> None:
     page.goto(kiosk.url)
     for name, size in (("packed", list(SIZE)), ("raw", [20, 10])):
-        expect(camera(page, name)).to_have_attribute("data-state", "live", timeout=20_000)
-        canvas = camera(page, name).locator("canvas")
+        expect(widget(page, name)).to_have_attribute("data-state", "live", timeout=20_000)
+        canvas = widget(page, name).locator("canvas")
         expect(canvas).to_have_attribute("width", str(size[0]), timeout=20_000)
         expect(canvas).to_have_attribute("height", str(size[1]))
-        expect(camera(page, name).locator(".sign")).to_be_hidden()
+        expect(widget(page, name).locator(".sign")).to_be_hidden()
     pixel = "(c) => [...c.getContext('2d').getImageData(2, 2, 1, 1).data]"
     nearly_green = pytest.approx([90, 200, 40, 255], abs=3)  # a JPEG keeps colours nearly
-    assert camera(page, "raw").locator("canvas").evaluate(pixel) == nearly_green
+    assert widget(page, "raw").locator("canvas").evaluate(pixel) == nearly_green
 
 
 def test_what_nobody_looks_at_is_not_subscribed_to(
@@ -126,13 +116,13 @@ def test_what_nobody_looks_at_is_not_subscribed_to(
 ) -> None:
     """Neither a hidden page nor one without the camera: then the bridge reads nothing of it."""
     page.goto(kiosk.url)
-    expect(camera(page, "packed")).to_have_attribute("data-state", "live", timeout=20_000)
+    expect(widget(page, "packed")).to_have_attribute("data-state", "live", timeout=20_000)
     assert is_read(session, "/test_packed")
     page.evaluate(HIDE, True)
     until(lambda: not is_read(session, "/test_packed"), "nobody reads it")
     assert kiosk.widget("packed")["state"] == "waiting"
     page.evaluate(HIDE, False)
-    expect(camera(page, "packed")).to_have_attribute("data-state", "live", timeout=20_000)
+    expect(widget(page, "packed")).to_have_attribute("data-state", "live", timeout=20_000)
     page.goto(f"{kiosk.url}/pages/two")
     until(lambda: not is_read(session, "/test_packed"), "nobody reads it")
 
@@ -152,13 +142,13 @@ def test_a_slow_browser_gets_the_newest_and_holds_nobody_up(kiosk: Server) -> No
 
 def test_a_picture_that_stays_out_is_old_and_says_so(kiosk: Server, node: RosNode, page: Page) -> None:
     page.goto(kiosk.url)
-    expect(camera(page, "packed")).to_have_attribute("data-state", "live", timeout=20_000)
+    expect(widget(page, "packed")).to_have_attribute("data-state", "live", timeout=20_000)
     node.withdraw("/test_packed")
-    expect(camera(page, "packed")).to_have_attribute("data-state", "old", timeout=20_000)
-    expect(camera(page, "packed").locator(".sign")).to_contain_text(" s old, received ")
+    expect(widget(page, "packed")).to_have_attribute("data-state", "old", timeout=20_000)
+    expect(widget(page, "packed").locator(".sign")).to_contain_text(" s old, received ")
     node.advertise("/test_packed", PACKED, **BEST_EFFORT)
     node.every("/test_packed", {"format": "png", "data": [*png(grey_pixels(0, 0))]}, 0.1)
-    expect(camera(page, "packed")).to_have_attribute("data-state", "live", timeout=40_000)
+    expect(widget(page, "packed")).to_have_attribute("data-state", "live", timeout=40_000)
 
 
 @pytest.mark.parametrize(
@@ -175,22 +165,22 @@ def test_what_can_not_be_shown_says_why(
     node.advertise("/test_raw", RAW, **BEST_EFFORT)
     node.every("/test_raw", fields, 0.1)
     page.goto(kiosk.url)
-    expect(camera(page, "raw").locator(".sign")).to_contain_text(said, timeout=40_000)
+    expect(widget(page, "raw").locator(".sign")).to_contain_text(said, timeout=40_000)
     node.advertise("/test_raw", RAW, **BEST_EFFORT)
     node.every("/test_raw", image("rgb8", 3), 0.1)
-    expect(camera(page, "raw")).to_have_attribute("data-state", "live", timeout=40_000)
+    expect(widget(page, "raw")).to_have_attribute("data-state", "live", timeout=40_000)
 
 
-def test_without_scripts_the_newest_picture_is_on_the_page(kiosk: Server, chromium: Browser) -> None:
-    with chromium.new_context(java_script_enabled=False) as context:
-        page = context.new_page()
-        page.goto(kiosk.url)
-        picture = camera(page, "packed").locator("img")
-        expect(picture).to_be_visible()
-        with page.expect_response(lambda answer: answer.url.endswith("/packed/frame")) as found:
-            page.reload()
-        assert found.value.headers["content-type"] == "image/png"
-        assert found.value.headers["x-content-type-options"] == "nosniff"
+def test_without_scripts_the_newest_picture_is_on_the_page(
+    kiosk: Server, without_scripts: Page
+) -> None:
+    without_scripts.goto(kiosk.url)
+    picture = widget(without_scripts, "packed").locator("img")
+    expect(picture).to_be_visible()
+    with without_scripts.expect_response(re.compile("/packed/frame$")) as found:
+        without_scripts.reload()
+    assert found.value.headers["content-type"] == "image/png"
+    assert found.value.headers["x-content-type-options"] == "nosniff"
 
 
 def test_a_picture_is_for_the_panels_own_pages(kiosk: Server) -> None:

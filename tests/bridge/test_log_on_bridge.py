@@ -4,9 +4,11 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Locator, Page, expect
 
-from tests.support.parts import Bridge, RosNode, Server, live, until
+from tests.support.pages import HIDE, widget
+from tests.support.parts import Bridge, RosNode, Server, until
+from tests.support.servers import live_server
 
 PANEL = """
 title = "Robot cell 1"
@@ -29,24 +31,15 @@ level = "debug"
 own = true
 """
 LOG = "rcl_interfaces/msg/Log"
-HIDE = """(hidden) => {
-  Object.defineProperty(document, "hidden", { value: hidden, configurable: true });
-  document.dispatchEvent(new Event("visibilitychange"));
-}"""
 
 
 @pytest.fixture(scope="module")
 def kiosk(bridge: Bridge, node: RosNode, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    folder = tmp_path_factory.mktemp("cell")
-    panel = folder / "cell.toml"
-    panel.write_text(PANEL)
     node.advertise("/rosout", LOG, durability="transient_local", depth=1000)
-    mine = live(bridge.endpoint, folder, KIOSK_PANEL=str(panel))
-    until(mine.ready, "ready")
-    say(node, "hello")
-    until(lambda: lines(mine, search="hello"), "a first line comes")
-    yield mine
-    mine.end()
+    with live_server(bridge, tmp_path_factory.mktemp("cell"), PANEL) as mine:
+        say(node, "hello")
+        until(lambda: lines(mine, search="hello"), "a first line comes")
+        yield mine
     node.withdraw("/rosout")
 
 
@@ -61,8 +54,8 @@ def lines(kiosk: Server, widget: str = "robot", **query: Any) -> list[dict[str, 
     return found
 
 
-def rows(page: Page, widget: str = "robot") -> Any:
-    return page.locator(f'[data-widget="{widget}"] .line')
+def rows(page: Page) -> Locator:
+    return widget(page, "robot").locator(".line")
 
 
 def test_lines_come_with_their_level_and_are_chosen(kiosk: Server, node: RosNode, page: Page) -> None:
@@ -76,14 +69,14 @@ def test_lines_come_with_their_level_and_are_chosen(kiosk: Server, node: RosNode
     expect(first.locator("svg .error")).to_be_hidden()
     say(node, "axis 3 stands", 40)
     expect(first.locator(".text")).to_have_text("axis 3 stands")
-    widget = page.locator('[data-widget="robot"]')
-    widget.locator("input.node").fill("GRIP")
+    robot = widget(page, "robot")
+    robot.locator("input.node").fill("GRIP")
     expect(rows(page).first.locator(".text")).to_have_text("the gripper is slow")
-    widget.locator("input.node").fill("")
-    widget.locator("input.search").fill("axis")
+    robot.locator("input.node").fill("")
+    robot.locator("input.search").fill("axis")
     expect(rows(page).first.locator(".text")).to_have_text("axis 3 stands")
-    widget.locator("input.search").fill("")
-    widget.locator("select.level").select_option("error")
+    robot.locator("input.search").fill("")
+    robot.locator("select.level").select_option("error")
     say(node, "no more than a hint", 20)
     until(lambda: lines(kiosk, search="hint"), "it came")
     expect(rows(page).first.locator(".text")).to_have_text("axis 3 stands")
@@ -94,7 +87,7 @@ def test_a_pause_keeps_the_lines_and_the_page_stays_small(
 ) -> None:
     page.goto(kiosk.url)
     expect(rows(page)).not_to_have_count(0)
-    pause = page.locator('[data-widget="robot"] .pause')
+    pause = widget(page, "robot").locator(".pause")
     pause.click()
     before = rows(page).first.locator(".text").text_content()
     node.flood("/rosout", {"name": "arm", "msg": "step {n}", "level": 20}, 300, 1.0)
@@ -103,7 +96,7 @@ def test_a_pause_keeps_the_lines_and_the_page_stays_small(
     pause.click()
     expect(rows(page).first.locator(".text")).to_contain_text("step 29")
     expect(rows(page)).to_have_count(20)
-    expect(page.locator('[data-widget="robot"] .left-out')).to_contain_text("more are not shown")
+    expect(widget(page, "robot").locator(".left-out")).to_contain_text("more are not shown")
 
 
 def test_a_hidden_page_asks_for_nothing(kiosk: Server, node: RosNode, page: Page) -> None:
@@ -128,15 +121,13 @@ def test_the_panels_own_lines_are_shown_where_it_says_so(kiosk: Server) -> None:
 
 
 def test_without_scripts_the_newest_lines_are_on_the_page(
-    kiosk: Server, node: RosNode, chromium: Browser
+    kiosk: Server, node: RosNode, without_scripts: Page
 ) -> None:
     say(node, "seen without scripts")
     until(lambda: lines(kiosk, search="seen without"), "it came")
-    with chromium.new_context(java_script_enabled=False) as context:
-        page = context.new_page()
-        page.goto(kiosk.url)
-        expect(rows(page).first.locator(".text")).to_have_text("seen without scripts")
-        expect(page.locator('[data-widget="robot"] .wanted')).to_be_hidden()
+    without_scripts.goto(kiosk.url)
+    expect(rows(without_scripts).first.locator(".text")).to_have_text("seen without scripts")
+    expect(widget(without_scripts, "robot").locator(".wanted")).to_be_hidden()
 
 
 def test_what_is_no_log_has_no_lines(kiosk: Server) -> None:

@@ -9,7 +9,9 @@ from typing import Any, Final
 import pytest
 from playwright.sync_api import Locator, Page, expect
 
-from tests.support.parts import Bridge, RosNode, Server, has_heard, live, until
+from tests.support.pages import place
+from tests.support.parts import Bridge, RosNode, Server, has_heard, until
+from tests.support.servers import live_server
 
 PANEL: Final = """
 title = "Robot cell 1"
@@ -64,18 +66,11 @@ def robot(node: RosNode) -> RosNode:
 
 @pytest.fixture(scope="module")
 def cell(bridge: Bridge, robot: RosNode, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    folder = tmp_path_factory.mktemp("cell")
-    panel = folder / "cell.toml"
-    panel.write_text(PANEL)
-    mine = live(bridge.endpoint, folder, KIOSK_PANEL=str(panel))
-    try:
-        until(mine.ready, "ready")
+    with live_server(bridge, tmp_path_factory.mktemp("cell"), PANEL) as mine:
         for topic in (STAMPED, PATH):
             until(partial(robot.endpoints, topic), f"the robot sees who publishes {topic}")
         until(lambda: mine.snapshot()["link"]["node"]["state"] == "ok", "the robot is seen")
         yield mine
-    finally:
-        mine.end()
 
 
 def heard_after(robot: RosNode, topic: str, act: Callable[[], object]) -> Any:
@@ -130,8 +125,7 @@ def test_a_slider_without_a_step_goes_in_fine_ones(cell: Server, robot: RosNode,
     expect(output).to_have_text("0.36")
     page.get_by_label("Speed: less").click()
     expect(output).to_have_text("0.34")
-    box = speed.bounding_box()
-    assert box is not None
+    box = place(speed)
     middle = box["y"] + box["height"] / 2
     page.mouse.move(box["x"] + box["width"] * 0.3, middle)
     page.mouse.down()

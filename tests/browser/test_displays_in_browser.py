@@ -7,9 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Page, expect
 
-from tests.support.parts import TAP_AGAIN_MS, Bridge, RosNode, Server, has_heard, live, until
+from tests.support.pages import widget
+from tests.support.parts import TAP_AGAIN_MS, Bridge, RosNode, Server, has_heard, until
+from tests.support.servers import live_server
 
 PANEL = """
 title = "Robot cell 1"
@@ -128,16 +130,11 @@ def robot(node: RosNode) -> RosNode:
 
 @pytest.fixture(scope="module")
 def cell(bridge: Bridge, robot: RosNode, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    folder = tmp_path_factory.mktemp("cell")
-    panel = folder / "cell.toml"
-    panel.write_text(PANEL)
-    mine = live(bridge.endpoint, folder, KIOSK_PANEL=str(panel))
-    until(mine.ready, "ready")
-    for topic in TOPICS:
-        until(partial(robot.endpoints, topic), f"the robot sees who publishes {topic}")
-    until(lambda: mine.snapshot()["link"]["node"]["state"] == "ok", "the robot is seen")
-    yield mine
-    mine.end()
+    with live_server(bridge, tmp_path_factory.mktemp("cell"), PANEL) as mine:
+        for topic in TOPICS:
+            until(partial(robot.endpoints, topic), f"the robot sees who publishes {topic}")
+        until(lambda: mine.snapshot()["link"]["node"]["state"] == "ok", "the robot is seen")
+        yield mine
 
 
 def press(page: Page, name: str) -> None:
@@ -145,10 +142,6 @@ def press(page: Page, name: str) -> None:
     pressed = page.get_by_role("button", name=name, exact=True)
     expect(pressed).not_to_have_attribute("aria-busy", "true")
     pressed.click()
-
-
-def widget(page: Page, name: str) -> Any:
-    return page.locator(f'[data-widget="{name}"]')
 
 
 def heard(robot: RosNode, topic: str, before: int) -> list[dict[str, Any]]:
@@ -224,10 +217,9 @@ def test_a_select_and_a_toggle_give_their_values(cell: Server, robot: RosNode, p
 
 
 def test_without_scripts_the_same_values_arrive(
-    cell: Server, robot: RosNode, chromium: Browser
+    cell: Server, robot: RosNode, without_scripts: Page
 ) -> None:
-    context = chromium.new_context(java_script_enabled=False)
-    page = context.new_page()
+    page = without_scripts
     before = {topic: len(robot.heard(topic)) for topic in TOPICS}
 
     def drives() -> bool:
@@ -259,7 +251,6 @@ def test_without_scripts_the_same_values_arrive(
     page.wait_for_timeout(TAP_AGAIN_MS)
     press(page, "Choose")
     assert heard(robot, "/test_mode", before["/test_mode"]) == [{"data": -1}]
-    context.close()
 
 
 def test_a_lamp_has_text_and_shape_for_each_state(cell: Server, robot: RosNode, page: Page) -> None:
@@ -309,43 +300,37 @@ def test_a_best_effort_publisher_is_told_in_words_unless_it_is_asked_for(
 def test_a_durability_that_the_robot_does_not_publish_is_told(
     bridge: Bridge, robot: RosNode, tmp_path: Path
 ) -> None:
-    panel = tmp_path / "cell.toml"
     latched = 'qos = { durability = "transient_local" }'
-    panel.write_text(PANEL.replace('qos = { reliability = "best_effort", depth = 1 }', latched))
+    panel = PANEL.replace('qos = { reliability = "best_effort", depth = 1 }', latched)
     robot.advertise("/test_current", "std_msgs/msg/Float32")
-    mine = live(bridge.endpoint, tmp_path, KIOSK_PANEL=str(panel))
     said = "The robot publishes /test_current as volatile, but this panel requires transient local."
     try:
-        until(lambda: mine.widget("current")["note"] == said, "the mismatch is told")
-        robot.withdraw("/test_current")
-        until(lambda: mine.widget("current")["state"] == "waiting", "it went")
-        robot.advertise("/test_current", "std_msgs/msg/Float32", durability="transient_local")
+        with live_server(bridge, tmp_path, panel) as mine:
+            until(lambda: mine.widget("current")["note"] == said, "the mismatch is told")
+            robot.withdraw("/test_current")
+            until(lambda: mine.widget("current")["state"] == "waiting", "it went")
+            robot.advertise("/test_current", "std_msgs/msg/Float32", durability="transient_local")
 
-        def is_heard() -> bool:
-            robot.publish("/test_current", {"data": 1.5})
-            return bool(mine.widget("current")["text"] == "1.5 A")
+            def is_heard() -> bool:
+                robot.publish("/test_current", {"data": 1.5})
+                return bool(mine.widget("current")["text"] == "1.5 A")
 
-        until(is_heard, "the right one is heard", every_s=0.2)
+            until(is_heard, "the right one is heard", every_s=0.2)
     finally:
-        mine.end()
         robot.withdraw("/test_current")
 
 
 def test_a_subscriber_that_would_not_hear_a_best_effort_press_locks_it(
     bridge: Bridge, robot: RosNode, tmp_path: Path
 ) -> None:
-    panel = tmp_path / "cell.toml"
     message = 'message = { data = "{mode}" }'
-    panel.write_text(PANEL.replace(message, f'{message}\nqos = {{ reliability = "best_effort" }}'))
-    mine = live(bridge.endpoint, tmp_path, KIOSK_PANEL=str(panel))
+    panel = PANEL.replace(message, f'{message}\nqos = {{ reliability = "best_effort" }}')
     said = "The robot requires /test_mode as reliable, but this panel publishes it as best effort."
-    try:
+    with live_server(bridge, tmp_path, panel) as mine:
         until(lambda: mine.widget("choose")["reason"] == said, "the mismatch is told")
         answer = mine.http.post("/widgets/choose", json={"inputs": {"mode": 1}})
         assert answer.status_code == 409
         assert answer.json()["reason"].endswith(f": {said}")
-    finally:
-        mine.end()
 
 
 @pytest.mark.parametrize(("width", "height"), [(1280, 800), (1024, 600)])

@@ -4,12 +4,14 @@ from collections.abc import Iterator
 from typing import Any, Final
 
 import pytest
-from playwright.sync_api import Locator, Page, expect
+from playwright.sync_api import Page, expect
 
 from app.panel import Panel, load_panel
 from app.panel.checks.fit import group_width, page_height, page_width, reason, row_heights
 from app.panel.checks.tile_sizes import LOW_SCREEN, Screen
-from tests.support.parts import ROOT, Server, until
+from tests.support.pages import ROWS, place
+from tests.support.parts import ROOT, Server
+from tests.support.servers import ready
 
 PALLETIZER: Final = ROOT / "docs/examples/palletizer.toml"
 SCREENS: Final = ("1920x1080", "1280x800", "1024x600", "800x480", "800x1280")
@@ -30,14 +32,6 @@ MEASURE: Final = """() => {
       .map((e) => e.className || e.tagName),
   };
 }"""
-# The heights that the rows need: without the room that is left over.
-ROWS: Final = """(number) => {
-  const grid = document.querySelector(`[data-group="${number}"] > .grid`);
-  grid.style.alignContent = "start";
-  const rows = getComputedStyle(grid).gridTemplateRows;
-  grid.style.alignContent = "";
-  return rows.split(" ").map(parseFloat);
-}"""
 
 
 @pytest.fixture(scope="module")
@@ -47,16 +41,8 @@ def panel() -> Panel:
 
 @pytest.fixture(scope="module")
 def demo() -> Iterator[Server]:
-    mine = Server(ROOT, KIOSK_PANEL=str(PALLETIZER))
-    until(mine.ready, "ready")
-    yield mine
-    mine.end()
-
-
-def box_of(key: Locator) -> Any:
-    found = key.bounding_box()
-    assert found is not None
-    return found
+    with ready(Server(ROOT, KIOSK_PANEL=str(PALLETIZER))) as mine:
+        yield mine
 
 
 @pytest.mark.parametrize("size", SCREENS)
@@ -87,14 +73,14 @@ def test_keys_are_20_mm_high_and_5_mm_apart_on_every_screen(
         page.set_viewport_size({"width": screen.width, "height": screen.height})
         page.goto(demo.url)
         boxes = [
-            box_of(key)
+            place(key)
             for key in page.locator(".cell > .key > button:visible, .action button:visible").all()
         ]
         least = 14 if screen.height <= LOW_SCREEN else 20  # beside a key that cancels
         assert len(boxes) >= 2
         assert all(box["height"] >= least * screen.mm - 0.5 for box in boxes), size
         start, reset = (
-            box_of(page.locator(f"[data-widget={of}] > button")) for of in ("start", "reset")
+            place(page.locator(f"[data-widget={of}] > button")) for of in ("start", "reset")
         )
         assert min(start["width"], reset["width"]) >= 20 * screen.mm - 0.5
         assert reset["x"] - start["x"] - start["width"] >= 5 * screen.mm - 0.5, size

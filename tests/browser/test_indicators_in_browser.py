@@ -6,12 +6,14 @@ from functools import partial
 from typing import Any, Final
 
 import pytest
-from playwright.sync_api import Browser, Locator, Page, expect
+from playwright.sync_api import Page, expect
 
 from app.panel import Panel, load_panel
 from app.panel.checks.fit import group_width, page_width, reason, row_heights
 from app.panel.checks.tile_sizes import Screen
-from tests.support.parts import Bridge, RosNode, Server, live, until
+from tests.support.pages import ROWS, widget
+from tests.support.parts import Bridge, RosNode, Server, until
+from tests.support.servers import live_server, panel_file
 
 PANEL: Final = """
 title = "Cell"
@@ -103,29 +105,18 @@ TOPICS: Final = {
 
 @pytest.fixture(scope="module")
 def panel(tmp_path_factory: pytest.TempPathFactory) -> Panel:
-    path = tmp_path_factory.mktemp("panel") / "cell.toml"
-    path.write_text(PANEL)
-    return load_panel(path)
+    return load_panel(panel_file(tmp_path_factory.mktemp("panel"), PANEL))
 
 
 @pytest.fixture(scope="module")
 def cell(bridge: Bridge, node: RosNode, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    folder = tmp_path_factory.mktemp("cell")
-    path = folder / "cell.toml"
-    path.write_text(PANEL)
-    mine = live(bridge.endpoint, folder, KIOSK_PANEL=str(path))
-    until(mine.ready, "ready")
-    for topic, name in TOPICS.items():
-        node.advertise(topic, name)
-        until(partial(node.subscribers, topic), f"the panel listens to {topic}")
-    yield mine
-    for topic in TOPICS:
-        node.withdraw(topic)
-    mine.end()
-
-
-def widget(page: Page, name: str) -> Locator:
-    return page.locator(f'[data-widget="{name}"]')
+    with live_server(bridge, tmp_path_factory.mktemp("cell"), PANEL) as mine:
+        for topic, name in TOPICS.items():
+            node.advertise(topic, name)
+            until(partial(node.subscribers, topic), f"the panel listens to {topic}")
+        yield mine
+        for topic in TOPICS:
+            node.withdraw(topic)
 
 
 def air(node: RosNode, value: float) -> None:
@@ -210,7 +201,7 @@ def test_a_table_keeps_the_latest_of_each_part_and_its_rows_stay_in_place(
 
 
 def test_without_scripts_the_page_shows_the_same(
-    cell: Server, node: RosNode, chromium: Browser
+    cell: Server, node: RosNode, without_scripts: Page
 ) -> None:
     air(node, 2.5)
     node.publish("/diagnostics", {"status": [status("gripper", 1)]})
@@ -218,15 +209,13 @@ def test_without_scripts_the_page_shows_the_same(
     until(lambda: cell.widget("air")["text"] == "2.5", "the value arrived")
     until(lambda: cell.widget("arm")["joint_values"][0] == "+0.0", "the joint arrived")
     until(lambda: cell.widget("parts")["table_rows"], "the entry arrived")
-    context = chromium.new_context(java_script_enabled=False)
-    page = context.new_page()
+    page = without_scripts
     page.goto(cell.url)
     expect(widget(page, "air").locator(".said")).to_have_text("below low 4")
     expect(widget(page, "air").locator(".pointer")).to_have_attribute("y", "75.0%")
     expect(widget(page, "vacuum").locator(".pointer")).to_have_attribute("x", "50.0%")
     expect(widget(page, "arm").locator(".now").first).to_have_text("+0.0")
     expect(widget(page, "parts").locator("tbody tr").first).to_contain_text("gripper")
-    context.close()
 
 
 def test_a_page_that_is_cut_off_shows_old_values(cell: Server, node: RosNode, page: Page) -> None:
@@ -238,16 +227,6 @@ def test_a_page_that_is_cut_off_shows_old_values(cell: Server, node: RosNode, pa
         expect(widget(page, name)).to_have_attribute("data-state", "old")
     expect(widget(page, "air").locator(".said")).to_be_hidden()
     assert widget(page, "air").locator(".marks > *:visible").count() == 0
-
-
-# The heights that the rows need: without the room that is left over.
-ROWS: Final = """(number) => {
-  const grid = document.querySelector(`[data-group="${number}"] > .grid`);
-  grid.style.alignContent = "start";
-  const rows = getComputedStyle(grid).gridTemplateRows;
-  grid.style.alignContent = "";
-  return rows.split(" ").map(parseFloat);
-}"""
 
 
 @pytest.mark.parametrize("size", ["1280x800", "1024x600", "800x480"])

@@ -11,7 +11,8 @@ from app.i18n.catalogue import files
 from app.web.language import COOKIE
 from tests.browser.test_layout_in_browser import PANEL
 from tests.browser.test_screen_in_browser import CUT, OVERFLOWS
-from tests.support.parts import ROOT, Server, until
+from tests.support.parts import Server
+from tests.support.servers import demo_server
 
 SIZES: Final = ((1280, 800), (1024, 600), (800, 480))
 STATES: Final = ("ready", "online", "locked", "unknown", "lost")
@@ -46,12 +47,8 @@ PAINTED: Final = """(texts) => {
 
 @pytest.fixture(scope="module")
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    panel = tmp_path_factory.mktemp("panel") / "all.toml"
-    panel.write_text(PANEL)
-    mine = Server(ROOT, KIOSK_PANEL=str(panel), KIOSK_MODE="demo")
-    until(mine.ready, "ready")
-    yield mine
-    mine.end()
+    with demo_server(tmp_path_factory.mktemp("panel"), PANEL) as mine:
+        yield mine
 
 
 @pytest.fixture(params=sorted(files()))

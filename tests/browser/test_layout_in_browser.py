@@ -2,14 +2,16 @@
 kind of widget, long labels."""
 
 from collections.abc import Iterator
-from typing import Any, Final
+from typing import Final
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import FloatRect, Page, expect
 
 from tests.browser.test_pages import SIZES
 from tests.support.fonts import SETS
-from tests.support.parts import ROOT, Server, until
+from tests.support.pages import place
+from tests.support.parts import Server, until
+from tests.support.servers import demo_server
 
 SOFT_HYPHEN: Final = "\u00ad"
 LONG: Final = SOFT_HYPHEN.join(("Geschwindigkeits", "begrenzungs", "freigabe"))
@@ -102,12 +104,8 @@ def fonts(request: pytest.FixtureRequest) -> str:
 
 @pytest.fixture(scope="module")
 def demo(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    panel = tmp_path_factory.mktemp("panel") / "all.toml"
-    panel.write_text(PANEL)
-    mine = Server(ROOT, KIOSK_PANEL=str(panel), KIOSK_MODE="demo")
-    until(mine.ready, "ready")
-    yield mine
-    mine.end()
+    with demo_server(tmp_path_factory.mktemp("panel"), PANEL) as mine:
+        yield mine
 
 
 @pytest.fixture(params=SIZES)
@@ -119,11 +117,9 @@ def shown(demo: Server, page: Page, request: pytest.FixtureRequest) -> Page:
     return page
 
 
-def box(page: Page, selector: str) -> Any:
+def box(page: Page, selector: str) -> FloatRect:
     expect(page.locator(selector)).to_be_visible()
-    found = page.locator(selector).bounding_box()
-    assert found is not None, selector
-    return found
+    return place(page.locator(selector))
 
 
 def right(page: Page, selector: str) -> float:
@@ -173,9 +169,8 @@ def test_what_is_asked_names_the_robot_and_what_is_empty(shown: Page) -> None:
     dialog.locator(".no").click()
 
 
-def test_without_scripts_it_is_asked_the_same(demo: Server, chromium: Browser) -> None:
-    context = chromium.new_context(java_script_enabled=False)
-    page = context.new_page()
+def test_without_scripts_it_is_asked_the_same(demo: Server, without_scripts: Page) -> None:
+    page = without_scripts
     page.goto(demo.url)
     take = page.get_by_role("button", name="Take control")
     if take.is_visible():
@@ -184,7 +179,6 @@ def test_without_scripts_it_is_asked_the_same(demo: Server, chromium: Browser) -
     expect(page.get_by_role("heading", level=2)).to_have_text(f"{LONG} on {ROBOT}?")
     expect(page.get_by_text("SIMULATED ROBOT")).to_be_visible()
     expect(page.locator("dd")).to_have_text("(empty)")
-    context.close()
 
 
 def test_the_first_button_is_seen_without_scrolling(shown: Page) -> None:

@@ -8,7 +8,9 @@ import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
 
 from tests.browser.test_layout_in_browser import PANEL
+from tests.support.pages import place
 from tests.support.parts import ROOT, TAP_AGAIN_MS, Server, until
+from tests.support.servers import demo_server, ready
 
 PALLETIZER: Final = ROOT / "docs/examples/palletizer.toml"
 SCREENS: Final = ((1280, 800), (1024, 600), (800, 480), (800, 1280), (390, 844))
@@ -82,38 +84,22 @@ silent = true
 @pytest.fixture(scope="module")
 def cell() -> Iterator[Server]:
     """The demo robot with the palletizer's panel: groups, a frame with Stop, two pages."""
-    mine = Server(ROOT, KIOSK_PANEL=str(PALLETIZER))
-    until(mine.ready, "ready")
-    yield mine
-    mine.end()
+    with ready(Server(ROOT, KIOSK_PANEL=str(PALLETIZER))) as mine:
+        yield mine
 
 
 @pytest.fixture(scope="module")
 def several(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     """Several robots, control and long labels."""
-    panel = tmp_path_factory.mktemp("panel") / "all.toml"
-    panel.write_text(PANEL)
-    mine = Server(ROOT, KIOSK_PANEL=str(panel), KIOSK_MODE="demo")
-    until(mine.ready, "ready")
-    yield mine
-    mine.end()
+    with demo_server(tmp_path_factory.mktemp("panel"), PANEL) as mine:
+        yield mine
 
 
 @pytest.fixture(scope="module")
 def long(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    panel = tmp_path_factory.mktemp("panel") / "long.toml"
-    panel.write_text(HOLDS_MORE)
-    mine = Server(ROOT, KIOSK_PANEL=str(panel))
-    until(lambda: mine.widget("go")["enabled"], "the robot is there")
-    yield mine
-    mine.end()
-
-
-@pytest.fixture
-def without_scripts(chromium: Browser) -> Iterator[Page]:
-    context = chromium.new_context(java_script_enabled=False)
-    yield context.new_page()
-    context.close()
+    with demo_server(tmp_path_factory.mktemp("panel"), HOLDS_MORE) as mine:
+        until(lambda: mine.widget("go")["enabled"], "the robot is there")
+        yield mine
 
 
 def sized(page: Page, width: int, height: int) -> Page:
@@ -174,8 +160,7 @@ def test_groups_that_have_no_room_side_by_side_take_turns(
     if then is None:
         expect(tab).to_have_count(0)
         return
-    box = tab.bounding_box()
-    assert box is not None
+    box = place(tab)
     assert min(box["width"], box["height"]) >= 44
     stop = button(page, "Stop").bounding_box()
     tab.click()
@@ -291,8 +276,7 @@ def test_the_menu_leads_to_the_log_and_changes_the_look(
     button(page, "Menu").click()
     expect(menu).to_be_visible()
     for one in menu.locator("a:visible, button:visible").all():
-        box = one.bounding_box()
-        assert box is not None
+        box = place(one)
         assert box["height"] >= 44
         assert box["x"] + box["width"] <= width
     button(page, "Dark").click()
@@ -309,13 +293,11 @@ def test_the_menu_leads_to_the_log_and_changes_the_look(
 def test_the_tabs_change_sides(cell: Server, page: Page) -> None:
     sized(page, 1280, 800).goto(f"{cell.url}/pages/cell")
     tabs = page.locator("nav.pages")
-    left = tabs.bounding_box()
+    left = place(tabs)
     button(page, "Menu").click()
     button(page, "On the right").click()
     expect(page.locator("html")).to_have_attribute("data-hand", "left")
-    moved = tabs.bounding_box()
-    assert left is not None
-    assert moved is not None
+    moved = place(tabs)
     assert left["x"] == 0
     assert moved["x"] + moved["width"] == 1280
 

@@ -5,9 +5,11 @@ from functools import partial
 from typing import Final
 
 import pytest
-from playwright.sync_api import Browser, Locator, Page, expect
+from playwright.sync_api import Locator, Page, expect
 
-from tests.support.parts import TAP_AGAIN_MS, Bridge, RosNode, Server, has_heard, live, until
+from tests.support.pages import place
+from tests.support.parts import TAP_AGAIN_MS, Bridge, RosNode, Server, has_heard, until
+from tests.support.servers import live_server
 
 PANEL: Final = """
 title = "Cell"
@@ -37,18 +39,13 @@ FLOAT: Final = "std_msgs/msg/Float32"
 
 @pytest.fixture(scope="module")
 def cell(bridge: Bridge, node: RosNode, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    folder = tmp_path_factory.mktemp("cell")
-    path = folder / "cell.toml"
-    path.write_text(PANEL)
     node.subscribe(SET, FLOAT)
     node.advertise(REPORTED, FLOAT)
-    mine = live(bridge.endpoint, folder, KIOSK_PANEL=str(path))
-    until(mine.ready, "ready")
-    until(partial(node.subscribers, REPORTED), "the panel listens")
-    until(partial(node.endpoints, SET), "the robot sees who publishes")
-    yield mine
-    node.withdraw(REPORTED)
-    mine.end()
+    with live_server(bridge, tmp_path_factory.mktemp("cell"), PANEL) as mine:
+        until(partial(node.subscribers, REPORTED), "the panel listens")
+        until(partial(node.endpoints, SET), "the robot sees who publishes")
+        yield mine
+        node.withdraw(REPORTED)
 
 
 def key(page: Page, way: str) -> Locator:
@@ -88,8 +85,7 @@ def test_a_press_is_one_step_and_the_next_waits_for_it(cell: Server, node: RosNo
     is_reported(cell, node, 60.0)
     expect(up).to_be_disabled()
     expect(down).to_be_enabled()
-    box = down.bounding_box()
-    assert box is not None
+    box = place(down)
     assert min(box["width"], box["height"]) >= 20 / 0.22 - 0.5
 
 
@@ -110,11 +106,10 @@ def test_the_value_under_the_finger_counts(cell: Server, node: RosNode, page: Pa
 
 
 def test_without_scripts_a_form_sends_the_value_of_its_key(
-    cell: Server, node: RosNode, chromium: Browser
+    cell: Server, node: RosNode, without_scripts: Page
 ) -> None:
     is_reported(cell, node, 30.0)
-    context = chromium.new_context(java_script_enabled=False)
-    page = context.new_page()
+    page = without_scripts
     page.goto(cell.url)
     page.wait_for_timeout(TAP_AGAIN_MS)
     before = len(node.heard(SET))
@@ -124,4 +119,3 @@ def test_without_scripts_a_form_sends_the_value_of_its_key(
     assert node.heard_data(SET)[before:] == [20.0]
     expect(page.locator('[data-widget="speed"] .value')).to_contain_text("20")
     expect(page.locator('[data-widget="speed"] .result')).to_contain_text("Confirmed by /test_speed")
-    context.close()

@@ -10,7 +10,9 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, Page, Response, expect
 
-from tests.support.parts import ENOUGH_S, Bridge, RosNode, Server, live, until
+from tests.support.pages import HIDE, place
+from tests.support.parts import ENOUGH_S, Bridge, RosNode, Server, until
+from tests.support.servers import live_server
 
 PANEL = """
 title = "Trends"
@@ -56,23 +58,24 @@ PEAK = 97.25
 TREND = '[data-widget="course"]'
 
 
-@pytest.fixture(scope="module")
-def cell(bridge: Bridge, node: RosNode, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    folder = tmp_path_factory.mktemp("trends")
-    panel = folder / "trends.toml"
-    panel.write_text(PANEL)
-    node.advertise("/test_inlet", "std_msgs/msg/Float64")
-    node.advertise("/test_joints", "sensor_msgs/msg/JointState")
-    mine = live(bridge.endpoint, folder, KIOSK_PANEL=str(panel))
-    until(mine.ready, "ready")
+def receiving(bridge: Bridge, node: RosNode, folder: Path) -> Server:
+    """A server that the robot's values have reached."""
+    mine = live_server(bridge, folder, PANEL)
 
     def arrives() -> bool:
         says(node, 5.0)
         return bool(mine.widget("course")["state"] == "live")
 
     until(arrives, "the robot's values arrive", every_s=0.1)
-    yield mine
-    mine.end()
+    return mine
+
+
+@pytest.fixture(scope="module")
+def cell(bridge: Bridge, node: RosNode, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    node.advertise("/test_inlet", "std_msgs/msg/Float64")
+    node.advertise("/test_joints", "sensor_msgs/msg/JointState")
+    with receiving(bridge, node, tmp_path_factory.mktemp("trends")) as mine:
+        yield mine
 
 
 def says(node: RosNode, value: float) -> None:
@@ -210,8 +213,7 @@ def test_a_touch_shows_the_values_at_a_time(cell: Server, node: RosNode, chromiu
     until(lambda: line(page), "a line is drawn")
     key(page, "pause").tap()
     x = re.findall(r"[ML]([\d.]+) ", line(page))[-1]
-    box = page.locator(f"{TREND} .area").bounding_box()
-    assert box is not None
+    box = place(page.locator(f"{TREND} .area"))
     at = box["x"] + float(x) / 1000 * box["width"]
     page.touchscreen.tap(at, box["y"] + box["height"] / 2)
     values = page.locator(".cursor-values")
@@ -266,16 +268,11 @@ def test_what_nobody_sees_is_not_asked_for(cell: Server, page: Page) -> None:
         return len([url for url in asked if "/trend?" in url])
 
     until(lambda: count() >= 2, "it asks")
-    # A page behind another tab, as Chromium tells it.
-    hide = """(hidden) => {
-      Object.defineProperty(document, "hidden", { value: hidden, configurable: true });
-      document.dispatchEvent(new Event("visibilitychange"));
-    }"""
-    page.evaluate(hide, True)
+    page.evaluate(HIDE, True)
     before = count()
     time_passes(cell, page, 2.5)
     assert count() - before <= 1, "one may have been under way"
-    page.evaluate(hide, False)
+    page.evaluate(HIDE, False)
     until(lambda: count() > before + 1, "it asks again")
     page.goto(f"{cell.url}/pages/two")
     before = count()
@@ -301,20 +298,10 @@ def test_requests_are_at_most_two_a_second_and_small(cell: Server, page: Page) -
 def test_a_lost_server_marks_values_as_old_and_keeps_the_picture(
     bridge: Bridge, node: RosNode, page: Page, tmp_path: Path
 ) -> None:
-    panel = tmp_path / "trends.toml"
-    panel.write_text(PANEL)
-    mine = live(bridge.endpoint, tmp_path, KIOSK_PANEL=str(panel))
-    until(mine.ready, "ready")
-
-    def arrives() -> bool:
-        says(node, 5.0)
-        return bool(mine.widget("course")["state"] == "live")
-
-    until(arrives, "the robot's values arrive", every_s=0.1)
-    opened(page, mine)
-    until(lambda: line(page), "a line is drawn")
-    drawn = line(page)
-    mine.end()
+    with receiving(bridge, node, tmp_path) as mine:
+        opened(page, mine)
+        until(lambda: line(page), "a line is drawn")
+        drawn = line(page)
     expect(page.locator(TREND)).to_have_attribute("data-state", "old", timeout=1000 * ENOUGH_S)
     decoration = "e => getComputedStyle(e).textDecorationStyle"
     assert page.locator(f"{TREND} .pen-0 > b").evaluate(decoration) == "dotted"
