@@ -3,7 +3,7 @@
 import asyncio
 import threading
 import time
-from collections.abc import Awaitable, Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import pytest
@@ -13,10 +13,8 @@ from app.audit import (
     Filter,
     Limits,
     OperatorLog,
-    Origin,
     audit_log,
     data_dir,
-    new_entry,
     writer_thread,
 )
 from app.audit.queries import rows
@@ -24,45 +22,17 @@ from app.audit.store import Store
 from app.audit.ticket import Results
 from app.audit.verify import verify
 from app.errors import FolderInUse, LogCorrupt, LogError
+from tests.support.operator_log import pressed, run, sent, until_good
 from tests.support.parts import until
 from tests.support.words import english
 
 FREE = Limits(required=False)
 
 
-def pressed(number: int = 1) -> Entry:
-    return new_entry("pressed", Origin(address="10.0.0.7"), {}, press=f"p{number}", action="press")
-
-
-def sent(entry: Entry | None) -> Entry:
-    assert entry is not None
-    return entry.follow_up("closed", "published", "Sent.")
-
-
 def kinds(folder: Path) -> list[tuple[str, str, str]]:
     """(kind, press, outcome), the oldest first."""
     found = [row.entry for row in rows(folder, Filter(every=True), None, 10_000)]
     return [(entry.kind, entry.press, entry.outcome) for entry in reversed(found)]
-
-
-def run(
-    folder: Path, work: Callable[[OperatorLog], Awaitable[None]], limits: Limits | None = None
-) -> None:
-    async def opened() -> None:
-        log = OperatorLog(folder, limits or Limits())
-        await log.start()
-        try:
-            await work(log)
-        finally:
-            await log.stop()
-
-    asyncio.run(opened())
-
-
-async def until_good(log: OperatorLog) -> None:
-    async with asyncio.timeout(10):
-        while log.fault:
-            await asyncio.sleep(0.01)
 
 
 async def until_commits(disk: "Disk", count: int) -> None:

@@ -21,13 +21,14 @@ from typing import Any
 import httpx
 import pytest
 
-from app.audit import Filter, Limits, OperatorLog, Origin, new_entry, queries, reader_process, readers
+from app.audit import Filter, OperatorLog, Origin, new_entry, queries, reader_process, readers
 from app.audit.database import NAME
 from app.audit.export import FIELDS, csv_chunks
 from app.audit.store import Store
 from app.errors import LogError, TooMany
 from app.web.routes import audit_log as routes
 from tests.support.holds import PANEL, permit
+from tests.support.operator_log import run
 from tests.support.parts import Bridge, RosNode, Server, http_client, until
 from tests.support.servers import live_server
 from tests.web.test_hold_socket import Socket, opened
@@ -259,18 +260,6 @@ def test_the_end_of_the_server_waits_for_no_export(kiosk: Server) -> None:
 
 
 # Without a server.
-
-
-def run(folder: Path, work: Callable[[OperatorLog], Any]) -> None:
-    async def opened() -> None:
-        log = OperatorLog(folder, Limits())
-        await log.start()
-        try:
-            await work(log)
-        finally:
-            await log.stop()
-
-    asyncio.run(opened())
 
 
 def test_two_search_at_a_time_and_the_server_itself_waits_for_none(

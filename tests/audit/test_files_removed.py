@@ -3,48 +3,27 @@
 import asyncio
 import json
 import shutil
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from app.audit import Entry, Filter, Limits, NullLog, OperatorLog, Origin, new_entry
+from app.audit import Entry, Filter, Limits, NullLog, OperatorLog
 from app.audit.data_dir import LOCK, DataDir
 from app.audit.database import NAME
 from app.audit.queries import rows
 from app.audit.verify import verify
 from app.errors import FolderInUse, LogError
-from tests.audit.test_audit_log import until_good
+from tests.support.operator_log import pressed, run, sent, until_good
 from tests.support.parts import ROOT, Server, until
 
 LOGROTATE = f"{NAME}.1"
 WAL = f"{NAME}-wal"
 
 
-def pressed(number: int = 1) -> Entry:
-    return new_entry("pressed", Origin(address="10.0.0.7"), {}, press=f"p{number}", action="press")
-
-
-def sent(entry: Entry | None) -> Entry:
-    assert entry is not None
-    return entry.follow_up("closed", "published", "Sent.")
-
-
 def entries(folder: Path) -> list[Entry]:
     """The oldest first."""
     return [row.entry for row in reversed(rows(folder, Filter(every=True), None, 10_000))]
-
-
-def run(folder: Path, work: Callable[[OperatorLog], Awaitable[None]], *, required: bool = True) -> None:
-    async def opened() -> None:
-        log = OperatorLog(folder, Limits(required=required))
-        await log.start()
-        try:
-            await work(log)
-        finally:
-            await log.stop()
-
-    asyncio.run(opened())
 
 
 async def until_locked(log: OperatorLog) -> None:
@@ -208,7 +187,7 @@ def test_nothing_is_sent_while_another_server_has_the_folder(tmp_path: Path, req
         await until_good(log)
         assert await log.pressed(pressed(3))
 
-    run(tmp_path, work, required=required)
+    run(tmp_path, work, Limits(required=required))
 
 
 def test_without_a_log_too_the_lock_is_looked_at(tmp_path: Path) -> None:

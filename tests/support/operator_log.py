@@ -1,0 +1,43 @@
+"""An operator's log in an event loop of the test's own."""
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Final
+
+from app.audit import Entry, Limits, OperatorLog, Origin, new_entry
+
+LIMITS: Final = Limits()
+
+
+def run(
+    folder: Path, work: Callable[[OperatorLog], Awaitable[object]], limits: Limits = LIMITS
+) -> None:
+    """Works with a log that is started, and stopped whatever happens."""
+
+    async def opened() -> None:
+        log = OperatorLog(folder, limits)
+        await log.start()
+        try:
+            await work(log)
+        finally:
+            await log.stop()
+
+    asyncio.run(opened())
+
+
+async def until_good(log: OperatorLog) -> None:
+    """Waits until the log can be written."""
+    async with asyncio.timeout(10):
+        while log.fault:
+            await asyncio.sleep(0.01)
+
+
+def pressed(number: int = 1) -> Entry:
+    return new_entry("pressed", Origin(address="10.0.0.7"), {}, press=f"p{number}", action="press")
+
+
+def sent(entry: Entry | None) -> Entry:
+    """The entry that follows one of a press."""
+    assert entry is not None
+    return entry.follow_up("closed", "published", "Sent.")
