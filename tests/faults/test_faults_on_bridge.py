@@ -51,19 +51,33 @@ def next_lock(stream: Stream) -> tuple[float, str]:
             return time.monotonic(), data["reason"]
 
 
-@pytest.mark.real_time
-def test_a_killed_bridge_locks_within_a_second_and_its_return_opens(
+@pytest.fixture
+def kiosk(
     own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
-) -> None:
+) -> Server:
+    """A kiosk behind a bridge that the test may end, whose robot permits."""
     speaking(own_node)
-    kiosk = servers(live(own_bridge.endpoint, tmp_path))
-    opened(kiosk)
+    mine = servers(live(own_bridge.endpoint, tmp_path))
+    opened(mine)
+    return mine
+
+
+def lock_after(kiosk: Server, cause: Callable[[], object]) -> tuple[float, str]:
+    """Seconds from the begin of a cause to the next lock in the stream, and the reason of that."""
     with kiosk.stream() as stream:
         stream.next("snapshot")
-        killed_at = time.monotonic()
-        own_bridge.kill()
+        began = time.monotonic()
+        cause()
         locked_at, reason = next_lock(stream)
-    assert locked_at - killed_at < 1.0
+    return locked_at - began, reason
+
+
+@pytest.mark.real_time
+def test_a_killed_bridge_locks_within_a_second_and_its_return_opens(
+    own_bridge: Bridge, kiosk: Server
+) -> None:
+    seconds, reason = lock_after(kiosk, own_bridge.kill)
+    assert seconds < 1.0
     assert "No connection to the robot" in reason
     assert not any(kiosk.widget(w)["enabled"] for w in ("operation", "operation1", "operation2"))
     refused = kiosk.press("operation", "into the void")
@@ -94,28 +108,18 @@ def test_after_a_return_an_old_permission_does_not_count(
 
 @pytest.mark.real_time
 def test_a_frozen_bridge_locks_within_a_second_and_opens_when_it_thaws(
-    own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
+    own_bridge: Bridge, kiosk: Server
 ) -> None:
-    speaking(own_node)
-    kiosk = servers(live(own_bridge.endpoint, tmp_path))
-    opened(kiosk)
-    with kiosk.stream() as stream:
-        stream.next("snapshot")
-        frozen_at = time.monotonic()
-        own_bridge.freeze()
-        locked_at, reason = next_lock(stream)
-    assert locked_at - frozen_at < 1.0
+    seconds, reason = lock_after(kiosk, own_bridge.freeze)
+    assert seconds < 1.0
     assert "No connection to the robot" in reason
     own_bridge.thaw()
     opened(kiosk)
 
 
 def test_what_changed_while_the_bridge_was_frozen_is_what_counts(
-    own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
+    own_bridge: Bridge, own_node: RosNode, kiosk: Server
 ) -> None:
-    speaking(own_node)
-    kiosk = servers(live(own_bridge.endpoint, tmp_path))
-    opened(kiosk)
     own_bridge.freeze()
     until(lambda: not permitted(kiosk), "locked")
     own_node.publish("/operation_enabled", {"data": False})
