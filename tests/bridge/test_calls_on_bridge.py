@@ -13,19 +13,13 @@ from typing import Any
 import httpx
 import numpy as np
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Locator, Page, expect
 
 from app.commands.service_calls import MAX_UNANSWERED
-from tests.support import cyclone
 from tests.support.cyclone import TYPES, Client, CycloneRobot, served
-from tests.support.parts import Bridge, Server, Stream, http_client, live, until
-
-cyclone_bridge = cyclone.cyclone_bridge
-own_cyclone_bridge = cyclone.own_cyclone_bridge
-client = cyclone.client
-own_client = cyclone.own_client
-robots = cyclone.robots
-robot = cyclone.robot
+from tests.support.pages import widget
+from tests.support.parts import Bridge, Server, Stream, http_client, until
+from tests.support.servers import live_server
 
 FIBONACCI = "example_interfaces/action/Fibonacci"
 
@@ -112,26 +106,18 @@ goal = { order = -1 }
 """
 
 
-def panel_file(folder: Path) -> str:
-    path = folder / "calls.toml"
-    path.write_text(PANEL)
-    return str(path)
-
-
 @pytest.fixture
 def kiosk(cyclone_bridge: Bridge, robot: CycloneRobot, tmp_path: Path) -> Iterator[Server]:
-    mine = live(cyclone_bridge.endpoint, tmp_path, KIOSK_PANEL=panel_file(tmp_path))
-    until(lambda: mine.widget("enable")["enabled"], "the service is offered")
-    yield mine
-    mine.end()
+    with live_server(cyclone_bridge, tmp_path, PANEL) as mine:
+        until(lambda: mine.widget("enable")["enabled"], "the service is offered")
+        yield mine
 
 
 @pytest.fixture
 def own_kiosk(own_cyclone_bridge: Bridge, tmp_path: Path) -> Iterator[Server]:
     """A kiosk behind a bridge that the test may end."""
-    mine = live(own_cyclone_bridge.endpoint, tmp_path, KIOSK_PANEL=panel_file(tmp_path))
-    yield mine
-    mine.end()
+    with live_server(own_cyclone_bridge, tmp_path, PANEL) as mine:
+        yield mine
 
 
 def uuid_of(octets: bytes) -> Any:
@@ -225,10 +211,9 @@ def test_calls_that_wait_hold_up_no_press(
     tmp_path: Path,
     servers: Callable[[Server], Server],
 ) -> None:
-    path = tmp_path / "waiting.toml"
     names = [f"wait_{n}" for n in range(3 * (MAX_UNANSWERED + 1))]
-    path.write_text(PANEL + "".join(waiting_widget(*one) for one in enumerate(names)))
-    kiosk = servers(live(cyclone_bridge.endpoint, tmp_path, KIOSK_PANEL=str(path)))
+    panel = PANEL + "".join(waiting_widget(*one) for one in enumerate(names))
+    kiosk = servers(live_server(cyclone_bridge, tmp_path, panel))
     robot.subscribe(topic="/said", type="std_msgs/msg/String")
     robot.answer_slow(seconds=None)
     until(lambda: kiosk.widget("say")["enabled"], "joined")
@@ -503,13 +488,19 @@ def test_a_goal_that_was_cut_off_locks_its_button_until_it_is_found(
     until(lambda: own_kiosk.widget("count")["enabled"], "its end is known")
 
 
+def counting(kiosk: Server, page: Page) -> Locator:
+    """The widget of a goal, whose key was pressed."""
+    page.goto(kiosk.url)
+    count = widget(page, "count")
+    count.get_by_role("button", name="Count", exact=True).click()
+    return count
+
+
 def test_a_goal_of_more_than_five_seconds_survives_a_reload(
     kiosk: Server, robot: CycloneRobot, page: Page
 ) -> None:
     robot.fibonacci(step_s=1.0)
-    page.goto(kiosk.url)
-    count = page.locator('[data-widget="count"]')
-    count.get_by_role("button", name="Count", exact=True).click()
+    count = counting(kiosk, page)
     expect(count.locator(".result")).to_contain_text("In progress")
     page.reload()
     expect(count.locator(".result")).to_contain_text("so far [0, 1")
@@ -530,9 +521,7 @@ def test_a_goals_state_is_not_known_while_the_server_is_lost(
     kiosk: Server, robot: CycloneRobot, page: Page
 ) -> None:
     robot.fibonacci(step_s=30)
-    page.goto(kiosk.url)
-    count = page.locator('[data-widget="count"]')
-    count.get_by_role("button", name="Count", exact=True).click()
+    count = counting(kiosk, page)
     expect(count.locator(".goal")).to_have_text("Running")
     kiosk.process.send(signal.SIGSTOP)
     expect(count.locator(".goal")).to_have_text("unknown")

@@ -23,13 +23,6 @@ from tests.support.cyclone import (
 )
 from tests.support.parts import ENOUGH_S, Bridge, until
 
-cyclone_bridge = cyclone.cyclone_bridge
-own_cyclone_bridge = cyclone.own_cyclone_bridge
-client = cyclone.client
-own_client = cyclone.own_client
-robots = cyclone.robots
-robot = cyclone.robot
-
 Robots = Callable[..., CycloneRobot]
 
 SET_BOOL = "std_srvs/srv/SetBool"

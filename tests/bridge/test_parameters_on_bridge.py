@@ -8,16 +8,9 @@ from typing import Any
 import httpx
 import pytest
 
-from tests.support import cyclone
 from tests.support.cyclone import Client, CycloneRobot, served
-from tests.support.parts import Bridge, Server, live, until
-
-cyclone_bridge = cyclone.cyclone_bridge
-own_cyclone_bridge = cyclone.own_cyclone_bridge
-client = cyclone.client
-own_client = cyclone.own_client
-robots = cyclone.robots
-robot = cyclone.robot
+from tests.support.parts import Bridge, Server, until
+from tests.support.servers import live_server
 
 FORM = {"content-type": "application/x-www-form-urlencoded"}
 WIDGET = """
@@ -86,18 +79,11 @@ type = "double"
 """
 
 
-def panel_file(folder: Path) -> str:
-    path = folder / "setup.toml"
-    path.write_text(PANEL)
-    return str(path)
-
-
 @pytest.fixture
 def kiosk(cyclone_bridge: Bridge, robot: CycloneRobot, tmp_path: Path) -> Iterator[Server]:
-    mine = live(cyclone_bridge.endpoint, tmp_path, KIOSK_PANEL=panel_file(tmp_path))
-    until(lambda: mine.widget("speed")["enabled"], "the parameters are read")
-    yield mine
-    mine.end()
+    with live_server(cyclone_bridge, tmp_path, PANEL) as mine:
+        until(lambda: mine.widget("speed")["enabled"], "the parameters are read")
+        yield mine
 
 
 def press(kiosk: Server, widget: str, value: Any, **more: Any) -> httpx.Response:
@@ -253,7 +239,7 @@ def test_a_bridge_lost_while_setting_leaves_it_unknown(
 ) -> None:
     robot = robots(own_cyclone_bridge.domain)
     served(robot, own_client)
-    kiosk = servers(live(own_cyclone_bridge.endpoint, tmp_path, KIOSK_PANEL=panel_file(tmp_path)))
+    kiosk = servers(live_server(own_cyclone_bridge, tmp_path, PANEL))
     until(lambda: kiosk.widget("name")["enabled"], "offered")
     robot.answer_parameters(service="set_parameters", seconds=1.0)
     with ThreadPoolExecutor(1) as pool:

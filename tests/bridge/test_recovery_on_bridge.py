@@ -12,16 +12,10 @@ from app.audit import Entry, Filter
 from app.audit.queries import rows
 from app.audit.verify import verify
 from app.commands.actions.goal import goal_id
-from tests.bridge.test_calls_on_bridge import PANEL, cancel, panel_file, press
-from tests.support import cyclone
+from tests.bridge.test_calls_on_bridge import PANEL, cancel, press
 from tests.support.cyclone import CycloneRobot
 from tests.support.parts import Bridge, Server, live, until
-
-cyclone_bridge = cyclone.cyclone_bridge
-own_cyclone_bridge = cyclone.own_cyclone_bridge
-client = cyclone.client
-robots = cyclone.robots
-robot = cyclone.robot
+from tests.support.servers import panel_file
 
 GET_RESULT = "/fibonacci/_action/get_result"
 CANCEL_GOAL = "/fibonacci/_action/cancel_goal"
@@ -37,7 +31,7 @@ def start(
 
     def started(panel: str = "") -> Server:
         data = str(tmp_path / "data")
-        path = panel or panel_file(tmp_path)
+        path = panel or str(panel_file(tmp_path, PANEL))
         return servers(live(cyclone_bridge.endpoint, tmp_path, KIOSK_DATA=data, KIOSK_PANEL=path))
 
     return started
@@ -187,7 +181,7 @@ def test_a_goal_is_in_doubt_until_the_robot_is_there(
     tmp_path: Path,
 ) -> None:
     def start() -> Server:
-        data, panel = str(tmp_path / "data"), panel_file(tmp_path)
+        data, panel = str(tmp_path / "data"), str(panel_file(tmp_path, PANEL))
         bridge = own_cyclone_bridge.endpoint
         return servers(live(bridge, tmp_path, KIOSK_DATA=data, KIOSK_PANEL=panel))
 

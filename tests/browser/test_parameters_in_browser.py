@@ -2,15 +2,16 @@
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 from playwright.sync_api import Browser, Page, Route, expect
 
-from tests.bridge.test_parameters_on_bridge import panel_file
+from tests.bridge.test_parameters_on_bridge import PANEL
 from tests.support import cyclone
 from tests.support.cyclone import CycloneRobot
-from tests.support.parts import Bridge, Server, live, until
+from tests.support.pages import place, widget
+from tests.support.parts import Bridge, Server, until
+from tests.support.servers import live_server
 
 cyclone_bridge = cyclone.cyclone_bridge
 client = cyclone.client
@@ -22,15 +23,10 @@ MM = 1 / 0.22  # CSS pixels
 
 @pytest.fixture
 def kiosk(cyclone_bridge: Bridge, robot: CycloneRobot, tmp_path: Path) -> Iterator[Server]:
-    mine = live(cyclone_bridge.endpoint, tmp_path, KIOSK_PANEL=panel_file(tmp_path))
-    until(lambda: mine.widget("speed")["enabled"], "the parameters are read")
-    until(lambda: robot.subscribers(topic="/parameter_events"), "events are heard")
-    yield mine
-    mine.end()
-
-
-def widget(page: Page, name: str) -> Any:
-    return page.locator(f'[data-widget="{name}"]')
+    with live_server(cyclone_bridge, tmp_path, PANEL) as mine:
+        until(lambda: mine.widget("speed")["enabled"], "the parameters are read")
+        until(lambda: robot.subscribers(topic="/parameter_events"), "events are heard")
+        yield mine
 
 
 def set_(page: Page, label: str) -> None:
@@ -110,11 +106,9 @@ def test_what_a_dialog_shows_is_what_is_set(
     cyclone_bridge: Bridge, robot: CycloneRobot, tmp_path: Path, page: Page
 ) -> None:
     """The input follows the robot behind the dialog; the question stays what it was."""
-    panel = Path(panel_file(tmp_path))
     asked = 'parameter = "limit"\nconfirm_press = true'
-    panel.write_text(panel.read_text().replace('parameter = "limit"', asked))
-    kiosk = live(cyclone_bridge.endpoint, tmp_path, KIOSK_PANEL=str(panel))
-    try:
+    panel = PANEL.replace('parameter = "limit"', asked)
+    with live_server(cyclone_bridge, tmp_path, panel) as kiosk:
         until(lambda: kiosk.widget("limit")["enabled"], "the parameters are read")
         until(lambda: robot.subscribers(topic="/parameter_events"), "events are heard")
         robot.set_parameter(name="limit", value=20)
@@ -130,8 +124,6 @@ def test_what_a_dialog_shows_is_what_is_set(
         dialog.get_by_role("button", name="Limit").click()
         expect(widget(page, "limit").locator(".result")).to_contain_text("Set to 20")
         assert robot.parameters()["limit"] == 20
-    finally:
-        kiosk.end()
 
 
 def test_what_is_out_of_range_is_marked_and_refused(
@@ -185,11 +177,9 @@ def test_targets_fit_gloves_and_nothing_moves_when_a_lock_comes(
     })"""
     before = page.evaluate(places)
     for name in ("Set Speed", "Speed: more", "Speed: less"):
-        box = page.get_by_role("button", name=name, exact=True).bounding_box()
-        assert box is not None
+        box = place(page.get_by_role("button", name=name, exact=True))
         assert min(box["width"], box["height"]) >= 14 * MM - 0.5  # as high as the entry beside it
-    pressed = page.get_by_role("button", name="Set Speed", exact=True).bounding_box()
-    assert pressed is not None
+    pressed = place(page.get_by_role("button", name="Set Speed", exact=True))
     assert pressed["width"] >= 20 * MM - 0.5
     robot.end()
     expect(widget(page, "speed")).to_have_attribute("data-state", "old")

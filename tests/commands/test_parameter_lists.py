@@ -22,6 +22,7 @@ from tests.support import cyclone
 from tests.support.builders import panel_of, robot_there
 from tests.support.cyclone import CycloneRobot
 from tests.support.parts import Bridge, RosNode, Server, live, until
+from tests.support.servers import live_server
 from tests.support.words import english
 
 cyclone_bridge = cyclone.cyclone_bridge
@@ -261,13 +262,10 @@ type = "{kind}"
 
 @pytest.fixture
 def kiosk(cyclone_bridge: Bridge, robot: CycloneRobot, tmp_path: Path) -> Iterator[Server]:
-    path = tmp_path / "setup.toml"
-    path.write_text(PANEL)
-    mine = live(cyclone_bridge.endpoint, tmp_path, KIOSK_PANEL=str(path))
-    until(lambda: mine.widget("gains")["enabled"], "the parameters are read")
-    until(lambda: robot.subscribers(topic="/parameter_events"), "events are heard")
-    yield mine
-    mine.end()
+    with live_server(cyclone_bridge, tmp_path, PANEL) as mine:
+        until(lambda: mine.widget("gains")["enabled"], "the parameters are read")
+        until(lambda: robot.subscribers(topic="/parameter_events"), "events are heard")
+        yield mine
 
 
 def press(kiosk: Server, name: str, value: Any) -> httpx.Response:

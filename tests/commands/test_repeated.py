@@ -17,10 +17,11 @@ from app.audit.database import NAME
 from app.audit.entry import as_json
 from app.audit.store import Store
 from app.audit.verify import verify
-from tests.bridge.test_calls_on_bridge import panel_file
+from tests.bridge.test_calls_on_bridge import PANEL
 from tests.support import cyclone
 from tests.support.cyclone import CycloneRobot
-from tests.support.parts import Bridge, Server, live, until
+from tests.support.parts import Bridge, Server, until
+from tests.support.servers import live_server
 
 cyclone_bridge = cyclone.cyclone_bridge
 client = cyclone.client
@@ -40,8 +41,8 @@ def start(
     """Starts a server on the data of the one before."""
 
     def started() -> Server:
-        data, panel = str(tmp_path / "data"), panel_file(tmp_path)
-        kiosk = servers(live(cyclone_bridge.endpoint, tmp_path, KIOSK_DATA=data, KIOSK_PANEL=panel))
+        data = str(tmp_path / "data")
+        kiosk = servers(live_server(cyclone_bridge, tmp_path, PANEL, KIOSK_DATA=data))
         until(lambda: kiosk.widget("enable")["enabled"], "the service is offered")
         return kiosk
 

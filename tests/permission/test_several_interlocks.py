@@ -32,7 +32,8 @@ from tests.support.builders import (
     robot_there,
     says,
 )
-from tests.support.parts import ROOT, Server, until
+from tests.support.parts import Server, until
+from tests.support.servers import demo_server
 from tests.support.words import english
 
 DOORS: Final = "/doors_closed"
@@ -237,12 +238,9 @@ NO_AIR: Final = "Locked: waiting for /air."
 @pytest.fixture(scope="module")
 def kiosk(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
     """On the robot that it simulates, which says nothing of doors and air."""
-    panel = tmp_path_factory.mktemp("panel") / "cell.toml"
-    panel.write_text(PANEL)
-    mine = Server(ROOT, KIOSK_PANEL=str(panel), KIOSK_MODE="demo")
-    until(lambda: mine.widget("single")["enabled"], "the robot is there")
-    yield mine
-    mine.end()
+    with demo_server(tmp_path_factory.mktemp("panel"), PANEL) as mine:
+        until(lambda: mine.widget("single")["enabled"], "the robot is there")
+        yield mine
 
 
 @pytest.mark.parametrize("scripts", [True, False])
@@ -284,9 +282,7 @@ def test_an_operator_with_gloves_reads_all_reasons(
 def test_a_page_without_its_server_tells_that_alone(
     page: Page, servers: Callable[[Server], Server], tmp_path: Path
 ) -> None:
-    panel = tmp_path / "cell.toml"
-    panel.write_text(PANEL)
-    mine = servers(Server(ROOT, KIOSK_PANEL=str(panel), KIOSK_MODE="demo"))
+    mine = servers(demo_server(tmp_path, PANEL))
     until(lambda: mine.widget("single")["enabled"], "the robot is there")
     page.goto(mine.url)
     why = page.locator("#why-several")

@@ -9,7 +9,8 @@ from typing import Any
 import pytest
 
 from tests.audit.test_on_server import MOUNT, SMALL_DISK, fill, inside
-from tests.support.parts import ROOT, Server, until
+from tests.support.parts import Server, until
+from tests.support.servers import demo_server
 
 PANEL = """
 title = "Trends"
@@ -44,17 +45,10 @@ type = "std_msgs/msg/Float64"
 PATH = "/widgets/course/trend"
 
 
-def panel_file(folder: Path) -> str:
-    path = folder / "trends.toml"
-    path.write_text(PANEL)
-    return str(path)
-
-
 @pytest.fixture(scope="module")
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    mine = Server(ROOT, KIOSK_PANEL=panel_file(tmp_path_factory.mktemp("trends")))
-    yield mine
-    mine.end()
+    with demo_server(tmp_path_factory.mktemp("trends"), PANEL) as mine:
+        yield mine
 
 
 def history(server: Server, **query: Any) -> dict[str, Any]:
@@ -139,12 +133,12 @@ def test_a_killed_server_has_the_values_from_before(
     tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:
     """SIGKILL while it records; the next one shows what was written, then a gap, then what is new."""
-    panel, data = panel_file(tmp_path), str(tmp_path / "data")
-    first = servers(Server(ROOT, KIOSK_PANEL=panel, KIOSK_DATA=data))
+    data = str(tmp_path / "data")
+    first = servers(demo_server(tmp_path, PANEL, KIOSK_DATA=data))
     until(lambda: kept(first) >= 8, "some seconds are recorded", within_s=60)
     before = columns(first, span_s=600, points=600)
     first.end(signal.SIGKILL)
-    second = servers(Server(ROOT, KIOSK_PANEL=panel, KIOSK_DATA=data))
+    second = servers(demo_server(tmp_path, PANEL, KIOSK_DATA=data))
     until(lambda: columns(second, span_s=600, points=600)[-1][0] > before[-1][0] + 1, "it records")
     answer = history(second, span_s=600, points=600)["pens"][0]
     after = {one[0]: one for one in answer if one}
@@ -160,10 +154,8 @@ def test_a_killed_server_has_the_values_from_before(
 def test_a_full_disk_is_told_and_trends_go_on(
     tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:
-    text = Path(panel_file(tmp_path)).read_text()
-    panel = tmp_path / "quiet.toml"
-    panel.write_text(text.replace("[[page]]", "[log]\nenabled = false\n[[page]]", 1))
-    kiosk = servers(Server(ROOT, before=[*SMALL_DISK, MOUNT, "sh"], KIOSK_PANEL=str(panel)))
+    panel = PANEL.replace("[[page]]", "[log]\nenabled = false\n[[page]]", 1)
+    kiosk = servers(demo_server(tmp_path, panel, before=[*SMALL_DISK, MOUNT, "sh"]))
     until(lambda: kept(kiosk) >= 3, "it records")
     filler = fill(inside(kiosk))
     note = "Not kept on disk: no space left on device"

@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 from typing import Final
 
-from tests.support.parts import ROOT, Server, until
+from tests.support.servers import demo_server
 
 PANEL: Final = """
 title = "Cell"
@@ -28,12 +28,6 @@ title = "One"
 
 
 def test_the_script_of_a_frames_hold_is_loaded_on_every_page(tmp_path: Path) -> None:
-    panel = tmp_path / "cell.toml"
-    panel.write_text(PANEL)
-    server = Server(ROOT, KIOSK_PANEL=str(panel))
-    try:
-        until(server.ready, "ready")
+    with demo_server(tmp_path, PANEL) as server:
         html = server.http.get("/pages/one").text
         assert re.findall(r'data-scripts="([^"]*)"', html) == ["hold"]
-    finally:
-        server.end()

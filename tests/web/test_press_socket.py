@@ -14,6 +14,7 @@ from playwright.sync_api import Page, Request, WebSocket, WebSocketRoute, expect
 
 from app.web.routes.press_socket import MOST_AT_ONCE
 from tests.runtime.test_nothing_grows import MUTE, Robot, widget
+from tests.support.pages import HIDE
 from tests.support.parts import ROOT, PressSocket, Server, as_response, until, zenoh_file
 from tests.web.test_server import reads_nothing
 
@@ -283,11 +284,9 @@ def test_a_hidden_page_gives_its_socket_back(kiosk: Server, page: Page) -> None:
     page.goto(kiosk.url)
     first = touched(page)
     assert not first.is_closed()
-    hide = "Object.defineProperty(document, 'hidden', { value: %s, configurable: true });"
-    tell = "document.dispatchEvent(new Event('visibilitychange'));"
     with first.expect_event("close"):
-        page.evaluate(hide % "true" + tell)
-    page.evaluate(hide % "false" + tell)
+        page.evaluate(HIDE, True)
+    page.evaluate(HIDE, False)
     second = touched(page)
     publish(page).click()
     expect(page.locator("#receipt-free")).to_contain_text("Sent on /free at")

@@ -1,0 +1,10 @@
+"""Fixtures of robots on Cyclone DDS, behind bridges of their own."""
+
+from tests.support import cyclone
+
+cyclone_bridge = cyclone.cyclone_bridge
+own_cyclone_bridge = cyclone.own_cyclone_bridge
+client = cyclone.client
+own_client = cyclone.own_client
+robots = cyclone.robots
+robot = cyclone.robot
