@@ -7,6 +7,8 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from datetime import UTC, datetime, timedelta
 from functools import partial
 from pathlib import Path
@@ -29,6 +31,22 @@ from tests.support.parts import free_port, until
 
 RENEWALS = 30
 BURST = 500
+Linked = Callable[[Declarations], ZenohSession]
+
+
+@pytest.fixture
+def linked(peer: tuple[str, zenoh.Session]) -> Iterator[Linked]:
+    """Starts links to the peer, and closes them after the test."""
+    endpoint, _ = peer
+    with ExitStack() as stack:
+
+        def started(declarations: Declarations) -> ZenohSession:
+            link = ZenohSession(config_to(endpoint), lambda _: None, DIALECT)
+            stack.callback(link.close)
+            link.start(declarations)
+            return link
+
+        yield started
 
 
 def matched(publisher: zenoh.Publisher) -> bool:
@@ -120,22 +138,20 @@ def test_a_session_is_renewed_in_the_middle_of_what_comes_in(
     link.close()
 
 
-def test_a_burst_is_not_dropped(peer: tuple[str, zenoh.Session]) -> None:
+def test_a_burst_is_not_dropped(peer: tuple[str, zenoh.Session], linked: Linked) -> None:
     """With Zenoh's own queue some of these were lost, more on a busy machine, and no one was told."""
-    endpoint, session = peer
+    _, session = peer
     heard: list[bytes] = []
 
     def hear(sample: zenoh.Sample) -> None:
         heard.append(bytes(sample.payload))
 
     session.declare_subscriber("b", Callback(hear, indirect=False))
-    link = ZenohSession(config_to(endpoint), lambda _: None, DIALECT)
-    link.start(declared([], ["b"]))
+    link = linked(declared([], ["b"]))
     until(lambda: link.has_reader("b"), "the subscriber is known")
     for number in range(BURST):
         link.put("b", str(number).encode())
     until(lambda: len(heard) == BURST, f"all came, of {BURST}: {len(heard)}")
-    link.close()
     assert heard == [str(number).encode() for number in range(BURST)]
 
 
@@ -182,10 +198,9 @@ async def asked(link: ZenohSession) -> None:
     link.query("b", b"", 0.1).cancel()
 
 
-def test_nothing_is_left_of_the_sessions_that_were(peer: tuple[str, zenoh.Session]) -> None:
+def test_nothing_is_left_of_the_sessions_that_were(linked: Linked) -> None:
     """Zenoh kept a shared memory segment of each: a thousand losses of the link, and no file more."""
-    link = ZenohSession(config_to(peer[0]), lambda _: None, DIALECT)
-    link.start(declared(["a"], ["b"]))
+    link = linked(declared(["a"], ["b"]))
 
     def files() -> int:
         return len(list(Path("/proc/self/fd").iterdir()))
@@ -196,15 +211,13 @@ def test_nothing_is_left_of_the_sessions_that_were(peer: tuple[str, zenoh.Sessio
     for _ in range(8):
         link.renew()
     until(lambda: files() <= before, f"no more files than {before}")
-    link.close()
 
 
 def test_tokens_are_held_by_the_new_session_when_they_are_wanted_again(
-    peer: tuple[str, zenoh.Session],
+    peer: tuple[str, zenoh.Session], linked: Linked
 ) -> None:
-    endpoint, session = peer
-    link = ZenohSession(config_to(endpoint), lambda _: None, DIALECT)
-    link.start(declared([], []))
+    _, session = peer
+    link = linked(declared([], []))
     link.hold(tokens(link.zid, 1))
     link.renew()
     wanted = tokens(link.zid, 2)
@@ -215,15 +228,13 @@ def test_tokens_are_held_by_the_new_session_when_they_are_wanted_again(
         return {str(reply.ok.key_expr) for reply in replies if reply.ok is not None}
 
     until(lambda: found() == set(wanted), "the tokens of the new session are there")
-    link.close()
 
 
 def test_of_a_watched_topic_what_came_and_went_between_two_drains_is_kept(
-    peer: tuple[str, zenoh.Session],
+    peer: tuple[str, zenoh.Session], linked: Linked
 ) -> None:
-    endpoint, session = peer
-    link = ZenohSession(config_to(endpoint), lambda _: None, DIALECT)
-    link.start(declared(["a", "b"], [], watched=["a"]))
+    _, session = peer
+    link = linked(declared(["a", "b"], [], watched=["a"]))
     until(lambda: link.drain().link_up, "a link")
     said = [b"yes", b"no", b"no", b"yes", *(b"%d" % n for n in range(100)), b"yes"]
     for key in ("a", "b"):
@@ -240,15 +251,13 @@ def test_of_a_watched_topic_what_came_and_went_between_two_drains_is_kept(
         session.put("a", payload)
     time.sleep(0.5)
     assert [bytes(one.payload) for one in link.drain().samples["a"].skipped_payloads] == [b"yes", b"no"]
-    link.close()
 
 
 def test_a_stamp_of_a_clock_that_is_ahead_makes_the_link_deaf_to_nothing(
-    peer: tuple[str, zenoh.Session],
+    peer: tuple[str, zenoh.Session], linked: Linked
 ) -> None:
-    endpoint, session = peer
-    link = ZenohSession(config_to(endpoint), lambda _: None, DIALECT)
-    link.start(declared(["a"], [], watched=["a"]))
+    _, session = peer
+    link = linked(declared(["a"], [], watched=["a"]))
     until(partial(matched, publisher := session.declare_publisher("a")), "it is subscribed")
     own = session.new_timestamp().get_id()
     now = datetime.now(UTC)
@@ -263,21 +272,19 @@ def test_a_stamp_of_a_clock_that_is_ahead_makes_the_link_deaf_to_nothing(
         return len(heard) >= 26
 
     until(all_heard, "each value came")
-    link.close()
     assert heard == [b"true", *(b"false%d" % n for n in range(25))]
 
 
 def test_a_late_link_gets_the_last_value_of_a_cache_and_nothing_older_than_what_it_heard(
-    peer: tuple[str, zenoh.Session],
+    peer: tuple[str, zenoh.Session], linked: Linked
 ) -> None:
-    endpoint, session = peer
+    _, session = peer
     latched = declare_advanced_publisher(
         session, "a", cache=CacheConfig(max_samples=1), publisher_detection=True
     )
     latched.put(b"old")
     latched.put(b"last")
-    link = ZenohSession(config_to(endpoint), lambda _: None, DIALECT)
-    link.start(declared(["a"], []))
+    link = linked(declared(["a"], []))
     heard: list[bytes] = []
 
     def came(payload: bytes) -> bool:
@@ -294,18 +301,16 @@ def test_a_late_link_gets_the_last_value_of_a_cache_and_nothing_older_than_what_
     )
     again.put(b"of the next")
     until(partial(came, b"of the next"), "the next publisher is heard")
-    link.close()
     assert heard == [b"last", b"new", b"of the next"]
 
 
 def test_a_small_message_does_not_keep_all_that_it_was_read_with(
-    peer: tuple[str, zenoh.Session],
+    peer: tuple[str, zenoh.Session], linked: Linked
 ) -> None:
     """The latest of each topic stays for long: each kept a buffer of 64 kB, of which some was used."""
-    endpoint, session = peer
+    _, session = peer
     topics = [f"topic{number}" for number in range(300)]
-    link = ZenohSession(config_to(endpoint), lambda _: None, DIALECT)
-    link.start(declared(topics, []))
+    link = linked(declared(topics, []))
     until(lambda: link.drain().link_up, "a link")
     before = resident_kb()
     kept: dict[str, Sample] = {}
@@ -318,5 +323,4 @@ def test_a_small_message_does_not_keep_all_that_it_was_read_with(
         session.put(topic, b"small")
         until(partial(lambda wanted: came() == wanted, number), f"{topic} came")
     grown_kb = resident_kb() - before
-    link.close()
     assert grown_kb < len(topics) * 4
