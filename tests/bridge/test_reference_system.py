@@ -12,18 +12,8 @@ import zenoh
 
 from tests.support.form import several
 from tests.support.parts import ROOT, Bridge, RosNode, Server, has_heard, live, until
+from tests.support.samples import TEXTS
 
-TEXTS = [
-    "",
-    "hello",
-    "日本語",
-    "🤖👩‍🏭",
-    "\"quotes\" 'and' `ticks`",
-    "<script>alert(1)</script>",
-    "{braces} {{double}} {message}",
-    "x" * 80,
-    "\\ % \t ~ $HOME",
-]
 STARTS = several(12, 100)
 STRING_HASH = "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"
 

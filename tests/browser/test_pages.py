@@ -14,18 +14,10 @@ import pytest
 from playwright.sync_api import Browser, Page, Request, Route, expect
 
 from app.printable import printable
+from tests.support.pages import HIDE, place
 from tests.support.parts import TAP_AGAIN_MS, Bridge, RosNode, Server, has_heard, live, until
+from tests.support.samples import TEXTS
 
-TEXTS = [
-    "",
-    "hello",
-    "日本語",
-    "🤖👩‍🏭",
-    "\"quotes\" 'and' `ticks`",
-    "<script>alert(1)</script>",
-    "{braces} {{double}}",
-    "x" * 80,
-]
 SIZES = [(1280, 800), (1024, 600)]
 NO_SERVER = "No connection to the panel server"
 TELL_WHEN_LOCKED = """() => new MutationObserver(() => window.lockedAt ??= Date.now()).observe(
@@ -154,13 +146,12 @@ def test_every_text_arrives_intact(server: Server, node: RosNode, page: Page) ->
 
 
 def test_a_reload_shows_the_true_state_before_any_script(
-    server: Server, node: RosNode, chromium: Browser
+    server: Server, node: RosNode, without_scripts: Page
 ) -> None:
     until(server.ready, "ready")
     permit(node, True)
     until(lambda: server.widget("operation1")["enabled"], "permitted")
-    context = chromium.new_context(java_script_enabled=False)
-    page = context.new_page()
+    page = without_scripts
     page.goto(server.url)
     expect(button(page, "Publish1")).to_be_enabled()
     permit(node, False)
@@ -168,13 +159,13 @@ def test_a_reload_shows_the_true_state_before_any_script(
     page.reload()
     expect(button(page, "Publish1")).to_be_disabled()
     expect(why(page, "operation1")).to_contain_text("does not permit")
-    context.close()
 
 
-def test_without_scripts_a_press_is_a_form(server: Server, node: RosNode, chromium: Browser) -> None:
+def test_without_scripts_a_press_is_a_form(
+    server: Server, node: RosNode, without_scripts: Page
+) -> None:
     until(server.ready, "ready")
-    context = chromium.new_context(java_script_enabled=False)
-    page = context.new_page()
+    page = without_scripts
     # One that was locked for a moment, as by a stall of the server, loads itself again only later.
     until(lambda: page.goto(server.url) and button(page, "Publish").is_enabled(), "it is open")
     before = len(node.heard("/operation"))
@@ -190,7 +181,6 @@ def test_without_scripts_a_press_is_a_form(server: Server, node: RosNode, chromi
     server.press("operation", "the next")
     until(lambda: "the next" in node.heard_data("/operation")[before:], "heard")
     assert node.heard_data("/operation")[before:] == ["no script 日本語", "the next"]
-    context.close()
 
 
 def test_a_page_without_scripts_loads_itself_again(
@@ -198,19 +188,17 @@ def test_a_page_without_scripts_loads_itself_again(
     node: RosNode,
     tmp_path: Path,
     servers: Callable[[Server], Server],
-    chromium: Browser,
+    without_scripts: Page,
 ) -> None:
     """A lock shows without a touch."""
     mine = servers(live(bridge.endpoint, tmp_path, app="tests.support.apps.reloading:app"))
-    context = chromium.new_context(java_script_enabled=False)
-    page = context.new_page()
+    page = without_scripts
     page.goto(mine.url)
     expect(button(page, "Publish1")).to_be_disabled()
     permit(node, True)
     expect(button(page, "Publish1")).to_be_enabled()
     permit(node, False)
     expect(button(page, "Publish1")).to_be_disabled()
-    context.close()
 
 
 def test_enter_in_an_input_presses_nothing(server: Server, node: RosNode, chromium: Browser) -> None:
@@ -335,24 +323,16 @@ def test_a_hidden_tab_gives_its_stream_back_and_takes_a_snapshot_when_shown(
     def streams(count: int) -> bool:
         return f"kiosk_streams {count}.0" in server.http.get("/metrics").text
 
-    def show(visible: bool) -> None:
-        page.evaluate(
-            "(visible) => { Object.defineProperty(document, 'hidden',"
-            " { value: !visible, configurable: true });"
-            " document.dispatchEvent(new Event('visibilitychange')); }",
-            visible,
-        )
-
     until(server.ready, "ready")
     permit(node, True)
     page.goto(server.url)
     expect(button(page, "Publish1")).to_be_enabled()
     until(lambda: streams(1), "one stream")
-    show(False)
+    page.evaluate(HIDE, True)
     until(lambda: streams(0), "no stream")
     expect(button(page, "Publish1")).to_be_disabled()
     permit(node, False)
-    show(True)
+    page.evaluate(HIDE, False)
     until(lambda: streams(1), "one stream again")
     expect(why(page, "operation1")).to_contain_text("does not permit")
     expect(button(page, "Publish")).to_be_enabled()
@@ -425,8 +405,7 @@ def test_the_page_fits_its_screen_with_buttons_of_twenty_millimetres(
     mm_per_px = 0.22
     places = []
     for name in ("Publish", "Publish1", "Publish2"):
-        box = button(page, name).bounding_box()
-        assert box is not None
+        box = place(button(page, name))
         assert box["height"] * mm_per_px >= 19.9
         assert box["width"] * mm_per_px >= 20
         places.append(box)

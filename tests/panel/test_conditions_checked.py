@@ -15,6 +15,7 @@ from app.robot.state import RobotState, Sample, SkippedPayload
 from app.runtime.ingest import Ingest
 from app.transport.inbox import Changes
 from tests.support.builders import BRIDGE, ENABLED, INTERFACES, NOW, Table, robot_there
+from tests.support.samples import BATTERY
 
 FILE: Final = """
 title = "Cell"
@@ -36,17 +37,6 @@ type = "std_msgs/msg/Empty"
 message = {{}}
 interlock = "air"
 """
-BATTERY: Final[Table] = {
-    "header": {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""},
-    **dict.fromkeys(("voltage", "temperature", "current", "charge", "capacity"), 0.0),
-    **dict.fromkeys(("design_capacity", "percentage"), 0.0),
-    **dict.fromkeys(("power_supply_health", "power_supply_technology"), 0),
-    "present": True,
-    "cell_voltage": [],
-    "cell_temperature": [],
-    "location": "",
-    "serial_number": "",
-}
 LEVEL: Final[Table] = {"name": "", "message": "", "hardware_id": "", "values": []}
 
 

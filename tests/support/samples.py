@@ -18,6 +18,30 @@ LARGEST: Final[Mapping[str, float]] = {
     "float32": float(numpy.finfo(numpy.float32).max),
     "float64": float(numpy.finfo(numpy.float64).max),
 }
+# Texts that a way to the robot could spoil.
+TEXTS: Final = [
+    "",
+    "hello",
+    "日本語",
+    "🤖👩‍🏭",
+    "\"quotes\" 'and' `ticks`",
+    "<script>alert(1)</script>",
+    "{braces} {{double}} {message}",
+    "x" * 80,
+    "\\ % \t ~ $HOME",
+]
+# A sensor_msgs/msg/BatteryState that says nothing.
+BATTERY: Final[Mapping[str, Any]] = {
+    "header": {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""},
+    **dict.fromkeys(("voltage", "temperature", "current", "charge", "capacity"), 0.0),
+    **dict.fromkeys(("design_capacity", "percentage"), 0.0),
+    **dict.fromkeys(("power_supply_status", "power_supply_health", "power_supply_technology"), 0),
+    "present": True,
+    "cell_voltage": [],
+    "cell_temperature": [],
+    "location": "",
+    "serial_number": "",
+}
 
 
 class Samples:

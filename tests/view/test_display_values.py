@@ -12,6 +12,7 @@ from app.panel import load_panel
 from app.robot.state import RobotState, Sample
 from app.view.view import build_view
 from tests.support.builders import BRIDGE, DIALECT, HEARD, INTERFACES, NOW, panel_of, robot_there
+from tests.support.samples import BATTERY
 from tests.support.words import english
 
 AT = f"received {format_time(NOW)}"
@@ -130,18 +131,6 @@ def test_a_lamp_shows_the_state_of_its_value(value: int, text: str, shape: str, 
     }
 
 
-BATTERY = "sensor_msgs/msg/BatteryState"
-BATTERY_FIELDS: dict[str, Any] = {
-    "header": {"stamp": {"sec": 0, "nanosec": 0}, "frame_id": ""},
-    **dict.fromkeys(("voltage", "temperature", "current", "charge", "capacity"), 0.0),
-    **dict.fromkeys(("design_capacity", "percentage"), 0.0),
-    **dict.fromkeys(("power_supply_status", "power_supply_health", "power_supply_technology"), 0),
-    "present": True,
-    "cell_voltage": [],
-    "cell_temperature": [],
-    "location": "",
-    "serial_number": "",
-}
 LAMP_FILE = """
 title = "Cell"
 
@@ -170,7 +159,9 @@ def test_a_lamp_of_a_file_shows_the_state_of_a_constant(tmp_path: Path, status: 
     panel = load_panel(path)
     assert panel.displays == tuple(panel.widgets())
     robot = robot_there(panel)
-    battery = INTERFACES.encode(BATTERY, BATTERY_FIELDS | {"power_supply_status": status})
+    battery = INTERFACES.encode(
+        "sensor_msgs/msg/BatteryState", {**BATTERY, "power_supply_status": status}
+    )
     robot.update("heard", Sample(battery, 1, NOW, NOW, BRIDGE))
     assert english(build_view(panel, robot, NOW).view["widgets"]["supply"]["text"]) == text
 
