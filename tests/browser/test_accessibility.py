@@ -12,6 +12,7 @@ from app.panel import load_panel
 from app.settings import PACKAGE
 from app.web.display_choice import CHOICES, COOKIE
 from app.web.language import COOKIE as LANGUAGE
+from tests.support.pages import place
 from tests.support.parts import ROOT, Server, until
 
 AXE: Final = (files("axe_playwright_python") / "axe.min.js").read_text(encoding="utf-8")
@@ -176,12 +177,10 @@ def test_what_is_touched_is_large_enough(example: Server, page: Page, size: Any)
         page.keyboard.press("Escape")
         least = (14 if height <= 560 else 20) / MM_PER_PX
         for key in page.locator(MAIN_KEYS).locator("visible=true").all():
-            box = key.bounding_box()
-            assert box is not None
+            box = place(key)
             assert box["height"] >= least - 0.5
             assert box["width"] >= 20 / MM_PER_PX - 0.5
-    stop = page.locator(".frame-keys .key > button").bounding_box()
-    assert stop is not None
+    stop = place(page.locator(".frame-keys .key > button"))
     assert min(stop["height"] / 12, stop["width"] / 18) * MM_PER_PX >= 1 - 0.01
 
 

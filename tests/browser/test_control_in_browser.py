@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, Error, Page, expect
 
+from tests.support.pages import place
 from tests.support.parts import CHROMIUM, CHROMIUM_FLAGS, ROOT, TAP_AGAIN_MS, Server, until
 from tests.web.test_control_over_http import PROXY, control_panel
 
@@ -248,9 +249,8 @@ def test_two_taps_take_control_and_do_not_give_it_up(opens: Opens) -> None:
     first = opens(FIRST)
     button(first, "Take control").dblclick(delay=20)
     expect(button(first, "Release control")).to_be_visible()
-    place = button(first, "Release control").bounding_box()
-    assert place is not None
-    first.mouse.click(place["x"] + 5, place["y"] + 5)
+    release = place(button(first, "Release control"))
+    first.mouse.click(release["x"] + 5, release["y"] + 5)
     first.wait_for_timeout(1000)
     expect(bar(first)).to_contain_text("This panel has control")
 

@@ -18,6 +18,7 @@ from tests.browser.test_links_in_browser import Keep
 from tests.browser.test_pages import SIZES
 from tests.runtime.test_several_robots import MANY, heard, ten
 from tests.support.fonts import SETS
+from tests.support.pages import place
 from tests.support.parts import ROOT, Server
 
 __all__ = ["kiosk", "opens", "ten"]  # fixtures
@@ -50,8 +51,7 @@ def test_the_bar_fits_and_nothing_moves_when_somebody_asks(
         assert whole.evaluate("e => e.scrollHeight <= e.clientHeight + 1")
         page.keyboard.press("Escape")
         for one in page.locator("#control button:visible").all():
-            box = one.bounding_box()
-            assert box is not None
+            box = place(one)
             assert box["height"] >= 44
             assert box["width"] * 0.22 >= 19.9
     left, right = button(first, "Give").bounding_box(), button(first, "Keep").bounding_box()
@@ -89,14 +89,12 @@ def test_ten_robots_fit_the_screen(ten: Server, page: Page) -> None:
     tabs = page.locator("[data-robot]")
     expect(tabs).to_have_count(MANY)
     for tab in tabs.all():
-        box = tab.bounding_box()
-        assert box is not None
+        box = place(tab)
         assert box["width"] >= 20 / 0.22  # millimetres
         assert box["height"] >= 12 / 0.22 - 0.1  # as all of the frame that is touched
         name = tab.locator("span")
         assert name.evaluate("e => e.scrollWidth <= e.clientWidth"), name.text_content()
-    last = page.get_by_role("button", name="Publish2").bounding_box()
-    assert last is not None
+    last = place(page.get_by_role("button", name="Publish2"))
     assert last["y"] + last["height"] < 600 - 12 / 0.22  # above the tabs
     page.get_by_role("link", name="Robot 7").click()
     expect(page.locator("h1")).to_have_text("Robot 7 Robot cell 1")

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
 
+from tests.support.pages import place
 from tests.support.parts import ROOT, Bridge, RosNode, Server, live
 
 Keep = Callable[[Server], Server]
@@ -151,17 +152,16 @@ def test_the_links_open_under_a_finger_and_move_nothing(
     page = context.new_page()
     page.goto(server.url)
     expect(page.locator("#links")).to_be_hidden()
-    lamps = page.locator(".lamps").bounding_box()
-    assert lamps is not None
+    lamps = place(page.locator(".lamps"))
     assert lamps["height"] >= 44
     assert lamps["width"] * 0.22 >= 20
     publish = page.get_by_role("button", name="Publish", exact=True)
-    place = publish.bounding_box()
+    before = publish.bounding_box()
     page.locator(".lamps").click()
     expect(page.locator("#links")).to_be_visible()
     expect(said(page, "bridge", "locks")).to_be_visible()
     assert page.locator(".lamps").bounding_box() == lamps
-    assert publish.bounding_box() == place
+    assert publish.bounding_box() == before
     page.locator(".lamps").click()
     expect(page.locator("#links")).to_be_hidden()
     context.close()

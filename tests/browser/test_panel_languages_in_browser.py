@@ -58,9 +58,8 @@ def test_a_comma_is_typed_where_the_language_has_it(page: Page, kiosk: Server) -
     expect(page.locator('dialog [data-value-of="limit"]')).to_have_text("0,5")
 
 
-def test_without_scripts_the_language_changes_too(chromium: Browser, kiosk: Server) -> None:
-    context = chromium.new_context(java_script_enabled=False)
-    page = context.new_page()
+def test_without_scripts_the_language_changes_too(without_scripts: Page, kiosk: Server) -> None:
+    page = without_scripts
     page.goto(kiosk.url)
     choose(page, "日本語")
     expect(page.locator("html")).to_have_attribute("lang", "ja")
@@ -68,4 +67,3 @@ def test_without_scripts_the_language_changes_too(chromium: Browser, kiosk: Serv
     page.locator('[data-widget="limit"] input').fill("7.5")
     page.locator('[data-widget="set_limit"] button[type=submit]').click()
     expect(page.locator("#receipt-set_limit")).to_contain_text("上限は7.5です")
-    context.close()

@@ -4,14 +4,16 @@ import csv
 import io
 import re
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
 from typing import Any, Final
 
 import pytest
-from playwright.sync_api import Browser, Page, Route, expect
+from playwright.sync_api import Page, Route, expect
 
+from tests.support.finger import Touch
+from tests.support.pages import middle, place
 from tests.support.parts import ROOT, TAP_AGAIN_MS, Server, until
 
 # Each press as it leaves: in which event, and how many buttons were busy by then.
@@ -63,11 +65,9 @@ def make(page: Page, by: str) -> None:
     if by == "mouse":
         publish(page).click()
     elif by == "finger":
-        box = publish(page).bounding_box()
-        session = page.context.new_cdp_session(page)
-        where = {"x": box["x"] + box["width"] / 2, "y": box["y"] + box["height"] / 2}
-        session.send("Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": [where]})
-        session.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+        touch = Touch(page)
+        touch.send("touchStart", middle(publish(page)))
+        touch.send("touchEnd")
     elif by in PROGRAMS:
         publish(page).evaluate(PROGRAMS[by])
     else:
@@ -205,13 +205,6 @@ def double_tap(page: Page, x: float, y: float) -> None:
     page.wait_for_timeout(TAP_AGAIN_MS)
 
 
-@pytest.fixture
-def without_scripts(chromium: Browser) -> Iterator[Page]:
-    context = chromium.new_context(java_script_enabled=False)
-    yield context.new_page()
-    context.close()
-
-
 Opens = Callable[[Page, bool], Server]
 
 
@@ -246,13 +239,13 @@ def over_a_button(page: Page, answer: str) -> tuple[float, float]:
     """Where the dialog has an answer, and the page a button."""
     start(page, 3).click()
     dialog = page.get_by_role("dialog")
-    box = dialog.locator(answer).bounding_box()
-    assert box is not None
+    x, y = middle(dialog.locator(answer))
     dialog.locator(".no").click()
     page.wait_for_timeout(TAP_AGAIN_MS)
-    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-    page.mouse.wheel(0, middle(page, 5) - y)
-    until(lambda: abs(middle(page, 5) - y) < 20, "a button is where the dialog has its answer")
+    page.mouse.wheel(0, middle(start(page, 5))[1] - y)
+    until(
+        lambda: abs(middle(start(page, 5))[1] - y) < 20, "a button is where the dialog has its answer"
+    )
     return x, y
 
 
@@ -295,17 +288,10 @@ def test_an_answer_that_opens_under_a_resting_finger_is_not_given(opens: Opens, 
     until(lambda: pressed(mine) == 1, "a tap on the open answer is one")
 
 
-def middle(page: Page, number: int) -> float:
-    box = start(page, number).bounding_box()
-    assert box is not None
-    return float(box["y"] + box["height"] / 2)
-
-
 def test_without_scripts_too(opens: Opens, without_scripts: Page) -> None:
     page, mine = without_scripts, opens(without_scripts, True)
     start(page, 1).click()
-    yes = page.locator(".yes").bounding_box()
-    assert yes is not None
+    yes = place(page.locator(".yes"))
     x, y = yes["x"] + 5, yes["y"] + 5
     double_tap(page, x, y)  # the first one comes before anyone can have read the question
     expect(page.locator(".yes")).to_be_visible()
@@ -318,8 +304,7 @@ def test_without_scripts_a_double_tap_is_one_press_and_its_receipt_stays(
     opens: Opens, without_scripts: Page
 ) -> None:
     page, mine = without_scripts, opens(without_scripts, False)
-    box = start(page, 1).bounding_box()
-    assert box is not None
+    box = place(start(page, 1))
     double_tap(page, box["x"] + 20, box["y"] + 20)
     both = re.compile(r"Start 1: Sent on /operation at \S+ Not sent: this came so soon after the page")
     expect(page.locator("#receipt-go1")).to_have_text(both)

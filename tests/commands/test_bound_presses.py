@@ -204,17 +204,15 @@ def test_a_press_in_a_page_that_stood_still_is_not_sent(
 
 
 def test_without_scripts_a_page_that_is_too_old_presses_nothing(
-    kiosk: Server, node: RosNode, chromium: Browser
+    kiosk: Server, node: RosNode, without_scripts: Page
 ) -> None:
-    context = chromium.new_context(java_script_enabled=False)
-    page = context.new_page()
+    page = without_scripts
     page.goto(kiosk.url)
     html = page.content()
     page.wait_for_timeout(TAP_AGAIN_MS)
     page.get_by_label("Message").fill("fresh")
     page.get_by_role("button", name="Publish", exact=True).click()
     expect(page.locator("#receipt-operation")).to_contain_text("Sent")
-    context.close()
     fields = dict(
         part.split('" value="')
         for part in html.replace('">', "\n").split('name="')[1:]

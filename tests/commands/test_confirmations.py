@@ -34,6 +34,7 @@ from tests.support.builders import (
     says,
 )
 from tests.support.builders import panel_of as panel_with
+from tests.support.pages import place
 from tests.support.parts import ROOT, TAP_AGAIN_MS, Server, until
 
 CONFIRM = {"topic": "/heard", "field": "data", "equals": "{message}", "within_s": 0.2}
@@ -306,8 +307,7 @@ def test_a_press_is_confirmed_by_the_robot_in_every_browser(
     for width, height in ((1280, 800), (1024, 600)):
         page.set_viewport_size({"width": width, "height": height})
         for name in ("Back", "Start"):
-            box = dialog.get_by_role("button", name=name).bounding_box()
-            assert box is not None
+            box = place(dialog.get_by_role("button", name=name))
             assert min(box["width"], box["height"]) >= 90  # 20 mm
     dialog.get_by_role("button", name="Back").click()
     expect(dialog).to_be_hidden()
@@ -321,9 +321,8 @@ def test_a_press_is_confirmed_by_the_robot_in_every_browser(
     other_context.close()
 
 
-def test_without_scripts_the_server_asks(asking: Server, chromium: Browser) -> None:
-    context = chromium.new_context(java_script_enabled=False)
-    page = context.new_page()
+def test_without_scripts_the_server_asks(asking: Server, without_scripts: Page) -> None:
+    page = without_scripts
     page.goto(asking.url)
     page.get_by_label("Message").fill("by form")
     page.get_by_role("button", name="Start").click()
@@ -337,7 +336,6 @@ def test_without_scripts_the_server_asks(asking: Server, chromium: Browser) -> N
     page.wait_for_timeout(TAP_AGAIN_MS)
     page.get_by_role("button", name="Start").click()
     expect(page.locator('[data-widget="go"] .result')).to_contain_text("Confirmed by /last_heard")
-    context.close()
 
 
 def test_a_lock_takes_the_question_away(
