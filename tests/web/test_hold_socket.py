@@ -311,7 +311,8 @@ def test_a_message_that_is_too_large_closes_a_hold_at_once(demo: Server) -> None
 @pytest.mark.parametrize("header", ["Origin: http://evil.example", "Sec-Fetch-Site: cross-site"])
 def test_the_doors_are_shut_for_other_sites(demo: Server, header: str) -> None:
     name, _, value = header.partition(": ")
-    with pytest.raises(InvalidStatus) as refused, opened(demo, **{name: value}):
+    url = f"ws://127.0.0.1:{demo.port}/widgets/jog/hold"
+    with pytest.raises(InvalidStatus) as refused, connect(url, additional_headers={name: value}):
         raise AssertionError("it opened")
     assert refused.value.response.status_code == 403
 
