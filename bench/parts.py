@@ -86,7 +86,12 @@ def cpu_s(pids: Iterable[int]) -> float:
 
 def rss_mib(pids: Iterable[int]) -> float:
     """Resident memory in MiB, with shared pages counted for each process."""
-    return sum(_status_kib(pid, "VmRSS") for pid in pids) / 1024
+    return sum(_kib(pid, "status", "VmRSS") for pid in pids) / 1024
+
+
+def pss_mib(pids: Iterable[int]) -> float:
+    """Resident memory in MiB; of shared pages each process has its share."""
+    return sum(_kib(pid, "smaps_rollup", "Pss") for pid in pids) / 1024
 
 
 def _stat(pid: int) -> list[str]:
@@ -97,12 +102,12 @@ def _stat(pid: int) -> list[str]:
         return []
 
 
-def _status_kib(pid: int, name: str) -> int:
+def _kib(pid: int, file: str, name: str) -> int:
     try:
-        lines = Path(f"/proc/{pid}/status").read_text().splitlines()
+        lines = Path(f"/proc/{pid}/{file}").read_text().splitlines()
     except OSError:
         return 0
-    return next((int(line.split()[1]) for line in lines if line.startswith(name)), 0)
+    return next((int(line.split()[1]) for line in lines if line.startswith(f"{name}:")), 0)
 
 
 class Meter:

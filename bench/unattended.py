@@ -20,7 +20,7 @@ class Unattended:
     """One browser with one page in the foreground. DevTools are attached before and after a measurement
     only."""
 
-    def __init__(self, playwright: Playwright, profile: Path) -> None:
+    def __init__(self, playwright: Playwright, profile: Path, url: str = "about:blank") -> None:
         """`profile` is an empty folder."""
         self._playwright = playwright
         self._port_file = profile / "DevToolsActivePort"
@@ -32,7 +32,7 @@ class Unattended:
                 "--window-size=1280,800",
                 f"--user-data-dir={profile}",
                 "--remote-debugging-port=0",
-                "about:blank",
+                url,
             ],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,

@@ -30,7 +30,7 @@ class BridgeAdmin:
         self.missed = 0  # askings in a row that a bridge did not answer
 
     async def answered(self, within_s: float) -> bool:
-        """Whether all bridges of this robot answer a query for their version. LinkError without a link."""
+        """Whether all of the bridges answer a query of their version; LinkError without a link."""
         answers = await self._link.ask(bridge_dialect.VERSION, within_s)
         return self._robot.graph.bridges <= {bridge_dialect.zid_of(key) for key, _ in answers}
 

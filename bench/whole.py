@@ -1,0 +1,159 @@
+"""`python -m bench.whole`: what the whole kiosk takes: the server and its Chromium, on the real bridge.
+
+The page is that of the reference system: a text, two buttons that an interlock locks, and a value.
+Measured: from the start of the server to a button that can be pressed; memory and processor time at
+rest and with 10 messages a second; the closed loop: a real node permits, the button opens, a script
+presses it at once, and the node has the command. With `QUICK=1` it takes some seconds, to check that it
+works. Prints JSON.
+"""
+
+import json
+import os
+import statistics
+import tempfile
+import threading
+import time
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any, Final
+
+from playwright.sync_api import sync_playwright
+
+from bench.parts import Meter, family, pss_mib, rss_mib
+from bench.unattended import Unattended
+from tests.support.parts import Bridge, RosNode, live, until
+
+QUICK: Final = bool(os.environ.get("QUICK"))
+DOMAIN: Final = 98
+FOR_S: Final = 3.0 if QUICK else 20.0
+LOOPS: Final = 3 if QUICK else 40
+HZ: Final = 10.0
+TAP_AGAIN_S: Final = 0.8  # a button takes no second press before
+ENABLED, COMMAND, COUNT = "/operation_enabled", "/operation1", "/count"
+PANEL: Final = f"""
+title = "Kiosk"
+[[interlock]]
+id = "operation"
+topic = "{ENABLED}"
+[[page]]
+id = "operation"
+title = "Operation"
+[[page.widget]]
+id = "text"
+kind = "text"
+label = "Message"
+default = "hello"
+[[page.widget]]
+id = "first"
+kind = "publish"
+label = "Publish1"
+topic = "{COMMAND}"
+type = "std_msgs/msg/String"
+message = {{ data = "{{text}}" }}
+interlock = "operation"
+[[page.widget]]
+id = "second"
+kind = "publish"
+label = "Publish2"
+topic = "/operation2"
+type = "std_msgs/msg/String"
+message = {{ data = "{{text}}" }}
+interlock = "operation"
+[[page.widget]]
+id = "count"
+kind = "readout"
+label = "Count"
+topic = "{COUNT}"
+type = "std_msgs/msg/Float64"
+"""
+BUTTON: Final = '[data-widget="first"] button[type="submit"]'
+PRESS: Final = """(button) => {
+  const press = () => button.disabled || button.click();
+  new MutationObserver(press).observe(button, { attributes: true, attributeFilter: ["disabled"] });
+}"""
+
+
+class WholeKiosk:
+    """A node, the bridge, the server and a browser, until the stack is closed."""
+
+    def __init__(self, stack: ExitStack) -> None:
+        bridge = Bridge(DOMAIN)
+        bridge.start()
+        stack.callback(bridge.end)
+        self.robot = RosNode(DOMAIN, "robot")
+        stack.callback(self.robot.end)
+        self.robot.advertise(ENABLED, "std_msgs/msg/Bool", durability="transient_local")
+        self.robot.advertise(COUNT, "std_msgs/msg/Float64")
+        self.robot.subscribe(COMMAND, "std_msgs/msg/String", depth=1000)
+        self.robot.publish(ENABLED, {"data": True})
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="bench-whole-")))
+        (folder / "panel.toml").write_text(PANEL)
+        (folder / "profile").mkdir()
+        playwright = stack.enter_context(sync_playwright())
+        began = time.monotonic()
+        server = live(bridge.endpoint, folder, KIOSK_PANEL=str(folder / "panel.toml"))
+        stack.callback(server.end)
+        until(lambda: server.http.get("/healthz").is_success, "the server answers", every_s=0.01)
+        self.browser = Unattended(playwright, folder / "profile", server.url)
+        stack.callback(self.browser.close)
+        with self.browser.attached() as page:
+            page.locator(f"{BUTTON}:enabled").wait_for()
+        self.live_s = time.monotonic() - began
+        self._server = server.process.pid
+
+    def pids(self) -> set[int]:
+        return family((self._server,)) | self.browser.pids()
+
+    def cost(self) -> dict[str, float]:
+        """Over `FOR_S`: memory at the end, and processor time in % of one core."""
+        meter = Meter(self.pids)
+        time.sleep(FOR_S)
+        return {
+            "cpu_percent": round(meter.percent(), 1),
+            "pss_mib": round(pss_mib(self.pids())),
+            "rss_mib": round(rss_mib(self.pids())),
+        }
+
+    def loaded(self) -> dict[str, float]:
+        """The cost with a value that changes `HZ` times a second."""
+
+        def say() -> None:
+            for number in range(round(HZ * (FOR_S + 1))):
+                self.robot.publish(COUNT, {"data": number / 7})
+                time.sleep(1 / HZ)
+
+        saying = threading.Thread(target=say)
+        saying.start()
+        time.sleep(0.5)
+        found = self.cost()
+        saying.join()
+        return found
+
+    def closed_loop(self) -> dict[str, float]:
+        """Milliseconds from the node's permission to the command that it has."""
+        with self.browser.attached() as page:
+            page.locator(BUTTON).evaluate(PRESS)
+        spent: list[float] = []
+        for _ in range(LOOPS):
+            self.robot.publish(ENABLED, {"data": False})
+            time.sleep(TAP_AGAIN_S)
+            began = time.monotonic()
+            self.robot.publish(ENABLED, {"data": True})
+            until(lambda: len(self.robot.heard(COMMAND)) > len(spent), "the node has the command")
+            spent.append(1000 * (self.robot.heard_at(COMMAND)[-1] - began))
+        return {"p50_ms": round(statistics.median(spent), 1), "longest_ms": round(max(spent), 1)}
+
+
+def main() -> None:
+    with ExitStack() as stack:
+        kiosk = WholeKiosk(stack)
+        found: dict[str, Any] = {"load_before": os.getloadavg()[0], "live_s": round(kiosk.live_s, 2)}
+        time.sleep(2)
+        found["at rest"] = kiosk.cost()
+        found[f"{HZ:g} Hz"] = kiosk.loaded()
+        found["closed loop"] = kiosk.closed_loop()
+        print(json.dumps(found, indent=2))
+
+
+if __name__ == "__main__":
+    main()
