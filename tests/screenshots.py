@@ -37,7 +37,8 @@ def main() -> None:
                 loaded = load_panel(panel)
                 paths = {page.id: f"/pages/{page.id}" for page in loaded.pages}
                 looks = [("theme", theme) for theme in CHOICES["theme"]]
-                looks += [("language", one) for one in loaded.readers_languages if one != loaded.language]
+                others = [one for one in loaded.readers_languages if one != loaded.language]
+                looks += [("language", one) for one in others]
                 take_all(browser, server.url, name, paths, looks)
                 if panel == EXAMPLE:
                     take_all(browser, server.url, "gallery", {"": "/gallery"}, looks)

@@ -46,12 +46,15 @@ def demo() -> Iterator[Server]:
 
 
 @pytest.mark.parametrize("size", SCREENS)
-def test_sizes_are_those_of_the_browser(demo: Server, panel: Panel, page: Page, size: str) -> None:
+@pytest.mark.parametrize("of", [0, 2], ids=["three groups", "one group"])
+def test_sizes_are_those_of_the_browser(
+    demo: Server, panel: Panel, page: Page, size: str, of: int
+) -> None:
     screen = Screen.of(size, panel.mm_per_px)
     page.set_viewport_size({"width": screen.width, "height": screen.height})
-    page.goto(demo.url)
-    expect(page.locator('[data-widget="permission"]')).to_be_visible()
-    cell = panel.pages[0]
+    cell = panel.pages[of]
+    page.goto(f"{demo.url}/pages/{cell.id}")
+    expect(page.locator(".group").first).to_be_visible()
     assert reason(panel, cell, screen) == ""
     found: Any = page.evaluate(MEASURE)
     assert found["outside"] == []
