@@ -47,6 +47,13 @@ def test_only_pages_that_must_fit_are_judged_and_only_with_screens() -> None:
     assert not said(panel(["800x480"], {"widget": keys(20)}, fit=False))
 
 
+def test_a_page_with_a_template_of_its_own_is_left_to_a_look_in_a_browser() -> None:
+    given = panel(["800x480"], {"widget": keys(20)})
+    own = given.pages[0].model_copy(update={"template": "plan.html"})
+    theirs = given.model_copy(update={"pages": (own,)})
+    assert said(theirs) == "plan.html decides what fits: look at it in a browser"
+
+
 def test_widgets_are_placed_as_a_grid_places_them() -> None:
     """One that spans two rows keeps its cells free of those after it."""
     tall, wide, small = keys(3)

@@ -31,7 +31,10 @@ TAB_MM: Final = 12.0
 def fit_notes(panel: Panel) -> Iterator[Note]:
     """For each page that must fit: which of the panel's screens it fits, and why not the others."""
     for p, page in enumerate(panel.pages):
-        if not page.fit or not panel.screens or page.template:  # its template says how high things are
+        if not page.fit or not panel.screens:
+            continue
+        if page.template:
+            yield Note(f"page[{p}]", f"{page.template} decides what fits: look at it in a browser")
             continue
         short = {size: reason(panel, page, Screen.of(size, panel.mm_per_px)) for size in panel.screens}
         fitting = [size for size, why in short.items() if not why]
