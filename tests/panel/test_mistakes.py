@@ -18,7 +18,7 @@ from app.panel.interlock import CONDITIONS
 from app.panel.layout import Page
 from app.panel.model import Panel
 from app.panel.widgets.kinds import KINDS
-from tests.support.form import several
+from tests.support.form import LONG, several
 from tests.support.parts import TESTS
 
 GOOD: Final = (TESTS / "everything.toml").read_text()
@@ -111,7 +111,17 @@ def test_the_panel_with_everything_is_good_and_has_everything(told: Told) -> Non
         assert list(lacking(own | ({"qos": qos} if qos else {}), model)) == [], kind
 
 
-KEYS: Final = [number for number, line in enumerate(LINES, 1) if KEY.match(line)]
+def keys() -> Iterator[tuple[tuple[str, str], int]]:
+    """((the table's header, the key), number) of each line with a key."""
+    header = ""
+    for number, line in enumerate(LINES, 1):
+        header = found[1] if (found := HEADER.fullmatch(line)) else header
+        if found := KEY.match(line):
+            yield (header, found[1]), number
+
+
+# In the short form one line for each key of each table.
+KEYS: Final = [number for _, number in keys()] if LONG else [*dict(keys()).values()]
 HEADERS: Final = [number for number, line in enumerate(LINES, 1) if HEADER.fullmatch(line)]
 
 
