@@ -16,6 +16,7 @@ from app.settings import PACKAGE
 ROOMS = (
     "interfaces",
     "dialect",
+    "graph",
     "panel",
     "robot",
     "permission",

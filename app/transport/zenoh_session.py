@@ -36,6 +36,32 @@ def _own(payload: zenoh.ZBytes) -> bytes | zenoh.ZBytes:
     return payload if len(payload) > COPIED_MOST else payload.to_bytes()
 
 
+async def _collected(
+    ask: Callable[["Callback[zenoh.Reply]"], None], timeout_s: float
+) -> list[tuple[str, bytes]]:
+    """(key, payload) of each answer that comes within `timeout_s`."""
+    loop = asyncio.get_running_loop()
+    done: asyncio.Future[None] = loop.create_future()
+    answers: list[tuple[str, bytes]] = []
+
+    def on_reply(reply: zenoh.Reply) -> None:
+        if reply.ok is not None:
+            answers.append((str(reply.ok.key_expr), reply.ok.payload.to_bytes()))
+
+    def finish() -> None:
+        if not done.done():
+            done.set_result(None)
+
+    def on_end() -> None:
+        with suppress(RuntimeError):  # the loop is closed
+            loop.call_soon_threadsafe(finish)
+
+    ask(Callback(on_reply, on_end, indirect=False))
+    with suppress(TimeoutError):
+        await asyncio.wait_for(done, timeout_s + 1)
+    return answers
+
+
 class ZenohSession:
     """A session with its subscribers, publishers and tokens."""
 
@@ -203,7 +229,14 @@ class ZenohSession:
             return bool(status.matching)
 
     def query(self, key: str, payload: bytes, timeout_s: float) -> "asyncio.Future[bytes | None]":
-        """Queries a service once; the future gets the first answer, or None when there is none."""
+        """Queries a declared service once; the future gets the first answer, or None when there is
+        none."""
+        return self.query_at(self._declared.query[key], payload, timeout_s)
+
+    def query_at(
+        self, expression: str, payload: bytes, timeout_s: float
+    ) -> "asyncio.Future[bytes | None]":
+        """The same, for any service by its key expression."""
         loop = asyncio.get_running_loop()
         answered: asyncio.Future[bytes | None] = loop.create_future()
 
@@ -219,8 +252,7 @@ class ZenohSession:
             if reply.ok is not None:
                 hand_over(reply.ok.payload.to_bytes())
 
-        expression = self._declared.query[key]
-        with translated(f"can't ask {key}"):
+        with translated(f"can't ask {expression}"):
             self._session.get(
                 expression,
                 Callback(on_reply, lambda: hand_over(None), indirect=False),
@@ -233,27 +265,27 @@ class ZenohSession:
 
     async def ask(self, selector: str, timeout_s: float = ASK_TIMEOUT_S) -> list[tuple[str, bytes]]:
         """(key, payload) of each answer to a query that comes within `timeout_s`."""
-        loop = asyncio.get_running_loop()
-        done: asyncio.Future[None] = loop.create_future()
-        answers: list[tuple[str, bytes]] = []
-
-        def on_reply(reply: zenoh.Reply) -> None:
-            if reply.ok is not None:
-                answers.append((str(reply.ok.key_expr), reply.ok.payload.to_bytes()))
-
-        def finish() -> None:
-            if not done.done():
-                done.set_result(None)
-
-        def on_end() -> None:
-            with suppress(RuntimeError):  # the loop is closed
-                loop.call_soon_threadsafe(finish)
-
         with translated(f"can't ask {selector}"):
-            self._session.get(selector, Callback(on_reply, on_end, indirect=False), timeout=timeout_s)
-        with suppress(TimeoutError):
-            await asyncio.wait_for(done, timeout_s + 1)
-        return answers
+            return await _collected(
+                lambda callback: self._session.get(selector, callback, timeout=timeout_s), timeout_s
+            )
+
+    async def tokens(self, timeout_s: float = ASK_TIMEOUT_S) -> list[str]:
+        """Every liveliness token of the ROS graph that is held now."""
+        with translated("can't ask for the ROS graph"):
+            liveliness = self._session.liveliness()
+            found = await _collected(
+                lambda callback: liveliness.get(self._dialect.tokens, callback, timeout=timeout_s),
+                timeout_s,
+            )
+        return [key for key, _ in found]
+
+    @property
+    def is_connected(self) -> bool:
+        """Whether it has a connection to any other peer or router."""
+        with translated("the Zenoh session can't be used"):
+            info = self._session.info
+            return bool(info.routers_zid() or info.peers_zid())
 
     def respond(self) -> None:
         """Returns when neither the inbox nor the session stands still; blocks while one does."""

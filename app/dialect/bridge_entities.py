@@ -1,0 +1,160 @@
+"""What a bridge's admin space says of DDS readers and writers, routes and nodes. Pure.
+
+Source: zenoh-plugin-ros2dds 1.10.2 (`@/<zid>/ros2/dds|route|node/…`), tried with nodes on Fast DDS and
+on Cyclone DDS.
+"""
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+from app.interfaces.names import is_valid_name, valid_type
+
+DDS: Final = "@/*/ros2/dds/**"  # participants, readers and writers of a robot's nodes, not the bridge's
+EVERY_ROUTE: Final = "@/*/ros2/route/**"
+
+# How RTPS numbers the vendors of DDS: the first two bytes of a GUID (OMG DDSI-RTPS, vendor ids).
+VENDORS: Final[Mapping[str, str]] = {
+    "0101": "RTI Connext DDS",
+    "0103": "OpenDDS",
+    "010f": "Fast DDS",
+    "0110": "Cyclone DDS",
+    "0111": "GurumDDS",
+}
+_ENTITY = re.compile(r"@/(?P<zid>[^/]+)/ros2/dds/(?P<participant>[^/]+)/(?P<role>reader|writer)/.+")
+_ROUTE = re.compile(
+    r"@/(?P<zid>[^/]+)/ros2/route/(?P<kind>topic|service|action)/(?P<direction>pub|sub|srv|cli)"
+    r"/(?P<key>.+)"
+)
+_NODE = re.compile(r"@/(?P<zid>[^/]+)/ros2/node/(?P<participant>[^/]+)/(?P<name>.+)")
+_DDS_TYPE = re.compile(r"(?P<package>\w+)::(?P<kind>msg|srv|action)::dds_::(?P<name>\w+)_")
+_HASH = re.compile(r"typehash=(RIHS\d\d_[0-9a-f]+)")
+_TOKEN_QOS = re.compile(
+    r"K?:(?P<reliable>[01]?):(?P<durability>[^:]*):(?:(?P<all>[01]?),?(?P<depth>\d*))(?::(?P<data>.*))?"
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DdsEntity:
+    """A DDS reader or writer of a ROS 2 topic; `name` is the topic's on the robot ("/speed")."""
+
+    zid: str
+    participant: str
+    writer: bool
+    name: str
+    type: str
+    reliable: bool
+    transient_local: bool
+    keep_all: bool
+    depth: int | None
+    type_hash: str
+
+    @property
+    def vendor(self) -> str:
+        return vendor_of(self.participant)
+
+
+def vendor_of(guid: str) -> str:
+    """The DDS of a participant by its GUID; "" if it is none of the known ones."""
+    return VENDORS.get(guid[:4], "")
+
+
+def entity_of(admin_key: str, told: Any) -> DdsEntity | None:
+    """A reader or writer of a topic from an answer to `DDS`; None for participants, for services and
+    for what is not of ROS 2."""
+    place = _ENTITY.fullmatch(admin_key)
+    if place is None or not isinstance(told, dict):
+        return None
+    topic, dds_type = told.get("topic_name"), _DDS_TYPE.fullmatch(str(told.get("type_name")))
+    if not isinstance(topic, str) or not topic.startswith("rt/") or dds_type is None:
+        return None
+    if not is_valid_name(topic.removeprefix("rt/")):
+        return None
+    qos = told["qos"] if isinstance(told.get("qos"), dict) else {}
+    writer = place["role"] == "writer"
+    return DdsEntity(
+        zid=place["zid"],
+        participant=place["participant"],
+        writer=writer,
+        name=topic.removeprefix("rt"),
+        type=valid_type("/".join(dds_type.group("package", "kind", "name"))),
+        # Left out where it is DDS's default, which differs between readers and writers.
+        reliable=_kind(qos, "reliability", "RELIABLE" if writer else "BEST_EFFORT") == "RELIABLE",
+        transient_local=_kind(qos, "durability", "VOLATILE") != "VOLATILE",
+        keep_all=_kind(qos, "history", "KEEP_LAST") == "KEEP_ALL",
+        depth=_depth(qos, place["participant"]),
+        type_hash=_type_hash(qos.get("user_data")),
+    )
+
+
+def _kind(qos: Mapping[str, Any], policy: str, default: str) -> str:
+    given = qos.get(policy)
+    return str(given.get("kind", default)) if isinstance(given, dict) else default
+
+
+def _depth(qos: Mapping[str, Any], participant: str) -> int | None:
+    """Cyclone DDS leaves out the default of 1; Fast DDS does not announce its depth at all."""
+    history = qos.get("history")
+    if isinstance(history, dict) and isinstance(history.get("depth"), int):
+        return int(history["depth"])
+    return 1 if history is None and vendor_of(participant) == "Cyclone DDS" else None
+
+
+def _type_hash(user_data: Any) -> str:
+    try:
+        text = bytes(user_data).decode("utf-8", "replace")
+    except (TypeError, ValueError):
+        return ""
+    found = _HASH.search(text)
+    return found[1] if found else ""
+
+
+@dataclass(frozen=True, slots=True)
+class TokenQos:
+    """The QoS in a liveliness token of a publisher or subscriber; None: not in the token."""
+
+    reliable: bool | None
+    transient_local: bool
+    keep_all: bool
+    depth: int | None
+    type_hash: str
+
+
+def qos_of(token: str) -> TokenQos:
+    """The QoS at the end of a token of a topic; all unknown for a malformed one."""
+    found = _TOKEN_QOS.fullmatch(token.rpartition("/")[2])
+    if found is None:
+        return TokenQos(None, False, False, None, "")
+    type_hash = _HASH.search(found["data"] or "")
+    return TokenQos(
+        {"0": False, "1": True}.get(found["reliable"]),
+        found["durability"] == "1",
+        found["all"] == "1",
+        int(found["depth"]) if found["depth"] else None,
+        type_hash[1] if type_hash else "",
+    )
+
+
+def route_place(admin_key: str) -> tuple[str, str, str, str] | None:
+    """(bridge, kind, direction, key) of an answer to `EVERY_ROUTE`."""
+    found = _ROUTE.fullmatch(admin_key)
+    return None if found is None else (found["zid"], found["kind"], found["direction"], found["key"])
+
+
+def node_place(admin_key: str) -> tuple[str, str, str] | None:
+    """(bridge, participant, node name like "/arm/driver") of an answer for a node."""
+    found = _NODE.fullmatch(admin_key)
+    if found is None or not is_valid_name(found["name"]):
+        return None
+    return found["zid"], found["participant"], f"/{found['name']}"
+
+
+def names_of(told: Mapping[str, Any], part: str) -> Iterator[tuple[str, str]]:
+    """(name, type) of each entry of a node's list, such as its "publishers"; malformed ones are left
+    out."""
+    listed = told.get(part)
+    for one in listed if isinstance(listed, list) else ():
+        name = str(one.get("name")) if isinstance(one, dict) else ""
+        if name.startswith("/") and is_valid_name(name[1:]):
+            yield name, valid_type(str(one.get("type")))

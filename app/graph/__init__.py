@@ -1,0 +1,1 @@
+"""The ROS graph of robots at one moment, as their bridges report it."""

@@ -1,0 +1,250 @@
+"""Descriptions of bridges, nodes, topics, services, actions and parameters. Frozen; no I/O.
+
+Names are as on the robot ("/speed"). A bridge may put its namespace before them, that is
+`RobotGraph.namespace`, "" for none. A `key` is the name behind that namespace without its first slash
+("robot1/speed").
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from typing import Any, Final, Literal, Protocol, TypeVar
+
+from app.interfaces.names import key_of
+
+FAST_DDS: Final = "Fast DDS"
+CYCLONE_DDS: Final = "Cyclone DDS"
+NEAR_MOST: Final = 3
+
+RouteKind = Literal["topic", "service", "action"]
+# pub and srv: from the robot's nodes to Zenoh; sub and cli: from Zenoh to the robot's nodes.
+RouteDirection = Literal["pub", "sub", "srv", "cli"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bridge:
+    """A bridge that announced itself. `version` is "" if it did not answer. `config` is the
+    configuration of its ROS plugin, empty if it did not answer."""
+
+    zid: str
+    version: str = ""
+    config: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def answers(self) -> bool:
+        return bool(self.version)
+
+    @property
+    def namespace(self) -> str:
+        """Like "/robot1"; "" for none."""
+        given = self.config.get("namespace")
+        return given.rstrip("/") if isinstance(given, str) else ""
+
+    @property
+    def domain(self) -> int | None:
+        """The ROS_DOMAIN_ID that it joined; None if unknown."""
+        given = self.config.get("domain")
+        return given if isinstance(given, int) else None
+
+    @property
+    def node(self) -> str:
+        """Its own node's name in ROS; "" if unknown."""
+        given = self.config.get("nodename")
+        return f"/{given}" if isinstance(given, str) else ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EndpointQos:
+    """The QoS of one publisher or subscriber. None: not known. Fast DDS does not announce its depth."""
+
+    reliable: bool | None = None
+    transient_local: bool = False
+    keep_all: bool = False
+    depth: int | None = None
+
+    def __str__(self) -> str:
+        known = {True: "reliable", False: "best effort", None: "reliability unknown"}
+        words = [known[self.reliable], "transient local" if self.transient_local else "volatile"]
+        if self.keep_all:
+            words.append("keep all")
+        elif self.depth is not None:
+            words.append(f"depth {self.depth}")
+        return ", ".join(words)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TopicEndpoint:
+    """A publisher or a subscriber of a topic.
+
+    `nodes` are the nodes that it may belong to: one, or several of one process, or none if unknown.
+    `dds` is the vendor of its DDS ("Fast DDS", "Cyclone DDS", another, or "" if unknown).
+    """
+
+    type: str
+    qos: EndpointQos
+    bridge: str
+    nodes: tuple[str, ...] = ()
+    dds: str = ""
+    type_hash: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Topic:
+    """A topic of a robot. `announced`: its bridge passes it on; else the bridge's `allow` or `deny`
+    holds it back."""
+
+    name: str
+    key: str
+    publishers: tuple[TopicEndpoint, ...] = ()
+    subscribers: tuple[TopicEndpoint, ...] = ()
+    announced: bool = True
+
+    @property
+    def types(self) -> tuple[str, ...]:
+        """Each type once, the publishers' first: one, unless two nodes disagree."""
+        return tuple(dict.fromkeys(e.type for e in (*self.publishers, *self.subscribers)))
+
+    @property
+    def type(self) -> str:
+        return next(iter(self.types), "")
+
+    @property
+    def latched(self) -> bool:
+        """Whether all its publishers keep their last message for late subscribers."""
+        return bool(self.publishers) and all(e.qos.transient_local for e in self.publishers)
+
+    @property
+    def reliable(self) -> bool:
+        """Whether none of its publishers is best effort."""
+        return all(e.qos.reliable is not False for e in self.publishers)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Server:
+    """A service or an action of a robot. `nodes` serve it; `dds` is their DDS, "" if unknown. Through
+    the bridge only servers on Cyclone DDS can be called."""
+
+    name: str
+    key: str
+    type: str
+    bridge: str
+    nodes: tuple[str, ...] = ()
+    dds: str = ""
+
+    @property
+    def can_be_called(self) -> bool:
+        """False for a server on another DDS: it would not answer, and may misread the request."""
+        return self.dds in ("", CYCLONE_DDS)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Node:
+    """A node; the names of what it publishes, subscribes to, serves and uses."""
+
+    name: str
+    bridge: str
+    dds: str = ""
+    publishers: tuple[str, ...] = ()
+    subscribers: tuple[str, ...] = ()
+    services: tuple[str, ...] = ()
+    clients: tuple[str, ...] = ()
+    actions: tuple[str, ...] = ()
+    action_clients: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BridgeRoute:
+    """A route of a bridge. `local_nodes` are of the robot, `remote` the Zenoh peers ("<zid>:<key>")
+    that use it. `active`: None if the bridge does not say. `endpoint` is the bridge's own DDS reader
+    or writer for it, "" for none."""
+
+    bridge: str
+    kind: RouteKind
+    direction: RouteDirection
+    name: str
+    key: str
+    type: str
+    active: bool | None = None
+    local_nodes: tuple[str, ...] = ()
+    remote: tuple[str, ...] = ()
+    endpoint: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PeerEndpoint:
+    """What a peer that is no bridge, such as a panel, holds in the graph: with the role "MP" it
+    publishes, with "MS" it subscribes."""
+
+    zid: str
+    role: str
+    key: str
+    type: str
+    qos: EndpointQos
+
+
+class _Named(Protocol):
+    @property
+    def name(self) -> str: ...
+
+
+Entry = TypeVar("Entry", bound=_Named)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RobotGraph:
+    """What is behind the bridges of one namespace; each list is sorted by name."""
+
+    namespace: str = ""
+    bridges: tuple[Bridge, ...] = ()
+    nodes: tuple[Node, ...] = ()
+    topics: tuple[Topic, ...] = ()
+    services: tuple[Server, ...] = ()
+    actions: tuple[Server, ...] = ()
+    routes: tuple[BridgeRoute, ...] = ()
+
+    def topic(self, name: str) -> Topic | None:
+        return find(self.topics, name)
+
+    def node(self, name: str) -> Node | None:
+        return find(self.nodes, name)
+
+    def service(self, name: str) -> Server | None:
+        return find(self.services, name)
+
+    def action(self, name: str) -> Server | None:
+        return find(self.actions, name)
+
+    def key(self, name: str) -> str:
+        """The key of a topic or service by its name on the robot; ValueError for a malformed name."""
+        return key_of(name, self.namespace)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RosGraph:
+    """All robots that are reached by one link, by namespace. Bridges of one namespace are of one robot.
+    `peers` is what panels and tools hold in the graph, as far as the router tells: to a peer it tells of
+    clients only. Who uses a route is in `BridgeRoute.remote`, of all of them."""
+
+    robots: tuple[RobotGraph, ...] = ()
+    peers: tuple[PeerEndpoint, ...] = ()
+
+    @property
+    def bridges(self) -> tuple[Bridge, ...]:
+        return tuple(bridge for robot in self.robots for bridge in robot.bridges)
+
+    def robot(self, namespace: str) -> RobotGraph | None:
+        """The robot whose bridges have this namespace ("" for none)."""
+        return next((one for one in self.robots if one.namespace == namespace.rstrip("/")), None)
+
+
+def find(entries: Sequence[Entry], name: str) -> Entry | None:
+    return next((one for one in entries if one.name == name), None)
+
+
+def near(name: str, known: Iterable[str]) -> list[str]:
+    """Known names that are similar to one that does not exist: typing errors first, then the same last
+    part in other namespaces."""
+    names = list(known)
+    last = name.rpartition("/")[2].lower()
+    same = [one for one in names if one.rpartition("/")[2].lower() == last]
+    return list(dict.fromkeys([*same, *get_close_matches(name, names, NEAR_MOST)]))[:NEAR_MOST]

@@ -1,0 +1,288 @@
+"""Reads the whole ROS graph behind all bridges of a link, once: tokens, nodes, DDS entities, routes."""
+
+import asyncio
+import json
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import Any, Protocol, cast
+
+from app.dialect import bridge_dialect as dialect
+from app.dialect import bridge_entities as entities
+from app.dialect.bridge_entities import DdsEntity
+from app.dialect.endpoint import Endpoint
+from app.graph.model import (
+    Bridge,
+    BridgeRoute,
+    EndpointQos,
+    Node,
+    PeerEndpoint,
+    RobotGraph,
+    RosGraph,
+    RouteDirection,
+    RouteKind,
+    Server,
+    Topic,
+    TopicEndpoint,
+)
+
+Answers = list[tuple[str, Any]]  # (admin key, JSON)
+HIDDEN = "/_action/"  # the topics and services that an action is made of
+
+
+class GraphLink(Protocol):
+    """What is needed of the link: (key, payload) of each answer to a query; the liveliness tokens."""
+
+    async def ask(self, selector: str, timeout_s: float = ...) -> list[tuple[str, bytes]]: ...
+
+    async def tokens(self, timeout_s: float = ...) -> list[str]: ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GraphAnswers:
+    """All that the bridges of a link say of their graph."""
+
+    zid: str = ""  # of the session that asked
+    tokens: Iterable[str] = ()
+    versions: Mapping[str, str] = field(default_factory=dict)
+    configs: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    nodes: Answers = field(default_factory=list)
+    entities: Answers = field(default_factory=list)
+    routes: Answers = field(default_factory=list)
+
+
+async def read_graph(link: GraphLink, zid: str) -> RosGraph:
+    """The graph now; `zid` is that of the session that asks. LinkError without a link. A bridge that
+    is known by its token and does not answer is in it, without a version."""
+    tokens, versions, configs, nodes, dds, routes = await asyncio.gather(
+        link.tokens(),
+        link.ask(dialect.VERSION),
+        _ask_json(link, dialect.CONFIG),
+        _ask_json(link, dialect.NODES),
+        _ask_json(link, entities.DDS),
+        _ask_json(link, entities.EVERY_ROUTE),
+    )
+    return ros_graph(
+        GraphAnswers(
+            zid=zid,
+            tokens=tokens,
+            versions={
+                dialect.zid_of(key): told.decode(errors="replace").strip('"') for key, told in versions
+            },
+            configs={dialect.zid_of(key): told for key, told in configs if isinstance(told, dict)},
+            nodes=nodes,
+            entities=dds,
+            routes=routes,
+        )
+    )
+
+
+async def _ask_json(link: GraphLink, selector: str) -> Answers:
+    found: Answers = []
+    for key, told in await link.ask(selector):
+        with suppress(ValueError):
+            found.append((key, json.loads(told)))
+    return found
+
+
+def ros_graph(answers: GraphAnswers) -> RosGraph:
+    """The graph that these answers describe."""
+    parsed = [(token, one) for token in answers.tokens if (one := dialect.parsed(token)) is not None]
+    zids = {one.zid for _, one in parsed if one.role is None} | answers.versions.keys()
+    bridges = [
+        Bridge(zid=zid, version=answers.versions.get(zid, ""), config=answers.configs.get(zid, {}))
+        for zid in sorted(zids)
+    ]
+    by_namespace: defaultdict[str, list[Bridge]] = defaultdict(list)
+    for bridge in bridges:
+        by_namespace[bridge.namespace].append(bridge)
+    peers = [
+        PeerEndpoint(zid=one.zid, role=str(one.role), key=one.key, type=one.type, qos=_token_qos(token))
+        for token, one in parsed
+        if one.zid not in zids and one.zid != answers.zid and one.role in ("MP", "MS")
+    ]
+    robots = [
+        _Robot(namespace, tuple(found), parsed, answers).graph()
+        for namespace, found in sorted(by_namespace.items())
+    ]
+    return RosGraph(robots=tuple(robots), peers=tuple(sorted(peers, key=lambda p: (p.zid, p.key))))
+
+
+def _token_qos(token: str) -> EndpointQos:
+    told = entities.qos_of(token)
+    return EndpointQos(
+        reliable=told.reliable,
+        transient_local=told.transient_local,
+        keep_all=told.keep_all,
+        depth=told.depth,
+    )
+
+
+class _Robot:
+    """The graph of one robot, put together from what its bridges say."""
+
+    def __init__(
+        self,
+        namespace: str,
+        bridges: tuple[Bridge, ...],
+        tokens: Iterable[tuple[str, Endpoint]],
+        answers: GraphAnswers,
+    ) -> None:
+        self._namespace = namespace
+        self._bridges = bridges
+        zids = {bridge.zid for bridge in bridges}
+        self._tokens = [(t, e) for t, e in tokens if e.zid in zids and e.role is not None]
+        # (bridge, participant) → its nodes: a process may have several.
+        self._nodes: defaultdict[tuple[str, str], list[Node]] = defaultdict(list)
+        for zid, participant, node in _nodes(answers.nodes):
+            if zid in zids:
+                self._nodes[zid, participant].append(node)
+        found = (entities.entity_of(key, told) for key, told in answers.entities)
+        self._entities = [one for one in found if one is not None and one.zid in zids]
+        self._routes = [one for one in _routes(answers.routes, namespace) if one.bridge in zids]
+
+    def graph(self) -> RobotGraph:
+        nodes = [node for several in self._nodes.values() for node in several]
+        return RobotGraph(
+            namespace=self._namespace,
+            bridges=self._bridges,
+            nodes=tuple(sorted(nodes, key=lambda one: one.name)),
+            topics=tuple(self._topics()),
+            services=tuple(self._servers("SS")),
+            actions=tuple(self._servers("AS")),
+            routes=tuple(sorted(self._routes, key=lambda one: (one.kind, one.key, one.direction))),
+        )
+
+    def _name(self, key: str) -> str:
+        """The name on the robot of a key behind the bridge's namespace."""
+        return f"/{key}".removeprefix(self._namespace)
+
+    def _topics(self) -> Iterator[Topic]:
+        publishers: defaultdict[str, list[TopicEndpoint]] = defaultdict(list)
+        subscribers: defaultdict[str, list[TopicEndpoint]] = defaultdict(list)
+        for one in self._entities:
+            if HIDDEN not in one.name:
+                (publishers if one.writer else subscribers)[one.name].append(self._endpoint(one))
+        announced = {self._name(e.key) for _, e in self._tokens if e.role in ("MP", "MS")}
+        for token, endpoint in self._tokens:  # a bridge that knows no DDS, as the simulated robot's
+            name = self._name(endpoint.key)
+            known = {"MP": publishers, "MS": subscribers}.get(str(endpoint.role))
+            if known is not None and all(one.bridge != endpoint.zid for one in known[name]):
+                known[name].append(self._by_token(token, endpoint))
+        for name in sorted(publishers.keys() | subscribers.keys()):
+            if publishers[name] or subscribers[name]:
+                yield Topic(
+                    name=name,
+                    key=f"{self._namespace}{name}"[1:],
+                    publishers=tuple(publishers[name]),
+                    subscribers=tuple(subscribers[name]),
+                    announced=name in announced,
+                )
+
+    def _endpoint(self, of: DdsEntity) -> TopicEndpoint:
+        nodes = [
+            node.name
+            for node in self._nodes.get((of.zid, of.participant), ())
+            if of.name in (node.publishers if of.writer else node.subscribers)
+        ]
+        return TopicEndpoint(
+            type=of.type,
+            qos=EndpointQos(
+                reliable=of.reliable,
+                transient_local=of.transient_local,
+                keep_all=of.keep_all,
+                depth=of.depth,
+            ),
+            bridge=of.zid,
+            nodes=tuple(sorted(nodes)),
+            dds=of.vendor,
+            type_hash=of.type_hash,
+        )
+
+    def _by_token(self, token: str, endpoint: Endpoint) -> TopicEndpoint:
+        return TopicEndpoint(
+            type=endpoint.type,
+            qos=_token_qos(token),
+            bridge=endpoint.zid,
+            type_hash=entities.qos_of(token).type_hash,
+        )
+
+    def _servers(self, role: str) -> Iterator[Server]:
+        found = {
+            (e.key, e.zid): Server(
+                name=self._name(e.key), key=e.key, type=e.type, bridge=e.zid, **self._serving(role, e)
+            )
+            for _, e in self._tokens
+            if e.role == role and HIDDEN not in e.key
+        }
+        yield from (found[key] for key in sorted(found))
+
+    def _serving(self, role: str, endpoint: Endpoint) -> dict[str, Any]:
+        """The nodes that serve it, and their DDS: of several, one that can't be called through the
+        bridge counts, as each of them gets the request."""
+        name = self._name(endpoint.key)
+        nodes = [
+            node
+            for (zid, _), several in self._nodes.items()
+            for node in several
+            if zid == endpoint.zid and name in (node.services if role == "SS" else node.actions)
+        ]
+        vendors = sorted({node.dds for node in nodes}, key=lambda dds: dds in ("", "Cyclone DDS"))
+        return {
+            "nodes": tuple(sorted(node.name for node in nodes)),
+            "dds": vendors[0] if vendors else "",
+        }
+
+
+def _nodes(answers: Answers) -> Iterator[tuple[str, str, Node]]:
+    """(bridge, participant, node)."""
+    for key, told in answers:
+        place = entities.node_place(key)
+        if place is None or not isinstance(told, dict):
+            continue
+        zid, participant, name = place
+        yield (
+            zid,
+            participant,
+            Node(
+                name=name,
+                bridge=zid,
+                dds=entities.vendor_of(participant),
+                publishers=_names(told, "publishers"),
+                subscribers=_names(told, "subscribers"),
+                services=_names(told, "service_servers"),
+                clients=_names(told, "service_clients"),
+                actions=_names(told, "action_servers"),
+                action_clients=_names(told, "action_clients"),
+            ),
+        )
+
+
+def _names(told: Mapping[str, Any], part: str) -> tuple[str, ...]:
+    return tuple(sorted(name for name, _ in entities.names_of(told, part)))
+
+
+def _routes(answers: Answers, namespace: str) -> Iterator[BridgeRoute]:
+    for admin_key, told in answers:
+        place = entities.route_place(admin_key)
+        if place is None or not isinstance(told, dict):
+            continue
+        zid, kind, direction, key = place
+        name, active = told.get("ros2_name"), told.get("is_active")
+        yield BridgeRoute(
+            bridge=zid,
+            kind=cast("RouteKind", kind),
+            direction=cast("RouteDirection", direction),
+            name=name if isinstance(name, str) else f"/{key}".removeprefix(namespace),
+            key=key,
+            type=str(told.get("ros2_type", "")),
+            active=active if isinstance(active, bool) else None,
+            local_nodes=_texts(told.get("local_nodes")),
+            remote=_texts(told.get("remote_routes")),
+            endpoint=str(told.get("dds_reader") or told.get("dds_writer") or ""),
+        )
+
+
+def _texts(given: Any) -> tuple[str, ...]:
+    return tuple(map(str, given)) if isinstance(given, list) else ()

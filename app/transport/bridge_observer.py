@@ -1,0 +1,105 @@
+"""A link that only looks: the ROS graph behind the bridges, calls that read, topics as they come.
+
+For commands that run beside the panel's server or without one. It publishes nothing.
+"""
+
+import asyncio
+import time
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager, suppress
+from typing import Final
+
+from app.dialect.bridge_dialect import BridgeDialect
+from app.dialect.endpoint import OwnEndpoint
+from app.errors import LinkError
+from app.graph.model import RosGraph
+from app.robot.sample import Sample
+from app.transport.bridge_graph import read_graph
+from app.transport.declarations import Declarations
+from app.transport.zenoh_config import Config
+from app.transport.zenoh_session import ZenohSession
+
+CONNECT_S: Final = 3.0
+CALL_S: Final = 2.0
+POLL_S: Final = 0.02
+
+
+class BridgeObserver:
+    """One session of its own. Used on the event loop that it was opened on."""
+
+    def __init__(self, config: Config) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._woken = asyncio.Event()
+        self._link_up = False
+        self._dialect = BridgeDialect()
+        self._session = ZenohSession(config, self._wake, self._dialect)
+
+    @property
+    def zid(self) -> str:
+        """The id of its session."""
+        return self._session.zid
+
+    @property
+    def endpoints(self) -> tuple[str, ...]:
+        """Where it connects, such as "tcp/127.0.0.1:7447"."""
+        return self._session.endpoints
+
+    async def connect(self, within_s: float = CONNECT_S) -> None:
+        """Waits for a connection; LinkError that says where nothing answered."""
+        end = time.monotonic() + within_s
+        while not self._session.is_connected:
+            if time.monotonic() > end:
+                where = ", ".join(self.endpoints) or "any place that was found by scouting"
+                raise LinkError(f"no Zenoh router or bridge answers at {where} within {within_s:g} s")
+            await asyncio.sleep(POLL_S)
+
+    async def graph(self) -> RosGraph:
+        """The graph now; LinkError without a link. A graph without robots: no bridge is there."""
+        return await read_graph(self._session, self.zid)
+
+    async def call(self, key: str, payload: bytes, timeout_s: float = CALL_S) -> bytes | None:
+        """The response of a service that only reads; None for none in time. Only for a service that
+        the graph shows and that can be called: a query that nobody answers stays in the bridge."""
+        answer = self._session.query_at(self._dialect.service(key, ""), payload, timeout_s)
+        await asyncio.wait({answer}, timeout=timeout_s + 1)
+        return answer.result() if answer.done() else None
+
+    async def listen(self, topic: OwnEndpoint) -> AsyncIterator[Sample]:
+        """Each sample of a topic, that which a latched publisher has kept first. Once per observer.
+        LinkError when the connection is lost."""
+        expression = self._dialect.topic(topic.key, topic.type)
+        self._session.start(
+            Declarations(subscribe={topic.key: expression}, whole={topic.key}, prompt={topic.key})
+        )
+        # While the token is held the bridge keeps its route: each sample comes once.
+        self._session.hold(self._dialect.own_tokens(self.zid, [topic]))
+        connected = False
+        while True:
+            await self._woken.wait()
+            self._woken.clear()
+            changes = self._session.drain()
+            for _, sample in changes.kept:
+                yield sample
+            if connected and not changes.link_up:
+                raise LinkError(f"the connection to {', '.join(self.endpoints)} was lost")
+            connected = changes.link_up
+
+    async def close(self) -> None:
+        """Ends the session."""
+        await asyncio.to_thread(self._session.close)
+
+    def _wake(self, _: bool) -> None:
+        """On Zenoh's threads."""
+        with suppress(RuntimeError):  # the loop is closed
+            self._loop.call_soon_threadsafe(self._woken.set)
+
+
+@asynccontextmanager
+async def observing(config: Config, within_s: float = CONNECT_S) -> AsyncIterator[BridgeObserver]:
+    """An observer that is connected, closed at the end."""
+    observer = BridgeObserver(config)
+    try:
+        await observer.connect(within_s)
+        yield observer
+    finally:
+        await observer.close()
