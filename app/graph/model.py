@@ -221,8 +221,8 @@ class RobotGraph:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RosGraph:
-    """All robots that are reached by one link, by namespace. Bridges of one namespace are of one robot.
-    `peers` is what panels and tools hold in the graph, as far as the router tells: to a peer it tells of
+    """All robots that are reached by one link, by namespace. Bridges of one namespace are one robot's.
+    `peers` is what panels and tools hold in the graph, as far as the router tells: to peers it tells of
     clients only. Who uses a route is in `BridgeRoute.remote`, of all of them."""
 
     robots: tuple[RobotGraph, ...] = ()

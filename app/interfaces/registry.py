@@ -12,7 +12,7 @@ from app.interfaces.cdr.codec import Codec
 from app.interfaces.cdr.encapsulation import LITTLE_ENDIAN_HEADER
 from app.interfaces.cdr.fields import FieldReader
 from app.interfaces.cdr.selection import Resolver
-from app.interfaces.definitions import Structure, Type, interface_name
+from app.interfaces.definitions import Definitions, Structure, Type, interface_name
 from app.interfaces.derived_types import ActionTypes, action_types
 from app.interfaces.distributions import read_distribution
 from app.interfaces.mcap_schema import definition_text
@@ -27,6 +27,7 @@ from app.interfaces.type_hash import type_hash
 from app.interfaces.validation import Check, field_check, message_check
 
 MAX_SUGGESTIONS: Final = 3
+NO_DEFINITIONS: Final = Definitions()
 PACKAGE_SIMILARITY: Final = 0.8  # high, because most package names end in "_msgs"
 
 
@@ -37,15 +38,25 @@ class Interfaces:
     in ROS: "std_srvs/srv/SetBool_Request", "example_interfaces/action/Fibonacci_Feedback".
     """
 
-    def __init__(self, distro: str = "jazzy", folders: Sequence[Path] = ()) -> None:
+    def __init__(
+        self,
+        distro: str = "jazzy",
+        folders: Sequence[Path] = (),
+        described: Definitions = NO_DEFINITIONS,
+    ) -> None:
         """`folders` are packages, or contain packages (a workspace's `share`); their definitions take
-        precedence over the distribution's. A file that can't be used is an error only when its type is
-        requested: see `unusable`. InterfaceError names a folder without interfaces."""
+        precedence over the distribution's, and `described`, which a robot's nodes gave, over both. A
+        file that can't be used is an error only when its type is requested: see `unusable`.
+        InterfaceError names a folder without interfaces."""
         known = read_distribution(distro)
+        if described.structures:
+            known = known | described
         self._distro = distro
         self._idl_only = find_idl_only(folders)
         self._definitions = (
-            usable_definitions(read_folders(folders), known, self._idl_only) if folders else known
+            usable_definitions(read_folders(folders) | described, known, self._idl_only)
+            if folders
+            else known
         )
         self._structures = self._definitions.structures
         self._codec = Codec(self._structures)
@@ -143,6 +154,13 @@ class Interfaces:
         try:
             return self._codec.deserialize(data, type_name)
         except Exception as error:  # no received bytes may stop the panel
+            raise DecodeError(f"{len(data)} bytes are not a {type_name}: {error}") from error
+
+    def decode_whole(self, type_name: str, data: bytes) -> Any:
+        """The same, of any number of elements: for commands, which have no screen to keep alive."""
+        try:
+            return self._codec.deserialize(data, type_name, whole=True)
+        except Exception as error:  # whatever was received is an error of that kind
             raise DecodeError(f"{len(data)} bytes are not a {type_name}: {error}") from error
 
     def prepare_codecs(self, type_names: Iterable[str]) -> None:

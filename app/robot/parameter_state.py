@@ -8,15 +8,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
+from app.graph.node_services import PARAMETER_TYPES
 from app.i18n import TextLike, joined, say
 from app.panel.number_range import Range, range_text
 from app.panel.widgets.parameter import Parameter, Value
 
-# The names of rcl_interfaces/msg/ParameterType, by their numbers.
-TYPE_NAMES: Final = (
-    "not set", "bool", "integer", "double", "string", "byte[]", "bool[]", "integer[]", "double[]",
-    "string[]",
-)  # fmt: skip
 NOT_SET: Final = 0
 EMPTY_VALUE: Final[Mapping[str, Any]] = {
     "type": NOT_SET,
@@ -65,7 +61,7 @@ def read_parameter_state(
     if kind == described_as == NOT_SET and not (descriptor is not None and descriptor.dynamic_typing):
         return ParameterState("undeclared", wall=wall)
     for one in (kind, described_as):
-        if one != NOT_SET and one != TYPE_NAMES.index(parameter.type):
+        if one != NOT_SET and one != PARAMETER_TYPES.index(parameter.type):
             return ParameterState("mistyped", robot_type=type_name(one), wall=wall)
     if descriptor is None:
         return ParameterState("unreadable", wall=wall)
@@ -82,7 +78,7 @@ def read_parameter_state(
 
 def type_name(kind: int) -> str:
     """The name of a rcl_interfaces/msg/ParameterType."""
-    return TYPE_NAMES[kind] if kind < len(TYPE_NAMES) else f"type {kind}"
+    return PARAMETER_TYPES[kind] if kind < len(PARAMETER_TYPES) else f"type {kind}"
 
 
 def decode_value(parameter: Parameter, value: Any) -> Value:
@@ -93,7 +89,11 @@ def decode_value(parameter: Parameter, value: Any) -> Value:
 
 def encode_value(parameter: Parameter, value: Value) -> dict[str, Any]:
     """The fields of a ParameterValue."""
-    return {**EMPTY_VALUE, "type": TYPE_NAMES.index(parameter.type), _value_field(parameter): value}
+    return {
+        **EMPTY_VALUE,
+        "type": PARAMETER_TYPES.index(parameter.type),
+        _value_field(parameter): value,
+    }
 
 
 def _value_field(parameter: Parameter) -> str:

@@ -3,11 +3,18 @@
 import asyncio
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from app.errors import LinkError
 from app.graph.model import RosGraph
+from app.graph.node_services import NodeParameter, NodeServices
+from app.interfaces import Interfaces, load_interfaces
+from app.interfaces.definitions import Definitions
+from app.interfaces.parsing import parse_definition
+from app.interfaces.type_descriptions import SERVICE_TYPE_NAME, definitions_of
+from app.interfaces.type_hash import _describe_structure, referenced_structures, type_hash
 from app.transport.bridge_observer import observing
 from app.transport.zenoh_config import config_to
 from tests.support import cyclone
@@ -19,6 +26,8 @@ client = cyclone.client
 robots = cyclone.robots
 robot = cyclone.robot
 
+GRIPPER = "gripper_msgs/msg/Gripper"
+INTERFACES = load_interfaces("kilted")
 BOOL = "std_msgs/msg/Bool"
 
 
@@ -37,7 +46,10 @@ def until_graph(endpoint: str, holds: Callable[[RosGraph], bool], why: str) -> R
         found.append(graph_at(endpoint))
         return holds(found[-1])
 
-    until(there, why, every_s=0.1)
+    try:
+        until(there, why, every_s=0.1)
+    except AssertionError as error:
+        raise AssertionError(f"{error}: {found[-1]}") from None
     return found[-1]
 
 
@@ -111,6 +123,101 @@ def test_a_bridge_with_a_namespace_is_a_robot_of_that_namespace(domain: int) -> 
     speed = found.topic("/speed")
     assert speed
     assert (speed.key, found.key("/speed")) == ("robot1/speed", "robot1/speed")
+
+
+def test_parameters_are_those_of_nodes_that_can_be_asked(
+    robot: CycloneRobot, cyclone_bridge: Bridge
+) -> None:
+    ros = RosNode(cyclone_bridge.domain, "on_fast_dds")
+    try:
+        graph = until_graph(
+            cyclone_bridge.endpoint,
+            lambda graph: (
+                {"/on_fast_dds", f"/{NODE}"} <= {n.name for r in graph.robots for n in r.nodes}
+            ),
+            "the bridge has found both nodes",
+        )
+        (found,) = graph.robots
+
+        async def ask(name: str) -> tuple[NodeParameter, ...] | None:
+            async with observing(config_to(cyclone_bridge.endpoint)) as observer:
+                node = found.node(name)
+                assert node is not None
+                return await NodeServices(found, INTERFACES, observer).parameters(node)
+
+        assert asyncio.run(ask("/on_fast_dds")) is None  # it would misread the request
+        told = asyncio.run(ask(f"/{NODE}"))
+    finally:
+        ros.end()
+    assert told is not None
+    parameters = {one.name: one for one in told}
+    speed, serial = parameters["speed"], parameters["serial"]
+    assert (speed.type, speed.value, speed.min, speed.max) == ("double", 0.5, 0.0, 2.0)
+    assert speed.step == 0.1
+    assert (serial.type, serial.value, serial.read_only) == ("string", "CR-0001", True)
+
+
+def described(definitions: Definitions, name: str) -> list[dict[str, Any]]:
+    """The plain description of a type, as REP 2016 has it, with what it refers to."""
+    structure = definitions.structures[name]
+    inner = referenced_structures(structure, definitions.structures.__getitem__)
+    return [_describe_structure(one) for one in (structure, *inner.values())]
+
+
+def test_a_node_describes_a_type_that_nobody_else_knows(
+    robot: CycloneRobot, cyclone_bridge: Bridge
+) -> None:
+    text = {"Gripper": "float64 width\nJaw[] jaws", "Jaw": "string name\nfloat32 force"}
+    whole = Definitions()
+    for name, lines in text.items():
+        whole |= parse_definition(lines, "gripper_msgs", "msg", name, Path("x.msg"))
+    hash_ = type_hash(whole.structures[GRIPPER], whole.structures.__getitem__)
+    robot.describe_gripper(types=described(whole, GRIPPER), hash=hash_)
+    until(lambda: not robot.unmatched(), "the bridge found the service")
+    graph = until_graph(
+        cyclone_bridge.endpoint,
+        lambda graph: any(
+            r.topic("/gripper") and r.service(f"/{NODE}/get_type_description") for r in graph.robots
+        ),
+        "the bridge has found the topic",
+    )
+    (found,) = graph.robots
+    gripper = found.topic("/gripper")
+    assert gripper is not None
+
+    async def ask() -> Definitions | None:
+        async with observing(config_to(cyclone_bridge.endpoint)) as observer:
+            return await NodeServices(found, INTERFACES, observer).definitions(gripper)
+
+    definitions = asyncio.run(ask())
+    assert definitions is not None
+    assert definitions.structures == whole.structures
+    interfaces = Interfaces(described=definitions)
+    assert interfaces.type_hash(GRIPPER) == hash_
+    assert interfaces.field_type(GRIPPER, "jaws[0].force") == "float32"
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "std_msgs/msg/Bool",
+        "sensor_msgs/msg/JointState",
+        "diagnostic_msgs/msg/DiagnosticArray",
+        "rcl_interfaces/msg/Log",
+    ],
+)
+def test_an_rclpy_node_describes_its_types_as_they_are_known(node: RosNode, name: str) -> None:
+    """The service itself: through the bridge a node on Fast DDS can't be asked."""
+    node.subscribe(f"/described/{name.rpartition('/')[2].lower()}", name)
+    answer = INTERFACES.decode_whole(
+        f"{SERVICE_TYPE_NAME}_Response", bytes.fromhex(node.describe(name, INTERFACES.type_hash(name)))
+    )
+    assert (answer.successful, answer.failure_reason) == (True, "")
+    definitions = definitions_of(answer.type_description, INTERFACES.type_hash(name))
+    assert definitions.structures.keys() >= {name}
+    for each, structure in definitions.structures.items():
+        known = INTERFACES.structures[each].fields
+        assert [(f.name, f.type) for f in structure.fields] == [(f.name, f.type) for f in known]
 
 
 def test_nothing_there_is_an_error_that_says_where() -> None:

@@ -19,11 +19,16 @@ from cyclone_types import (
     AddTwoInts_Request,
     AddTwoInts_Response,
     Bool,
+    GetTypeDescription_Request,
+    GetTypeDescription_Response,
+    Gripper,
+    Jaw,
     SetBool_Request,
     SetBool_Response,
     String,
     Trigger_Request,
     Trigger_Response,
+    described,
     plain,
 )
 
@@ -137,6 +142,25 @@ class Commands:
 
     def heard(self, topic: str) -> list[Any]:
         return self._heard_on[topic]
+
+    def describe_gripper(self, types: list[dict[str, Any]], hash: str) -> None:
+        """Publishes gripper_msgs/msg/Gripper on /gripper, and describes it by `get_type_description`
+        to who gives its hash."""
+
+        def describe(request: GetTypeDescription_Request, answer: Answer) -> None:
+            good = (request.type_name, request.type_hash) == (types[0]["type_name"], hash)
+            reason = "" if good else "no such type"
+            answer(GetTypeDescription_Response(good, reason, described(types), [], []))
+
+        service = f"/{self._node.name}/get_type_description"
+        self._node.serve(service, GetTypeDescription_Request, GetTypeDescription_Response, describe)
+        self._node.advertise(
+            "/gripper",
+            Gripper,
+            qos_of(depth=1, durability="transient_local", user_data=f"typehash={hash};"),
+        )
+        self._node.tell()
+        self._node.published["/gripper"].write(Gripper(0.05, [Jaw("left", 2.5), Jaw("right", 3.0)]))
 
     def close(self) -> None:
         self._node.close()

@@ -9,7 +9,18 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 from cyclonedds.idl import IdlStruct, make_idl_struct
-from cyclonedds.idl.types import array, float64, int8, int32, int64, sequence, uint8, uint32, uint64
+from cyclonedds.idl.types import (
+    array,
+    float32,
+    float64,
+    int8,
+    int32,
+    int64,
+    sequence,
+    uint8,
+    uint32,
+    uint64,
+)
 
 
 def dds_name(ros_name: str) -> str:
@@ -315,3 +326,92 @@ class DescribeParameters_Request(IdlStruct, typename=parameter_service("Describe
 @dataclass
 class DescribeParameters_Response(IdlStruct, typename=parameter_service("DescribeParameters_Response")):
     descriptors: sequence[ParameterDescriptor]
+
+
+# Descriptions of types, and a message whose package nobody else has.
+
+
+@dataclass
+class FieldType(IdlStruct, typename=dds_name("type_description_interfaces/msg/FieldType")):
+    type_id: uint8
+    capacity: uint64
+    string_capacity: uint64
+    nested_type_name: str
+
+
+@dataclass
+class Field(IdlStruct, typename=dds_name("type_description_interfaces/msg/Field")):
+    name: str
+    type: FieldType
+    default_value: str
+
+
+@dataclass
+class IndividualTypeDescription(
+    IdlStruct, typename=dds_name("type_description_interfaces/msg/IndividualTypeDescription")
+):
+    type_name: str
+    fields: sequence[Field]
+
+
+@dataclass
+class TypeDescription(IdlStruct, typename=dds_name("type_description_interfaces/msg/TypeDescription")):
+    type_description: IndividualTypeDescription
+    referenced_type_descriptions: sequence[IndividualTypeDescription]
+
+
+@dataclass
+class TypeSource(IdlStruct, typename=dds_name("type_description_interfaces/msg/TypeSource")):
+    type_name: str
+    encoding: str
+    raw_file_contents: str
+
+
+@dataclass
+class KeyValue(IdlStruct, typename=dds_name("type_description_interfaces/msg/KeyValue")):
+    key: str
+    value: str
+
+
+@dataclass
+class GetTypeDescription_Request(
+    IdlStruct, typename=dds_name("type_description_interfaces/srv/GetTypeDescription_Request")
+):
+    type_name: str
+    type_hash: str
+    include_type_sources: bool
+
+
+@dataclass
+class GetTypeDescription_Response(
+    IdlStruct, typename=dds_name("type_description_interfaces/srv/GetTypeDescription_Response")
+):
+    successful: bool
+    failure_reason: str
+    type_description: TypeDescription
+    type_sources: sequence[TypeSource]
+    extra_information: sequence[KeyValue]
+
+
+@dataclass
+class Jaw(IdlStruct, typename=dds_name("gripper_msgs/msg/Jaw")):
+    name: str
+    force: float32
+
+
+@dataclass
+class Gripper(IdlStruct, typename=dds_name("gripper_msgs/msg/Gripper")):
+    width: float64
+    jaws: sequence[Jaw]
+
+
+def described(types: list[dict[str, Any]]) -> TypeDescription:
+    """A description from plain values, the type itself first."""
+    first, *others = [
+        IndividualTypeDescription(
+            one["type_name"],
+            [Field(each["name"], FieldType(**each["type"]), "") for each in one["fields"]],
+        )
+        for one in types
+    ]
+    return TypeDescription(first, others)

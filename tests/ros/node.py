@@ -17,7 +17,9 @@ import rclpy
 from commands import obey
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.serialization import serialize_message
 from rclpy.subscription import RCLError
+from type_description_interfaces.srv import GetTypeDescription
 
 GONE_S = 2.0  # within which a publisher that was withdrawn is gone
 
@@ -187,6 +189,23 @@ class Commands:
             else:
                 time.sleep(0.0005)
         return sent
+
+    def describe(self, type: str, hash: str, timeout_s: float = 15) -> str:
+        """What the node's own `get_type_description` answers, as the hexadecimal digits of its CDR."""
+        service = f"/{self.node.get_name()}/get_type_description"
+        client = self.node.create_client(GetTypeDescription, service)
+        try:
+            if not client.wait_for_service(timeout_s):
+                raise TimeoutError(f"{service} is not there")
+            request = GetTypeDescription.Request(type_name=type, type_hash=hash)
+            answered = threading.Event()
+            answer = client.call_async(request)
+            answer.add_done_callback(lambda _: answered.set())
+            if not answered.wait(timeout_s):
+                raise TimeoutError(f"{service} does not answer")
+            return serialize_message(answer.result()).hex()
+        finally:
+            self.node.destroy_client(client)
 
     def withdraw(self, topic: str) -> None:
         timer = self.timers.pop(topic, None)

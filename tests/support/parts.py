@@ -270,6 +270,7 @@ ORDERS: Mapping[str, tuple[str, ...]] = {
     "film": ("topic",),
     "once": ("topic", "type", "fields"),
     "withdraw": ("topic",),
+    "describe": ("type", "hash"),
     "subscribers": ("topic",),
     "nodes": (),
     "topics": (),

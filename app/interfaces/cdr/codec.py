@@ -34,10 +34,10 @@ class Codec:
         self._writer(name)(out, message)
         return bytes(out)
 
-    def deserialize(self, data: bytes, name: str) -> Any:
+    def deserialize(self, data: bytes, name: str, whole: bool = False) -> Any:
         """The message object; ValueError, `struct.error` or UnicodeError if the bytes are no such
-        message."""
-        if len(data) > SMALL_MESSAGE_BYTES:
+        message. `whole`: of any number of elements."""
+        if len(data) > SMALL_MESSAGE_BYTES and not whole:
             self._check_element_count(data, name)
         body, order = split_header(data)
         message, end = self._reader(order, name)(body, 0)
