@@ -61,6 +61,8 @@ SPEAK_ZENOH = {
 # The bridge's dialect and peer, and who else may know them.
 OF_THE_BRIDGE = ("app.dialect.bridge_", "app.transport.bridge_")
 WIRE_THE_BRIDGE = {
+    "app.cli.robot_link",
+    "app.cli.topic_reader",
     "app.runtime.robot_session",
     "app.simulator.zenoh_peer",
     "app.simulator.zenoh_robot",

@@ -1,4 +1,4 @@
-"""`operator-panel run | check | log | simulate`: each command is a module of this room."""
+"""`operator-panel run | check | …`: each command is a module of this room."""
 
 import sys
 from argparse import ArgumentTypeError, RawDescriptionHelpFormatter
@@ -14,6 +14,10 @@ COMMANDS = {
     "check": "check panel files: every fault with its place",
     "log": "check that the operator's log is as it was written",
     "simulate": "run the robot of a panel, or a recording, as a Zenoh peer of its own",
+    "topics": "list the topics of a robot",
+    "echo": "show the messages of a topic",
+    "hz": "show how often a topic is published",
+    "completion": "print a shell's completion of these commands",
 }
 Command = Callable[[Sequence[str], str], int]
 
@@ -40,6 +44,14 @@ def _command(name: str) -> Command:
             from app.cli.check import main
         case "log":
             from app.cli.log import main
+        case "topics":
+            from app.cli.topics import main
+        case "echo":
+            from app.cli.echo import main
+        case "hz":
+            from app.cli.hz import main
+        case "completion":
+            from app.cli.completion import main
         case _:
             from app.cli.simulate import main
     return main
@@ -66,14 +78,12 @@ def _parser() -> Parser:
         usage=f"{APP} [-h] [--version] COMMAND ...",
         description="An operator's touch panel for ROS 2 robots.",
         epilog="commands:\n"
-        + "".join(f"  {name:10}{text}\n" for name, text in COMMANDS.items())
+        + "".join(f"  {name:14}{text}\n" for name, text in COMMANDS.items())
         + f"\n`{APP} COMMAND --help` tells the options of a command.",
         formatter_class=RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"{APP} {_version()}")
-    parser.add_argument(
-        "command", nargs="?", metavar="COMMAND", type=_known, help="run, check, log or simulate"
-    )
+    parser.add_argument("command", nargs="?", metavar="COMMAND", type=_known, help="one of those below")
     return parser
 
 

@@ -17,16 +17,7 @@ PROG = "python -m app.log"
 
 
 def main(arguments: Sequence[str], prog: str = PROG) -> int:
-    parser = Parser(prog=prog, description="The operator's log.")
-    commands = parser.add_subparsers(metavar="COMMAND", required=True)
-    check = commands.add_parser("verify", help="check that no entry was changed")
-    check.add_argument(
-        "--data", type=Path, metavar="FOLDER", help="where the log is; default: KIOSK_DATA's folder"
-    )
-    check.add_argument(
-        "--head", default="", metavar="HASH", help="a head that was noted once, and must be in it"
-    )
-    given = parser.parse_args(arguments)
+    given = _parser(prog).parse_args(arguments)
     try:
         found = verify(given.data or _usual_folder(), given.head)
     except KioskError as error:
@@ -45,3 +36,16 @@ def _usual_folder() -> Path:
     if settings.data is not None:  # a panel file with a fault is no reason not to look
         return settings.data
     return settings.data_folder(settings.mode or load_panel(settings.panel).mode)
+
+
+def _parser(prog: str) -> Parser:
+    parser = Parser(prog=prog, description="The operator's log.")
+    commands = parser.add_subparsers(metavar="COMMAND", required=True)
+    check = commands.add_parser("verify", help="check that no entry was changed")
+    check.add_argument(
+        "--data", type=Path, metavar="FOLDER", help="where the log is; default: KIOSK_DATA's folder"
+    )
+    check.add_argument(
+        "--head", default="", metavar="HASH", help="a head that was noted once, and must be in it"
+    )
+    return parser

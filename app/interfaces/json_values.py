@@ -35,6 +35,11 @@ def to_plain(message: Any) -> Any:
     return {name: to_plain(getattr(message, each)) for each, name in _field_names(message.__class__)}
 
 
+def message_fields(message: Any) -> Iterator[tuple[str, Any]]:
+    """(field name, value) of a message object, in the order of its definition."""
+    return ((name, getattr(message, each)) for each, name in _field_names(message.__class__))
+
+
 def plain_text(value: Any, most: int) -> str:
     """A value in a decoded message as `str(to_plain(value))`, cut to `most` characters. The rest is not
     read: a list may have any length."""

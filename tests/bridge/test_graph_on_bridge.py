@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from app.errors import LinkError
-from app.graph.model import RosGraph
+from app.graph.model import Node, RosGraph
 from app.graph.node_services import NodeParameter, NodeServices
 from app.interfaces import Interfaces, load_interfaces
 from app.interfaces.definitions import Definitions
@@ -132,8 +132,8 @@ def test_parameters_are_those_of_nodes_that_can_be_asked(
     try:
         graph = until_graph(
             cyclone_bridge.endpoint,
-            lambda graph: (
-                {"/on_fast_dds", f"/{NODE}"} <= {n.name for r in graph.robots for n in r.nodes}
+            lambda graph: any(
+                r.node("/on_fast_dds") and r.service(f"/{NODE}/get_parameters") for r in graph.robots
             ),
             "the bridge has found both nodes",
         )
@@ -141,9 +141,8 @@ def test_parameters_are_those_of_nodes_that_can_be_asked(
 
         async def ask(name: str) -> tuple[NodeParameter, ...] | None:
             async with observing(config_to(cyclone_bridge.endpoint)) as observer:
-                node = found.node(name)
-                assert node is not None
-                return await NodeServices(found, INTERFACES, observer).parameters(node)
+                services = NodeServices(found, INTERFACES, observer)
+                return await services.parameters(Node(name=name, bridge=""))
 
         assert asyncio.run(ask("/on_fast_dds")) is None  # it would misread the request
         told = asyncio.run(ask(f"/{NODE}"))

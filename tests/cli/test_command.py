@@ -26,7 +26,7 @@ def test_help_names_every_command(capsys: pytest.CaptureFixture[str]) -> None:
     said = helped(capsys=capsys)
     assert said.startswith("usage: operator-panel [-h] [--version] COMMAND")
     for name, text in COMMANDS.items():
-        assert f"  {name:10}{text}\n" in said
+        assert f"  {name:14}{text}\n" in said
 
 
 @pytest.mark.parametrize("name", COMMANDS)
@@ -60,10 +60,10 @@ def test_no_command_is_help_and_an_error(capsys: pytest.CaptureFixture[str]) -> 
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (["rnu"], '"rnu" is not a command: there is run, check, log, simulate'),
+        (["rnu"], '"rnu" is not a command: there is run, check, log, simulate, topics, echo'),
         (["cell1.toml"], "did you mean operator-panel run cell1.toml?"),
         (["--verison"], "--verison is not an option"),
-        (["--"], "the command is missing: there is run, check, log, simulate"),
+        (["--"], "the command is missing: there is run, check, log, simulate, topics, echo"),
         (["log", "veryfy"], "argument COMMAND: invalid choice: 'veryfy'"),
         (["log"], "the following arguments are required: COMMAND"),
         (["check", "--verbos"], "--verbos is not an option of this command: did you mean --verbose?"),

@@ -1,0 +1,102 @@
+"""`operator-panel echo TOPIC [TYPE]`: the messages of a topic, as `ros2 topic echo` shows them.
+
+Exit status: 0 it was ended, or has shown what was asked for; 1 no robot, no such topic, or nothing came
+in time; 2 a mistake on the command line.
+"""
+
+import asyncio
+import json
+import sys
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
+
+from app.cli.message_text import Shape, csv_line, yaml_text
+from app.cli.parser import Parser
+from app.cli.robot_link import GONE, add_options, ended, opened, place_of, seconds
+from app.cli.topic_reader import TopicReader, value_in
+from app.errors import DecodeError
+from app.interfaces import Interfaces, to_plain
+from app.printable import printable
+
+PROG = "python -m app.cli echo"
+SEPARATOR = "---"
+
+
+def main(arguments: Sequence[str], prog: str = PROG) -> int:
+    given = _parser(prog).parse_args(arguments)
+    return ended(lambda: _echo(given))
+
+
+async def _echo(given: Any) -> int:
+    place = place_of(given)
+    async with opened(place) as (observer, graph):
+        reader = TopicReader.find(observer, graph, place, given.topic, given.type or "")
+        interfaces = await reader.interfaces(place)
+        if given.field:
+            interfaces.type_at(reader.type, given.field)
+        try:
+            async with asyncio.timeout(given.timeout) as limit:
+                async for sample in reader.samples():
+                    limit.reschedule(None)
+                    _show(bytes(sample.payload), interfaces, reader.type, given)
+                    if given.once:
+                        return 0
+        except TimeoutError:
+            print(f"nothing came on {reader.topic.name} in {given.timeout:g} s", file=sys.stderr)
+            return GONE
+    return 0
+
+
+def _show(data: bytes, interfaces: Interfaces, type_name: str, given: Any) -> None:
+    """One message; one that can't be decoded is told of, and the next one is awaited."""
+    try:
+        value = value_in(data, interfaces, type_name, given.field or "")
+    except DecodeError as error:
+        print(error, file=sys.stderr, flush=True)
+        return
+    print(_written(given)(value), flush=True)
+
+
+def _written(given: Any) -> Callable[[Any], str]:
+    shape = Shape(
+        most=None if given.full_length else given.truncate_length,
+        lists=not given.no_arr,
+        texts=not given.no_str,
+    )
+    if given.json:
+        return lambda value: printable(json.dumps(to_plain(value), ensure_ascii=False))
+    if given.csv:
+        return partial(csv_line, shape=shape)
+    return lambda value: f"{yaml_text(value, shape)}\n{SEPARATOR}"
+
+
+def _parser(prog: str) -> Parser:
+    parser = Parser(
+        prog=prog,
+        description="Shows the messages of a topic, through the robot's bridge and without ROS.",
+        epilog="Its type is that on the robot, and its QoS the publisher's. Ctrl-C ends it. Exit"
+        " status: 1 no robot, no such topic, or nothing came in time.",
+    )
+    add = parser.add_argument
+    add("topic", metavar="TOPIC", help="such as /speed")
+    add("type", nargs="?", metavar="TYPE", help="only where it has several on the robot")
+    add("--once", action="store_true", help="one message, then end")
+    add("--timeout", type=seconds, metavar="S", help="end if nothing came in so many seconds")
+    add("--field", metavar="PATH", help='only this field, such as pose.position.x or "status[0].name"')
+    form = parser.add_mutually_exclusive_group().add_argument
+    form("--csv", action="store_true", help="one line of values with commas for each message")
+    form("--json", action="store_true", help="one line of JSON for each message")
+    add("-f", "--full-length", action="store_true", help="lists and texts of any length")
+    add(
+        "-l",
+        "--truncate-length",
+        type=int,
+        default=128,
+        metavar="N",
+        help="so many elements of a list and characters of a text; default: %(default)s",
+    )
+    add("--no-arr", action="store_true", help="without the elements of lists")
+    add("--no-str", action="store_true", help="without texts")
+    add_options(parser)
+    return parser

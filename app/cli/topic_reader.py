@@ -1,0 +1,98 @@
+"""One topic of a robot, found by its name: its type, how to decode it, its messages as they come."""
+
+import sys
+from collections.abc import AsyncIterator
+from dataclasses import dataclass
+from typing import Any, Final
+
+from app.cli.robot_link import Place, topic_named
+from app.dialect.endpoint import OwnEndpoint
+from app.errors import InterfaceError, LinkError
+from app.graph.model import RobotGraph, RosGraph, Topic
+from app.graph.node_services import NodeServices
+from app.interfaces import Interfaces, load_interfaces
+from app.interfaces.definitions import attribute_name
+from app.interfaces.field_path import Key, path_steps
+from app.interfaces.names import Qos
+from app.robot.sample import Sample
+from app.transport.bridge_observer import BridgeObserver
+
+DEPTH: Final = 100  # of the bridge's reader: no message of a burst is lost
+HOW: Final = "give the folder of its package with --interfaces (a workspace's install/, or its source)"
+
+
+@dataclass(frozen=True, slots=True)
+class TopicReader:
+    """A topic that is there, with its one type."""
+
+    observer: BridgeObserver
+    robot: RobotGraph
+    topic: Topic
+    type: str
+
+    @classmethod
+    def find(
+        cls, observer: BridgeObserver, graph: RosGraph, place: Place, name: str, type_name: str = ""
+    ) -> "TopicReader":
+        """LinkError for a topic that is not there or not passed on, and for one of several types."""
+        robot, topic = topic_named(graph, place.namespace, name)
+        if not topic.announced:
+            raise LinkError(
+                f"the bridge does not pass {topic.name} on: see `allow` and `deny` in its configuration"
+            )
+        if type_name and type_name not in topic.types:
+            raise LinkError(
+                f"{topic.name} is {' and '.join(topic.types)} on the robot, not {type_name}"
+            )
+        if len(topic.types) > 1 and not type_name:
+            raise LinkError(f"{topic.name} has several types, name one: {', '.join(topic.types)}")
+        return cls(observer, robot, topic, type_name or topic.type)
+
+    async def interfaces(self, place: Place) -> Interfaces:
+        """With the topic's type as the robot has it. InterfaceError says how to give its definition."""
+        known = load_interfaces(place.distro, place.interfaces)
+        hashes = {one.type_hash for one in self.topic.publishers if one.type == self.type} - {""}
+        try:
+            known.require(self.type)
+            if not hashes or known.type_hash(self.type) in hashes:
+                return known
+            differs = True
+        except InterfaceError as error:
+            differs, why = False, error
+        described = await NodeServices(self.robot, known, self.observer).definitions(self.topic)
+        if described is not None and self.type in described.structures:
+            return Interfaces(place.distro, place.interfaces, described)
+        if not differs:
+            raise InterfaceError(f"{why}; {HOW}") from why
+        print(
+            f"warning: the robot's {self.type} has another definition than the one known here: {HOW}",
+            file=sys.stderr,
+        )
+        return known
+
+    async def samples(self) -> AsyncIterator[Sample]:
+        """Each sample, that which a latched publisher has kept first."""
+        if not self.topic.publishers:
+            print(f"nobody publishes {self.topic.name} now; waiting", file=sys.stderr, flush=True)
+        hashes = [one.type_hash for one in self.topic.publishers if one.type_hash]
+        qos = Qos(self.topic.reliable, self.topic.latched, DEPTH)
+        own = OwnEndpoint("MS", self.topic.key, self.type, qos, next(iter(hashes), ""))
+        async for sample in self.observer.listen(own):
+            yield sample
+
+
+def value_in(data: bytes, interfaces: Interfaces, type_name: str, path: str) -> Any:
+    """The value at a path in a message, from its bytes; the whole message for "". None where a list has
+    no such element. DecodeError if the bytes are no such message."""
+    steps = path_steps(path) if path else ()
+    if any(isinstance(step, Key) for step in steps):
+        return interfaces.field_reader(type_name, [path]).read(data).get(path)
+    value = interfaces.decode_whole(type_name, data)
+    for step in steps:
+        if isinstance(step, str):
+            value = getattr(value, attribute_name(step))
+        elif isinstance(step, int) and step < len(value):
+            value = value[step]
+        else:
+            return None
+    return value

@@ -1,0 +1,93 @@
+"""`operator-panel topics`: the topics of a robot through its bridge, as `ros2 topic list` shows them.
+
+Exit status: 0 they are listed, 1 there is no robot, 2 a mistake on the command line.
+"""
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
+from typing import Any
+
+from app.cli.parser import Parser
+from app.cli.robot_link import add_options, check_namespace, ended, opened, place_of, shown_topics
+from app.graph.model import RobotGraph, Topic, TopicEndpoint
+from app.printable import printable
+
+PROG = "python -m app.cli topics"
+Found = Mapping[str, tuple[RobotGraph, Topic]]
+
+
+def main(arguments: Sequence[str], prog: str = PROG) -> int:
+    given = _parser(prog).parse_args(arguments)
+    return ended(lambda: _list(given))
+
+
+async def _list(given: Any) -> int:
+    place = place_of(given)
+    async with opened(place) as (_, graph):
+        check_namespace(graph, place.namespace)
+        found = {
+            name: one
+            for name, one in sorted(shown_topics(graph, place.namespace).items())
+            if given.include_hidden_topics or not is_hidden(name)
+        }
+    if given.count_topics:
+        print(len(found))
+    elif given.json:
+        print(json.dumps([_plain(name, *one) for name, one in found.items()], indent=1))
+    else:
+        for line in _lines(found, given.show_types, given.verbose):
+            print(printable(line))
+    return 0
+
+
+def is_hidden(name: str) -> bool:
+    """As ROS 2 has it: a part of the name begins with "_"."""
+    return "/_" in name
+
+
+def _lines(found: Found, types: bool, verbose: bool) -> Iterator[str]:
+    for name, (robot, topic) in found.items():
+        yield f"{name} [{', '.join(topic.types)}]" if types or verbose else name
+        if verbose:
+            for word, endpoints in (("publisher", topic.publishers), ("subscriber", topic.subscribers)):
+                yield from (f"  {word}: {_described(robot, one)}" for one in endpoints)
+            if not topic.announced:
+                yield "  not passed on: the bridge's `allow` or `deny` holds it back"
+
+
+def _described(robot: RobotGraph, one: TopicEndpoint) -> str:
+    nodes = " or ".join(f"{robot.namespace}{node}" for node in one.nodes) or "(node unknown)"
+    return f"{nodes}, {one.qos}" + (f", {one.dds}" if one.dds else "")
+
+
+def _plain(name: str, robot: RobotGraph, topic: Topic) -> dict[str, Any]:
+    return {
+        "name": name,
+        "namespace": robot.namespace,
+        "types": topic.types,
+        "passed_on": topic.announced,
+        "publishers": [asdict(one) for one in topic.publishers],
+        "subscribers": [asdict(one) for one in topic.subscribers],
+    }
+
+
+def _parser(prog: str) -> Parser:
+    parser = Parser(
+        prog=prog,
+        description="Lists the topics of a robot, through its bridge and without ROS.",
+        epilog="Exit status: 0 they are listed, 1 there is no robot.",
+    )
+    add = parser.add_argument
+    add("-t", "--show-types", action="store_true", help="with their types")
+    add(
+        "-v",
+        "--verbose",
+        action="store_true",
+        help="with types, and each publisher and subscriber with its node and QoS",
+    )
+    add("-c", "--count-topics", action="store_true", help="only how many there are")
+    add("--include-hidden-topics", action="store_true", help='those too whose name has a "/_"')
+    add("--json", action="store_true", help="all that is known of them, as one JSON list")
+    add_options(parser)
+    return parser
