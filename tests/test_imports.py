@@ -30,6 +30,7 @@ ROOMS = (
     "process",
     "web",
     "simulator",
+    "scaffold",
     "cli",
 )
 # What every room may import.

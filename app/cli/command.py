@@ -17,6 +17,7 @@ COMMANDS = {
     "topics": "list the topics of a robot",
     "echo": "show the messages of a topic",
     "hz": "show how often a topic is published",
+    "scaffold": "write a first panel that fits a running robot",
     "completion": "print a shell's completion of these commands",
 }
 Command = Callable[[Sequence[str], str], int]
@@ -50,6 +51,8 @@ def _command(name: str) -> Command:
             from app.cli.echo import main
         case "hz":
             from app.cli.hz import main
+        case "scaffold":
+            from app.cli.scaffold import main
         case "completion":
             from app.cli.completion import main
         case _:

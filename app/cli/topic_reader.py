@@ -21,6 +21,13 @@ DEPTH: Final = 100  # of the bridge's reader: no message of a burst is lost
 HOW: Final = "give the folder of its package with --interfaces (a workspace's install/, or its source)"
 
 
+def endpoint_for(topic: Topic, type_name: str) -> OwnEndpoint:
+    """A subscription with the QoS of the topic's publishers."""
+    hashes = [one.type_hash for one in topic.publishers if one.type_hash]
+    qos = Qos(topic.reliable, topic.latched, DEPTH)
+    return OwnEndpoint("MS", topic.key, type_name, qos, next(iter(hashes), ""))
+
+
 @dataclass(frozen=True, slots=True)
 class TopicReader:
     """A topic that is there, with its one type."""
@@ -74,10 +81,8 @@ class TopicReader:
         """Each sample, that which a latched publisher has kept first."""
         if not self.topic.publishers:
             print(f"nobody publishes {self.topic.name} now; waiting", file=sys.stderr, flush=True)
-        hashes = [one.type_hash for one in self.topic.publishers if one.type_hash]
-        qos = Qos(self.topic.reliable, self.topic.latched, DEPTH)
-        own = OwnEndpoint("MS", self.topic.key, self.type, qos, next(iter(hashes), ""))
-        async for sample in self.observer.listen(own):
+        own = endpoint_for(self.topic, self.type)
+        async for _, sample in self.observer.listen([own]):
             yield sample
 
 

@@ -5,7 +5,7 @@ For commands that run beside the panel's server or without one. It publishes not
 
 import asyncio
 import time
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager, suppress
 from typing import Final
 
@@ -64,22 +64,22 @@ class BridgeObserver:
         await asyncio.wait({answer}, timeout=timeout_s + 1)
         return answer.result() if answer.done() else None
 
-    async def listen(self, topic: OwnEndpoint) -> AsyncIterator[Sample]:
-        """Each sample of a topic, that which a latched publisher has kept first. Once per observer.
-        LinkError when the connection is lost."""
-        expression = self._dialect.topic(topic.key, topic.type)
+    async def listen(self, topics: Sequence[OwnEndpoint]) -> AsyncIterator[tuple[str, Sample]]:
+        """(key, sample) of each sample of these topics, those which latched publishers have kept first.
+        Once per observer. LinkError when the connection is lost."""
+        expressions = {one.key: self._dialect.topic(one.key, one.type) for one in topics}
         self._session.start(
-            Declarations(subscribe={topic.key: expression}, whole={topic.key}, prompt={topic.key})
+            Declarations(subscribe=expressions, whole=set(expressions), prompt=set(expressions))
         )
-        # While the token is held the bridge keeps its route: each sample comes once.
-        self._session.hold(self._dialect.own_tokens(self.zid, [topic]))
+        # While a token is held the bridge keeps its route: each sample comes once.
+        self._session.hold(self._dialect.own_tokens(self.zid, topics))
         connected = False
         while True:
             await self._woken.wait()
             self._woken.clear()
             changes = self._session.drain()
-            for _, sample in changes.kept:
-                yield sample
+            for kept in changes.kept:
+                yield kept
             if connected and not changes.link_up:
                 raise LinkError(f"the connection to {', '.join(self.endpoints)} was lost")
             connected = changes.link_up

@@ -1,0 +1,1 @@
+"""A first panel file for a robot, from its ROS graph. Pure."""

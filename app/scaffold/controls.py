@@ -1,0 +1,108 @@
+"""The widgets that act on the robot: keys for topics, services and actions, and parameters."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any, Final
+
+from app.graph.model import Server, Topic
+from app.graph.node_services import NodeParameter
+from app.interfaces import Interfaces
+from app.interfaces.definitions import FLOAT_TYPES
+from app.scaffold.entry import Entry
+from app.scaffold.fields import NUMBERS
+from app.scaffold.naming import label_of, page_of, words_of
+
+TWISTS: Final = ("geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped")
+OF_EVERY_NODE: Final = (
+    "rcl_interfaces/srv/",
+    "type_description_interfaces/srv/",
+    "logging_demo/srv/",
+    "composition_interfaces/srv/",
+    "lifecycle_msgs/srv/",
+)
+PARAMETER_TYPES: Final = ("bool", "integer", "double", "string")
+ROLES: Final = {"start": "start", "stop": "stop", "reset": "reset"}
+
+
+def publishers(topic: Topic, interfaces: Interfaces) -> Iterator[Entry]:
+    """Keys that publish on a topic that the robot listens to."""
+    nodes = {node for one in topic.subscribers for node in one.nodes}
+    about = {"label": label_of(topic.name), "topic": topic.name, "type": topic.type}
+    if topic.type in TWISTS:
+        keys = {**about, "span": 6}
+        yield _control("joystick", topic.name, nodes, keys, "Moves the robot while it is held.")
+        return
+    message = _message(topic.type, interfaces)
+    if message is not None:
+        keys = {**about, "message": message, **_role(topic.name)}
+        yield _control("publish", topic.name, nodes, keys)
+
+
+def _message(type_name: str, interfaces: Interfaces) -> dict[str, Any] | None:
+    """What a key of a type with one plain field sends; None for a type that needs thought."""
+    fields = interfaces.structures[type_name].fields
+    if not fields:
+        return {}
+    (one, *more) = fields
+    if more or one.type.is_nested or one.type.container != "one":
+        return None
+    if one.type.name in NUMBERS:
+        return {one.name: 0.0 if one.type.name in FLOAT_TYPES else 0}
+    return {one.name: True if one.type.name == "bool" else "text"}
+
+
+def calls(service: Server, interfaces: Interfaces) -> Iterator[Entry]:
+    """Keys that call a service whose request is empty or one bool."""
+    if service.type.startswith(OF_EVERY_NODE):
+        return
+    request, _ = interfaces.service_types(service.type)
+    fields = interfaces.structures[request].fields
+    about = {"service": service.name, "type": service.type}
+    label = label_of(service.name)
+    if not fields:
+        keys = {"label": label, **about, **_role(service.name)}
+        yield _control("call", service.name, service.nodes, keys)
+    elif [str(one.type) for one in fields] == ["bool"]:
+        for value, word in ((True, "on"), (False, "off")):
+            labelled: dict[str, Any] = {
+                "label": f"{label} {word}",
+                **about,
+                "request": {fields[0].name: value},
+            }
+            yield _control("call", f"{service.name}/{word}", service.nodes, labelled)
+
+
+def goals(action: Server, interfaces: Interfaces) -> Iterator[Entry]:
+    """A key that sends a goal with default values."""
+    goal = interfaces.action_types(action.type).goal
+    fields = interfaces.structures[goal].fields
+    plain = {one.name: one.default_value for one in fields if not one.type.is_nested}
+    keys = {"label": label_of(action.name), "action": action.name, "type": action.type, "goal": plain}
+    comment = "Fill in the goal." if fields else ""
+    yield _control("action", action.name, action.nodes, keys, comment)
+
+
+def parameter(of: NodeParameter) -> Iterator[Entry]:
+    """An entry for a parameter that can be set."""
+    kind = of.type.removesuffix("[]")
+    hidden = of.name.startswith("qos_overrides.") or of.name == "use_sim_time"
+    if kind not in PARAMETER_TYPES or of.read_only or hidden:
+        return
+    keys: dict[str, Any] = {
+        "label": label_of("/" + of.name.replace(".", "/")),
+        "node": of.node,
+        "parameter": of.name,
+        "type": of.type,
+        "span": 6,
+    }
+    comment = " ".join(f"Now {of.value!r}. {of.description}".split()) if of.value is not None else ""
+    yield _control("parameter", f"{of.node}/{of.name}", (of.node,), keys, comment)
+
+
+def _role(name: str) -> Mapping[str, str]:
+    last = words_of(name.rpartition("/")[2])
+    return next(({"role": ROLES[word]} for word in last if word in ROLES), {})
+
+
+def _control(kind: str, name: str, nodes: Any, keys: Mapping[str, Any], comment: str = "") -> Entry:
+    page = page_of(name if kind != "parameter" else nodes[0] + "/x", nodes)
+    return Entry(kind=kind, name=name, keys=keys, comment=comment, control=True, page=page)

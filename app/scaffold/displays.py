@@ -1,0 +1,138 @@
+"""The widgets that show a topic."""
+
+from collections.abc import Iterator, Mapping
+from math import ceil, degrees, pi
+from typing import Any, Final
+
+from app.graph.model import Topic
+from app.interfaces import Interfaces
+from app.scaffold.entry import Entry
+from app.scaffold.fields import NUMBERS, Shown, is_text, range_for, shown_fields
+from app.scaffold.naming import NEGATIVE, label_of, page_of
+
+JOINTS: Final = "sensor_msgs/msg/JointState"
+DIAGNOSTICS: Final = "diagnostic_msgs/msg/DiagnosticArray"
+LOG: Final = "rcl_interfaces/msg/Log"
+PICTURES: Final = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
+MAX_JOINTS: Final = 24
+NODES_PAGE: Final = "nodes"
+
+
+def displays(topic: Topic, interfaces: Interfaces, sample: Any = None) -> Iterator[Entry]:
+    """The widgets of a topic that the robot publishes. `sample` is one of its messages, if one came."""
+    nodes = {node for one in topic.publishers for node in one.nodes}
+    about = {"topic": topic.name, "type": topic.type, **_qos(topic)}
+    page = page_of(topic.name, nodes)
+    label = label_of(topic.name)
+    match topic.type:
+        case t if t in PICTURES:
+            keys = {"label": label, "topic": topic.name, "type": topic.type, "span": 6}
+            yield Entry(kind="camera", name=topic.name, page=page, keys=keys)
+        case t if t == JOINTS:
+            yield from _joints(topic, label, page, about, sample)
+        case t if t == DIAGNOSTICS:
+            yield _diagnostics(topic, label, about)
+        case t if t == LOG:
+            keys = {"label": "Log of the nodes", "topic": topic.name}
+            yield Entry(kind="log", name=topic.name, page=NODES_PAGE, keys=keys)
+        case _:
+            for shown in shown_fields(topic.type, interfaces):
+                yield _field(topic, page, about, shown, _value(sample, shown.field))
+
+
+def _qos(topic: Topic) -> dict[str, Any]:
+    """The panel asks for reliable, which a best-effort publisher does not match."""
+    return {} if topic.reliable else {"qos": {"reliability": "best_effort"}}
+
+
+def _value(sample: Any, path: str) -> Any:
+    value = sample
+    for name in path.split("."):
+        value = getattr(value, name, None)
+    return value
+
+
+def _field(topic: Topic, page: str, about: Mapping[str, Any], shown: Shown, value: Any) -> Entry:
+    label = " ".join(filter(None, (label_of(topic.name), shown.word)))
+    name = topic.name if not shown.word else f"{topic.name}/{shown.field.replace('.', '_')}"
+    field = {} if shown.field == "data" else {"field": shown.field}
+    keys: dict[str, Any] = {"label": label, **about, **field}
+    if shown.kind == "bool":
+        return _lamp(name, page, keys, label)
+    if is_text(shown.kind) or shown.kind not in NUMBERS:
+        return Entry(kind="readout", name=name, page=page, keys={**keys, "span": 6})
+    keys |= {"unit": shown.unit} if shown.unit else {}
+    keys |= {"scale": shown.scale} if shown.scale != 1.0 else {}
+    keys |= {"format": shown.format} if shown.format else {}
+    if shown.low is None and shown.unit:
+        return Entry(kind="readout", name=name, page=page, keys={**keys, "span": 3})
+    seen = float(value) * shown.scale if isinstance(value, int | float) else None
+    low, high = range_for(shown, (shown.field, topic.name), seen)
+    comment = "" if shown.low is not None else "The ends of the scale are a guess."
+    keys |= {"min": low, "max": high, "span": 3}
+    return Entry(kind="gauge", name=name, page=page, keys=keys, comment=comment)
+
+
+def _lamp(name: str, page: str, keys: dict[str, Any], label: str) -> Entry:
+    """One that tells of a fault is red where it is on."""
+    on, off = {"value": True, "text": "On"}, {"value": False, "text": "Off"}
+    if NEGATIVE.search(name):
+        on |= {"text": label, "shape": "cross", "colour": "red"}
+        off |= {"text": f"No {label.lower()}", "shape": "circle", "colour": "white"}
+    else:
+        on |= {"shape": "circle"}
+        off |= {"shape": "cross", "colour": "white"}
+    keys["states"] = [on, off]
+    return Entry(kind="indicator", name=name, page=page, keys={**keys, "span": 3})
+
+
+def _joints(
+    topic: Topic, label: str, page: str, about: Mapping[str, Any], sample: Any
+) -> Iterator[Entry]:
+    names = [] if sample is None else list(sample.name)[:MAX_JOINTS]
+    positions = [] if sample is None else list(sample.position)
+    joints = [_joint(name, at) for name, at in zip(names, positions, strict=False) if name]
+    if joints and len({one["name"] for one in joints}) == len(joints):
+        keys = {"label": label, **about, "joint": joints, "span": 6}
+        yield Entry(
+            kind="joints",
+            name=topic.name,
+            page=page,
+            keys=keys,
+            comment='Give each joint its own limits: see its data sheet. Linear axes have unit = "mm".',
+        )
+
+
+def _joint(name: str, position: float) -> dict[str, Any]:
+    turns = max(1, ceil(abs(position) / pi)) if abs(position) < 100 else 1
+    end = round(degrees(pi)) * turns
+    return {"name": name, "label": label_of(name), "min": -end, "max": end}
+
+
+def _diagnostics(topic: Topic, label: str, about: Mapping[str, Any]) -> Entry:
+    levels = (
+        ("OK", "OK", "circle", ""),
+        ("WARN", "Warning", "triangle", "yellow"),
+        ("ERROR", "Error", "cross", "red"),
+        ("STALE", "Stale", "bar", "yellow"),
+    )
+    states = [
+        {"value": value, "text": text, "shape": shape, **({"colour": colour} if colour else {})}
+        for value, text, shape, colour in levels
+    ]
+    keys = {
+        "label": label,
+        **about,
+        "field": "status",
+        "key": "name",
+        "sort": {"first": "largest", "by": "level"},
+        "rows_shown": 5,
+        "column": [
+            {"label": "Level", "field": "level", "width": 2, "states": states},
+            {"label": "Part", "field": "name", "width": 3},
+            {"label": "Message", "field": "message", "width": 4},
+        ],
+    }
+    return Entry(
+        kind="table", name=topic.name, page=NODES_PAGE, keys=keys, comment="The worst parts come first."
+    )

@@ -1,0 +1,156 @@
+"""A draft of a panel from a robot's graph: what is shown on which page, and what acts on it."""
+
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Final
+
+from app.errors import InterfaceError
+from app.graph.model import Server, Topic
+from app.graph.node_services import NodeParameter
+from app.interfaces import Interfaces
+from app.scaffold import controls
+from app.scaffold.displays import JOINTS, NODES_PAGE, displays
+from app.scaffold.entry import Draft, Entry, InterlockCandidate
+from app.scaffold.naming import GENERAL, NEGATIVE, id_of, permits
+
+BOOL: Final = "std_msgs/msg/Bool"
+LEFT_OUT: Final = frozenset(
+    ("/parameter_events", "/clock", "/tf", "/tf_static", "/robot_description", "/diagnostics_agg")
+)
+MOST_PENS: Final = 4
+MOST_PAGES: Final = 8
+TREND_KEYS: Final = ("topic", "type", "qos", "field", "label", "unit", "scale", "format")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Known:
+    """What was read of a robot: names without the panel's namespace. `samples` is a message of a topic,
+    by its name, where one came. `unasked` are nodes whose parameters can't be read."""
+
+    topics: Sequence[Topic] = ()
+    services: Sequence[Server] = ()
+    actions: Sequence[Server] = ()
+    parameters: Sequence[NodeParameter] = ()
+    samples: Mapping[str, Any] = field(default_factory=dict)
+    unasked: Sequence[str] = ()
+
+
+def shown(topics: Iterable[Topic]) -> Iterator[Topic]:
+    """The topics that a panel may have: not ROS's own, not hidden ones, none that is held back."""
+    for topic in topics:
+        if topic.name not in LEFT_OUT and "/_" not in topic.name and topic.announced:
+            yield topic
+
+
+def make_draft(known: Known, interfaces: Interfaces, base: Draft) -> Draft:
+    """`base` with pages, interlock candidates and remarks."""
+    interlocks = list(_interlocks(known.topics))
+    entries: list[Entry] = []
+    remarks: list[str] = []
+    for topic in shown(known.topics):
+        try:
+            _check(topic, interfaces)
+            found = _of_topic(topic, interfaces, known.samples.get(topic.name))
+        except InterfaceError as error:
+            remarks.append(f"{topic.name}: {error}")
+            continue
+        entries += found
+        if not found:
+            remarks.append(_why_not(topic))
+    for server in (*known.services, *known.actions):
+        entries += _of_server(server, interfaces, remarks)
+    for one in known.parameters:
+        entries += controls.parameter(one)
+    remarks += [f"parameters of {node}: {CYCLONE_ONLY}" for node in known.unasked]
+    return replace(base, interlocks=interlocks, pages=_pages(entries), remarks=remarks)
+
+
+CYCLONE_ONLY: Final = "the bridge reaches services on Cyclone DDS only (RMW_IMPLEMENTATION)"
+
+
+def _check(topic: Topic, interfaces: Interfaces) -> None:
+    if len(topic.types) > 1:
+        raise InterfaceError(f"it has several types: {', '.join(topic.types)}")
+    interfaces.require(topic.type)
+
+
+def _of_topic(topic: Topic, interfaces: Interfaces, sample: Any) -> list[Entry]:
+    if topic.publishers:
+        return list(displays(topic, interfaces, sample))
+    return list(controls.publishers(topic, interfaces))
+
+
+def _why_not(topic: Topic) -> str:
+    if topic.type == JOINTS:
+        return f"{topic.name}: no message came that names its joints"
+    return f"{topic.name} ({topic.type})"
+
+
+def _of_server(server: Server, interfaces: Interfaces, remarks: list[str]) -> list[Entry]:
+    make = controls.goals if "/action/" in server.type else controls.calls
+    try:
+        found = list(make(server, interfaces))
+    except InterfaceError as error:
+        remarks.append(f"{server.name}: {error}")
+        return []
+    if not server.can_be_called and found:
+        remarks.append(f"{server.name} ({server.type}), on {server.dds}: {CYCLONE_ONLY}")
+        return []
+    if not found and not server.type.startswith(controls.OF_EVERY_NODE):
+        remarks.append(f"{server.name} ({server.type}): give its request")
+    return found
+
+
+def _interlocks(topics: Iterable[Topic]) -> Iterator[InterlockCandidate]:
+    """Bools that look like permissions: those of a telling name first, of these the latched ones."""
+    candidates = [
+        topic
+        for topic in shown(topics)
+        if topic.publishers and topic.types == (BOOL,) and topic.reliable and _may_permit(topic)
+    ]
+    taken: set[str] = set()
+    by_name = sorted(candidates, key=lambda one: (not permits(one.name), not one.latched, one.name))
+    for topic in by_name:
+        own_id = id_of(topic.name, taken)
+        taken.add(own_id)
+        yield InterlockCandidate(id=own_id, topic=topic.name, type=topic.type, kept=topic.latched)
+
+
+def _may_permit(topic: Topic) -> bool:
+    """A latched bool is a state that others go by. Of one that tells of a fault, true permits
+    nothing."""
+    return permits(topic.name) or (topic.latched and not NEGATIVE.search(topic.name))
+
+
+def _pages(entries: Sequence[Entry]) -> dict[str, list[Entry]]:
+    """Page → widgets, displays first, then their trend, then controls. Pages of one widget, and those
+    beyond `MOST_PAGES`, are put together."""
+    sizes = Counter(one.page for one in entries)
+    kept = {page for page, count in sizes.most_common(MOST_PAGES) if count > 1} | {NODES_PAGE}
+    found: defaultdict[str, list[Entry]] = defaultdict(list)
+    for one in entries:
+        found[one.page if one.page in kept else GENERAL].append(one)
+    ordered = sorted(found, key=lambda page: (page == NODES_PAGE, page))
+    return {page: _ordered(found[page], page) for page in ordered} or {GENERAL: []}
+
+
+ORDER: Final = ("indicator", "gauge", "readout", "joints", "camera", "table", "log")
+
+
+def _ordered(entries: Sequence[Entry], page: str) -> list[Entry]:
+    shown = [one for one in entries if not one.control]
+    shown.sort(key=lambda one: (ORDER.index(one.kind), one.name))
+    acting = sorted((one for one in entries if one.control), key=lambda one: (one.kind, one.name))
+    return [*shown, *_trend(shown, page), *acting]
+
+
+def _trend(entries: Sequence[Entry], page: str) -> Iterator[Entry]:
+    """A trend of the gauges that have the unit of the first."""
+    gauges = [one for one in entries if one.kind == "gauge"]
+    same = [one for one in gauges if one.keys.get("unit") == gauges[0].keys.get("unit")]
+    pens = [{k: one.keys[k] for k in TREND_KEYS if k in one.keys} for one in same[:MOST_PENS]]
+    if pens:
+        keys = {"label": "Trend", "window": "5m", "keep": "8h", "pen": pens, "span": 12}
+        comment = "Its history is kept in memory; disk = true keeps it over a restart."
+        yield Entry(kind="trend", name=f"{page}/trend", page=page, keys=keys, comment=comment)

@@ -1,0 +1,150 @@
+"""Which fields of the usual types are worth showing, with units and ranges."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from math import floor, isfinite, log10
+from typing import Final
+
+from app.interfaces import STRING_TYPES, Interfaces
+from app.interfaces.definitions import FLOAT_TYPES, INTEGER_RANGES
+from app.simulator.values.guesses import NAMES
+
+NUMBERS: Final = frozenset((*FLOAT_TYPES, *INTEGER_RANGES))
+MOST_FIELDS: Final = 4
+UNKNOWN_RANGE: Final = (0.0, 100.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shown:
+    """A field that is shown. Without a range (`low`, `high`, after `scale`) it is no gauge."""
+
+    field: str
+    kind: str  # a base type
+    word: str = ""  # behind the topic's label
+    unit: str = ""
+    scale: float = 1.0
+    format: str = ""
+    low: float | None = None
+    high: float | None = None
+
+
+def _number(
+    field: str,
+    unit: str,
+    low: float | None = None,
+    high: float | None = None,
+    *,
+    format: str = ".1f",
+    scale: float = 1.0,
+    word: str = "",
+) -> Shown:
+    return Shown(
+        field=field,
+        kind="float64",
+        word=word,
+        unit=unit,
+        scale=scale,
+        format=format,
+        low=low,
+        high=high,
+    )
+
+
+_SPEED = ("m/s", -2.0, 2.0)
+_TURN = ("rad/s", -2.0, 2.0)
+KNOWN: Final[Mapping[str, tuple[Shown, ...]]] = {
+    "sensor_msgs/msg/Temperature": (_number("temperature", "°C", 0, 100),),
+    "sensor_msgs/msg/FluidPressure": (
+        _number("fluid_pressure", "bar", 0, 10, scale=0.00001, format=".2f"),
+    ),
+    "sensor_msgs/msg/RelativeHumidity": (_number("relative_humidity", "%", 0, 100, scale=100.0),),
+    "sensor_msgs/msg/Illuminance": (_number("illuminance", "lx", 0, 1000, format=".0f"),),
+    "sensor_msgs/msg/Range": (_number("range", "m", 0, 5, format=".2f"),),
+    "sensor_msgs/msg/BatteryState": (
+        _number("percentage", "%", 0, 100, scale=100.0, format=".0f", word="charge"),
+        _number("voltage", "V", word="voltage"),
+        _number("current", "A", word="current"),
+    ),
+    "sensor_msgs/msg/NavSatFix": (
+        _number("latitude", "°", format=".6f", word="latitude"),
+        _number("longitude", "°", format=".6f", word="longitude"),
+    ),
+    "sensor_msgs/msg/Imu": (
+        _number("linear_acceleration.z", "m/s²", format=".2f", word="acceleration z"),
+        _number("angular_velocity.z", "rad/s", format=".2f", word="turn rate"),
+    ),
+    "geometry_msgs/msg/Twist": (
+        _number("linear.x", *_SPEED, format=".2f", word="forward"),
+        _number("angular.z", *_TURN, format=".2f", word="turn"),
+    ),
+    "geometry_msgs/msg/TwistStamped": (
+        _number("twist.linear.x", *_SPEED, format=".2f", word="forward"),
+        _number("twist.angular.z", *_TURN, format=".2f", word="turn"),
+    ),
+    "nav_msgs/msg/Odometry": (
+        _number("pose.pose.position.x", "m", format=".2f", word="x"),
+        _number("pose.pose.position.y", "m", format=".2f", word="y"),
+        _number("twist.twist.linear.x", *_SPEED, format=".2f", word="forward"),
+    ),
+    "geometry_msgs/msg/PoseStamped": (
+        _number("pose.position.x", "m", format=".3f", word="x"),
+        _number("pose.position.y", "m", format=".3f", word="y"),
+        _number("pose.position.z", "m", format=".3f", word="z"),
+    ),
+    "geometry_msgs/msg/PointStamped": (
+        _number("point.x", "m", format=".3f", word="x"),
+        _number("point.y", "m", format=".3f", word="y"),
+        _number("point.z", "m", format=".3f", word="z"),
+    ),
+    "geometry_msgs/msg/WrenchStamped": (
+        _number("wrench.force.x", "N", -200, 200, word="force x"),
+        _number("wrench.force.y", "N", -200, 200, word="force y"),
+        _number("wrench.force.z", "N", -200, 200, word="force z"),
+    ),
+}
+
+
+def shown_fields(type_name: str, interfaces: Interfaces) -> Iterator[Shown]:
+    """The fields of a type that are worth showing: the usual ones, else its first plain ones."""
+    if type_name in KNOWN:
+        yield from KNOWN[type_name]
+        return
+    plain = [
+        one
+        for one in interfaces.structures[type_name].fields
+        if not one.type.is_nested and one.type.container == "one" and one.type.name != "wstring"
+    ]
+    for one in plain[:MOST_FIELDS]:
+        word = "" if one.name == "data" and len(plain) == 1 else one.name.replace("_", " ")
+        number = one.type.name in NUMBERS
+        text = ".2f" if one.type.name in FLOAT_TYPES else ""
+        yield Shown(field=one.name, kind="float64" if number else one.type.name, word=word, format=text)
+
+
+def is_text(kind: str) -> bool:
+    return kind in STRING_TYPES
+
+
+def range_for(shown: Shown, names: tuple[str, ...], value: float | None) -> tuple[float, float]:
+    """The ends of a gauge's scale: the usual ones of the type, else by a word in the name, wide enough
+    for the value that was seen."""
+    low, high = shown.low, shown.high
+    if low is None or high is None:
+        by_name = (span for name in names for words, span in NAMES if words.search(name))
+        span = next((s for s in by_name if s.high > s.low), None)
+        low, high = (span.low, span.high) if span else UNKNOWN_RANGE
+        low = min(0.0, _round_away(low))
+        high = max(0.0, _round_away(high))
+    if value is not None and isfinite(value):
+        low, high = min(low, _round_away(value)), max(high, _round_away(value))
+    return low, high
+
+
+def _round_away(value: float) -> float:
+    """The next of 1, 2, 5, 10, 20, … further from zero."""
+    if value == 0:
+        return 0.0
+    size = abs(value)
+    power = 10.0 ** floor(log10(size))
+    step = next(step for step in (1, 2, 5, 10) if step * power >= size * (1 - 1e-9))
+    return (step * power) if value > 0 else -(step * power)

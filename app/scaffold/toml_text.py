@@ -1,0 +1,125 @@
+"""A draft as the text of a panel file, with comments for those who write their first one."""
+
+import json
+import textwrap
+from collections.abc import Iterator, Mapping
+from typing import Any, Final
+
+from app.printable import printable
+from app.scaffold.entry import Draft, Entry
+from app.scaffold.naming import id_of, label_of
+
+WIDTH: Final = 100
+CHECK: Final = "operator-panel check"
+
+
+def toml_text(draft: Draft, controls: bool = False) -> str:
+    """The file. `controls`: keys that act on the robot are live, each behind the first interlock."""
+    lines = [*_head(draft), *_interlocks(draft)]
+    taken: set[str] = set()
+    for page, entries in draft.pages.items():
+        lines += _page(page, taken)
+        for entry in entries:
+            live = not entry.control or (controls and bool(draft.interlocks))
+            lines += _widget(entry, id_of(entry.name, taken), draft, live, taken)
+    if draft.remarks:
+        lines += ["", *_comment("Not on the panel:"), *(f"# - {one}" for one in draft.remarks)]
+    return "\n".join(printable(line) for line in lines) + "\n"
+
+
+def _head(draft: Draft) -> Iterator[str]:
+    yield from _comment(
+        "A first panel, made from what is on the robot now. Delete what you do not need, and give"
+        f" labels, units and limits of your own. `{CHECK} FILE` names every mistake with its line."
+    )
+    yield ""
+    yield f"title = {_value(draft.title)}"
+    yield 'mode = "live"'
+    yield f"distro = {_value(draft.distro)}  # of the robot's ROS 2"
+    if draft.interfaces:
+        yield f"interfaces = {_value(list(draft.interfaces))}  # packages with the robot's own types"
+    if draft.namespace and not draft.robots:
+        yield f"namespace = {_value(draft.namespace)}  # it stands before each name below"
+    for robot in draft.robots:
+        yield ""
+        yield "[[robot]]"
+        yield from (f"{key} = {_value(one)}" for key, one in robot.items())
+
+
+def _interlocks(draft: Draft) -> Iterator[str]:
+    if not draft.interlocks:
+        yield ""
+        yield from _comment(
+            "No topic was found that looks like a permission of the robot. A control needs one: a topic"
+            " with a bool that is true while the robot permits it."
+        )
+        yield from ("#", "# [[interlock]]", '# id = "operation"', '# topic = "/operation_enabled"')
+        yield from ('# type = "std_msgs/msg/Bool"', "# max_age_s = 2.0")
+        return
+    yield ""
+    yield from _comment(
+        "Topics that look like permissions, by their names and QoS. Check what each of them means"
+        " before a control depends on it. A control is locked while its interlock is not true, is"
+        " unknown, or the robot is cut off."
+    )
+    for one in draft.interlocks:
+        yield "[[interlock]]"
+        yield f"id = {_value(one.id)}"
+        yield f"label = {_value(label_of(one.topic).lower())}"
+        yield f"topic = {_value(one.topic)}"
+        yield f"type = {_value(one.type)}"
+        if one.kept:
+            yield "require_publisher = true  # locks when its publisher is gone"
+        else:
+            yield "max_age_s = 2.0  # locks when it is not heard for so long"
+        yield ""
+
+
+def _page(page: str, taken: set[str]) -> Iterator[str]:
+    yield ""
+    yield "[[page]]"
+    yield f"id = {_value(id_of(page, ()))}"
+    yield f"title = {_value(label_of(page))}"
+
+
+def _widget(entry: Entry, own_id: str, draft: Draft, live: bool, taken: set[str]) -> Iterator[str]:
+    taken.add(own_id)
+    yield ""
+    if entry.comment:
+        yield from _comment(entry.comment)
+    if not live:
+        yield from _comment("It acts on the robot. Uncomment it when you know what it does.")
+    body = ["[[page.widget]]", f"id = {_value(own_id)}", f"kind = {_value(entry.kind)}"]
+    for key, value in entry.keys.items():
+        body += _key(key, value)
+    if entry.control and draft.interlocks:
+        body.append(f"interlock = {_value(draft.interlocks[0].id)}")
+    elif entry.control:
+        body.append('# interlock = "…": it needs one')
+    yield from body if live else (f"# {line}" for line in body)
+
+
+def _key(key: str, value: Any) -> Iterator[str]:
+    if isinstance(value, list) and value and isinstance(value[0], Mapping):
+        yield f"{key} = ["
+        yield from (f"  {_value(one)}," for one in value)
+        yield "]"
+    else:
+        yield f"{key} = {_value(value)}"
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int | float):
+        return repr(value)
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, Mapping):
+        inner = ", ".join(f"{key} = {_value(one)}" for key, one in value.items())
+        return f"{{ {inner} }}" if inner else "{}"
+    return f"[{', '.join(map(_value, value))}]"
+
+
+def _comment(text: str) -> list[str]:
+    return [f"# {line}" for line in textwrap.wrap(printable(text), WIDTH)]
