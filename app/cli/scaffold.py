@@ -63,8 +63,8 @@ async def _scaffold(given: Any) -> int:
     draft = make_draft(known, interfaces, _base(given, place, graph, robot, below, target))
     if given.controls and not draft.interlocks:
         raise ScaffoldError(
-            "no topic looks like a permission of the robot, so no control is made live: leave --controls"
-            " out, and give the controls an interlock of your own"
+            "no topic looks like a permission of the robot, so no control is made live: leave"
+            " --controls out, and give the controls an interlock of your own"
         )
     text = toml_text(draft, given.controls)
     if target is None:

@@ -1,6 +1,6 @@
 """The widgets that act on the robot: keys for topics, services and actions, and parameters."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from typing import Any, Final
 
 from app.graph.model import Server, Topic
@@ -68,7 +68,7 @@ def calls(service: Server, interfaces: Interfaces) -> Iterator[Entry]:
                 **about,
                 "request": {fields[0].name: value},
             }
-            yield _control("call", f"{service.name}/{word}", service.nodes, labelled)
+            yield _control("call", service.name, service.nodes, labelled, id_word=word)
 
 
 def goals(action: Server, interfaces: Interfaces) -> Iterator[Entry]:
@@ -87,7 +87,7 @@ def parameter(of: NodeParameter) -> Iterator[Entry]:
     hidden = of.name.startswith("qos_overrides.") or of.name == "use_sim_time"
     if kind not in PARAMETER_TYPES or of.read_only or hidden:
         return
-    keys: dict[str, Any] = {
+    labelled: dict[str, Any] = {
         "label": label_of("/" + of.name.replace(".", "/")),
         "node": of.node,
         "parameter": of.name,
@@ -95,7 +95,7 @@ def parameter(of: NodeParameter) -> Iterator[Entry]:
         "span": 6,
     }
     comment = " ".join(f"Now {of.value!r}. {of.description}".split()) if of.value is not None else ""
-    yield _control("parameter", f"{of.node}/{of.name}", (of.node,), keys, comment)
+    yield _control("parameter", f"{of.node}/{of.name}", (of.node,), labelled, comment)
 
 
 def _role(name: str) -> Mapping[str, str]:
@@ -103,6 +103,14 @@ def _role(name: str) -> Mapping[str, str]:
     return next(({"role": ROLES[word]} for word in last if word in ROLES), {})
 
 
-def _control(kind: str, name: str, nodes: Any, keys: Mapping[str, Any], comment: str = "") -> Entry:
-    page = page_of(name if kind != "parameter" else nodes[0] + "/x", nodes)
-    return Entry(kind=kind, name=name, keys=keys, comment=comment, control=True, page=page)
+def _control(
+    kind: str,
+    name: str,
+    nodes: Collection[str],
+    keys: Mapping[str, Any],
+    comment: str = "",
+    id_word: str = "",
+) -> Entry:
+    own_name = f"{name}/{id_word}" if id_word else name
+    page = page_of(name, nodes)
+    return Entry(kind=kind, name=own_name, keys=keys, comment=comment, control=True, page=page)

@@ -69,8 +69,12 @@ def _field(topic: Topic, page: str, about: Mapping[str, Any], shown: Shown, valu
     seen = float(value) * shown.scale if isinstance(value, int | float) else None
     low, high = range_for(shown, (shown.field, topic.name), seen)
     comment = "" if shown.low is not None else "The ends of the scale are a guess."
-    keys |= {"min": low, "max": high, "span": 3}
+    keys |= {"min": _whole(low), "max": _whole(high), "span": 3}
     return Entry(kind="gauge", name=name, page=page, keys=keys, comment=comment)
+
+
+def _whole(value: float) -> float:
+    return int(value) if float(value).is_integer() else value
 
 
 def _lamp(name: str, page: str, keys: dict[str, Any], label: str) -> Entry:

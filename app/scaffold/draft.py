@@ -135,20 +135,25 @@ def _pages(entries: Sequence[Entry]) -> dict[str, list[Entry]]:
     return {page: _ordered(found[page], page) for page in ordered} or {GENERAL: []}
 
 
+CONTROLS_ONLY: Final = "The controls of this page are in the panel file, commented out"
 ORDER: Final = ("indicator", "gauge", "readout", "joints", "camera", "table", "log")
 
 
 def _ordered(entries: Sequence[Entry], page: str) -> list[Entry]:
     shown = [one for one in entries if not one.control]
     shown.sort(key=lambda one: (ORDER.index(one.kind), one.name))
+    if not shown:
+        keys = {"label": CONTROLS_ONLY, "size": "small", "span": 12}
+        shown = [Entry(kind="label", name=f"{page}/note", page=page, keys=keys)]
     acting = sorted((one for one in entries if one.control), key=lambda one: (one.kind, one.name))
     return [*shown, *_trend(shown, page), *acting]
 
 
 def _trend(entries: Sequence[Entry], page: str) -> Iterator[Entry]:
-    """A trend of the gauges that have the unit of the first."""
+    """A trend of the gauges of the unit that most of them have."""
     gauges = [one for one in entries if one.kind == "gauge"]
-    same = [one for one in gauges if one.keys.get("unit") == gauges[0].keys.get("unit")]
+    units = Counter(one.keys.get("unit", "") for one in gauges)
+    same = [one for one in gauges if one.keys.get("unit", "") == max(units, key=units.__getitem__)]
     pens = [{k: one.keys[k] for k in TREND_KEYS if k in one.keys} for one in same[:MOST_PENS]]
     if pens:
         keys = {"label": "Trend", "window": "5m", "keep": "8h", "pen": pens, "span": 12}
