@@ -63,6 +63,7 @@ SPEAK_ZENOH = {
 OF_THE_BRIDGE = ("app.dialect.bridge_", "app.transport.bridge_")
 WIRE_THE_BRIDGE = {
     "app.cli.robot_link",
+    "app.cli.scaffold",
     "app.cli.topic_reader",
     "app.runtime.robot_session",
     "app.simulator.zenoh_peer",

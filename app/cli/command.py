@@ -3,6 +3,7 @@
 import sys
 from argparse import ArgumentTypeError, RawDescriptionHelpFormatter
 from collections.abc import Callable, Sequence
+from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from typing import NoReturn
 
@@ -54,7 +55,9 @@ def _command(name: str) -> Command:
         case "scaffold":
             from app.cli.scaffold import main
         case "completion":
-            from app.cli.completion import main
+            from app.cli.completion import print_completion
+
+            return partial(print_completion, COMMANDS, _parser())
         case _:
             from app.cli.simulate import main
     return main

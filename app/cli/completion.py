@@ -7,7 +7,7 @@ starting Python, and only the names of topics ask the robot. Source of the synta
 
 import argparse
 import shlex
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from importlib import import_module
 from typing import Final
 
@@ -20,20 +20,23 @@ TOPIC: Final = "TOPIC"  # the argument of the commands whose argument is a topic
 TOPICS: Final = f"{APP} topics --wait 1 2>/dev/null"
 
 
-def main(arguments: Sequence[str], prog: str = PROG) -> int:
+Parsers = Sequence[tuple[str, str, argparse.ArgumentParser]]  # (command, what it does, its parser)
+
+
+def print_completion(
+    commands: Mapping[str, str],
+    program: argparse.ArgumentParser,
+    arguments: Sequence[str],
+    prog: str = PROG,
+) -> int:
+    """Prints the completion of these commands; `program` has the options before any command."""
     shell = _parser(prog).parse_args(arguments).shell
-    print(_fish() if shell == "fish" else _bash(with_zsh=shell == "zsh"))
+    parsers = [
+        (name, text, import_module(f"app.cli.{name.replace('-', '_')}")._parser(f"{APP} {name}"))
+        for name, text in commands.items()
+    ]
+    print(_fish(parsers, program) if shell == "fish" else _bash(parsers, program, shell == "zsh"))
     return 0
-
-
-def _parsers() -> Iterator[tuple[str, str, argparse.ArgumentParser]]:
-    """(command, what it does, its parser); of a command's commands the outer parser."""
-    from app.cli.command import COMMANDS, _parser
-
-    for name, text in COMMANDS.items():
-        module = import_module(f"app.cli.{name.replace('-', '_')}")
-        yield name, text, module._parser(f"{APP} {name}")
-    yield "", "", _parser()
 
 
 def _words(parser: argparse.ArgumentParser) -> list[str]:
@@ -56,27 +59,27 @@ def _has_topic(parser: argparse.ArgumentParser) -> bool:
     return any(action.metavar == TOPIC for action in parser._actions)
 
 
-def _bash(with_zsh: bool) -> str:
+def _bash(parsers: Parsers, program: argparse.ArgumentParser, with_zsh: bool) -> str:
+    first = [*(name for name, _, _ in parsers), *_words(program)]
     lines = ["autoload -U +X bashcompinit && bashcompinit"] if with_zsh else []
     lines += [
         "_operator_panel() {",
         "  local current=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD-1]} words=",
         "  COMPREPLY=()",
         "  if [ $COMP_CWORD -eq 1 ]; then",
-        f"    words={shlex.quote(' '.join(_top_words()))}",
+        f"    words={shlex.quote(' '.join(first))}",
         "  else",
         "    case ${COMP_WORDS[1]}:$before in",
     ]
-    for name, _, parser in _parsers():
-        for options, values in _choices(parser) if name else ():
+    for name, _, parser in parsers:
+        for options, values in _choices(parser):
             cases = "|".join(f"{name}:{option}" for option in options)
             lines.append(f"      {cases}) words={shlex.quote(' '.join(values))} ;;")
     lines += ["    esac", '    if [ -z "$words" ]; then', "    case ${COMP_WORDS[1]}:$current in"]
-    for name, _, parser in _parsers():
-        if name and _has_topic(parser):
+    for name, _, parser in parsers:
+        if _has_topic(parser):
             lines.append(f"      {name}:/*) words=$({TOPICS}) ;;")
-        if name:
-            lines.append(f"      {name}:*) words={shlex.quote(' '.join(_words(parser)))} ;;")
+        lines.append(f"      {name}:*) words={shlex.quote(' '.join(_words(parser)))} ;;")
     lines += [
         "    esac",
         "    fi",
@@ -88,28 +91,20 @@ def _bash(with_zsh: bool) -> str:
     return "\n".join(lines)
 
 
-def _top_words() -> list[str]:
-    named = list(_parsers())
-    return [name for name, _, _ in named if name] + _words(named[-1][2])
-
-
-def _fish() -> str:
-    lines = []
-    for name, text, parser in _parsers():
-        if name:
-            is_first = f"complete -c {APP} -n __fish_use_subcommand"
-            lines.append(f"{is_first} -f -a {name} -d {shlex.quote(text)}")
-        seen = f"complete -c {APP}" + (
-            f" -n '__fish_seen_subcommand_from {name}'" if name else " -n __fish_use_subcommand"
-        )
-        if name and _has_topic(parser):
+def _fish(parsers: Parsers, program: argparse.ArgumentParser) -> str:
+    first = f"complete -c {APP} -n __fish_use_subcommand"
+    lines = [f"{first} {_fish_option(action)}" for action in program._actions if action.option_strings]
+    for name, text, parser in parsers:
+        lines.append(f"{first} -f -a {name} -d {shlex.quote(text)}")
+        seen = f"complete -c {APP} -n '__fish_seen_subcommand_from {name}'"
+        if _has_topic(parser):
             lines.append(f"{seen} -f -a {shlex.quote(f'({TOPICS})')}")
         lines += [f"{seen} {_fish_option(action)}" for action in parser._actions if _is_shown(action)]
     return "\n".join(lines)
 
 
 def _is_shown(action: argparse.Action) -> bool:
-    return bool(action.option_strings or (action.choices is not None and action.metavar != "COMMAND"))
+    return bool(action.option_strings) or action.choices is not None
 
 
 def _fish_option(action: argparse.Action) -> str:

@@ -20,6 +20,8 @@ def toml_text(draft: Draft, controls: bool = False) -> str:
     for page, entries in draft.pages.items():
         lines += _page(page, taken)
         for entry in entries:
+            if controls and entry.kind == "label":
+                continue  # it says that they are commented out
             live = not entry.control or (controls and bool(draft.interlocks))
             lines += _widget(entry, id_of(entry.name, taken), draft, live, taken)
     if draft.remarks:

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from importlib import import_module
 from importlib.metadata import PackageNotFoundError
 
 import pytest
@@ -60,10 +61,10 @@ def test_no_command_is_help_and_an_error(capsys: pytest.CaptureFixture[str]) -> 
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (["rnu"], '"rnu" is not a command: there is run, check, log, simulate, topics, echo'),
+        (["rnu"], '"rnu" is not a command: there is run, check, log, simulate, topics'),
         (["cell1.toml"], "did you mean operator-panel run cell1.toml?"),
         (["--verison"], "--verison is not an option"),
-        (["--"], "the command is missing: there is run, check, log, simulate, topics, echo"),
+        (["--"], "the command is missing: there is run, check, log, simulate, topics"),
         (["log", "veryfy"], "argument COMMAND: invalid choice: 'veryfy'"),
         (["log"], "the following arguments are required: COMMAND"),
         (["check", "--verbos"], "--verbos is not an option of this command: did you mean --verbose?"),
@@ -96,6 +97,12 @@ def test_it_tells_its_version(
         main(["--version"])
     shown = "1.2.3" if installed else "(a checkout, not installed)"
     assert capsys.readouterr().out == f"operator-panel {shown}\n"
+
+
+def test_every_command_is_a_module_with_a_parser() -> None:
+    for name in COMMANDS:
+        module = import_module(f"app.cli.{name.replace('-', '_')}")
+        assert module._parser("x").prog == "x"
 
 
 def test_to_check_a_panel_takes_no_server() -> None:

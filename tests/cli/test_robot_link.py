@@ -1,0 +1,141 @@
+"""How commands find a robot and a topic, and how often a topic is published."""
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from app.cli.hz import Rate
+from app.cli.robot_link import Place, add_options, place_of, topic_named
+from app.cli.topic_reader import TopicReader
+from app.errors import LinkError, PanelError
+from app.graph.model import Bridge, EndpointQos, RobotGraph, RosGraph, Topic, TopicEndpoint
+
+BOOL = "std_msgs/msg/Bool"
+
+
+def topic(name: str, *types: str, **more: Any) -> Topic:
+    publishers = [TopicEndpoint(type=one, qos=EndpointQos(), bridge="a") for one in types or (BOOL,)]
+    return Topic(name=name, key=name[1:], publishers=tuple(publishers), **more)
+
+
+def graph_of(*robots: tuple[str, Sequence[Topic]]) -> RosGraph:
+    return RosGraph(
+        robots=tuple(
+            RobotGraph(
+                namespace=namespace,
+                bridges=(Bridge(zid=namespace or "a", version="v1", config={"namespace": namespace}),),
+                topics=tuple(topics),
+            )
+            for namespace, topics in robots
+        )
+    )
+
+
+ONE = graph_of(("", [topic("/arm/enabled"), topic("/speed"), topic("/arm2/enabled")]))
+TWO = graph_of(("/r1", [topic("/speed")]), ("/r2", [topic("/speed"), topic("/load")]))
+
+
+@pytest.mark.parametrize(
+    ("graph", "below", "given", "robot", "name"),
+    [
+        (ONE, "", "/speed", "", "/speed"),
+        (ONE, "", "speed", "", "/speed"),
+        (ONE, "/arm", "/enabled", "", "/arm/enabled"),
+        (TWO, "", "/r2/speed", "/r2", "/speed"),
+        (TWO, "/r1", "/speed", "/r1", "/speed"),
+    ],
+)
+def test_a_topic_is_found_by_its_name(
+    graph: RosGraph, below: str, given: str, robot: str, name: str
+) -> None:
+    found, one = topic_named(graph, below, given)
+    assert (found.namespace, one.name) == (robot, name)
+
+
+@pytest.mark.parametrize(
+    ("graph", "below", "given", "sentence"),
+    [
+        (ONE, "", "/sped", "no topic /sped is there: did you mean /speed?"),
+        (ONE, "", "/enabled", "did you mean /arm/enabled or /arm2/enabled?"),
+        (ONE, "", "/zzz", "no topic /zzz is there: `operator-panel topics` lists them"),
+        (TWO, "", "/load", "did you mean /r2/load?"),
+        (TWO, "/r3", "/load", "there are no topics below /r3: the bridges have /r1, /r2"),
+        (ONE, "/r3", "/load", "there are no topics below /r3: no bridge has a namespace"),
+    ],
+)
+def test_a_topic_that_is_not_there_is_a_sentence(
+    graph: RosGraph, below: str, given: str, sentence: str
+) -> None:
+    with pytest.raises(LinkError) as caught:
+        topic_named(graph, below, given)
+    assert sentence in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("of", "type_name", "sentence"),
+    [
+        (topic("/x", announced=False), "", "the bridge does not pass /x on: see `allow` and `deny`"),
+        (topic("/x"), "std_msgs/msg/String", "/x is std_msgs/msg/Bool on the robot, not std_msgs"),
+        (
+            topic("/x", BOOL, "a/msg/B"),
+            "",
+            "/x has several types, name one: std_msgs/msg/Bool, a/msg/B",
+        ),
+    ],
+)
+def test_a_topic_that_can_not_be_read_is_a_sentence(of: Topic, type_name: str, sentence: str) -> None:
+    observer: Any = None
+    place = Place(zenoh=Path("zenoh.json5"))
+    with pytest.raises(LinkError) as caught:
+        TopicReader.find(observer, graph_of(("", [of])), place, "/x", type_name)
+    assert sentence in str(caught.value)
+
+
+def given(*words: str) -> Place:
+    parser = argparse.ArgumentParser()
+    add_options(parser)
+    return place_of(parser.parse_args(words))
+
+
+PANEL = 'title = "x"\ndistro = "humble"\nnamespace = "/r7"\n[[page]]\nid = "a"\ntitle = "A"\n'
+
+
+def test_a_panel_file_says_where_the_robot_is(tmp_path: Path) -> None:
+    path = tmp_path / "cell.toml"
+    path.write_text(PANEL)
+    found = given("--panel", str(path))
+    assert (found.namespace, found.distro, found.connect) == ("/r7", "humble", ())
+    robot = '[[robot]]\nid = "a"\nname = "A"\nnamespace = "/r9"\nconnect = ["tcp/r9:7447"]\n'
+    path.write_text(PANEL.replace('namespace = "/r7"\n', robot))
+    found = given("--panel", str(path), "--distro", "jazzy")
+    assert (found.namespace, found.distro, found.connect) == ("/r9", "jazzy", ("tcp/r9:7447",))
+    assert given("--panel", str(path), "--connect", "tcp/x:1").connect == ("tcp/x:1",)
+    with pytest.raises(PanelError):
+        given("--panel", str(tmp_path / "none.toml"))
+
+
+@pytest.mark.parametrize(
+    "words", [("--namespace", "a b"), ("--wait", "0"), ("--wait", "inf"), ("--wait", "x")]
+)
+def test_a_mistake_in_an_option_is_told(
+    words: Sequence[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit):
+        given(*words)
+    assert "is not a" in capsys.readouterr().err
+
+
+def test_a_namespace_may_be_given_with_or_without_its_slash() -> None:
+    assert given("--namespace", "robot1/").namespace == "/robot1"
+    assert given("--namespace", "/").namespace == ""
+
+
+def test_a_rate_is_that_of_the_window() -> None:
+    rate = Rate(window=3)
+    assert str(rate) == ""
+    for at in (0.0, 1.0, 1.5, 2.0):
+        rate.add(at)
+    assert str(rate) == ("average rate: 2.000\n\tmin: 0.500s max: 0.500s std dev: 0.00000s window: 3")

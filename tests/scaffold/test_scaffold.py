@@ -1,0 +1,300 @@
+"""A first panel from a robot's graph: what is shown, what is locked, and that it is a good panel."""
+
+import tomllib
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from app.graph.model import EndpointQos, Server, Topic, TopicEndpoint
+from app.graph.node_services import NodeParameter
+from app.interfaces import load_interfaces
+from app.panel import check_panel
+from app.scaffold.draft import Known, make_draft
+from app.scaffold.entry import Draft
+from app.scaffold.fields import Shown, range_for
+from app.scaffold.naming import id_of, label_of, page_of, permits
+from app.scaffold.toml_text import toml_text
+
+INTERFACES = load_interfaces("jazzy")
+BOOL = "std_msgs/msg/Bool"
+
+
+def endpoint(type_name: str, node: str, **qos: Any) -> TopicEndpoint:
+    reliable = qos.pop("reliable", True)
+    return TopicEndpoint(
+        type=type_name, qos=EndpointQos(reliable=reliable, **qos), bridge="a", nodes=(node,)
+    )
+
+
+def published(name: str, type_name: str, node: str = "/cell_io", **qos: Any) -> Topic:
+    return Topic(name=name, key=name[1:], publishers=(endpoint(type_name, node, **qos),))
+
+
+def heard(name: str, type_name: str, node: str = "/cell_io") -> Topic:
+    return Topic(name=name, key=name[1:], subscribers=(endpoint(type_name, node),))
+
+
+def server(name: str, type_name: str, dds: str = "Cyclone DDS") -> Server:
+    return Server(name=name, key=name[1:], type=type_name, bridge="a", nodes=("/plc",), dds=dds)
+
+
+def text_of(controls: bool = False, base: Draft | None = None, **known: Any) -> str:
+    return toml_text(
+        make_draft(Known(**known), INTERFACES, base or Draft(title="Cell")), controls=controls
+    )
+
+
+def widgets(text: str) -> dict[str, dict[str, Any]]:
+    pages = tomllib.loads(text)["page"]
+    return {one["id"]: one for page in pages for one in page.get("widget", ())}
+
+
+ENABLED = published("/operation_enabled", BOOL, transient_local=True)
+CELL: Mapping[str, Any] = {
+    "topics": [
+        ENABLED,
+        published("/estop_pressed", BOOL, transient_local=True),
+        published("/arm/guard_closed", BOOL, "/arm/io"),
+        published("/arm/joint_states", "sensor_msgs/msg/JointState", "/arm/driver"),
+        published("/arm/temperature", "sensor_msgs/msg/Temperature", "/arm/driver", reliable=False),
+        published("/speed", "std_msgs/msg/Float64"),
+        published("/mode", "std_msgs/msg/String"),
+        published("/odom", "nav_msgs/msg/Odometry"),
+        published("/camera/image_raw", "sensor_msgs/msg/Image"),
+        published("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray"),
+        published("/rosout", "rcl_interfaces/msg/Log", transient_local=True),
+        published("/parameter_events", "rcl_interfaces/msg/ParameterEvent"),
+        heard("/start", BOOL),
+        heard("/cmd_vel", "geometry_msgs/msg/Twist"),
+        heard("/pose", "geometry_msgs/msg/Pose"),
+        heard("/target", "std_msgs/msg/Float64"),
+    ],
+    "services": [
+        server("/reset", "std_srvs/srv/Trigger"),
+        server("/light", "std_srvs/srv/SetBool"),
+        server("/add", "example_interfaces/srv/AddTwoInts"),
+        server("/plc/get_parameters", "rcl_interfaces/srv/GetParameters"),
+        server("/old", "std_srvs/srv/Trigger", "Fast DDS"),
+    ],
+    "actions": [server("/count", "example_interfaces/action/Fibonacci")],
+    "parameters": [
+        NodeParameter(node="/plc", name="speed", type="double", value=0.5, min=0, max=2),
+        NodeParameter(node="/plc", name="serial", type="string", value="1", read_only=True),
+        NodeParameter(node="/plc", name="use_sim_time", type="bool", value=False),
+    ],
+    "samples": {
+        "/arm/joint_states": SimpleNamespace(name=["j1", "j2"], position=[0.5, -4.0]),
+        "/speed": SimpleNamespace(data=3.2),
+    },
+}
+
+
+@pytest.mark.parametrize("controls", [False, True])
+def test_what_is_made_is_a_good_panel(tmp_path: Path, controls: bool) -> None:
+    path = tmp_path / "cell.toml"
+    path.write_text(text_of(controls, **CELL))
+    assert bool(check_panel(path).panel.commands) is controls
+
+
+def test_a_robot_with_nothing_is_a_good_panel_too(tmp_path: Path) -> None:
+    path = tmp_path / "cell.toml"
+    path.write_text(text_of())
+    check_panel(path)
+
+
+def test_no_control_is_live_until_it_is_asked_for() -> None:
+    text = text_of(**CELL)
+    assert {one["kind"] for one in widgets(text).values()} <= {
+        "indicator",
+        "readout",
+        "gauge",
+        "joints",
+        "camera",
+        "table",
+        "log",
+        "trend",
+        "label",
+    }
+    for name in ("/start", "/reset", "/count", "/cmd_vel"):
+        assert f'"{name}"' in text
+        assert all(line.startswith("#") for line in text.splitlines() if f'"{name}"' in line)
+
+
+def test_each_live_control_has_the_interlock() -> None:
+    live = {
+        name: one
+        for name, one in widgets(text_of(controls=True, **CELL)).items()
+        if one["kind"] in ("publish", "joystick", "call", "action", "parameter")
+    }
+    assert set(live) == {
+        "start",
+        "cmd_vel",
+        "target",
+        "reset",
+        "light_on",
+        "light_off",
+        "count",
+        "plc_speed",
+    }
+    assert {one["interlock"] for one in live.values()} == {"operation_enabled"}
+
+
+def test_without_a_candidate_no_control_is_live() -> None:
+    text = text_of(controls=True, topics=[heard("/start", BOOL)])
+    assert 'topic = "/start"' in text
+    assert "start" not in widgets(text)
+    assert "No topic was found that looks like a permission" in text
+
+
+def test_interlock_candidates_are_bools_that_permit() -> None:
+    found = tomllib.loads(text_of(**CELL))["interlock"]
+    assert [(one["topic"], one.get("require_publisher"), one.get("max_age_s")) for one in found] == [
+        ("/operation_enabled", True, None),  # latched: it is published once
+        ("/arm/guard_closed", None, 2.0),
+    ]
+
+
+def test_a_bool_of_a_fault_is_a_red_lamp() -> None:
+    lamp = widgets(text_of(**CELL))["estop_pressed"]
+    assert lamp["states"][0] == {
+        "value": True,
+        "text": "Estop pressed",
+        "shape": "cross",
+        "colour": "red",
+    }
+
+
+def test_what_is_shown_of_the_usual_types() -> None:
+    found = widgets(text_of(**CELL))
+    assert found["arm_joint_states"]["joint"] == [
+        {"name": "j1", "label": "J1", "min": -180, "max": 180},
+        {"name": "j2", "label": "J2", "min": -360, "max": 360},  # it was seen beyond half a turn
+    ]
+    gauge = found["arm_temperature"]
+    assert (gauge["unit"], gauge["min"], gauge["max"]) == ("°C", 0, 100)
+    assert gauge["qos"] == {"reliability": "best_effort"}  # else it would never be received
+    assert (found["speed"]["min"], found["speed"]["max"]) == (0, 5)  # 3.2 was seen
+    assert found["odom_pose_pose_position_x"]["unit"] == "m"
+    assert {found[name]["kind"] for name in ("camera_image_raw", "rosout", "diagnostics")} == {
+        "camera",
+        "log",
+        "table",
+    }
+    assert "parameter_events" not in found
+    assert any(one["kind"] == "trend" for one in found.values())
+
+
+def test_pages_are_namespaces_and_nodes() -> None:
+    pages = tomllib.loads(text_of(**CELL))["page"]
+    assert [page["id"] for page in pages] == ["arm", "cell_io", "plc", "robot", "nodes"]
+
+
+def test_what_has_no_widget_is_named() -> None:
+    text = text_of(**CELL, unasked=["/cell_io"])
+    assert "# - /pose (geometry_msgs/msg/Pose)" in text
+    assert "# - /add (example_interfaces/srv/AddTwoInts): give its request" in text
+    assert "# - /old (std_srvs/srv/Trigger), on Fast DDS: the bridge reaches" in text
+    assert "# - parameters of /cell_io: the bridge reaches services on Cyclone DDS only" in text
+    unknown = text_of(topics=[published("/jig", "jig_msgs/msg/Jig")])
+    assert (
+        '# - /jig: "jig_msgs/msg/Jig" is not an interface of ROS 2 jazzy; there is no package'
+        in unknown
+    )
+    joints = text_of(topics=[published("/joint_states", "sensor_msgs/msg/JointState")])
+    assert "# - /joint_states: no message came that names its joints" in joints
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda topic: Topic(name="/x", key="x", publishers=topic.publishers, announced=False),
+        lambda topic: Topic(name="/_hidden", key="_hidden", publishers=topic.publishers),
+        lambda topic: Topic(name="/clock", key="clock", publishers=topic.publishers),
+    ],
+)
+def test_what_is_not_for_a_panel_is_left_out(change: Callable[[Topic], Topic]) -> None:
+    assert widgets(text_of(topics=[change(published("/y", "std_msgs/msg/Int32"))])) == {}
+
+
+def test_two_types_on_one_topic_are_a_remark() -> None:
+    publishers = (endpoint(BOOL, "/a"), endpoint("std_msgs/msg/Int32", "/b"))
+    text = text_of(topics=[Topic(name="/x", key="x", publishers=publishers)])
+    assert "# - /x: it has several types: std_msgs/msg/Bool, std_msgs/msg/Int32" in text
+
+
+def test_texts_of_a_robot_can_not_leave_their_place(tmp_path: Path) -> None:
+    evil = NodeParameter(
+        node="/plc", name="x", type="string", value='"\n[[page]]\n', description="a\nb = 1\u2028c"
+    )
+    joints = {"/j": SimpleNamespace(name=['a"\n[x]', "b\u202e"], position=[0.0, 0.0])}
+    text = text_of(
+        topics=[ENABLED, published("/j", "sensor_msgs/msg/JointState")],
+        parameters=[evil],
+        samples=joints,
+    )
+    path = tmp_path / "cell.toml"
+    path.write_text(text)
+    assert [page["id"] for page in tomllib.loads(text)["page"]] == ["cell_io", "robot"]
+
+
+def test_several_robots_have_their_entries(tmp_path: Path) -> None:
+    robots: list[Mapping[str, Any]] = [
+        {"id": "robot1", "name": "R1", "namespace": "/r1", "connect": ["tcp/r1:7447"]},
+        {"id": "robot2", "name": "R2", "namespace": "/r2"},
+    ]
+    path = tmp_path / "cell.toml"
+    path.write_text(text_of(base=Draft(title="Cells", robots=robots), topics=[ENABLED]))
+    panel = check_panel(path).panel
+    assert [(one.namespace, one.connect) for one in panel.robots] == [
+        ("/r1", ("tcp/r1:7447",)),
+        ("/r2", ()),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("name", "label", "page"),
+    [
+        ("/arm/jointStates", "Joint states", "arm"),
+        ("/speed", "Speed", "node"),
+        ("/x/y/temp_2", "Temp 2", "x"),
+    ],
+)
+def test_labels_and_pages_are_made_from_names(name: str, label: str, page: str) -> None:
+    assert (label_of(name), page_of(name, ["/node"])) == (label, page)
+
+
+def test_ids_are_valid_and_differ() -> None:
+    assert id_of("/2nd/Speed", ()) == "n_2nd_speed"
+    assert id_of("/a/b", ("a_b",)) == "a_b_2"
+    assert len(id_of("/" + "x" * 300, ())) <= 64
+
+
+@pytest.mark.parametrize("name", ["/enabled", "/arm/auto", "/guard_closed", "/isReady"])
+def test_names_that_permit(name: str) -> None:
+    assert permits(name)
+
+
+@pytest.mark.parametrize("name", ["/e_stop_released", "/fault", "/enable_error", "/gripper_closed"])
+def test_names_that_do_not(name: str) -> None:
+    assert not permits(name)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "ends"),
+    [
+        ("/motor_temperature", None, (0, 100)),
+        ("/unheard_of", None, (0, 100)),
+        ("/unheard_of", 340.0, (0, 500)),
+        ("/unheard_of", -3.0, (-5, 100)),
+        ("/unheard_of", float("nan"), (0, 100)),
+        ("/unheard_of", float("inf"), (0, 100)),
+        ("/battery_level", 0.9, (0, 100)),
+    ],
+)
+def test_ranges_fit_the_name_and_the_value(
+    name: str, value: float | None, ends: tuple[float, float]
+) -> None:
+    assert range_for(Shown(field="data", kind="float64"), (name,), value) == ends
