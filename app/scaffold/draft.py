@@ -38,9 +38,11 @@ class Known:
 
 def shown(topics: Iterable[Topic]) -> Iterator[Topic]:
     """The topics that a panel may have: not ROS's own, not hidden ones, none that is held back."""
-    for topic in topics:
-        if topic.name not in LEFT_OUT and "/_" not in topic.name and topic.announced:
-            yield topic
+    return (topic for topic in topics if topic.announced and _is_public(topic))
+
+
+def _is_public(topic: Topic) -> bool:
+    return topic.name not in LEFT_OUT and "/_" not in topic.name
 
 
 def make_draft(known: Known, interfaces: Interfaces, base: Draft) -> Draft:
@@ -58,6 +60,11 @@ def make_draft(known: Known, interfaces: Interfaces, base: Draft) -> Draft:
         entries += found
         if not found:
             remarks.append(_why_not(topic))
+    remarks += [
+        f"{topic.name}: `allow` or `deny` in the bridge's configuration holds it back"
+        for topic in known.topics
+        if not topic.announced and _is_public(topic)
+    ]
     for server in (*known.services, *known.actions):
         entries += _of_server(server, interfaces, remarks)
     for one in known.parameters:

@@ -219,6 +219,11 @@ def test_what_is_not_for_a_panel_is_left_out(change: Callable[[Topic], Topic]) -
     assert widgets(text_of(topics=[change(published("/y", "std_msgs/msg/Int32"))])) == {}
 
 
+def test_a_topic_that_the_bridge_holds_back_is_a_remark() -> None:
+    text = text_of(topics=[Topic(name="/x", key="x", publishers=ENABLED.publishers, announced=False)])
+    assert "# - /x: `allow` or `deny` in the bridge's configuration holds it back" in text
+
+
 def test_two_types_on_one_topic_are_a_remark() -> None:
     publishers = (endpoint(BOOL, "/a"), endpoint("std_msgs/msg/Int32", "/b"))
     text = text_of(topics=[Topic(name="/x", key="x", publishers=publishers)])
