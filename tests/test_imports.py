@@ -53,6 +53,7 @@ COMMON = {
 }
 WIRING = {"app.main", "app.check", "app.log", "app.simulator.__main__"}  # these may import every room
 SPEAK_ZENOH = {
+    "app.transport.zenoh_answers",
     "app.transport.zenoh_config",
     "app.transport.zenoh_session",
     "app.simulator.zenoh_action",

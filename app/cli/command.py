@@ -84,7 +84,7 @@ def _parser() -> Parser:
         usage=f"{APP} [-h] [--version] COMMAND ...",
         description="An operator's touch panel for ROS 2 robots.",
         epilog="commands:\n"
-        + "".join(f"  {name:14}{text}\n" for name, text in COMMANDS.items())
+        + "".join(f"  {name:15}{text}\n" for name, text in COMMANDS.items())
         + f"\n`{APP} COMMAND --help` tells the options of a command.",
         formatter_class=RawDescriptionHelpFormatter,
     )

@@ -20,7 +20,7 @@ from app.interfaces import DISTROS
 from app.interfaces.names import NAMESPACE
 from app.panel import load_panel
 from app.settings import Settings
-from app.transport.bridge_observer import CONNECT_S, BridgeObserver, observing
+from app.transport.bridge_observer import CONNECT_S, BridgeObserver
 from app.transport.zenoh_config import config_from
 
 GONE, USAGE = 1, 2
@@ -121,13 +121,12 @@ def place_of(given: Any) -> Place:
 @asynccontextmanager
 async def opened(place: Place) -> AsyncIterator[tuple[BridgeObserver, RosGraph]]:
     """A connected observer and the graph now. LinkError says what is missing, and what to do."""
-    config = config_from(place.zenoh, place.connect)
+    observer = BridgeObserver(config_from(place.zenoh, place.connect))
     try:
-        link = observing(config, place.within_s)
-        observer = await link.__aenter__()
-    except LinkError as error:
-        raise LinkError(f"{error}: {BRIDGE_HINT}") from error
-    try:
+        try:
+            await observer.connect(place.within_s)
+        except LinkError as error:
+            raise LinkError(f"{error}: {BRIDGE_HINT}") from error
         graph = await observer.graph()
         where = ", ".join(observer.endpoints)
         if not graph.bridges:
@@ -136,7 +135,7 @@ async def opened(place: Place) -> AsyncIterator[tuple[BridgeObserver, RosGraph]]
             raise LinkError(f"the bridge at {where} does not answer: it hangs; restart it")
         yield observer, graph
     finally:
-        await link.__aexit__(None, None, None)
+        await observer.close()
 
 
 def full_name(robot: RobotGraph, name: str) -> str:

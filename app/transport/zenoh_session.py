@@ -19,6 +19,7 @@ from app.errors import LinkError
 from app.transport.declarations import NOTHING, Declarations
 from app.transport.inbox import Changes, Inbox
 from app.transport.native_threads import attach
+from app.transport.zenoh_answers import collected
 from app.transport.zenoh_config import endpoints_of, translated
 
 ASK_TIMEOUT_S = 2.0
@@ -34,32 +35,6 @@ def _own(payload: zenoh.ZBytes) -> bytes | zenoh.ZBytes:
     """A payload that may be kept for long: a small one is a part of what the network was read into,
     and would keep all of that, so that the next message has to be read into another."""
     return payload if len(payload) > COPIED_MOST else payload.to_bytes()
-
-
-async def _collected(
-    ask: Callable[["Callback[zenoh.Reply]"], None], timeout_s: float
-) -> list[tuple[str, bytes]]:
-    """(key, payload) of each answer that comes within `timeout_s`."""
-    loop = asyncio.get_running_loop()
-    done: asyncio.Future[None] = loop.create_future()
-    answers: list[tuple[str, bytes]] = []
-
-    def on_reply(reply: zenoh.Reply) -> None:
-        if reply.ok is not None:
-            answers.append((str(reply.ok.key_expr), reply.ok.payload.to_bytes()))
-
-    def finish() -> None:
-        if not done.done():
-            done.set_result(None)
-
-    def on_end() -> None:
-        with suppress(RuntimeError):  # the loop is closed
-            loop.call_soon_threadsafe(finish)
-
-    ask(Callback(on_reply, on_end, indirect=False))
-    with suppress(TimeoutError):
-        await asyncio.wait_for(done, timeout_s + 1)
-    return answers
 
 
 class ZenohSession:
@@ -266,7 +241,7 @@ class ZenohSession:
     async def ask(self, selector: str, timeout_s: float = ASK_TIMEOUT_S) -> list[tuple[str, bytes]]:
         """(key, payload) of each answer to a query that comes within `timeout_s`."""
         with translated(f"can't ask {selector}"):
-            return await _collected(
+            return await collected(
                 lambda callback: self._session.get(selector, callback, timeout=timeout_s), timeout_s
             )
 
@@ -274,7 +249,7 @@ class ZenohSession:
         """Every liveliness token of the ROS graph that is held now."""
         with translated("can't ask for the ROS graph"):
             liveliness = self._session.liveliness()
-            found = await _collected(
+            found = await collected(
                 lambda callback: liveliness.get(self._dialect.tokens, callback, timeout=timeout_s),
                 timeout_s,
             )

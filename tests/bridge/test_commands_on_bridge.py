@@ -3,6 +3,7 @@ robot on Cyclone DDS."""
 
 import json
 import re
+import shlex
 import signal
 import subprocess
 import sys
@@ -20,10 +21,6 @@ from app.panel import check_panel
 from tests.support import cyclone
 from tests.support.cyclone import CycloneRobot
 from tests.support.parts import ENOUGH_S, ROOT, Bridge, RosNode, Server, free_port, until
-
-cyclone_bridge = cyclone.cyclone_bridge
-client = cyclone.client
-robots = cyclone.robots
 
 COMMAND = [sys.executable, "-m", "app.cli"]
 BOOL = "std_msgs/msg/Bool"
@@ -282,6 +279,44 @@ def client_tokens(bridge: Bridge) -> list[str]:
         return made.tokens()
     finally:
         made.close()
+
+
+def shown_commands() -> list[list[str]]:
+    """The commands of the how-to page, but for the server's own and the completion."""
+    page = (ROOT / "docs/how-to/scaffold.md").read_text()
+    blocks = re.findall(r"^```sh\n(.*?)^```", page, re.DOTALL | re.MULTILINE)
+    lines = [shlex.split(line) for block in blocks for line in block.splitlines()]
+    return [words[1:] for words in lines if words[0] == "operator-panel" and words[1] != "run"]
+
+
+def test_each_command_of_the_page_works(domain: int, tmp_path: Path) -> None:
+    bridge = Bridge(domain + 1)
+    bridge.start()
+    node = RosNode(bridge.domain)
+    try:
+        node.advertise("/speed", "std_msgs/msg/Float64")
+        node.every("/speed", {"data": 0.5}, 0.1)
+        node.advertise("/joint_states", "sensor_msgs/msg/JointState")
+        node.every("/joint_states", {"name": ["joint_1"], "position": [0.25]}, 0.1)
+        until_passed_on(bridge, "/speed", "/joint_states")
+        commands = shown_commands()
+        assert [words[0] for words in commands] == [
+            *("scaffold", "check", "topics", "topics", "echo", "echo", "hz")
+        ]
+        place = {"tcp/robot1:7447": bridge.endpoint, "cell1.toml": str(tmp_path / "cell1.toml")}
+        for words in commands:
+            done = subprocess.run(
+                [*COMMAND, *(place.get(word, word) for word in words)],
+                cwd=ROOT,
+                capture_output=True,
+                text=True,
+                timeout=ENOUGH_S * 2,
+                check=False,
+            )
+            assert (done.returncode, done.stderr) == (0, ""), words
+    finally:
+        node.end()
+        bridge.end()
 
 
 def test_a_scaffold_of_a_robot_with_a_namespace_has_it(domain: int, tmp_path: Path) -> None:

@@ -17,14 +17,8 @@ from app.interfaces.type_descriptions import SERVICE_TYPE_NAME, definitions_of
 from app.interfaces.type_hash import _describe_structure, referenced_structures, type_hash
 from app.transport.bridge_observer import observing
 from app.transport.zenoh_config import config_to
-from tests.support import cyclone
 from tests.support.cyclone import NODE, CycloneRobot
 from tests.support.parts import Bridge, RosNode, free_port, live, until
-
-cyclone_bridge = cyclone.cyclone_bridge
-client = cyclone.client
-robots = cyclone.robots
-robot = cyclone.robot
 
 GRIPPER = "gripper_msgs/msg/Gripper"
 INTERFACES = load_interfaces("kilted")

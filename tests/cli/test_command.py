@@ -27,7 +27,7 @@ def test_help_names_every_command(capsys: pytest.CaptureFixture[str]) -> None:
     said = helped(capsys=capsys)
     assert said.startswith("usage: operator-panel [-h] [--version] COMMAND")
     for name, text in COMMANDS.items():
-        assert f"  {name:14}{text}\n" in said
+        assert f"  {name:15}{text}\n" in said
 
 
 @pytest.mark.parametrize("name", COMMANDS)
