@@ -28,9 +28,10 @@ from app.graph.model import Node, RobotGraph, RosGraph, Server, Topic
 from app.graph.node_services import NodeParameter, NodeServices
 from app.interfaces import Interfaces, load_interfaces
 from app.panel import check_panel
-from app.scaffold.displays import PICTURES
+from app.scaffold.displays import JOINTS
 from app.scaffold.draft import Known, make_draft, shown
 from app.scaffold.entry import Draft
+from app.scaffold.fields import shown_fields
 from app.scaffold.naming import label_of
 from app.scaffold.toml_text import toml_text
 from app.settings import APP
@@ -147,14 +148,19 @@ def _server(one: Server, below: str) -> Server:
     return replace(one, name=one.name.removeprefix(below))
 
 
+def _tells(topic: Topic, interfaces: Interfaces) -> bool:
+    """Whether a message of it tells a name or a range that the panel needs."""
+    return topic.type == JOINTS or any(shown_fields(topic.type, interfaces))
+
+
 async def _samples(
     observer: BridgeObserver, topics: Sequence[Topic], interfaces: Interfaces, listen_s: float
 ) -> dict[str, Any]:
-    """A message of each topic that is shown, but for pictures, until all came or time is up."""
+    """A message of each topic that it tells something of, until all came or time is up."""
     wanted = {
         one.key: one
         for one in shown(topics)
-        if one.publishers and one.type not in PICTURES and one.type in interfaces.structures
+        if one.publishers and one.type in interfaces.structures and _tells(one, interfaces)
     }
     found: dict[str, Any] = {}
     if not wanted:

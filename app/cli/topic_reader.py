@@ -82,7 +82,7 @@ class TopicReader:
         if not self.topic.publishers:
             print(f"nobody publishes {self.topic.name} now; waiting", file=sys.stderr, flush=True)
         own = endpoint_for(self.topic, self.type)
-        async for _, sample in self.observer.listen([own]):
+        async for _, sample in self.observer.listen([own], hold=bool(self.topic.publishers)):
             yield sample
 
 

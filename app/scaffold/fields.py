@@ -104,10 +104,22 @@ KNOWN: Final[Mapping[str, tuple[Shown, ...]]] = {
 }
 
 
+# Their messages are for programs, but for those in KNOWN: clouds, scans, maps, paths, markers.
+FOR_PROGRAMS: Final = frozenset(
+    (
+        *("action_msgs", "builtin_interfaces", "diagnostic_msgs", "geometry_msgs", "lifecycle_msgs"),
+        *("map_msgs", "nav_msgs", "pcl_msgs", "rcl_interfaces", "rosgraph_msgs", "sensor_msgs"),
+        *("service_msgs", "shape_msgs", "statistics_msgs", "stereo_msgs", "tf2_msgs"),
+        *("trajectory_msgs", "type_description_interfaces", "visualization_msgs"),
+    )
+)
+
+
 def shown_fields(type_name: str, interfaces: Interfaces) -> Iterator[Shown]:
     """The fields of a type that are worth showing: the usual ones, else its first plain ones."""
     if type_name in KNOWN:
         yield from KNOWN[type_name]
+    if type_name.partition("/")[0] in FOR_PROGRAMS:
         return
     plain = [
         one

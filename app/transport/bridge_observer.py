@@ -64,15 +64,21 @@ class BridgeObserver:
         await asyncio.wait({answer}, timeout=timeout_s + 1)
         return answer.result() if answer.done() else None
 
-    async def listen(self, topics: Sequence[OwnEndpoint]) -> AsyncIterator[tuple[str, Sample]]:
+    async def listen(
+        self, topics: Sequence[OwnEndpoint], *, hold: bool = True
+    ) -> AsyncIterator[tuple[str, Sample]]:
         """(key, sample) of each sample of these topics, those which latched publishers have kept first.
-        Once per observer. LinkError when the connection is lost."""
+        Once per observer. LinkError when the connection is lost.
+
+        `hold`: with tokens, by which the bridge keeps its routes and each sample comes once. Not for a
+        topic without a publisher: the token would fix the route's QoS for the publisher that comes.
+        """
         expressions = {one.key: self._dialect.topic(one.key, one.type) for one in topics}
         self._session.start(
             Declarations(subscribe=expressions, whole=set(expressions), prompt=set(expressions))
         )
-        # While a token is held the bridge keeps its route: each sample comes once.
-        self._session.hold(self._dialect.own_tokens(self.zid, topics))
+        if hold:
+            self._session.hold(self._dialect.own_tokens(self.zid, topics))
         connected = False
         while True:
             await self._woken.wait()

@@ -7,11 +7,13 @@ from typing import Any
 
 import pytest
 
+from app.dialect.endpoint import OwnEndpoint
 from app.errors import LinkError
 from app.graph.model import Node, RosGraph
 from app.graph.node_services import NodeParameter, NodeServices
 from app.interfaces import Interfaces, load_interfaces
 from app.interfaces.definitions import Definitions
+from app.interfaces.names import Qos
 from app.interfaces.parsing import parse_definition
 from app.interfaces.type_descriptions import SERVICE_TYPE_NAME, definitions_of
 from app.interfaces.type_hash import _describe_structure, referenced_structures, type_hash
@@ -211,6 +213,35 @@ def test_an_rclpy_node_describes_its_types_as_they_are_known(node: RosNode, name
     for each, structure in definitions.structures.items():
         known = INTERFACES.structures[each].fields
         assert [(f.name, f.type) for f in structure.fields] == [(f.name, f.type) for f in known]
+
+
+@pytest.mark.parametrize("hold", [True, False])
+def test_a_listener_holds_a_route_only_where_it_is_to(
+    own_bridge: Bridge, own_node: RosNode, hold: bool
+) -> None:
+    own_node.advertise("/heard", BOOL, durability="transient_local", depth=1)
+    own_node.publish("/heard", {"data": True})
+    graph = until_graph(
+        own_bridge.endpoint,
+        lambda graph: any(r.topic("/heard") for r in graph.robots),
+        "the bridge has found the topic",
+    )
+    topic = graph.robots[0].topic("/heard")
+    assert topic is not None
+
+    async def listen() -> tuple[bytes, tuple[str, ...]]:
+        async with observing(config_to(own_bridge.endpoint)) as observer:
+            own = OwnEndpoint("MS", topic.key, BOOL, Qos(transient_local=True))
+            async for _, sample in observer.listen([own], hold=hold):
+                async with observing(config_to(own_bridge.endpoint)) as other:
+                    (found,) = (await other.graph()).robots
+                used = [r for r in found.routes if r.key == "heard" and r.direction == "pub"]
+                return bytes(sample.payload), used[0].remote
+        raise AssertionError("it ended")
+
+    payload, remote = asyncio.run(listen())
+    assert payload[4:5] == b"\1"
+    assert bool(remote) is hold
 
 
 def test_nothing_there_is_an_error_that_says_where() -> None:

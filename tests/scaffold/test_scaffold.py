@@ -208,6 +208,15 @@ def test_what_has_no_widget_is_named() -> None:
 
 
 @pytest.mark.parametrize(
+    "name", ["sensor_msgs/msg/PointCloud2", "sensor_msgs/msg/LaserScan", "nav_msgs/msg/OccupancyGrid"]
+)
+def test_what_is_for_programs_is_no_gauge(name: str) -> None:
+    text = text_of(topics=[published("/x", name)])
+    assert widgets(text) == {}
+    assert f"# - /x ({name})" in text
+
+
+@pytest.mark.parametrize(
     "change",
     [
         lambda topic: Topic(name="/x", key="x", publishers=topic.publishers, announced=False),
