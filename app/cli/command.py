@@ -19,6 +19,7 @@ COMMANDS = {
     "echo": "show the messages of a topic",
     "hz": "show how often a topic is published",
     "scaffold": "write a first panel that fits a running robot",
+    "bridge-config": "write a configuration of the bridge that fits a panel",
     "completion": "print a shell's completion of these commands",
 }
 Command = Callable[[Sequence[str], str], int]
@@ -54,6 +55,8 @@ def _command(name: str) -> Command:
             from app.cli.hz import main
         case "scaffold":
             from app.cli.scaffold import main
+        case "bridge-config":
+            from app.cli.bridge_config import main
         case "completion":
             from app.cli.completion import print_completion
 

@@ -162,21 +162,29 @@ class Process:
 class Bridge:
     """The real bridge with the shipped configuration, on a port and a domain of this test."""
 
-    def __init__(self, domain: int, namespace: str = "/") -> None:
+    def __init__(self, domain: int, namespace: str = "/", options: Sequence[str] = ()) -> None:
+        """`options` are further places of its configuration, as `path=json5`."""
         self.domain = domain
         self.port = free_port()
         self.endpoint = f"tcp/127.0.0.1:{self.port}"
-        self._namespace = namespace
+        self._configuration = [
+            str(ROOT / "deploy/bridge.json5"),
+            f'listen/endpoints=["{self.endpoint}"]',
+            f"plugins/ros2dds/domain={domain}",
+            f'plugins/ros2dds/namespace="{namespace}"',
+            *options,
+        ]
         self._process: Process | None = None
+
+    def configure(self, file: Path) -> None:
+        """Another configuration from the next start on; it has the bridge's endpoint and domain."""
+        self._configuration = [str(file)]
 
     def start(self) -> None:
         self._process = Process(
             [
                 str(BRIDGE),
-                str(ROOT / "deploy/bridge.json5"),
-                f'listen/endpoints=["{self.endpoint}"]',
-                f"plugins/ros2dds/domain={self.domain}",
-                f'plugins/ros2dds/namespace="{self._namespace}"',
+                *self._configuration,
                 'plugins/ros2dds/ros_automatic_discovery_range="LOCALHOST"',
             ],
             {"CYCLONEDDS_URI": CYCLONE_ON_LOOPBACK, "ROS_DISTRO": "jazzy"},

@@ -1,0 +1,162 @@
+"""A configuration of zenoh-bridge-ros2dds that lets through what a panel needs of one robot, and
+nothing else. Source of the keys: zenoh-plugin-ros2dds 1.10, `config.rs`, tried. No I/O.
+"""
+
+import json
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from app.interfaces.names import ROSOUT_TOPIC
+from app.panel.model import Panel, RobotEntry
+from app.panel.widgets.parameter import DESCRIBE, GET, SET
+from app.panel.widgets.service_action import Action, Call, ServerCommand
+from app.printable import printable
+
+LISTEN: Final = ("tcp/127.0.0.1:7447",)
+TIMEOUT_S: Final = 5.0  # the bridge's own, for each query that is not listed
+LISTED: Final = "publishers subscribers service_servers service_clients action_servers action_clients"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BridgeOptions:
+    """What a panel file does not say. `prefixed`: the robot's nodes have the panel's namespace in their
+    own names; else the bridge adds it."""
+
+    domain: int = 0
+    listen: Sequence[str] = LISTEN
+    nodename: str = "web_ui"
+    prefixed: bool = False
+
+
+def allowed(panel: Panel) -> dict[str, list[str]]:
+    """What the bridge has to let through, as the robot's nodes have it: kind of endpoint → names."""
+    servers = [w for w in panel.widgets() if isinstance(w, ServerCommand)]
+    nodes = {widget.node for widget in panel.parameters()}
+    services = {w.service for w in servers if isinstance(w, Call)}
+    services |= {f"{node}/{service}" for node in nodes for service, _ in (GET, DESCRIBE, SET)}
+    names: Mapping[str, Collection[str]] = {
+        "publishers": panel.listened(),
+        "subscribers": {*panel.publications(), ROSOUT_TOPIC},
+        "service_servers": services,
+        "service_clients": (),
+        "action_servers": panel.actions(),
+        "action_clients": (),
+    }
+    return {kind: sorted(names[kind]) for kind in LISTED.split()}
+
+
+def timeouts(panel: Panel) -> tuple[dict[str, float], dict[str, float]]:
+    """Services and actions that the panel gives more time than the bridge by itself: name → seconds."""
+    services: dict[str, float] = {}
+    actions: dict[str, float] = {}
+    for widget in panel.widgets():
+        if isinstance(widget, Call) and widget.timeout_s > TIMEOUT_S:
+            services[widget.service] = max(widget.timeout_s, services.get(widget.service, 0))
+        elif isinstance(widget, Action) and widget.timeout_s > TIMEOUT_S:
+            actions[widget.action] = max(widget.timeout_s, actions.get(widget.action, 0))
+    for widget in panel.parameters():
+        if widget.timeout_s > TIMEOUT_S:
+            for service, _ in (GET, DESCRIBE, SET):
+                name = f"{widget.node}/{service}"
+                services[name] = max(widget.timeout_s, services.get(name, 0))
+    return services, actions
+
+
+def bridge_config(panel: Panel, entry: RobotEntry | None, options: BridgeOptions) -> str:
+    """The file's text, JSON5 with comments. `entry` is one of several robots."""
+    namespace = entry.namespace if entry else panel.namespace
+    before = namespace if options.prefixed else ""
+    return "\n".join(
+        [
+            f"// The bridge beside the robot, for the panel {_comment(str(panel.title))}.",
+            "// zenoh-bridge-ros2dds -c bridge.json5",
+            "{",
+            '  mode: "router",',
+            f"  // Where the panel's server connects: `connect` in its Zenoh configuration.\n"
+            f"  listen: {{ endpoints: {json.dumps(list(options.listen))} }},",
+            _LINK,
+            "  plugins: {",
+            "    ros2dds: {",
+            "      // What `ros2 node list` shows.",
+            f"      nodename: {json.dumps(options.nodename)},",
+            "      // ROS_DOMAIN_ID of the robot: the same number here as in its nodes.",
+            f"      domain: {options.domain},",
+            *_namespace(namespace, options.prefixed),
+            _BLOCKING,
+            *_timeouts(panel, before),
+            *_allow(panel, before),
+            "    },",
+            "  },",
+            "}",
+            "",
+        ]
+    )
+
+
+def _comment(text: str) -> str:
+    return printable(text).replace("\n", " ")
+
+
+def _namespace(namespace: str, prefixed: bool) -> Iterator[str]:
+    if namespace and not prefixed:
+        yield "      // The bridge puts it before each name: the panel file's `namespace`."
+        yield f"      namespace: {json.dumps(namespace)},"
+    elif namespace:
+        yield f"      // No namespace here: the robot's nodes have {namespace} in their own names."
+
+
+def _timeouts(panel: Panel, before: str) -> Iterator[str]:
+    services, actions = timeouts(panel)
+    if services or actions:
+        yield "      // Seconds for an answer, where the panel waits longer than the bridge by itself."
+        yield "      queries_timeout: {"
+        yield f"        default: {TIMEOUT_S},"
+        yield f"        services: {_timed(services, before)},"
+        yield f"        actions: {{ send_goal: {_timed(actions, before)} }},"
+        yield "      },"
+
+
+def _timed(limits: Mapping[str, float], before: str) -> str:
+    return json.dumps([f"^{before}{name}$={seconds:g}" for name, seconds in sorted(limits.items())])
+
+
+def _allow(panel: Panel, before: str) -> Iterator[str]:
+    yield "      // Nothing else of the robot goes through: not to the panel, and not to its nodes."
+    yield "      allow: {"
+    for kind, names in allowed(panel).items():
+        yield from _named(kind, [before + name for name in names])
+    yield "      },"
+
+
+def _named(kind: str, names: Iterable[str]) -> Iterator[str]:
+    """Each is a regular expression; a ROS 2 name has no character that means anything in one."""
+    lines = [f"          {json.dumps(name)}," for name in names]
+    if not lines:
+        yield f"        {kind}: [],"
+        return
+    yield f"        {kind}: ["
+    yield from lines
+    yield "        ],"
+
+
+_LINK: Final = """\
+  scouting: {
+    multicast: { enabled: false },
+  },
+  transport: {
+    link: {
+      // The panel counts a frozen bridge as lost after this many ms of silence (default: 10000).
+      tx: {
+        lease: 2000,
+        keep_alive: 4,
+        // A panel that takes nothing for so long (µs; default: 5 s) is cut off, and locks.
+        queue: { congestion_control: { block: { wait_before_close: 200000 } } },
+      },
+    },
+  },"""
+
+_BLOCKING: Final = """\
+      // What a reliable publisher says reaches the panel, or the panel is cut off: with false the
+      // bridge drops in silence what finds no room, and a lost `false` would leave a control open.
+      reliable_routes_blocking: true,"""

@@ -1,0 +1,181 @@
+"""`operator-panel bridge-config`: what it lets through, and what it does with files and mistakes."""
+
+import json
+from pathlib import Path
+
+import pytest
+import zenoh
+
+from app.cli.command import main
+from tests.support.parts import ROOT
+
+PANEL = """
+title = "Cell"
+namespace = "/cell9"
+[[interlock]]
+id = "operation"
+topic = "/operation_enabled"
+[[page]]
+id = "main"
+title = "Main"
+[[page.widget]]
+id = "start"
+kind = "publish"
+label = "Start"
+topic = "/start"
+type = "std_msgs/msg/Bool"
+message = { data = true }
+interlock = "operation"
+confirm = { topic = "/started", type = "std_msgs/msg/Bool", equals = true }
+[[page.widget]]
+id = "pressure"
+kind = "readout"
+label = "Pressure"
+topic = "/pressure"
+type = "std_msgs/msg/Float64"
+field = "data"
+[[page.widget]]
+id = "reset"
+kind = "call"
+label = "Reset"
+service = "/reset"
+type = "std_srvs/srv/Trigger"
+timeout_s = 12.5
+[[page.widget]]
+id = "count"
+kind = "action"
+label = "Count"
+action = "/count"
+type = "example_interfaces/action/Fibonacci"
+goal = { order = 3 }
+timeout_s = 8.0
+[[page.widget]]
+id = "speed"
+kind = "parameter"
+label = "Speed"
+node = "/arm"
+parameter = "speed"
+type = "double"
+"""
+SEVERAL = PANEL.replace(
+    'namespace = "/cell9"',
+    'robot = [{ id = "left", name = "Left", namespace = "/l", connect = ["tcp/192.0.2.1:7447"] },'
+    ' { id = "right", name = "Right", namespace = "/r" }]',
+)
+
+
+@pytest.fixture
+def panel(tmp_path: Path) -> Path:
+    path = tmp_path / "cell1.toml"
+    path.write_text(PANEL)
+    return path
+
+
+def written(panel: Path, *options: str) -> zenoh.Config:
+    """What was written, as Zenoh reads it."""
+    path = panel.with_name("bridge.json5")
+    assert main(["bridge-config", str(panel), "--output", str(path), "--force", *options]) == 0
+    return zenoh.Config.from_file(path)
+
+
+def plugin(config: zenoh.Config) -> dict[str, object]:
+    found: dict[str, object] = json.loads(config.get_json("plugins/ros2dds"))
+    return found
+
+
+def test_it_lets_through_what_the_panel_uses_and_nothing_else(panel: Path) -> None:
+    said = plugin(written(panel, "--domain", "7"))
+    assert said["namespace"] == "/cell9"
+    assert said["domain"] == 7
+    assert said["allow"] == {
+        "publishers": ["/operation_enabled", "/parameter_events", "/pressure", "/started"],
+        "subscribers": ["/rosout", "/start"],
+        "service_servers": [
+            "/arm/describe_parameters",
+            "/arm/get_parameters",
+            "/arm/set_parameters",
+            "/reset",
+        ],
+        "service_clients": [],
+        "action_servers": ["/count"],
+        "action_clients": [],
+    }
+
+
+def test_it_waits_as_long_as_the_panel_does(panel: Path) -> None:
+    assert plugin(written(panel))["queries_timeout"] == {
+        "default": 5.0,
+        "services": ["^/reset$=12.5"],
+        "actions": {"send_goal": ["^/count$=8"]},
+    }
+
+
+def test_names_of_a_robot_that_has_the_namespace_itself(panel: Path) -> None:
+    said = plugin(written(panel, "--prefixed"))
+    assert "namespace" not in said
+    assert isinstance(allow := said["allow"], dict)
+    assert allow["action_servers"] == ["/cell9/count"]
+    assert "/cell9/pressure" in allow["publishers"]
+
+
+@pytest.mark.parametrize(
+    "place", ["mode", "transport/link/tx", "scouting/multicast", "listen/endpoints"]
+)
+def test_the_rest_is_as_in_the_shipped_file(panel: Path, place: str) -> None:
+    shipped = zenoh.Config.from_file(ROOT / "deploy/bridge.json5")
+    assert json.loads(written(panel).get_json(place)) == json.loads(shipped.get_json(place))
+
+
+def test_its_plugin_blocks_and_is_named_as_in_the_shipped_file(panel: Path) -> None:
+    shipped = plugin(zenoh.Config.from_file(ROOT / "deploy/bridge.json5"))
+    said = plugin(written(panel))
+    assert {key: said[key] for key in shipped} == shipped
+
+
+def test_the_shipped_panel_goes_to_standard_output(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["bridge-config", "--listen", "tcp/192.0.2.10:7447"]) == 0
+    assert 'listen: { endpoints: ["tcp/192.0.2.10:7447"] }' in capsys.readouterr().out
+
+
+def test_the_domain_is_this_machines_by_default(panel: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ROS_DOMAIN_ID", "42")
+    assert plugin(written(panel))["domain"] == 42
+
+
+def test_of_several_robots_one_is_named(panel: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    panel.write_text(SEVERAL)
+    config = written(panel, "--robot", "left")
+    assert plugin(config)["namespace"] == "/l"
+    assert json.loads(config.get_json("listen/endpoints")) == ["tcp/192.0.2.1:7447"]
+    with pytest.raises(SystemExit) as ended:
+        main(["bridge-config", str(panel)])
+    assert ended.value.code == 2
+    assert "there is left, right" in capsys.readouterr().err
+
+
+def test_a_file_is_not_replaced_unasked(panel: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    there = panel.with_name("bridge.json5")
+    there.write_text("mine")
+    assert main(["bridge-config", str(panel), "-o", str(there)]) == 1
+    assert "--force" in capsys.readouterr().err
+    assert there.read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    ("option", "words"),
+    [
+        ("--domain=233", "is not a ROS_DOMAIN_ID: 0 to 232"),
+        ("--listen=7447", "is not a Zenoh endpoint"),
+        ("--nodename=a/b", "is not a name of a ROS 2 node"),
+    ],
+)
+def test_a_mistake_is_named(option: str, words: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["bridge-config", option])
+    assert words in capsys.readouterr().err
+
+
+def test_a_panel_with_faults_is_refused(panel: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    panel.write_text("title = 3")
+    assert main(["bridge-config", str(panel)]) == 2
+    assert "can't be used" in capsys.readouterr().err
