@@ -31,6 +31,7 @@ ROOMS = (
     "web",
     "simulator",
     "scaffold",
+    "diagnose",
     "cli",
 )
 # What every room may import.
@@ -66,6 +67,10 @@ WIRE_THE_BRIDGE = {
     "app.cli.robot_link",
     "app.cli.scaffold",
     "app.cli.topic_reader",
+    "app.cli.bridge_config",
+    "app.diagnose.link",
+    "app.diagnose.robot",
+    "app.diagnose.watch",
     "app.runtime.robot_session",
     "app.simulator.zenoh_peer",
     "app.simulator.zenoh_robot",

@@ -19,6 +19,7 @@ COMMANDS = {
     "echo": "show the messages of a topic",
     "hz": "show how often a topic is published",
     "scaffold": "write a first panel that fits a running robot",
+    "doctor": "find out what is wrong between a panel, this machine and the robot",
     "bridge-config": "write a configuration of the bridge that fits a panel",
     "completion": "print a shell's completion of these commands",
 }
@@ -55,6 +56,8 @@ def _command(name: str) -> Command:
             from app.cli.hz import main
         case "scaffold":
             from app.cli.scaffold import main
+        case "doctor":
+            from app.cli.doctor import main
         case "bridge-config":
             from app.cli.bridge_config import main
         case "completion":

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Final
 
+from docs._generate.findings import findings_tables
 from docs._generate.icon_names import icon_list
 from docs._generate.keys import key_tables
 from docs._generate.locks import lock_tables, translated_page, translations
@@ -30,6 +31,7 @@ def files() -> Iterator[tuple[Path, str]]:
         "reference/locks.md": lock_tables(),
         "reference/settings.md": {"settings": settings_table()},
         "reference/sentences.md": {"sentences": sentences_table()},
+        "how-to/doctor.md": findings_tables(),
         "architecture.md": {"paths": paths_table(), "models": models_table()},
     }
     for name, parts in pages.items():

@@ -1,0 +1,140 @@
+"""`operator-panel doctor [PANEL]`: what is wrong between a panel, this machine and the robot.
+
+Exit status: 0 all is well (notes do not count), 1 there are findings, 2 it could not look.
+"""
+
+import asyncio
+import json
+import sys
+from argparse import ArgumentTypeError
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Final
+
+from app.cli.parser import Parser
+from app.diagnose.doctor import Diagnosis, Options, diagnose
+from app.diagnose.findings import Report
+from app.diagnose.robot import LISTEN_S
+from app.diagnose.versions import installed_version
+from app.errors import KioskError
+from app.settings import Settings
+
+PROG: Final = "python -m app.cli doctor"
+WELL, FINDINGS, FAILED = range(3)
+LONGEST_LISTEN_S: Final = 600.0
+
+
+def main(arguments: Sequence[str], prog: str = PROG) -> int:
+    given = _parser(prog).parse_args(arguments)
+    try:
+        settings = settings_of(given)
+        found = asyncio.run(diagnose(settings, options_of(given)))
+    except KioskError as error:
+        print(error, file=sys.stderr)
+        return FAILED
+    if given.json:
+        print(json.dumps(as_json(settings, found), indent=2, ensure_ascii=False))
+    else:
+        print(as_text(found.report, given.verbose))
+    return WELL if found.report.is_well else FINDINGS
+
+
+def settings_of(given: Any) -> Settings:
+    """The settings of the environment, with what the command line says instead."""
+    said = {name: getattr(given, name) for name in ("panel", "zenoh", "mode", "data")}
+    paths = {name: value for name, value in said.items() if value is not None}
+    return replace(Settings.from_environment(), **paths)
+
+
+def options_of(given: Any) -> Options:
+    return Options(host=given.host, port=given.port, listen_s=given.listen)
+
+
+def as_json(settings: Settings, found: Diagnosis) -> dict[str, Any]:
+    """What `--json` prints; see docs/how-to/doctor.md."""
+    return {
+        "version": installed_version(),
+        "panel": str(settings.panel),
+        "well": found.report.is_well,
+        "findings": [one.as_json() for one in found.report.findings],
+        "facts": found.report.facts,
+    }
+
+
+def as_text(report: Report, verbose: bool = False) -> str:
+    """One paragraph for each finding, errors first."""
+    lines = [f"ok       {fact}" for fact in report.facts] if verbose else []
+    for severity in ("error", "warning", "note"):
+        for one in report.findings:
+            if one.severity == severity:
+                robot = f" of robot {one.robot}" if one.robot else ""
+                lines += [f"{severity:8} {one.code}{robot}: {one.what}", f"         → {one.do}"]
+    counts = [
+        (number, severity)
+        for severity in ("error", "warning", "note")
+        if (number := sum(one.severity == severity for one in report.findings))
+    ]
+    said = ", ".join(f"{number} {severity}{'s' * (number > 1)}" for number, severity in counts)
+    what = "All is well" if report.is_well else "Something is wrong"
+    lines.append(f"{what}: {said or 'nothing was found'}, {len(report.facts)} checks were passed.")
+    return "\n".join(lines)
+
+
+def _parser(prog: str) -> Parser:
+    made = Parser(
+        prog=prog,
+        description="Finds out what is wrong between a panel, this machine and the robot, and says what"
+        " to do. It presses nothing, publishes nothing and calls no service of the robot.",
+        epilog="Exit status: 0 all is well (notes do not count), 1 there are findings, 2 it could not"
+        " look. docs/how-to/doctor.md lists all findings.",
+    )
+    add_options(made)
+    made.add_argument("--json", action="store_true", help="print JSON, for programs")
+    made.add_argument("-v", "--verbose", action="store_true", help="print what was found good, too")
+    return made
+
+
+def add_options(parser: Parser) -> None:
+    """The options of `run` that a diagnosis needs, and how long it listens."""
+    add = parser.add_argument
+    add(
+        "panel",
+        nargs="?",
+        type=_path,
+        metavar="PANEL",
+        help="the panel file; without one that of KIOSK_PANEL, else the shipped one",
+    )
+    add("--host", default="127.0.0.1", help="where the server listens; default: %(default)s")
+    add("--port", default=8000, type=_port, help="default: %(default)s")
+    add("--mode", choices=("demo", "live"), help="instead of what the panel file says (KIOSK_MODE)")
+    add("--zenoh", type=_path, metavar="FILE", help="Zenoh configuration (KIOSK_ZENOH)")
+    add("--data", type=_path, metavar="FOLDER", help="the server's data folder (KIOSK_DATA)")
+    add(
+        "--listen",
+        type=_seconds,
+        default=LISTEN_S,
+        metavar="SECONDS",
+        help="how long to listen to the robot at most; default: %(default)g",
+    )
+
+
+def _path(text: str) -> Path:
+    return Path(text).expanduser().resolve()
+
+
+def _port(text: str) -> int:
+    port = int(text) if text.isascii() and text.isdigit() else 0
+    if not 0 < port < 1 << 16:
+        raise ArgumentTypeError(f'"{text}" is not a port: 1 to 65535')
+    return port
+
+
+def _seconds(text: str) -> float:
+    try:
+        seconds = float(text)
+    except ValueError:
+        seconds = -1.0
+    if not 0 < seconds <= LONGEST_LISTEN_S:
+        raise ArgumentTypeError(f'"{text}" is not a time: up to {LONGEST_LISTEN_S:g} seconds')
+    return seconds

@@ -1,0 +1,91 @@
+"""All checks, in the order in which one would look: panel file, this machine, the way to each robot,
+its graph."""
+
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final
+
+from app.diagnose.findings import Report
+from app.diagnose.fonts import HasFont, check_fonts, has_font
+from app.diagnose.machine import FreeBytes, check_data, check_port, free_bytes
+from app.diagnose.names import PanelRobot
+from app.diagnose.robot import LISTEN_S, check_robot, check_way
+from app.diagnose.screen import DRM, check_screens
+from app.errors import PanelError
+from app.graph.model import RosGraph
+from app.i18n import ENGLISH
+from app.panel import Panel, load_panel
+from app.settings import Settings
+
+UNKNOWN_TYPE: Final = re.compile(
+    r'" is not (an interface|a service|an action) of ROS 2|" is not there: '
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Machine:
+    """What is asked of this machine; tests give another one."""
+
+    has_font: HasFont = has_font
+    screens: Path = DRM
+    free_bytes: FreeBytes = free_bytes
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Options:
+    """`host` and `port` are those of the server, `listen_s` is how long the robot is listened to."""
+
+    host: str = "127.0.0.1"
+    port: int = 8000
+    listen_s: float = LISTEN_S
+    machine: Machine = field(default_factory=Machine)
+
+
+@dataclass(slots=True)
+class Diagnosis:
+    """What was found. `graphs` are the robots' graphs by their ids, of those that could be reached."""
+
+    report: Report = field(default_factory=Report)
+    panel: Panel | None = None
+    graphs: dict[str, RosGraph] = field(default_factory=dict)
+
+
+async def diagnose(settings: Settings, options: Options) -> Diagnosis:
+    """PanelError for a panel file that can't be read at all; its faults are findings."""
+    found = Diagnosis()
+    report = found.report
+    found.panel = panel = _panel(report, settings)
+    mode = settings.mode or (panel.mode if panel else "live")
+    served = check_port(report, options.host, options.port)
+    machine = options.machine
+    check_data(report, settings.data_folder(mode), panel, served, machine.free_bytes)
+    check_fonts(report, panel.readers_languages if panel else (ENGLISH,), machine.has_font)
+    if panel is not None:
+        check_screens(report, panel, machine.screens)
+    if mode == "demo":
+        report.find("demo_mode", str(panel.title) if panel else "")
+    elif panel is None:
+        await check_way(report, "", settings.zenoh, ())
+    else:
+        for entry in panel.robots or (None,):
+            robot = PanelRobot(panel, entry)
+            graph = await check_robot(report, robot, settings.zenoh, options.listen_s)
+            if graph is not None:
+                found.graphs[robot.id] = graph
+    return found
+
+
+def _panel(report: Report, settings: Settings) -> Panel | None:
+    """None for a panel file with faults: what does not need it is looked at all the same."""
+    try:
+        panel = load_panel(settings.panel)
+    except PanelError as error:
+        if error.unreadable:
+            raise
+        for fault in error.faults:
+            code = "type_unknown" if UNKNOWN_TYPE.search(fault.message) else "panel_fault"
+            report.find(code, fault.location, detail=fault.message)
+        return None
+    report.fact(f'the panel "{panel.title}" ({settings.panel}) has no faults')
+    return panel

@@ -1,0 +1,99 @@
+"""What a panel needs of one robot, and where that is in the robot's graph. Pure."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from app.dialect.endpoint import within
+from app.graph.model import BridgeRoute, Node, RobotGraph, RosGraph, Server, Topic, TopicEndpoint
+from app.interfaces.names import key_of
+from app.panel.model import Panel, RobotEntry
+
+
+@dataclass(frozen=True, slots=True)
+class PanelRobot:
+    """A panel, and one of its robots: `entry` is None where it has only one."""
+
+    panel: Panel
+    entry: RobotEntry | None = None
+
+    @property
+    def id(self) -> str:
+        return self.entry.id if self.entry else ""
+
+    @property
+    def namespace(self) -> str:
+        return self.entry.namespace if self.entry else self.panel.namespace
+
+    def key(self, name: str) -> str:
+        return key_of(name, self.namespace)
+
+    def needed(self) -> set[str]:
+        """The names of all topics, services, actions and nodes that the panel uses."""
+        panel = self.panel
+        servers = {name for widget in panel.widgets() for _, name in widget.endpoints()}
+        nodes = {widget.node for widget in panel.parameters()}
+        return {*panel.listened(), *panel.publications(), *servers, *nodes} - {"/parameter_events"}
+
+
+@dataclass(frozen=True, slots=True)
+class Behind:
+    """What is behind those of a link's bridges that may have this robot, by the panel's names."""
+
+    robot: PanelRobot
+    graphs: tuple[RobotGraph, ...]
+
+    @classmethod
+    def of(cls, robot: PanelRobot, graph: RosGraph) -> "Behind":
+        return cls(robot, tuple(one for one in graph.robots if within(robot.namespace, one.namespace)))
+
+    def _places(self, name: str) -> Iterator[tuple[RobotGraph, str]]:
+        """Each graph, with the name as the robot has it there: without the bridge's namespace."""
+        for graph in self.graphs:
+            yield graph, f"/{self.robot.key(name)}".removeprefix(graph.namespace)
+
+    def topics(self, name: str) -> list[Topic]:
+        return [topic for graph, own in self._places(name) if (topic := graph.topic(own)) is not None]
+
+    def publishers(self, name: str) -> list[TopicEndpoint]:
+        return [one for topic in self.topics(name) for one in topic.publishers]
+
+    def subscribers(self, name: str) -> list[TopicEndpoint]:
+        return [one for topic in self.topics(name) for one in topic.subscribers]
+
+    def is_announced(self, name: str) -> bool:
+        """Whether a bridge passes a topic on."""
+        return any(topic.announced for topic in self.topics(name))
+
+    def services(self, name: str) -> list[Server]:
+        return [one for graph, own in self._places(name) for one in graph.services if one.name == own]
+
+    def actions(self, name: str) -> list[Server]:
+        return [one for graph, own in self._places(name) for one in graph.actions if one.name == own]
+
+    def nodes(self) -> list[Node]:
+        return [node for graph in self.graphs for node in graph.nodes]
+
+    def has_node(self, name: str) -> bool:
+        return any(graph.node(own) is not None for graph, own in self._places(name))
+
+    def offers(self, name: str) -> bool:
+        """Whether a node has a service or an action of this name, announced by its bridge or not."""
+        return any(
+            own in node.services or own in node.actions
+            for graph, own in self._places(name)
+            for node in graph.nodes
+        )
+
+    def routes(self, name: str) -> list[BridgeRoute]:
+        key = self.robot.key(name)
+        return [one for graph in self.graphs for one in graph.routes if one.key == key]
+
+    def elsewhere(self, names: set[str]) -> Iterator[tuple[str, str]]:
+        """(what there is, the namespace before it) of names that end like the panel's."""
+        own = self.robot.namespace
+        for graph in self.graphs:
+            topics, servers = (t.name for t in graph.topics), (*graph.services, *graph.actions)
+            for there in (f"{graph.namespace}{one}" for one in (*topics, *(s.name for s in servers))):
+                for name in names:
+                    if there.endswith(name) and there != f"{own}{name}":
+                        yield there, there.removesuffix(name)

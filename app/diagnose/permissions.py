@@ -1,0 +1,74 @@
+"""The panel's interlocks: whether their publishers stay, repeat themselves and permit now. Pure."""
+
+from typing import Final
+
+from app.diagnose.findings import Report
+from app.diagnose.names import Behind
+from app.diagnose.watch import Watched
+from app.errors import DecodeError
+from app.i18n import TextLike, render, say
+from app.interfaces import Interfaces
+from app.panel.interlock import Interlock
+from app.permission.conditions import permits, unmet
+
+REGULAR: Final = 2  # messages while one listens
+
+
+def check_permissions(report: Report, behind: Behind, watched: Watched, interfaces: Interfaces) -> None:
+    for topic in dict.fromkeys(one.topic for one in behind.robot.panel.interlocks):
+        _check_topic(report, behind, watched, topic)
+    for interlock in behind.robot.panel.interlocks:
+        _check_value(report, behind, watched, interlock, interfaces)
+
+
+def _check_topic(report: Report, behind: Behind, watched: Watched, topic: str) -> None:
+    """Whether its publisher stays, and a panel that starts later would get a permission."""
+    using = [one for one in behind.robot.panel.interlocks if one.topic == topic]
+    key, ids = behind.robot.key(topic), ", ".join(one.id for one in using)
+    count, window = len(watched.live(key)), f"{watched.window_s:.1f}"
+    publishers = behind.publishers(topic)
+    robot = behind.robot.id
+    if not publishers:
+        ended = watched.samples[key] or key in watched.lost
+        code = "permission_ends" if ended else "permission_no_publisher"
+        report.find(code, topic, robot=robot, ids=ids)
+        return
+    limits = [one.max_age_s for one in using if one.max_age_s is not None]
+    if limits and watched.longest_gap(key) > min(limits):
+        report.find(
+            "permission_stale",
+            topic,
+            robot=robot,
+            ids=ids,
+            count=count,
+            window=window,
+            limit=f"{min(limits):g}",
+        )
+    elif count < REGULAR and not any(one.qos.transient_local for one in publishers):
+        report.find("permission_not_latched", topic, robot=robot, ids=ids, count=count, window=window)
+    else:
+        report.fact(f"permission {topic} came {len(watched.samples[key])} times in {window} s")
+
+
+def _check_value(
+    report: Report, behind: Behind, watched: Watched, interlock: Interlock, interfaces: Interfaces
+) -> None:
+    """Whether the last value permits; nothing is said of one that is unknown."""
+    samples = watched.samples[behind.robot.key(interlock.topic)]
+    if not samples:
+        return
+    reader = interfaces.field_reader(interlock.type, [interlock.field])
+    try:
+        value = reader.read(bytes(samples[-1].payload)).get(interlock.field)
+    except DecodeError:  # another type, which is said of the topic
+        return
+    if permits(interlock, value):
+        return
+    reason: TextLike
+    if value is None:
+        reason = say("missing", field=interlock.field, topic=interlock.topic)
+    elif interlock.conditions:
+        reason = unmet(interlock, value)
+    else:
+        reason = say("forbidden", name=interlock.name)
+    report.find("permission_refused", interlock.topic, robot=behind.robot.id, detail=render(reason))

@@ -1,0 +1,155 @@
+"""The panel's topics, services, actions and parameters in the robot's graph: there, of the right type,
+definition, QoS and DDS. Pure."""
+
+from collections.abc import Iterable, Sequence
+from typing import Final
+
+from app.diagnose.bridges import denies
+from app.diagnose.findings import Report
+from app.diagnose.names import Behind
+from app.errors import InterfaceError
+from app.graph.model import Server, TopicEndpoint
+from app.interfaces import Interfaces
+from app.interfaces.names import Qos
+from app.panel.widgets.parameter import DESCRIBE, EVENTS, GET, SET
+from app.panel.widgets.service_action import Call
+
+HASH: Final = "RIHS01_"
+BEST_EFFORT: Final = "it is published best effort, and the panel asks for reliable."
+VOLATILE: Final = "it is published volatile, and the panel asks for transient local."
+WANTS_RELIABLE: Final = "its node asks for reliable, and the panel publishes best effort."
+WANTS_LATCHED: Final = "its node asks for transient local, and the panel publishes volatile."
+
+
+class TopicChecks:
+    """Everything but permissions, which are judged by what they say too."""
+
+    def __init__(
+        self,
+        report: Report,
+        behind: Behind,
+        interfaces: Interfaces,
+        earlier: Behind | None = None,
+    ) -> None:
+        """`earlier` is what was there some seconds before: a bridge announces a new publisher late."""
+        self._report = report
+        self._earlier = earlier or behind
+        self._behind = behind
+        self._interfaces = interfaces
+        self._panel = behind.robot.panel
+        self._robot = behind.robot.id
+        self._permissions = {one.topic for one in self._panel.interlocks}
+
+    def check(self) -> None:
+        for topic, wanted in self._panel.listened().items():
+            if topic != EVENTS:
+                self._check_listened(topic, wanted)
+        for topic, wanted in self._panel.publications().items():
+            self._check_published(topic, wanted)
+        calls = {w.service: w.type for w in self._panel.widgets() if isinstance(w, Call)}
+        for name, wanted in calls.items():
+            self._check_server("service", name, wanted, self._behind.services(name))
+        for name, wanted in self._panel.actions().items():
+            self._check_server("action", name, wanted, self._behind.actions(name))
+        for node in dict.fromkeys(widget.node for widget in self._panel.parameters()):
+            self._check_parameters(node)
+
+    def _find(self, code: str, about: str, **details: object) -> None:
+        self._report.find(code, about, robot=self._robot, **details)
+
+    def _check_listened(self, topic: str, wanted: str) -> None:
+        publishers = self._behind.publishers(topic)
+        if not publishers:
+            if topic not in self._permissions:
+                self._find("topic_no_publisher", topic)
+            return
+        if self._is_held_back("publishers", topic):
+            return
+        self._check_types(topic, wanted, publishers)
+        qos = self._panel.qos(topic).wire_qos
+        if qos.reliable and any(one.qos.reliable is False for one in publishers):
+            self._find("topic_qos", topic, detail=BEST_EFFORT)
+        if qos.transient_local and not all(one.qos.transient_local for one in publishers):
+            self._find("topic_qos", topic, detail=VOLATILE)
+        if self._is_unrouted(topic):
+            self._find("topic_unrouted", topic)
+
+    def _is_unrouted(self, topic: str) -> bool:
+        """Whether the bridge knows the publisher and does not pass it on, for whatever reason."""
+        known = (self._earlier, self._behind)
+        lost = all(one.publishers(topic) and not one.is_announced(topic) for one in known)
+        routes = self._behind.routes(topic)
+        return lost or any(r.direction == "pub" and r.remote and not r.endpoint for r in routes)
+
+    def _check_published(self, topic: str, wanted: str) -> None:
+        subscribers = self._behind.subscribers(topic)
+        if not subscribers:
+            self._find("topic_no_subscriber", topic)
+            return
+        if self._is_held_back("subscribers", topic):
+            return
+        self._check_types(topic, wanted, subscribers)
+        misfits = [_misfit(one, self._panel.qos(topic).wire_qos) for one in subscribers]
+        if all(misfits):  # one that gets it is enough
+            self._find("topic_qos", topic, detail=misfits[0])
+
+    def _is_held_back(self, kind: str, topic: str) -> bool:
+        """Whether a bridge knows a topic and does not announce it, by its file."""
+        if self._behind.is_announced(topic) or not self._is_denied(kind, topic):
+            return False
+        self._find("bridge_denies", topic)
+        return True
+
+    def _is_denied(self, kind: str, name: str) -> bool:
+        key = f"/{self._behind.robot.key(name)}"
+        return any(
+            denies(graph.bridges, kind, key.removeprefix(graph.namespace))
+            for graph in self._behind.graphs
+        )
+
+    def _check_types(self, topic: str, wanted: str, ends: Iterable[TopicEndpoint]) -> None:
+        for end in ends:
+            if end.type != wanted:
+                self._find("topic_type", topic, found=end.type, wanted=wanted)
+            elif self._differs(end.type_hash, wanted):
+                self._find("definition_differs", topic, type=wanted)
+
+    def _differs(self, theirs: str, type_name: str) -> bool:
+        """Whether the robot's definition is known to be another one, by its hash (REP 2016)."""
+        try:
+            return theirs.startswith(HASH) and theirs != self._interfaces.type_hash(type_name)
+        except InterfaceError:  # a distribution without hashes
+            return False
+
+    def _check_server(self, what: str, name: str, wanted: str, servers: Sequence[Server]) -> None:
+        """`what` is "service" or "action"."""
+        if not servers:
+            held = self._behind.offers(name) and self._is_denied(f"{what}_servers", name)
+            self._find("bridge_denies" if held else f"{what}_absent", name)
+            return
+        for server in servers:
+            if server.type != wanted:
+                self._find(f"{what}_type", name, found=server.type, wanted=wanted)
+            elif not server.can_be_called:
+                self._find("wrong_rmw", name, vendor=server.dds)
+
+    def _check_parameters(self, node: str) -> None:
+        names = [f"{node}/{service}" for service, _ in (GET, DESCRIBE, SET)]
+        served = [server for name in names for server in self._behind.services(name)]
+        held = [n for n in names if self._behind.offers(n) and self._is_denied("service_servers", n)]
+        if held:
+            self._find("bridge_denies", held[0])
+        elif not served:
+            self._find("parameters_absent", node)
+        for server in served:
+            if not server.can_be_called:
+                self._find("wrong_rmw", node, vendor=server.dds)
+
+
+def _misfit(subscriber: TopicEndpoint, qos: Qos) -> str:
+    """Why a subscriber does not get what is published with this QoS; "" where it does."""
+    if subscriber.qos.reliable and not qos.reliable:
+        return WANTS_RELIABLE
+    if subscriber.qos.transient_local and not qos.transient_local:
+        return WANTS_LATCHED
+    return ""

@@ -1,0 +1,103 @@
+"""What a robot's topics say while one listens: how often, how late by which clock, how many times."""
+
+import asyncio
+import time
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Final
+
+from app.dialect import bridge_dialect
+from app.robot.sample import Sample
+from app.transport.declarations import Declarations
+from app.transport.inbox import Changes
+from app.transport.zenoh_session import ZenohSession
+
+POLL_S: Final = 0.05
+LEAST_S: Final = 1.0  # for what a latched publisher kept, and for copies
+ENOUGH: Final = 3  # messages of a topic; more say nothing new
+COPIES_WITHIN_S: Final = 0.02
+APART: Final = 3  # times farther than copies are messages that can be told from them
+
+
+@dataclass(slots=True)
+class Watched:
+    """What came on each topic within `window_s`, by key; `began` and `ended` in monotonic seconds.
+    `lost` are the keys of those whose publisher ended."""
+
+    began: float = 0.0
+    ended: float = 0.0
+    samples: defaultdict[str, list[Sample]] = field(default_factory=lambda: defaultdict(list))
+    lost: set[str] = field(default_factory=set)
+
+    @property
+    def window_s(self) -> float:
+        return self.ended - self.began
+
+    def live(self, key: str) -> list[Sample]:
+        """Without what was kept from before."""
+        return [sample for sample in self.samples[key] if not sample.cached]
+
+    def longest_gap(self, key: str) -> float:
+        """Seconds without a message: between two, or from the last one to the end."""
+        times = [sample.at for sample in self.live(key)]
+        return max((b - a for a, b in pairwise([*times, self.ended])), default=self.window_s)
+
+
+async def watch(
+    session: ZenohSession, topics: Mapping[str, str], wanted: Iterable[str], longest_s: float
+) -> Watched:
+    """Listens to the topics (key → key expression): until each of `wanted` has come often enough, or
+    for `longest_s`."""
+    found = Watched(began=time.monotonic())
+    session.start(Declarations(subscribe=topics, whole=topics.keys()))
+    waited_for = set(wanted)
+    end = found.began + longest_s
+    while (now := time.monotonic()) < end:
+        await asyncio.sleep(POLL_S)
+        changes = session.drain()
+        for key, sample in changes.kept:
+            found.samples[key].append(sample)
+        found.lost |= {key for key in map(_published, _lost(changes)) if key}
+        if now - found.began >= min(LEAST_S, longest_s):
+            heard = {key for key in waited_for if len(found.live(key)) >= ENOUGH}
+            waited_for -= heard | found.lost
+            if not waited_for:
+                break
+    found.ended = time.monotonic()
+    return found
+
+
+def _lost(changes: Changes) -> Iterable[str]:
+    return (token for token, change in changes.tokens.items() if change.lost_seq)
+
+
+def _published(token: str) -> str:
+    """The key that a publisher's token is about; "" for any other token."""
+    endpoint = bridge_dialect.parsed(token)
+    return endpoint.key if endpoint is not None and endpoint.role == "MP" else ""
+
+
+def copies(samples: Sequence[Sample]) -> int:
+    """How many times each message comes from one bridge: 1 where they can't be told from a publisher
+    that repeats itself. Pure."""
+    by_source: defaultdict[str | None, list[Sample]] = defaultdict(list)
+    for sample in samples:
+        by_source[sample.source].append(sample)
+    return max((_copies(several) for several in by_source.values()), default=1)
+
+
+def _copies(samples: Sequence[Sample]) -> int:
+    groups: list[list[Sample]] = []
+    for sample in samples:
+        last = groups[-1][-1] if groups else None
+        same = last is not None and bytes(last.payload) == bytes(sample.payload)
+        if last is not None and same and sample.at - last.at <= COPIES_WITHIN_S:
+            groups[-1].append(sample)
+        else:
+            groups.append([sample])
+    apart = [b[0].at - a[-1].at for a, b in pairwise(groups)]
+    if not apart or min(apart) < APART * COPIES_WITHIN_S:
+        return 1
+    return min(map(len, groups))

@@ -1,0 +1,29 @@
+"""The tables of findings in docs/how-to/doctor.md, made from app/diagnose/wording.py."""
+
+import re
+from typing import Final
+
+from app.diagnose.findings import KINDS
+
+SEVERITIES: Final = ("error", "warning", "note")
+
+
+def findings_tables() -> dict[str, str]:
+    """Name of the section → table, one for each severity."""
+    return {f"findings {severity}": _table(severity) for severity in SEVERITIES}
+
+
+def _table(severity: str) -> str:
+    rows = [
+        (f"`{code}`", _shown(kind.what), _shown(kind.do))
+        for code, kind in KINDS.items()
+        if kind.severity == severity
+    ]
+    lines = [("Code", "What is wrong", "What to do"), ("---",) * 3, *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def _shown(sentence: str) -> str:
+    """With `…` for the name that it is about, and names of the other parameters in italics."""
+    text = sentence.replace("{about}", "…")
+    return re.sub(r"\{(\w+)\}", lambda found: f"*{found[1].replace('_', ' ')}*", text)

@@ -1,0 +1,336 @@
+"""`operator-panel doctor` on broken set-ups of the real bridge and real nodes: each is named right, and
+nothing else is."""
+
+import socket
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import pytest
+import zenoh
+
+from app.cli.command import main
+from tests.diagnose.setups import (
+    BOOL,
+    LONGEST_S,
+    STRING,
+    Setup,
+    action,
+    button,
+    call,
+    interlock,
+    named,
+    panel_of,
+    parameter,
+    readout,
+)
+from tests.support.cyclone import Client
+from tests.support.parts import Bridge, RosNode, free_port, until
+
+TRIGGER = "std_srvs/srv/Trigger"
+LIST_PARAMETERS = "rcl_interfaces/srv/ListParameters"
+JOINTS = "sensor_msgs/msg/JointState"
+SEEN = ("/permission", "/words", "/stamped", "/simulated", "/lossy", "/once", "/cell/elsewhere")
+
+
+@pytest.fixture(scope="module")
+def shared(domain: int) -> Iterator[Bridge]:
+    mine = Bridge(domain + 3)
+    mine.start()
+    yield mine
+    mine.end()
+
+
+@pytest.fixture(scope="module")
+def robot(shared: Bridge) -> Iterator[RosNode]:
+    """A node whose topics the bridge has announced."""
+    node, client = RosNode(shared.domain), Client(shared.endpoint)
+    node.advertise("/permission", BOOL)
+    node.every("/permission", {"data": True}, 0.1)
+    node.advertise("/words", STRING)
+    node.every("/words", {"data": "hello"}, 0.2)
+    node.advertise("/stamped", JOINTS)
+    node.every("/stamped", {"header": {"stamp": {"sec": 1_700_000_000}}}, 0.2)
+    node.advertise("/simulated", JOINTS)
+    node.every("/simulated", {"header": {"stamp": {"sec": 12}}}, 0.2)
+    node.advertise("/lossy", STRING, reliability="best_effort")
+    node.advertise("/once", BOOL)
+    node.subscribe("/heard", STRING)
+    node.advertise("/cell/elsewhere", STRING)
+    offered = [f"/system_controller/{name}_parameters" for name in ("list", "get")]
+    until(lambda: announced(client, *SEEN, "/heard", *offered), "the bridge has announced them")
+    yield node
+    client.close()
+    node.end()
+
+
+@pytest.fixture
+def setup(tmp_path: Path) -> Setup:
+    return Setup(tmp_path)
+
+
+def announced(client: Client, *names: str) -> bool:
+    tokens = client.tokens()
+    return all(any(f"{name}/" in token for token in tokens) for name in names)
+
+
+WELL = panel_of(interlock("/permission"), readout("/words"), button("/heard"))
+# What is broken, and what is said of it: (code, name) of each finding.
+BROKEN: list[tuple[str, str, list[tuple[str, str]]]] = [
+    (
+        "a topic of another type",
+        panel_of(readout("/words", BOOL)),
+        [("topic_type", "/words")],
+    ),
+    (
+        "a topic that nobody publishes",
+        panel_of(readout("/wrods")),
+        [("topic_no_publisher", "/wrods")],
+    ),
+    (
+        "a press that nobody hears",
+        panel_of(button("/nobody")),
+        [("topic_no_subscriber", "/nobody")],
+    ),
+    (
+        "a permission that nobody publishes",
+        panel_of(interlock("/nowhere")),
+        [("permission_no_publisher", "/nowhere")],
+    ),
+    (
+        "a volatile permission that is not repeated",
+        panel_of(interlock("/once")),
+        [("permission_not_latched", "/once")],
+    ),
+    (
+        "a permission that comes too seldom",
+        panel_of(interlock("/once", max_age_s=0.5)),
+        [("permission_stale", "/once")],
+    ),
+    (
+        "a robot with a namespace that the panel does not have",
+        panel_of(readout("/elsewhere")),
+        [("robot_elsewhere", ""), ("topic_no_publisher", "/elsewhere")],
+    ),
+    (
+        "another QoS",
+        panel_of(readout("/lossy")),
+        [("topic_qos", "/lossy")],
+    ),
+    (
+        "a service that nobody offers",
+        panel_of(call("/no_service", TRIGGER)),
+        [("service_absent", "/no_service")],
+    ),
+    (
+        "a service of another type",
+        panel_of(call("/system_controller/list_parameters", TRIGGER)),
+        [("service_type", "/system_controller/list_parameters")],
+    ),
+    (
+        "a service of a node on Fast DDS",
+        panel_of(call("/system_controller/list_parameters", LIST_PARAMETERS)),
+        [("wrong_rmw", "/system_controller/list_parameters")],
+    ),
+    (
+        "parameters of a node on Fast DDS",
+        panel_of(parameter("/system_controller")),
+        [("wrong_rmw", "/system_controller")],
+    ),
+    (
+        "parameters of a node that does not run",
+        panel_of(parameter("/arm")),
+        [("parameters_absent", "/arm")],
+    ),
+    (
+        "an action that nobody offers",
+        panel_of(action("/no_action")),
+        [("action_absent", "/no_action")],
+    ),
+    (
+        "a clock that is years behind",
+        panel_of(readout("/stamped", JOINTS, field="header.stamp.sec")),
+        [("clock_differs", "the stamps on /stamped")],
+    ),
+    (
+        "simulated time",
+        panel_of(readout("/simulated", JOINTS, field="header.stamp.sec")),
+        [("simulated_time", "/simulated")],
+    ),
+]
+
+
+@pytest.mark.parametrize(("text", "expected"), [b[1:] for b in BROKEN], ids=[b[0] for b in BROKEN])
+def test_what_is_broken_is_named_and_nothing_else(
+    text: str, expected: list[tuple[str, str]], shared: Bridge, robot: RosNode, setup: Setup
+) -> None:
+    by_what_it_says = {"permission_not_latched", "permission_stale", "clock_differs", "simulated_time"}
+    listen_s = LONGEST_S if expected[0][0] in by_what_it_says else 0.2
+    found = setup.findings(text, shared.endpoint, listen_s)
+    assert named(found) == expected
+    assert all(one.what and one.do for one in found)
+
+
+def test_where_all_is_well_nothing_is_named(shared: Bridge, robot: RosNode, setup: Setup) -> None:
+    found = setup.diagnose(WELL, shared.endpoint)
+    assert found.report.findings == []
+    facts = "\n".join(found.report.facts)
+    assert f"domain {shared.domain}" in facts
+    assert "Zenoh 1.10" in facts
+    assert "clock of the bridge's machine is within 1 s" in facts
+
+
+def test_a_publisher_that_ends_after_its_message_is_told_from_one_that_is_not_there(
+    shared: Bridge, robot: RosNode, setup: Setup
+) -> None:
+    text = panel_of(interlock("/hasty"))
+    with ThreadPoolExecutor() as pool:
+        published = pool.submit(robot.once, "/hasty", BOOL, {"data": True})
+        found = setup.findings(text, shared.endpoint, listen_s=15)
+        published.result()
+    assert named(found) == [("permission_ends", "/hasty")]
+
+
+def test_a_permission_that_says_no_is_a_note(shared: Bridge, setup: Setup) -> None:
+    node, client = RosNode(shared.domain, "refuser"), Client(shared.endpoint)
+    try:
+        node.advertise("/refused", BOOL, durability="transient_local")
+        node.publish("/refused", {"data": False})
+        until(lambda: announced(client, "/refused"), "announced")
+        found = setup.diagnose(panel_of(interlock("/refused")), shared.endpoint)
+        assert found.report.is_well
+        assert "permission_refused" in found.report.codes()
+    finally:
+        client.close()
+        node.end()
+
+
+def test_a_definition_that_is_another_one_is_named(
+    shared: Bridge, robot: RosNode, setup: Setup
+) -> None:
+    messages = setup.folder / "std_msgs/msg"
+    messages.mkdir(parents=True)
+    (messages / "String.msg").write_text("string data\nint32 length\n")
+    text = panel_of(readout("/words"), more='interfaces = ["std_msgs"]\n')
+    assert named(setup.findings(text, shared.endpoint)) == [("definition_differs", "/words")]
+
+
+def test_nobody_listens(setup: Setup) -> None:
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    assert named(setup.findings(WELL, endpoint)) == [("no_router", endpoint)]
+
+
+def test_a_name_that_nobody_knows(setup: Setup) -> None:
+    endpoint = "tcp/robot.invalid:7447"
+    assert named(setup.findings(WELL, endpoint)) == [("host_unknown", endpoint)]
+
+
+def test_a_port_where_no_zenoh_speaks(setup: Setup) -> None:
+    with closing(socket.create_server(("127.0.0.1", 0))) as silent:
+        endpoint = f"tcp/127.0.0.1:{silent.getsockname()[1]}"
+        assert named(setup.findings(WELL, endpoint)) == [("not_zenoh", endpoint)]
+
+
+def test_a_router_without_a_bridge(setup: Setup, peer: tuple[str, zenoh.Session]) -> None:
+    endpoint, _ = peer
+    assert named(setup.findings(WELL, endpoint)) == [("no_bridge", endpoint)]
+
+
+def test_a_bridge_with_another_namespace(domain: int, setup: Setup) -> None:
+    with started(Bridge(domain + 4, "/robot1")) as bridge:
+        (found,) = setup.findings(WELL, bridge.endpoint)
+        assert (found.code, found.details["theirs"]) == ("bridge_namespace", "/robot1")
+
+
+def test_a_bridge_in_a_domain_without_nodes(domain: int, setup: Setup) -> None:
+    with started(Bridge(domain + 4)) as bridge:
+        (found,) = setup.findings(WELL, bridge.endpoint)
+        assert (found.code, found.details["domain"]) == ("bridge_domain", str(domain + 4))
+
+
+def test_a_bridge_that_drops_in_silence(domain: int, setup: Setup) -> None:
+    option = "plugins/ros2dds/reliable_routes_blocking=false"
+    with started(Bridge(domain + 4, options=[option])) as bridge:
+        found = setup.findings(WELL, bridge.endpoint)
+        assert [one.code for one in found] == ["bridge_drops", "bridge_domain"]
+
+
+def test_a_frozen_bridge(domain: int, setup: Setup) -> None:
+    with started(Bridge(domain + 4)) as bridge:
+        bridge.freeze()
+        assert named(setup.findings(WELL, bridge.endpoint)) == [("not_zenoh", bridge.endpoint)]
+
+
+def test_two_bridges_for_one_robot(shared: Bridge, robot: RosNode, setup: Setup) -> None:
+    other = Bridge(shared.domain, options=[f'connect/endpoints=["{shared.endpoint}"]'])
+    with started(other), closing(Client(other.endpoint)) as client:
+        until(lambda: both(client), "both bridges forward it")
+        codes = [one.code for one in setup.findings(WELL, shared.endpoint)]
+        assert codes[0] == "bridges_two"
+
+
+def both(client: Client) -> bool:
+    return sum("MP/words/" in token for token in client.tokens()) == 2
+
+
+def test_a_bridge_that_holds_a_topic_back(
+    shared: Bridge, robot: RosNode, domain: int, setup: Setup
+) -> None:
+    setup.panel.write_text(panel_of(interlock("/permission")))
+    file, mine = setup.folder / "bridge.json5", Bridge(shared.domain)
+    options = ["--domain", str(mine.domain), "--listen", mine.endpoint, "-o", str(file)]
+    assert main(["bridge-config", str(setup.panel), *options]) == 0
+    mine.configure(file)
+    with started(mine), closing(Client(mine.endpoint)) as client:
+        until(lambda: announced(client, "/permission"), "announced")
+        text = panel_of(interlock("/permission"), readout("/words"), button("/heard"))
+        assert named(setup.findings(text, mine.endpoint)) == [
+            ("bridge_denies", "/words"),
+            ("bridge_denies", "/heard"),
+        ]
+
+
+def test_a_bridge_of_another_version(setup: Setup, peer: tuple[str, zenoh.Session]) -> None:
+    endpoint, session = peer
+    zid = session.zid()
+    answers = {"version": '"v1.4.0"', "config": '{"namespace": "/", "domain": 3}'}
+    node = '{"publishers": [], "subscribers": [], "service_servers": []}'
+    served = [
+        session.declare_queryable(f"@/{zid}/ros2/{name}", said(f"@/{zid}/ros2/{name}", text))
+        for name, text in {**answers, "node/0110aa/arm": node}.items()
+    ]
+    token = session.liveliness().declare_token(f"@/{zid}/@ros2_lv")
+    (first, *_) = setup.findings(panel_of(), endpoint, listen_s=0.1)
+    assert (first.code, first.details["theirs"]) == ("bridge_version", "1.4.0")
+    token.undeclare()
+    for one in served:
+        one.undeclare()
+
+
+def test_a_bridge_that_is_there_and_does_not_respond(
+    setup: Setup, peer: tuple[str, zenoh.Session]
+) -> None:
+    endpoint, session = peer
+    token = session.liveliness().declare_token(f"@/{session.zid()}/@ros2_lv")
+    assert named(setup.findings(WELL, endpoint)) == [("bridge_silent", str(session.zid()))]
+    token.undeclare()
+
+
+def said(key: str, text: str) -> Callable[[zenoh.Query], None]:
+    return lambda query: query.reply(key, text)
+
+
+class started:
+    """A bridge that runs while it is entered."""
+
+    def __init__(self, bridge: Bridge) -> None:
+        self._bridge = bridge
+
+    def __enter__(self) -> Bridge:
+        self._bridge.start()
+        return self._bridge
+
+    def __exit__(self, *_: Any) -> None:
+        self._bridge.end()

@@ -1,0 +1,95 @@
+"""The findings are complete: each has its sentences, is made somewhere, and is in the documentation."""
+
+import re
+from string import Formatter
+from typing import Final
+
+import pytest
+
+from app.diagnose.findings import KINDS, Report
+from app.diagnose.watch import copies
+from app.robot.sample import Sample
+from app.settings import PACKAGE
+from tests.support.parts import TESTS
+
+SOURCES: Final = {path.name: path.read_text() for path in (PACKAGE / "diagnose").glob("*.py")}
+CODE: Final = "".join(text for name, text in SOURCES.items() if name != "wording.py")
+TESTED: Final = "".join(path.read_text() for path in (TESTS / "diagnose").glob("*.py"))
+
+
+@pytest.mark.parametrize("code", KINDS)
+def test_each_finding_is_made_by_a_check(code: str) -> None:
+    made = set(re.findall(r'"([a-z_]+)"', CODE)) | {"service_type", "service_absent"}
+    made |= {"action_type", "action_absent"}  # of f"{what}_type" and f"{what}_absent"
+    assert code in made
+
+
+@pytest.mark.parametrize("code", KINDS)
+def test_each_finding_is_named_in_a_test(code: str) -> None:
+    assert f'"{code}"' in TESTED
+
+
+@pytest.mark.parametrize("code", KINDS)
+def test_each_sentence_ends_as_one_and_says_what_to_do(code: str) -> None:
+    kind = KINDS[code]
+    assert re.search(r"[.?)}]$", kind.what)
+    assert kind.do.endswith((".", "?"))
+    assert kind.what[0] in "{ABCDEFGHIJKLMNOPQRSTUVWXYZ"
+
+
+def test_a_code_that_is_none_is_refused() -> None:
+    with pytest.raises(KeyError, match="on_fire"):
+        Report().find("on_fire")
+
+
+def test_the_same_is_found_once_and_notes_do_not_count() -> None:
+    report = Report()
+    for _ in range(2):
+        report.find("server_running", "here")
+    assert report.codes() == ["server_running"]
+    assert report.is_well
+    report.find("no_router", "there")
+    assert not report.is_well
+
+
+def test_what_a_robot_says_is_made_printable() -> None:
+    report = Report()
+    report.find("topic_type", "/a", found="\x1b[2J", wanted="{about}")
+    assert report.findings[0].what == "/a is \\u001b[2J on the robot and {about} in the panel file."
+
+
+@pytest.mark.parametrize("code", KINDS)
+def test_placeholders_are_names(code: str) -> None:
+    kind = KINDS[code]
+    names = {name for text in (kind.what, kind.do) for _, name, _, _ in Formatter().parse(text) if name}
+    assert all(name.isidentifier() for name in names)
+
+
+def sample(at: float, payload: bytes = b"x", source: str = "a") -> Sample:
+    return Sample(payload, 0, at, at, source)
+
+
+@pytest.mark.parametrize(
+    ("times", "expected"),
+    [
+        ([], 1),
+        ([0.0, 0.001], 1),  # one message only: it may have been published twice
+        ([0.0, 0.5, 1.0], 1),
+        ([0.0, 0.001, 0.5, 0.501, 1.0, 1.002], 2),
+        ([0.0, 0.001, 0.5, 1.0, 1.002], 1),
+        ([0.0, 0.01, 0.02, 0.03, 0.04, 0.05], 1),  # 100 Hz
+    ],
+)
+def test_copies_are_told_from_a_fast_publisher(times: list[float], expected: int) -> None:
+    assert copies([sample(at) for at in times]) == expected
+
+
+def test_the_same_by_two_bridges_are_no_copies_of_one() -> None:
+    both = [
+        sample(at + late, source=source) for at in (0.0, 0.5) for late, source in ((0, "a"), (0, "b"))
+    ]
+    assert copies(both) == 1
+
+
+def test_others_close_by_are_no_copies() -> None:
+    assert copies([sample(at + i / 1000, bytes([i])) for at in (0.0, 0.5) for i in range(3)]) == 1

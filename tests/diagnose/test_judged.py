@@ -1,0 +1,185 @@
+"""What the doctor makes of a graph, of samples and of answers that real parts give only by accident."""
+
+import asyncio
+import json
+import socket
+from dataclasses import replace
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from app.diagnose import link
+from app.diagnose.bridges import denies
+from app.diagnose.clocks import check_clocks
+from app.diagnose.findings import Report
+from app.diagnose.names import Behind, PanelRobot
+from app.diagnose.robot import check_copies
+from app.diagnose.topics import TopicChecks
+from app.diagnose.watch import Watched
+from app.graph.model import (
+    Bridge,
+    BridgeRoute,
+    EndpointQos,
+    RobotGraph,
+    RosGraph,
+    Server,
+    Topic,
+    TopicEndpoint,
+)
+from app.interfaces import load_interfaces
+from app.panel import load_panel
+from app.robot.sample import Sample
+from tests.diagnose.setups import BOOL, STRING, action, named, panel_of, readout
+
+QOS = EndpointQos(reliable=True)
+BRIDGE = Bridge(zid="b1", version="v1.10.2", config={"namespace": "/", "domain": 0})
+INTERFACES = load_interfaces("jazzy")
+SENT = INTERFACES.encode(STRING, {"data": "x"})
+
+
+def robot(folder: Path, text: str) -> PanelRobot:
+    path = folder / "cell1.toml"
+    path.write_text(text)
+    return PanelRobot(load_panel(path))
+
+
+def topic(name: str, of: str = STRING, qos: EndpointQos = QOS) -> Topic:
+    one = TopicEndpoint(type=of, qos=qos, bridge="b1")
+    return Topic(name=name, key=name[1:], publishers=(one,))
+
+
+def judged(robot: PanelRobot, **graph: Any) -> Report:
+    report = Report()
+    behind = Behind.of(robot, RosGraph(robots=(RobotGraph(bridges=(BRIDGE,), **graph),)))
+    TopicChecks(report, behind, INTERFACES).check()
+    return report
+
+
+def test_an_action_of_another_type(tmp_path: Path) -> None:
+    server = Server(name="/count", key="count", type="cell_msgs/action/Count", bridge="b1")
+    report = judged(robot(tmp_path, panel_of(action("/count"))), actions=(server,))
+    assert named(report.findings) == [("action_type", "/count")]
+
+
+@pytest.mark.parametrize(
+    ("endpoint", "remote", "expected"),
+    [("", ("us:words",), ["topic_unrouted"]), ("0110aa", ("us:words",), []), ("", (), [])],
+)
+def test_a_route_without_its_reader(
+    endpoint: str, remote: tuple[str, ...], expected: list[str], tmp_path: Path
+) -> None:
+    route = BridgeRoute(
+        bridge="b1",
+        kind="topic",
+        direction="pub",
+        name="/words",
+        key="words",
+        type=STRING,
+        remote=remote,
+        endpoint=endpoint,
+    )
+    here = robot(tmp_path, panel_of(readout("/words")))
+    assert judged(here, topics=(topic("/words"),), routes=(route,)).codes() == expected
+
+
+def test_a_publisher_that_the_bridge_has_lost(tmp_path: Path) -> None:
+    here = robot(tmp_path, panel_of(readout("/words")))
+    lost = replace(topic("/words"), announced=False)
+    assert judged(here, topics=(lost,)).codes() == ["topic_unrouted"]
+    new = Behind.of(here, RosGraph(robots=(RobotGraph(bridges=(BRIDGE,), topics=(lost,)),)))
+    report, before = Report(), Behind.of(here, RosGraph(robots=(RobotGraph(bridges=(BRIDGE,)),)))
+    TopicChecks(report, new, INTERFACES, before).check()
+    assert report.codes() == []
+
+
+def test_a_namespace_of_the_bridge_is_before_the_robots_names(tmp_path: Path) -> None:
+    text = panel_of(readout("/words"), more='namespace = "/robot1"\n')
+    bridged = RobotGraph(namespace="/robot1", bridges=(BRIDGE,), topics=(topic("/words"),))
+    other = RobotGraph(namespace="/robot2", bridges=(BRIDGE,), topics=(topic("/words", BOOL),))
+    report = Report()
+    behind = Behind.of(robot(tmp_path, text), RosGraph(robots=(bridged, other)))
+    TopicChecks(report, behind, INTERFACES).check()
+    assert report.codes() == []
+
+
+@pytest.mark.parametrize(
+    ("config", "expected"),
+    [
+        ({}, False),
+        ({"allow": {"publishers": "^/words$|^/speed$"}}, False),
+        ({"allow": {"publishers": "^/speed$"}}, True),
+        ({"allow": {"subscribers": "^/words$"}}, True),  # nothing is said of publishers
+        ({"deny": {"publishers": "^/wor.*$"}}, True),
+        ({"deny": {"subscribers": "^/words$"}}, False),
+        ({"deny": {"publishers": "^/(?<no python>"}}, True),
+    ],
+)
+def test_what_a_bridge_holds_back(config: dict[str, Any], expected: bool) -> None:
+    assert denies([Bridge(zid="b1", config=config)], "publishers", "/words") is expected
+
+
+def watched(*samples: tuple[float, float | None]) -> Watched:
+    """Of /words: (when it came, by the sender's clock)."""
+    found = Watched(began=0.0, ended=3.0)
+    found.samples["words"] = [Sample(SENT, 0, at, at, "b1", sent=sent) for at, sent in samples]
+    return found
+
+
+@pytest.mark.parametrize(
+    ("ahead_s", "expected"), [(0.3, []), (-75.0, ["clock_differs"]), (90.0, ["clock_differs"])]
+)
+def test_the_clock_of_the_bridges_machine(ahead_s: float, expected: list[str], tmp_path: Path) -> None:
+    report = Report()
+    came = watched(*((at, at + ahead_s) for at in (0.1, 1.1, 2.1)))
+    check_clocks(report, robot(tmp_path, panel_of(readout("/words"))), came, INTERFACES)
+    assert report.codes() == expected
+    for one in report.findings:
+        assert f"{abs(ahead_s):.1f} s {'ahead of' if ahead_s > 0 else 'behind'}" in one.what
+
+
+def test_a_clock_that_nothing_is_known_of(tmp_path: Path) -> None:
+    report = Report()
+    here = robot(tmp_path, panel_of(readout("/words")))
+    check_clocks(report, here, watched((0.1, None)), INTERFACES)
+    assert report.codes() == ["clock_unknown"]
+
+
+def test_readers_that_a_bridge_has_piled_up(tmp_path: Path) -> None:
+    report = Report()
+    here = robot(tmp_path, panel_of(readout("/words")))
+    check_copies(report, here, watched(*((at + c / 1000, at) for at in (0.1, 1.1) for c in range(3))))
+    assert named(report.findings) == [("bridge_piled_readers", "/words")]
+    assert report.findings[0].details["times"] == 3
+
+
+@pytest.mark.parametrize(
+    ("theirs", "expected"),
+    [("v1.4.0-12-gabc", ["zenoh_version"]), (f"v{version('eclipse-zenoh')}", [])],
+)
+def test_another_version_of_zenoh(theirs: str, expected: list[str]) -> None:
+    class Session:
+        zid = "us"
+
+        async def ask(self, selector: str, within_s: float) -> list[tuple[str, bytes]]:
+            far = {"sessions": [{"peer": "them"}], "version": "v0.5.0"}
+            near = {"sessions": [{"peer": "us"}], "version": theirs}
+            answers = [b"no JSON", json.dumps(far).encode(), json.dumps(near).encode()]
+            return [(selector, one) for one in answers] if "router" in selector else []
+
+    report = Report()
+    asyncio.run(link.check_version(report, Session(), "tcp/robot:7447", ""))
+    assert report.codes() == expected
+    assert len(report.facts) == 1 - len(expected)
+
+
+@pytest.mark.parametrize("error", [TimeoutError(), OSError(113, "No route to host")])
+def test_a_host_that_does_not_answer(error: OSError, monkeypatch: pytest.MonkeyPatch) -> None:
+    def connect(*_: Any) -> socket.socket:
+        raise error
+
+    monkeypatch.setattr(socket, "create_connection", connect)
+    report = Report()
+    assert not link.connects(report, "tcp/192.0.2.1:7447", "")
+    assert report.codes() == ["no_route"]

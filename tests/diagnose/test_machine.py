@@ -1,0 +1,238 @@
+"""What the doctor finds on this machine: port, data folder, disk, fonts, screens."""
+
+import json
+import os
+import socket
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from app.cli.command import main
+from app.diagnose.findings import KINDS, Report
+from app.diagnose.fonts import check_fonts, has_font
+from app.diagnose.machine import MB, check_data, check_port
+from app.diagnose.screen import check_screens, displays
+from app.panel import load_panel
+from tests.diagnose.setups import Setup, named, panel_of, readout
+from tests.support.fonts import fonts_file
+from tests.support.parts import ROOT, Server, free_port
+
+NO_ROUTER = "tcp/127.0.0.1:9"  # the discard port: nothing listens
+
+
+@pytest.fixture
+def setup(tmp_path: Path) -> Setup:
+    return Setup(tmp_path)
+
+
+def edid(width: int, height: int, width_mm: int, height_mm: int) -> bytes:
+    """What a screen of this size says of itself."""
+    said = bytearray(128)
+    said[:8] = bytes.fromhex("00ffffffffffff00")
+    said[21:23] = width_mm // 10, height_mm // 10
+    timing = bytearray(18)
+    timing[2], timing[4] = width & 0xFF, width >> 4 & 0xF0
+    timing[5], timing[7] = height & 0xFF, height >> 4 & 0xF0
+    timing[12], timing[13] = width_mm & 0xFF, height_mm & 0xFF
+    timing[14] = width_mm >> 4 & 0xF0 | height_mm >> 8 & 0x0F
+    said[54:72] = timing
+    return bytes(said)
+
+
+def connect(root: Path, said: bytes, name: str = "card0-HDMI-A-1", status: str = "connected") -> None:
+    folder = root / name
+    folder.mkdir()
+    (folder / "status").write_text(f"{status}\n")
+    (folder / "edid").write_bytes(said)
+
+
+def codes(setup: Setup, text: str = "") -> list[str]:
+    """Without the one about the router that is not there."""
+    found = setup.diagnose(text or panel_of(), NO_ROUTER).report.codes()
+    return [code for code in found if code != "no_router"]
+
+
+def test_a_free_port_a_writable_folder_fonts_and_no_screen_are_well(setup: Setup) -> None:
+    assert codes(setup) == []
+    assert not setup.data.exists()  # it only looks
+
+
+def test_a_port_of_another_program_is_named(setup: Setup) -> None:
+    with closing(socket.create_server(("127.0.0.1", setup.port))):
+        assert codes(setup) == ["port_in_use"]
+
+
+def test_an_address_that_is_not_this_machines() -> None:
+    report = Report()
+    check_port(report, "192.0.2.99", free_port())
+    (found,) = report.findings
+    assert found.code == "address_unusable"
+    assert "can't assign" in found.what or "cannot assign" in found.what
+
+
+@pytest.fixture
+def server() -> Iterator[Server]:
+    mine = Server(ROOT, KIOSK_MODE="live", KIOSK_ZENOH=str(ROOT / "zenoh.json5"))
+    yield mine
+    mine.end()
+
+
+def test_a_server_of_ours_is_told_from_another_program(setup: Setup, server: Server) -> None:
+    setup.port, setup.data = server.port, server.data
+    found = setup.diagnose(panel_of(), NO_ROUTER).report
+    assert found.codes()[:2] == ["server_running", "server_not_ready"]
+    assert "bridge" in found.findings[1].what
+    assert "data_in_use" not in found.codes()
+
+
+def test_a_data_folder_that_another_server_has(setup: Setup, server: Server) -> None:
+    setup.data = server.data
+    assert codes(setup) == ["data_in_use"]
+
+
+@pytest.mark.parametrize("place", ["file/data", "/proc/data"])
+def test_a_folder_that_cannot_be_written(setup: Setup, place: str) -> None:
+    (setup.folder / "file").write_text("")
+    setup.data = setup.folder / place
+    assert codes(setup) == ["data_unwritable"]
+
+
+def test_a_full_disk(setup: Setup) -> None:
+    setup.machine["free_bytes"] = lambda folder: 20 * MB
+    found = setup.diagnose(panel_of(), NO_ROUTER).report.findings
+    (full,) = [one for one in found if one.code == "data_full"]
+    assert full.details == {"free_mb": 20, "needed_mb": 562}  # the log's 512 and others
+
+
+def test_what_is_there_already_is_not_needed_again(setup: Setup) -> None:
+    setup.data.mkdir()
+    with (setup.data / "operators-log.sqlite3").open("wb") as file:
+        os.truncate(file.fileno(), 500 * MB)
+    report = Report()
+    setup.panel.write_text(panel_of())
+    check_data(report, setup.data, load_panel(setup.panel), False, lambda folder: 70 * MB)
+    assert report.is_well
+
+
+@pytest.mark.parametrize(("fonts", "missing"), [("dejavu", ["ja"]), ("cjk", [])])
+def test_japanese_needs_its_fonts(
+    fonts: str, missing: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("FONTCONFIG_FILE", str(fonts_file(fonts, tmp_path)))
+    report = Report()
+    check_fonts(report, ("en", "ja"), has_font)
+    assert named(report.findings) == [("fonts_missing", tag) for tag in missing]
+    assert all("fonts-noto-cjk" in one.do for one in report.findings)
+
+
+def test_without_fontconfig_the_files_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", "")
+    monkeypatch.setattr("app.diagnose.fonts.FOLDERS", (tmp_path,))
+    assert not has_font("en")
+    (tmp_path / "DejaVuSans.ttf").touch()
+    assert has_font("en")
+    assert not has_font("ja")
+    (tmp_path / "NotoSansCJK-Regular.ttc").touch()
+    assert has_font("ja")
+
+
+@pytest.mark.parametrize(
+    ("size", "expected"),
+    [
+        ((1280, 800, 282, 176), []),  # 0.22 mm for a pixel, as the panel has it
+        ((1280, 800, 150, 94), ["screen_small_targets"]),  # a 7-inch screen
+        ((1280, 800, 518, 324), ["screen_scale"]),
+        ((1280, 800, 0, 0), ["screen_unknown"]),
+    ],
+)
+def test_a_screen_is_measured(
+    setup: Setup, size: tuple[int, int, int, int], expected: list[str]
+) -> None:
+    connect(setup.screens, edid(*size))
+    assert codes(setup) == expected
+
+
+def test_the_key_that_comes_out_too_small_is_told_in_mm(setup: Setup) -> None:
+    connect(setup.screens, edid(1280, 800, 150, 94))
+    found = setup.diagnose(panel_of(), NO_ROUTER).report.findings[0]
+    assert "a key of 20 mm is 11 mm wide" in found.what
+    assert "mm_per_px = 0.117" in found.do
+
+
+def test_a_page_that_does_not_fit_the_screen(setup: Setup) -> None:
+    connect(setup.screens, edid(800, 480, 176, 106))
+    many = [readout(f"/topic{number}") for number in range(40)]
+    text = panel_of(*many).replace('title = "Main"\n', 'title = "Main"\nfit = true\n')
+    assert codes(setup, text) == ["page_too_large"]
+
+
+def test_what_is_no_screen_is_passed_over(tmp_path: Path) -> None:
+    connect(tmp_path, edid(1280, 800, 282, 176), "card0-DP-1", "disconnected")
+    connect(tmp_path, b"", "card0-HDMI-A-1")
+    connect(tmp_path, b"\xff" * 128, "card1-DP-1")
+    (tmp_path / "card0-VGA-1").mkdir()
+    assert list(displays(tmp_path)) == []
+    report = Report()
+    check_screens(report, load_panel(ROOT / "app/panel.toml"), tmp_path)
+    assert report.facts == []
+    assert report.findings == []
+
+
+def test_a_type_without_definition_and_another_fault(setup: Setup) -> None:
+    text = panel_of(readout("/door", "cell_msgs/msg/Door"))
+    assert codes(setup, text) == ["type_unknown"]
+    text += readout("/lamp").replace('label = "/lamp"', "")
+    assert codes(setup, text) == ["type_unknown", "panel_fault"]
+
+
+def test_the_command_says_it_in_its_exit_status(
+    setup: Setup, capsys: pytest.CaptureFixture[str]
+) -> None:
+    setup.panel.write_text(panel_of(more='mode = "demo"\n'))
+    command = ["doctor", str(setup.panel), "--port", str(setup.port), "--data", str(setup.data)]
+    assert main([*command, "--verbose"]) == 0
+    said = capsys.readouterr().out
+    assert f"ok       127.0.0.1 port {setup.port} is free" in said
+    assert "note     demo_mode: " in said
+    assert "\nAll is well: 1 note, " in said
+    with closing(socket.create_server(("127.0.0.1", setup.port))):
+        assert main([*command, "--json"]) == 1
+    found = json.loads(capsys.readouterr().out)
+    assert found["well"] is False
+    assert set(found) == {"version", "panel", "well", "findings", "facts"}
+    first, second = found["findings"]
+    assert second["code"] == "demo_mode"
+    assert first == {
+        "severity": "error",
+        "code": "port_in_use",
+        "about": f"127.0.0.1 port {setup.port}",
+        "robot": "",
+        "what": f"Another program listens on 127.0.0.1 port {setup.port}, and it is no panel server.",
+        "do": KINDS["port_in_use"].do,
+    }
+    setup.panel.unlink()
+    assert main(command) == 2
+    assert str(setup.panel) in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("option", "words"),
+    [("--port=0", "is not a port: 1 to 65535"), ("--listen=no", "is not a time: up to 600 seconds")],
+)
+def test_a_mistake_on_the_command_line(
+    option: str, words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit):
+        main(["doctor", option])
+    assert words in capsys.readouterr().err
+
+
+def test_a_zenoh_file_that_cannot_be_used(setup: Setup, capsys: pytest.CaptureFixture[str]) -> None:
+    setup.panel.write_text(panel_of())
+    file = setup.folder / "mine.json5"
+    file.write_text("{ mode: 3 }")
+    where = ["--zenoh", str(file), "--data", str(setup.data), "--port", str(setup.port)]
+    assert main(["doctor", str(setup.panel), *where]) == 1
+    assert "zenoh_config" in capsys.readouterr().out
