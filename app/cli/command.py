@@ -20,6 +20,7 @@ COMMANDS = {
     "hz": "show how often a topic is published",
     "scaffold": "write a first panel that fits a running robot",
     "doctor": "find out what is wrong between a panel, this machine and the robot",
+    "support": "collect what support needs to know in a zip file",
     "bridge-config": "write a configuration of the bridge that fits a panel",
     "completion": "print a shell's completion of these commands",
 }
@@ -58,6 +59,8 @@ def _command(name: str) -> Command:
             from app.cli.scaffold import main
         case "doctor":
             from app.cli.doctor import main
+        case "support":
+            from app.cli.support import main
         case "bridge-config":
             from app.cli.bridge_config import main
         case "completion":

@@ -1,0 +1,86 @@
+"""`operator-panel support [PANEL]`: a zip of what support needs to know, listed before it is written.
+
+Exit status: 0 written or listed, 1 it can't be written, 2 a mistake on the command line, or not wanted.
+"""
+
+import asyncio
+import os
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final
+
+from app.cli.doctor import add_options, as_json, options_of, settings_of
+from app.cli.parser import Parser
+from app.diagnose.bundle import Part, Sources, journal, parts, write
+from app.diagnose.doctor import diagnose
+from app.errors import KioskError
+
+PROG: Final = "python -m app.cli support"
+
+
+def main(arguments: Sequence[str], prog: str = PROG) -> int:
+    given = _parser(prog).parse_args(arguments)
+    file = given.output or Path(time.strftime("operator-panel-support-%Y%m%d-%H%M%S.zip"))
+    if not given.list and not given.yes and not sys.stdin.isatty():
+        print("nobody can be asked here: give --yes to write it, or --list", file=sys.stderr)
+        return 2
+    try:
+        settings, options = settings_of(given), options_of(given)
+        found = asyncio.run(diagnose(settings, options))
+    except KioskError as error:
+        print(error, file=sys.stderr)
+        return 2
+    sources = Sources(environment=os.environ, journal=journal)
+    made = parts(settings, options, found, as_json(settings, found), sources)
+    print(listed(made))
+    if given.list:
+        return 0
+    if not given.yes and not _wanted(file):
+        print("nothing was written")
+        return 2
+    try:
+        size = write(file, made)
+    except FileExistsError:
+        print(f"{file} is there already", file=sys.stderr)
+        return 1
+    except OSError as error:
+        print(f"{file} can't be written: {error.strerror}", file=sys.stderr)
+        return 1
+    print(f"{file}: {_size(size)}")
+    return 0
+
+
+def listed(made: Sequence[Part]) -> str:
+    """What the bundle holds, a line for each file."""
+    lines = [f"  {one.name:32} {_size(one.size):>8}  {one.about}" for one in made]
+    return "\n".join(["The bundle holds:", *lines, "Without passwords, tokens, keys and typed values."])
+
+
+def _size(count: int) -> str:
+    return f"{count / 1000:.1f} kB" if count < 1_000_000 else f"{count / 1_000_000:.1f} MB"
+
+
+def _wanted(file: Path) -> bool:
+    return input(f"Write {file}? [y/N] ").strip().lower() in ("y", "yes")
+
+
+def _parser(prog: str) -> Parser:
+    parser = Parser(
+        prog=prog,
+        description="Collects what support needs to know in a zip file: panel, settings, versions, the"
+        " last hour of logs, state, ROS graph, metrics and the doctor's findings. It lists what the"
+        " file holds, and asks before it writes it.",
+        epilog="Exit status: 0 written or listed, 1 it can't be written, 2 a mistake on the command"
+        " line, or not wanted.",
+    )
+    parser.add_argument(
+        "-o", "--output", type=Path, metavar="FILE", help="the zip; default: one named by the time"
+    )
+    parser.add_argument(
+        "--list", action="store_true", help="list what it would hold, and write nothing"
+    )
+    parser.add_argument("-y", "--yes", action="store_true", help="write it without a question")
+    add_options(parser)
+    return parser
