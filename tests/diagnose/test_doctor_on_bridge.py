@@ -32,7 +32,16 @@ from tests.support.parts import Bridge, RosNode, free_port, until
 TRIGGER = "std_srvs/srv/Trigger"
 LIST_PARAMETERS = "rcl_interfaces/srv/ListParameters"
 JOINTS = "sensor_msgs/msg/JointState"
-SEEN = ("/permission", "/words", "/stamped", "/simulated", "/lossy", "/once", "/cell/elsewhere")
+SEEN = (
+    "/permission",
+    "/words",
+    "/stamped",
+    "/simulated",
+    "/lossy",
+    "/once",
+    "/refused",
+    "/cell/elsewhere",
+)
 
 
 @pytest.fixture(scope="module")
@@ -57,6 +66,8 @@ def robot(shared: Bridge) -> Iterator[RosNode]:
     node.every("/simulated", {"header": {"stamp": {"sec": 12}}}, 0.2)
     node.advertise("/lossy", STRING, reliability="best_effort")
     node.advertise("/once", BOOL)
+    node.advertise("/refused", BOOL, durability="transient_local")
+    node.publish("/refused", {"data": False})
     node.subscribe("/heard", STRING)
     node.advertise("/cell/elsewhere", STRING)
     offered = [f"/system_controller/{name}_parameters" for name in ("list", "get")]
@@ -193,18 +204,10 @@ def test_a_publisher_that_ends_after_its_message_is_told_from_one_that_is_not_th
     assert named(found) == [("permission_ends", "/hasty")]
 
 
-def test_a_permission_that_says_no_is_a_note(shared: Bridge, setup: Setup) -> None:
-    node, client = RosNode(shared.domain, "refuser"), Client(shared.endpoint)
-    try:
-        node.advertise("/refused", BOOL, durability="transient_local")
-        node.publish("/refused", {"data": False})
-        until(lambda: announced(client, "/refused"), "announced")
-        found = setup.diagnose(panel_of(interlock("/refused")), shared.endpoint)
-        assert found.report.is_well
-        assert "permission_refused" in found.report.codes()
-    finally:
-        client.close()
-        node.end()
+def test_a_permission_that_says_no_is_a_note(shared: Bridge, robot: RosNode, setup: Setup) -> None:
+    found = setup.diagnose(panel_of(interlock("/refused")), shared.endpoint)
+    assert found.report.is_well
+    assert "permission_refused" in found.report.codes()
 
 
 def test_a_definition_that_is_another_one_is_named(
@@ -215,6 +218,19 @@ def test_a_definition_that_is_another_one_is_named(
     (messages / "String.msg").write_text("string data\nint32 length\n")
     text = panel_of(readout("/words"), more='interfaces = ["std_msgs"]\n')
     assert named(setup.findings(text, shared.endpoint)) == [("definition_differs", "/words")]
+
+
+def test_of_several_robots_each_is_looked_at(shared: Bridge, robot: RosNode, setup: Setup) -> None:
+    lost = f"tcp/127.0.0.1:{free_port()}"
+    entries = (
+        f'{{ id = "left", name = "Left", connect = ["{shared.endpoint}"] }},'
+        f' {{ id = "right", name = "Right", namespace = "/right", connect = ["{lost}"] }}'
+    )
+    text = panel_of(readout("/wrods"), more=f"robot = [{entries}]\n")
+    found = setup.diagnose(text, shared.endpoint, listen_s=0.2)
+    said = [(one.robot, one.code) for one in found.report.findings if one.severity != "note"]
+    assert said == [("left", "topic_no_publisher"), ("right", "no_router")]
+    assert set(found.graphs) == {"left"}
 
 
 def test_nobody_listens(setup: Setup) -> None:

@@ -27,6 +27,14 @@ def setup(tmp_path: Path) -> Setup:
     return Setup(tmp_path)
 
 
+@pytest.fixture
+def another_program(setup: Setup, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """It has the panel's port, and says nothing."""
+    monkeypatch.setattr("app.diagnose.machine.ANSWER_S", 0.1)
+    with closing(socket.create_server(("127.0.0.1", setup.port))):
+        yield
+
+
 def edid(width: int, height: int, width_mm: int, height_mm: int) -> bytes:
     """What a screen of this size says of itself."""
     said = bytearray(128)
@@ -59,9 +67,9 @@ def test_a_free_port_a_writable_folder_fonts_and_no_screen_are_well(setup: Setup
     assert not setup.data.exists()  # it only looks
 
 
+@pytest.mark.usefixtures("another_program")
 def test_a_port_of_another_program_is_named(setup: Setup) -> None:
-    with closing(socket.create_server(("127.0.0.1", setup.port))):
-        assert codes(setup) == ["port_in_use"]
+    assert codes(setup) == ["port_in_use"]
 
 
 def test_an_address_that_is_not_this_machines() -> None:
@@ -187,18 +195,35 @@ def test_a_type_without_definition_and_another_fault(setup: Setup) -> None:
     assert codes(setup, text) == ["type_unknown", "panel_fault"]
 
 
-def test_the_command_says_it_in_its_exit_status(
+def command(setup: Setup, *more: str) -> list[str]:
+    setup.panel.write_text(panel_of(more='mode = "demo"\n'))
+    where = ["--port", str(setup.port), "--data", str(setup.data)]
+    return ["doctor", str(setup.panel), *where, *more]
+
+
+def test_the_command_ends_with_0_where_all_is_well(
     setup: Setup, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    setup.panel.write_text(panel_of(more='mode = "demo"\n'))
-    command = ["doctor", str(setup.panel), "--port", str(setup.port), "--data", str(setup.data)]
-    assert main([*command, "--verbose"]) == 0
+    assert main(command(setup, "--verbose")) == 0
     said = capsys.readouterr().out
     assert f"ok       127.0.0.1 port {setup.port} is free" in said
     assert "note     demo_mode: " in said
     assert "\nAll is well: 1 note, " in said
-    with closing(socket.create_server(("127.0.0.1", setup.port))):
-        assert main([*command, "--json"]) == 1
+
+
+@pytest.mark.usefixtures("another_program")
+def test_the_command_ends_with_1_where_something_is_wrong(
+    setup: Setup, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(command(setup)) == 1
+    said = capsys.readouterr().out
+    assert said.startswith("error    port_in_use: Another program listens on 127.0.0.1 port ")
+    assert "\nSomething is wrong: 1 error, 1 note, " in said
+
+
+@pytest.mark.usefixtures("another_program")
+def test_the_command_speaks_json_to_programs(setup: Setup, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(command(setup, "--json")) == 1
     found = json.loads(capsys.readouterr().out)
     assert found["well"] is False
     assert set(found) == {"version", "panel", "well", "findings", "facts"}
@@ -212,8 +237,14 @@ def test_the_command_says_it_in_its_exit_status(
         "what": f"Another program listens on 127.0.0.1 port {setup.port}, and it is no panel server.",
         "do": KINDS["port_in_use"].do,
     }
+
+
+def test_the_command_ends_with_2_where_it_cannot_look(
+    setup: Setup, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = command(setup)
     setup.panel.unlink()
-    assert main(command) == 2
+    assert main(arguments) == 2
     assert str(setup.panel) in capsys.readouterr().err
 
 
