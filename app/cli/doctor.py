@@ -9,12 +9,13 @@ import sys
 from argparse import ArgumentTypeError
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import groupby
 from pathlib import Path
 from typing import Any, Final
 
 from app.cli.parser import Parser
 from app.diagnose.doctor import Diagnosis, Options, diagnose
-from app.diagnose.findings import Report
+from app.diagnose.findings import SEVERITIES, Finding, Report
 from app.diagnose.robot import LISTEN_S
 from app.diagnose.versions import installed_version
 from app.errors import KioskError
@@ -63,22 +64,26 @@ def as_json(settings: Settings, found: Diagnosis) -> dict[str, Any]:
 
 
 def as_text(report: Report, verbose: bool = False) -> str:
-    """One paragraph for each finding, errors first."""
+    """A line for each finding, errors first; after those of one kind what to do about them."""
     lines = [f"ok       {fact}" for fact in report.facts] if verbose else []
-    for severity in ("error", "warning", "note"):
-        for one in report.findings:
-            if one.severity == severity:
-                robot = f" of robot {one.robot}" if one.robot else ""
-                lines += [f"{severity:8} {one.code}{robot}: {one.what}", f"         → {one.do}"]
+    ordered = [one for severity in SEVERITIES for one in report.findings if one.severity == severity]
+    for advice, found in groupby(ordered, lambda one: one.do):
+        lines += map(_line, found)
+        lines.append(f"         → {advice}")
     counts = [
         (number, severity)
-        for severity in ("error", "warning", "note")
-        if (number := sum(one.severity == severity for one in report.findings))
+        for severity in SEVERITIES
+        if (number := sum(one.severity == severity for one in ordered))
     ]
     said = ", ".join(f"{number} {severity}{'s' * (number > 1)}" for number, severity in counts)
     what = "All is well" if report.is_well else "Something is wrong"
     lines.append(f"{what}: {said or 'nothing was found'}, {len(report.facts)} checks were passed.")
     return "\n".join(lines)
+
+
+def _line(one: Finding) -> str:
+    robot = f" of robot {one.robot}" if one.robot else ""
+    return f"{one.severity:8} {one.code}{robot}: {one.what}"
 
 
 def _parser(prog: str) -> Parser:

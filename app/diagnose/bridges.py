@@ -69,7 +69,7 @@ def _check_nodes(report: Report, behind: Behind, bridges: Sequence[Bridge]) -> b
     if not topics and not nodes:
         report.find("bridge_domain", robot=behind.robot.id, domain=domain)
         return False
-    report.fact(f"{len(nodes)} nodes and {topics} topics are there in domain {domain}")
+    report.fact(f"domain {domain} has nodes: {len(nodes)}, and topics: {topics}")
     needed = behind.robot.needed()
     there = any(behind.topics(n) or behind.offers(n) or behind.has_node(n) for n in needed)
     if not there and (found := next(behind.elsewhere(needed), None)) is not None:

@@ -4,7 +4,7 @@ to do about it. A new finding is a row of `wording.py`; docs/how-to/doctor.md is
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, get_args
 
 from app.diagnose import wording
 from app.printable import printable
@@ -12,6 +12,7 @@ from app.printable import printable
 # An error keeps the panel, or a part of it, from working. A warning lets it work, but not always or not
 # as meant. A note is worth knowing, and is no reason for another exit status.
 Severity = Literal["error", "warning", "note"]
+SEVERITIES: Final[tuple[Severity, ...]] = get_args(Severity)
 
 
 @dataclass(frozen=True, slots=True)

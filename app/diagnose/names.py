@@ -2,9 +2,19 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Literal
 
 from app.dialect.endpoint import within
-from app.graph.model import BridgeRoute, Node, RobotGraph, RosGraph, Server, Topic, TopicEndpoint
+from app.graph.model import (
+    BridgeRoute,
+    Node,
+    RobotGraph,
+    RosGraph,
+    Server,
+    Topic,
+    TopicEndpoint,
+    near,
+)
 from app.interfaces.names import key_of
 from app.panel.model import Panel, RobotEntry
 
@@ -88,6 +98,13 @@ class Behind:
         key = self.robot.key(name)
         return [one for graph in self.graphs for one in graph.routes if one.key == key]
 
+    def hint(self, name: str, kind: Literal["topics", "services", "actions"]) -> str:
+        """A sentence with similar names that are there; "" without one."""
+        there = [f"{graph.namespace}{one.name}" for graph in self.graphs for one in _of(graph, kind)]
+        own = self.robot.namespace
+        similar = [one.removeprefix(own) for one in near(f"{own}{name}", there)]
+        return f" Did you mean {' or '.join(similar)}?" if similar else ""
+
     def elsewhere(self, names: set[str]) -> Iterator[tuple[str, str]]:
         """(what there is, the namespace before it) of names that end like the panel's."""
         own = self.robot.namespace
@@ -97,3 +114,12 @@ class Behind:
                 for name in names:
                     if there.endswith(name) and there != f"{own}{name}":
                         yield there, there.removesuffix(name)
+
+
+def _of(graph: RobotGraph, kind: str) -> tuple[Topic, ...] | tuple[Server, ...]:
+    match kind:
+        case "topics":
+            return graph.topics
+        case "services":
+            return graph.services
+    return graph.actions

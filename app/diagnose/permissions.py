@@ -29,9 +29,11 @@ def _check_topic(report: Report, behind: Behind, watched: Watched, topic: str) -
     publishers = behind.publishers(topic)
     robot = behind.robot.id
     if not publishers:
-        ended = watched.samples[key] or key in watched.lost
-        code = "permission_ends" if ended else "permission_no_publisher"
-        report.find(code, topic, robot=robot, ids=ids)
+        if watched.samples[key] or key in watched.lost:
+            report.find("permission_ends", topic, robot=robot, ids=ids)
+        else:
+            hint = behind.hint(topic, "topics")
+            report.find("permission_no_publisher", topic, robot=robot, ids=ids, hint=hint)
         return
     limits = [one.max_age_s for one in using if one.max_age_s is not None]
     if limits and watched.longest_gap(key) > min(limits):

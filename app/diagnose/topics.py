@@ -61,7 +61,8 @@ class TopicChecks:
         publishers = self._behind.publishers(topic)
         if not publishers:
             if topic not in self._permissions:
-                self._find("topic_no_publisher", topic)
+                hint = self._behind.hint(topic, "topics")
+                self._find("topic_no_publisher", topic, hint=hint)
             return
         if self._is_held_back("publishers", topic):
             return
@@ -84,7 +85,8 @@ class TopicChecks:
     def _check_published(self, topic: str, wanted: str) -> None:
         subscribers = self._behind.subscribers(topic)
         if not subscribers:
-            self._find("topic_no_subscriber", topic)
+            hint = self._behind.hint(topic, "topics")
+            self._find("topic_no_subscriber", topic, hint=hint)
             return
         if self._is_held_back("subscribers", topic):
             return
@@ -124,8 +126,11 @@ class TopicChecks:
     def _check_server(self, what: str, name: str, wanted: str, servers: Sequence[Server]) -> None:
         """`what` is "service" or "action"."""
         if not servers:
-            held = self._behind.offers(name) and self._is_denied(f"{what}_servers", name)
-            self._find("bridge_denies" if held else f"{what}_absent", name)
+            if self._behind.offers(name) and self._is_denied(f"{what}_servers", name):
+                self._find("bridge_denies", name)
+                return
+            hint = self._behind.hint(name, "services" if what == "service" else "actions")
+            self._find(f"{what}_absent", name, hint=hint)
             return
         for server in servers:
             if server.type != wanted:

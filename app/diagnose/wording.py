@@ -1,6 +1,6 @@
 """The sentences of the findings, by code: what is wrong, and what to do. `{about}` is the name that a
-finding is about. They are for the one who sets a panel up, not for its operators, and in English as the
-other commands are.
+finding is about, `{hint}` a further sentence, or "". They are for the one who sets a panel up, not for
+its operators, and in English as the other commands are.
 """
 
 from collections.abc import Mapping
@@ -127,7 +127,7 @@ ERRORS: Final[Rows] = {
     ),
     # Permissions
     "permission_no_publisher": (
-        "No node publishes the permission {about} (interlock {ids}).",
+        "No node publishes the permission {about} (interlock {ids}).{hint}",
         "Start the node; compare the topic's name and namespace (`ros2 topic list -t`).",
     ),
     "permission_ends": (
@@ -145,7 +145,7 @@ ERRORS: Final[Rows] = {
     ),
     # Services, actions, parameters
     "service_absent": (
-        "No node offers the service {about}.",
+        "No node offers the service {about}.{hint}",
         "Start its node; compare name and namespace (`ros2 service list`).",
     ),
     "service_type": (
@@ -153,7 +153,7 @@ ERRORS: Final[Rows] = {
         "Correct `type` in the panel file, or the service's name.",
     ),
     "action_absent": (
-        "No node offers the action {about}.",
+        "No node offers the action {about}.{hint}",
         "Start its node; compare name and namespace (`ros2 action list`).",
     ),
     "action_type": (
@@ -219,11 +219,11 @@ WARNINGS: Final[Rows] = {
         "do not fit the robot's.",
     ),
     "topic_no_publisher": (
-        "No node publishes {about}.",
+        "No node publishes {about}.{hint}",
         "Start the node; compare the topic's name and namespace (`ros2 topic list -t`).",
     ),
     "topic_no_subscriber": (
-        "No node subscribes to {about}: a press has no effect.",
+        "No node subscribes to {about}: a press has no effect.{hint}",
         "Start the node; compare the topic's name and namespace (`ros2 topic info -v`).",
     ),
     "permission_not_latched": (

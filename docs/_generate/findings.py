@@ -1,11 +1,8 @@
 """The tables of findings in docs/how-to/doctor.md, made from app/diagnose/wording.py."""
 
 import re
-from typing import Final
 
-from app.diagnose.findings import KINDS
-
-SEVERITIES: Final = ("error", "warning", "note")
+from app.diagnose.findings import KINDS, SEVERITIES
 
 
 def findings_tables() -> dict[str, str]:
@@ -25,5 +22,5 @@ def _table(severity: str) -> str:
 
 def _shown(sentence: str) -> str:
     """With `…` for the name that it is about, and names of the other parameters in italics."""
-    text = sentence.replace("{about}", "…")
+    text = sentence.replace("{about}", "…").replace("{hint}", "")
     return re.sub(r"\{(\w+)\}", lambda found: f"*{found[1].replace('_', ' ')}*", text)

@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from app.cli.doctor import as_text
 from app.diagnose import link
 from app.diagnose.bridges import denies
 from app.diagnose.clocks import check_clocks
@@ -31,7 +32,7 @@ from app.graph.model import (
 from app.interfaces import load_interfaces
 from app.panel import load_panel
 from app.robot.sample import Sample
-from tests.diagnose.setups import BOOL, STRING, action, named, panel_of, readout
+from tests.diagnose.setups import BOOL, STRING, action, button, named, panel_of, readout
 
 QOS = EndpointQos(reliable=True)
 BRIDGE = Bridge(zid="b1", version="v1.10.2", config={"namespace": "/", "domain": 0})
@@ -92,6 +93,28 @@ def test_a_publisher_that_the_bridge_has_lost(tmp_path: Path) -> None:
     report, before = Report(), Behind.of(here, RosGraph(robots=(RobotGraph(bridges=(BRIDGE,)),)))
     TopicChecks(report, new, INTERFACES, before).check()
     assert report.codes() == []
+
+
+@pytest.mark.parametrize(
+    ("there", "words"),
+    [("/wrods", " Did you mean /wrods?"), ("/cell/words", " Did you mean /cell/words?"), ("/tf", "")],
+)
+def test_a_name_that_is_nearly_there_is_named(there: str, words: str, tmp_path: Path) -> None:
+    report = judged(robot(tmp_path, panel_of(readout("/words"))), topics=(topic(there),))
+    assert [one.what for one in report.findings] == [f"No node publishes /words.{words}"]
+
+
+def test_advice_for_several_is_given_once(tmp_path: Path) -> None:
+    here = robot(tmp_path, panel_of(readout("/a"), readout("/b"), button("/c")))
+    lines = as_text(judged(here)).splitlines()
+    assert [line.split()[0] for line in lines] == [
+        "warning",
+        "warning",
+        "→",
+        "warning",
+        "→",
+        "Something",
+    ]
 
 
 def test_a_namespace_of_the_bridge_is_before_the_robots_names(tmp_path: Path) -> None:
