@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator
 from functools import partial
+from pathlib import Path
 from typing import Any, Final
 
 import pytest
@@ -12,7 +13,7 @@ from app.panel import Panel, load_panel
 from app.panel.checks.fit import group_width, page_width, reason, row_heights
 from app.panel.checks.tile_sizes import Screen
 from tests.support.pages import ROWS, widget
-from tests.support.parts import Bridge, RosNode, Server, until
+from tests.support.parts import ROOT, Bridge, RosNode, Server, until
 from tests.support.servers import live_server, panel_file
 
 PANEL: Final = """
@@ -157,6 +158,34 @@ def test_a_gauge_moves_its_pointer_and_says_which_limit_it_is_beyond(
     expect(lying.locator(".pointer")).to_have_attribute("x", "100%")
     expect(lying.locator(".beyond.above")).to_be_visible()
     expect(lying.locator(".said")).to_have_text("above the scale")
+
+
+JOINTS_ALONE: Final = """
+title = "Arm"
+mode = "demo"
+
+[[page]]
+id = "one"
+title = "One"
+
+[[page.widget]]
+id = "arm"
+kind = "joints"
+label = "Arm"
+joint = [{ name = "joint_1", min = -180, max = 180 }]
+"""
+
+
+def test_joints_look_the_same_on_a_page_without_gauges(page: Page, tmp_path: Path) -> None:
+    path = tmp_path / "arm.toml"
+    path.write_text(JOINTS_ALONE)
+    server = Server(ROOT, KIOSK_PANEL=str(path), KIOSK_MODE="demo")
+    try:
+        page.goto(server.url)
+        trough = widget(page, "arm").locator(".trough")
+        assert trough.evaluate("one => getComputedStyle(one).fill") != "rgb(0, 0, 0)"
+    finally:
+        server.end()
 
 
 def test_joints_are_found_by_name_in_messages_of_any_order(
