@@ -239,6 +239,14 @@ def test_two_types_on_one_topic_are_a_remark() -> None:
     assert "# - /x: it has several types: std_msgs/msg/Bool, std_msgs/msg/Int32" in text
 
 
+def test_a_type_of_another_definition_is_a_remark() -> None:
+    for hash_, known in ((INTERFACES.type_hash(BOOL), True), ("RIHS01_0", False)):
+        one = TopicEndpoint(type=BOOL, qos=EndpointQos(), bridge="a", type_hash=hash_)
+        text = text_of(topics=[Topic(name="/x", key="x", publishers=(one,))])
+        assert ("x" in widgets(text)) is known
+        assert ("# - /x: the robot's std_msgs/msg/Bool has another definition" in text) is not known
+
+
 def test_texts_of_a_robot_can_not_leave_their_place(tmp_path: Path) -> None:
     evil = NodeParameter(
         node="/plc", name="x", type="string", value='"\n[[page]]\n', description="a\nb = 1\u2028c"
