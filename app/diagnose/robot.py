@@ -1,7 +1,6 @@
 """One robot of a panel, looked at through its bridge: the way there, its graph, what it publishes."""
 
 import asyncio
-import time
 from contextlib import suppress
 from pathlib import Path
 from typing import Final
@@ -18,13 +17,12 @@ from app.dialect.bridge_dialect import BridgeDialect
 from app.errors import LinkError
 from app.graph.model import RosGraph
 from app.interfaces import load_interfaces
-from app.transport.bridge_graph import read_graph
+from app.transport.bridge_graph import first_graph, read_graph
 from app.transport.zenoh_config import config_from
 from app.transport.zenoh_session import ZenohSession
 
 LISTEN_S: Final = 5.0
 CONNECTED_WITHIN_S: Final = 4.0
-TOLD_WITHIN_S: Final = 1.5
 POLL_S: Final = 0.02
 
 
@@ -63,22 +61,12 @@ async def _connected(session: ZenohSession) -> None:
                 await asyncio.sleep(POLL_S)
 
 
-async def _first_graph(session: ZenohSession) -> RosGraph:
-    """A router tells a new session of what is behind it some time after it has connected."""
-    end = time.monotonic() + TOLD_WITHIN_S
-    while True:
-        graph = await read_graph(session, session.zid)
-        if graph.bridges or time.monotonic() > end:
-            return graph
-        await asyncio.sleep(POLL_S)
-
-
 async def _look(
     report: Report, robot: PanelRobot, session: ZenohSession, endpoints: list[str], listen_s: float
 ) -> RosGraph:
     """Listens first: what ended in the meantime is not in the graph after it any more."""
     interfaces = load_interfaces(robot.panel.distro, robot.panel.interfaces)
-    before = await _first_graph(session)
+    before = await first_graph(session, session.zid)
     if not check_bridges(report, before, Behind.of(robot, before), endpoints):
         return before
     watched = await _watched(robot, session, before, listen_s)

@@ -2,11 +2,12 @@
 
 import asyncio
 import json
+import time
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import Any, Protocol, cast
+from typing import Any, Final, Protocol, cast
 
 from app.dialect import bridge_dialect as dialect
 from app.dialect import bridge_entities as entities
@@ -50,6 +51,21 @@ class GraphAnswers:
     nodes: Answers = field(default_factory=list)
     entities: Answers = field(default_factory=list)
     routes: Answers = field(default_factory=list)
+
+
+TOLD_WITHIN_S: Final = 1.5
+POLL_S: Final = 0.02
+
+
+async def first_graph(link: GraphLink, zid: str) -> RosGraph:
+    """`read_graph` in a new session: a router tells it of the bridges some time after it has
+    connected. Without a bridge this takes `TOLD_WITHIN_S`."""
+    end = time.monotonic() + TOLD_WITHIN_S
+    while True:
+        graph = await read_graph(link, zid)
+        if graph.bridges or time.monotonic() > end:
+            return graph
+        await asyncio.sleep(POLL_S)
 
 
 async def read_graph(link: GraphLink, zid: str) -> RosGraph:

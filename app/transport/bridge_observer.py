@@ -14,7 +14,7 @@ from app.dialect.endpoint import OwnEndpoint
 from app.errors import LinkError
 from app.graph.model import RosGraph
 from app.robot.sample import Sample
-from app.transport.bridge_graph import read_graph
+from app.transport.bridge_graph import first_graph
 from app.transport.declarations import Declarations
 from app.transport.zenoh_config import Config
 from app.transport.zenoh_session import ZenohSession
@@ -55,7 +55,7 @@ class BridgeObserver:
 
     async def graph(self) -> RosGraph:
         """The graph now; LinkError without a link. A graph without robots: no bridge is there."""
-        return await read_graph(self._session, self.zid)
+        return await first_graph(self._session, self.zid)
 
     async def call(self, key: str, payload: bytes, timeout_s: float = CALL_S) -> bytes | None:
         """The response of a service that only reads; None for none in time. Only for a service that
