@@ -47,8 +47,8 @@ else
 endif
 
 check: .venv/test
-	.venv/bin/ruff check app tests bench docs
-	.venv/bin/ruff format --check app tests bench docs
+	.venv/bin/ruff check app tests bench deploy docs
+	.venv/bin/ruff format --check app tests bench deploy docs
 	.venv/bin/mypy
 	.venv/bin/python -m app.i18n
 	.venv/bin/python -m docs._generate --check
@@ -172,6 +172,7 @@ $(BENCH)/router: system
 # The locked versions, anew: needs uv.
 lock:
 	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 pyproject.toml -o deploy/requirements.lock
+	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 --group build -o deploy/build.lock
 	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 pyproject.toml --group test -o tests/requirements.lock
 	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 pyproject.toml --group docs -o docs/requirements.lock
 	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 tests/ros/requirements.in -o tests/ros/requirements.lock
