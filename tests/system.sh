@@ -34,6 +34,8 @@ need fonts-dejavu-core test -e "$FONTS/dejavu/DejaVuSans.ttf"
 need fonts-noto-core test -e "$FONTS/noto/NotoSans-Regular.ttf"
 need fonts-noto-cjk test -e "${FONTS%/*}/opentype/noto/NotoSansCJK-Regular.ttc"
 need util-linux nsenter --version
+need curl curl --version
+need sqlite3 sqlite3 --version
 need python3-venv "${PYTHON:-python3}" -c "import ensurepip"
 [ "$only" != npm ] || need npm npm --version # for the benchmark's rivals alone
 [ -n "$only" ] || command -v cargo >/dev/null || { echo "missing: Rust $RUST or later (cargo)" >&2; exit 1; }

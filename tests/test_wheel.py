@@ -1,33 +1,123 @@
-"""The built wheel, installed where nothing of the checkout is."""
+"""The built wheel, installed where nothing of the checkout is, as the service page says; and the
+container that is made of it."""
 
+import json
+import os
+import re
+import shlex
+import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 import httpx
+import pytest
+from ruamel.yaml import YAML
 
 from app.settings import PACKAGE
 from tests.support.parts import ROOT, Process, Server, free_port, until
+from tests.support.shown_commands import commands_for
 
-SHIPPED = PACKAGE / "panel.toml"
+SHIPPED: Final = PACKAGE / "panel.toml"
+# What the pages' commands read and write of the machine is in a folder instead.
+PLACES: Final = ("opt", "etc/operator-panel", "var/lib/operator-panel", "backup/panel")
+ABSOLUTE: Final = re.compile(rf"(?<![\w.])/(?={'|'.join(PLACES)}\b)")
+SERVICE: Final = "test_a_wheel_is_installed_as_the_service_page_says"
+SERVED: Final = "test_a_panel_is_served_by_its_command_and_its_data_is_backed_up"
+CONTAINERFILE: Final = (ROOT / "deploy/Containerfile").read_text().replace("\\\n", "")
+COMPOSE: Final = YAML(typ="safe").load(ROOT / "deploy/compose.yaml")
+# As a container is: a root that can't be written to, a volume for the data, no capability, and a
+# network of its own. $1 is the environment, $2 what runs.
+CONTAINED: Final = """
+mount --make-rprivate /
+mount -t tmpfs panel /opt && mkdir /opt/panel && mount --bind "$1" /opt/panel
+mount -t tmpfs data /var/lib && mkdir /var/lib/operator-panel
+mount -o remount,bind,ro / && mount -o remount,ro /opt && mount -o remount,bind,ro /opt/panel
+ip link set lo up
+exec setpriv --bounding-set=-all --inh-caps=-all --no-new-privs sh -c "$2"
+"""
 
 
-def test_an_installed_wheel_serves_from_any_folder(tmp_path: Path) -> None:
-    build = [sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", str(tmp_path)]
+@dataclass(frozen=True)
+class Machine:
+    """A folder that is the machine's root, and one with what was copied to it."""
+
+    root: Path
+    copied: Path
+
+    @property
+    def python(self) -> str:
+        return str(self.root / "opt/panel/bin/python")
+
+    def here(self, command: str) -> str:
+        """A page's command, with this folder's paths."""
+        return ABSOLUTE.sub(f"{self.root}/", command)
+
+    def run(self, command: str) -> subprocess.CompletedProcess[str]:
+        path = f"{Path(sys.executable).parent}:/usr/local/bin:/usr/bin:/bin"
+        return subprocess.run(
+            ["sh", "-c", self.here(command)],
+            cwd=self.copied,
+            # To compile would take as long as the rest, and is not needed here.
+            env={**os.environ, "PATH": path, "PIP_NO_COMPILE": "1", "PYTHONPATH": ""},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+
+
+def of_pages(test: str) -> list[str]:
+    return commands_for(f"tests/test_wheel.py::{test}")
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("wheel")
+    build = [sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", str(folder)]
     subprocess.run(build, cwd=ROOT, check=True, capture_output=True, timeout=120)
-    (wheel,) = tmp_path.glob("*.whl")
-    venv = tmp_path / "venv"
-    subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(venv)], check=True, timeout=120)
-    python = venv / "bin/python"
-    lock = ROOT / "deploy/requirements.lock"
-    pip = [sys.executable, "-m", "pip", "--python", str(python), "install", "--no-compile"]
-    pip += ["--quiet", "--disable-pip-version-check"]
-    subprocess.run([*pip, "--require-hashes", "-r", str(lock)], check=True, timeout=600)
-    subprocess.run([*pip, "--no-deps", str(wheel)], check=True, timeout=120)
+    (built,) = folder.glob("*.whl")
+    return built
 
-    elsewhere = tmp_path / "elsewhere"
-    elsewhere.mkdir()
-    mine = Server(elsewhere, python=str(python))
+
+@pytest.fixture(scope="module")
+def machine(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Machine:
+    """After the commands of the service page; the old version is the new one's."""
+    mine = Machine(tmp_path_factory.mktemp("machine"), tmp_path_factory.mktemp("copied"))
+    for path in (ROOT / "deploy/requirements.lock", ROOT / "zenoh.json5", wheel):
+        shutil.copy(path, mine.copied)
+    shutil.copy(SHIPPED, mine.copied / "cell1.toml")
+    for place in PLACES:
+        (mine.root / place).mkdir(parents=True)
+    (mine.root / "opt/panel-0.2").symlink_to("panel")
+    for command in of_pages(SERVICE):
+        done = mine.run(command)
+        assert done.returncode == 0, f"{command}: {done.stdout}{done.stderr}"
+    return mine
+
+
+def test_a_wheel_is_installed_as_the_service_page_says(machine: Machine, wheel: Path) -> None:
+    commands = of_pages(SERVICE)
+    assert sum("pip install" in one for one in commands) == 2
+    told = machine.run("/opt/panel/bin/operator-panel --version")
+    assert told.stdout.split() == ["operator-panel", wheel.name.split("-")[1]]
+    check = machine.run("/opt/panel/bin/operator-panel check /etc/operator-panel/panel.toml")
+    assert check.returncode == 0, check.stderr
+    # Installed, it needs no file of the checkout: these are its own.
+    shipped = machine.run("/opt/panel/bin/python -m app.check")
+    assert shipped.returncode == 0, shipped.stderr
+    assert str(ROOT) not in shipped.stdout
+    services = (
+        "from app.interfaces import load_interfaces as of; "
+        "of('jazzy').service_types('std_srvs/srv/SetBool')"
+    )
+    assert machine.run(f"/opt/panel/bin/python -c {shlex.quote(services)}").returncode == 0
+
+
+def test_an_installed_wheel_serves_from_any_folder(machine: Machine, tmp_path: Path) -> None:
+    mine = Server(tmp_path, python=machine.python)
     try:
         until(mine.ready, "ready")
         html = mine.http.get("/").text
@@ -38,33 +128,119 @@ def test_an_installed_wheel_serves_from_any_folder(tmp_path: Path) -> None:
         assert mine.press("operation", "from a wheel").json()["outcome"] == "published"
     finally:
         mine.end()
-    live = Server(elsewhere, python=str(python), KIOSK_MODE="live")
+    live = Server(tmp_path, python=machine.python, KIOSK_MODE="live")
     try:  # by the zenoh.json5 that is in it
         assert "No connection to the robot" in live.widget("operation")["reason"]
     finally:
         live.end()
-    check = subprocess.run(
-        [str(python), "-m", "app.check"], cwd=elsewhere, capture_output=True, text=True, check=False
-    )
-    assert check.returncode == 0, check.stderr
-    command = str(venv / "bin/operator-panel")
-    told = subprocess.run(
-        [command, "--version"], cwd=elsewhere, capture_output=True, text=True, check=True
-    )
-    assert told.stdout.split()[1] == wheel.name.split("-")[1]
-    panel, port = elsewhere / "cell1.toml", free_port()
+
+
+def test_a_panel_is_served_by_its_command_and_its_data_is_backed_up(machine: Machine) -> None:
+    run, *backups = sorted(of_pages(SERVED), key=lambda command: " run " not in command)
+    assert len(backups) >= 3
+    panel, port = machine.copied / "cell1.toml", free_port()
     panel.write_text(SHIPPED.read_text().replace("Publish1", "Pick up"))
-    run = [command, "run", panel.name, f"--port={port}", f"--data={tmp_path / 'data'}"]
-    served = Process(run, {"PYTHONPATH": ""}, cwd=elsewhere)
+    served = Process(
+        [*shlex.split(machine.here(run)), f"--port={port}"],
+        {"PYTHONPATH": "", "KIOSK_DATA": str(machine.root / "var/lib/operator-panel")},
+        cwd=machine.copied,
+    )
     try:
         until(lambda: "the panel is at" in served.text, "it listens", within_s=30)
         assert "Pick up" in httpx.get(f"http://127.0.0.1:{port}/", trust_env=False).text
+        for command in backups:
+            done = machine.run(command)
+            assert done.returncode == 0, f"{command}: {done.stdout}{done.stderr}"
     finally:
         served.end()
-    services = (
-        "from app.interfaces import load_interfaces as of; "
-        "of('jazzy').service_types('std_srvs/srv/SetBool')"
+    backup = machine.root / "backup/panel"
+    assert (backup / "operators-log.sqlite3").stat().st_size > 0
+    assert (backup / "panel.toml").read_text() == SHIPPED.read_text()
+
+
+def instructions(name: str) -> list[str]:
+    """What follows an instruction in the last stage of the Containerfile."""
+    last = re.split(r"^FROM .*$", CONTAINERFILE, flags=re.MULTILINE)[-1]
+    return re.findall(rf"^{name} +(.*)$", last, re.MULTILINE)
+
+
+def test_the_image_has_what_the_service_page_installs(wheel: Path) -> None:
+    installs = [one for one in of_pages(SERVICE) if "pip install" in one or " -m venv " in one]
+    made = re.sub(r" --no-cache-dir|/build/", "", CONTAINERFILE)
+    assert [one for one in installs if one not in made] == []
+    (copied,) = re.findall(r"^COPY (deploy/.*) /build/$", CONTAINERFILE, re.MULTILINE)
+    lock, built = copied.split()
+    assert (ROOT / lock).is_file()
+    assert Path(built).match(f"dist/{built.split('/')[1]}")
+    assert wheel.match(built.split("/")[1])
+    ignored = (ROOT / ".dockerignore").read_text().splitlines()
+    assert [one for one in ignored if one[:1] != "#"] == ["*", f"!{lock}", f"!{built}"]
+
+
+def test_the_image_names_no_host_and_runs_as_a_user_of_its_own() -> None:
+    images = re.findall(r"^FROM (\S+)", CONTAINERFILE, re.MULTILINE)
+    images += [one["image"] for one in COMPOSE["services"].values()]
+    assert [one for one in images if "." in one.split("/")[0] and "/" in one] == []
+    assert instructions("USER") == ["10001"]
+    assert "useradd --system --uid 10001" in CONTAINERFILE
+
+
+def shell(words: str) -> str:
+    """An instruction's JSON list, as a command of a shell with the image's variables."""
+    setting = "".join(f"export {line}; " for line in instructions("ENV"))
+    return f"{setting}exec {shlex.join(json.loads(words))}"
+
+
+@pytest.fixture
+def container(machine: Machine) -> Iterator[Process]:
+    """What the image starts; its environment is that of the service page, with the same content."""
+    (entry,), (command,) = instructions("ENTRYPOINT"), instructions("CMD")
+    start = shell(json.dumps([*json.loads(entry), *json.loads(command)]))
+    mine = Process(
+        [
+            *("unshare", "--mount", "--net", "sh", "-ec", CONTAINED),
+            *("sh", str(machine.root / "opt/panel"), start),
+        ],
+        {"PYTHONPATH": "", "HOME": "/nonexistent"},
+        cwd="/",
     )
-    subprocess.run([str(python), "-c", services], cwd=elsewhere, check=True, timeout=60)
-    # Installed, it needs no file of the checkout: these are its own.
-    assert str(ROOT) not in check.stdout
+    yield mine
+    mine.end()
+
+
+def test_the_image_starts_read_only_and_its_health_check_sees_it(container: Process) -> None:
+    (health,) = instructions("HEALTHCHECK")
+
+    def inside(command: str) -> int:
+        enter = ["nsenter", f"--target={container.pid}", "--mount", "--net", "sh", "-c", command]
+        return subprocess.run(enter, capture_output=True, cwd="/", check=False).returncode
+
+    until(lambda: "the panel is at" in container.text, "it serves", within_s=60)
+    check = shell(health.split(" CMD ", 1)[1])
+    assert inside(check) == 0
+    assert inside("touch /opt/panel/x || touch /x || touch /etc/x") != 0
+    assert inside(check.replace(":8000/", ":8001/")) != 0  # where nothing serves
+
+
+def test_the_composition_gives_both_what_they_need_and_no_more() -> None:
+    services = COMPOSE["services"]
+    assert set(services) == {"panel", "bridge"}
+    for one in services.values():
+        assert (one["read_only"], one["cap_drop"], one["network_mode"]) == (True, ["ALL"], "host")
+        assert one["security_opt"] == ["no-new-privileges:true"]
+        assert "ports" not in one  # the host's network has none to publish
+        assert one["restart"] == "unless-stopped"
+    panel, bridge = services["panel"], services["bridge"]
+    folder = ROOT / "deploy" / panel["build"]["context"]
+    assert (folder / panel["build"]["dockerfile"]).resolve() == ROOT / "deploy/Containerfile"
+    mounted = {one["target"]: one for one in panel["volumes"] if isinstance(one, dict)}
+    assert panel["command"] == ["run", "/etc/operator-panel/panel.toml"]
+    assert mounted["/etc/operator-panel"]["read_only"]
+    (data,) = (one for one in panel["volumes"] if isinstance(one, str))
+    assert data == f"{next(iter(COMPOSE['volumes']))}:{instructions('VOLUME')[0]}"
+    (config,) = bridge["volumes"]
+    assert (ROOT / "deploy" / config["source"]).resolve() == ROOT / "deploy/bridge.json5"
+    assert bridge["command"] == ["-c", config["target"]]
+    cargo = (ROOT / "tests/bridge_crate/Cargo.toml").read_text()
+    (version,) = re.findall(r'zenoh-plugin-ros2dds = \{ version = "=([\d.]+)"', cargo)
+    assert bridge["image"].endswith(f":{version}")

@@ -1,0 +1,96 @@
+"""Each shell command that README and documentation show is run by a test, or it is said why not: see
+commands_in_docs.toml."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+import pytest
+
+from tests.simulator.test_replay import mcap_file
+from tests.support.parts import ROOT, Process
+from tests.support.shell import Shell
+from tests.support.shown_commands import TABLE, Row, Shown, beside, commands_of, row_of, rows, shown
+from tests.test_tutorial import STEPS
+
+RECORDING: Final = "cell1-2026-05-04.mcap"
+
+
+def runs() -> list[tuple[Row, Shown]]:
+    """Each command that is run here, once; those with the same beside them follow one another."""
+    once = {one.command: one for one in reversed(shown())}
+    found = [(row, one) for one in once.values() if (row := row_of(one.command)) and row.kind == "run"]
+    order = rows()
+    return sorted(found, key=lambda pair: (pair[0].text("beside"), order.index(pair[0])))
+
+
+class Machine:
+    """The shell, and what runs beside its commands."""
+
+    def __init__(self, folder: Path) -> None:
+        self.shell = Shell(folder)
+        self._name = ""
+        self._beside: Process | None = None
+        # `checkout` has links to the repository's files: these are its own.
+        (self.shell.checkout / "cell1.toml").write_text(STEPS[-1])
+        mcap_file(folder).rename(self.shell.checkout / RECORDING)
+
+    def beside(self, name: str) -> None:
+        """Has that run and nothing else; "" is nothing."""
+        if name == self._name:
+            return
+        if self._beside is not None:
+            self.shell.interrupt(self._beside)
+            self._beside = None
+        if name:
+            self._beside = self.shell.start(**_command(name))
+        self._name = name
+
+
+def _command(name: str) -> dict[str, str]:
+    return {"command": beside()[name]["command"], "ready": beside()[name]["until"]}
+
+
+@pytest.fixture(scope="module")
+def machine(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Machine]:
+    mine = Machine(tmp_path_factory.mktemp("machine"))
+    yield mine
+    mine.shell.close()
+
+
+def test_each_command_is_run_by_a_test_or_it_is_said_why_not() -> None:
+    missing = [f"{one.place}: {one.command}" for one in shown() if row_of(one.command) is None]
+    assert missing == [], f"say in {TABLE.relative_to(ROOT)} how these commands are tested"
+
+
+def test_each_row_is_of_a_command_that_a_page_shows() -> None:
+    used = {row_of(one.command) for one in shown()}
+    assert [row.command for row in rows() if row not in used] == [], f"remove them from {TABLE.name}"
+
+
+@pytest.mark.parametrize(
+    "row", [row for row in rows() if row.kind != "run"], ids=lambda row: row.command
+)
+def test_what_is_not_run_here_has_its_reason_or_its_test(row: Row) -> None:
+    if row.kind == "not_run":
+        assert len(row.text("why").split()) > 2
+    else:
+        file, _, name = row.text("test").partition("::")
+        assert f"\ndef {name}(" in (ROOT / file).read_text()
+
+
+@pytest.mark.parametrize(("row", "one"), runs(), ids=lambda value: getattr(value, "place", ""))
+def test_it_does_what_its_page_says(machine: Machine, row: Row, one: Shown) -> None:
+    machine.beside(row.text("beside"))
+    if wanted := row.text("until"):
+        machine.shell.interrupt(machine.shell.start(one.command, wanted))
+        return
+    done = machine.shell.run(one.command)
+    assert done.returncode == row.given.get("status", 0), done.stdout
+    assert row.text("says") in done.stdout
+
+
+def test_commands_are_found_with_their_lines_and_without_comments() -> None:
+    page = "text\n\n```sh\nmake run   # the demo\n# a comment\ncurl -s x \\\n  -d '#1'\n```\n\n"
+    page += "   ```sh\n   ls\n   ```\n"
+    assert list(commands_of(page)) == [(4, "make run"), (6, "curl -s x -d '#1'"), (11, "ls")]
