@@ -7,6 +7,7 @@
 # make soak  an ordinary day for SOAK_S seconds (an hour)
 # make bench  this panel and its rivals side by side (25 minutes); QUICK=1 only shows that it works
 # make bench-setup  what the benchmark's rivals need, into the cache
+# make release  wheel, sdist, SBOM and documentation, checked in a clean environment, in dist/release
 # make dev   the panel, which starts again with every change that is saved
 
 PYTHON ?= python3
@@ -18,7 +19,7 @@ export BENCH_CACHE := $(BENCH)
 export TEST_BRIDGE := $(CACHE)/bridge/release/test-bridge
 export TEST_ROS_PYTHON := $(CURDIR)/.venv-ros/bin/python
 
-.PHONY: run test check dev docs wheel faults screenshots soak bench bench-setup test-parts bridge lock clean
+.PHONY: run test check dev docs wheel release faults screenshots soak bench bench-setup test-parts bridge lock clean
 .DELETE_ON_ERROR:
 
 run: .venv/run
@@ -81,6 +82,10 @@ soak: test-parts
 wheel: .venv/test
 	.venv/bin/python -m build --wheel --no-isolation --outdir dist
 
+# Of a tag: `make release TAG=v0.2.0` also checks that version and changelog are those of the tag.
+release: docs .venv-release/ready
+	.venv-release/bin/python deploy/release.py dist/release $(if $(TAG),--tag $(TAG))
+
 test-parts: system .venv/test .venv-ros/ready bridge
 
 .PHONY: system
@@ -106,6 +111,12 @@ NEW_ENOUGH := $(PYTHON) -c 'import sys; sys.exit(None if sys.version_info >= (3,
 	@$(NEW_ENOUGH)
 	$(PYTHON) -m venv --clear .venv-docs
 	.venv-docs/bin/python $(PIP_INSTALL) $<
+	touch $@
+
+.venv-release/ready: deploy/release.lock
+	@$(NEW_ENOUGH)
+	$(PYTHON) -m venv --clear .venv-release
+	.venv-release/bin/python $(PIP_INSTALL) $<
 	touch $@
 
 .venv/test: tests/requirements.lock | .venv/bin/python
@@ -173,6 +184,7 @@ $(BENCH)/router: system
 lock:
 	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 pyproject.toml -o deploy/requirements.lock
 	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 --group build -o deploy/build.lock
+	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 --group release -o deploy/release.lock
 	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 pyproject.toml --group test -o tests/requirements.lock
 	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 pyproject.toml --group docs -o docs/requirements.lock
 	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 tests/ros/requirements.in -o tests/ros/requirements.lock
@@ -180,4 +192,4 @@ lock:
 	uv pip compile --quiet --upgrade --generate-hashes --no-header --no-annotate --python-version 3.11 bench/peers/nicegui_zenoh/requirements.in -o bench/peers/nicegui_zenoh/requirements.lock
 
 clean:
-	rm -rf .venv .venv-ros .venv-docs dist build .mypy_cache .ruff_cache
+	rm -rf .venv .venv-ros .venv-docs .venv-release dist build .mypy_cache .ruff_cache

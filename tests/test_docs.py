@@ -173,18 +173,6 @@ def test_the_messages_of_a_hold_are_json() -> None:
     ]
 
 
-def test_the_commands_of_the_reference_work(tmp_path: Path) -> None:
-    panel = tmp_path / "cell1.toml"
-    panel.write_text(shown("reference/panel-file.md", "toml")[0])
-    for line in shown("reference/panel-file.md", "sh")[0].splitlines():
-        _, *command = shlex.split(line, comments=True)
-        run = subprocess.run(
-            [sys.executable, *[str(panel) if word == panel.name else word for word in command]],
-            cwd=ROOT, capture_output=True, text=True, check=False,
-        )  # fmt: skip
-        assert run.returncode == 0, run.stderr
-
-
 def test_every_place_in_the_code_is_there() -> None:
     """Paths in backticks that begin with a folder of the project."""
     found = set(

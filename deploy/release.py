@@ -1,0 +1,169 @@
+"""`python deploy/release.py FOLDER [--tag TAG]`: the files of a release, each checked.
+
+FOLDER gets the wheel, the sdist, the SBOM (CycloneDX), the documentation as a site, the locked
+dependencies and SHA256SUMS. The version is that of pyproject.toml. Exit status 1: what is wrong is
+printed.
+"""
+
+import argparse
+import hashlib
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tarfile
+import tempfile
+import time
+import tomllib
+import urllib.request
+import venv
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from xml.etree import ElementTree
+
+ROOT = Path(__file__).resolve().parent.parent
+LOCK = ROOT / "deploy/requirements.lock"
+SITE = ROOT / "build/docs"
+STARTS_WITHIN_S = 60
+
+
+class ReleaseError(Exception):
+    """What keeps this from being a release."""
+
+
+def version() -> str:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    return str(project["version"])
+
+
+def check_version(tag: str | None) -> None:
+    """A ROS package has to name the version itself; a tag's changes are under its heading."""
+    named = ElementTree.parse(ROOT / "deploy/ros/package.xml").findtext("version")
+    if named != version():
+        raise ReleaseError(f"package.xml says {named}, pyproject.toml {version()}")
+    if tag is None:
+        return
+    if tag != f"v{version()}":
+        raise ReleaseError(f'the tag is "{tag}": of version {version()} it is "v{version()}"')
+    heading = rf"^## {re.escape(version())} – \d{{4}}-\d{{2}}-\d{{2}}$"
+    if not re.search(heading, (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE):
+        raise ReleaseError(f'CHANGELOG.md has no "## {version()} – YYYY-MM-DD": what was "Unreleased"')
+
+
+def build(folder: Path) -> Path:
+    """Wheel and sdist; the wheel. The sdist gives the same wheel as the checkout."""
+    run("-m", "build", "--no-isolation", "--sdist", "--wheel", "--outdir", str(folder), str(ROOT))
+    (wheel,), (sdist,) = folder.glob("*.whl"), folder.glob("*.tar.gz")
+    with tempfile.TemporaryDirectory() as unpacked:
+        with tarfile.open(sdist) as archive:
+            archive.extractall(unpacked, filter="data")
+        (source,) = Path(unpacked).iterdir()
+        run("-m", "build", "--no-isolation", "--wheel", "--outdir", unpacked, str(source))
+        (again,) = Path(unpacked).glob("*.whl")
+        if again.name != wheel.name or digest(again) != digest(wheel):
+            raise ReleaseError(f"{sdist.name} gives another wheel than the checkout")
+    return wheel
+
+
+def describe(folder: Path) -> None:
+    """The SBOM: each locked dependency with its hashes."""
+    target = folder / f"operator_panel-{version()}.cdx.json"
+    arguments = ["--pyproject", str(ROOT / "pyproject.toml"), "--output-reproducible", "--validate"]
+    run("-m", "cyclonedx_py", "requirements", *arguments, "-o", str(target), str(LOCK))
+
+
+def pack_docs(folder: Path) -> None:
+    if not (SITE / "index.html").is_file():
+        raise ReleaseError(f"{SITE} has no documentation: `make docs` writes it")
+    shutil.make_archive(str(folder / f"operator_panel-{version()}-docs"), "gztar", SITE)
+
+
+def try_out(wheel: Path) -> None:
+    """In an environment with the locked dependencies only: its version, and a demo that is ready."""
+    with tempfile.TemporaryDirectory() as folder:
+        venv.create(Path(folder) / "venv", with_pip=True)
+        python = f"{folder}/venv/bin/python"
+        pip = ("-m", "pip", "--disable-pip-version-check", "--quiet", "install")
+        run(*pip, "--require-hashes", "-r", str(LOCK), python=python)
+        run(*pip, "--no-deps", str(wheel), python=python)
+        command = f"{folder}/venv/bin/operator-panel"
+        said = subprocess.check_output([command, "--version"], cwd=folder, text=True).strip()
+        if said != f"operator-panel {version()}":
+            raise ReleaseError(f'the installed wheel says "{said}", not version {version()}')
+        with serving(command, Path(folder)) as port:
+            wait_until_ready(port)
+
+
+@contextmanager
+def serving(command: str, folder: Path) -> Iterator[int]:
+    """The server with the shipped demo; its port."""
+    log = folder / "server.log"
+    env = {**os.environ, "KIOSK_DATA": str(folder / "data"), "PYTHONPATH": ""}
+    with log.open("w") as stream:
+        server = subprocess.Popen([command, "run", "--port=0"], cwd=folder, env=env, stderr=stream)
+    try:
+        until = time.monotonic() + STARTS_WITHIN_S
+        while not (found := re.search(r"the panel is at http://[\d.]+:(\d+)", log.read_text())):
+            if server.poll() is not None or time.monotonic() > until:
+                raise ReleaseError(f"the installed server does not start:\n{log.read_text()}")
+            time.sleep(0.1)
+        yield int(found[1])
+    finally:
+        server.terminate()
+        server.wait()
+
+
+def wait_until_ready(port: int) -> None:
+    until = time.monotonic() + STARTS_WITHIN_S
+    while True:
+        try:
+            with urllib.request.urlopen(f"http://127.0.0.1:{port}/readyz", timeout=5):
+                return
+        except OSError as error:  # 503 is one, too
+            if time.monotonic() > until:
+                raise ReleaseError(f"the installed server is not ready: {error}") from error
+        time.sleep(0.1)
+
+
+def write_sums(folder: Path) -> None:
+    """As `sha256sum --check` reads them."""
+    shutil.copy(LOCK, folder)
+    files = sorted(path for path in folder.iterdir() if path.name != "SHA256SUMS")
+    (folder / "SHA256SUMS").write_text("".join(f"{digest(path)}  {path.name}\n" for path in files))
+
+
+def digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def run(*arguments: str, python: str = sys.executable) -> None:
+    done = subprocess.run([python, *arguments], capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise ReleaseError(f"{' '.join(arguments[:4])} failed:\n{done.stdout}{done.stderr}")
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description="Makes and checks the files of a release.")
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--tag", help="the tag that this is a release of")
+    given = parser.parse_args()
+    try:
+        check_version(given.tag)
+        shutil.rmtree(given.folder, ignore_errors=True)
+        given.folder.mkdir(parents=True)
+        wheel = build(given.folder)
+        describe(given.folder)
+        pack_docs(given.folder)
+        write_sums(given.folder)
+        try_out(wheel)
+    except ReleaseError as error:
+        print(error, file=sys.stderr)
+        return 1
+    print("".join(f"{path}\n" for path in sorted(given.folder.iterdir())), end="")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,97 @@
+"""What `make release` makes and checks: deploy/release.py."""
+
+import re
+import tarfile
+from pathlib import Path
+from types import ModuleType
+from typing import Any, Final
+
+import pytest
+from ruamel.yaml import YAML
+
+from deploy import release
+from tests.support.parts import ROOT
+
+WORKFLOW: Final[dict[str, Any]] = YAML(typ="safe").load(ROOT / ".github/workflows/release.yml")
+
+
+@pytest.fixture
+def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+    """The release of a checkout that has only what names the version: it is 1.2.3."""
+    (tmp_path / "deploy/ros").mkdir(parents=True)
+    (tmp_path / "pyproject.toml").write_text('[project]\nversion = "1.2.3"\n')
+    (tmp_path / "deploy/ros/package.xml").write_text("<package><version>1.2.3</version></package>")
+    (tmp_path / "CHANGELOG.md").write_text("## Unreleased\n\n## 1.2.3 – 2026-05-04\n")
+    monkeypatch.setattr(release, "ROOT", tmp_path)
+    monkeypatch.setattr(release, "SITE", tmp_path / "build/docs")
+    return release
+
+
+def test_the_version_is_in_one_place_and_in_the_ros_package() -> None:
+    release.check_version(None)
+    said = re.findall(r"^version = .*$", (ROOT / "pyproject.toml").read_text(), re.MULTILINE)
+    assert said == [f'version = "{release.version()}"']
+
+
+def test_a_tag_is_of_the_version_and_has_its_changes(checkout: ModuleType) -> None:
+    checkout.check_version("v1.2.3")
+    with pytest.raises(release.ReleaseError, match=r'of version 1\.2\.3 it is "v1\.2\.3"'):
+        checkout.check_version("v1.2.4")
+    changelog = checkout.ROOT / "CHANGELOG.md"
+    changelog.write_text("## Unreleased\n")
+    with pytest.raises(release.ReleaseError, match=r'has no "## 1\.2\.3 – YYYY-MM-DD"'):
+        checkout.check_version("v1.2.3")
+
+
+def test_a_ros_package_of_another_version_is_no_release(checkout: ModuleType) -> None:
+    package = checkout.ROOT / "deploy/ros/package.xml"
+    package.write_text("<package><version>1.2.2</version></package>")
+    with pytest.raises(
+        release.ReleaseError, match=r"package\.xml says 1\.2\.2, pyproject\.toml 1\.2\.3"
+    ):
+        checkout.check_version(None)
+
+
+def test_the_sdist_gives_the_wheel_of_the_checkout(tmp_path: Path) -> None:
+    wheel = release.build(tmp_path)
+    assert wheel.name == f"operator_panel-{release.version()}-py3-none-any.whl"
+    with tarfile.open(next(tmp_path.glob("*.tar.gz"))) as archive:
+        names = {Path(*Path(name).parts[1:]).as_posix() for name in archive.getnames()}
+    assert {"pyproject.toml", "README.md", "CHANGELOG.md", "LICENSE", "zenoh.json5"} <= names
+    assert not [name for name in names if name.startswith(("tests/", "docs/", "deploy/", ".git/"))]
+
+
+def test_without_its_documentation_it_is_no_release(checkout: ModuleType, tmp_path: Path) -> None:
+    with pytest.raises(release.ReleaseError, match="`make docs` writes it"):
+        checkout.pack_docs(tmp_path)
+    checkout.SITE.mkdir(parents=True)
+    (checkout.SITE / "index.html").write_text("<title>Operator panel</title>")
+    checkout.pack_docs(tmp_path)
+    assert (tmp_path / "operator_panel-1.2.3-docs.tar.gz").is_file()
+
+
+def test_the_sums_are_of_all_its_files(tmp_path: Path) -> None:
+    (tmp_path / "a.whl").write_bytes(b"wheel")
+    release.write_sums(tmp_path)
+    lines = [line.split("  ") for line in (tmp_path / "SHA256SUMS").read_text().splitlines()]
+    assert {name: digest for digest, name in lines} == {
+        name: release.digest(tmp_path / name) for name in ("a.whl", "requirements.lock")
+    }
+
+
+def test_the_workflow_may_do_no_more_than_it_must() -> None:
+    assert WORKFLOW["on"] == {"push": {"tags": ["v*"]}}
+    assert WORKFLOW["permissions"] == {}
+    jobs = WORKFLOW["jobs"]
+    assert {name: job["permissions"] for name, job in jobs.items()} == {
+        "files": {"contents": "read"},
+        "publish": {"contents": "write"},
+    }
+    used = [step["uses"] for job in jobs.values() for step in job["steps"] if "uses" in step]
+    assert [one for one in used if not re.fullmatch(r"actions/[a-z-]+@(v\d+|[0-9a-f]{40})", one)] == []
+    # What has the right to publish runs nothing of the checkout.
+    assert not [one for one in jobs["publish"]["steps"] if "checkout" in one.get("uses", "")]
+    runs = [step.get("run", "") for step in jobs["files"]["steps"]]
+    assert any(re.match(r"make release TAG=", one) for one in runs)
+    # A name is a variable of the shell, and not a part of the script.
+    assert not [one for one in runs if re.search(r"\$\{\{ *github\.(ref|head|event)", one)]
