@@ -84,6 +84,7 @@ wheel: .venv/test
 
 # Of a tag: `make release TAG=v0.2.0` also checks that version and changelog are those of the tag.
 release: docs .venv-release/ready
+	.venv-release/bin/hadolint deploy/Containerfile
 	.venv-release/bin/python deploy/release.py dist/release $(if $(TAG),--tag $(TAG))
 
 test-parts: system .venv/test .venv-ros/ready bridge

@@ -179,17 +179,28 @@ def test_a_launch_starts_the_server_and_the_bridge(launched: tuple[Process, str]
     assert process.count("launch: interrupted") == 1
 
 
-def test_a_launch_ends_with_a_panel_that_has_a_fault(workspace: Workspace, tmp_path: Path) -> None:
-    (tmp_path / "cell1.toml").write_text(PANEL.replace('"/start"', '"start"'))
+def launch(workspace: Workspace, folder: Path, *arguments: str) -> str:
+    """What a launch says that ends by itself."""
+    (folder / "cell1.toml").write_text(PANEL.replace('"/start"', '"start"'))
     file = workspace.installed / f"share/{PACKAGE}/launch/kiosk.launch.py"
-    launch = [sys.executable, str(TESTS / "ros/launch_file.py"), str(file)]
     done = subprocess.run(
-        [*launch, "panel:=cell1.toml", f"port:={free_port()}", "bridge:=false"],
-        cwd=tmp_path,
-        env={**workspace.environment(), "KIOSK_DATA": str(tmp_path / "data")},
+        [sys.executable, str(TESTS / "ros/launch_file.py"), str(file), *arguments],
+        cwd=folder,
+        env={**workspace.environment(), "KIOSK_DATA": str(folder / "data")},
         capture_output=True,
         text=True,
         check=False,
     )
-    assert 'line 9: "start" is not an absolute ROS 2 topic name' in done.stderr
-    assert "launch: the panel's server has ended" in done.stderr
+    return done.stderr
+
+
+def test_a_launch_ends_with_a_panel_that_has_a_fault(workspace: Workspace, tmp_path: Path) -> None:
+    said = launch(workspace, tmp_path, "panel:=cell1.toml", f"port:={free_port()}", "bridge:=false")
+    assert 'line 9: "start" is not an absolute ROS 2 topic name' in said
+    assert "launch: the panel's server has ended" in said
+
+
+def test_a_launch_names_the_bridge_that_is_not_installed(workspace: Workspace, tmp_path: Path) -> None:
+    said = launch(workspace, tmp_path, "panel:=cell1.toml", "bridge_command:=no-such-bridge")
+    assert 'the bridge\'s program "no-such-bridge" is not on the PATH: install it' in said
+    assert "missing: panel" in launch(workspace, tmp_path)

@@ -17,7 +17,7 @@ GIVEN = dict(word.split(":=", 1) for word in sys.argv[2:])
 
 class LaunchConfiguration(SimpleNamespace):
     def __init__(self, name):
-        self.text = lambda values: values[name]
+        self.text = self.perform = lambda values: values[name]
 
 
 class PathJoinSubstitution(SimpleNamespace):
@@ -51,17 +51,20 @@ class EmitEvent(SimpleNamespace):
 
 
 class ExecuteProcess(SimpleNamespace):
-    def __init__(
-        self, *, name, cmd, output, on_exit=None, respawn=False, respawn_delay=0.0, condition=None
-    ):
-        super().__init__(name=name, cmd=cmd, on_exit=on_exit, condition=condition)
+    def __init__(self, *, name, cmd, output, on_exit=None, respawn=False, respawn_delay=0.0):
+        super().__init__(name=name, cmd=cmd, on_exit=on_exit)
         self.respawn = respawn
         self.delay = respawn_delay
 
 
+class OpaqueFunction(SimpleNamespace):
+    def __init__(self, *, function, condition):
+        super().__init__(function=function, condition=condition)
+
+
 MODULES = {
-    "launch": {"LaunchDescription": list},
-    "launch.actions": (DeclareLaunchArgument, EmitEvent, ExecuteProcess),
+    "launch": {"LaunchContext": dict, "LaunchDescription": list},
+    "launch.actions": (DeclareLaunchArgument, EmitEvent, ExecuteProcess, OpaqueFunction),
     "launch.conditions": (IfCondition,),
     "launch.events": (Shutdown,),
     "launch.substitutions": (LaunchConfiguration, PathJoinSubstitution, ThisLaunchFileDir),
@@ -112,8 +115,16 @@ def main():
     if missing or set(GIVEN) - set(declared):
         sys.exit(f"the arguments are {', '.join(declared)}; missing: {', '.join(missing)}")
     values = {n: GIVEN[n] if n in GIVEN else text(one.default, {}) for n, one in declared.items()}
-    processes = [one for one in actions if isinstance(one, ExecuteProcess)]
-    run([one for one in processes if not one.condition or one.condition.holds(values)], values)
+    run(list(processes_of(actions, values)), values)
+
+
+def processes_of(actions, values):
+    """What the actions start, if their conditions hold."""
+    for one in actions:
+        if isinstance(one, OpaqueFunction) and one.condition.holds(values):
+            yield from one.function(values)
+        elif isinstance(one, ExecuteProcess):
+            yield one
 
 
 main()

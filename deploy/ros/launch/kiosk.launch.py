@@ -1,8 +1,10 @@
 """`ros2 launch operator_panel kiosk.launch.py panel:=cell1.toml`: the panel's server, and the bridge to
 the ROS 2 nodes of this machine's domain. `--show-args` lists the arguments; KIOSK_… set the rest."""
 
-from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument, EmitEvent, ExecuteProcess
+from shutil import which
+
+from launch import LaunchContext, LaunchDescription
+from launch.actions import DeclareLaunchArgument, EmitEvent, ExecuteProcess, OpaqueFunction
 from launch.conditions import IfCondition
 from launch.events import Shutdown
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution, ThisLaunchFileDir
@@ -20,6 +22,24 @@ ARGUMENTS = {
         "the bridge's configuration; ROS_DOMAIN_ID goes before the domain in it",
     ),
 }
+
+
+def start_bridge(context: LaunchContext) -> list[ExecuteProcess]:
+    """RuntimeError ends the launch: launch itself would go on without the bridge."""
+    command = LaunchConfiguration("bridge_command").perform(context)
+    if which(command) is None:
+        raise RuntimeError(
+            f'the bridge\'s program "{command}" is not on the PATH: install it, name it with'
+            " bridge_command:=…, or start without it by bridge:=false"
+        )
+    bridge = ExecuteProcess(
+        name="zenoh_bridge",
+        cmd=[command, "-c", LaunchConfiguration("bridge_config")],
+        output="screen",
+        respawn=True,
+        respawn_delay=1.0,
+    )
+    return [bridge]
 
 
 def generate_launch_description() -> LaunchDescription:
@@ -42,12 +62,5 @@ def generate_launch_description() -> LaunchDescription:
         # A panel file with a fault ends the launch; its text says what is wrong.
         on_exit=EmitEvent(event=Shutdown(reason="the panel's server has ended")),
     )
-    bridge = ExecuteProcess(
-        name="zenoh_bridge",
-        cmd=[value["bridge_command"], "-c", value["bridge_config"]],
-        output="screen",
-        respawn=True,
-        respawn_delay=1.0,
-        condition=IfCondition(value["bridge"]),
-    )
+    bridge = OpaqueFunction(function=start_bridge, condition=IfCondition(value["bridge"]))
     return LaunchDescription([*declared, bridge, server])
