@@ -28,6 +28,8 @@ ROOMS = (
     "transport",
     "runtime",
     "process",
+    "kiosk",
+    "install",
     "web",
     "simulator",
     "scaffold",

@@ -14,6 +14,10 @@ COMMANDS = {
     "run": "serve a panel to browsers",
     "check": "check panel files: every fault with its place",
     "log": "check that the operator's log is as it was written",
+    "install": "install the panel as services of this machine",
+    "update": "run another version, and back if it does not come up",
+    "uninstall": "take the installation back; data stays",
+    "kiosk": "show the panel on this machine's screen",
     "simulate": "run the robot of a panel, or a recording, as a Zenoh peer of its own",
     "topics": "list the topics of a robot",
     "echo": "show the messages of a topic",
@@ -67,6 +71,14 @@ def _command(name: str) -> Command:
             from app.cli.completion import print_completion
 
             return partial(print_completion, COMMANDS, _parser())
+        case "install":
+            from app.cli.install import install as main
+        case "update":
+            from app.cli.install import update as main
+        case "uninstall":
+            from app.cli.install import uninstall as main
+        case "kiosk":
+            from app.cli.kiosk import main
         case _:
             from app.cli.simulate import main
     return main

@@ -139,4 +139,5 @@ if (document.querySelector("[data-scan]")) import("./scan.js").catch(absent);
 if (body.dataset.sounds === "on") import("./sound.js").catch(absent);
 import("./floor.js").catch(absent);
 const presser = new Presser(widgets, source, { unsure: body.dataset.unsure });
+window.operatorPanel = { eventAgeMs: () => source.ageMs }; // for the watcher of a kiosk's screen
 source.start();

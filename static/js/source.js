@@ -45,6 +45,11 @@ export class Source {
     return this.#seen;
   }
 
+  // How long ago the last event arrived.
+  get ageMs() {
+    return performance.now() - this.#aliveAt;
+  }
+
   // The server's time of an event here, in RFC 3339.
   timeOf(event) {
     return new Date(this.#offset + event.timeStamp).toISOString();

@@ -1,0 +1,74 @@
+"""The machine that is installed on, or a folder that becomes one (`--root`)."""
+
+import os
+import subprocess
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from app.errors import SettingsError
+
+APT_ENV: Final = {"DEBIAN_FRONTEND": "noninteractive"}
+
+
+class StepFailed(SettingsError):
+    """A step could not be done: what was done before it stays, and the next run goes on from there."""
+
+
+@dataclass(frozen=True, slots=True)
+class Host:
+    """`root` is "/" for this machine; else commands run in it by chroot, and no unit is started."""
+
+    root: Path = Path("/")
+
+    @property
+    def is_this_machine(self) -> bool:
+        return self.root == Path("/")
+
+    @property
+    def runs_systemd(self) -> bool:
+        """Whether units can be started: sd_booted(3)."""
+        return self.is_this_machine and Path("/run/systemd/system").is_dir()
+
+    def path(self, path: str) -> Path:
+        """Where an absolute path of the machine is."""
+        return self.root / path.lstrip("/")
+
+    def run(self, command: Sequence[str], env: Mapping[str, str] | None = None) -> str:
+        """The standard output of a command on the machine; StepFailed with its last lines."""
+        inside = [] if self.is_this_machine else ["chroot", str(self.root)]
+        return self._run([*inside, *command], {**os.environ, **(env or {})})
+
+    def run_outside(self, command: Sequence[str]) -> str:
+        """The same for a command that takes the root itself, such as `systemctl --root`."""
+        return self._run(command, os.environ)
+
+    def succeeds(self, command: Sequence[str]) -> bool:
+        try:
+            self.run(command)
+        except StepFailed:
+            return False
+        return True
+
+    def _run(self, command: Sequence[str], env: Mapping[str, str]) -> str:
+        try:
+            done = subprocess.run(command, env=env, check=False, text=True, capture_output=True)
+        except OSError as error:
+            raise StepFailed(f"{command[0]} can't be run: {error.strerror}") from error
+        if done.returncode:
+            last = "\n".join((done.stderr or done.stdout).strip().splitlines()[-8:])
+            raise StepFailed(f"{' '.join(command)} failed:\n{last}")
+        return done.stdout
+
+
+def release_of(host: Host) -> tuple[str, str]:
+    """(id, version) of the system, such as ("debian", "12"); os-release(5)."""
+    found = {}
+    for name in ("/etc/os-release", "/usr/lib/os-release"):
+        if host.path(name).exists():
+            for line in host.path(name).read_text().splitlines():
+                key, _, value = line.partition("=")
+                found[key] = value.strip('"')
+            break
+    return found.get("ID", ""), found.get("VERSION_ID", "")

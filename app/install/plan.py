@@ -1,0 +1,173 @@
+"""The steps of an installation, in their order."""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from app.errors import SettingsError
+from app.install.assets import Assets
+from app.install.files import Masked, OwnFile, UsersFile
+from app.install.host import Host, release_of
+from app.install.release import CheckedPanel, Current, Release
+from app.install.step import Step
+from app.install.system import Packages, Unit, User
+
+SYSTEMS: Final = {("debian", "12"), ("debian", "13"), ("ubuntu", "24.04")}
+ETC: Final = "/etc/operator-panel"
+PANEL: Final = f"{ETC}/panel.toml"
+SERVER: Final = "operator-panel.service"
+SCREEN: Final = "operator-panel-kiosk.service"
+USER: Final = "operator-kiosk"
+TOUCH_RULE: Final = "/etc/udev/rules.d/90-operator-panel-touch.rules"
+# Where Chromium and Chrome read what their users may do.
+POLICIES: Final = (
+    "/etc/chromium/policies/managed/operator-panel.json",
+    "/etc/opt/chrome/policies/managed/operator-panel.json",
+)
+ALWAYS: Final = ("python3-venv",)
+FOR_THE_SCREEN: Final = (
+    "sway",
+    "seatd",
+    "swayidle",
+    "libgl1-mesa-dri",
+    "fonts-noto-core",
+    "fonts-noto-cjk",
+)
+CHROMIUM: Final = "chromium"
+# Not a snap: that one has no access to the unit's folders and its DevTools pipe.
+OTHER_BROWSERS: Final = ("/usr/bin/google-chrome-stable", "/usr/bin/chromium")
+NUMBER: Final = re.compile(r"-?\d+(\.\d+)?")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Options:
+    """What is installed. `touch_matrix` has six numbers of libinput's calibration matrix, or none."""
+
+    wheel: Path
+    panel: Path | None = None
+    zenoh: Path | None = None
+    wheels: Path | None = None
+    screen: bool = True
+    touch_matrix: tuple[str, ...] = ()
+    any_system: bool = False
+
+
+def steps(options: Options, host: Host) -> list[Step]:
+    """All steps; SettingsError if this system or an option can't be used."""
+    assets = Assets(options.wheel)
+    release = Release(
+        wheel=options.wheel, lock=assets.text("deploy/requirements.lock"), wheels=options.wheels
+    )
+    return [
+        Packages(_packages(options, host)),
+        release,
+        UsersFile(
+            path=PANEL,
+            content=_given(options.panel) or assets.text("panel.toml"),
+            about=str(options.panel or "the shipped panel with a simulated robot"),
+            replaces=options.panel is not None,
+        ),
+        UsersFile(
+            path=f"{ETC}/zenoh.json5",
+            content=_given(options.zenoh) or assets.text("zenoh.json5"),
+            about=str(options.zenoh or "how the robot's bridge is reached"),
+            replaces=options.zenoh is not None,
+        ),
+        CheckedPanel(release.name, PANEL),
+        Current(release.name),
+        *own_files(assets, options.screen),
+        *(_of_the_screen(options, assets) if options.screen else []),
+        Unit(SERVER),
+        *([Unit(SCREEN)] if options.screen else []),
+    ]
+
+
+def own_files(assets: Assets, screen: bool) -> list[Step]:
+    """The files that each release has its own of."""
+    unit = "/etc/systemd/system"
+    files: list[Step] = [
+        OwnFile(
+            path=f"{unit}/{SERVER}", content=assets.text(f"deploy/{SERVER}"), about="the server's unit"
+        )
+    ]
+    if screen:
+        policies = assets.text("deploy/kiosk-policies.json")
+        files += [OwnFile(path=path, content=policies, about="no way out of it") for path in POLICIES]
+        content = assets.text(f"deploy/{SCREEN}")
+        files.append(OwnFile(path=f"{unit}/{SCREEN}", content=content, about="the screen's unit"))
+    return files
+
+
+def _of_the_screen(options: Options, assets: Assets) -> list[Step]:
+    users = "/etc/sysusers.d/operator-panel.conf"
+    found: list[Step] = [
+        OwnFile(path=users, content=assets.text("deploy/sysusers.conf"), about="the browser's user"),
+        User(USER, users),
+        UsersFile(
+            path=f"{ETC}/kiosk.toml", content=assets.text("deploy/kiosk.toml"), about="the screen"
+        ),
+        Masked(unit="ctrl-alt-del.target", about="the keys that restart the machine"),
+    ]
+    if options.touch_matrix:
+        rule = touch_rule(options.touch_matrix)
+        found.append(OwnFile(path=TOUCH_RULE, content=rule, about="the touch screen's calibration"))
+    return found
+
+
+def uninstall_steps(host: Host) -> list[Step]:
+    """What there may be to take back, whatever was installed."""
+    here = Path(__file__)  # the names of files count here, not what is in them
+    return [
+        Packages([*ALWAYS, *FOR_THE_SCREEN, CHROMIUM]),
+        Release(wheel=here, lock=""),
+        *(
+            UsersFile(path=f"{ETC}/{name}", content="", about="")
+            for name in ("panel.toml", "zenoh.json5", "kiosk.toml")
+        ),
+        *own_files(Assets(), screen=True),
+        OwnFile(path="/etc/sysusers.d/operator-panel.conf", content="", about=""),
+        User(USER, ""),
+        Masked(unit="ctrl-alt-del.target", about=""),
+        OwnFile(path=TOUCH_RULE, content="", about=""),
+        Unit(SERVER),
+        Unit(SCREEN),
+    ]
+
+
+def touch_rule(matrix: tuple[str, ...]) -> str:
+    """A rule for udev, with libinput's calibration matrix."""
+    if len(matrix) != 6 or not all(map(NUMBER.fullmatch, matrix)):
+        raise SettingsError(
+            f'--touch-matrix is "{" ".join(matrix)}": six numbers, such as "1 0 0 0 1 0"'
+        )
+    return (
+        "# Touch calibration: see docs/how-to/kiosk.md\n"
+        'SUBSYSTEM=="input", KERNEL=="event*", ENV{ID_INPUT_TOUCHSCREEN}=="1", '
+        f'ENV{{LIBINPUT_CALIBRATION_MATRIX}}="{" ".join(matrix)}"\n'
+    )
+
+
+def _packages(options: Options, host: Host) -> list[str]:
+    system = release_of(host)
+    if system not in SYSTEMS and not options.any_system:
+        name = " ".join(filter(None, system)) or "this system"
+        raise SettingsError(
+            f"{name} is not supported: Debian 12, 13 or Ubuntu 24.04 (--any-system goes on anyway)"
+        )
+    names = [*ALWAYS, *(FOR_THE_SCREEN if options.screen else ())]
+    if not options.screen or any(host.path(path).exists() for path in OTHER_BROWSERS):
+        return names
+    if system[0] == "ubuntu":
+        raise SettingsError(
+            "there is no browser: Ubuntu's Chromium is a snap, which a service of its own user can't"
+            " run. Install Google Chrome's Debian package (google-chrome-stable), then run this again"
+        )
+    return [*names, CHROMIUM]
+
+
+def _given(path: Path | None) -> str:
+    try:
+        return path.read_text() if path else ""
+    except OSError as error:
+        raise SettingsError(f"{path} can't be read: {error.strerror}") from error

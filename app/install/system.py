@@ -1,0 +1,90 @@
+"""Steps of the operating system: packages, users, units."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from app.install.host import APT_ENV, Host
+
+
+@dataclass(frozen=True, slots=True)
+class Packages:
+    """Debian packages. They stay at the end: other programs may use them by then."""
+
+    names: Sequence[str]
+
+    def _missing(self, host: Host) -> list[str]:
+        asked = ["dpkg-query", "--show", "--showformat=${db:Status-Status}"]
+        return [name for name in self.names if not _installed(host, [*asked, name])]
+
+    def describe(self, host: Host) -> str:
+        return f"install the packages {', '.join(self._missing(host) or self.names)} (apt-get)"
+
+    def is_done(self, host: Host) -> bool:
+        return not self._missing(host)
+
+    def do(self, host: Host) -> None:
+        host.run(["apt-get", "update", "-qq"], APT_ENV)
+        get = ["apt-get", "install", "-y", "-qq", "--no-install-recommends"]
+        host.run([*get, *self._missing(host)], APT_ENV)
+
+    def undo(self, host: Host) -> str:
+        there = [name for name in self.names if name not in self._missing(host)]
+        return f"kept the packages {', '.join(there)}" if there else ""
+
+
+def _installed(host: Host, asked: Sequence[str]) -> bool:
+    return host.succeeds(asked) and host.run(asked) == "installed"
+
+
+@dataclass(frozen=True, slots=True)
+class User:
+    """A system user, as a file of sysusers.d(5) that a step before has written describes it."""
+
+    name: str
+    file: str
+
+    def describe(self, host: Host) -> str:
+        return f"add the user {self.name}, without log-in"
+
+    def is_done(self, host: Host) -> bool:
+        passwd = host.path("/etc/passwd")
+        return passwd.exists() and f"\n{self.name}:" in f"\n{passwd.read_text()}"
+
+    def do(self, host: Host) -> None:
+        host.run_outside(["systemd-sysusers", f"--root={host.root}", self.file])
+
+    def undo(self, host: Host) -> str:
+        if not self.is_done(host):
+            return ""
+        host.run(["userdel", self.name])
+        return f"removed the user {self.name}"
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """A unit that starts with the machine, and now. Its file is another step's."""
+
+    name: str
+
+    def describe(self, host: Host) -> str:
+        return f"enable {self.name}" + (" and start it" if host.runs_systemd else "")
+
+    def is_done(self, host: Host) -> bool:
+        wanted = host.path("/etc/systemd/system/multi-user.target.wants") / self.name
+        if not wanted.is_symlink():
+            return False
+        return not host.runs_systemd or host.succeeds(["systemctl", "is-active", "--quiet", self.name])
+
+    def do(self, host: Host) -> None:
+        host.run_outside(["systemctl", f"--root={host.root}", "enable", "--quiet", self.name])
+        if host.runs_systemd:
+            host.run(["systemctl", "daemon-reload"])
+            host.run(["systemctl", "restart", "--no-block", self.name])
+
+    def undo(self, host: Host) -> str:
+        if not (host.path("/etc/systemd/system/multi-user.target.wants") / self.name).is_symlink():
+            return ""
+        if host.runs_systemd:
+            host.run(["systemctl", "stop", self.name])
+        host.run_outside(["systemctl", f"--root={host.root}", "disable", "--quiet", self.name])
+        return f"stopped and disabled {self.name}"

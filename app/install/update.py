@@ -1,0 +1,122 @@
+"""Another release in place of the one that runs, and back if it does not come up."""
+
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, Protocol
+
+from app.install.assets import Assets
+from app.install.host import Host, StepFailed
+from app.install.plan import PANEL, SCREEN, SERVER, own_files
+from app.install.release import CheckedPanel, Current, Release, linked, wheel_in
+from app.install.step import apply
+
+COMES_WITHIN_S: Final = 60.0
+ASKED_EVERY_S: Final = 0.5
+ASKED_WITHIN_S: Final = 5.0
+URL: Final = "http://127.0.0.1:8000"
+Say = Callable[[str], object]
+
+
+class Services(Protocol):
+    def restart(self) -> None:
+        """Starts the server, and the screen if there is one, from the files as they are now."""
+
+
+@dataclass(frozen=True, slots=True)
+class SystemdServices:
+    host: Host
+
+    def restart(self) -> None:
+        if not self.host.runs_systemd:
+            return
+        self.host.run(["systemctl", "daemon-reload"])
+        # A panel on the screen loads again by itself; the watcher is of the release too.
+        self.host.run(["systemctl", "restart", "--no-block", SERVER])
+        self.host.run(["systemctl", "try-restart", "--no-block", SCREEN])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Updater:
+    """`url` is None if no server runs from the files, as in a folder that becomes a machine."""
+
+    host: Host
+    services: Services
+    url: str | None
+    say: Say
+    comes_within_s: float = COMES_WITHIN_S
+
+    def update(self, wheel: Path, wheels: Path | None = None) -> None:
+        """Installs `wheel` and runs it. If its server or page does not come, the release of before runs
+        again. StepFailed with the reason."""
+        lock = Assets(wheel).text("deploy/requirements.lock")
+        release = Release(wheel=wheel, lock=lock, wheels=wheels)
+        if linked(self.host, "current") == release.name:
+            self.say(f"{release.name} runs already")
+            return
+        apply([release, CheckedPanel(release.name, PANEL)], self.host, self.say)
+        self._switch(release.name)
+
+    def back(self) -> None:
+        """Runs the release of before again; StepFailed if there is none."""
+        before = linked(self.host, "previous")
+        if not before:
+            raise StepFailed("there is no release before this one")
+        self._switch(before)
+
+    def _switch(self, name: str) -> None:
+        before = linked(self.host, "current")
+        was_ready = self._status("/readyz") == 200
+        self._run(name)
+        reason = self._does_not_come(was_ready)
+        if not reason:
+            self.say(f"{name} runs")
+            return
+        if not before:
+            raise StepFailed(f"{name} does not come up: {reason}")
+        self.say(f"{name} does not come up ({reason}): {before} is started again")
+        self._run(before)
+        again = self._does_not_come(was_ready)
+        end = f"; nor does {before}: {again}" if again else f": {before} runs again"
+        raise StepFailed(f"{name} does not come up: {reason}{end}")
+
+    def _run(self, name: str) -> None:
+        screen = self.host.path(f"/etc/systemd/system/{SCREEN}").exists()
+        files = own_files(Assets(wheel_in(self.host, name)), screen)
+        apply([*files, Current(name)], self.host, self.say)
+        self.services.restart()
+
+    def _does_not_come(self, was_ready: bool) -> str:
+        """Why the release is not good; "" if it is. A robot that was off before may be off after."""
+        if self.url is None:
+            return ""
+        end = time.monotonic() + self.comes_within_s
+        while reason := self._missing(was_ready):
+            if time.monotonic() > end:
+                return f"{reason} within {self.comes_within_s:g} s"
+            time.sleep(ASKED_EVERY_S)
+        return ""
+
+    def _missing(self, was_ready: bool) -> str:
+        if self._status("/healthz") != 200:
+            return "the server does not answer"
+        if self._status("/", shows=b"data-widget") != 200:
+            return "its page does not come"
+        if was_ready and self._status("/readyz") != 200:
+            return "/readyz is not 200 as it was before"
+        return ""
+
+    def _status(self, path: str, shows: bytes = b"") -> int:
+        """The status of a response, 0 without one or if it does not have what it shows."""
+        if self.url is None:
+            return 0
+        try:
+            with urllib.request.urlopen(f"{self.url}{path}", timeout=ASKED_WITHIN_S) as response:
+                return int(response.status) if shows in response.read() else 0
+        except urllib.error.HTTPError as error:
+            return error.code
+        except OSError:
+            return 0

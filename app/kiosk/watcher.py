@@ -1,0 +1,146 @@
+"""Keeps the panel on the screen: compositor, browser and page, each restarted when it hangs.
+
+Everything is judged in one loop, about once a second. The service manager gets its ping from this loop,
+so a watcher that hangs is restarted too, with all that it started.
+"""
+
+import asyncio
+import logging
+import os
+import shutil
+import sys
+from collections.abc import Mapping
+from dataclasses import replace
+from datetime import datetime
+from pathlib import Path
+from time import monotonic
+from typing import Final
+
+from app.errors import SettingsError
+from app.kiosk.browser import Browser, find_browser
+from app.kiosk.child import Child
+from app.kiosk.compositor import Compositor
+from app.kiosk.config import KioskConfig
+from app.kiosk.devtools import DevToolsError
+from app.kiosk.judge import Action, Judge
+from app.kiosk.language import panel_language
+from app.kiosk.night import Night
+from app.kiosk.server_probe import server_answers
+from app.process.sd_notify import ServiceManager, status_line
+
+log = logging.getLogger("kiosk.screen")
+
+LOOK_INTERVAL_S: Final = 1.0
+# From this age of the last event on the server is asked whether it answers.
+YOUNG_S: Final = 2.0
+# After a start that failed, so that a missing part does not fill the machine's log.
+PAUSE_S: Final = 1.0
+
+
+class Watcher:
+    """Runs from `run` until it is cancelled. `folder` is in memory: it has the profile and more."""
+
+    def __init__(
+        self, config: KioskConfig, folder: Path, manager: ServiceManager, env: Mapping[str, str]
+    ) -> None:
+        self._config = config
+        self._folder = folder
+        self._manager = manager
+        self._env = {**env, "HOME": str(folder), "XDG_CONFIG_HOME": str(folder / "config")}
+        self._program = find_browser(config.browser)
+        self._compositor = Compositor(config, folder, self._env)
+        self._night = Night(config, self._compositor.power, self._ignore_input)
+        self._browser: Browser | None = None
+        self._judge = Judge()
+        self._starts_failed = 0
+        self._waiting = folder / "waiting.html"
+
+    async def run(self) -> None:
+        try:
+            while True:
+                try:
+                    await self._step()
+                except (DevToolsError, SettingsError, OSError) as error:
+                    log.error("the browser is restarted: %s", error)
+                    await self._stop_browser()
+                    self._starts_failed += 1
+                    await asyncio.sleep(PAUSE_S)
+                else:
+                    await asyncio.sleep(LOOK_INTERVAL_S)
+                self._tell()
+        finally:
+            self._manager.notify("STOPPING=1")
+            await self._night.end()
+            await self._stop_browser()
+            await self._compositor.end()
+
+    async def _step(self) -> None:
+        if not self._compositor.runs:
+            await self._stop_browser()
+            await self._compositor.start()
+        browser = self._browser
+        if browser is None or not browser.runs:
+            await self._start_browser()
+        else:
+            await self._judge_page(browser)
+        await self._night.update(datetime.now().time(), self._compositor.env)
+
+    async def _start_browser(self) -> None:
+        if self._browser is not None:
+            log.error("the browser ended: it is started again")
+            await self._stop_browser()
+        profile = self._folder / "profile"
+        if self._starts_failed:  # perhaps by what is in it
+            shutil.rmtree(profile, ignore_errors=True)
+        up = await server_answers(self._config.url)
+        url = self._config.url if up else await self._waiting_url()
+        flags = (*self._compositor.flags, *self._language_flags(), *self._config.flags)
+        self._browser = Browser(self._program, flags, profile)
+        await self._browser.start(url, self._compositor.env)
+        if self._night.dark:
+            await self._browser.ignore_input(True)
+        self._starts_failed = 0
+        self._judge = Judge()
+        log.info("the browser shows %s", "the panel" if up else "that the server does not answer yet")
+
+    async def _judge_page(self, browser: Browser) -> None:
+        look = await browser.look(self._waiting.as_uri(), self._config.origin)
+        young = look.on_panel and look.age_s is not None and look.age_s < YOUNG_S
+        server = None if young and look.responds else await server_answers(self._config.url)
+        if self._night.dark:
+            look = replace(look, drawn=True)
+        verdict = self._judge.judge(look, server, monotonic())
+        if verdict.action is not Action.NONE:
+            log.info("%s: %s", verdict.reason, verdict.action.value)
+        if verdict.action is Action.OPEN_PANEL:
+            await browser.open(self._config.url)
+        elif verdict.action is Action.OPEN_WAITING:
+            await browser.open(await self._waiting_url())
+        elif verdict.action is Action.RESTART:
+            await self._stop_browser()
+            await self._start_browser()
+
+    async def _stop_browser(self) -> None:
+        browser, self._browser = self._browser, None
+        if browser is not None:
+            await browser.end()
+
+    async def _ignore_input(self, ignore: bool) -> None:
+        if self._browser is not None:
+            await self._browser.ignore_input(ignore)
+
+    async def _waiting_url(self) -> str:
+        """The address of the waiting page, which is made when it is needed for the first time."""
+        if not self._waiting.exists():
+            made = [sys.executable, "-m", "app.kiosk.waiting_page", self._config.panel]
+            await Child([*made, str(self._waiting)], os.environ).ended.wait()
+        return self._waiting.as_uri()
+
+    def _language_flags(self) -> tuple[str, ...]:
+        language = panel_language(Path(self._config.panel))
+        return (f"--accept-lang={language}",) if language else ()
+
+    def _tell(self) -> None:
+        shown = "the browser runs" if self._browser is not None else "the browser does not start"
+        ready = ["READY=1"] if self._browser is not None else []
+        self._manager.notify(*ready, "WATCHDOG=1", status_line(shown))

@@ -1,0 +1,106 @@
+"""A kiosk's screen in tests: `operator-panel kiosk` with the real Chromium, without windows."""
+
+import json
+import os
+import signal
+import sys
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import httpx
+from websockets.exceptions import WebSocketException
+from websockets.sync.client import connect
+
+from app.kiosk.page_script import LOOK
+from tests.support.parts import CHROMIUM, ROOT, Process, free_port
+
+HEADLESS_FLAGS = ("--headless=new", "--no-sandbox", "--disable-gpu")
+ASKED_WITHIN_S = 2.0
+ALIVE_WITHIN_S = 2.0
+
+PRESS = """(text) => {
+    document.querySelector('[data-widget="message"] input').value = text;
+    document.querySelector('[data-widget="operation"] button').click();
+}"""
+# Presses ten times a second, each time with another text, until the page is gone.
+PRESS_ON = f"""(name) => {{
+    let number = 0;
+    clearInterval(window.pressing);
+    window.pressing = setInterval(() => ({PRESS})(`${{name}} ${{number++}}`), 100);
+}}"""
+
+
+class KioskScreen:
+    """The watcher and its browser; the test has a DevTools port of its own beside the watcher's pipe."""
+
+    def __init__(self, url: str, folder: Path, *options: str, **env: str) -> None:
+        self.url = url
+        self.folder = folder
+        self.port = free_port()
+        flags = (*HEADLESS_FLAGS, f"--remote-debugging-port={self.port}")
+        command = [sys.executable, "-m", "app.cli", "kiosk", "--compositor=none", f"--url={url}/"]
+        command += [f"--browser={CHROMIUM}", f"--folder={folder}", *options]
+        command += [f"--flag={flag}" for flag in flags]
+        self.process = Process(command, {"PYTHONPATH": "", **env}, cwd=ROOT)
+
+    def pages(self) -> list[dict[str, Any]]:
+        """The pages that the browser has; none while it does not answer."""
+        with suppress(httpx.HTTPError):
+            url = f"http://127.0.0.1:{self.port}/json/list"
+            found = httpx.get(url, timeout=ASKED_WITHIN_S, trust_env=False).json()
+            return [one for one in found if one["type"] == "page"]
+        return []
+
+    def call(self, method: str, **params: Any) -> dict[str, Any] | None:
+        """The result of a command to the page; None if it does not answer."""
+        pages = self.pages()
+        return _called(pages[0]["webSocketDebuggerUrl"], method, params) if pages else None
+
+    def evaluate(self, expression: str) -> Any:
+        """The value of an expression in the page; None if the page does not answer."""
+        given = {"expression": expression, "awaitPromise": True, "returnByValue": True}
+        return ((self.call("Runtime.evaluate", **given) or {}).get("result") or {}).get("value")
+
+    def lives(self) -> bool:
+        """Whether one page is shown, of the panel, whose events are young and which draws."""
+        if len(self.pages()) != 1:
+            return False
+        seen = self.evaluate(LOOK)
+        if not seen or not seen["url"].startswith(self.url) or seen["age_s"] is None:
+            return False
+        return bool(seen["drawn"] and seen["age_s"] < ALIVE_WITHIN_S)
+
+    def press_on(self, name: str) -> None:
+        self.evaluate(f"({PRESS_ON})({json.dumps(name)})")
+
+    def stop_presses(self) -> None:
+        self.evaluate("clearInterval(window.pressing)")
+
+    def processes(self, kind: str) -> list[int]:
+        """Those of a kind: "browser", "renderer" or "GPU"."""
+        url = f"http://127.0.0.1:{self.port}/json/version"
+        at = httpx.get(url, timeout=ASKED_WITHIN_S, trust_env=False).json()["webSocketDebuggerUrl"]
+        found = _called(at, "SystemInfo.getProcessInfo", {}) or {}
+        return [one["id"] for one in found["processInfo"] if one["type"] == kind]
+
+    def send(self, kind: str, number: signal.Signals) -> None:
+        for pid in self.processes(kind):
+            os.kill(pid, number)
+
+    def end(self) -> None:
+        if self.process.running:
+            assert self.process.end() == 0, self.process.text
+
+
+def _called(url: str, method: str, params: Mapping[str, Any]) -> dict[str, Any] | None:
+    try:
+        with connect(url, open_timeout=ASKED_WITHIN_S, max_size=None) as socket:
+            socket.send(json.dumps({"id": 1, "method": method, "params": params}))
+            while True:
+                message = json.loads(socket.recv(ASKED_WITHIN_S))
+                if message.get("id") == 1:
+                    return dict(message.get("result", {}))
+    except (OSError, TimeoutError, WebSocketException):
+        return None
