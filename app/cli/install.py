@@ -76,8 +76,8 @@ def _uninstall(given: Namespace) -> int:
 
 
 def _update(parser: Parser, given: Namespace) -> int:
-    if given.back is (given.wheel is not None):
-        parser.error("name a wheel, or give --back")
+    if given.back and given.wheel is not None:
+        parser.error("either a wheel or --back")
     host = Host(given.root.resolve())
     url = given.url if host.runs_systemd else None
     updater = Updater(host=host, services=SystemdServices(host), url=url, say=_say)
@@ -134,7 +134,13 @@ def _update_parser(prog: str) -> Parser:
         description="Installs another version beside the one that runs, and starts it. If its server or"
         " page does not come up within a minute, the version of before runs again.",
     )
-    parser.add_argument("wheel", nargs="?", type=Path, metavar="WHEEL", help="of the other version")
+    parser.add_argument(
+        "wheel",
+        nargs="?",
+        type=Path,
+        metavar="WHEEL",
+        help="of the other version; default: the wheel that this runs from",
+    )
     parser.add_argument("--back", action="store_true", help="run the version of before again")
     parser.add_argument("--url", default=URL, help="where the server answers; default: %(default)s")
     _add_root(parser)

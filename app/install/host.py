@@ -38,11 +38,20 @@ class Host:
     def run(self, command: Sequence[str], env: Mapping[str, str] | None = None) -> str:
         """The standard output of a command on the machine; StepFailed with its last lines."""
         inside = [] if self.is_this_machine else ["chroot", str(self.root)]
-        return self._run([*inside, *command], {**os.environ, **(env or {})})
-
-    def run_outside(self, command: Sequence[str]) -> str:
-        """The same for a command that takes the root itself, such as `systemctl --root`."""
-        return self._run(command, os.environ)
+        try:
+            done = subprocess.run(
+                [*inside, *command],
+                env={**_without_own(os.environ), **(env or {})},
+                check=False,
+                text=True,
+                capture_output=True,
+            )
+        except OSError as error:
+            raise StepFailed(f"{command[0]} can't be run: {error.strerror}") from error
+        if done.returncode:
+            last = "\n".join((done.stderr or done.stdout).strip().splitlines()[-8:])
+            raise StepFailed(f"{' '.join(command)} failed:\n{last}")
+        return done.stdout
 
     def succeeds(self, command: Sequence[str]) -> bool:
         try:
@@ -51,15 +60,10 @@ class Host:
             return False
         return True
 
-    def _run(self, command: Sequence[str], env: Mapping[str, str]) -> str:
-        try:
-            done = subprocess.run(command, env=env, check=False, text=True, capture_output=True)
-        except OSError as error:
-            raise StepFailed(f"{command[0]} can't be run: {error.strerror}") from error
-        if done.returncode:
-            last = "\n".join((done.stderr or done.stdout).strip().splitlines()[-8:])
-            raise StepFailed(f"{' '.join(command)} failed:\n{last}")
-        return done.stdout
+
+def _without_own(env: Mapping[str, str]) -> dict[str, str]:
+    """Without what is meant for this program: a release's Python has modules of its own."""
+    return {name: value for name, value in env.items() if not name.startswith(("PYTHON", "KIOSK_"))}
 
 
 def release_of(host: Host) -> tuple[str, str]:

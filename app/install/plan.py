@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Final
 
 from app.errors import SettingsError
-from app.install.assets import Assets
+from app.install.assets import Assets, own_wheel
 from app.install.files import Masked, OwnFile, UsersFile
 from app.install.host import Host, release_of
 from app.install.release import CheckedPanel, Current, Release
@@ -125,7 +125,7 @@ def uninstall_steps(host: Host) -> list[Step]:
             UsersFile(path=f"{ETC}/{name}", content="", about="")
             for name in ("panel.toml", "zenoh.json5", "kiosk.toml")
         ),
-        *own_files(Assets(), screen=True),
+        *own_files(Assets(own_wheel()), screen=True),
         OwnFile(path="/etc/sysusers.d/operator-panel.conf", content="", about=""),
         User(USER, ""),
         Masked(unit="ctrl-alt-del.target", about=""),

@@ -36,6 +36,13 @@ def link_to(host: Host, link: str, name: str) -> None:
     draft.replace(host.path(f"{BASE}/{link}"))
 
 
+def forget(host: Host, name: str) -> None:
+    """Removes a release that is no good: nothing goes back to it."""
+    if linked(host, "previous") == name:
+        host.path(f"{BASE}/previous").unlink()
+    shutil.rmtree(host.path(f"{RELEASES}/{name}"), ignore_errors=True)
+
+
 def wheel_in(host: Host, name: str) -> Path:
     """The wheel that a release was made of; StepFailed if it is gone."""
     found = list(host.path(f"{RELEASES}/{name}").glob("*.whl"))

@@ -51,7 +51,7 @@ class User:
         return passwd.exists() and f"\n{self.name}:" in f"\n{passwd.read_text()}"
 
     def do(self, host: Host) -> None:
-        host.run_outside(["systemd-sysusers", f"--root={host.root}", self.file])
+        host.run(["systemd-sysusers", self.file])
 
     def undo(self, host: Host) -> str:
         if not self.is_done(host):
@@ -76,7 +76,7 @@ class Unit:
         return not host.runs_systemd or host.succeeds(["systemctl", "is-active", "--quiet", self.name])
 
     def do(self, host: Host) -> None:
-        host.run_outside(["systemctl", f"--root={host.root}", "enable", "--quiet", self.name])
+        host.run(["systemctl", "enable", "--quiet", self.name])
         if host.runs_systemd:
             host.run(["systemctl", "daemon-reload"])
             host.run(["systemctl", "restart", "--no-block", self.name])
@@ -86,5 +86,5 @@ class Unit:
             return ""
         if host.runs_systemd:
             host.run(["systemctl", "stop", self.name])
-        host.run_outside(["systemctl", f"--root={host.root}", "disable", "--quiet", self.name])
+        host.run(["systemctl", "disable", "--quiet", self.name])
         return f"stopped and disabled {self.name}"

@@ -11,10 +11,11 @@ from typing import Final, Protocol
 from app.install.assets import Assets
 from app.install.host import Host, StepFailed
 from app.install.plan import PANEL, SCREEN, SERVER, own_files
-from app.install.release import CheckedPanel, Current, Release, linked, wheel_in
+from app.install.release import CheckedPanel, Current, Release, forget, linked, wheel_in
 from app.install.step import apply
 
 COMES_WITHIN_S: Final = 60.0
+STAYS_S: Final = 3.0
 ASKED_EVERY_S: Final = 0.5
 ASKED_WITHIN_S: Final = 5.0
 URL: Final = "http://127.0.0.1:8000"
@@ -34,8 +35,9 @@ class SystemdServices:
         if not self.host.runs_systemd:
             return
         self.host.run(["systemctl", "daemon-reload"])
-        # A panel on the screen loads again by itself; the watcher is of the release too.
-        self.host.run(["systemctl", "restart", "--no-block", SERVER])
+        # Stopped first, and waited for: what answers after it is the other release.
+        self.host.run(["systemctl", "stop", SERVER])
+        self.host.run(["systemctl", "start", "--no-block", SERVER])
         self.host.run(["systemctl", "try-restart", "--no-block", SCREEN])
 
 
@@ -48,6 +50,7 @@ class Updater:
     url: str | None
     say: Say
     comes_within_s: float = COMES_WITHIN_S
+    stays_s: float = STAYS_S
 
     def update(self, wheel: Path, wheels: Path | None = None) -> None:
         """Installs `wheel` and runs it. If its server or page does not come, the release of before runs
@@ -79,6 +82,7 @@ class Updater:
             raise StepFailed(f"{name} does not come up: {reason}")
         self.say(f"{name} does not come up ({reason}): {before} is started again")
         self._run(before)
+        forget(self.host, name)
         again = self._does_not_come(was_ready)
         end = f"; nor does {before}: {again}" if again else f": {before} runs again"
         raise StepFailed(f"{name} does not come up: {reason}{end}")
@@ -98,7 +102,9 @@ class Updater:
             if time.monotonic() > end:
                 return f"{reason} within {self.comes_within_s:g} s"
             time.sleep(ASKED_EVERY_S)
-        return ""
+        time.sleep(self.stays_s)
+        reason = self._missing(was_ready)
+        return f"{reason} any more" if reason else ""
 
     def _missing(self, was_ready: bool) -> str:
         if self._status("/healthz") != 200:

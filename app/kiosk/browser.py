@@ -44,7 +44,7 @@ FLAGS: Final = (
     "--disable-backgrounding-occluded-windows",
     "--disable-renderer-backgrounding",
     "--disable-features=Translate,MediaRouter,OptimizationHints,InterestFeedContentSuggestions,"
-    "CalculateNativeWinOcclusion,TouchpadOverscrollHistoryNavigation",
+    "CalculateNativeWinOcclusion,TouchpadOverscrollHistoryNavigation,SpareRendererForSitePerProcess",
     "--password-store=basic",
     "--autoplay-policy=no-user-gesture-required",
     "--disk-cache-size=8388608",

@@ -46,7 +46,12 @@ class Watcher:
         self._config = config
         self._folder = folder
         self._manager = manager
-        self._env = {**env, "HOME": str(folder), "XDG_CONFIG_HOME": str(folder / "config")}
+        places = {
+            "HOME": folder,
+            "XDG_CONFIG_HOME": folder / "config",
+            "XDG_CACHE_HOME": folder / "cache",
+        }
+        self._env = {**env, **{name: str(path) for name, path in places.items()}}
         self._program = find_browser(config.browser)
         self._compositor = Compositor(config, folder, self._env)
         self._night = Night(config, self._compositor.power, self._ignore_input)

@@ -30,7 +30,7 @@ FAULTS: Final[dict[str, Fault]] = {
     "browser frozen": lambda screen: screen.send("browser", signal.SIGSTOP),
     "page frozen": lambda screen: screen.send("renderer", signal.SIGSTOP),
     "page killed": lambda screen: screen.send("renderer", signal.SIGKILL),
-    "page crashed": lambda screen: screen.call("Page.navigate", url="chrome://crash"),
+    "page crashed": lambda screen: screen.call("Page.crash"),
     "page in a loop": lambda screen: screen.evaluate("setTimeout(() => { for (;;); })"),
     "GPU process killed": lambda screen: screen.send("GPU", signal.SIGKILL),
     "GPU process frozen": lambda screen: screen.send("GPU", signal.SIGSTOP),

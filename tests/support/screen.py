@@ -33,7 +33,7 @@ PRESS_ON = f"""(name) => {{
 
 
 class KioskScreen:
-    """The watcher and its browser; the test has a DevTools port of its own beside the watcher's pipe."""
+    """The watcher and its browser. The test has a DevTools port beside the watcher's pipe."""
 
     def __init__(self, url: str, folder: Path, *options: str, **env: str) -> None:
         self.url = url

@@ -1,0 +1,247 @@
+"""Installing into a folder that becomes a machine: what is said, done, done again and taken back."""
+
+import json
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from app.errors import SettingsError
+from app.install.assets import Assets, checked_wheel
+from app.install.files import Masked, OwnFile, UsersFile
+from app.install.host import Host, StepFailed, release_of
+from app.install.plan import PANEL, SCREEN, SERVER, Options, own_files, steps, touch_rule
+from app.install.release import Current, Release, link_to, linked, release_name
+from app.install.step import Step, apply, describe, revert
+from app.install.system import Packages, User
+from tests.support.parts import ROOT
+
+SHIPPED = {
+    "app/panel.toml": "app/panel.toml",
+    "app/zenoh.json5": "zenoh.json5",
+    **{f"app/deploy/{path.name}": f"deploy/{path.name}" for path in (ROOT / "deploy").iterdir()},
+}
+
+
+def make_wheel(folder: Path, version: str = "0.1.0", **changed: str) -> Path:
+    """A wheel with the shipped files only, some of them changed."""
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / f"operator_panel-{version}-py3-none-any.whl"
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, source in SHIPPED.items():
+            archive.writestr(name, changed.get(source, (ROOT / source).read_text()))
+    return path
+
+
+@pytest.fixture
+def host(tmp_path: Path) -> Host:
+    """A folder with what says that it is Debian 12."""
+    root = tmp_path / "root"
+    (root / "etc").mkdir(parents=True)
+    (root / "etc/os-release").write_text('ID=debian\nVERSION_ID="12"\n')
+    (root / "etc/passwd").write_text("root:x:0:0::/root:/bin/sh\n")
+    return Host(root)
+
+
+def of_files(plan: list[Step]) -> list[Step]:
+    """The steps that need no program of the machine."""
+    return [step for step in plan if isinstance(step, (OwnFile, UsersFile, Masked))]
+
+
+def tree(root: Path) -> dict[str, str]:
+    found = {}
+    for path in sorted(root.rglob("*")):
+        name = str(path.relative_to(root))
+        if path.is_symlink():
+            found[name] = f"-> {path.readlink()}"
+        elif path.is_file():
+            found[name] = path.read_text()
+    return found
+
+
+def test_the_plan_says_each_step_before_anything_is_changed(host: Host, tmp_path: Path) -> None:
+    before = tree(host.root)
+    plan = steps(Options(wheel=make_wheel(tmp_path)), host)
+    said = list(describe(plan, host))
+    assert tree(host.root) == before
+    assert all(line.startswith("to do ") for line in said)
+    for about in ("chromium", "sway", "/opt/operator-panel/releases/0.1.0-", PANEL, SERVER, SCREEN):
+        assert any(about in line for line in said), about
+
+
+def test_files_are_written_once_and_taken_back_but_the_users_stay(host: Host, tmp_path: Path) -> None:
+    before = tree(host.root)
+    plan = of_files(steps(Options(wheel=make_wheel(tmp_path), touch_matrix=("1",) * 6), host))
+    assert apply(plan, host, str) == len(plan)
+    written = tree(host.root)
+    assert apply(plan, host, str) == 0
+    assert tree(host.root) == written
+    policies = json.loads(written["etc/chromium/policies/managed/operator-panel.json"])
+    assert policies["URLBlocklist"] == ["*"]
+
+    said: list[str] = []
+    revert(plan, host, said.append)
+    kept = {"etc/operator-panel/panel.toml", "etc/operator-panel/zenoh.json5"}
+    kept.add("etc/operator-panel/kiosk.toml")
+    assert tree(host.root).keys() - before.keys() == kept
+    assert f"kept {PANEL}" in said
+
+
+def test_a_panel_of_the_users_is_kept_by_the_next_run_and_replaced_by_a_new_one(
+    host: Host, tmp_path: Path
+) -> None:
+    wheel = make_wheel(tmp_path)
+    mine = tmp_path / "cell1.toml"
+    mine.write_text("# first\n")
+    apply(of_files(steps(Options(wheel=wheel, panel=mine), host)), host, str)
+    apply(of_files(steps(Options(wheel=wheel), host)), host, str)
+    assert host.path(PANEL).read_text() == "# first\n"
+    mine.write_text("# second\n")
+    apply(of_files(steps(Options(wheel=wheel, panel=mine), host)), host, str)
+    assert host.path(PANEL).read_text() == "# second\n"
+    assert host.path(f"{PANEL}.before").read_text() == "# first\n"
+
+
+def test_units_of_another_version_replace_those_that_are_there(host: Host, tmp_path: Path) -> None:
+    apply(own_files(Assets(make_wheel(tmp_path / "1")), True), host, str)
+    other = make_wheel(tmp_path / "2", "0.2.0", **{f"deploy/{SERVER}": "# other\n"})
+    assert apply(own_files(Assets(other), True), host, str) == 1
+    assert host.path(f"/etc/systemd/system/{SERVER}").read_text() == "# other\n"
+
+
+def test_the_server_alone_needs_no_screen(host: Host, tmp_path: Path) -> None:
+    plan = steps(Options(wheel=make_wheel(tmp_path), screen=False), host)
+    said = "\n".join(describe(plan, host))
+    assert [word for word in ("sway", "chromium", "kiosk", "user") if word in said] == []
+    assert SERVER in said
+
+
+@pytest.mark.parametrize(
+    ("system", "said"),
+    [
+        ('ID=fedora\nVERSION_ID="42"\n', "fedora 42 is not supported"),
+        ('ID=debian\nVERSION_ID="11"\n', "debian 11 is not supported"),
+        ('ID=ubuntu\nVERSION_ID="24.04"\n', "Ubuntu's Chromium is a snap"),
+    ],
+)
+def test_a_system_that_can_not_be_used_is_named(
+    host: Host, tmp_path: Path, system: str, said: str
+) -> None:
+    host.path("/etc/os-release").write_text(system)
+    with pytest.raises(SettingsError, match=said):
+        steps(Options(wheel=make_wheel(tmp_path)), host)
+
+
+def test_ubuntu_with_chrome_is_good(host: Host, tmp_path: Path) -> None:
+    host.path("/etc/os-release").write_text('ID=ubuntu\nVERSION_ID="24.04"\n')
+    chrome = host.path("/usr/bin/google-chrome-stable")
+    chrome.parent.mkdir(parents=True)
+    chrome.touch()
+    packages = steps(Options(wheel=make_wheel(tmp_path)), host)[0]
+    assert isinstance(packages, Packages)
+    assert "chromium" not in packages.names
+    assert release_of(host) == ("ubuntu", "24.04")
+
+
+@pytest.mark.parametrize("matrix", [("1", "0"), ("1", "0", "0", "0", "1", "$(x)")])
+def test_a_calibration_that_is_none_is_named(matrix: tuple[str, ...]) -> None:
+    with pytest.raises(SettingsError, match="six numbers"):
+        touch_rule(matrix)
+
+
+def test_the_rule_of_a_touch_screen_is_one_for_udev() -> None:
+    rule = touch_rule(("0", "-1", "1", "1", "0", "0"))
+    assert 'ENV{LIBINPUT_CALIBRATION_MATRIX}="0 -1 1 1 0 0"' in rule
+
+
+def test_a_user_is_there_when_the_machine_has_it(host: Host) -> None:
+    user = User("operator-kiosk", "")
+    assert not user.is_done(host)
+    assert user.undo(host) == ""
+    with host.path("/etc/passwd").open("a") as file:
+        file.write("operator-kiosk:x:999:999::/:/usr/sbin/nologin\n")
+    assert user.is_done(host)
+
+
+def test_a_release_that_was_cut_off_is_no_release(host: Host, tmp_path: Path) -> None:
+    release = Release(wheel=make_wheel(tmp_path), lock="")
+    host.path(f"{release.folder}/bin").mkdir(parents=True)
+    assert not release.is_done(host)
+    host.path(f"{release.folder}/.complete").touch()
+    assert release.is_done(host)
+
+
+def test_only_the_release_that_runs_and_the_one_before_stay(host: Host) -> None:
+    names = ["0.1.0-a", "0.2.0-b", "0.3.0-c"]
+    for name in names[:2]:
+        host.path(f"/opt/operator-panel/releases/{name}").mkdir(parents=True)
+    link_to(host, "current", names[0])
+    Current(names[1]).do(host)
+    assert (linked(host, "previous"), linked(host, "current")) == (names[0], names[1])
+    host.path(f"/opt/operator-panel/releases/{names[2]}").mkdir()
+    Current(names[2]).do(host)
+    assert (linked(host, "previous"), linked(host, "current")) == (names[1], names[2])
+    left = {path.name for path in host.path("/opt/operator-panel/releases").iterdir()}
+    assert left == set(names[1:])
+
+
+def test_two_builds_of_one_version_are_two_releases(tmp_path: Path) -> None:
+    first, second = make_wheel(tmp_path / "1"), make_wheel(tmp_path / "2", **{"app/panel.toml": "x"})
+    assert release_name(first) != release_name(second)
+
+
+@pytest.mark.parametrize("name", ["missing.whl", "other-1.0-py3-none-any.whl"])
+def test_what_is_no_wheel_of_the_panel_is_named(tmp_path: Path, name: str) -> None:
+    path = tmp_path / name
+    if name.startswith("other"):
+        path.touch()
+    with pytest.raises(SettingsError, match=r"is no wheel of the operator panel"):
+        checked_wheel(path)
+
+
+def test_a_command_that_fails_says_why() -> None:
+    with pytest.raises(StepFailed, match="boom"):
+        Host().run(["sh", "-c", "echo boom >&2; exit 3"])
+    with pytest.raises(StepFailed, match="no-such-command can't be run"):
+        Host().run(["no-such-command"])
+
+
+def test_a_command_of_the_machine_does_not_read_this_programs_modules(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("PYTHONPATH", "/elsewhere")
+    assert Host().run(["sh", "-c", 'printf %s "$PYTHONPATH"']) == ""
+
+
+def test_the_command_runs_from_the_wheels_file_with_nothing_installed(
+    host: Host, tmp_path: Path
+) -> None:
+    build = [sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", str(tmp_path)]
+    subprocess.run(build, cwd=ROOT, check=True, capture_output=True, timeout=120)
+    (wheel,) = tmp_path.glob("*.whl")
+    # -S: none of the packages that this Python has.
+    command = [sys.executable, "-S", "-m", "app.cli", "install", f"--root={host.root}"]
+    before = tree(host.root)
+
+    def run(*more: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [*command, *more],
+            cwd=tmp_path,
+            env={"PATH": "/usr/bin:/bin", "PYTHONPATH": str(wheel)},
+            capture_output=True,
+            text=True,
+            check=False,
+            stdin=subprocess.DEVNULL,
+        )
+
+    dry = run("--dry-run")
+    assert dry.returncode == 0, dry.stderr
+    assert f"install {wheel.name} into" in dry.stdout
+    unasked = run()
+    assert (unasked.returncode, unasked.stderr) == (
+        2,
+        "nothing was changed: add --yes to go on without a question\n",
+    )
+    assert tree(host.root) == before
