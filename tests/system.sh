@@ -28,6 +28,12 @@ need chromium chromium --version
 need chromium-headless-shell test -e /usr/bin/chromium-headless-shell
 need libclang-dev has_libclang
 need faketime has_faketime
+# The kiosk's compositor, what takes its picture, types into it and tells of idleness.
+need sway sway --version
+need grim test -e /usr/bin/grim
+need wtype test -e /usr/bin/wtype
+need swayidle test -e /usr/bin/swayidle
+need systemd systemd-analyze --version
 need iproute2 ip -V
 # Pages are laid out with each of these alone, see tests/support/fonts.py.
 need fonts-dejavu-core test -e "$FONTS/dejavu/DejaVuSans.ttf"

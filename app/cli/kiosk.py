@@ -46,8 +46,13 @@ async def _run(config: KioskConfig, folder: Path) -> None:
     watcher = Watcher(config, folder.resolve(), ServiceManager(), os.environ)
     running = asyncio.ensure_future(watcher.run())
     loop = asyncio.get_running_loop()
+
+    def stop() -> None:
+        watcher.stop()
+        running.cancel()
+
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        loop.add_signal_handler(number, running.cancel)
+        loop.add_signal_handler(number, stop)
     with suppress(asyncio.CancelledError):
         await running
 

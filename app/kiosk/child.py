@@ -51,7 +51,8 @@ class Child:
         if grace_s and self.runs:
             os.kill(self.pid, signal.SIGTERM)
             with suppress(TimeoutError):
-                await asyncio.wait_for(self.ended.wait(), grace_s)
+                async with asyncio.timeout(grace_s):
+                    await self.ended.wait()
         with suppress(ProcessLookupError):
             os.killpg(self.pid, signal.SIGKILL)  # what it started may live on
         await self.ended.wait()

@@ -119,6 +119,7 @@ class Compositor:
         with suppress(OSError, TimeoutError):
             said = Child(["swaymsg", "--quiet", *command], self._env)
             try:
-                await asyncio.wait_for(said.ended.wait(), SAYS_WITHIN_S)
+                async with asyncio.timeout(SAYS_WITHIN_S):
+                    await said.ended.wait()
             finally:
                 await said.end()

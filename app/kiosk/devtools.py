@@ -63,7 +63,8 @@ class DevTools:
         self._replies[number] = reply = asyncio.get_running_loop().create_future()
         self._writer.write(json.dumps(message).encode() + END)
         try:
-            found = await asyncio.wait_for(reply, timeout_s)
+            async with asyncio.timeout(timeout_s):  # wait_for of Python 3.11 may lose a cancellation
+                found = await reply
         except TimeoutError:
             raise NoResponse(f"{method}: no response within {timeout_s:g} s") from None
         finally:

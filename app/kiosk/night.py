@@ -4,6 +4,7 @@ swayidle tells of idleness by signals: SIGUSR1 when the time is up, SIGUSR2 at t
 """
 
 import asyncio
+import logging
 import os
 import signal
 from collections.abc import Awaitable, Callable, Mapping
@@ -13,6 +14,8 @@ from typing import Final
 
 from app.kiosk.child import Child
 from app.kiosk.config import KioskConfig
+
+log = logging.getLogger("kiosk.screen")
 
 # Between the touch that wakes the screen and the first that counts.
 AWAKE_AFTER_S: Final = 1.0
@@ -79,6 +82,7 @@ class Night:
     async def _follow(self) -> None:
         while self.dark != self._wanted:
             dark = self._wanted
+            log.info("the screen %s", "goes off" if dark else "goes on")
             if dark:
                 self.dark = True  # first no touch counts, then the screen is off
                 await self._ignore_input(True)
@@ -88,3 +92,4 @@ class Night:
                 await asyncio.sleep(AWAKE_AFTER_S)
                 await self._ignore_input(False)
                 self.dark = False
+                log.info("touches count again")

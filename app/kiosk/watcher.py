@@ -58,11 +58,12 @@ class Watcher:
         self._browser: Browser | None = None
         self._judge = Judge()
         self._starts_failed = 0
+        self._stopping = False
         self._waiting = folder / "waiting.html"
 
     async def run(self) -> None:
         try:
-            while True:
+            while not self._stopping:
                 try:
                     await self._step()
                 except (DevToolsError, SettingsError, OSError) as error:
@@ -74,10 +75,15 @@ class Watcher:
                     await asyncio.sleep(LOOK_INTERVAL_S)
                 self._tell()
         finally:
+            self._stopping = True
             self._manager.notify("STOPPING=1")
             await self._night.end()
             await self._stop_browser()
             await self._compositor.end()
+
+    def stop(self) -> None:
+        """`run` ends after what it is doing now, even if its task loses a cancellation."""
+        self._stopping = True
 
     async def _step(self) -> None:
         if not self._compositor.runs:

@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import pytest
 
@@ -45,8 +45,8 @@ FAULTS: Final[dict[str, Fault]] = {
 def screens(tmp_path: Path) -> Iterator[Callable[..., KioskScreen]]:
     made: list[KioskScreen] = []
 
-    def make(url: str, *options: str, **env: str) -> KioskScreen:
-        made.append(KioskScreen(url, tmp_path / "run", *options, **env))
+    def make(url: str, *options: str, **more: Any) -> KioskScreen:
+        made.append(KioskScreen(url, tmp_path / "run", "--compositor=none", *options, **more))
         return made[-1]
 
     yield make

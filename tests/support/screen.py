@@ -4,7 +4,7 @@ import json
 import os
 import signal
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,8 @@ from websockets.sync.client import connect
 from app.kiosk.page_script import LOOK
 from tests.support.parts import CHROMIUM, ROOT, Process, free_port
 
-HEADLESS_FLAGS = ("--headless=new", "--no-sandbox", "--disable-gpu")
+WITHOUT_GPU = ("--no-sandbox", "--disable-gpu")
+HEADLESS_FLAGS = ("--headless=new", *WITHOUT_GPU)
 ASKED_WITHIN_S = 2.0
 ALIVE_WITHIN_S = 2.0
 
@@ -35,12 +36,20 @@ PRESS_ON = f"""(name) => {{
 class KioskScreen:
     """The watcher and its browser. The test has a DevTools port beside the watcher's pipe."""
 
-    def __init__(self, url: str, folder: Path, *options: str, **env: str) -> None:
+    def __init__(
+        self,
+        url: str,
+        folder: Path,
+        *options: str,
+        before: Sequence[str] = (),
+        flags: Sequence[str] = HEADLESS_FLAGS,
+        **env: str,
+    ) -> None:
         self.url = url
         self.folder = folder
         self.port = free_port()
-        flags = (*HEADLESS_FLAGS, f"--remote-debugging-port={self.port}")
-        command = [sys.executable, "-m", "app.cli", "kiosk", "--compositor=none", f"--url={url}/"]
+        flags = (*flags, f"--remote-debugging-port={self.port}")
+        command = [*before, sys.executable, "-m", "app.cli", "kiosk", f"--url={url}/"]
         command += [f"--browser={CHROMIUM}", f"--folder={folder}", *options]
         command += [f"--flag={flag}" for flag in flags]
         self.process = Process(command, {"PYTHONPATH": "", **env}, cwd=ROOT)

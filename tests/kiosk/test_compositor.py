@@ -1,0 +1,143 @@
+"""The kiosk's screen in the real compositor, which has no screen here: what it shows, and keys."""
+
+import os
+import subprocess
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, Final
+
+import pytest
+
+from tests.support.parts import ROOT, Server, until
+from tests.support.screen import WITHOUT_GPU, KioskScreen
+
+# The compositor does not run as root.
+NO_ROOT: Final = ("unshare", "--user", "--map-user=1000", "--map-group=1000")
+NO_SCREEN: Final = {
+    "WLR_BACKENDS": "headless",
+    "WLR_LIBINPUT_NO_DEVICES": "1",
+    "WLR_RENDERER": "pixman",
+}
+PICTURE: Final = (1280, 720)
+SHORTCUTS: Final = (
+    *("ctrl t", "ctrl n", "ctrl w", "ctrl o", "ctrl p", "ctrl s", "ctrl u", "ctrl l", "ctrl h"),
+    *("ctrl plus", "ctrl minus", "ctrl+shift i", "ctrl+shift n", "ctrl+shift w", "ctrl Tab", "alt F4"),
+    *(
+        "alt Left",
+        "alt d",
+        "ctrl+alt F2",
+        "ctrl+alt Delete",
+        "F1",
+        "F3",
+        "F5",
+        "F6",
+        "F7",
+        "F11",
+        "F12",
+    ),
+)
+
+
+class SwayScreen(KioskScreen):
+    """A kiosk's screen with its compositor; keys are typed into the compositor."""
+
+    def _run(self, *command: str, **options: Any) -> subprocess.CompletedProcess[bytes]:
+        display = (self.folder / "wayland-display").read_text()
+        env = {**os.environ, "XDG_RUNTIME_DIR": str(self.folder), "WAYLAND_DISPLAY": display}
+        return subprocess.run(command, env=env, check=True, capture_output=True, timeout=30)
+
+    def picture(self) -> tuple[int, int, bytes]:
+        """(width, height, RGB) of what the screen shows."""
+        kind, width, height, _, pixels = self._run("grim", "-t", "ppm", "-").stdout.split(maxsplit=4)
+        assert kind == b"P6"
+        return int(width), int(height), pixels
+
+    def type(self, shortcut: str) -> None:
+        """Types a key with its modifiers, such as "ctrl+shift i"."""
+        *modifiers, key = shortcut.replace("+", " ").split()
+        held = [word for name in modifiers for word in ("-M", name)]
+        self._run("wtype", *held, "-k", key)
+
+    def tell(self, *command: str) -> None:
+        """Tells the compositor something."""
+        socket = str(self.folder / "sway.sock")
+        subprocess.run(["swaymsg", "-s", socket, "--", *command], check=False, capture_output=True)
+
+    def click(self) -> None:
+        """Presses at the lower end of the screen, where nothing is."""
+        for act in ("set 640 715", "press button1", "release button1"):
+            self.tell("seat", "-", "cursor", *act.split())
+
+
+@pytest.fixture
+def sway(tmp_path: Path, demo: Server) -> Iterator[Callable[..., SwayScreen]]:
+    made: list[SwayScreen] = []
+
+    def make(*options: str) -> SwayScreen:
+        panel = f"--panel={ROOT / 'app/panel.toml'}"
+        screen = SwayScreen(
+            demo.url, tmp_path / "r", panel, *options, before=NO_ROOT, flags=WITHOUT_GPU, **NO_SCREEN
+        )
+        made.append(screen)
+        until(screen.lives, "the panel is shown")
+        return screen
+
+    yield make
+    for screen in made:
+        screen.end()
+
+
+def colours(pixels: bytes) -> set[bytes]:
+    return {pixels[at : at + 3] for at in range(0, len(pixels) - 2, 3)}
+
+
+def test_the_panel_fills_the_screen(sway: Callable[..., SwayScreen]) -> None:
+    screen = sway()
+    width, height, _ = screen.picture()
+    assert (width, height) == PICTURE
+    assert screen.evaluate("[innerWidth, innerHeight]") == [*PICTURE]
+    until(lambda: len(colours(screen.picture()[2])) > 50, "a whole page is drawn")
+
+
+def test_a_rotated_screen_is_laid_out_upright(sway: Callable[..., SwayScreen]) -> None:
+    screen = sway("--rotate=90")
+    assert screen.picture()[:2] == PICTURE[::-1]
+    assert screen.evaluate("[innerWidth, innerHeight]") == [*PICTURE[::-1]]
+
+
+def test_no_key_leads_out_of_the_panel(sway: Callable[..., SwayScreen]) -> None:
+    screen = sway()
+    screen.evaluate("window.before = devicePixelRatio; window.keys = 0")
+    screen.evaluate("addEventListener('keyup', () => window.keys++)")
+    for shortcut in SHORTCUTS:
+        screen.type(shortcut)
+    screen.type("z")
+    until(lambda: screen.evaluate("window.keys"), "keys arrive in the panel")
+    until(screen.lives, "nothing but the panel is shown")
+    assert screen.evaluate("window.before === devicePixelRatio")
+    assert screen.evaluate("[innerWidth, innerHeight]") == [*PICTURE]
+
+
+def test_what_wakes_a_dark_screen_does_not_reach_the_panel(
+    sway: Callable[..., SwayScreen], tmp_path: Path
+) -> None:
+    config = tmp_path / "kiosk.toml"
+    config.write_text("off_after_s = 2\n")
+    screen = sway(f"--config={config}")
+    screen.evaluate("window.pressed = 0; addEventListener('pointerdown', () => window.pressed++)")
+    until(lambda: "the screen goes off" in screen.process.text, "the screen is dark")
+    screen.click()
+    screen.type("a")
+    until(lambda: "touches count again" in screen.process.text, "the screen is awake")
+    assert screen.evaluate("window.pressed") == 0
+    screen.click()
+    until(lambda: screen.evaluate("window.pressed"), "a press arrives")
+
+
+def test_a_compositor_that_ends_is_started_again(sway: Callable[..., SwayScreen]) -> None:
+    screen = sway()
+    screen.evaluate("window.before = true")
+    screen.tell("exit")
+    until(lambda: not screen.evaluate("window.before"), "the page is gone")
+    until(screen.lives, "the panel is back")
+    assert screen.picture()[:2] == PICTURE
