@@ -222,7 +222,7 @@ def test_what_is_tighter_stays() -> None:
 
 def test_the_unit_starts_the_server_and_gives_it_the_files_that_it_wants() -> None:
     unit = (ROOT / "deploy/operator-panel.service").read_text()
-    assert "\nExecStart=/opt/panel/bin/operator-panel run\n" in unit
+    assert "\nExecStart=/opt/operator-panel/current/bin/operator-panel run\n" in unit
     assert f"\nLimitNOFILE={FILES_WANTED}\n" in unit
 
 

@@ -1,0 +1,92 @@
+"""What is done about what the screen shows."""
+
+from itertools import pairwise
+
+from app.kiosk.judge import (
+    FOREIGN_AFTER_S,
+    LONGEST_PAUSE_S,
+    SILENT_AFTER_S,
+    UNDRAWN_AFTER_S,
+    Action,
+    Judge,
+    Look,
+)
+
+LIVE = Look(on_panel=True, ours=True, age_s=0.2)
+SILENT = Look(on_panel=True, ours=True, age_s=60.0)
+
+
+def actions(look: Look, server: bool | None, for_s: float, judge: Judge | None = None) -> list[Action]:
+    """What a judge does about the same look once a second."""
+    judge = judge or Judge()
+    return [judge.judge(look, server, float(second)).action for second in range(int(for_s) + 1)]
+
+
+def first(look: Look, server: bool | None = True) -> Action:
+    return Judge().judge(look, server, 0.0).action
+
+
+def test_a_live_panel_is_left_alone() -> None:
+    assert set(actions(LIVE, None, 600)) == {Action.NONE}
+
+
+def test_a_page_without_a_stream_is_left_alone() -> None:
+    assert set(actions(Look(on_panel=True, ours=True), True, 600)) == {Action.NONE}
+
+
+def test_what_does_not_respond_is_restarted() -> None:
+    assert first(Look(responds=False)) is Action.RESTART
+
+
+def test_a_crashed_page_is_opened_again_or_waits_for_the_server() -> None:
+    assert first(Look(crashed=True), True) is Action.OPEN_PANEL
+    assert first(Look(crashed=True), False) is Action.OPEN_WAITING
+
+
+def test_a_page_that_crashes_again_and_again_needs_another_browser() -> None:
+    assert Action.RESTART in actions(Look(crashed=True), True, 5)
+
+
+def test_the_waiting_page_stays_until_the_server_answers() -> None:
+    waiting = Look(waiting=True)
+    assert set(actions(waiting, False, 600)) == {Action.NONE}
+    assert first(waiting, True) is Action.OPEN_PANEL
+
+
+def test_another_page_is_left_at_once() -> None:
+    assert first(Look(), True) is Action.OPEN_PANEL
+    assert first(Look(), False) is Action.OPEN_WAITING
+
+
+def test_a_page_of_the_server_that_is_none_of_the_panel_is_left_soon() -> None:
+    found = actions(Look(on_panel=True), True, FOREIGN_AFTER_S)
+    assert (set(found[:-1]), found[-1]) == ({Action.NONE}, Action.OPEN_PANEL)
+
+
+def test_a_page_that_draws_nothing_is_restarted() -> None:
+    undrawn = Look(on_panel=True, ours=True, age_s=0.2, drawn=False)
+    found = actions(undrawn, None, UNDRAWN_AFTER_S)
+    assert (set(found[:-1]), found[-1]) == ({Action.NONE}, Action.RESTART)
+
+
+def test_one_look_that_draws_starts_the_time_anew() -> None:
+    judge = Judge()
+    undrawn = Look(on_panel=True, ours=True, age_s=0.2, drawn=False)
+    looks = [undrawn] * 4 + [LIVE] + [undrawn] * 4
+    found = {judge.judge(look, None, float(at)).action for at, look in enumerate(looks)}
+    assert found == {Action.NONE}
+
+
+def test_a_locked_page_stays_while_the_server_is_gone() -> None:
+    assert set(actions(SILENT, False, 600)) == {Action.NONE}
+
+
+def test_a_silent_page_is_opened_again_then_the_browser_is_restarted_ever_more_rarely() -> None:
+    found = actions(SILENT, True, 3600)
+    acted = [at for at, action in enumerate(found) if action is not Action.NONE]
+    assert acted[0] == SILENT_AFTER_S
+    assert found[acted[0]] is Action.OPEN_PANEL
+    assert found[acted[1]] is Action.RESTART
+    pauses = [after - before for before, after in pairwise(acted)]
+    assert pauses == sorted(pauses)
+    assert pauses[-1] >= LONGEST_PAUSE_S
