@@ -8,7 +8,18 @@ from contextlib import redirect_stderr, redirect_stdout
 import pytest
 
 # Who takes one of these fixtures needs the bridge, the ROS 2 nodes or the browser.
-PARTS = {"domain", "cyclone_bridge", "own_cyclone_bridge", "robots", "ros", "chromium"}
+PARTS = {
+    "domain",
+    "cyclone_bridge",
+    "own_cyclone_bridge",
+    "robots",
+    "ros",
+    "chromium",
+    "screen",
+    "screens",
+    "sway",
+    "units",
+}
 
 
 def needs_part(item: pytest.Item) -> bool:
