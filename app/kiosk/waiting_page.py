@@ -14,8 +14,9 @@ from app.i18n import render, say
 from app.i18n.catalogue import files
 
 STYLE = """
-html { background: #1b1f23; color: #fff; font: 28px/1.4 "Noto Sans", "Noto Sans CJK JP", sans-serif }
-body { margin: 0; height: 100vh; display: grid; gap: 1.2em; place-content: center;
+html { background: #1b1f23; color: #fff;
+  font: min(28px, 4.2vh)/1.4 "Noto Sans", "Noto Sans CJK JP", sans-serif }
+body { margin: 0 4vw; height: 100vh; display: grid; gap: 1.2em; place-content: center;
   justify-items: center; text-align: center; user-select: none; cursor: none }
 h1 { font-size: 1.3em; margin: 0 } p { margin: .2em 0 } p.late { color: #c8ccd0; font-size: .8em }
 i { width: 2em; height: 2em; border: .3em solid #555; border-top-color: #fff; border-radius: 50%;
