@@ -14,10 +14,6 @@ COMMANDS = {
     "run": "serve a panel to browsers",
     "check": "check panel files: every fault with its place",
     "log": "check that the operator's log is as it was written",
-    "install": "install the panel as services of this machine",
-    "update": "run another version, and back if it does not come up",
-    "uninstall": "take the installation back; data stays",
-    "kiosk": "show the panel on this machine's screen",
     "simulate": "run the robot of a panel, or a recording, as a Zenoh peer of its own",
     "topics": "list the topics of a robot",
     "echo": "show the messages of a topic",
@@ -27,6 +23,10 @@ COMMANDS = {
     "support": "collect what support needs to know in a zip file",
     "bridge-config": "write a configuration of the bridge that fits a panel",
     "completion": "print a shell's completion of these commands",
+    "install": "install the panel as services of this machine",
+    "update": "run another version, and back if it does not come up",
+    "uninstall": "take the installation back; data stays",
+    "kiosk": "show the panel on this machine's screen",
 }
 Command = Callable[[Sequence[str], str], int]
 
