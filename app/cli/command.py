@@ -74,9 +74,9 @@ def _command(name: str) -> Command:
         case "install":
             from app.cli.install import install as main
         case "update":
-            from app.cli.install import update as main
+            from app.cli.update import main
         case "uninstall":
-            from app.cli.install import uninstall as main
+            from app.cli.uninstall import main
         case "kiosk":
             from app.cli.kiosk import main
         case _:

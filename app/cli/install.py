@@ -20,7 +20,7 @@ PROG = "python -m app.cli"
 
 
 def install(arguments: Sequence[str], prog: str = f"{PROG} install") -> int:
-    return _run(_install, _install_parser(prog), arguments)
+    return _run(_install, _parser(prog), arguments)
 
 
 def uninstall(arguments: Sequence[str], prog: str = f"{PROG} uninstall") -> int:
@@ -101,7 +101,7 @@ def _say(text: str) -> None:
     print(text, flush=True)
 
 
-def _install_parser(prog: str) -> Parser:
+def _parser(prog: str) -> Parser:
     parser = Parser(
         prog=prog,
         description="Installs the panel as services of this machine: server, compositor, browser. Says"
