@@ -25,6 +25,7 @@ SHIPPED: Final = PACKAGE / "panel.toml"
 # What the pages' commands read and write of the machine is in a folder instead.
 PLACES: Final = ("opt", "etc/operator-panel", "var/lib/operator-panel", "backup/panel")
 ABSOLUTE: Final = re.compile(rf"(?<![\w.])/(?={'|'.join(PLACES)}\b)")
+RELEASE: Final = "/opt/operator-panel/current"  # where the service page installs it
 SERVICE: Final = "test_a_wheel_is_installed_as_the_service_page_says"
 SERVED: Final = "test_a_panel_is_served_by_its_command_and_its_data_is_backed_up"
 CONTAINERFILE: Final = (ROOT / "deploy/Containerfile").read_text().replace("\\\n", "")
@@ -50,7 +51,7 @@ class Machine:
 
     @property
     def python(self) -> str:
-        return str(self.root / "opt/panel/bin/python")
+        return str(self.root / RELEASE[1:] / "bin/python")
 
     def here(self, command: str) -> str:
         """A page's command, with this folder's paths."""
@@ -91,7 +92,8 @@ def machine(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Machine:
     shutil.copy(SHIPPED, mine.copied / "cell1.toml")
     for place in PLACES:
         (mine.root / place).mkdir(parents=True)
-    (mine.root / "opt/panel-0.2").symlink_to("panel")
+    (mine.root / "opt/operator-panel").mkdir()
+    (mine.root / "opt/operator-panel/0.2").symlink_to("current")
     for command in of_pages(SERVICE):
         done = mine.run(command)
         assert done.returncode == 0, f"{command}: {done.stdout}{done.stderr}"
@@ -101,19 +103,19 @@ def machine(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Machine:
 def test_a_wheel_is_installed_as_the_service_page_says(machine: Machine, wheel: Path) -> None:
     commands = of_pages(SERVICE)
     assert sum("pip install" in one for one in commands) == 2
-    told = machine.run("/opt/panel/bin/operator-panel --version")
+    told = machine.run(f"{RELEASE}/bin/operator-panel --version")
     assert told.stdout.split() == ["operator-panel", wheel.name.split("-")[1]]
-    check = machine.run("/opt/panel/bin/operator-panel check /etc/operator-panel/panel.toml")
+    check = machine.run(f"{RELEASE}/bin/operator-panel check /etc/operator-panel/panel.toml")
     assert check.returncode == 0, check.stderr
     # Installed, it needs no file of the checkout: these are its own.
-    shipped = machine.run("/opt/panel/bin/python -m app.check")
+    shipped = machine.run(f"{RELEASE}/bin/python -m app.check")
     assert shipped.returncode == 0, shipped.stderr
     assert str(ROOT) not in shipped.stdout
     services = (
         "from app.interfaces import load_interfaces as of; "
         "of('jazzy').service_types('std_srvs/srv/SetBool')"
     )
-    assert machine.run(f"/opt/panel/bin/python -c {shlex.quote(services)}").returncode == 0
+    assert machine.run(f"{RELEASE}/bin/python -c {shlex.quote(services)}").returncode == 0
 
 
 def test_an_installed_wheel_serves_from_any_folder(machine: Machine, tmp_path: Path) -> None:
@@ -199,7 +201,7 @@ def container(machine: Machine) -> Iterator[Process]:
     mine = Process(
         [
             *("unshare", "--mount", "--net", "sh", "-ec", CONTAINED),
-            *("sh", str(machine.root / "opt/panel"), start),
+            *("sh", str(machine.root / RELEASE[1:]), start),
         ],
         {"PYTHONPATH": "", "HOME": "/nonexistent"},
         cwd="/",
