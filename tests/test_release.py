@@ -2,6 +2,7 @@
 
 import re
 import tarfile
+import zipfile
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Final
@@ -58,7 +59,12 @@ def test_the_sdist_gives_the_wheel_of_the_checkout(tmp_path: Path) -> None:
     with tarfile.open(next(tmp_path.glob("*.tar.gz"))) as archive:
         names = {Path(*Path(name).parts[1:]).as_posix() for name in archive.getnames()}
     assert {"pyproject.toml", "README.md", "CHANGELOG.md", "LICENSE", "zenoh.json5"} <= names
-    assert not [name for name in names if name.startswith(("tests/", "docs/", "deploy/", ".git/"))]
+    assert not [name for name in names if name.startswith(("tests/", "docs/", ".git/"))]
+    with zipfile.ZipFile(wheel) as archive:
+        installed = {name for name in archive.namelist() if name.startswith("app/deploy/")}
+    assert installed == {f"app/{name}" for name in names if name.startswith("deploy/")}
+    assert "app/deploy/operator-panel-kiosk.service" in installed
+    assert "app/deploy/release.lock" not in installed
 
 
 def test_without_its_documentation_it_is_no_release(checkout: ModuleType, tmp_path: Path) -> None:

@@ -34,9 +34,11 @@ COMPOSE: Final = YAML(typ="safe").load(ROOT / "deploy/compose.yaml")
 # network of its own. $1 is the environment, $2 what runs.
 CONTAINED: Final = """
 mount --make-rprivate /
-mount -t tmpfs panel /opt && mkdir /opt/panel && mount --bind "$1" /opt/panel
+mount -t tmpfs panel /opt && mkdir -p /opt/operator-panel/current
+mount --bind "$1" /opt/operator-panel/current
 mount -t tmpfs data /var/lib && mkdir /var/lib/operator-panel
-mount -o remount,bind,ro / && mount -o remount,ro /opt && mount -o remount,bind,ro /opt/panel
+mount -o remount,bind,ro / && mount -o remount,ro /opt
+mount -o remount,bind,ro /opt/operator-panel/current
 ip link set lo up
 exec setpriv --bounding-set=-all --inh-caps=-all --no-new-privs sh -c "$2"
 """
@@ -220,7 +222,7 @@ def test_the_image_starts_read_only_and_its_health_check_sees_it(container: Proc
     until(lambda: "the panel is at" in container.text, "it serves", within_s=60)
     check = shell(health.split(" CMD ", 1)[1])
     assert inside(check) == 0
-    assert inside("touch /opt/panel/x || touch /x || touch /etc/x") != 0
+    assert inside("touch /opt/operator-panel/current/x || touch /x || touch /etc/x") != 0
     assert inside(check.replace(":8000/", ":8001/")) != 0  # where nothing serves
 
 

@@ -219,6 +219,7 @@ def test_calls_that_wait_hold_up_no_press(
     until(lambda: kiosk.widget("say")["enabled"], "joined")
     until(lambda: kiosk.widget(names[-1])["enabled"], "offered")
     until(lambda: robot.publishers(topic="/said"), "the bridge publishes")
+    until(lambda: _is_published(kiosk), "the kiosk knows that the node subscribes")
     alone = median(heard_after_s(kiosk, robot, f"alone {n}") for n in range(20))
     with ThreadPoolExecutor(len(names)) as pool:
         began = time.monotonic()
@@ -231,6 +232,11 @@ def test_calls_that_wait_hold_up_no_press(
     assert outcomes == {"timed_out": 3 * MAX_UNANSWERED, "refused": 3}
     assert len(robot.requests("/slow")) == MAX_UNANSWERED
     assert beside < 3 * alone + 0.02, f"{beside * 1000:.1f} ms instead of {alone * 1000:.1f} ms"
+
+
+def _is_published(kiosk: Server) -> bool:
+    answer = kiosk.http.post("/widgets/say", json={"inputs": {"words": "first"}})
+    return bool(answer.json()["outcome"] == "published")
 
 
 WAITING_S = 6.0

@@ -200,6 +200,8 @@ def test_ctrl_c_ends_it_without_words(cyclone_bridge: Bridge, io: RosNode) -> No
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
+        # Where the tests run in the background, it would ignore Ctrl-C as they do.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     assert echo.stdout is not None
     assert echo.stdout.readline() == "header:\n"

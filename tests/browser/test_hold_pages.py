@@ -116,5 +116,9 @@ def test_a_page_that_did_not_load_whole_is_loaded_again(kiosk: Server, page: Pag
     page.wait_for_function("() => performance.getEntriesByType('navigation')[0].type === 'reload'")
     button = page.get_by_role("button", name="Jog")
     expect(button).to_be_enabled()
-    button.dispatch_event("pointerdown", {"isPrimary": True, "button": 0, "pointerId": 7})
-    expect(button).to_have_attribute("aria-pressed", "true")
+
+    def is_held() -> bool:
+        button.dispatch_event("pointerdown", {"isPrimary": True, "button": 0, "pointerId": 7})
+        return button.get_attribute("aria-pressed") == "true"
+
+    until(is_held, "the script of the kind is there, and it is held", every_s=0.05)

@@ -21,7 +21,11 @@ from tests.support.parts import ROOT
 SHIPPED = {
     "app/panel.toml": "app/panel.toml",
     "app/zenoh.json5": "zenoh.json5",
-    **{f"app/deploy/{path.name}": f"deploy/{path.name}" for path in (ROOT / "deploy").iterdir()},
+    **{
+        f"app/deploy/{path.name}": f"deploy/{path.name}"
+        for path in (ROOT / "deploy").iterdir()
+        if path.is_file()
+    },
 }
 
 

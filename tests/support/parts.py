@@ -167,24 +167,30 @@ class Bridge:
         self.domain = domain
         self.port = free_port()
         self.endpoint = f"tcp/127.0.0.1:{self.port}"
-        self._configuration = [
-            str(ROOT / "deploy/bridge.json5"),
-            f'listen/endpoints=["{self.endpoint}"]',
+        self._options = [
             f"plugins/ros2dds/domain={domain}",
             f'plugins/ros2dds/namespace="{namespace}"',
             *options,
         ]
+        self._file: Path | None = None
         self._process: Process | None = None
 
     def configure(self, file: Path) -> None:
         """Another configuration from the next start on; it has the bridge's endpoint and domain."""
-        self._configuration = [str(file)]
+        self._file = file
+
+    def _configuration(self) -> list[str]:
+        """At each start: a test may have given another endpoint."""
+        if self._file is not None:
+            return [str(self._file)]
+        listen = f'listen/endpoints=["{self.endpoint}"]'
+        return [str(ROOT / "deploy/bridge.json5"), listen, *self._options]
 
     def start(self) -> None:
         self._process = Process(
             [
                 str(BRIDGE),
-                *self._configuration,
+                *self._configuration(),
                 'plugins/ros2dds/ros_automatic_discovery_range="LOCALHOST"',
             ],
             {"CYCLONEDDS_URI": CYCLONE_ON_LOOPBACK, "ROS_DISTRO": "jazzy"},
