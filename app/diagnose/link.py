@@ -13,13 +13,11 @@ from typing import Final, Protocol
 from app.diagnose.findings import Report
 from app.dialect.bridge_dialect import BridgeDialect
 from app.errors import LinkError, SettingsError
-from app.transport.declarations import NOTHING
 from app.transport.zenoh_config import config_from, endpoints_of
 from app.transport.zenoh_session import ZenohSession
 
 CONNECT_S: Final = 3.0
 HANDSHAKE_S: Final = 3.0
-POLL_S: Final = 0.02
 ASK_S: Final = 1.0
 ROUTERS: Final = (
     "@/*/router",
@@ -85,12 +83,7 @@ async def _shakes_hands(report: Report, zenoh: Path, endpoint: str, robot: str) 
         ZenohSession, config_from(zenoh, [endpoint]), lambda _: None, BridgeDialect()
     )
     try:
-        session.start(NOTHING)
-        with suppress(TimeoutError):
-            async with asyncio.timeout(HANDSHAKE_S):
-                while not session.drain().link_up:
-                    await asyncio.sleep(POLL_S)
-        if not session.drain().link_up:
+        if not await session.connected(HANDSHAKE_S):
             report.find("not_zenoh", endpoint, robot=robot)
             return False
         await check_version(report, session, endpoint, robot)
@@ -107,9 +100,9 @@ async def check_version(report: Report, session: Asked, endpoint: str, robot: st
     """Whether the other side has this Zenoh; its admin space may be off."""
     ours = version("eclipse-zenoh")
     answers = await asyncio.gather(*(session.ask(selector, ASK_S) for selector in ROUTERS))
-    for _, told in (answer for several in answers for answer in several):
+    for _, answer in (one for several in answers for one in several):
         with suppress(ValueError, TypeError, AttributeError):  # an answer that is none of Zenoh's
-            said = json.loads(told)
+            said = json.loads(answer)
             if all(session.zid != one.get("peer") for one in said["sessions"]):
                 continue  # further away
             theirs = RELEASE.match(said["version"])

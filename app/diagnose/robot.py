@@ -17,13 +17,12 @@ from app.dialect.bridge_dialect import BridgeDialect
 from app.errors import LinkError
 from app.graph.model import RosGraph
 from app.interfaces import load_interfaces
-from app.transport.bridge_graph import first_graph, read_graph
+from app.transport.bridge_graph_reader import first_graph, later_graph, silent
 from app.transport.zenoh_config import config_from
 from app.transport.zenoh_session import ZenohSession
 
 LISTEN_S: Final = 5.0
 CONNECTED_WITHIN_S: Final = 4.0
-POLL_S: Final = 0.02
 
 
 async def check_way(report: Report, robot_id: str, zenoh: Path, connect: tuple[str, ...]) -> list[str]:
@@ -44,7 +43,7 @@ async def check_robot(
         ZenohSession, config_from(zenoh, endpoints), lambda _: None, BridgeDialect()
     )
     try:
-        await _connected(session)
+        await session.connected(CONNECTED_WITHIN_S)
         return await _look(report, robot, session, endpoints, listen_s)
     except LinkError as error:
         report.find("zenoh_config", str(zenoh), robot=robot.id, detail=str(error))
@@ -52,13 +51,6 @@ async def check_robot(
     finally:
         with suppress(LinkError):
             await asyncio.to_thread(session.close)
-
-
-async def _connected(session: ZenohSession) -> None:
-    with suppress(TimeoutError):
-        async with asyncio.timeout(CONNECTED_WITHIN_S):
-            while not session.is_connected:
-                await asyncio.sleep(POLL_S)
 
 
 async def _look(
@@ -70,13 +62,25 @@ async def _look(
     if not check_bridges(report, before, Behind.of(robot, before), endpoints):
         return before
     watched = await _watched(robot, session, before, listen_s)
-    graph = await read_graph(session, session.zid)
+    graph = await _later(session, before)
+    if gone := silent(before, graph):
+        for bridge in gone:
+            report.find("bridge_silent", bridge, robot=robot.id)
+        return before
     behind = Behind.of(robot, graph)
     check_permissions(report, behind, watched, interfaces)
     TopicChecks(report, behind, interfaces, Behind.of(robot, before)).check()
     check_clocks(report, robot, watched, interfaces)
     check_copies(report, robot, watched)
     return graph
+
+
+async def _later(session: ZenohSession, before: RosGraph) -> RosGraph:
+    """Empty if no answer comes."""
+    try:
+        return await later_graph(session, session.zid, before)
+    except LinkError:
+        return RosGraph()
 
 
 def check_copies(report: Report, robot: PanelRobot, watched: Watched) -> None:

@@ -78,7 +78,7 @@ ERRORS: Final[Rows] = {
         "Start zenoh-bridge-ros2dds on the robot, and let it listen there or connect to this router.",
     ),
     "bridge_silent": (
-        "The bridge {about} is connected, but does not respond.",
+        "The bridge {about} is known, but does not respond.",
         "Restart the bridge. If it happens again, look at its log.",
     ),
     "bridge_namespace": (

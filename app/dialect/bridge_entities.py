@@ -14,12 +14,13 @@ from app.interfaces.names import is_valid_name, valid_type
 DDS: Final = "@/*/ros2/dds/**"  # participants, readers and writers of a robot's nodes, not the bridge's
 EVERY_ROUTE: Final = "@/*/ros2/route/**"
 
+CYCLONE: Final = "0110"
 # How RTPS numbers the vendors of DDS: the first two bytes of a GUID (OMG DDSI-RTPS, vendor ids).
 VENDORS: Final[Mapping[str, str]] = {
     "0101": "RTI Connext DDS",
     "0103": "OpenDDS",
     "010f": "Fast DDS",
-    "0110": "Cyclone DDS",
+    CYCLONE: "Cyclone DDS",
     "0111": "GurumDDS",
 }
 _ENTITY = re.compile(r"@/(?P<zid>[^/]+)/ros2/dds/(?P<participant>[^/]+)/(?P<role>reader|writer)/.+")
@@ -60,18 +61,18 @@ def vendor_of(guid: str) -> str:
     return VENDORS.get(guid[:4], "")
 
 
-def entity_of(admin_key: str, told: Any) -> DdsEntity | None:
+def entity_of(admin_key: str, answer: Any) -> DdsEntity | None:
     """A reader or writer of a topic from an answer to `DDS`; None for participants, for services and
     for what is not of ROS 2."""
     place = _ENTITY.fullmatch(admin_key)
-    if place is None or not isinstance(told, dict):
+    if place is None or not isinstance(answer, dict):
         return None
-    topic, dds_type = told.get("topic_name"), _DDS_TYPE.fullmatch(str(told.get("type_name")))
+    topic, dds_type = answer.get("topic_name"), _DDS_TYPE.fullmatch(str(answer.get("type_name")))
     if not isinstance(topic, str) or not topic.startswith("rt/") or dds_type is None:
         return None
     if not is_valid_name(topic.removeprefix("rt/")):
         return None
-    qos = told["qos"] if isinstance(told.get("qos"), dict) else {}
+    qos = answer["qos"] if isinstance(answer.get("qos"), dict) else {}
     writer = place["role"] == "writer"
     return DdsEntity(
         zid=place["zid"],
@@ -98,7 +99,7 @@ def _depth(qos: Mapping[str, Any], participant: str) -> int | None:
     history = qos.get("history")
     if isinstance(history, dict) and isinstance(history.get("depth"), int):
         return int(history["depth"])
-    return 1 if history is None and vendor_of(participant) == "Cyclone DDS" else None
+    return 1 if history is None and participant.startswith(CYCLONE) else None
 
 
 def _type_hash(user_data: Any) -> str:
@@ -150,10 +151,10 @@ def node_place(admin_key: str) -> tuple[str, str, str] | None:
     return found["zid"], found["participant"], f"/{found['name']}"
 
 
-def names_of(told: Mapping[str, Any], part: str) -> Iterator[tuple[str, str]]:
+def names_of(answer: Mapping[str, Any], part: str) -> Iterator[tuple[str, str]]:
     """(name, type) of each entry of a node's list, such as its "publishers"; malformed ones are left
     out."""
-    listed = told.get(part)
+    listed = answer.get(part)
     for one in listed if isinstance(listed, list) else ():
         name = str(one.get("name")) if isinstance(one, dict) else ""
         if name.startswith("/") and is_valid_name(name[1:]):

@@ -14,6 +14,7 @@ from app.interfaces.names import key_of
 
 FAST_DDS: Final = "Fast DDS"
 CYCLONE_DDS: Final = "Cyclone DDS"
+CALLABLE: Final = ("", CYCLONE_DDS)  # of a server; "": its DDS is not known
 NEAR_MOST: Final = 3
 
 RouteKind = Literal["topic", "service", "action"]
@@ -134,7 +135,7 @@ class Server:
     @property
     def can_be_called(self) -> bool:
         """False for a server on another DDS: it would not answer, and may misread the request."""
-        return self.dds in ("", CYCLONE_DDS)
+        return self.dds in CALLABLE
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,19 +1,16 @@
-"""Reads the whole ROS graph behind all bridges of a link, once: tokens, nodes, DDS entities, routes."""
+"""The ROS graph from what the bridges of a link answer: tokens, nodes, DDS entities, routes. Pure."""
 
-import asyncio
-import json
-import time
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import Any, Final, Protocol, cast
+from typing import Any, cast
 
 from app.dialect import bridge_dialect as dialect
 from app.dialect import bridge_entities as entities
-from app.dialect.bridge_entities import DdsEntity
+from app.dialect.bridge_entities import DdsEntity, TokenQos
 from app.dialect.endpoint import Endpoint
 from app.graph.model import (
+    CALLABLE,
     Bridge,
     BridgeRoute,
     EndpointQos,
@@ -32,14 +29,6 @@ Answers = list[tuple[str, Any]]  # (admin key, JSON)
 HIDDEN = "/_action/"  # the topics and services that an action is made of
 
 
-class GraphLink(Protocol):
-    """What is needed of the link: (key, payload) of each answer to a query; the liveliness tokens."""
-
-    async def ask(self, selector: str, timeout_s: float = ...) -> list[tuple[str, bytes]]: ...
-
-    async def tokens(self, timeout_s: float = ...) -> list[str]: ...
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GraphAnswers:
     """All that the bridges of a link say of their graph."""
@@ -51,55 +40,6 @@ class GraphAnswers:
     nodes: Answers = field(default_factory=list)
     entities: Answers = field(default_factory=list)
     routes: Answers = field(default_factory=list)
-
-
-TOLD_WITHIN_S: Final = 1.5
-POLL_S: Final = 0.02
-
-
-async def first_graph(link: GraphLink, zid: str) -> RosGraph:
-    """`read_graph` in a new session: a router tells it of the bridges some time after it has
-    connected. Without a bridge this takes `TOLD_WITHIN_S`."""
-    end = time.monotonic() + TOLD_WITHIN_S
-    while True:
-        graph = await read_graph(link, zid)
-        if graph.bridges or time.monotonic() > end:
-            return graph
-        await asyncio.sleep(POLL_S)
-
-
-async def read_graph(link: GraphLink, zid: str) -> RosGraph:
-    """The graph now; `zid` is that of the session that asks. LinkError without a link. A bridge that
-    is known by its token and does not answer is in it, without a version."""
-    tokens, versions, configs, nodes, dds, routes = await asyncio.gather(
-        link.tokens(),
-        link.ask(dialect.VERSION),
-        _ask_json(link, dialect.CONFIG),
-        _ask_json(link, dialect.NODES),
-        _ask_json(link, entities.DDS),
-        _ask_json(link, entities.EVERY_ROUTE),
-    )
-    return ros_graph(
-        GraphAnswers(
-            zid=zid,
-            tokens=tokens,
-            versions={
-                dialect.zid_of(key): told.decode(errors="replace").strip('"') for key, told in versions
-            },
-            configs={dialect.zid_of(key): told for key, told in configs if isinstance(told, dict)},
-            nodes=nodes,
-            entities=dds,
-            routes=routes,
-        )
-    )
-
-
-async def _ask_json(link: GraphLink, selector: str) -> Answers:
-    found: Answers = []
-    for key, told in await link.ask(selector):
-        with suppress(ValueError):
-            found.append((key, json.loads(told)))
-    return found
 
 
 def ros_graph(answers: GraphAnswers) -> RosGraph:
@@ -114,7 +54,13 @@ def ros_graph(answers: GraphAnswers) -> RosGraph:
     for bridge in bridges:
         by_namespace[bridge.namespace].append(bridge)
     peers = [
-        PeerEndpoint(zid=one.zid, role=str(one.role), key=one.key, type=one.type, qos=_token_qos(token))
+        PeerEndpoint(
+            zid=one.zid,
+            role=str(one.role),
+            key=one.key,
+            type=one.type,
+            qos=_qos(entities.qos_of(token)),
+        )
         for token, one in parsed
         if one.zid not in zids and one.zid != answers.zid and one.role in ("MP", "MS")
     ]
@@ -125,13 +71,12 @@ def ros_graph(answers: GraphAnswers) -> RosGraph:
     return RosGraph(robots=tuple(robots), peers=tuple(sorted(peers, key=lambda p: (p.zid, p.key))))
 
 
-def _token_qos(token: str) -> EndpointQos:
-    told = entities.qos_of(token)
+def _qos(of: DdsEntity | TokenQos) -> EndpointQos:
     return EndpointQos(
-        reliable=told.reliable,
-        transient_local=told.transient_local,
-        keep_all=told.keep_all,
-        depth=told.depth,
+        reliable=of.reliable,
+        transient_local=of.transient_local,
+        keep_all=of.keep_all,
+        depth=of.depth,
     )
 
 
@@ -154,7 +99,7 @@ class _Robot:
         for zid, participant, node in _nodes(answers.nodes):
             if zid in zids:
                 self._nodes[zid, participant].append(node)
-        found = (entities.entity_of(key, told) for key, told in answers.entities)
+        found = (entities.entity_of(key, answer) for key, answer in answers.entities)
         self._entities = [one for one in found if one is not None and one.zid in zids]
         self._routes = [one for one in _routes(answers.routes, namespace) if one.bridge in zids]
 
@@ -204,12 +149,7 @@ class _Robot:
         ]
         return TopicEndpoint(
             type=of.type,
-            qos=EndpointQos(
-                reliable=of.reliable,
-                transient_local=of.transient_local,
-                keep_all=of.keep_all,
-                depth=of.depth,
-            ),
+            qos=_qos(of),
             bridge=of.zid,
             nodes=tuple(sorted(nodes)),
             dds=of.vendor,
@@ -217,11 +157,12 @@ class _Robot:
         )
 
     def _by_token(self, token: str, endpoint: Endpoint) -> TopicEndpoint:
+        announced = entities.qos_of(token)
         return TopicEndpoint(
             type=endpoint.type,
-            qos=_token_qos(token),
+            qos=_qos(announced),
             bridge=endpoint.zid,
-            type_hash=entities.qos_of(token).type_hash,
+            type_hash=announced.type_hash,
         )
 
     def _servers(self, role: str) -> Iterator[Server]:
@@ -244,7 +185,7 @@ class _Robot:
             for node in several
             if zid == endpoint.zid and name in (node.services if role == "SS" else node.actions)
         ]
-        vendors = sorted({node.dds for node in nodes}, key=lambda dds: dds in ("", "Cyclone DDS"))
+        vendors = sorted({node.dds for node in nodes}, key=lambda dds: dds in CALLABLE)
         return {
             "nodes": tuple(sorted(node.name for node in nodes)),
             "dds": vendors[0] if vendors else "",
@@ -253,9 +194,9 @@ class _Robot:
 
 def _nodes(answers: Answers) -> Iterator[tuple[str, str, Node]]:
     """(bridge, participant, node)."""
-    for key, told in answers:
+    for key, answer in answers:
         place = entities.node_place(key)
-        if place is None or not isinstance(told, dict):
+        if place is None or not isinstance(answer, dict):
             continue
         zid, participant, name = place
         yield (
@@ -265,38 +206,38 @@ def _nodes(answers: Answers) -> Iterator[tuple[str, str, Node]]:
                 name=name,
                 bridge=zid,
                 dds=entities.vendor_of(participant),
-                publishers=_names(told, "publishers"),
-                subscribers=_names(told, "subscribers"),
-                services=_names(told, "service_servers"),
-                clients=_names(told, "service_clients"),
-                actions=_names(told, "action_servers"),
-                action_clients=_names(told, "action_clients"),
+                publishers=_names(answer, "publishers"),
+                subscribers=_names(answer, "subscribers"),
+                services=_names(answer, "service_servers"),
+                clients=_names(answer, "service_clients"),
+                actions=_names(answer, "action_servers"),
+                action_clients=_names(answer, "action_clients"),
             ),
         )
 
 
-def _names(told: Mapping[str, Any], part: str) -> tuple[str, ...]:
-    return tuple(sorted(name for name, _ in entities.names_of(told, part)))
+def _names(answer: Mapping[str, Any], part: str) -> tuple[str, ...]:
+    return tuple(sorted(name for name, _ in entities.names_of(answer, part)))
 
 
 def _routes(answers: Answers, namespace: str) -> Iterator[BridgeRoute]:
-    for admin_key, told in answers:
+    for admin_key, answer in answers:
         place = entities.route_place(admin_key)
-        if place is None or not isinstance(told, dict):
+        if place is None or not isinstance(answer, dict):
             continue
         zid, kind, direction, key = place
-        name, active = told.get("ros2_name"), told.get("is_active")
+        name, active = answer.get("ros2_name"), answer.get("is_active")
         yield BridgeRoute(
             bridge=zid,
             kind=cast("RouteKind", kind),
             direction=cast("RouteDirection", direction),
             name=name if isinstance(name, str) else f"/{key}".removeprefix(namespace),
             key=key,
-            type=str(told.get("ros2_type", "")),
+            type=str(answer.get("ros2_type", "")),
             active=active if isinstance(active, bool) else None,
-            local_nodes=_texts(told.get("local_nodes")),
-            remote=_texts(told.get("remote_routes")),
-            endpoint=str(told.get("dds_reader") or told.get("dds_writer") or ""),
+            local_nodes=_texts(answer.get("local_nodes")),
+            remote=_texts(answer.get("remote_routes")),
+            endpoint=str(answer.get("dds_reader") or answer.get("dds_writer") or ""),
         )
 
 

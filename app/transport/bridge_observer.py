@@ -4,7 +4,6 @@ For commands that run beside the panel's server or without one. It publishes not
 """
 
 import asyncio
-import time
 from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager, suppress
 from typing import Final
@@ -14,14 +13,13 @@ from app.dialect.endpoint import OwnEndpoint
 from app.errors import LinkError
 from app.graph.model import RosGraph
 from app.robot.sample import Sample
-from app.transport.bridge_graph import first_graph
+from app.transport.bridge_graph_reader import first_graph
 from app.transport.declarations import Declarations
 from app.transport.zenoh_config import Config
 from app.transport.zenoh_session import ZenohSession
 
 CONNECT_S: Final = 3.0
 CALL_S: Final = 2.0
-POLL_S: Final = 0.02
 
 
 class BridgeObserver:
@@ -46,12 +44,9 @@ class BridgeObserver:
 
     async def connect(self, within_s: float = CONNECT_S) -> None:
         """Waits for a connection; LinkError that says where nothing answered."""
-        end = time.monotonic() + within_s
-        while not self._session.is_connected:
-            if time.monotonic() > end:
-                where = ", ".join(self.endpoints) or "any place that was found by scouting"
-                raise LinkError(f"no Zenoh router or bridge answers at {where} within {within_s:g} s")
-            await asyncio.sleep(POLL_S)
+        if not await self._session.connected(within_s):
+            where = ", ".join(self.endpoints) or "any place that was found by scouting"
+            raise LinkError(f"no Zenoh router or bridge answers at {where} within {within_s:g} s")
 
     async def graph(self) -> RosGraph:
         """The graph now; LinkError without a link. A graph without robots: no bridge is there."""
@@ -59,7 +54,7 @@ class BridgeObserver:
 
     async def call(self, key: str, payload: bytes, timeout_s: float = CALL_S) -> bytes | None:
         """The response of a service that only reads; None for none in time. Only for a service that
-        the graph shows and that can be called: a query that nobody answers stays in the bridge."""
+        the graph shows and that can be called: a query without an answer stays in the bridge."""
         answer = self._session.query_at(self._dialect.service(key, ""), payload, timeout_s)
         await asyncio.wait({answer}, timeout=timeout_s + 1)
         return answer.result() if answer.done() else None

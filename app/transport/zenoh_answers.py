@@ -1,20 +1,22 @@
-"""The answers to a Zenoh query, collected on the event loop."""
+"""The answers to a Zenoh query, handed over to the event loop."""
 
 import asyncio
+import time
 from collections.abc import Callable
 from contextlib import suppress
 
 import zenoh
 from zenoh.handlers import Callback
 
+Ask = Callable[["Callback[zenoh.Reply]"], None]  # queries with this handler of its replies
 
-async def collected(
-    ask: Callable[["Callback[zenoh.Reply]"], None], timeout_s: float
-) -> list[tuple[str, bytes]]:
-    """(key, payload) of each answer that comes within `timeout_s`."""
+
+async def collected(ask: Ask, timeout_s: float) -> tuple[list[tuple[str, bytes]], bool]:
+    """(key, payload) of each answer that comes within `timeout_s`, and whether all had come by then."""
     loop = asyncio.get_running_loop()
     done: asyncio.Future[None] = loop.create_future()
     answers: list[tuple[str, bytes]] = []
+    end = time.monotonic() + timeout_s
 
     def on_reply(reply: zenoh.Reply) -> None:
         if reply.ok is not None:
@@ -31,4 +33,25 @@ async def collected(
     ask(Callback(on_reply, on_end, indirect=False))
     with suppress(TimeoutError):
         await asyncio.wait_for(done, timeout_s + 1)
-    return answers
+    return answers, time.monotonic() < end
+
+
+def first_answer(ask: Ask) -> "asyncio.Future[bytes | None]":
+    """The payload of the first answer, or None when there is none."""
+    loop = asyncio.get_running_loop()
+    answered: asyncio.Future[bytes | None] = loop.create_future()
+
+    def finish(answer: bytes | None) -> None:
+        if not answered.done():
+            answered.set_result(answer)
+
+    def hand_over(answer: bytes | None) -> None:
+        with suppress(RuntimeError):  # the loop is closed
+            loop.call_soon_threadsafe(finish, answer)
+
+    def on_reply(reply: zenoh.Reply) -> None:
+        if reply.ok is not None:
+            hand_over(reply.ok.payload.to_bytes())
+
+    ask(Callback(on_reply, lambda: hand_over(None), indirect=False))
+    return answered

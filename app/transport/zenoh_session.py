@@ -3,12 +3,11 @@ inbox. Its errors leave here as LinkError."""
 
 import asyncio
 import atexit
-import os
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
-from typing import Any, Final
+from typing import Any
 
 import zenoh
 from zenoh.handlers import Callback
@@ -19,16 +18,13 @@ from app.errors import LinkError
 from app.transport.declarations import NOTHING, Declarations
 from app.transport.inbox import Changes, Inbox
 from app.transport.native_threads import attach
-from app.transport.zenoh_answers import collected
+from app.transport.zenoh_answers import collected, first_answer
 from app.transport.zenoh_config import endpoints_of, translated
 
 ASK_TIMEOUT_S = 2.0
 CACHE_TIMEOUT_S = 10.0
+POLL_S = 0.02
 COPIED_MOST = 16_384  # bytes of a sample
-# Zenoh's own setting of its threads, read when its first session opens. By default the thread that
-# waits for the network wakes another one for each message: where one does both, it costs half.
-RUNTIME: Final = "(rx: (handover: net))"
-os.environ.setdefault("ZENOH_RUNTIME", RUNTIME)
 
 
 def _own(payload: zenoh.ZBytes) -> bytes | zenoh.ZBytes:
@@ -212,48 +208,47 @@ class ZenohSession:
         self, expression: str, payload: bytes, timeout_s: float
     ) -> "asyncio.Future[bytes | None]":
         """The same, for any service by its key expression."""
-        loop = asyncio.get_running_loop()
-        answered: asyncio.Future[bytes | None] = loop.create_future()
-
-        def finish(answer: bytes | None) -> None:
-            if not answered.done():
-                answered.set_result(answer)
-
-        def hand_over(answer: bytes | None) -> None:
-            with suppress(RuntimeError):  # the loop is closed
-                loop.call_soon_threadsafe(finish, answer)
-
-        def on_reply(reply: zenoh.Reply) -> None:
-            if reply.ok is not None:
-                hand_over(reply.ok.payload.to_bytes())
-
         with translated(f"can't ask {expression}"):
-            self._session.get(
-                expression,
-                Callback(on_reply, lambda: hand_over(None), indirect=False),
-                payload=payload,
-                attachment=self._attachment(expression),
-                timeout=timeout_s,
-                consolidation=zenoh.ConsolidationMode.NONE,
+            return first_answer(
+                lambda callback: self._session.get(
+                    expression,
+                    callback,
+                    payload=payload,
+                    attachment=self._attachment(expression),
+                    timeout=timeout_s,
+                    consolidation=zenoh.ConsolidationMode.NONE,
+                )
             )
-        return answered
 
     async def ask(self, selector: str, timeout_s: float = ASK_TIMEOUT_S) -> list[tuple[str, bytes]]:
         """(key, payload) of each answer to a query that comes within `timeout_s`."""
         with translated(f"can't ask {selector}"):
-            return await collected(
+            found, _ = await collected(
                 lambda callback: self._session.get(selector, callback, timeout=timeout_s), timeout_s
             )
+        return found
 
     async def tokens(self, timeout_s: float = ASK_TIMEOUT_S) -> list[str]:
-        """Every liveliness token of the ROS graph that is held now."""
+        """Every liveliness token of the ROS graph that is held now; LinkError when they do not all come
+        within `timeout_s`."""
         with translated("can't ask for the ROS graph"):
             liveliness = self._session.liveliness()
-            found = await collected(
+            found, whole = await collected(
                 lambda callback: liveliness.get(self._dialect.tokens, callback, timeout=timeout_s),
                 timeout_s,
             )
+        if not whole:
+            raise LinkError(f"the ROS graph did not come within {timeout_s:g} s")
         return [key for key, _ in found]
+
+    async def connected(self, within_s: float) -> bool:
+        """Whether it has a connection to any other peer or router, or gets one in time."""
+        end = time.monotonic() + within_s
+        while not self.is_connected:
+            if time.monotonic() > end:
+                return False
+            await asyncio.sleep(POLL_S)
+        return True
 
     @property
     def is_connected(self) -> bool:

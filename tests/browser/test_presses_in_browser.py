@@ -306,8 +306,11 @@ def test_without_scripts_a_double_tap_is_one_press_and_its_receipt_stays(
     page, mine = without_scripts, opens(without_scripts, False)
     box = place(start(page, 1))
     double_tap(page, box["x"] + 20, box["y"] + 20)
-    both = re.compile(r"Start 1: Sent on /operation at \S+ Not sent: this came so soon after the page")
-    expect(page.locator("#receipt-go1")).to_have_text(both)
+    # The second tap is on the page that the first one brings, or still on that of the first one, whose
+    # form is the same press again.
+    sent, soon = r"Sent on /operation at [\d:]+\.", "Not sent: this came so soon after the page.*"
+    either = re.compile(f"^(Start 1: {sent} {soon}|{sent})$")
+    expect(page.locator("#receipt-go1")).to_have_text(either)
     assert pressed(mine) == 1
     page.mouse.click(box["x"] + 20, box["y"] + 20)
     until(lambda: pressed(mine) == 2, "a later one is another press")

@@ -2,6 +2,7 @@
 nothing else is."""
 
 import socket
+import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
@@ -12,6 +13,7 @@ import pytest
 import zenoh
 
 from app.cli.command import main
+from app.diagnose.watch import Watched, watch
 from tests.diagnose.setups import (
     BOOL,
     LONGEST_S,
@@ -277,6 +279,33 @@ def test_a_frozen_bridge(domain: int, setup: Setup) -> None:
     with started(Bridge(domain + 4)) as bridge:
         bridge.freeze()
         assert named(setup.findings(WELL, bridge.endpoint)) == [("not_zenoh", bridge.endpoint)]
+
+
+@pytest.mark.parametrize(("frozen_s", "expected"), [(2.0, "wrong_rmw"), (60.0, "bridge_silent")])
+def test_a_bridge_that_stops_answering_does_not_make_a_service_absent(
+    shared: Bridge,
+    robot: RosNode,
+    setup: Setup,
+    monkeypatch: pytest.MonkeyPatch,
+    frozen_s: float,
+    expected: str,
+) -> None:
+    thaw = threading.Timer(frozen_s, shared.thaw)
+
+    async def watched(*arguments: Any) -> Watched:
+        found = await watch(*arguments)
+        shared.freeze()
+        thaw.start()
+        return found
+
+    monkeypatch.setattr("app.diagnose.robot.watch", watched)
+    text = panel_of(call("/system_controller/list_parameters", LIST_PARAMETERS))
+    try:
+        found = setup.findings(text, shared.endpoint, listen_s=0.2)
+    finally:
+        thaw.cancel()
+        shared.thaw()
+    assert [one.code for one in found] == [expected]
 
 
 def test_two_bridges_for_one_robot(shared: Bridge, robot: RosNode, setup: Setup) -> None:

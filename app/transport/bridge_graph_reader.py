@@ -1,0 +1,118 @@
+"""Reads the whole ROS graph behind all bridges of a link."""
+
+import asyncio
+import json
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Final, Protocol
+
+from app.dialect import bridge_dialect as dialect
+from app.dialect import bridge_entities as entities
+from app.errors import LinkError
+from app.graph.model import RosGraph
+from app.transport.bridge_graph import Answers, GraphAnswers, ros_graph
+
+ANNOUNCED_WITHIN_S: Final = 1.5
+ANSWERED_WITHIN_S: Final = 5.0
+POLL_S: Final = 0.02
+
+
+class GraphLink(Protocol):
+    """What is needed of the link: (key, payload) of each answer to a query; the liveliness tokens."""
+
+    async def ask(self, selector: str, timeout_s: float = ...) -> list[tuple[str, bytes]]: ...
+
+    async def tokens(self, timeout_s: float = ...) -> list[str]: ...
+
+
+async def first_graph(link: GraphLink, zid: str) -> RosGraph:
+    """`read_graph` in a new session, to which a router announces the bridges some time after it has
+    connected. Without a bridge this takes `ANNOUNCED_WITHIN_S`."""
+    return await _read_until(link, zid, lambda graph: bool(graph.bridges), ANNOUNCED_WITHIN_S)
+
+
+async def later_graph(link: GraphLink, zid: str, earlier: RosGraph) -> RosGraph:
+    """`read_graph` once more: a bridge that answered earlier has `ANSWERED_WITHIN_S` to answer again
+    with all that is still there, for on a busy machine it stops for seconds, and loses its link."""
+
+    def is_whole(graph: RosGraph) -> bool:
+        return not silent(earlier, graph) and not _unannounced(earlier, graph)
+
+    return await _read_until(link, zid, is_whole, ANSWERED_WITHIN_S)
+
+
+def silent(earlier: RosGraph, graph: RosGraph) -> list[str]:
+    """The ids of the bridges that answered for the earlier graph and not for this one."""
+    return sorted({one.zid for one in earlier.bridges if one.answers} - _answering(graph))
+
+
+def _answering(graph: RosGraph) -> set[str]:
+    return {one.zid for one in graph.bridges if one.answers}
+
+
+def _unannounced(earlier: RosGraph, graph: RosGraph) -> set[str]:
+    """The keys of services and actions that were announced earlier, and are now only known to be
+    offered by a node."""
+    offered = {
+        robot.key(name)
+        for robot in graph.robots
+        for node in robot.nodes
+        for name in (*node.services, *node.actions)
+    }
+    return (_servers(earlier) - _servers(graph)) & offered
+
+
+def _servers(graph: RosGraph) -> set[str]:
+    return {one.key for robot in graph.robots for one in (*robot.services, *robot.actions)}
+
+
+async def _read_until(
+    link: GraphLink, zid: str, is_whole: Callable[[RosGraph], bool], within_s: float
+) -> RosGraph:
+    end = time.monotonic() + within_s
+    while True:
+        try:
+            graph = await read_graph(link, zid)
+            if is_whole(graph) or time.monotonic() > end:
+                return graph
+        except LinkError:
+            if time.monotonic() > end:
+                raise
+        await asyncio.sleep(POLL_S)
+
+
+async def read_graph(link: GraphLink, zid: str) -> RosGraph:
+    """The graph now; `zid` is that of the session that asks. LinkError without a link, and when the
+    tokens do not come in time. A bridge that is known by its token and does not answer is in it,
+    without a version."""
+    tokens, versions, configs, nodes, dds, routes = await asyncio.gather(
+        link.tokens(),
+        link.ask(dialect.VERSION),
+        _ask_json(link, dialect.CONFIG),
+        _ask_json(link, dialect.NODES),
+        _ask_json(link, entities.DDS),
+        _ask_json(link, entities.EVERY_ROUTE),
+    )
+    return ros_graph(
+        GraphAnswers(
+            zid=zid,
+            tokens=tokens,
+            versions={
+                dialect.zid_of(key): version.decode(errors="replace").strip('"')
+                for key, version in versions
+            },
+            configs={dialect.zid_of(key): one for key, one in configs if isinstance(one, dict)},
+            nodes=nodes,
+            entities=dds,
+            routes=routes,
+        )
+    )
+
+
+async def _ask_json(link: GraphLink, selector: str) -> Answers:
+    found: Answers = []
+    for key, answer in await link.ask(selector):
+        with suppress(ValueError):
+            found.append((key, json.loads(answer)))
+    return found
