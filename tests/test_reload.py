@@ -60,24 +60,12 @@ def test_make_dev_watches_the_folder_of_another_panel(tmp_path: Path) -> None:
     assert f"--reload-dir={tmp_path} " in made(KIOSK_PANEL=str(tmp_path / "cell1.toml"))
 
 
-@pytest.fixture
-def checkout(tmp_path: Path) -> Iterator[Checkout]:
-    mine = Checkout(tmp_path)
+@pytest.fixture(scope="module")
+def checkout(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Checkout]:
+    """One for all: each test takes its changes back, but the last."""
+    mine = Checkout(tmp_path_factory.mktemp("checkout"))
     yield mine
     mine.server.end(signal.SIGINT)
-
-
-def test_every_kind_of_change_reaches_an_open_browser(checkout: Checkout, page: Page) -> None:
-    page.goto(checkout.server.url)
-    expect(page.get_by_role("button", name="Publish1")).to_be_visible()
-    checkout.edit("app/panel.toml", 'label = "Publish1"', 'label = "Pick up"')
-    expect(page.get_by_role("button", name="Pick up")).to_be_visible(timeout=STARTED_MS)
-    checkout.edit("templates/screen.html", ">{{ page.title }}</h2>", ">A new heading</h2>")
-    expect(page.get_by_role("heading", name="A new heading")).to_be_visible(timeout=STARTED_MS)
-    checkout.edit("static/css/tokens.css", "--ground: #bbc2c8", "--ground: #123456")
-    expect(page.locator("body")).to_have_css("background-color", "rgb(18, 52, 86)", timeout=STARTED_MS)
-    checkout.edit("app/i18n/en.po", 'msgstr "Server"', 'msgstr "Changed server"')
-    expect(page.locator('[data-lamp="server"]')).to_contain_text("Changed server", timeout=STARTED_MS)
 
 
 def test_a_panel_with_a_fault_is_a_page_that_says_where_until_it_is_mended(
@@ -105,6 +93,19 @@ def test_a_template_with_a_fault_is_told_and_the_page_comes_back_by_itself(
     expect(page.locator("body")).to_contain_text("templates/screen.html", timeout=STARTED_MS)
     checkout.edit("templates/screen.html", f"<main>{fault}", "<main>")
     expect(page.get_by_role("button", name="Publish1")).to_be_visible(timeout=STARTED_MS)
+
+
+def test_every_kind_of_change_reaches_an_open_browser(checkout: Checkout, page: Page) -> None:
+    page.goto(checkout.server.url)
+    expect(page.get_by_role("button", name="Publish1")).to_be_visible()
+    checkout.edit("app/panel.toml", 'label = "Publish1"', 'label = "Pick up"')
+    expect(page.get_by_role("button", name="Pick up")).to_be_visible(timeout=STARTED_MS)
+    checkout.edit("templates/screen.html", ">{{ page.title }}</h2>", ">A new heading</h2>")
+    expect(page.get_by_role("heading", name="A new heading")).to_be_visible(timeout=STARTED_MS)
+    checkout.edit("static/css/tokens.css", "--ground: #bbc2c8", "--ground: #123456")
+    expect(page.locator("body")).to_have_css("background-color", "rgb(18, 52, 86)", timeout=STARTED_MS)
+    checkout.edit("app/i18n/en.po", 'msgstr "Server"', 'msgstr "Changed server"')
+    expect(page.locator('[data-lamp="server"]')).to_contain_text("Changed server", timeout=STARTED_MS)
 
 
 def test_it_starts_with_a_faulty_panel_and_shows_the_fault(tmp_path: Path, page: Page) -> None:

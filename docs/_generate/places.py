@@ -104,15 +104,24 @@ def sentences_table() -> str:
     """Each sentence, with its code and the modules that say it."""
     rows = []
     for code in (code for code in SENTENCES if code not in BETWEEN):
-        told = [path for path, names in _said().items() if _says(names, code)]
-        named = told or [path for path, tree in modules().items() if _has(tree, code)]
+        saying = [path for path, names in _said().items() if _says(names, code)]
+        # A code that comes by a variable and is an ordinary word is only somewhere in the text.
+        named = saying or [path for path, texts in _texts().items() if code in texts]
         rows.append((shown(SENTENCES[code]), f"`{code}`", ", ".join(map(place, named))))
     return _markdown(rows, [("Sentence", "Code", "Said in"), ("---",) * 3])
 
 
-def _has(tree: ast.Module, code: str) -> bool:
-    """Whether it stands there, for a code that comes by a variable and is an ordinary word."""
-    return any(isinstance(node, ast.Constant) and node.value == code for node in ast.walk(tree))
+@cache
+def _texts() -> dict[Path, frozenset[str]]:
+    """All strings in each module."""
+    return {
+        path: frozenset(
+            node.value
+            for node in ast.walk(tree)
+            if isinstance(node, ast.Constant) and isinstance(node.value, str)
+        )
+        for path, tree in modules().items()
+    }
 
 
 @cache

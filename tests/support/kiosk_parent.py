@@ -38,6 +38,16 @@ UVICORN: Final = (
     "protocols.http.auto",
     "protocols.websockets.auto",
 )
+LATER: Final = (  # imported when a server starts, not by `app.main`
+    "app.simulator.panel_robot",
+    "app.simulator.zenoh_peer",
+    "app.trends.recorder",
+    "babel.dates",
+    "babel.messages.pofile",
+    "encodings.idna",
+    "fastapi.telemetry._runtime",
+    "uvloop",
+)
 LONGEST: Final = 1 << 18
 
 
@@ -56,6 +66,8 @@ def read_libraries() -> dict[str, str]:
             for part in statement.names:
                 if not hasattr(package, part.name):
                     import_module(f"{statement.module}.{part.name}")
+    for name in LATER:
+        import_module(name)
     assert len(list(Path("/proc/self/task").iterdir())) == threading.active_count() == 1
     return {name: value for name, value in os.environ.items() if before.get(name) != value}
 
