@@ -9,6 +9,7 @@ from app.errors import SettingsError
 from app.install.assets import Assets, own_wheel
 from app.install.files import Masked, OwnFile, UsersFile
 from app.install.host import Host, release_of
+from app.install.panel_files import copies_for
 from app.install.release import CheckedPanel, Current, Release
 from app.install.step import Step
 from app.install.system import Packages, Unit, User
@@ -74,6 +75,7 @@ def steps(options: Options, host: Host) -> list[Step]:
             about=str(options.zenoh or "how the robot's bridge is reached"),
             replaces=options.zenoh is not None,
         ),
+        *(copies_for(options.panel, ETC) if options.panel else ()),
         CheckedPanel(release.name, PANEL),
         Current(release.name),
         *own_files(assets, options.screen),

@@ -44,6 +44,16 @@ def file_stamps(folders: Sequence[Path]) -> tuple[tuple[Path, int, int], ...]:
     return tuple((file, *_mtime_and_size(file)) for file in files)
 
 
+def package_files(folder: Path) -> list[Path]:
+    """The files of a folder by which its packages are known: their definitions and package.xml."""
+    return [
+        file
+        for package in _packages(folder)
+        for file in (*_files(package), package / "package.xml")
+        if file.is_file()
+    ]
+
+
 def _mtime_and_size(file: Path) -> tuple[int, int]:
     try:
         about = file.stat()

@@ -12,6 +12,7 @@ from app.errors import SettingsError
 from app.install.assets import Assets, checked_wheel
 from app.install.files import Masked, OwnFile, UsersFile
 from app.install.host import Host, StepFailed, release_of
+from app.install.panel_files import UsersCopy
 from app.install.plan import PANEL, SCREEN, SERVER, Options, own_files, steps, touch_rule
 from app.install.release import Current, Release, link_to, linked, release_name
 from app.install.step import Step, apply, describe, revert
@@ -51,7 +52,7 @@ def host(tmp_path: Path) -> Host:
 
 def of_files(plan: list[Step]) -> list[Step]:
     """The steps that need no program of the machine."""
-    return [step for step in plan if isinstance(step, (OwnFile, UsersFile, Masked))]
+    return [step for step in plan if isinstance(step, (OwnFile, UsersCopy, UsersFile, Masked))]
 
 
 def tree(root: Path) -> dict[str, str]:
@@ -106,6 +107,54 @@ def test_a_panel_of_the_users_is_kept_by_the_next_run_and_replaced_by_a_new_one(
     apply(of_files(steps(Options(wheel=wheel, panel=mine), host)), host, str)
     assert host.path(PANEL).read_text() == "# second\n"
     assert host.path(f"{PANEL}.before").read_text() == "# first\n"
+
+
+def test_what_the_panel_names_beside_itself_goes_with_it(host: Host, tmp_path: Path) -> None:
+    package = tmp_path / "install/cell_msgs/share/cell_msgs"
+    files = {
+        "install/cell_msgs/share/cell_msgs/msg/Jog.msg": "float64 speed\n",
+        "install/cell_msgs/share/cell_msgs/package.xml": "<name>cell_msgs</name>",
+        "pictures/plan.svg": "<svg/>",
+        "pages/cell.html": "{{ widget('start') }}",
+    }
+    for name, text in {**files, "install/cell_msgs/lib/driver": "a program"}.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    mine, wheel = tmp_path / "cell1.toml", make_wheel(tmp_path)
+    mine.write_text(
+        f'interfaces = ["install", "{package}"]\npictures = "./pictures"\n'
+        '[[page]]\ntemplate = "pages/cell.html"\n'
+    )
+
+    def plan() -> list[Step]:
+        return of_files(steps(Options(wheel=wheel, panel=mine), host))
+
+    assert "copy pictures into /etc/operator-panel (1 file)" in "\n".join(describe(plan(), host))
+    apply(plan(), host, str)
+    etc = tree(host.path("/etc/operator-panel"))
+    assert {name: text for name, text in etc.items() if "/" in name} == files
+    assert apply(plan(), host, str) == 0
+    (tmp_path / "pictures/plan.svg").write_text("<svg>2</svg>")
+    assert apply(plan(), host, str) == 1
+    said: list[str] = []
+    revert(plan(), host, said.append)
+    assert "kept /etc/operator-panel/pictures" in said
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ('pictures = "../plans"', r'cell1\.toml names "\.\./plans", which is not below its own folder'),
+        ('interfaces = ["msgs"]', r'cell1\.toml names "msgs", and .*/msgs is not there'),
+    ],
+)
+def test_what_can_not_go_with_the_panel_is_named_before_anything_is_changed(
+    host: Host, tmp_path: Path, line: str, said: str
+) -> None:
+    mine = tmp_path / "cell1.toml"
+    mine.write_text(f"{line}\n")
+    with pytest.raises(SettingsError, match=said):
+        steps(Options(wheel=make_wheel(tmp_path), panel=mine), host)
 
 
 def test_units_of_another_version_replace_those_that_are_there(host: Host, tmp_path: Path) -> None:
