@@ -175,23 +175,23 @@ def _gone(names: Sequence[str]) -> Text:
     return say("node_gone", name=name)
 
 
-BROWSERS_OWN = "server"  # each browser knows for itself since when it is connected
+BROWSERS_OWN = "server"  # each browser measures for itself how long it has been connected
 
 
-class Since:
-    """Remembers the state of each link and when it began."""
+class LinkTimes:
+    """The state of each link, and when it began."""
 
     def __init__(self, wall: Callable[[], float] = time.time) -> None:
         """`wall` gives seconds since the epoch."""
         self._wall = wall
         self._began: dict[str, tuple[tuple[str, TextLike], TextLike]] = {}
-        self._seen: Mapping[str, LinkStatus] = {}
+        self._plain: Mapping[str, LinkStatus] = {}
         self._dated: dict[str, LinkStatus] = {}
 
     def dated(self, links: Mapping[str, LinkStatus]) -> dict[str, LinkStatus]:
         """The same, with `since` for those that the server knows of."""
-        if links != self._seen:
-            self._seen = links
+        if links != self._plain:
+            self._plain = links
             self._dated = {name: self._of(name, lamp) for name, lamp in links.items()}
         return self._dated
 

@@ -18,7 +18,7 @@ from app.panel.widgets.families import DisplayWidget
 from app.permission.control_authority import ControlAuthority
 from app.robot.state import RobotState
 from app.ros_logging import RobotLog
-from app.view.link_status import Lamp, Since
+from app.view.link_status import Lamp, LinkTimes
 from app.view.publisher import ViewPublisher
 from app.view.view import ViewWithDeadlines, build_view, lock_all, update_displays
 
@@ -80,7 +80,7 @@ class ViewRefresher:
         self._robot = robot
         self._sources = sources
         self._log = RobotLog(log, robot.name)
-        self._since = Since()
+        self._link_times = LinkTimes()
         self._frame_s = 1 / panel.display_hz
         self._displays = [
             (frozenset(robot.key(source.topic) for source in w.sources()), w) for w in panel.displays
@@ -192,5 +192,5 @@ class ViewRefresher:
             control_lock=sources.control.lock,
             control_until=sources.control.until,
         )
-        seen.view["link"] = self._since.dated(seen.view["link"])
+        seen.view["link"] = self._link_times.dated(seen.view["link"])
         return seen

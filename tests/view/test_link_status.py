@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from app.dialect.bridge_dialect import bridge_token, server_token
+from app.i18n import render
 from app.interfaces.names import Qos
 from app.panel.model import Panel
 from app.panel.number_range import Range
@@ -15,7 +16,16 @@ from app.permission.interlocks import PERMITTED, Verdict
 from app.robot.parameter_state import ParameterState
 from app.robot.state import RobotState
 from app.settings import PACKAGE
-from app.view.link_status import BRIDGE, LONGEST_LIST, NODE, LinkStatus, labels, link_statuses, locks
+from app.view.link_status import (
+    BRIDGE,
+    LONGEST_LIST,
+    NODE,
+    LinkStatus,
+    LinkTimes,
+    labels,
+    link_statuses,
+    locks,
+)
 from app.view.view import build_view
 from tests.support.builders import (
     BOOL,
@@ -32,12 +42,14 @@ from tests.support.builders import (
     permits,
     robot_there,
     says,
+    small_panel,
 )
 from tests.support.builders import BRIDGE as BRIDGE_ZID
 from tests.support.words import english
 
 GUARDED = {**FREE, "id": "guarded", "label": "Guarded", "topic": "/guarded", "interlock": "operation"}
 AGED = {**HEARD, "max_age_s": 5.0}
+DAY_S = 86_400.0
 
 
 SPEED = {
@@ -303,3 +315,62 @@ def test_what_the_bridge_does_not_pass_on_is_the_bridges() -> None:
 def test_a_long_list_is_cut_with_the_number_of_the_rest(names: list[str], said: str) -> None:
     assert english(locks(names)) == said
     assert len(said) < LONGEST_LIST + 30
+
+
+class DatedLinks:
+    """A robot's links as they are dated, at a wall clock that is set by hand."""
+
+    def __init__(self) -> None:
+        self.panel = small_panel()
+        self.robot = robot_there(self.panel)
+        self.wall = 0.0
+        self._times = LinkTimes(lambda: self.wall)
+
+    def at(self, wall: float) -> tuple[str, str, str]:
+        """`since` of server, bridge and node at a time of the wall clock."""
+        self.wall = wall
+        dated = self._times.dated(build_view(self.panel, self.robot, NOW).view["link"])
+        server, bridge, node = (render(lamp["since"]) for lamp in dated.values())
+        return server, bridge, node
+
+
+@pytest.mark.usefixtures("utc")
+def test_a_state_begins_when_it_is_first_seen() -> None:
+    links = DatedLinks()
+    assert links.at(61.0) == ("", "1970-01-01 00:01:01", "1970-01-01 00:01:01")
+    assert links.at(3 * DAY_S) == ("", "1970-01-01 00:01:01", "1970-01-01 00:01:01")
+
+
+@pytest.mark.usefixtures("utc")
+def test_each_link_has_its_own_time() -> None:
+    links = DatedLinks()
+    links.at(1.0)
+    endpoint(links.robot, "MP", "/heard", TEXT)
+    assert links.at(DAY_S + 2) == ("", "1970-01-01 00:00:01", "1970-01-02 00:00:02")
+    links.robot.graph.apply_token(bridge_token(BRIDGE_ZID), False)
+    assert links.at(DAY_S + 3) == ("", "1970-01-02 00:00:03", "1970-01-02 00:00:03")
+
+
+@pytest.mark.usefixtures("utc")
+def test_a_new_reason_is_not_a_new_state() -> None:
+    links = DatedLinks()
+    endpoint(links.robot, "MP", "/heard", TEXT)
+    before = links.at(1.0)
+    endpoint(links.robot, "MP", "/operation_enabled", TEXT)
+    assert links.at(2.0) == before
+
+
+@pytest.mark.usefixtures("utc")
+def test_a_clock_that_is_set_back_changes_no_time_that_was_noted() -> None:
+    links = DatedLinks()
+    before = links.at(DAY_S)
+    assert links.at(1.0) == before
+
+
+@pytest.mark.usefixtures("utc")
+def test_dating_changes_nothing_but_since() -> None:
+    links = DatedLinks()
+    plain = build_view(links.panel, links.robot, NOW).view["link"]
+    dated = LinkTimes(lambda: 0.0).dated(plain)
+    assert {name: {**lamp, "since": ""} for name, lamp in dated.items()} == plain
+    assert plain["bridge"]["since"] == ""

@@ -73,7 +73,7 @@ class Machine:
 
 
 def of_pages(test: str) -> list[str]:
-    return commands_for(f"tests/test_wheel.py::{test}")
+    return commands_for(f"tests/deploy/test_wheel.py::{test}")
 
 
 @pytest.fixture(scope="module")

@@ -7,11 +7,11 @@ from typing import Final
 
 import pytest
 
+from tests.docs.test_tutorial import STEPS
 from tests.simulator.test_replay import mcap_file
 from tests.support.parts import ROOT, Process
 from tests.support.shell import Shell
 from tests.support.shown_commands import TABLE, Row, Shown, beside, commands_of, row_of, rows, shown
-from tests.test_tutorial import STEPS
 
 RECORDING: Final = "cell1-2026-05-04.mcap"
 
