@@ -65,7 +65,7 @@ class Crowd:
         self._came: list[tuple[int, int]] = []  # (number, monotonic ns)
         self._bytes = 0
         self._lost = 0
-        self._asked = self._answer = b""
+        self._query = self._answer = b""
         threading.Thread(target=self._run, daemon=True).start()
 
     def join(
@@ -82,8 +82,8 @@ class Crowd:
         """Connects clients until there are `count`. For the other arguments see `bench.peer.Bare`;
         `say_bytes` is in hex."""
         if answers is not None:
-            asked, answer = answers
-            self._asked, self._answer = bytes([0x81, len(asked)]) + asked.encode(), frame(answer)
+            query, answer = answers
+            self._query, self._answer = bytes([0x81, len(query)]) + query.encode(), frame(answer)
         frames = [*map(frame, say), *(frame(bytes.fromhex(said)) for said in say_bytes)]
         while len(self._sockets) < count:
             own = path.format(id=found_in_page(port, found)) if found else path
@@ -120,7 +120,7 @@ class Crowd:
             self._selector.unregister(one)
             return
         self._bytes += len(data)
-        if self._asked and self._asked in data:
+        if self._query and self._query in data:
             one.sendall(self._answer)
         last = key.data
         for found in NUMBER.findall(data):

@@ -35,14 +35,14 @@ class Matched:
 
 
 def toggles_matched(
-    said: Sequence[tuple[float, bool]], seen: Sequence[tuple[float, bool]], slack_ms: float = 0.5
+    said: Sequence[tuple[float, bool]], shown: Sequence[tuple[float, bool]], slack_ms: float = 0.5
 ) -> Matched:
     """Matches each change by the robot to its display; times in ms, in order.
 
     A change is lost if the next display came only after the same value had been published again.
     `slack_ms` is the tolerance between the clocks.
     """
-    left = deque(seen)
+    left = deque(shown)
     found: list[float] = []
     for turn, (at, value) in enumerate(said):
         while left and left[0][0] < at - slack_ms:  # of a change that counts as lost

@@ -35,8 +35,8 @@ def down(rig: Rig, peer: Peer, over: str = "", router: str = "") -> dict[str, fl
         time.sleep(SETTLE_S)
         with browser.attached() as page:
             toggles = Watched(page, peer.shown).take("toggles")
-        seen = [(clock.ns(at) / 1e6, value) for at, value in toggles]
-        matched = toggles_matched([(at / 1e6, value) for at, value in said], seen)
+        shown = [(clock.ns(at) / 1e6, value) for at, value in toggles]
+        matched = toggles_matched([(at / 1e6, value) for at, value in said], shown)
         return figures_of(matched, clock.doubt_ms)
 
 

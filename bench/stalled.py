@@ -74,9 +74,9 @@ def _others(
         said += [(at / 1e6, value) for at, value in more]
         most = max(most, rss_mib(family(pids)))
     time.sleep(SETTLE_S)
-    seen = [(clock.ns(at) / 1e6, value) for at, value in page.take("toggles")]
+    shown = [(clock.ns(at) / 1e6, value) for at, value in page.take("toggles")]
     page.take("texts")
-    return list(toggles_matched(said, seen).ms), most
+    return list(toggles_matched(said, shown).ms), most
 
 
 def number_of(text: str) -> int:

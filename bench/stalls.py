@@ -1,6 +1,6 @@
 """The application with a measurement of its event loop, for `uvicorn bench.stalls:app`.
 
-`GET /stalls` tells the longest time between two turns since the last asking: as the clock has it
+`GET /stalls` answers the longest time between two turns since the last request: as the clock has it
 (`wall_ms`), and how much of it the loop's thread has worked (`cpu_ms`), which is the server's own on a
 machine with other work.
 """

@@ -146,7 +146,7 @@ class Holding:
         self.ended = ""
 
     def hold(self, ended: threading.Event) -> None:
-        seen = self._server.snapshot()["id"]
+        event_id = self._server.snapshot()["id"]
         with connect(f"ws://127.0.0.1:{self._server.port}/widgets/jog/hold") as socket:
             said, at = json.loads(socket.recv()), time.monotonic()
 
@@ -156,7 +156,7 @@ class Holding:
                 heard: dict[str, Any] = json.loads(socket.recv())
                 return heard
 
-            said = say(do="begin", inputs={}, seen=seen)
+            said = say(do="begin", inputs={}, seen=event_id)
             lease, at = said.get("lease", ""), time.monotonic()
             while said["state"] == "held" and not ended.wait(BEAT_S):
                 self.beats += 1

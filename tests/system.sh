@@ -28,7 +28,7 @@ need chromium chromium --version
 need chromium-headless-shell test -e /usr/bin/chromium-headless-shell
 need libclang-dev has_libclang
 need faketime has_faketime
-# The kiosk's compositor, what takes its picture, types into it and tells of idleness.
+# The kiosk's compositor, what takes its picture, types into it and reports idleness.
 need sway sway --version
 need grim test -e /usr/bin/grim
 need wtype test -e /usr/bin/wtype

@@ -51,14 +51,14 @@ def test_of_nothing_there_is_no_percentile() -> None:
 
 def test_each_change_is_matched_to_when_it_showed() -> None:
     said = [(0.0, False), (10.0, True), (20.0, False)]
-    seen = [(-5.0, True), (1.0, False), (12.0, True), (21.5, False)]
-    assert toggles_matched(said, seen).ms == (1.0, 2.0, 1.5)
+    shown = [(-5.0, True), (1.0, False), (12.0, True), (21.5, False)]
+    assert toggles_matched(said, shown).ms == (1.0, 2.0, 1.5)
 
 
 def test_a_late_one_is_late_and_not_lost() -> None:
     said = [(0.0, False), (10.0, True), (20.0, False), (30.0, True)]
-    seen = [(45.0, False), (45.1, True), (45.2, False), (45.3, True)]
-    matched = toggles_matched(said, seen)
+    shown = [(45.0, False), (45.1, True), (45.2, False), (45.3, True)]
+    matched = toggles_matched(said, shown)
     assert matched.lost == 0
     assert matched.ms == pytest.approx((45.0, 35.1, 25.2, 15.3))
 
@@ -104,7 +104,7 @@ def test_growth_is_linear_where_the_end_costs_no_more_than_the_beginning(
     assert slope(list(zip((0.0, 1.0, 2.0, 4.0), ys, strict=True)), noise=0.25).linear is linear
 
 
-def test_a_slope_is_told_of_one_unit() -> None:
+def test_a_slope_is_given_in_one_unit() -> None:
     assert slope([(1, 12.0), (2, 14.0), (4, 18.0)], noise=0.0).per_unit == pytest.approx(2.0)
 
 
@@ -153,7 +153,7 @@ def test_what_was_not_measured_is_not_reached() -> None:
     assert {target.reached for target in targets(results())} == {None}
 
 
-def test_growth_is_told_for_each_axis_that_was_measured() -> None:
+def test_growth_is_given_for_each_axis_that_was_measured() -> None:
     points = [[1, 2.0, 60.0, 0.1], [4, 5.0, 61.0, 0.1], [8, 9.0, 62.3, 0.1]]
     (one,) = grown(results(growth={"rounds": [{"robots": {"points": points}}]}))
     assert one.axis.unit == "robot"
@@ -162,7 +162,7 @@ def test_growth_is_told_for_each_axis_that_was_measured() -> None:
     assert one.mib == (60.0, 61.0, 62.3)
 
 
-def test_the_results_are_told_with_whatever_there_is(tmp_path: Path) -> None:
+def test_the_results_are_given_with_whatever_there_is(tmp_path: Path) -> None:
     page = tmp_path / "benchmark.md"
     page.write_text(f"before\n{BEGIN}\nwhat was there\n{END}\nafter\n")
     found = results(up=phase(kiosk={"p50": 1.0, "p99": 2.5}), faults={"nicegui": "not installed"})

@@ -106,7 +106,7 @@ def test_a_whole_network_has_a_limit_and_leaves_the_cell_its_own(pressing: Press
     assert pressing.admitted(browser(1, AT_THE_CELL), 10) == 10
 
 
-def test_each_that_is_too_many_is_counted_and_told_to_the_log(pressing: Pressing) -> None:
+def test_each_that_is_too_many_is_counted_and_logged(pressing: Pressing) -> None:
     too_many = 1000 - pressing.admitted(browser(1), 1000)
     assert pressing.limits.refused == too_many == len(pressing.left_out)
     assert (pressing.left_out[0].browser, pressing.left_out[0].who) == ("b1", "Panel 1")

@@ -132,8 +132,8 @@ def test_the_kiosk_logs_at_its_level_and_above(level: str, capsys: pytest.Captur
     configure_logging(level)
     for number in LEVELS.values():
         logging.getLogger("kiosk.part").log(number, "level %d", number)
-    seen = re.findall(r"level (\d+)", capsys.readouterr().err)
-    assert seen == [str(number) for number in LEVELS.values() if number >= LEVELS[level]]
+    shown = re.findall(r"level (\d+)", capsys.readouterr().err)
+    assert shown == [str(number) for number in LEVELS.values() if number >= LEVELS[level]]
 
 
 @pytest.mark.usefixtures("logging_as_before")

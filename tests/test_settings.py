@@ -67,7 +67,7 @@ def test_an_empty_variable_is_as_if_it_were_not_there(name: str) -> None:
     assert Settings.from_environment({name: ""}) == Settings.from_environment({})
 
 
-def test_the_panel_answers_to_loopback_names_only_unless_told() -> None:
+def test_the_panel_answers_to_loopback_names_only_by_default() -> None:
     assert Settings.from_environment({}).hosts == ("127.0.0.1", "localhost", "[::1]")
 
 
@@ -125,12 +125,14 @@ def test_a_host_that_could_never_match_is_refused(hosts: str) -> None:
     ("name", "meant"),
     [("KIOSK_PANNEL", "KIOSK_PANEL"), ("KIOSK_HOST", "KIOSK_HOSTS"), ("KIOSK_panel", "KIOSK_PANEL")],
 )
-def test_an_unknown_variable_stops_the_start_and_is_told_what_was_meant(name: str, meant: str) -> None:
+def test_an_unknown_variable_stops_the_start_and_the_error_names_what_was_meant(
+    name: str, meant: str
+) -> None:
     with pytest.raises(SettingsError, match=f"^{name} is not a setting .* did you mean {meant}\\?$"):
         Settings.from_environment({name: ""})
 
 
-def test_a_variable_like_none_that_there_is_is_told_all_that_there_are() -> None:
+def test_a_variable_like_no_other_gets_an_error_with_all_that_there_are() -> None:
     with pytest.raises(SettingsError, match=r"KIOSK_XYZZY .* there are KIOSK_PANEL, KIOSK_ZENOH, "):
         Settings.from_environment({"KIOSK_XYZZY": "1", "PATH": "/bin", "KIOSKS": "2"})
 
@@ -142,6 +144,6 @@ def test_proxies_are_addresses_and_networks_and_none_without_a_word() -> None:
 
 
 @pytest.mark.parametrize("given", ["*", "proxy.local", "192.0.2.1/24", "127.0.0.1:80", "[::1]"])
-def test_a_proxy_that_could_be_anybody_or_nobody_is_refused(given: str) -> None:
+def test_a_proxy_that_could_be_any_or_no_client_is_refused(given: str) -> None:
     with pytest.raises(SettingsError, match="KIOSK_PROXIES has "):
         Settings.from_environment({"KIOSK_PROXIES": given})

@@ -48,7 +48,7 @@ def test_what_can_not_be_installed_is_said_with_the_reason(tmp_path: Path, step:
     ]
 
 
-def test_who_may_install_nothing_is_told_what_is_missing(tmp_path: Path) -> None:
+def test_without_the_right_to_install_it_names_what_is_missing(tmp_path: Path) -> None:
     done = installed(tmp_path, "exit 9", user=1000)
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr.startswith("missing: python3-venv (Debian's names): install them")

@@ -112,20 +112,20 @@ def _settings(settings: Settings, environment: Mapping[str, str]) -> dict[str, A
 
 
 def _machine(settings: Settings, found: Diagnosis) -> dict[str, Any]:
-    told: dict[str, Any] = {"time": time.strftime("%Y-%m-%dT%H:%M:%S%z"), "cpus": os.cpu_count()}
+    facts: dict[str, Any] = {"time": time.strftime("%Y-%m-%dT%H:%M:%S%z"), "cpus": os.cpu_count()}
     with suppress(OSError):
-        told["load"] = os.getloadavg()
+        facts["load"] = os.getloadavg()
     with suppress(OSError):
-        told["memory"] = Path("/proc/meminfo").read_text().splitlines()[:5]
+        facts["memory"] = Path("/proc/meminfo").read_text().splitlines()[:5]
     with suppress(OSError):
-        told["uptime_s"] = float(Path("/proc/uptime").read_text().split()[0])
+        facts["uptime_s"] = float(Path("/proc/uptime").read_text().split()[0])
     folder = settings.data_folder(settings.mode or (found.panel.mode if found.panel else "live"))
     with suppress(OSError):
-        told["disk"] = shutil.disk_usage(folder)._asdict()
+        facts["disk"] = shutil.disk_usage(folder)._asdict()
     with suppress(OSError):
-        told["data"] = {one.name: one.stat().st_size for one in folder.iterdir() if one.is_file()}
-    told["screens"] = [asdict(display) for display in displays()]
-    return told
+        facts["data"] = {one.name: one.stat().st_size for one in folder.iterdir() if one.is_file()}
+    facts["screens"] = [asdict(display) for display in displays()]
+    return facts
 
 
 def _files(settings: Settings) -> Iterator[Part]:
@@ -164,18 +164,18 @@ def _of_server(options: Options, found: Diagnosis) -> Iterator[Part]:
     """What a running server says; nothing without one."""
     if "server_running" not in found.report.codes():
         return
-    asked = [("readyz.json", "/readyz", "whether the server reaches the robot")]
+    queries = [("readyz.json", "/readyz", "whether the server reaches the robot")]
     robots = [f"/robots/{one.id}" for one in found.panel.robots] if found.panel else []
-    asked += [
+    queries += [
         (f"snapshot{base.replace('/', '-')}.txt", f"{base}/events?once=1", "what the pages show")
         for base in robots or [""]
     ]
-    asked.append(("metrics.txt", "/metrics", "metrics"))
-    for name, path, about in asked:
+    queries.append(("metrics.txt", "/metrics", "metrics"))
+    for name, path, about in queries:
         answer = ask_server(options.host, options.port, path)
         if answer is not None:
-            told = answer[1]
-            yield text_part(f"state/{name}", about, told if isinstance(told, str) else json.dumps(told))
+            body = answer[1]
+            yield text_part(f"state/{name}", about, body if isinstance(body, str) else json.dumps(body))
 
 
 def write(file: Path, made: Sequence[Part]) -> int:

@@ -8,7 +8,7 @@ from typing import Final
 
 from app.diagnose.findings import Report
 
-ASKED_S: Final = 20.0  # fontconfig may have to read every font first
+QUERY_TIMEOUT_S: Final = 20.0  # fontconfig may have to read every font first
 FOLDERS: Final = (
     Path("/usr/share/fonts"),
     Path("/usr/local/share/fonts"),
@@ -31,7 +31,10 @@ def has_font(language: str) -> bool:
     program = shutil.which("fc-list")
     if program is not None:
         listed = subprocess.run(
-            [program, f":lang={language}", "file"], capture_output=True, text=True, timeout=ASKED_S
+            [program, f":lang={language}", "file"],
+            capture_output=True,
+            text=True,
+            timeout=QUERY_TIMEOUT_S,
         )
         return bool(listed.stdout.strip())
     names = [file.name.lower() for folder in FOLDERS for file in _font_files(folder.expanduser())]

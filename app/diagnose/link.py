@@ -27,7 +27,7 @@ TCP: Final = re.compile(r"(?P<protocol>tcp|tls|ws)/(?P<host>\[[^\]]+\]|[^\s/?#:]
 RELEASE: Final = re.compile(r"v?(\d+\.\d+)(\.\d+)?")
 
 
-class Asked(Protocol):
+class AdminSession(Protocol):
     """What is needed of a session."""
 
     zid: str
@@ -96,7 +96,7 @@ async def _shakes_hands(report: Report, zenoh: Path, endpoint: str, robot: str) 
             await asyncio.to_thread(session.close)
 
 
-async def check_version(report: Report, session: Asked, endpoint: str, robot: str) -> None:
+async def check_version(report: Report, session: AdminSession, endpoint: str, robot: str) -> None:
     """Whether the other side has this Zenoh; its admin space may be off."""
     ours = version("eclipse-zenoh")
     answers = await asyncio.gather(*(session.ask(selector, ASK_S) for selector in ROUTERS))

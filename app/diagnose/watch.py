@@ -18,7 +18,7 @@ POLL_S: Final = 0.05
 LEAST_S: Final = 1.0  # for what a latched publisher kept, and for copies
 ENOUGH: Final = 3  # messages of a topic; more say nothing new
 COPIES_WITHIN_S: Final = 0.02
-APART: Final = 3  # times farther than copies are messages that can be told from them
+APART: Final = 3  # times farther than copies are messages that are none
 
 
 @dataclass(slots=True)
@@ -80,7 +80,7 @@ def _published(token: str) -> str:
 
 
 def copies(samples: Sequence[Sample]) -> int:
-    """How many times each message comes from one bridge: 1 where they can't be told from a publisher
+    """How many times each message comes from one bridge: 1 where they may be those of a publisher
     that repeats itself. Pure."""
     by_source: defaultdict[str | None, list[Sample]] = defaultdict(list)
     for sample in samples:

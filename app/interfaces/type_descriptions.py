@@ -1,6 +1,6 @@
 """Definitions from type_description_interfaces/msg/TypeDescription, as nodes give them (REP 2016).
 
-A node that offers the service `get_type_description` tells the types that it uses, so that a panel
+A node that offers the service `get_type_description` describes the types that it uses, so that a panel
 need not have the files of their packages. Default values are left out: they matter to who publishes.
 """
 

@@ -65,7 +65,7 @@ class Clients:
     def __init__(self) -> None:
         self._known: OrderedDict[str, Client] = OrderedDict()
 
-    def seen(self, token: str, address: str) -> Client:
+    def identify(self, token: str, address: str) -> Client:
         """The browser with this token, now at this address."""
         address, local = where(address)
         browser = self._known.get(token)

@@ -84,7 +84,7 @@ def role(control: ControlView, who: Principal, rules: ControlRules) -> Role:
     return "over" if who.client.local and rules.local else "held"
 
 
-def seen_as(control: ControlView, role: Role) -> ControlView:
+def for_role(control: ControlView, role: Role) -> ControlView:
     """The view as a client of this role gets it."""
     if role == "asking":
         shown = control["asker_text"]

@@ -50,14 +50,14 @@ class EndpointPresence:
 
 
 @cached_until_change
-def _any_present(graph: Graph, seen: EndpointPresence) -> bool:
-    return any(graph.has_endpoint(role, key) for role, key in seen.required.values())
+def _any_present(graph: Graph, presence: EndpointPresence) -> bool:
+    return any(graph.has_endpoint(role, key) for role, key in presence.required.values())
 
 
 @cached_until_change
-def _missing(graph: Graph, seen: EndpointPresence) -> list[str]:
+def _missing(graph: Graph, presence: EndpointPresence) -> list[str]:
     return [
         end[1]
-        for end, bridges in seen.last_bridges.items()
-        if bridges & graph.bridges and not graph.has_endpoint(*seen.required[end])
+        for end, bridges in presence.last_bridges.items()
+        if bridges & graph.bridges and not graph.has_endpoint(*presence.required[end])
     ]

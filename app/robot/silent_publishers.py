@@ -47,7 +47,7 @@ class SilentPublishers:
             return
         self._last_messages[key, source] = _LastMessage(seq, at)
         silent = self._silent[key]
-        for bridge in [b for b, since in silent.items() if since < seq]:
+        for bridge in [b for b, appeared in silent.items() if appeared < seq]:
             if source is None or bridge in (source, None):
                 del silent[bridge]
 
@@ -57,12 +57,12 @@ class SilentPublishers:
         if endpoint.role != "MP" or endpoint.key not in self._topics:
             return
         key, bridge = endpoint.key, endpoint.zid
-        since = max(self._last_changes.get((key, bridge), 0), lost_before)
-        self._last_changes[key, bridge] = max(seq, since)
+        last_change = max(self._last_changes.get((key, bridge), 0), lost_before)
+        self._last_changes[key, bridge] = max(seq, last_change)
         before_s = TOKEN_DELAY_LATCHED_S if endpoint.transient_local else TOKEN_DELAY_S
         for source in (bridge, None):
             last = self._last_messages.get((key, source))
-            if last and (last.seq > seq or (last.seq > since and at - last.at <= before_s)):
+            if last and (last.seq > seq or (last.seq > last_change and at - last.at <= before_s)):
                 return
         self._silent[key][bridge] = seq
 

@@ -95,7 +95,7 @@ class Feed:
         self._lookers = 0
         self._leaving: asyncio.TimerHandle | None = None
         self._newest: Frame | None = None  # set on the link's thread
-        self._seen = LookedAt()
+        self._received = LookedAt()
         self._viewed_at = -math.inf  # of the newest frame that the view knows of
         self._came: asyncio.Future[None] | None = None  # of those who wait for a frame
         self._made: tuple[Frame, asyncio.Task[Picture]] | None = None
@@ -111,7 +111,7 @@ class Feed:
             yield
         finally:
             self._lookers -= 1
-            if not self._lookers and self._robot.looked_at.get(self._key) is self._seen:
+            if not self._lookers and self._robot.looked_at.get(self._key) is self._received:
                 self._leaving = self._loop.call_later(LINGER_S, self.close)
 
     async def newer(self, than: int) -> Frame:
@@ -154,7 +154,7 @@ class Feed:
             self._leaving = None
         if self._key in self._robot.looked_at:
             return
-        self._seen = self._robot.looked_at[self._key] = LookedAt()
+        self._received = self._robot.looked_at[self._key] = LookedAt()
         self._viewed_at = -math.inf
         self._newest = None  # what arrived while the last subscription ended
         expression = self._robot.dialect.topic(self._key, self._type)
@@ -168,7 +168,7 @@ class Feed:
         last = self._newest  # the loop may replace it by None
         frame = Frame(last.number + 1 if last else 1, payload, time.monotonic(), time.time())
         self._newest = frame
-        self._seen.at, self._seen.wall = frame.at, frame.wall
+        self._received.at, self._received.wall = frame.at, frame.wall
         if self._came is not None:
             with suppress(RuntimeError):  # the loop is closed
                 self._loop.call_soon_threadsafe(self._wake)
@@ -195,6 +195,6 @@ class Feed:
 
     def _problem(self, error: NoPicture | None) -> None:
         problem = error.reason if error else ""
-        if self._seen.problem != problem:
-            self._seen.problem = problem
+        if self._received.problem != problem:
+            self._received.problem = problem
             self._changed()

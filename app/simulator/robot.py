@@ -76,7 +76,7 @@ class DemoRobot:
     def __init__(self) -> None:
         self._began: float | None = None
         self._now = 0.0
-        self._told: tuple[bool, float] | None = None
+        self._published: tuple[bool, float] | None = None
         self._heard: list[Message] = []
         self._goals: dict[bytes, Goal] = {}
         self.parameters = NodeParameters(NODE, own_parameters())
@@ -105,8 +105,12 @@ class DemoRobot:
         self._now = now
         said, self._heard = self._heard, []
         said += [(EVENTS, event) for event in self.parameters.news()]
-        if self._told is None or self._told[0] != self.permits or now - self._told[1] >= REPEAT_S:
-            self._told = (self.permits, now)
+        if (
+            self._published is None
+            or self._published[0] != self.permits
+            or now - self._published[1] >= REPEAT_S
+        ):
+            self._published = (self.permits, now)
             said.append(("/operation_enabled", {"data": self.permits}))
         return said
 

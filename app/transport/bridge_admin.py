@@ -40,7 +40,9 @@ class BridgeAdmin:
         answers, namespaces = await asyncio.gather(
             self._link.ask(bridge_dialect.VERSION), self._namespaces()
         )
-        versions = {bridge_dialect.zid_of(key): told.decode(errors="replace") for key, told in answers}
+        versions = {
+            bridge_dialect.zid_of(key): answer.decode(errors="replace") for key, answer in answers
+        }
         graph.update_namespaces(namespaces)
         self.missed = 0 if graph.bridges <= versions.keys() else self.missed + 1
         if self.missed == 0 or self.missed > MISSES_ALLOWED:
@@ -48,37 +50,39 @@ class BridgeAdmin:
         if self.missed:
             return  # it would answer nothing else either, and each question takes its time
         routes = [
-            r for key, told in await self._ask_json(bridge_dialect.ROUTES) if (r := _route(key, told))
+            r
+            for key, answer in await self._ask_json(bridge_dialect.ROUTES)
+            if (r := _route(key, answer))
         ]
         nodes: set[Endpoint] = set()
-        for key, told in await self._ask_json(bridge_dialect.NODES):
+        for key, answer in await self._ask_json(bridge_dialect.NODES):
             with suppress(KeyError, TypeError):  # an answer that is no node's
                 namespace = namespaces.get(bridge_dialect.zid_of(key), self._robot.namespace)
-                nodes.update(bridge_dialect.endpoints_of(key, told, namespace))
+                nodes.update(bridge_dialect.endpoints_of(key, answer, namespace))
         graph.update_routes(routes, nodes)
 
     async def _namespaces(self) -> dict[str, str]:
         """The namespace of each bridge that says it, "" for none."""
         return {
-            bridge_dialect.zid_of(key): told["namespace"].rstrip("/")
-            for key, told in await self._ask_json(bridge_dialect.CONFIG)
-            if isinstance(told, dict) and isinstance(told.get("namespace"), str)
+            bridge_dialect.zid_of(key): answer["namespace"].rstrip("/")
+            for key, answer in await self._ask_json(bridge_dialect.CONFIG)
+            if isinstance(answer, dict) and isinstance(answer.get("namespace"), str)
         }
 
     async def _ask_json(self, selector: str) -> list[tuple[str, Any]]:
         """(key, answer) of each answer that is JSON; others are passed over."""
         found = []
-        for key, told in await self._link.ask(selector):
+        for key, answer in await self._link.ask(selector):
             with suppress(ValueError):
-                found.append((key, json.loads(told)))
+                found.append((key, json.loads(answer)))
         return found
 
 
-def _route(key: str, told: Any) -> Route | None:
+def _route(key: str, answer: Any) -> Route | None:
     """What a bridge says of a route; None for what is none."""
     place = bridge_dialect.route_of(key)
-    if place is None or not isinstance(told, dict) or not isinstance(told.get("ros2_type"), str):
+    if place is None or not isinstance(answer, dict) or not isinstance(answer.get("ros2_type"), str):
         return None
     zid, direction, topic_key = place
-    whole = direction == "sub" or told.get("dds_reader") != ""
-    return Route(zid, direction, topic_key, valid_type(told["ros2_type"]), whole)
+    whole = direction == "sub" or answer.get("dds_reader") != ""
+    return Route(zid, direction, topic_key, valid_type(answer["ros2_type"]), whole)

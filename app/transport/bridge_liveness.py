@@ -27,7 +27,7 @@ EVERY_S: Final = 0.2
 SILENT_S: Final = 0.4  # without an answer, beside the time that the network takes
 TURN_S: Final = 0.02  # given to an answer that came while the loop stood still
 STOOD_STILL_S: Final = 0.4  # a query so late: messages from the meantime are still on their way
-GOOD: Final = 2  # answers in time to what was asked after a silence: the bridge's news came before
+GOOD: Final = 2  # answers in time to queries sent after a silence: the bridge's news came before
 LOOKED_AT: Final = 10  # answers
 LONGEST_S: Final = 2.5  # a question is not waited for any longer
 
@@ -37,7 +37,7 @@ class LivenessDetector:
 
     def __init__(self) -> None:
         self.silent = False
-        self._asked: deque[float] = deque(maxlen=int(LONGEST_S / EVERY_S) * 10)
+        self._unanswered: deque[float] = deque(maxlen=int(LONGEST_S / EVERY_S) * 10)
         self._took: deque[float] = deque(maxlen=LOOKED_AT)
         self._heard_at = math.inf  # the first answer after a silence began
         self._good = 0
@@ -48,23 +48,23 @@ class LivenessDetector:
         return SILENT_S + max(self._took, default=0.0)
 
     def ask(self, now: float) -> None:
-        self._asked.append(now)
+        self._unanswered.append(now)
 
-    def hear(self, asked: float, now: float) -> None:
+    def hear(self, sent_at: float, now: float) -> None:
         """An answer; earlier queries without an answer do not count any more."""
-        while self._asked and self._asked[0] <= asked:
-            self._asked.popleft()
-        in_time = now - asked <= self.limit
+        while self._unanswered and self._unanswered[0] <= sent_at:
+            self._unanswered.popleft()
+        in_time = now - sent_at <= self.limit
         # In time, or known to be late: else the loop stood still, which says nothing of the network.
         if in_time or self.silent:
-            self._took.append(now - asked)
+            self._took.append(now - sent_at)
         if self.silent:
-            self._good = self._good + 1 if in_time and asked > self._heard_at else 0
+            self._good = self._good + 1 if in_time and sent_at > self._heard_at else 0
             self._heard_at = min(self._heard_at, now)
             self.silent = self._good < GOOD
 
     def judge(self, now: float) -> None:
-        if not self.silent and self._asked and now - self._asked[0] >= self.limit:
+        if not self.silent and self._unanswered and now - self._unanswered[0] >= self.limit:
             self.silent, self._heard_at, self._good = True, math.inf, 0
 
 
@@ -90,8 +90,8 @@ class BridgeLiveness:
         self._awaited: set[asyncio.Task[bool]] = set()  # by who wants to know whether something arrived
         self._silenced: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self._asking: asyncio.Task[None] | None = None
-        self._asked_at = math.inf  # the last time
-        self._behind = 0  # answers, to what was asked `_behind_since`, until all is taken in
+        self._last_sent_at = math.inf
+        self._behind = 0  # answers, to queries sent after `_behind_since`, until all is taken in
         self._behind_since = 0.0
 
     def start(self) -> None:
@@ -122,16 +122,16 @@ class BridgeLiveness:
         """Before anything is judged: whether the event loop stood still, and so may know nothing of
         what the robot has published in the meantime."""
         now = self._monotonic()
-        if now - self._asked_at < EVERY_S + STOOD_STILL_S:
+        if now - self._last_sent_at < EVERY_S + STOOD_STILL_S:
             return
         if not self._behind:
-            self._log.warning("the event loop stood still for %.1f s", now - self._asked_at)
+            self._log.warning("the event loop stood still for %.1f s", now - self._last_sent_at)
         self._behind, self._behind_since = GOOD, now
         self._catch_up(False)
 
-    def _hear(self, asked: float) -> None:
+    def _hear(self, sent_at: float) -> None:
         """An answer came: what the bridge sent before it is taken in, when the next one is there."""
-        if self._behind and asked >= self._behind_since:
+        if self._behind and sent_at >= self._behind_since:
             self._behind, self._behind_since = self._behind - 1, self._monotonic()
             self._catch_up(not self._behind)
 
@@ -147,7 +147,7 @@ class BridgeLiveness:
 
     def _ask(self) -> "asyncio.Task[bool]":
         self.look()
-        self._asked_at = self._monotonic()
+        self._last_sent_at = self._monotonic()
         self._follow()
         task = asyncio.get_running_loop().create_task(self._answered())
         self._questions.add(task)
@@ -166,9 +166,9 @@ class BridgeLiveness:
 
     async def _answered(self) -> bool:
         """One question to all bridges; whether they answered it."""
-        silence, asked = self._silence, self._monotonic()
+        silence, sent_at = self._silence, self._monotonic()
         answer = asyncio.ensure_future(self._all(self._bridges))
-        silence.ask(asked)
+        silence.ask(sent_at)
         try:
             await asyncio.wait({answer}, timeout=silence.limit)
             if not answer.done():
@@ -181,9 +181,9 @@ class BridgeLiveness:
         finally:
             answer.cancel()
         if answered:
-            silence.hear(asked, self._monotonic())
+            silence.hear(sent_at, self._monotonic())
             self._tell()
-            self._hear(asked)
+            self._hear(sent_at)
         return answered
 
     async def _all(self, bridges: frozenset[str]) -> bool:

@@ -31,7 +31,7 @@ class LivelinessTokens:
         self._robot = robot
         self._log = RobotLog(log, robot.name)
         self._wrongly_held: set[str] = set()
-        self._told: set[tuple[str, str]] = set()
+        self._reported: set[tuple[str, str]] = set()
         self._listened: set[str] = set()  # keys of subscriptions whose token was held
         self._held_as: dict[str, bool] = {}  # key → whether its token is TRANSIENT_LOCAL
 
@@ -55,8 +55,8 @@ class LivelinessTokens:
         for role, topic, type_name, qos in wanted:
             key = self._robot.key(topic)
             if found := self._robot.graph.mismatched_type(role, key, type_name):
-                if (topic, found) not in self._told:
-                    self._told.add((topic, found))
+                if (topic, found) not in self._reported:
+                    self._reported.add((topic, found))
                     self._log.error("%s is %s on the robot, %s in the panel", topic, found, type_name)
                 continue
             type_hash = self._interfaces.type_hash(type_name)

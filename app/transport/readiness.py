@@ -8,7 +8,7 @@ from typing import Final
 
 from app.errors import LinkError
 
-log = logging.getLogger("kiosk.asked")
+log = logging.getLogger("kiosk.readiness")
 
 EVERY_S: Final = 0.5  # from one question to the next
 WITHIN_S: Final = 0.8  # in which a bridge has to answer
@@ -21,14 +21,14 @@ class CoalescedQuery:
     def __init__(self, ask: Callable[[], Awaitable[bool]]) -> None:
         """`ask` is whether all bridges answered; it may raise LinkError."""
         self._ask = ask
-        self._asked_at = -math.inf
+        self._sent_at = -math.inf
         self._asking: asyncio.Task[bool] | None = None
 
     async def answers(self) -> bool:
         """The result of a query that is `EVERY_S` old at most when this is called."""
         loop = asyncio.get_running_loop()
-        if self._asking is None or (self._asking.done() and loop.time() - self._asked_at >= EVERY_S):
-            self._asked_at = loop.time()
+        if self._asking is None or (self._asking.done() and loop.time() - self._sent_at >= EVERY_S):
+            self._sent_at = loop.time()
             self._asking = loop.create_task(self._answered())
         return await asyncio.shield(self._asking)
 

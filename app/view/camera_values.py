@@ -12,16 +12,16 @@ from app.robot.state import RobotState
 
 def camera(widget: Camera, robot: RobotState, now: float) -> tuple[dict[str, Any], float]:
     """Attributes: `state` and `note`; and when they change. Unknown while no browser shows it."""
-    seen = robot.looked_at.get(robot.key(widget.topic))
+    received = robot.looked_at.get(robot.key(widget.topic))
     doubt = topic_mismatch("MS", widget, robot)
     if doubt and doubt.code != "unheard":  # its bridge reads it while a browser shows it
         return {"state": "unreadable", "note": doubt.reason or ""}, math.inf
-    if seen is None or seen.at == -math.inf:
+    if received is None or received.at == -math.inf:
         return {"state": "waiting", "note": say("camera_waiting", topic=widget.topic)}, math.inf
-    if seen.problem:
-        return {"state": "unreadable", "note": seen.problem}, math.inf
-    if now - seen.at < widget.max_age_s:
+    if received.problem:
+        return {"state": "unreadable", "note": received.problem}, math.inf
+    if now - received.at < widget.max_age_s:
         shown = {"state": "live", "note": ""}
-        return shown, seen.at + widget.max_age_s
-    note = say("camera_old", age=format_age(now - seen.at), time=format_time(seen.wall))
-    return {"state": "old", "note": note}, age_changes_at(seen.at, now)
+        return shown, received.at + widget.max_age_s
+    note = say("camera_old", age=format_age(now - received.at), time=format_time(received.wall))
+    return {"state": "old", "note": note}, age_changes_at(received.at, now)

@@ -82,42 +82,42 @@ def topic_state(widget: ShownTopic, robot: RobotState, now: float) -> FieldState
 
 def field_state(widget: ShownField, robot: RobotState, now: float) -> FieldState:
     """What is known of a field at `now`; the panel must listen to its topic and read the field."""
-    seen = topic_state(widget, robot, now)
-    if seen.state in ("unreadable", "waiting"):
-        return seen
+    field = topic_state(widget, robot, now)
+    if field.state in ("unreadable", "waiting"):
+        return field
     reading = robot.reading(widget.topic)
     value = reading.value(widget.field)
     if value is None:
         code = "readout_several" if reading.is_ambiguous(widget.field) else "readout_missing"
         time = format_time(reading.wall)
         return FieldState("missing", say(code, field=widget.field, time=time))
-    return replace(seen, value=value)
+    return replace(field, value=value)
 
 
-def _dated(reading: Reading, seen: FieldState, max_age_s: float | None, now: float) -> FieldState:
+def _dated(reading: Reading, field: FieldState, max_age_s: float | None, now: float) -> FieldState:
     """What is known of a message that was received, by its age."""
     if reading.status == "cut":
-        return replace(seen, state="old", note=say("readout_cut", time=format_time(reading.wall)))
+        return replace(field, state="old", note=say("readout_cut", time=format_time(reading.wall)))
     if max_age_s is None:
-        return seen
+        return field
     if now - reading.at < max_age_s:
-        return replace(seen, until=reading.at + max_age_s)
+        return replace(field, until=reading.at + max_age_s)
     note = say("readout_old", age=format_age(now - reading.at))
-    return replace(seen, state="old", note=note, until=age_changes_at(reading.at, now))
+    return replace(field, state="old", note=note, until=age_changes_at(reading.at, now))
 
 
 def value(widget: Display, robot: RobotState, now: float) -> tuple[dict[str, Any], float]:
     """Attributes of any display: `state`, `text` (its value as it is) and `note`; and when they
     change."""
-    seen = field_state(widget, robot, now)
-    return {"state": seen.state, "text": shown_value(seen.value), "note": seen.note}, seen.until
+    field = field_state(widget, robot, now)
+    return {"state": field.state, "text": shown_value(field.value), "note": field.note}, field.until
 
 
 def readout(widget: Readout, robot: RobotState, now: float) -> tuple[dict[str, Any], float]:
     """Attributes of a readout: `state`, `text` and `note`; and when they change."""
-    seen = field_state(widget, robot, now)
-    text = NOTHING if seen.value is None else _value(widget, seen.value, robot)
-    return {"state": seen.state, "text": text, "note": seen.note}, seen.until
+    field = field_state(widget, robot, now)
+    text = NOTHING if field.value is None else _value(widget, field.value, robot)
+    return {"state": field.state, "text": text, "note": field.note}, field.until
 
 
 def indicator(widget: Indicator, robot: RobotState, now: float) -> tuple[dict[str, Any], float]:
@@ -125,15 +125,15 @@ def indicator(widget: Indicator, robot: RobotState, now: float) -> tuple[dict[st
 
     What is not known now has a shape and a text of its own, and never a colour.
     """
-    seen = field_state(widget, robot, now)
-    text, shape, colour = lamp_of(widget.states, seen.value)
-    note = seen.note
-    if seen.state != "live":
-        if seen.state == "old":
+    field = field_state(widget, robot, now)
+    text, shape, colour = lamp_of(widget.states, field.value)
+    note = field.note
+    if field.state != "live":
+        if field.state == "old":
             note = say("lamp_was", text=text, note=note)
-        text, shape, colour = say(f"lamp_{seen.state}"), SHAPES[seen.state], "none"
-    shown = {"state": seen.state, "text": text, "shape": shape, "colour": colour, "note": note}
-    return shown, seen.until
+        text, shape, colour = say(f"lamp_{field.state}"), SHAPES[field.state], "none"
+    shown = {"state": field.state, "text": text, "shape": shape, "colour": colour, "note": note}
+    return shown, field.until
 
 
 def lamp_of(states: Iterable[LampState], value: Any) -> tuple[TextLike, str, str]:

@@ -22,24 +22,24 @@ def gauge(widget: Gauge, robot: RobotState, now: float) -> tuple[Attributes, flo
     `setpoint` are in percent of the scale, None where they are unknown; `beyond` is "below" or "above"
     for a value beyond the scale.
     """
-    seen = field_state(widget, robot, now)
+    field = field_state(widget, robot, now)
     target, set_at, until = _setpoint(widget, robot, now)
-    shown = _shown(widget, seen) | {"target": target, "setpoint": set_at}
-    return shown, min(seen.until, until)
+    shown = _shown(widget, field) | {"target": target, "setpoint": set_at}
+    return shown, min(field.until, until)
 
 
-def _shown(widget: Gauge, seen: FieldState) -> Attributes:
-    shown: Attributes = {"state": seen.state, "note": seen.note, "text": NOTHING, "said": ""}
+def _shown(widget: Gauge, field: FieldState) -> Attributes:
+    shown: Attributes = {"state": field.state, "note": field.note, "text": NOTHING, "said": ""}
     shown |= {"level": "", "pointer": None, "beyond": ""}
-    if seen.value is None:
+    if field.value is None:
         return shown
-    value = scaled(widget, seen.value)
+    value = scaled(widget, field.value)
     if math.isnan(value):
         return shown | {"state": "unreadable", "note": say("gauge_no_number")}
     shown |= {"text": written_number(value, widget.format), "pointer": widget.percent(value)}
     if value < widget.min or value > widget.max:
         shown["beyond"] = "below" if value < widget.min else "above"
-    if seen.state == "live":
+    if field.state == "live":
         shown["level"], shown["said"] = _level(widget, value)
         if shown["beyond"] and shown["level"] in ("normal", "abnormal"):
             shown["level"], shown["said"] = "abnormal", say(f"gauge_{shown['beyond']}")
@@ -74,11 +74,11 @@ def _setpoint(widget: Gauge, robot: RobotState, now: float) -> tuple[TextLike, f
     if not isinstance(widget.setpoint, SetpointField):
         written = written_number(widget.setpoint, widget.format)
         return say("gauge_setpoint", value=written), widget.percent(widget.setpoint), math.inf
-    seen = field_state(widget.setpoint, robot, now)
-    value = math.nan if seen.value is None else scaled(widget, seen.value)
+    field = field_state(widget.setpoint, robot, now)
+    value = math.nan if field.value is None else scaled(widget, field.value)
     if math.isnan(value):
-        return say("gauge_setpoint_unknown"), None, seen.until
+        return say("gauge_setpoint_unknown"), None, field.until
     written = written_number(value, widget.format)
-    if seen.state != "live":
-        return say("gauge_setpoint_old", value=written), None, seen.until
-    return say("gauge_setpoint", value=written), widget.percent(value), seen.until
+    if field.state != "live":
+        return say("gauge_setpoint_old", value=written), None, field.until
+    return say("gauge_setpoint", value=written), widget.percent(value), field.until

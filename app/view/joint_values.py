@@ -22,9 +22,9 @@ def joints(widget: Joints, robot: RobotState, now: float) -> tuple[dict[str, Any
     (percent of the range, None where unknown) and `joint_levels` ("normal", "near", "low" and "high"
     beyond a soft limit, "low_low" and "high_high" beyond the range, "missing", "" where unknown).
     """
-    seen = [field_state(_field(widget, joint), robot, now) for joint in widget.joints]
-    whole = next((one for one in seen if one.state != "missing"), seen[0])
-    shown = [_joint(widget, *pair) for pair in zip(widget.joints, seen, strict=True)]
+    fields = [field_state(_field(widget, joint), robot, now) for joint in widget.joints]
+    whole = next((one for one in fields if one.state != "missing"), fields[0])
+    shown = [_joint(widget, *pair) for pair in zip(widget.joints, fields, strict=True)]
     values, bars, levels, words = zip(*shown, strict=True)
     attributes = {
         "state": whole.state,
@@ -34,7 +34,7 @@ def joints(widget: Joints, robot: RobotState, now: float) -> tuple[dict[str, Any
         "joint_bars": list(bars),
         "joint_levels": list(levels),
     }
-    return attributes, min(one.until for one in seen)
+    return attributes, min(one.until for one in fields)
 
 
 def _field(widget: Joints, joint: Joint) -> FieldOf:
@@ -42,19 +42,19 @@ def _field(widget: Joints, joint: Joint) -> FieldOf:
 
 
 def _joint(
-    widget: Joints, joint: Joint, seen: FieldState
+    widget: Joints, joint: Joint, field: FieldState
 ) -> tuple[TextLike, float | None, str, TextLike]:
     """Its value, its bar, its level and what is said of that."""
     label = joint.shown_label
-    if seen.state == "missing":
+    if field.state == "missing":
         return say("joint_missing"), None, "missing", say("joint_is_missing", joint=label)
-    if seen.value is None:
+    if field.value is None:
         return NOTHING, None, "", ""
-    value = seen.value * joint.shown_unit.factor
+    value = field.value * joint.shown_unit.factor
     text = written_number(value, widget.format)
     if math.isnan(value):
         return text, None, "missing", say("joint_is_missing", joint=label)
-    if seen.state != "live":
+    if field.state != "live":
         return text, joint.percent(value), "", ""
     level, limit = _level(joint, value)
     words = (

@@ -120,8 +120,8 @@ def _node(
 
 def silent(panel: Panel, robot: RobotState, now: float) -> tuple[TextLike, float]:
     """Why a node is taken for silent: its publisher is there by its token, but what it permits is
-    older than the panel allows. "" where none is; and when that may change. What is only shown may
-    be told of events, and looks old by itself."""
+    older than the panel allows. "" where none is; and when that may change. A topic that
+    is only displayed may be published on events, and its display shows its age."""
     until = math.inf
     for of in panel.interlocks:
         if of.max_age_s is None:

@@ -41,7 +41,7 @@ def parameter(parameter: Parameter, robot: RobotState) -> dict[str, Any]:
     known = robot.parameters.get(parameter.id, UNKNOWN)
     limits = allowed_range(parameter, known)
     return {
-        "state": "waiting" if never_told(known) else LOOKS[known.state],
+        "state": "waiting" if never_received(known) else LOOKS[known.state],
         "text": NOTHING if known.value is None else _text(parameter, known.value),
         "note": _note(parameter, known, robot),
         "hint": printable(known.hint[:LONGEST_HINT])[:LONGEST_HINT],
@@ -83,13 +83,13 @@ def _beginning(value: Value) -> Value:
     return tuple(found)
 
 
-def never_told(known: ParameterState) -> bool:
+def never_received(known: ParameterState) -> bool:
     return known.state in ("waiting", "silent") and known.value is None
 
 
 def _note(parameter: Parameter, known: ParameterState, robot: RobotState) -> Text:
     time = format_time(known.wall)
-    if never_told(known):
+    if never_received(known):
         silent = known.state == "silent" and parameter.id not in robot.querying
         return say("parameter_unanswered" if silent else "parameter_asking", node=parameter.node)
     match known.state:

@@ -20,7 +20,7 @@ from app.permission.control_authority_view import Role
 from app.view.heartbeat import Heartbeat
 from app.view.kinds import Attributes
 from app.view.sections import Events, difference
-from app.view.view import View, seen_as
+from app.view.view import View, for_role
 
 NOTHING: Final[Mapping[str, Attributes]] = {}
 NO_PAGES: Final[Mapping[str, Collection[str]]] = {}
@@ -58,11 +58,11 @@ class ViewPublisher:
         self._changed = asyncio.Event()
         self._news: Events = {}  # from the view before to this one
         self._without_control = without_control
-        self._seen: dict[tuple[Role, str], View] = {}
+        self._by_role: dict[tuple[Role, str], View] = {}
         # By the language, the version before, the roles then and now, and the page.
         self._prepared: dict[tuple[str, int, Role, Role, str], bytes] = {}
         self._whole: dict[tuple[str, str, int], bytes] = {}  # by the language, the event and its data
-        self._turned: dict[str, int] = {}
+        self._lock_changes: dict[str, int] = {}
         self.closed = False
 
     @property
@@ -78,15 +78,15 @@ class ViewPublisher:
         self.version += 1
         for widget, changed in news.get("update", {}).items():
             if "enabled" in changed:
-                self._turned[widget] = self.version
+                self._lock_changes[widget] = self.version
         self.view, self._news, self._without_control = view, news, without_control
-        self._seen, self._prepared, self._whole = {}, {}, {}
+        self._by_role, self._prepared, self._whole = {}, {}, {}
         self.heartbeat.along()
         self._wake()
 
     def lock_changed_at(self, widget: str) -> int:
         """The version in which a widget's lock has last closed or opened; 0 if it never has."""
-        return self._turned.get(widget, 0)
+        return self._lock_changes.get(widget, 0)
 
     def close(self) -> None:
         """Ends every stream."""
@@ -102,15 +102,15 @@ class ViewPublisher:
         if not self.closed and (self.version, self.heartbeat.count) == (version, beats):
             await self._changed.wait()
 
-    def seen_as(self, role: Role = "", page: str = "") -> View:
+    def for_role(self, role: Role = "", page: str = "") -> View:
         """The newest view, as clients of this role get it on a page; of all pages with "", and with a
         page that the panel does not have (any more)."""
         key = role, page
-        if key not in self._seen:
-            whole = seen_as(self.view, self._without_control, role)
+        if key not in self._by_role:
+            whole = for_role(self.view, self._without_control, role)
             own = self._of_page(whole["widgets"], page)
-            self._seen[key] = whole if own is whole["widgets"] else {**whole, "widgets": own}
-        return self._seen[key]
+            self._by_role[key] = whole if own is whole["widgets"] else {**whole, "widgets": own}
+        return self._by_role[key]
 
     def _of_page(self, widgets: dict[str, Any], page: str) -> dict[str, Any]:
         shown = self._pages.get(page)
@@ -118,11 +118,11 @@ class ViewPublisher:
 
     def snapshot(self, language: str = ENGLISH, role: Role = "", page: str = "") -> bytes:
         """The `snapshot` event: everything that the page shows."""
-        view = self.seen_as(role, page)
+        view = self.for_role(role, page)
         about = {"id": self.id, "revision": self.revision}
         return self._all_of("snapshot", view, language, lambda: {**about, **view})
 
-    def since(
+    def events_since(
         self,
         version: int,
         view: View,
@@ -137,7 +137,7 @@ class ViewPublisher:
         prepared = self._prepared.get(key)
         if prepared is None:
             latest = version == self.version - 1 and not (was or role)
-            news = self._news_of(page) if latest else difference(view, self.seen_as(role, page))
+            news = self._news_of(page) if latest else difference(view, self.for_role(role, page))
             prepared = self._prepared[key] = b"".join(
                 self._event(name, data, language)
                 if name == "update"

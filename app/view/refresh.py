@@ -85,10 +85,10 @@ class ViewRefresher:
         self._displays = [
             (frozenset(robot.key(source.topic) for source in w.sources()), w) for w in panel.displays
         ]
-        self._seen = self._sight()
-        self.lamp = self._seen.robot
+        self._current = self._build()
+        self.lamp = self._current.robot
         self.publisher = ViewPublisher(
-            self._seen.view, revision, self._seen.without_control, panel.widgets_by_page
+            self._current.view, revision, self._current.without_control, panel.widgets_by_page
         )
         self._shown_at = 0.0
         self._spoke: set[str] = set()  # keys of topics that said something since
@@ -133,38 +133,38 @@ class ViewRefresher:
         self._shown_at = time.monotonic()
         try:
             self._refresh()
-            self.publisher.post(self._seen.view, self._seen.without_control)
+            self.publisher.post(self._current.view, self._current.without_control)
         except Exception:
             if not self._failed:
                 self._log.exception("the view could not be refreshed; it is tried again")
             self._failed = self._whole = True
             self._at(self._shown_at + AGAIN_S)
-            locked = lock_all(self._seen, say("view_failed"))
+            locked = lock_all(self._current, say("view_failed"))
             self.publisher.post(locked.view, locked.without_control)
         else:
             self._failed = self._whole = False
             self._spoke = set()
-            self._at(self._seen.until)
+            self._at(self._current.until)
 
     def _refresh(self) -> None:
         now = self._shown_at
-        if self._whole or now >= self._seen.rest:
+        if self._whole or now >= self._current.rest:
             self._look()
         else:
-            self._seen = update_displays(self._seen, self._stale(now), self._robot, now)
+            self._current = update_displays(self._current, self._stale(now), self._robot, now)
 
     def _stale(self, now: float) -> list[DisplayWidget]:
         """The displays that a topic or time has changed."""
-        untils, spoke = self._seen.displays, self._spoke
+        untils, spoke = self._current.displays, self._spoke
         return [w for keys, w in self._displays if not keys.isdisjoint(spoke) or untils[w.id] <= now]
 
     def _look(self) -> None:
         """Builds the whole view."""
-        self._seen = self._sight()
-        if self._seen.robot != self.lamp:
-            self.lamp = self._seen.robot
+        self._current = self._build()
+        if self._current.robot != self.lamp:
+            self.lamp = self._current.robot
             self._sources.others.show_but(self._robot)
-            self._seen = self._sight()
+            self._current = self._build()
 
     def _at(self, when: float) -> None:
         """Shows again at `when` (monotonic seconds), or sooner if that is planned already."""
@@ -176,11 +176,11 @@ class ViewRefresher:
         loop = asyncio.get_running_loop()
         self._timer = None if when == math.inf else loop.call_at(when, self._frame)
 
-    def _sight(self) -> ViewWithDeadlines:
+    def _build(self) -> ViewWithDeadlines:
         sources = self._sources
         unlogged = sources.operators_log.fault
         faults = (unlogged, sources.recordings.fault if sources.recordings else "")
-        seen = build_view(
+        built = build_view(
             self._panel,
             self._robot,
             time.monotonic(),
@@ -192,5 +192,5 @@ class ViewRefresher:
             control_lock=sources.control.lock,
             control_until=sources.control.until,
         )
-        seen.view["link"] = self._link_times.dated(seen.view["link"])
-        return seen
+        built.view["link"] = self._link_times.dated(built.view["link"])
+        return built

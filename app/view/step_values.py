@@ -12,16 +12,16 @@ from app.view.display_values import NOTHING, field_state, written_number
 def step(widget: Step, robot: RobotState, now: float) -> tuple[dict[str, Any], float]:
     """Attributes: `state`, `text` (the reported value) and `note`; `step_up` and `step_down`, the
     values that the keys publish, "" where they publish none; and when they change."""
-    seen = field_state(widget.value, robot, now)
+    field = field_state(widget.value, robot, now)
     base, verdict = reported_value(widget, robot, now)
     attributes = {
-        "state": seen.state,
-        "text": NOTHING if seen.value is None else written_number(seen.value, widget.format),
-        "note": seen.note,
+        "state": field.state,
+        "text": NOTHING if field.value is None else written_number(field.value, widget.format),
+        "note": field.note,
         "step_up": _target(widget, base, 1),
         "step_down": _target(widget, base, -1),
     }
-    return attributes, min(seen.until, verdict.until)
+    return attributes, min(field.until, verdict.until)
 
 
 def _target(widget: Step, base: float | None, steps: int) -> str:

@@ -17,22 +17,22 @@ def trend(widget: Trend, robot: RobotState, now: float) -> tuple[dict[str, Any],
     state, until = "live", math.inf
     notes: list[TextLike] = []
     for number, (pen, one) in enumerate(zip(widget.pens, widget.readouts, strict=True)):
-        seen = field_state(one, robot, now)
-        until = min(until, seen.until)
-        if seen.state != "live":
-            state = seen.state if state == "live" else state
-            notes.append(say("trend_pen", label=pen.label, note=seen.note))
+        field = field_state(one, robot, now)
+        until = min(until, field.until)
+        if field.state != "live":
+            state = field.state if state == "live" else state
+            notes.append(say("trend_pen", label=pen.label, note=field.note))
         shown[f"text{number}"] = readout(one, robot, now)[0]["text"]
-        shown[f"state{number}"] = _state(pen, seen)
+        shown[f"state{number}"] = _state(pen, field)
     note = joined(dict.fromkeys(notes))
     fault = robot.history.fault if widget.disk else ""
     return {"state": state, "note": note, "fault": fault, **shown}, until
 
 
-def _state(pen: Pen, seen: FieldState) -> str:
-    if seen.state != "live" or not isinstance(seen.value, int | float):
-        return seen.state
-    value = pen.shown(seen.value)
+def _state(pen: Pen, field: FieldState) -> str:
+    if field.state != "live" or not isinstance(field.value, int | float):
+        return field.state
+    value = pen.shown(field.value)
     if pen.low is not None and value < pen.low:
         return "low"
     return "high" if pen.high is not None and value > pen.high else "live"

@@ -14,7 +14,7 @@ from app.i18n import Text, TextLike, say
 from app.panel.model import Panel
 from app.panel.widgets.families import DisplayWidget
 from app.permission.control_authority_view import IN_CONTROL, NO_CONTROL, ControlView, Role
-from app.permission.control_authority_view import seen_as as control_seen_as
+from app.permission.control_authority_view import for_role as control_for_role
 from app.permission.interlocks import PERMITTED, Verdict, interlock_verdict, link_verdict
 from app.permission.press_permission import Grounds, Question, permission
 from app.robot.state import RobotState
@@ -109,11 +109,11 @@ def build_view(
 
 def _without_control(questions: Iterable[Question], lock: Verdict) -> dict[str, Attributes]:
     """The same commands, asked for a client that has no control."""
-    asked = (one._replace(grounds=replace(one.grounds, control=lock)) for one in questions)
-    return {one.widget.id: show(one.widget, one.robot, one.now, permission(one))[0] for one in asked}
+    others = (one._replace(grounds=replace(one.grounds, control=lock)) for one in questions)
+    return {one.widget.id: show(one.widget, one.robot, one.now, permission(one))[0] for one in others}
 
 
-def lock_all(seen: ViewWithDeadlines, reason: Text) -> ViewWithDeadlines:
+def lock_all(current: ViewWithDeadlines, reason: Text) -> ViewWithDeadlines:
     """The same with every interlock and command locked for one reason."""
     overlay = {"enabled": False, "reason": reason, "reasons": reason, "more": ""}
 
@@ -122,29 +122,29 @@ def lock_all(seen: ViewWithDeadlines, reason: Text) -> ViewWithDeadlines:
             return attributes
         return {name: overlay.get(name, value) for name, value in attributes.items()}
 
-    view = seen.view.copy()
+    view = current.view.copy()
     view["interlocks"] = {name: locked(one) for name, one in view["interlocks"].items()}
     view["widgets"] = {name: locked(one) for name, one in view["widgets"].items()}
     view["state"] = UNKNOWN
-    without = {name: locked(one) for name, one in seen.without_control.items()}
-    return seen._replace(view=view, without_control=without)
+    without = {name: locked(one) for name, one in current.without_control.items()}
+    return current._replace(view=view, without_control=without)
 
 
 def update_displays(
-    seen: ViewWithDeadlines, displays: Iterable[DisplayWidget], robot: RobotState, now: float
+    current: ViewWithDeadlines, displays: Iterable[DisplayWidget], robot: RobotState, now: float
 ) -> ViewWithDeadlines:
     """The same with these displays as of `now`, where nothing else has changed."""
-    widgets, untils = dict(seen.view["widgets"]), dict(seen.displays)
+    widgets, untils = dict(current.view["widgets"]), dict(current.displays)
     for widget in displays:
         widgets[widget.id], untils[widget.id] = show(widget, robot, now)
-    return seen._replace(view={**seen.view, "widgets": widgets}, displays=untils)
+    return current._replace(view={**current.view, "widgets": widgets}, displays=untils)
 
 
-def seen_as(view: View, without_control: Mapping[str, Attributes], role: Role) -> View:
+def for_role(view: View, without_control: Mapping[str, Attributes], role: Role) -> View:
     """The view as clients of this role get it: without control, what can be pressed is locked."""
     if not role:
         return view
-    control = control_seen_as(view["control"], role)
+    control = control_for_role(view["control"], role)
     if role in IN_CONTROL:
         return {**view, "control": control}
     return {**view, "control": control, "widgets": {**view["widgets"], **without_control}}

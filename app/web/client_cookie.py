@@ -24,11 +24,11 @@ class Caller:
     token: str
     address: str
 
-    def seen(self, state: AppState) -> Principal:
+    def principal(self, state: AppState) -> Principal:
         """Who this is now; without a token an anonymous client."""
         if not self.token:
             return Principal(anonymous(self.address))
-        return Principal(state.clients.seen(self.token, self.address))
+        return Principal(state.clients.identify(self.token, self.address))
 
 
 def caller(request: HTTPConnection) -> Caller:
@@ -39,7 +39,7 @@ def caller(request: HTTPConnection) -> Caller:
 
 def visitor(request: HTTPConnection, state: AppState) -> Principal:
     """Who asks, by the cookie; without one, or with one that is not ours, an anonymous client."""
-    return caller(request).seen(state)
+    return caller(request).principal(state)
 
 
 def welcomed(request: Request, state: AppState) -> tuple[Principal, str]:
@@ -53,7 +53,7 @@ def welcomed(request: Request, state: AppState) -> tuple[Principal, str]:
         return who, ""
     token = new_token()
     if by_hand(request):
-        return Principal(state.clients.seen(token, who.client.address)), token
+        return Principal(state.clients.identify(token, who.client.address)), token
     return Principal(new_client(token, who.client.address)), token
 
 

@@ -16,14 +16,14 @@ HEAD_MOST: Final = 65_536  # bytes after those that came with its first one
 CONNECTIONS_MOST: Final = 2000  # half of them from one address
 FILES_WANTED: Final = 4096  # as the unit's LimitNOFILE
 FILES_KEPT: Final = 200  # for all that is no connection
-TOLD_EVERY_S: Final = 60.0
+WARN_EVERY_S: Final = 60.0
 
 
 class Connection(HttpToolsProtocol):
     """uvicorn's, which is closed when the head of a request takes too long or is too large, and at once
     when there are too many."""
 
-    told_at: ClassVar[float] = -math.inf
+    warned_at: ClassVar[float] = -math.inf
 
     _due: asyncio.TimerHandle | None = None  # while a head is waited for
     _head = 0
@@ -79,8 +79,8 @@ class Connection(HttpToolsProtocol):
 
     def _tell(self) -> None:
         now = self.loop.time()
-        if now - Connection.told_at >= TOLD_EVERY_S:
-            Connection.told_at = now
+        if now - Connection.warned_at >= WARN_EVERY_S:
+            Connection.warned_at = now
             where = self.client[0] if self.client else "a local socket"
             log.warning("too many connections (%d): closed one from %s", len(self.connections), where)
 

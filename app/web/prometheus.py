@@ -23,10 +23,10 @@ class _Of(Collector):
 
     def collect(self) -> Iterator[Metric]:
         metrics = self._metrics
-        told = "Refused presses that the operator's log only counts"
-        yield CounterMetricFamily("kiosk_refusals_left_out", told, value=metrics.left_out())
-        told = "Presses, holds and cancels over their limit, answered 429"
-        yield CounterMetricFamily("kiosk_presses_limited", told, value=metrics.limited())
+        about = "Refused presses that the operator's log only counts"
+        yield CounterMetricFamily("kiosk_refusals_left_out", about, value=metrics.left_out())
+        about = "Presses, holds and cancels over their limit, answered 429"
+        yield CounterMetricFamily("kiosk_presses_limited", about, value=metrics.limited())
         presses = CounterMetricFamily("kiosk_presses", "Presses by outcome", labels=["outcome"])
         for outcome, count in metrics.presses.items():
             presses.add_metric([outcome], count.value, created=count.since)

@@ -8,7 +8,7 @@ from typing import Any, Final
 from docs._generate.schema import REF, ROOT, WIDGET, WORDS, Schema, of_kind, panel_schema
 
 EVERYTHING: Final = Path(__file__).parents[2] / "tests/everything.toml"
-EXACT: Final = 2**53  # the limit of every number in a browser: it is told once, not at each key
+EXACT: Final = 2**53  # the limit of every number in a browser: it is described once, not at each key
 NOUNS: Final = {"string": "text", "number": "number", "integer": "whole number", "object": "table"}
 LIMITS: Final = {
     "minimum": "{} or more",

@@ -1,4 +1,4 @@
-"""The tables of docs/reference/locks.md: each sentence that tells why something is locked, refused or
+"""The tables of docs/reference/locks.md: each sentence that says why something is locked, refused or
 ended, from the catalogue, with what to do about it, from locks.toml.
 
 In another language the whole page, docs/reference/locks.<language>.md, is made of that catalogue, of
@@ -56,7 +56,7 @@ def translated_page(language: str, path: Path) -> str:
 
 
 def unexplained() -> list[str]:
-    """Codes of the catalogue of which nobody has said whether they lock, and what to do."""
+    """Codes of the catalogue for which no file says whether they lock, and what to do."""
     explained = {code for codes in groups(ADVICE).values() for code in codes}
     patterns = ADVICE[OTHERS]["codes"]
     return [

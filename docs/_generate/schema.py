@@ -128,7 +128,7 @@ def _finish(name: str, table: Schema) -> None:
 
 
 def about(table: str, key: str) -> str:
-    """What a key means; KeyError where nobody has said it."""
+    """What a key means; KeyError if no file describes it."""
     for place in (table, "any"):
         if (said := WORDS.get(place, {}).get(key)) is not None:
             return str(said)
@@ -195,9 +195,9 @@ def _bare(prop: Schema) -> Schema:
 
 def _any_of(props: list[Schema]) -> Schema:
     """A key of several kinds: the conditions say which it is."""
-    told = list(dict.fromkeys(prop["description"] for prop in props))
+    texts = list(dict.fromkeys(prop["description"] for prop in props))
     bare = [_bare(prop) for prop in props]
-    return {"description": "\n\n".join(told), **(bare[0] if len(bare) == 1 else {"anyOf": bare})}
+    return {"description": "\n\n".join(texts), **(bare[0] if len(bare) == 1 else {"anyOf": bare})}
 
 
 def _renamed(of: Any, names: Mapping[str, str]) -> Any:

@@ -160,7 +160,7 @@ def test_a_disk_that_hangs_blocks_no_loop_and_locks(
     ]
 
 
-def test_a_press_that_nobody_waits_for_any_more_is_closed(tmp_path: Path, disk: Disk) -> None:
+def test_a_press_that_no_client_waits_for_any_more_is_closed(tmp_path: Path, disk: Disk) -> None:
     async def work(log: OperatorLog) -> None:
         disk.open.clear()
         before = disk.commits
@@ -179,15 +179,15 @@ def test_a_press_that_is_called_away_as_it_was_written_is_closed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     presses: list[asyncio.Task[Entry | None]] = []
-    told = OperatorLog._deliver_results
+    deliver = OperatorLog._deliver_results
 
-    def told_too_late(log: OperatorLog, results: Results, changed: bool) -> None:
-        told(log, results, changed)
+    def deliver_too_late(log: OperatorLog, results: Results, changed: bool) -> None:
+        deliver(log, results, changed)
         for press in presses:
             press.cancel()
 
     async def work(log: OperatorLog) -> None:
-        monkeypatch.setattr(OperatorLog, "_deliver_results", told_too_late)
+        monkeypatch.setattr(OperatorLog, "_deliver_results", deliver_too_late)
         presses.append(asyncio.create_task(log.pressed(pressed(1))))
         (cancelled,) = await asyncio.gather(*presses, return_exceptions=True)
         assert isinstance(cancelled, asyncio.CancelledError)

@@ -183,7 +183,7 @@ def holds(kiosk: Server) -> bool:
 def test_exports_and_searches_disturb_neither_presses_nor_holds(kiosk: Server) -> None:
     alone = press_s(kiosk)
     with exporting(kiosk), searching(kiosk) as statuses, unread(kiosk, 50):
-        until(lambda: {200, 429} <= set(statuses), "some search, others are told to come later", 30)
+        until(lambda: {200, 429} <= set(statuses), "some search, others get 429", 30)
         assert press_s(kiosk) < 12 * alone + 0.05
         assert holds(kiosk)
 
@@ -191,8 +191,8 @@ def test_exports_and_searches_disturb_neither_presses_nor_holds(kiosk: Server) -
 def test_one_export_at_a_time_and_it_is_whole(kiosk: Server) -> None:
     with exporting(kiosk) as (first, *_), unread(kiosk, 10):
         assert first.stdout is not None
-        told = {line.split()[0] for line, _ in zip(first.stdout, range(3), strict=False)}
-        assert "429" in told or "200" in told
+        first_statuses = {line.split()[0] for line, _ in zip(first.stdout, range(3), strict=False)}
+        assert "429" in first_statuses or "200" in first_statuses
     refused: list[httpx.Response] = []
 
     def whole() -> httpx.Response | None:
@@ -282,7 +282,7 @@ def test_two_search_at_a_time_and_the_server_itself_waits_for_none(
     run(tmp_path, work)
 
 
-def test_an_export_that_nobody_takes_is_given_up(
+def test_an_export_that_no_client_reads_is_given_up(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr(routes, "TAKEN_WITHIN_S", 0.2)

@@ -25,7 +25,7 @@ def all_entries(folder: Path) -> list[Entry]:
 
 
 def press_on(url: str, client: int, receipts: dict[str, str]) -> None:
-    """Presses, one after another, until the server is gone; keeps what it was told."""
+    """Presses, one after another, until the server is gone; keeps the answers."""
     with http_client(url, 10) as http:
         for number in range(100_000):
             press_id = f"{http.base_url.port}-{client}-{number}"

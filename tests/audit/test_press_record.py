@@ -111,7 +111,7 @@ class Bench:
         panel = panel or small_panel()
         self.happened = happened
         self.robot = robot_there(panel)
-        self.asked: list[asyncio.Future[bytes | None]] = []
+        self.queries: list[asyncio.Future[bytes | None]] = []
         permits(self.robot)
         self.presses = presses_of(
             panel, self.robot, self, asker=self, press_log=PressLog(log, "arm", lambda: "board-3")
@@ -127,8 +127,8 @@ class Bench:
 
     def query(self, key: str, payload: bytes, timeout_s: float) -> "asyncio.Future[bytes | None]":
         self.happened.append("sent")
-        self.asked.append(asyncio.get_running_loop().create_future())
-        return self.asked[-1]
+        self.queries.append(asyncio.get_running_loop().create_future())
+        return self.queries[-1]
 
     async def press(self, widget: str = "guarded", press_id: str = "p1", **inputs: Any) -> Receipt:
         return await self.presses.press(widget, inputs or {"message": "hi"}, press_id, FROM)
@@ -162,7 +162,7 @@ def real(
     return [row.entry for row in reversed(rows(folder, Filter(every=True), None, 1000))][1:]
 
 
-def test_a_press_is_written_then_sent_then_on_the_disk_then_told() -> None:
+def test_a_press_is_written_then_sent_then_on_the_disk_then_answered() -> None:
     async def work(log: SlowLog, bench: Bench) -> None:
         task = asyncio.create_task(bench.press())
         await asyncio.sleep(0.02)
@@ -239,7 +239,7 @@ def test_two_presses_of_one_service_wait_for_the_disk_and_one_is_sent() -> None:
         assert outcomes == ["timed_out", "refused"]
         assert bench.happened.count("sent") == 1
         assert {e.verdict for e in log.entries if e.outcome == "refused"} == {"busy"}
-        bench.asked[0].cancel()
+        bench.queries[0].cancel()
 
     slow(work, panel_of(SET, *_message()))
 
@@ -267,7 +267,7 @@ def test_a_cancel_does_not_wait_for_the_log() -> None:
         press = asyncio.create_task(bench.press("count"))
         await asyncio.sleep(0.02)
         accepted = {"accepted": True, "stamp": {"sec": 0, "nanosec": 0}}
-        bench.asked[0].set_result(INTERFACES.encode(types.send_goal_response, accepted))
+        bench.queries[0].set_result(INTERFACES.encode(types.send_goal_response, accepted))
         assert (await press).outcome == "accepted"
         log.written.clear()
         bench.happened.clear()
@@ -275,7 +275,7 @@ def test_a_cancel_does_not_wait_for_the_log() -> None:
         await asyncio.sleep(0.02)
         assert sorted(bench.happened) == ["sent", "written"]  # its entry is still being written
         assert not log.written.is_set()
-        bench.asked[-1].set_result(None)
+        bench.queries[-1].set_result(None)
         log.written.set()
         assert (await cancel).outcome == "unknown"
         assert [e.action for e in log.entries if e.kind == "closed"] == ["press", "cancel"]
@@ -306,12 +306,12 @@ def test_a_press_that_is_given_up_while_it_waits_is_closed_as_unknown() -> None:
         task.cancel()
         await asyncio.gather(task, return_exceptions=True)
         assert [(e.kind, e.outcome) for e in log.entries] == [("pressed", ""), ("closed", "unknown")]
-        bench.asked[0].cancel()
+        bench.queries[0].cancel()
 
     slow(work, panel_of(SET, *_message()))
 
 
-def test_an_entry_tells_who_what_where_and_by_which_state(tmp_path: Path) -> None:
+def test_an_entry_says_who_what_where_and_by_which_state(tmp_path: Path) -> None:
     async def work(bench: Bench) -> None:
         await bench.press()
 
@@ -376,7 +376,7 @@ def test_a_late_answer_is_a_further_entry(tmp_path: Path) -> None:
 
     async def work(bench: Bench) -> None:
         assert (await bench.press("light")).outcome == "timed_out"
-        bench.asked[0].set_result(answer)
+        bench.queries[0].set_result(answer)
         await asyncio.sleep(0.02)
         receipt = bench.presses.receipt("p1")
         assert receipt is not None

@@ -115,17 +115,21 @@ def test_it_remembers_no_more_than_it_must(counted: Counted) -> None:
     assert len(counted.refusals._balances) == MAX_QUOTAS
 
 
-def test_what_is_left_out_is_told_by_browser_and_the_rest_together(counted: Counted) -> None:
+def test_what_is_left_out_is_summed_up_by_browser_and_the_rest_together(counted: Counted) -> None:
     counted.come(KIM, 60 + 7)
     for number in range(2 * MAX_BROWSERS):
         counted.come(Origin(address=f"10.0.0.{number}", browser="c"), 61)
-    told = counted.refusals.summary_due()
-    assert len(told) == MAX_BROWSERS + 1
-    assert told[0].reason.startswith("7 more refusals from Panel 1 (10.0.0.7) since ")
-    assert (told[0].kind, told[0].outcome, told[0].browser) == ("refused", "refused", "b1")
-    assert json.loads(told[0].values) == {"more": 7}
-    assert told[-1].reason.split(" since")[0].endswith("more refusals from others")
-    assert sum(json.loads(entry.values)["more"] for entry in told) == counted.refusals.left_out
+    summaries = counted.refusals.summary_due()
+    assert len(summaries) == MAX_BROWSERS + 1
+    assert summaries[0].reason.startswith("7 more refusals from Panel 1 (10.0.0.7) since ")
+    assert (summaries[0].kind, summaries[0].outcome, summaries[0].browser) == (
+        "refused",
+        "refused",
+        "b1",
+    )
+    assert json.loads(summaries[0].values) == {"more": 7}
+    assert summaries[-1].reason.split(" since")[0].endswith("more refusals from others")
+    assert sum(json.loads(entry.values)["more"] for entry in summaries) == counted.refusals.left_out
     assert counted.refusals.summary_due() == []
 
 
@@ -186,7 +190,9 @@ def test_a_flood_of_refused_presses_leaves_the_log_as_it_was(tmp_path: Path) -> 
     assert json.loads(more.values) == {"more": 2000 - OF_BROWSER.burst}
 
 
-def test_they_are_told_while_the_flood_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_they_are_summed_up_while_the_flood_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(audit_log, "SUMMARY_INTERVAL_S", 0.05)
 
     async def work(cell: Cell) -> None:
@@ -266,7 +272,7 @@ def test_cancels_of_nothing_are_limited_too(tmp_path: Path) -> None:
     written(tmp_path, work)
 
 
-def test_while_the_log_is_broken_they_are_kept_to_be_told(
+def test_while_the_log_is_broken_they_are_kept_for_a_summary(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(audit_log, "SUMMARY_INTERVAL_S", 0.02)

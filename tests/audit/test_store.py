@@ -61,7 +61,7 @@ def test_an_entry_is_read_as_it_was_written(store: Store, tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("reason", ['Nein: "ö"\\', say("waiting", topic="/ö")])
-def test_a_hash_can_be_computed_by_whoever_reads_the_file(
+def test_a_hash_can_be_computed_by_any_reader_of_the_file(
     store: Store, tmp_path: Path, reason: TextLike
 ) -> None:
     (written,) = store.append([new_entry("refused", FROM, {"text": 'ä"\n'}, reason=reason)])
@@ -72,7 +72,7 @@ def test_a_hash_can_be_computed_by_whoever_reads_the_file(
     assert digest == written.hash == hashlib.sha256(text.encode()).hexdigest()
 
 
-def test_an_outcome_tells_which_press_it_is_of(store: Store, tmp_path: Path) -> None:
+def test_an_outcome_says_which_press_it_is_of(store: Store, tmp_path: Path) -> None:
     fill(store, 1)
     closed, opened = read(tmp_path, every=True)
     assert (closed.kind, closed.of, closed.outcome, closed.verdict) == (
@@ -278,7 +278,7 @@ def test_a_log_that_is_not_there_or_no_log_is_unreadable(
     assert "can't be read" in capsys.readouterr().err
 
 
-def test_a_panel_with_a_fault_keeps_nobody_from_verifying(
+def test_a_log_can_be_verified_with_a_fault_in_the_panel(
     store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     fill(store, 2)
@@ -351,7 +351,7 @@ def test_what_was_written_before_the_clock_was_set_is_not_old_by_that(store: Sto
     assert store.head.count == 1
 
 
-def test_only_a_clock_that_nobody_set_for_an_hour_makes_anything_old() -> None:
+def test_only_a_clock_that_was_not_set_for_an_hour_makes_anything_old() -> None:
     clock = ClockSteadiness()
     assert not clock.is_steady(1000.0, 0.0)
     assert not clock.is_steady(1000.0 + HOUR_S - 1, HOUR_S - 1)

@@ -151,7 +151,7 @@ def test_the_robot_says_no_with_its_words(kiosk: Server, robot: CycloneRobot) ->
     assert robot.requests("/set_enabled") == [{"data": True}] * 2
 
 
-def test_no_such_service_is_told_at_once(kiosk: Server) -> None:
+def test_no_such_service_is_reported_at_once(kiosk: Server) -> None:
     assert "does not offer /nowhere" in kiosk.widget("nowhere")["reason"]
     began = time.monotonic()
     receipt = press(kiosk, "nowhere")
@@ -224,7 +224,7 @@ def test_calls_that_wait_hold_up_no_press(
     with ThreadPoolExecutor(len(names)) as pool:
         began = time.monotonic()
         calls = [pool.submit(press_alone, kiosk, name) for name in names]
-        until(lambda: sum(call.done() for call in calls) == 3, "what is too many is told at once")
+        until(lambda: sum(call.done() for call in calls) == 3, "what is too many is refused at once")
         assert time.monotonic() - began < WAITING_S / 2
         beside = median(heard_after_s(kiosk, robot, f"beside {n}") for n in range(20))
         assert sum(call.done() for call in calls) == 3, "the others wait all the while"
@@ -467,7 +467,7 @@ def test_a_goal_whose_answer_was_cut_off_is_found_again_and_can_be_canceled(
 
 
 def locked_until_found(kiosk: Server) -> None:
-    """A goal that was cut off: at no time another can be sent, before the robot tells of it."""
+    """A goal that was cut off: at no time another can be sent, before the robot reports it."""
 
     def found() -> bool:
         shown = kiosk.widget("count")
@@ -513,12 +513,12 @@ def test_a_goal_of_more_than_five_seconds_survives_a_reload(
     expect(count.locator(".goal")).to_have_text("Running")
     other = page.context.new_page()
     other.goto(kiosk.url)
-    seen_elsewhere = other.locator('[data-widget="count"]')
-    expect(seen_elsewhere.locator(".goal")).to_have_text("Running")
+    on_another_page = other.locator('[data-widget="count"]')
+    expect(on_another_page.locator(".goal")).to_have_text("Running")
     expect(count.get_by_role("button", name="Cancel")).to_be_enabled()
     expect(count.locator(".result")).to_contain_text("Succeeded", timeout=20_000)
     expect(count.locator(".goal")).to_be_empty()
-    expect(seen_elsewhere.locator(".goal")).to_be_empty()
+    expect(on_another_page.locator(".goal")).to_be_empty()
     expect(count.get_by_role("button", name="Cancel")).to_be_disabled()
     expect(count.get_by_role("button", name="Count", exact=True)).to_be_enabled()
 
@@ -555,7 +555,7 @@ def test_a_late_answer_corrects_what_every_browser_shows(
 
 
 @pytest.mark.parametrize("manner", ["rclcpp", "rclpy"])
-def test_a_cancel_that_the_robot_refuses_is_told(
+def test_a_cancel_that_the_robot_refuses_is_reported(
     kiosk: Server, robot: CycloneRobot, page: Page, manner: str
 ) -> None:
     robot.fibonacci(step_s=30, refuse_cancels=manner)

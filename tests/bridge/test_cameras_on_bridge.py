@@ -111,7 +111,7 @@ def test_both_kinds_of_pictures_are_drawn(kiosk: Server, page: Page) -> None:
     assert widget(page, "raw").locator("canvas").evaluate(pixel) == nearly_green
 
 
-def test_what_nobody_looks_at_is_not_subscribed_to(
+def test_a_camera_that_no_page_shows_is_not_subscribed_to(
     kiosk: Server, session: zenoh.Session, page: Page
 ) -> None:
     """Neither a hidden page nor one without the camera: then the bridge reads nothing of it."""
@@ -119,15 +119,15 @@ def test_what_nobody_looks_at_is_not_subscribed_to(
     expect(widget(page, "packed")).to_have_attribute("data-state", "live", timeout=20_000)
     assert is_read(session, "/test_packed")
     page.evaluate(HIDE, True)
-    until(lambda: not is_read(session, "/test_packed"), "nobody reads it")
+    until(lambda: not is_read(session, "/test_packed"), "no node reads it")
     assert kiosk.widget("packed")["state"] == "waiting"
     page.evaluate(HIDE, False)
     expect(widget(page, "packed")).to_have_attribute("data-state", "live", timeout=20_000)
     page.goto(f"{kiosk.url}/pages/two")
-    until(lambda: not is_read(session, "/test_packed"), "nobody reads it")
+    until(lambda: not is_read(session, "/test_packed"), "no node reads it")
 
 
-def test_a_slow_browser_gets_the_newest_and_holds_nobody_up(kiosk: Server) -> None:
+def test_a_slow_browser_gets_the_newest_and_delays_no_other(kiosk: Server) -> None:
     with looking(kiosk, "packed") as slow, looking(kiosk, "packed") as quick:
         first = ask(slow)
         for _ in range(10):

@@ -40,7 +40,7 @@ def run(bridge: Bridge, *words: str) -> subprocess.CompletedProcess[str]:
     return done
 
 
-def told(bridge: Bridge, *words: str) -> str:
+def output_of(bridge: Bridge, *words: str) -> str:
     done = run(bridge, *words)
     assert (done.returncode, done.stderr) == (0, "")
     return done.stdout
@@ -76,27 +76,27 @@ def io(cyclone_bridge: Bridge) -> Iterator[RosNode]:
 
 
 def test_topics_are_listed_as_ros_lists_them(cyclone_bridge: Bridge, io: RosNode) -> None:
-    listed = told(cyclone_bridge, "topics").split()
+    listed = output_of(cyclone_bridge, "topics").split()
     assert listed == sorted(listed)
-    typed = told(cyclone_bridge, "topics", "-t")
+    typed = output_of(cyclone_bridge, "topics", "-t")
     assert "/operation_enabled [std_msgs/msg/Bool]\n" in typed
-    assert int(told(cyclone_bridge, "topics", "--count-topics")) == len(listed)
-    assert told(cyclone_bridge, "topics", "--namespace", "/arm") == "/joint_states\n/temperature\n"
+    assert int(output_of(cyclone_bridge, "topics", "--count-topics")) == len(listed)
+    assert output_of(cyclone_bridge, "topics", "--namespace", "/arm") == "/joint_states\n/temperature\n"
 
 
 def test_topics_are_described_with_qos_and_nodes(cyclone_bridge: Bridge, io: RosNode) -> None:
-    lines = told(cyclone_bridge, "topics", "-v").splitlines()
+    lines = output_of(cyclone_bridge, "topics", "-v").splitlines()
     at = lines.index("/operation_enabled [std_msgs/msg/Bool]")
     assert lines[at + 1] == "  publisher: /cell_io, reliable, transient local, Fast DDS"
     at = lines.index("/start [std_msgs/msg/Bool]")
     assert lines[at + 1] == "  subscriber: /cell_io, reliable, volatile, Fast DDS"
-    plain = json.loads(told(cyclone_bridge, "topics", "--json"))
+    plain = json.loads(output_of(cyclone_bridge, "topics", "--json"))
     enabled = next(one for one in plain if one["name"] == "/operation_enabled")
     assert (enabled["types"], enabled["publishers"][0]["nodes"]) == ([BOOL], ["/cell_io"])
 
 
 def test_echo_shows_the_last_value_of_a_latched_topic(cyclone_bridge: Bridge, io: RosNode) -> None:
-    assert told(cyclone_bridge, "echo", "/operation_enabled", "--once") == "data: true\n---\n"
+    assert output_of(cyclone_bridge, "echo", "/operation_enabled", "--once") == "data: true\n---\n"
 
 
 @pytest.mark.parametrize(
@@ -111,17 +111,17 @@ def test_echo_shows_the_last_value_of_a_latched_topic(cyclone_bridge: Bridge, io
 def test_echo_shows_messages_whole_or_a_field(
     cyclone_bridge: Bridge, io: RosNode, options: Sequence[str], text: str
 ) -> None:
-    assert told(cyclone_bridge, "echo", "/arm/joint_states", "--once", *options) == text
+    assert output_of(cyclone_bridge, "echo", "/arm/joint_states", "--once", *options) == text
 
 
 def test_echo_receives_best_effort_publishers(cyclone_bridge: Bridge, io: RosNode) -> None:
-    assert told(cyclone_bridge, "echo", "/arm/temperature", "--once", "--field", "temperature") == (
-        "41.5\n---\n"
-    )
+    assert output_of(
+        cyclone_bridge, "echo", "/arm/temperature", "--once", "--field", "temperature"
+    ) == ("41.5\n---\n")
 
 
 def test_hz_measures_the_rate(cyclone_bridge: Bridge, io: RosNode) -> None:
-    last = told(cyclone_bridge, "hz", "/arm/joint_states", "--for", "2").splitlines()[-2]
+    last = output_of(cyclone_bridge, "hz", "/arm/joint_states", "--for", "2").splitlines()[-2]
     rate = float(last.removeprefix("average rate: "))
     assert 5 < rate < 40  # it publishes at 20 Hz
 
@@ -179,7 +179,7 @@ def test_no_router_is_a_sentence_that_says_what_to_do() -> None:
     )
 
 
-def test_a_router_without_a_bridge_is_told_apart(peer: tuple[str, Any]) -> None:
+def test_a_router_without_a_bridge_is_a_finding_of_its_own(peer: tuple[str, Any]) -> None:
     endpoint, _ = peer
     done = subprocess.run(
         [*COMMAND, "topics", "--connect", endpoint],
@@ -241,7 +241,7 @@ def test_a_scaffold_is_a_good_panel_that_is_alive_at_once(
         "the services are announced",
     )
     path = tmp_path / "cell.toml"
-    said = told(cyclone_bridge, "scaffold", "-o", str(path), "--listen", "20")
+    said = output_of(cyclone_bridge, "scaffold", "-o", str(path), "--listen", "20")
     assert re.search(r"interlock candidate", said)
     text = path.read_text()
     panel = check_panel(path).panel
@@ -329,7 +329,7 @@ def test_a_scaffold_of_a_robot_with_a_namespace_has_it(domain: int, tmp_path: Pa
     try:
         node.advertise("/speed", "std_msgs/msg/Float64")
         until_passed_on(bridge, "/robot1/speed")
-        told(bridge, "scaffold", "-o", str(path), "--listen", "0.1")
+        output_of(bridge, "scaffold", "-o", str(path), "--listen", "0.1")
     finally:
         node.end()
         bridge.end()
@@ -352,7 +352,7 @@ def test_live_controls_need_a_permission(domain: int, tmp_path: Path) -> None:
         assert not path.exists()
         node.advertise("/enabled", BOOL, durability="transient_local", depth=1)
         until_passed_on(bridge, "/enabled")
-        told(bridge, "scaffold", "-o", str(path), "--controls", "--listen", "0.1")
+        output_of(bridge, "scaffold", "-o", str(path), "--controls", "--listen", "0.1")
     finally:
         node.end()
         bridge.end()

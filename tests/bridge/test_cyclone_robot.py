@@ -84,19 +84,19 @@ def test_trigger_and_its_dummy_byte(robot: CycloneRobot, client: Client) -> None
 def test_calls_under_way_get_each_its_own_reply(robot: CycloneRobot, client: Client) -> None:
     # Ten at most: the bridge's writer of requests keeps no more.
     numbers = [*range(8), 2**62, -(2**63)]
-    asked = [client.ask("add_two_ints", encoded(f"{ADD}_Request", n, 1)) for n in numbers]
-    assert [response(ADD, replies).sum for replies in asked] == [n + 1 for n in numbers]
+    answers = [client.ask("add_two_ints", encoded(f"{ADD}_Request", n, 1)) for n in numbers]
+    assert [response(ADD, replies).sum for replies in answers] == [n + 1 for n in numbers]
     assert [r["a"] for r in robot.requests("/add_two_ints")] == numbers
 
 
-def test_a_slow_answer_comes_late_and_holds_nobody_up(robot: CycloneRobot, client: Client) -> None:
+def test_a_slow_answer_comes_late_and_delays_no_other(robot: CycloneRobot, client: Client) -> None:
     robot.answer_slow(seconds=SLOW_S)
-    asked_at = time.monotonic()
+    sent_at = time.monotonic()
     slow = client.ask("slow", EMPTY_REQUEST, ENOUGH_S)
     client.call("reset", TRIGGER)
-    assert time.monotonic() - asked_at < SLOW_S
+    assert time.monotonic() - sent_at < SLOW_S
     assert response(TRIGGER, slow).message == "done"
-    assert time.monotonic() - asked_at >= SLOW_S
+    assert time.monotonic() - sent_at >= SLOW_S
 
 
 def test_no_answer_is_a_timeout_and_no_server_is_nothing_at_once(
@@ -106,9 +106,9 @@ def test_no_answer_is_a_timeout_and_no_server_is_nothing_at_once(
     assert errors(client.get("slow", EMPTY_REQUEST, timeout_s=0.5)) == {"Timeout"}
     until(lambda: robot.requests("/slow"), "it came")
     assert robot.requests("/slow") == [{}]
-    asked_at = time.monotonic()
+    sent_at = time.monotonic()
     assert client.get("nowhere", EMPTY_REQUEST, ENOUGH_S) == []
-    assert time.monotonic() - asked_at < ENOUGH_S / 2
+    assert time.monotonic() - sent_at < ENOUGH_S / 2
 
 
 def test_a_big_endian_request_is_executed_and_its_reply_lost(
@@ -168,19 +168,22 @@ def no_time() -> Any:
 
 def statuses(heard: list[Any], goal: bytes) -> list[int]:
     """Through which statuses a goal went, by the messages on the status topic."""
-    seen: list[int] = []
+    went_through: list[int] = []
     for message in heard:
         for status in message.status_list:
-            if status.goal_info.goal_id.uuid.tobytes() == goal and status.status not in seen[-1:]:
-                seen.append(status.status)
-    return seen
+            if (
+                status.goal_info.goal_id.uuid.tobytes() == goal
+                and status.status not in went_through[-1:]
+            ):
+                went_through.append(status.status)
+    return went_through
 
 
-def went(seen: list[int], *states: int) -> bool:
+def went(went_through: list[int], *states: int) -> bool:
     """Whether a goal went through these, to the last one: a topic that keeps one message only may leave
     out those that did not last, as EXECUTING does."""
-    in_order = seen == [state for state in states if state in seen]
-    return in_order and EXECUTING in seen and seen[-1] == states[-1]
+    in_order = went_through == [state for state in states if state in went_through]
+    return in_order and EXECUTING in went_through and went_through[-1] == states[-1]
 
 
 def test_a_goal_from_its_acceptance_to_its_result(robot: CycloneRobot, client: Client) -> None:
@@ -192,10 +195,10 @@ def test_a_goal_from_its_acceptance_to_its_result(robot: CycloneRobot, client: C
         heard(robot, "/fibonacci/_action/feedback", "/fibonacci/_action/status")
         goal = goals.sent(order=5)
         assert goals.result(goal) == (SUCCEEDED, [0, 1, 1, 2, 3, 5])
-        until(lambda: statuses(status, goal)[-1:] == [SUCCEEDED], "its end is told")
+        until(lambda: statuses(status, goal)[-1:] == [SUCCEEDED], "its end is published")
     assert went(statuses(status, goal), ACCEPTED, EXECUTING, SUCCEEDED)
-    told = [message.feedback.sequence.tolist() for message in feedback]
-    assert told == [[0, 1, 1], [0, 1, 1, 2], [0, 1, 1, 2, 3], [0, 1, 1, 2, 3, 5]]
+    sequences = [message.feedback.sequence.tolist() for message in feedback]
+    assert sequences == [[0, 1, 1], [0, 1, 1, 2], [0, 1, 1, 2, 3], [0, 1, 1, 2, 3, 5]]
     assert {message.goal_id.uuid.tobytes() for message in feedback} == {goal}
 
 
@@ -231,7 +234,7 @@ def test_the_client_cancels_a_goal(robot: CycloneRobot, client: Client) -> None:
         goal, other = goals.sent(order=5), goals.sent(order=5)
         assert goals.cancel(goal) == (0, [goal])
         assert goals.result(goal) == (CANCELED, [0, 1])
-        until(lambda: statuses(status, goal)[-1:] == [CANCELED], "its end is told")
+        until(lambda: statuses(status, goal)[-1:] == [CANCELED], "its end is published")
     assert went(statuses(status, goal), ACCEPTED, EXECUTING, CANCELING, CANCELED)
     assert {g["id"]: g["status"] for g in robot.goals()} == {
         goal.hex(): CANCELED,
@@ -361,7 +364,7 @@ def test_parameters_are_read_all_or_none(robot: CycloneRobot, client: Client) ->
     assert parameters(client, "get_parameters", ["speed", "nothing"]).values == []
 
 
-def test_a_parameter_is_set_and_the_change_is_told(robot: CycloneRobot, client: Client) -> None:
+def test_a_parameter_is_set_and_the_change_is_published(robot: CycloneRobot, client: Client) -> None:
     with client.hearing("parameter_events", "rcl_interfaces/msg/ParameterEvent") as events:
         heard(robot, "/parameter_events")
         assert set_one(client, "speed", 1.3) == (True, "")
@@ -369,7 +372,7 @@ def test_a_parameter_is_set_and_the_change_is_told(robot: CycloneRobot, client: 
         assert set_one(client, "enabled", False) == (True, "")
         assert set_one(client, "limit", 100) == (True, "")
         robot.set_parameter(name="serial", value="CR-0002")
-        until(lambda: len(events) >= 5, "each change is told")
+        until(lambda: len(events) >= 5, "each change is published")
     assert {
         name: robot.parameters()[name] for name in ("speed", "name", "enabled", "limit", "serial")
     } == {
@@ -442,7 +445,7 @@ def test_a_killed_robot_times_out_until_its_lease_ends_and_comes_back(
     assert client.call("reset", TRIGGER).success
     assert robot.requests("/reset") == [{}]
     robot.end()
-    until(lambda: not client.tokens(), "its leave is told", within_s=LEASE_S / 2)
+    until(lambda: not client.tokens(), "its leave is announced", within_s=LEASE_S / 2)
 
 
 def test_a_robot_killed_and_started_at_once_is_lost_when_the_old_lease_ends(
@@ -484,7 +487,7 @@ def test_without_a_token_of_the_client_a_second_life_brings_each_message_twice(
             until(partial(came, events, times=life), "both come")
             copies.append(limits(events).count(1))
         robot.end()
-        until(lambda: not client.tokens(), "its leave is told")
+        until(lambda: not client.tokens(), "its leave is announced")
     assert copies == [1, 2]
 
 

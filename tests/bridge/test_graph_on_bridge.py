@@ -141,11 +141,11 @@ def test_parameters_are_those_of_nodes_that_can_be_asked(
                 return await services.parameters(Node(name=name, bridge=""))
 
         assert asyncio.run(ask("/on_fast_dds")) is None  # it would misread the request
-        told = asyncio.run(ask(f"/{NODE}"))
+        declared = asyncio.run(ask(f"/{NODE}"))
     finally:
         ros.end()
-    assert told is not None
-    parameters = {one.name: one for one in told}
+    assert declared is not None
+    parameters = {one.name: one for one in declared}
     speed, serial = parameters["speed"], parameters["serial"]
     assert (speed.type, speed.value, speed.min, speed.max) == ("double", 0.5, 0.0, 2.0)
     assert speed.step == 0.1
@@ -159,7 +159,7 @@ def described(definitions: Definitions, name: str) -> list[dict[str, Any]]:
     return [_describe_structure(one) for one in (structure, *inner.values())]
 
 
-def test_a_node_describes_a_type_that_nobody_else_knows(
+def test_a_node_describes_a_type_that_no_other_knows(
     robot: CycloneRobot, cyclone_bridge: Bridge
 ) -> None:
     text = {"Gripper": "float64 width\nJaw[] jaws", "Jaw": "string name\nfloat32 force"}

@@ -104,14 +104,14 @@ def test_a_hidden_page_asks_for_nothing(kiosk: Server, node: RosNode, page: Page
     page.goto(kiosk.url)
     expect(rows(page)).not_to_have_count(0)
     page.evaluate(HIDE, True)
-    asked: list[str] = []
-    page.on("request", lambda request: asked.append(request.url))
+    urls: list[str] = []
+    page.on("request", lambda request: urls.append(request.url))
     before = int(kiosk.widget("robot")["count"])
     say(node, "while it is hidden")
     until(lambda: int(kiosk.widget("robot")["count"]) > before, "it came")
     page.evaluate(HIDE, False)
     expect(rows(page).first.locator(".text")).to_have_text("while it is hidden")
-    hidden = [url for url in asked if "/lines" in url]
+    hidden = [url for url in urls if "/lines" in url]
     assert len(hidden) <= 4, hidden  # both logs, after the page shows again
 
 

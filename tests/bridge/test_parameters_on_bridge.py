@@ -73,7 +73,7 @@ type = "integer"
 id = "elsewhere"
 kind = "parameter"
 label = "Elsewhere"
-node = "/nobody"
+node = "/absent_node"
 parameter = "speed"
 type = "double"
 """
@@ -144,7 +144,7 @@ def test_what_the_node_would_not_take_is_not_sent(
     receipt = press(kiosk, widget, value)
     assert (receipt.status_code, receipt.json()["outcome"]) == (422, "refused")
     assert reason in receipt.json()["reason"]
-    assert robot.asked_parameters(service="set_parameters") == 0
+    assert robot.parameter_requests(service="set_parameters") == 0
 
 
 def test_a_parameter_that_is_declared_anew_is_described_anew(
@@ -174,7 +174,7 @@ def test_read_only_undeclared_mistyped_and_absent_are_locked(
         "serial": "Read only: /cyclone_robot does not allow serial to be set.",
         "nothing": "Locked: /cyclone_robot has no parameter nothing.",
         "mistyped": "mode of /cyclone_robot is integer, but this panel expects string.",
-        "elsewhere": "Locked: the robot does not offer the parameters of /nobody at present.",
+        "elsewhere": "Locked: the robot does not offer the parameters of /absent_node at present.",
     }
     robot.declare_parameter(name="mode", value=1)
     until(lambda: "integer" in kiosk.widget("mistyped")["reason"], "its type is known")
@@ -182,7 +182,7 @@ def test_read_only_undeclared_mistyped_and_absent_are_locked(
     assert {name: shown[name]["reason"] for name in reasons} == reasons
     assert not shown["serial"]["settable"]
     assert [press(kiosk, name, "x").status_code for name in reasons] == [409, 409, 409, 503]
-    assert robot.asked_parameters(service="set_parameters") == 0
+    assert robot.parameter_requests(service="set_parameters") == 0
 
 
 def test_changes_by_others_show_without_asking(kiosk: Server, robot: CycloneRobot) -> None:
@@ -215,7 +215,7 @@ def test_a_node_that_does_not_answer_in_time(kiosk: Server, robot: CycloneRobot)
     until(lambda: kiosk.widget("speed")["outcome"] == "succeeded", "the late answer is shown")
     assert press(kiosk, "speed", 0.8, id="slow-1").json()["outcome"] == "succeeded"
     shows(kiosk, "speed", "0.8 m/s")
-    assert robot.asked_parameters(service="set_parameters") == 1
+    assert robot.parameter_requests(service="set_parameters") == 1
 
 
 def test_a_node_that_comes_back_is_read_anew(kiosk: Server, robot: CycloneRobot) -> None:
@@ -244,7 +244,7 @@ def test_a_bridge_lost_while_setting_leaves_it_unknown(
     robot.answer_parameters(service="set_parameters", seconds=1.0)
     with ThreadPoolExecutor(1) as pool:
         waiting = pool.submit(press, kiosk, "name", "later")
-        until(lambda: robot.asked_parameters(service="set_parameters"), "the robot is at it")
+        until(lambda: robot.parameter_requests(service="set_parameters"), "the robot is at it")
         own_cyclone_bridge.kill()
         receipt = waiting.result()
     assert (receipt.status_code, receipt.json()["outcome"]) == (200, "unknown")

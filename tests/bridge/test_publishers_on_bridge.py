@@ -80,7 +80,7 @@ def test_a_latched_value_that_the_bridge_finds_late_does_not_count_as_fresh(
     own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:
     """The bridge is frozen while a latched publisher permits; then DDS sends it again, and nothing in
-    it tells how old it is. What a periodic one says next opens."""
+    it says how old it is. What a periodic one says next opens."""
     panel = tmp_path / "panel.toml"
     panel.write_text(PANEL)
     kiosk = servers(live(own_bridge.endpoint, tmp_path, KIOSK_PANEL=str(panel)))

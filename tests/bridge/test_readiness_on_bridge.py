@@ -60,7 +60,7 @@ def main_loop_hangs(bridge: Bridge) -> Iterator[None]:
 
 
 def some_time_passes(kiosk: Server) -> None:
-    """More than a second: what was asked before is too old to be told."""
+    """More than a second: an earlier answer is too old to be given."""
     with kiosk.stream() as stream:
         for _ in range(4):
             stream.next("beat")

@@ -117,14 +117,14 @@ def test_what_a_node_said_around_a_press_reads_back_with_ros_2(
 
 
 def presses(found: Mapping[str, list[Record]]) -> list[tuple[str, str | None, str | None]]:
-    told = []
+    recorded = []
     for schema, channel, message in found["/web_ui/presses"]:
         assert (schema.encoding, channel.message_encoding) == ("jsonschema", "json")
         press = json.loads(message.data)
         assert set(press) == set(json.loads(schema.data)["properties"])
         assert press["who"] == "a program (127.0.0.1)"
-        told.append((press["id"], press["outcome"], press["reason"]))
-    return told
+        recorded.append((press["id"], press["outcome"], press["reason"]))
+    return recorded
 
 
 def test_a_hold_is_recorded_from_its_begin_to_its_end(
@@ -140,9 +140,9 @@ def test_a_hold_is_recorded_from_its_begin_to_its_end(
     until(lambda: files(tmp_path), "the recording is finished")
     (path,) = files(tmp_path)
     assert path.name.endswith("Z-jog.mcap")
-    told = presses(records(path))
-    assert [one[1] for one in told[:2]] == [None, "refused"]
-    assert told[-2:] == [
+    found = presses(records(path))
+    assert [one[1] for one in found[:2]] == [None, "refused"]
+    assert found[-2:] == [
         (socket.lease, None, None),
         (socket.lease, ended["outcome"], ended["reason"]),
     ]
@@ -189,7 +189,7 @@ def test_without_a_disk_it_says_so_and_presses_work(
     kiosk = servers(recording(own_bridge, tmp_path))
     until(kiosk.ready, "ready")
     assert kiosk.press("operation", "hello").status_code == 200
-    until(lambda: "Presses are not recorded" in kiosk.snapshot()["notice"]["fault"], "it is told")
+    until(lambda: "Presses are not recorded" in kiosk.snapshot()["notice"]["fault"], "it is shown")
     assert kiosk.widget("operation")["enabled"]
     assert kiosk.press("operation", "again").status_code == 200
     assert kiosk.process.count("recording stopped, in ")

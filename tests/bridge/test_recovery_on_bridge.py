@@ -51,8 +51,8 @@ def found_again(kiosk: Server) -> Server:
     return kiosk
 
 
-def told(folder: Path, press_id: str = "goal-1") -> list[tuple[str, str]]:
-    """What the log tells of a press: (kind, outcome), the oldest first."""
+def logged(folder: Path, press_id: str = "goal-1") -> list[tuple[str, str]]:
+    """What the log has of a press: (kind, outcome), the oldest first."""
     return [(entry.kind, entry.outcome) for entry in entries_of(folder, press_id)]
 
 
@@ -78,11 +78,11 @@ def test_after_a_restart_a_goal_is_followed_to_its_end(
     assert again.widget("count")["stoppable"]
     assert press(again, "count", id="goal-2").status_code == 409
     robot.fibonacci(step_s=0.05)
-    until(lambda: again.widget("count")["outcome"] == "succeeded", "its end is told")
+    until(lambda: again.widget("count")["outcome"] == "succeeded", "its end is shown")
     assert "[0, 1, 1, 2, 3, 5, 8]" in again.widget("count")["result"]
     assert again.widget("count")["enabled"]
     ended = [*BROKEN_OFF, ("corrected", "accepted"), ("corrected", "succeeded")]
-    until(lambda: told(tmp_path) == ended, "and logged")
+    until(lambda: logged(tmp_path) == ended, "and logged")
     assert verify(tmp_path / "data").fault == ""
     ((goal),) = robot.goals()
     assert goal["id"] == goal_id(entries_of(tmp_path, "goal-1")[0].hash).hex
@@ -103,7 +103,7 @@ def test_after_a_kill_a_goal_can_be_canceled(
     expect(count.locator(".goal")).to_be_empty()
     expect(count.get_by_role("button", name="Count", exact=True)).to_be_enabled()
     assert len(robot.requests(CANCEL_GOAL)) == 1
-    until(lambda: told(tmp_path)[-1] == ("corrected", "canceled"), "logged")
+    until(lambda: logged(tmp_path)[-1] == ("corrected", "canceled"), "logged")
 
 
 def test_a_second_kill_loses_it_no_more_than_the_first(
@@ -113,7 +113,7 @@ def test_a_second_kill_loses_it_no_more_than_the_first(
     with_a_goal(start).end(signal.SIGKILL)
     for _ in range(2):
         again = found_again(start())
-        until(lambda: told(tmp_path)[-1] == ("corrected", "accepted"), "logged")
+        until(lambda: logged(tmp_path)[-1] == ("corrected", "accepted"), "logged")
         again.end(signal.SIGKILL)
     last = found_again(start())
     assert cancel(last, press="goal-1").json()["outcome"] == "accepted"
@@ -121,14 +121,16 @@ def test_a_second_kill_loses_it_no_more_than_the_first(
     assert len(robot.goals()) == 1
 
 
-def test_a_goal_that_ended_meanwhile_is_told(start: Start, robot: CycloneRobot, tmp_path: Path) -> None:
+def test_a_goal_that_ended_in_the_meantime_is_shown(
+    start: Start, robot: CycloneRobot, tmp_path: Path
+) -> None:
     robot.fibonacci(step_s=30)
     with_a_goal(start).end(signal.SIGKILL)
     robot.abort()
     again = start()
-    until(lambda: again.widget("count")["outcome"] == "aborted", "its end is told")
+    until(lambda: again.widget("count")["outcome"] == "aborted", "its end is shown")
     assert again.widget("count")["result"].startswith("Aborted by the robot before ")
-    until(lambda: told(tmp_path) == [*BROKEN_OFF, ("corrected", "aborted")], "and logged")
+    until(lambda: logged(tmp_path) == [*BROKEN_OFF, ("corrected", "aborted")], "and logged")
 
 
 def test_a_goal_that_the_robot_forgot_is_said_to_be_unknown_once(
@@ -140,14 +142,14 @@ def test_a_goal_that_the_robot_forgot_is_said_to_be_unknown_once(
     again = start()
     until(lambda: again.widget("count")["enabled"], "open")
     assert "no longer knows this goal" in again.widget("count")["result"]
-    until(lambda: told(tmp_path) == [*BROKEN_OFF, ("corrected", "unknown")], "and logged")
+    until(lambda: logged(tmp_path) == [*BROKEN_OFF, ("corrected", "unknown")], "and logged")
     again.end()
-    asked = len(robot.requests(GET_RESULT))
+    before = len(robot.requests(GET_RESULT))
     last = start()
     until(lambda: last.widget("count")["enabled"], "open")
     assert last.widget("count")["result"] == ""
-    assert len(robot.requests(GET_RESULT)) == asked
-    assert len(told(tmp_path)) == len(BROKEN_OFF) + 1
+    assert len(robot.requests(GET_RESULT)) == before
+    assert len(logged(tmp_path)) == len(BROKEN_OFF) + 1
 
 
 @pytest.mark.parametrize("by", [signal.SIGKILL, signal.SIGTERM])
@@ -171,7 +173,7 @@ def test_an_end_before_the_robots_answer_leaves_a_goal_that_is_found(
         ("corrected", "accepted"),
         ("corrected", "canceled"),
     ]
-    until(lambda: told(tmp_path) == ended, "and logged")
+    until(lambda: logged(tmp_path) == ended, "and logged")
 
 
 def test_a_goal_is_in_doubt_until_the_robot_is_there(

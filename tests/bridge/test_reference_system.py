@@ -115,7 +115,7 @@ def test_a_value_published_once_counts_after_its_publisher_is_gone(
         assert data["enabled"] is False
     until(
         lambda: "does not permit" in (server.widget("operation2")["reason"] or ""),
-        "it is told that the robot forbids it",
+        "it shows that the robot forbids it",
     )
     refused = server.press("operation2", "forged")
     assert refused.status_code == 409
@@ -142,7 +142,7 @@ def test_a_page_loaded_later_shows_the_true_state_in_its_html(server: Server, no
 
 
 @pytest.mark.parametrize("robot_first", [True, False])
-def test_a_transient_local_value_arrives_whoever_starts_first(
+def test_a_transient_local_value_arrives_in_either_order_of_start(
     own_bridge: Bridge,
     own_node: RosNode,
     tmp_path: Path,
@@ -182,7 +182,7 @@ def test_the_first_press_after_each_start_is_received(
     assert own_node.heard_data("/operation")[before:] == texts
 
 
-def test_what_nobody_hears_is_unknown_and_says_so(
+def test_a_press_without_a_subscriber_is_unknown_and_says_so(
     own_bridge: Bridge, tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:
     kiosk = servers(live(own_bridge.endpoint, tmp_path))
@@ -267,7 +267,7 @@ def test_another_type_on_the_robot_locks_and_says_which(
     def wrong(widget: str) -> bool:
         return "is std_msgs/msg/" in (kiosk.widget(widget)["reason"] or "")
 
-    until(lambda: wrong("operation") and wrong("operation1"), "both mismatches are told")
+    until(lambda: wrong("operation") and wrong("operation1"), "both mismatches are shown")
     assert "std_msgs/msg/Bool on the robot" in kiosk.widget("operation")["reason"]
     assert "std_msgs/msg/String on the robot" in kiosk.widget("operation1")["reason"]
     assert kiosk.press("operation", "x").status_code == 409

@@ -18,7 +18,7 @@ from tests.web.test_control_over_http import PROXY, control_panel
 IDLE_S = 4.0
 FIRST, SECOND = "192.0.2.1", "192.0.2.2"
 
-NOBODY = "No panel has control of the robot. Take control first."
+UNCONTROLLED = "No panel has control of the robot. Take control first."
 
 Opens = Callable[..., Page]
 
@@ -116,7 +116,7 @@ def test_the_panel_at_the_cell_has_control_at_once(kiosk: Server, opens: Opens) 
 
 def test_a_touch_that_a_stopped_server_finds_late_takes_no_control(kiosk: Server, opens: Opens) -> None:
     page = opens(FIRST)
-    locked_by(page, NOBODY)
+    locked_by(page, UNCONTROLLED)
     kiosk.process.send(signal.SIGSTOP)
     try:
         with page.expect_response("**/control/take") as answered:
@@ -126,13 +126,13 @@ def test_a_touch_that_a_stopped_server_finds_late_takes_no_control(kiosk: Server
         assert answered.value.status == 409
     finally:
         kiosk.process.send(signal.SIGCONT)
-    locked_by(page, NOBODY)
+    locked_by(page, UNCONTROLLED)
     take(page)
 
 
 def test_taking_looking_on_asking_keeping_and_giving(kiosk: Server, opens: Opens) -> None:
     first, second = opens(FIRST), opens(SECOND)
-    locked_by(first, NOBODY)
+    locked_by(first, UNCONTROLLED)
     take(first)
     sends(first)
     locked_by(second, "Panel 1 (192.0.2.1) has control of the robot.")
@@ -255,7 +255,7 @@ def test_two_taps_take_control_and_do_not_give_it_up(opens: Opens) -> None:
     expect(bar(first)).to_contain_text("This panel has control")
 
 
-def test_after_a_restart_of_the_server_nobody_has_it(
+def test_after_a_restart_of_the_server_no_client_has_it(
     kiosk: Server, opens: Opens, tmp_path: Path
 ) -> None:
     first = opens(FIRST)

@@ -280,7 +280,7 @@ def test_a_lamp_has_text_and_shape_for_each_state(cell: Server, robot: RosNode, 
     robot.withdraw("/test_state")
 
 
-def test_a_best_effort_publisher_is_told_in_words_unless_it_is_asked_for(
+def test_a_best_effort_publisher_is_a_mismatch_in_words_unless_the_panel_wants_one(
     cell: Server, robot: RosNode, page: Page
 ) -> None:
     page.goto(cell.url)
@@ -297,7 +297,7 @@ def test_a_best_effort_publisher_is_told_in_words_unless_it_is_asked_for(
         robot.withdraw(topic)
 
 
-def test_a_durability_that_the_robot_does_not_publish_is_told(
+def test_a_durability_that_the_robot_does_not_publish_is_reported(
     bridge: Bridge, robot: RosNode, tmp_path: Path
 ) -> None:
     latched = 'qos = { durability = "transient_local" }'
@@ -306,7 +306,7 @@ def test_a_durability_that_the_robot_does_not_publish_is_told(
     said = "The robot publishes /test_current as volatile, but this panel requires transient local."
     try:
         with live_server(bridge, tmp_path, panel) as mine:
-            until(lambda: mine.widget("current")["note"] == said, "the mismatch is told")
+            until(lambda: mine.widget("current")["note"] == said, "the mismatch is shown")
             robot.withdraw("/test_current")
             until(lambda: mine.widget("current")["state"] == "waiting", "it went")
             robot.advertise("/test_current", "std_msgs/msg/Float32", durability="transient_local")
@@ -327,7 +327,7 @@ def test_a_subscriber_that_would_not_hear_a_best_effort_press_locks_it(
     panel = PANEL.replace(message, f'{message}\nqos = {{ reliability = "best_effort" }}')
     said = "The robot requires /test_mode as reliable, but this panel publishes it as best effort."
     with live_server(bridge, tmp_path, panel) as mine:
-        until(lambda: mine.widget("choose")["reason"] == said, "the mismatch is told")
+        until(lambda: mine.widget("choose")["reason"] == said, "the mismatch is shown")
         answer = mine.http.post("/widgets/choose", json={"inputs": {"mode": 1}})
         assert answer.status_code == 409
         assert answer.json()["reason"].endswith(f": {said}")

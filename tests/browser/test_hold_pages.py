@@ -102,11 +102,11 @@ def test_without_scripts_it_is_locked_and_says_why(without_scripts: Page, kiosk:
 
 
 def test_a_page_that_did_not_load_whole_is_loaded_again(kiosk: Server, page: Page) -> None:
-    asked = []
+    requested = []
 
     def cut_once(route: Route) -> None:
-        asked.append(route.request.url)
-        if len(asked) == 1:
+        requested.append(route.request.url)
+        if len(requested) == 1:
             route.abort()
         else:
             route.continue_()

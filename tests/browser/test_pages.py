@@ -351,7 +351,7 @@ def test_hostile_text_is_only_text(server: Server, node: RosNode, page: Page) ->
     assert page.locator("main img").count() == 0
 
 
-def test_the_first_page_is_small_and_asks_nobody_else(demo: Server, chromium: Browser) -> None:
+def test_the_first_page_is_small_and_asks_no_other_host(demo: Server, chromium: Browser) -> None:
     context = chromium.new_context()
     page = context.new_page()
     requests: list[Request] = []
@@ -375,15 +375,15 @@ def test_the_first_page_is_small_and_asks_nobody_else(demo: Server, chromium: Br
     expect(button(page, "Publish")).to_be_enabled()
     page.wait_for_timeout(500)
 
-    def asked() -> list[str]:
+    def requested_urls() -> list[str]:
         return [request.url for request in requests if not request.url.startswith("data:")]
 
     def all_came() -> bool:
         page.wait_for_timeout(50)
-        return len(received) == len(asked())
+        return len(received) == len(requested_urls())
 
     until(all_came, "all has come")
-    urls = asked()
+    urls = requested_urls()
     assert len(urls) <= 11, urls
     assert all(url.startswith(demo.url) for url in urls)
     assert len(received) == len(urls)

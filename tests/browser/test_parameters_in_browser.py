@@ -106,8 +106,8 @@ def test_what_a_dialog_shows_is_what_is_set(
     cyclone_bridge: Bridge, robot: CycloneRobot, tmp_path: Path, page: Page
 ) -> None:
     """The input follows the robot behind the dialog; the question stays what it was."""
-    asked = 'parameter = "limit"\nconfirm_press = true'
-    panel = PANEL.replace('parameter = "limit"', asked)
+    confirmed = 'parameter = "limit"\nconfirm_press = true'
+    panel = PANEL.replace('parameter = "limit"', confirmed)
     with live_server(cyclone_bridge, tmp_path, panel) as kiosk:
         until(lambda: kiosk.widget("limit")["enabled"], "the parameters are read")
         until(lambda: robot.subscribers(topic="/parameter_events"), "events are heard")

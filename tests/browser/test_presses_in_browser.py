@@ -1,4 +1,4 @@
-"""How a press leaves the page: with its click, whoever made that, and before the page shows it."""
+"""How a press leaves the page: with its click, whatever made that, and before the page shows it."""
 
 import csv
 import io
@@ -324,8 +324,8 @@ def test_a_form_that_comes_as_soon_as_its_page_says_so_and_loses_nothing(demo: S
     before = page.url.params["receipt"]
     again = demo.http.post("/widgets/operation", data={**soon, "_last": before}, follow_redirects=True)
     assert again.text.count("Not sent: this came so soon after the page") == 1
-    told = [entry for entry in logged(demo) if entry["press"] == before]
-    assert [(entry["kind"], entry["outcome"]) for entry in told] == [("refused", "refused")]
+    entries = [entry for entry in logged(demo) if entry["press"] == before]
+    assert [(entry["kind"], entry["outcome"]) for entry in entries] == [("refused", "refused")]
 
 
 def test_without_scripts_a_page_that_loaded_itself_takes_a_press_at_once(

@@ -85,7 +85,7 @@ def test_a_page_that_stood_still_shows_what_is_so_now_and_nothing_that_waited(
 
 
 class Line:
-    """A relay to a server that carries what the server says at a limited speed, while it is told to."""
+    """A relay to a server: what the server sends passes at a limited speed, while a test wants it."""
 
     def __init__(self, port: int) -> None:
         self._server = port

@@ -90,7 +90,7 @@ def highest(server: Server) -> float:
 
 
 def time_passes(server: Server, page: Page, seconds: float) -> None:
-    """By the server's clock; the page's events are taken meanwhile."""
+    """By the server's clock; the page's events are taken in the meantime."""
 
     def now() -> float:
         page.evaluate("0")
@@ -172,13 +172,13 @@ def test_a_pause_keeps_the_picture_while_the_server_goes_on(
     key(page, "pause").click()
     expect(page.locator(".paused")).to_have_text(re.compile(r"^Paused −00:00:\d\d$"))
     expect(key(page, "live")).to_be_focused()
-    before, asked = line(page), []
-    page.on("request", lambda request: asked.append(request.url))
+    before, urls = line(page), []
+    page.on("request", lambda request: urls.append(request.url))
     says(node, PEAK)
     expect(page.locator(f"{TREND} .pen-0 > b")).to_have_text("97.25 bar")
     expect(page.locator(".paused")).to_have_text(re.compile(r"−00:00:0[3-9]"))
     assert line(page) == before
-    assert not [url for url in asked if "/trend?" in url]
+    assert not [url for url in urls if "/trend?" in url]
     key(page, "live").click()
     expect(page.locator(".paused")).to_be_hidden()
     until(lambda: line(page) != before, "it follows again")
@@ -258,14 +258,14 @@ def test_a_reload_and_another_browser_show_what_was(
         context.close()
 
 
-def test_what_nobody_sees_is_not_asked_for(cell: Server, page: Page) -> None:
-    asked: list[str] = []
-    page.on("request", lambda request: asked.append(request.url))
+def test_a_hidden_trend_is_not_requested(cell: Server, page: Page) -> None:
+    urls: list[str] = []
+    page.on("request", lambda request: urls.append(request.url))
     opened(page, cell)
 
     def count() -> int:
         page.evaluate("0")
-        return len([url for url in asked if "/trend?" in url])
+        return len([url for url in urls if "/trend?" in url])
 
     until(lambda: count() >= 2, "it asks")
     page.evaluate(HIDE, True)

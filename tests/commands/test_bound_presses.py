@@ -37,15 +37,15 @@ def kiosk(server: Server, node: RosNode) -> Iterator[Server]:
 
 
 def permit(kiosk: Server, node: RosNode, value: bool) -> None:
-    def told() -> bool:
+    def is_applied() -> bool:
         node.publish("/operation_enabled", {"data": value})
         return bool(kiosk.widget("operation1")["enabled"]) is value
 
-    until(told, f"permitted: {value}", every_s=0.1)
+    until(is_applied, f"permitted: {value}", every_s=0.1)
 
 
 def server_time(kiosk: Server, later_s: float = 0.0) -> str:
-    """The server's own time as its heartbeat tells it."""
+    """The server's own time as its heartbeat has it."""
     events = events_in(kiosk.http.get("/events?once=1").text)
     (data,) = [data for name, data, _ in events if name == "beat"]
     seconds = float(httpx.Response(200, text=data).json()["now"]) / 1000 + later_s
@@ -54,16 +54,16 @@ def server_time(kiosk: Server, later_s: float = 0.0) -> str:
 
 def test_what_changed_since_it_was_seen_is_not_pressed(kiosk: Server, node: RosNode, way: str) -> None:
     kiosk = kiosk.by(way)
-    seen = kiosk.snapshot()["id"]
-    assert kiosk.press("operation1", "as seen", seen=seen).status_code == 200
+    event_id = kiosk.snapshot()["id"]
+    assert kiosk.press("operation1", "as seen", seen=event_id).status_code == 200
     permit(kiosk, node, False)
     permit(kiosk, node, True)
-    answer = kiosk.press("operation1", "changed", seen=seen, id="changed-1")
+    answer = kiosk.press("operation1", "changed", seen=event_id, id="changed-1")
     assert (answer.status_code, answer.json()["outcome"]) == (409, "refused")
     assert "changed while you pressed" in answer.json()["reason"]
-    again = kiosk.press("operation1", "changed", seen=seen, id="changed-1")
+    again = kiosk.press("operation1", "changed", seen=event_id, id="changed-1")
     assert (again.status_code, again.json()) == (409, answer.json())
-    assert kiosk.press("operation", "not guarded", seen=seen).status_code == 200
+    assert kiosk.press("operation", "not guarded", seen=event_id).status_code == 200
     assert kiosk.press("operation1", "anew", seen=kiosk.snapshot()["id"]).status_code == 200
     until(lambda: node.heard_data("/operation1")[-1:] == ["anew"], "heard")
     assert "changed" not in node.heard_data("/operation1")

@@ -37,7 +37,7 @@ class Line:
     """A link whose queries are answered by hand."""
 
     def __init__(self) -> None:
-        self.asked: list[tuple[str, bytes, asyncio.Future[bytes | None]]] = []
+        self.queries: list[tuple[str, bytes, asyncio.Future[bytes | None]]] = []
         self.timeouts: list[float] = []
         self.refuses = ""  # the end of the keys that can't be asked
 
@@ -45,14 +45,14 @@ class Line:
         if self.refuses and key.endswith(self.refuses):
             raise LinkError(f"can't ask {key}")
         future: asyncio.Future[bytes | None] = asyncio.get_running_loop().create_future()
-        self.asked.append((key, payload, future))
+        self.queries.append((key, payload, future))
         self.timeouts.append(timeout_s)
         if key.endswith("send_goal"):  # as Zenoh, where no one is waited for any longer
             asyncio.get_running_loop().call_later(timeout_s, give_up, future)
         return future
 
     def answer(self, type_name: str, number: int = -1, **fields: Any) -> None:
-        self.asked[number][2].set_result(INTERFACES.encode(type_name, fields))
+        self.queries[number][2].set_result(INTERFACES.encode(type_name, fields))
 
 
 def give_up(future: "asyncio.Future[bytes | None]") -> None:
@@ -120,16 +120,16 @@ def run(test: Test) -> None:
     asyncio.run(test(Bench()))
 
 
-async def asked(bench: Bench, count: int) -> None:
-    while len(bench.line.asked) < count:
+async def queried(bench: Bench, count: int) -> None:
+    while len(bench.line.queries) < count:
         await asyncio.sleep(0)
 
 
 def test_an_answer_that_can_not_be_read_is_unknown() -> None:
     async def test(bench: Bench) -> None:
         call = bench.call()
-        await asked(bench, 1)
-        bench.line.asked[0][2].set_result(b"\0\1\0\0")
+        await queried(bench, 1)
+        bench.line.queries[0][2].set_result(b"\0\1\0\0")
         answer = await call
         assert answer.outcome == "unknown"
         assert "The robot may have done it" in str(answer.text)
@@ -140,7 +140,7 @@ def test_an_answer_that_can_not_be_read_is_unknown() -> None:
 def test_what_the_robot_answers_is_shown_by_its_escapes() -> None:
     async def test(bench: Bench) -> None:
         call = bench.call()
-        await asked(bench, 1)
+        await queried(bench, 1)
         bench.line.answer(f"{TRIGGER}_Response", success=False, message="no \u202e\x1b[2Jon")
         assert str((await call).text).endswith(": no \\u202e\\u001b[2Jon")
 
@@ -153,7 +153,7 @@ def test_a_first_timeout_hints_at_cyclone_and_a_later_one_does_not() -> None:
         assert first.outcome == "timed_out"
         assert "Cyclone DDS" in str(first.text)
         call = bench.call("p2")
-        await asked(bench, 2)
+        await queried(bench, 2)
         bench.line.answer(f"{TRIGGER}_Response", success=True, message="")
         assert (await call).outcome == "succeeded"
         assert "Cyclone DDS" not in str((await bench.call("p3")).text)
@@ -164,8 +164,8 @@ def test_a_first_timeout_hints_at_cyclone_and_a_later_one_does_not() -> None:
 def test_a_query_that_ends_without_an_answer_is_unknown() -> None:
     async def test(bench: Bench) -> None:
         call = bench.call()
-        await asked(bench, 1)
-        bench.line.asked[0][2].set_result(None)
+        await queried(bench, 1)
+        bench.line.queries[0][2].set_result(None)
         answer = await call
         assert answer.outcome == "unknown"
         assert "/reset" in str(answer.text)
@@ -173,14 +173,14 @@ def test_a_query_that_ends_without_an_answer_is_unknown() -> None:
     run(test)
 
 
-def test_calls_that_nobody_answers_are_bounded_and_forgotten() -> None:
+def test_calls_without_an_answer_are_bounded_and_forgotten() -> None:
     async def test(bench: Bench) -> None:
         for number in range(MAX_UNANSWERED):
             assert (await bench.call(f"p{number}")).outcome == "timed_out"
         one_more = await bench.call("too many")
         assert one_more.outcome == "refused"
-        assert len(bench.line.asked) == MAX_UNANSWERED
-        for _, _, future in bench.line.asked:
+        assert len(bench.line.queries) == MAX_UNANSWERED
+        for _, _, future in bench.line.queries:
             future.set_result(None)
         await asyncio.sleep(0)
         assert bench.calls.unanswered("reset") == 0
@@ -192,7 +192,7 @@ def test_a_late_answer_corrects_its_own_press_and_not_what_came_after() -> None:
     async def test(bench: Bench) -> None:
         await bench.call("p1")
         second = bench.call("p2")
-        await asked(bench, 2)
+        await queried(bench, 2)
         bench.line.answer(f"{TRIGGER}_Response", 1, success=True, message="second")
         await second
         bench.line.answer(f"{TRIGGER}_Response", 0, success=False, message="first")
@@ -210,7 +210,7 @@ def test_a_late_answer_corrects_its_own_press_and_not_what_came_after() -> None:
 def test_a_bridge_that_goes_away_ends_the_waiting_at_once(what: str) -> None:
     async def test(bench: Bench) -> None:
         waiting = getattr(bench, what)()
-        await asked(bench, 1)
+        await queried(bench, 1)
         bench.lose_the_bridge()
         answer = await waiting
         assert answer.outcome == "unknown"
@@ -219,20 +219,20 @@ def test_a_bridge_that_goes_away_ends_the_waiting_at_once(what: str) -> None:
     run(test)
 
 
-def test_a_goal_cut_off_is_unknown_until_the_robot_tells_its_result() -> None:
+def test_a_goal_cut_off_is_unknown_until_the_robot_says_its_result() -> None:
     async def test(bench: Bench) -> None:
         types = INTERFACES.action_types(COUNT)
         start = bench.send_goal()
-        await asked(bench, 1)
+        await queried(bench, 1)
         bench.line.answer(types.send_goal_response, accepted=True, stamp={"sec": 0, "nanosec": 0})
         assert (await start).outcome == "accepted"
-        await asked(bench, 2)
+        await queried(bench, 2)
         bench.lose_the_bridge()
         await in_doubt(bench)
         outcomes = [bench.shown.outcome]
         bench.robot.graph.apply_token(bridge_dialect.bridge_token(BRIDGE), True)
         assert locked_by(bench) == "perhaps_busy"
-        await asked(bench, 3)
+        await queried(bench, 3)
         assert (locked_by(bench), bench.shown.can_cancel) == ("perhaps_busy", True)
         bench.line.answer(types.get_result_response, status=4, result={"sequence": [0, 1]})
         while not str(bench.robot.command_status["count"].text).startswith("Succeeded"):
@@ -248,24 +248,26 @@ def test_a_goal_cut_off_is_unknown_until_the_robot_tells_its_result() -> None:
 def goal_id(bench: Bench, number: int = 0) -> bytes:
     """The id of the goal that was asked for, as the robot got it."""
     request = INTERFACES.action_types(COUNT).send_goal_request
-    return bytes(INTERFACES.decode(request, bench.line.asked[number][1]).goal_id.uuid)
+    return bytes(INTERFACES.decode(request, bench.line.queries[number][1]).goal_id.uuid)
 
 
 def tell_states(bench: Bench, *states: tuple[bytes, int]) -> None:
     """The action's server publishes the states of its goals."""
     stamp = {"sec": 0, "nanosec": 0}
-    told = [{"goal_info": {"goal_id": {"uuid": i}, "stamp": stamp}, "status": s} for i, s in states]
-    payload = INTERFACES.encode(INTERFACES.action_types(COUNT).status, {"status_list": told})
+    listed_states = [
+        {"goal_info": {"goal_id": {"uuid": i}, "stamp": stamp}, "status": s} for i, s in states
+    ]
+    payload = INTERFACES.encode(INTERFACES.action_types(COUNT).status, {"status_list": listed_states})
     bench.actions.on_status("/count", sample_of(payload))
 
 
 async def accepted(bench: Bench, press_id: str = "g1") -> None:
-    count = len(bench.line.asked)
+    count = len(bench.line.queries)
     start = bench.send_goal(press_id)
-    await asked(bench, count + 1)
+    await queried(bench, count + 1)
     bench.answer_goal(accepted=True)
     assert (await start).outcome == "accepted"
-    await asked(bench, count + 2)
+    await queried(bench, count + 2)
 
 
 async def cancel_answered(
@@ -273,10 +275,10 @@ async def cancel_answered(
 ) -> tuple[Outcome, bytes]:
     """Cancels the goal of a press: what came of that, and the goal that was to be canceled."""
     request, response = INTERFACES.service_types("action_msgs/srv/CancelGoal")
-    count = len(bench.line.asked)
+    count = len(bench.line.queries)
     cancel = asyncio.create_task(bench.actions.cancel(bench.count, press_id))
-    await asked(bench, count + 1)
-    info = INTERFACES.decode(request, bench.line.asked[-1][1]).goal_info
+    await queried(bench, count + 1)
+    info = INTERFACES.decode(request, bench.line.queries[-1][1]).goal_info
     goal = {"goal_id": {"uuid": info.goal_id.uuid}, "stamp": {"sec": 0, "nanosec": 0}}
     bench.line.answer(response, return_code=return_code, goals_canceling=[goal] if listed else [])
     return await cancel, bytes(info.goal_id.uuid)
@@ -284,11 +286,11 @@ async def cancel_answered(
 
 async def canceled(bench: Bench, press_id: str, return_code: int = 0) -> bytes:
     """The same, as it has to be; the id."""
-    answer, asked_for = await cancel_answered(
+    answer, goal = await cancel_answered(
         bench, press_id, return_code=return_code, listed=not return_code
     )
     assert answer.outcome == ("rejected" if return_code else "accepted")
-    return asked_for
+    return goal
 
 
 def test_a_goal_that_the_robot_does_not_list_is_not_being_canceled() -> None:
@@ -311,10 +313,10 @@ def test_a_goal_that_the_robot_does_not_list_is_not_being_canceled() -> None:
 def test_an_answer_to_a_cancel_that_can_not_be_read_is_no_refusal() -> None:
     async def test(bench: Bench) -> None:
         await accepted(bench)
-        count = len(bench.line.asked)
+        count = len(bench.line.queries)
         cancel = asyncio.create_task(bench.actions.cancel(bench.count, "g1"))
-        await asked(bench, count + 1)
-        bench.line.asked[-1][2].set_result(b"broken")
+        await queried(bench, count + 1)
+        bench.line.queries[-1][2].set_result(b"broken")
         answer = await cancel
         assert answer.outcome == "unknown"
         assert "not with action_msgs/srv/CancelGoal" in str(answer.text)
@@ -380,7 +382,7 @@ def test_a_goals_state_has_its_ros_name_and_only_goes_on() -> None:
 def test_a_state_that_comes_before_the_answer_counts() -> None:
     async def test(bench: Bench) -> None:
         start = bench.send_goal()
-        await asked(bench, 1)
+        await queried(bench, 1)
         tell_states(bench, (goal_id(bench), 2))
         assert bench.shown.goal == ""  # the answer is awaited
         bench.answer_goal(accepted=True)
@@ -396,7 +398,7 @@ def test_another_programs_goal_and_a_rejected_one_have_no_state() -> None:
         tell_states(bench, (b"\7" * 16, 2))
         assert "count" not in bench.robot.command_status
         start = bench.send_goal()
-        await asked(bench, 1)
+        await queried(bench, 1)
         bench.answer_goal(accepted=False)
         assert (await start).outcome == "rejected"
         tell_states(bench, (b"\7" * 16, 2))
@@ -438,13 +440,13 @@ def test_a_goal_without_an_answer_is_under_way_when_the_robot_says_so() -> None:
 def test_a_goal_cut_off_before_its_answer_is_asked_for_when_the_bridge_is_back() -> None:
     async def test(bench: Bench) -> None:
         start = bench.send_goal()
-        await asked(bench, 1)
+        await queried(bench, 1)
         bench.lose_the_bridge()
         assert (await start).outcome == "unknown"
         assert (bench.shown.goal, bench.shown.busy) == ("UNKNOWN", True)
         bench.robot.graph.apply_token(bridge_dialect.bridge_token(BRIDGE), True)
-        await asked(bench, 2)
-        assert bench.line.asked[1][0].endswith("get_result")
+        await queried(bench, 2)
+        assert bench.line.queries[1][0].endswith("get_result")
         tell_states(bench, (goal_id(bench), 2))
         assert (bench.shown.goal, bench.shown.can_cancel) == ("EXECUTING", True)
         bench.line.answer(
@@ -465,7 +467,7 @@ def test_a_goal_shows_no_state_until_its_server_is_offered_again() -> None:
         tell_states(bench, (goal_id(bench), 2))
         assert (bench.shown.goal, bench.shown.busy) == ("UNKNOWN", False)
         bench.robot.graph.apply_token(bridge_dialect.bridge_token(BRIDGE), True)
-        await asked(bench, 3)
+        await queried(bench, 3)
         assert (bench.shown.goal, bench.shown.can_cancel) == ("EXECUTING", True)
         assert [answer.outcome for _, answer in bench.corrected] == ["accepted"]
         await bench.actions.stop()
@@ -476,7 +478,7 @@ def test_a_goal_shows_no_state_until_its_server_is_offered_again() -> None:
 def test_a_goal_that_began_and_is_cut_off_before_its_answer_is_unknown() -> None:
     async def test(bench: Bench) -> None:
         start = bench.send_goal()
-        await asked(bench, 1)
+        await queried(bench, 1)
         tell_states(bench, (goal_id(bench), 2))
         bench.lose_the_bridge()
         assert (await start).outcome == "unknown"
@@ -487,11 +489,11 @@ def test_a_goal_that_began_and_is_cut_off_before_its_answer_is_unknown() -> None
     run(test)
 
 
-def test_a_goal_that_nobody_answers_at_once_waits_for_the_news_of_the_cut() -> None:
+def test_a_goal_without_an_answer_waits_for_the_news_of_the_cut() -> None:
     async def test(bench: Bench) -> None:
         start = bench.send_goal()
-        await asked(bench, 1)
-        bench.line.asked[0][2].set_result(None)
+        await queried(bench, 1)
+        bench.line.queries[0][2].set_result(None)
         await asyncio.sleep(0.01)
         bench.lose_the_bridge()
         assert "connection was lost" in str((await start).text)
@@ -508,13 +510,13 @@ def test_a_result_that_could_not_be_asked_for_is_asked_for_again(
     async def test(bench: Bench) -> None:
         bench.line.refuses = "get_result"
         start = bench.send_goal()
-        await asked(bench, 1)
+        await queried(bench, 1)
         bench.answer_goal(accepted=True)
         await start
         await asyncio.sleep(0.01)
         assert (bench.shown.goal, bench.shown.can_cancel) == ("ACCEPTED", True)
         bench.line.refuses = ""
-        await asked(bench, 2)
+        await queried(bench, 2)
         bench.line.answer(
             INTERFACES.action_types(COUNT).get_result_response, status=4, result={"sequence": []}
         )
@@ -544,7 +546,7 @@ def test_what_breaks_while_a_goal_is_followed_leaves_it_unknown(
     run(test)
 
 
-def test_a_goal_that_nobody_heard_of_is_asked_for_only_for_a_while(
+def test_a_goal_without_any_news_is_queried_only_for_a_while(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr("app.commands.actions.client.BRIDGE_LOSS_DELAY_S", 0)
@@ -552,11 +554,11 @@ def test_a_goal_that_nobody_heard_of_is_asked_for_only_for_a_while(
     async def test(bench: Bench) -> None:
         for number in range(MAX_UNANSWERED):
             assert (await bench.send_goal()).outcome == "timed_out"
-            await asked(bench, 2 * (number + 1))
+            await queried(bench, 2 * (number + 1))
         assert bench.line.timeouts[1] == LATE_S
         assert (await bench.send_goal()).outcome == "refused"
-        assert len(bench.line.asked) == 2 * MAX_UNANSWERED
-        for _, _, future in bench.line.asked:
+        assert len(bench.line.queries) == 2 * MAX_UNANSWERED
+        for _, _, future in bench.line.queries:
             if not future.done():
                 future.set_result(None)
         await settled(bench)
@@ -577,7 +579,7 @@ def test_a_goal_whose_server_ends_is_unknown_and_asked_for_when_it_is_back() -> 
         assert (bench.shown.goal, bench.shown.can_cancel) == ("UNKNOWN", False)
         assert "stopped offering /count" in str(bench.shown.text)
         bench.robot.graph.apply_token(token, True)
-        await asked(bench, 3)
+        await queried(bench, 3)
         assert locked_by(bench) == "perhaps_busy"
         bench.line.answer(
             INTERFACES.action_types(COUNT).get_result_response, status=0, result={"sequence": []}
@@ -648,7 +650,7 @@ def test_feedback_of_another_programs_goal_is_passed_over() -> None:
     async def test(bench: Bench) -> None:
         types = INTERFACES.action_types(COUNT)
         start = bench.send_goal()
-        await asked(bench, 1)
+        await queried(bench, 1)
         bench.line.answer(types.send_goal_response, accepted=True, stamp={"sec": 0, "nanosec": 0})
         await start
         before = bench.robot.command_status["count"]
@@ -665,12 +667,12 @@ def test_feedback_is_taken_in_and_waits_for_the_next_frame() -> None:
     async def test(bench: Bench) -> None:
         types = INTERFACES.action_types(COUNT)
         start = bench.send_goal()
-        await asked(bench, 1)
+        await queried(bench, 1)
         bench.answer_goal(True)
         await start
-        await asked(bench, 2)
+        await queried(bench, 2)
         shows = len(bench.shows)
-        goal_id = INTERFACES.decode(types.get_result_request, bench.line.asked[1][1]).goal_id.uuid
+        goal_id = INTERFACES.decode(types.get_result_request, bench.line.queries[1][1]).goal_id.uuid
         for number in range(100):
             feedback = {"goal_id": {"uuid": goal_id}, "feedback": {"sequence": [number]}}
             payload = INTERFACES.encode(types.feedback_message, feedback)

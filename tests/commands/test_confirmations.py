@@ -272,7 +272,7 @@ def panel_file(folder: Path, more: str) -> Path:
         ),
     ],
 )
-def test_what_is_wrong_with_it_is_told_at_load(tmp_path: Path, more: str, fault: str) -> None:
+def test_what_is_wrong_with_it_is_reported_at_load(tmp_path: Path, more: str, fault: str) -> None:
     with pytest.raises(PanelError) as caught:
         load_panel(panel_file(tmp_path, more))
     assert fault in faults_text(caught.value)

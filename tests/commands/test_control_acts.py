@@ -20,7 +20,7 @@ from app.view.view import build_view
 from tests.support.builders import NOW, robot_there, small_panel
 
 _KNOWN = Clients()
-ANN, BOB = (Principal(_KNOWN.seen(f"{n:032x}", f"192.0.2.{n}")) for n in (1, 2))
+ANN, BOB = (Principal(_KNOWN.identify(f"{n:032x}", f"192.0.2.{n}")) for n in (1, 2))
 PANEL = small_panel()
 
 

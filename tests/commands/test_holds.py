@@ -150,20 +150,20 @@ class Bench:
         for change in pending:
             change()
 
-    def asked(
+    def begin(
         self, widget: str = "jog", inputs: Mapping[str, Any] = HALF, age_s: float = 0.0
     ) -> Receipt | ActiveHold:
         sent = self.loop.now - age_s
         return self.holds.begin(widget, inputs, sent, FROM, self.receipts.append)
 
     def begun(self, widget: str = "jog") -> ActiveHold:
-        holding = self.asked(widget)
+        holding = self.begin(widget)
         assert isinstance(holding, ActiveHold)
         return holding
 
     def refused(self, *arguments: Any, **named: Any) -> tuple[str, str]:
         before = list(self.way.sent)
-        receipt = self.asked(*arguments, **named)
+        receipt = self.begin(*arguments, **named)
         assert isinstance(receipt, Receipt)
         assert (receipt.outcome, self.way.sent) == ("refused", before)
         return receipt.cause, str(receipt.reason).partition(": ")[2]
@@ -379,13 +379,13 @@ def test_a_second_browser_is_refused_and_changes_nothing(bench: Bench) -> None:
     holding = bench.begun()
     assert bench.refused() == ("interlock", "held by another browser.")
     bench.holds.end(holding, RELEASED)
-    assert isinstance(bench.asked(), ActiveHold)
+    assert isinstance(bench.begin(), ActiveHold)
 
 
 def test_no_two_holds_send_on_one_topic(bench: Bench) -> None:
     bench.begun()
     assert bench.refused("back") == ("interlock", "Jog is held, which also sends on /jog.")
-    assert isinstance(bench.asked("arm"), ActiveHold)
+    assert isinstance(bench.begin("arm"), ActiveHold)
 
 
 def test_a_press_that_comes_late_is_refused(bench: Bench) -> None:
@@ -401,7 +401,7 @@ def test_a_lock_bad_input_and_a_lost_way_refuse_as_with_a_press(bench: Bench) ->
     bench.robot.link_up = False
     assert bench.refused()[0] == "link"
     with pytest.raises(NotFound, match="speed"):
-        bench.asked("speed")
+        bench.begin("speed")
     assert bench.robot.held_since == {}
 
 
@@ -437,7 +437,7 @@ REGION: Final[Table] = {
 
 
 @pytest.mark.parametrize(("rate_hz", "deadline_ms"), [(1.0, 3000), (20.0, 150), (100.0, 100)])
-def test_the_robot_is_told_its_deadline_and_the_count(rate_hz: float, deadline_ms: int) -> None:
+def test_each_message_has_its_deadline_and_the_count(rate_hz: float, deadline_ms: int) -> None:
     bench = Bench({**REGION, "rate_hz": rate_hz})
     for _ in range(2):
         bench.keep(bench.begun(), 2 / rate_hz)
@@ -526,7 +526,7 @@ class Orders(RuleBasedStateMachine):
         # A lease that has run out while the loop stood still is no reason to refuse.
         free = held is None or self.now >= self.beats[held.lease.id] + LEASE_S
         sent = self.now - age_s
-        answer = self.bench.asked(age_s=age_s)
+        answer = self.bench.begin(age_s=age_s)
         allowed = free and self.permitted and self.now < sent + LEASE_S
         assert isinstance(answer, ActiveHold) == allowed
         if isinstance(answer, ActiveHold):

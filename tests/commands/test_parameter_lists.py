@@ -227,7 +227,7 @@ def test_a_list_shows_its_beginning_however_long_its_texts_are(
         ),
     ],
 )
-def test_what_is_wrong_in_the_panel_file_is_told(more: dict[str, Any], fault: str) -> None:
+def test_what_is_wrong_in_the_panel_file_is_reported(more: dict[str, Any], fault: str) -> None:
     assert any(one.startswith(f"page[0].widget[0]{fault}") for one in faults({**GAINS, **more}))
 
 
@@ -382,14 +382,14 @@ type = "std_msgs/msg/String"
     expect(gains.locator(".note")).to_have_text("no response from /system_controller", timeout=60_000)
     expect(again).to_be_enabled()
     expect(gains.locator(".why")).to_contain_text("“Read again” tries once more.")
-    told: set[str] = set()  # the seconds at which it spoke, longer than it was waited to ask once more
+    notes: set[str] = set()  # the seconds at which it spoke, longer than it was waited to ask once more
 
-    def told_for_seconds() -> bool:
-        told.add(mine.widget("heard")["note"])
-        return len(told) > 6
+    def goes_on() -> bool:
+        notes.add(mine.widget("heard")["note"])
+        return len(notes) > 6
 
     fast.every("/heard", {"data": "alive"}, 0.5)
-    until(told_for_seconds, "the node goes on speaking", within_s=60, every_s=0.2)
+    until(goes_on, "the node goes on speaking", within_s=60, every_s=0.2)
     before = printed()  # 0 where the first question was lost on its way
     assert before <= 1
     # Whether Fast DDS prints a question that it can't read is chance: the page says that it was asked.

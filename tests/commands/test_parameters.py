@@ -1,4 +1,4 @@
-"""Parameters that a node tells wrongly, late, twice or not at all: without a bridge, by hand."""
+"""Parameters that a node reports wrongly, late, twice or not at all: without a bridge, by hand."""
 
 import asyncio
 import math
@@ -51,16 +51,16 @@ class Line:
     """A link whose queries are answered by hand."""
 
     def __init__(self) -> None:
-        self.asked: list[tuple[str, bytes, asyncio.Future[bytes | None]]] = []
+        self.queries: list[tuple[str, bytes, asyncio.Future[bytes | None]]] = []
 
     def query(self, key: str, payload: bytes, timeout_s: float) -> "asyncio.Future[bytes | None]":
         future: asyncio.Future[bytes | None] = asyncio.get_running_loop().create_future()
-        self.asked.append((key, payload, future))
+        self.queries.append((key, payload, future))
         return future
 
     @property
     def keys(self) -> list[str]:
-        return [key for key, _, _ in self.asked]
+        return [key for key, _, _ in self.queries]
 
 
 class Bench:
@@ -89,15 +89,15 @@ class Bench:
         assert endpoint is not None
         self.parameters.on_token_lost(endpoint)
 
-    async def asked(self, count: int) -> None:
+    async def queried(self, count: int) -> None:
         async with asyncio.timeout(5):
-            while len(self.line.asked) < count:
+            while len(self.line.queries) < count:
                 await asyncio.sleep(0.001)
 
     async def answer(self, number: int, service: tuple[str, str], **fields: Any) -> None:
         """The answer to the query of this number, which must be of this service."""
-        await self.asked(number)
-        key, _, future = self.line.asked[number - 1]
+        await self.queried(number)
+        key, _, future = self.line.queries[number - 1]
         assert key == f"arm/{service[0]}"
         future.set_result(INTERFACES.encode(f"{service[1]}_Response", fields))
         for _ in range(5):
@@ -110,8 +110,8 @@ class Bench:
         await self.answer(first + 1, GET, values=[value(DOUBLE, given)])
 
     def event(self, node: str = "/arm", *, skipped: int = 0, **parts: Any) -> None:
-        told = {"new_parameters": [], "changed_parameters": [], "deleted_parameters": [], **parts}
-        fields = {"stamp": {"sec": 0, "nanosec": 0}, "node": node, **told}
+        lists = {"new_parameters": [], "changed_parameters": [], "deleted_parameters": [], **parts}
+        fields = {"stamp": {"sec": 0, "nanosec": 0}, "node": node, **lists}
         payload = INTERFACES.encode(EVENT_TYPE, fields)
         self.parameters.on_event(Sample(payload, 1, NOW, NOW, BRIDGE, skipped))
 
@@ -163,7 +163,7 @@ def test_a_node_is_asked_when_it_is_seen_and_no_more() -> None:
         assert "does not offer the parameters of /arm" in bench.reason()
         bench.offer()
         bench.parameters.on_graph_change()
-        await bench.asked(1)
+        await bench.queried(1)
         assert "waiting for /arm to report speed" in bench.reason()
         await bench.tell(1, 0.5)
         assert (bench.known().state, bench.known().value, bench.reason()) == ("live", 0.5, "")
@@ -184,7 +184,7 @@ def test_a_node_that_appeared_is_read_once_more_when_its_events_flow(
         await bench.tell(3, 0.6)
         assert bench.known().value == 0.6
         await asyncio.sleep(0.1)
-        assert len(bench.line.asked) == 4
+        assert len(bench.line.queries) == 4
 
     run(test)
 
@@ -199,7 +199,7 @@ def test_an_event_of_the_node_counts_and_one_of_another_does_not() -> None:
             bench.event(other, changed_parameters=change(9.0))
         bench.parameters.on_event(Sample(b"\xff" * 9, 1, NOW, NOW, BRIDGE))
         assert bench.known().value == 0.7
-        assert len(bench.line.asked) == 2
+        assert len(bench.line.queries) == 2
 
     run(test)
 
@@ -251,11 +251,11 @@ def test_an_answer_of_before_a_cut_does_not_count() -> None:
     async def test(bench: Bench) -> None:
         bench.offer()
         await bench.answer(1, DESCRIBE, descriptors=[descriptor("speed", DOUBLE)])
-        await bench.asked(2)
+        await bench.queried(2)
         bench.offer(alive=False)
         bench.offer()
-        await bench.asked(3)
-        old = bench.line.asked[1][2]
+        await bench.queried(3)
+        old = bench.line.queries[1][2]
         if not old.done():
             old.set_result(INTERFACES.encode(f"{GET[1]}_Response", {"values": [value(DOUBLE, 9.0)]}))
         await asyncio.sleep(0.01)
@@ -290,7 +290,7 @@ def test_a_node_that_does_not_answer_is_asked_again_when_it_is_touched_or_new(
         (one,) = bench.panel.parameters()
         assert "does not offer" in str(bench.parameters.read_again(one))
         bench.offer()
-        await bench.asked(1)
+        await bench.queried(1)
         assert bench.parameters.read_again(one) == ""  # it is being asked
         await bench.until(lambda: bench.known().state == "silent")
         assert english((bench.shown["askable"], bench.shown["note"])) == (False, "waiting for /arm")
@@ -304,15 +304,15 @@ def test_a_node_that_does_not_answer_is_asked_again_when_it_is_touched_or_new(
             bench.event(skipped=1, changed_parameters=change(0.7), new_parameters=change(0.7))
             bench.parameters.on_graph_change()
             await asyncio.sleep(0.03)
-        assert len(bench.line.asked) == 1
+        assert len(bench.line.queries) == 1
         assert bench.parameters.read_again(one) == ""
         assert bench.parameters.read_again(one) == ""
-        await bench.asked(2)
+        await bench.queried(2)
         await asyncio.sleep(0.03)
-        bench.line.asked[1][2].set_result(None)  # after its time
+        bench.line.queries[1][2].set_result(None)  # after its time
         await bench.until(lambda: bench.shown["askable"])
         await asyncio.sleep(0.03)
-        assert len(bench.line.asked) == 2
+        assert len(bench.line.queries) == 2
         monkeypatch.setattr(client, "ANSWER_S", 5.0)
         bench.offer(alive=False)
         assert bench.shown["askable"] is False
@@ -336,7 +336,7 @@ def test_a_node_that_has_just_answered_is_not_asked_as_often_as_somebody_wants_i
         for _ in range(20):
             assert bench.parameters.read_again(one) == ""
             await asyncio.sleep(0.001)
-        assert len(bench.line.asked) == 2
+        assert len(bench.line.queries) == 2
         monkeypatch.setattr(sync, "AGAIN_S", 0.0)
         assert bench.parameters.read_again(one) == ""
         await bench.tell(3, 0.6)
@@ -348,8 +348,8 @@ def test_a_node_that_has_just_answered_is_not_asked_as_often_as_somebody_wants_i
 def test_a_question_that_the_bridge_dropped_is_asked_again() -> None:
     async def test(bench: Bench) -> None:
         bench.offer()
-        await bench.asked(1)
-        bench.line.asked[0][2].set_result(None)  # at once: it never got to the node
+        await bench.queried(1)
+        bench.line.queries[0][2].set_result(None)  # at once: it never got to the node
         await bench.tell(2, 0.5)
         assert bench.known().value == 0.5
 
@@ -359,10 +359,10 @@ def test_a_question_that_the_bridge_dropped_is_asked_again() -> None:
 def test_a_node_that_was_cut_off_while_it_was_asked_can_be_asked_when_it_is_back() -> None:
     async def test(bench: Bench) -> None:
         bench.offer()
-        await bench.asked(1)
+        await bench.queried(1)
         bench.offer(alive=False)
         bench.offer()
-        await bench.asked(2)
+        await bench.queried(2)
         assert bench.robot.querying == {"speed"}
         await bench.tell(2, 0.5)
         await bench.until(lambda: bench.shown["askable"])
@@ -387,7 +387,7 @@ def test_a_node_that_answers_without_it_is_asked_ever_more_rarely(
         for number in range(1, 9, 2):
             await bench.answer(number, DESCRIBE, descriptors=[])
             await bench.answer(number + 1, GET, values=[])
-        await bench.asked(9)
+        await bench.queried(9)
         assert paused[1:8:2] == [0.01, 0.02, 0.04, 0.04]  # the others are between any two readings
 
     run(test)
@@ -437,8 +437,8 @@ def test_what_a_node_says_locks_or_not(
 def test_what_can_not_be_read_is_said() -> None:
     async def test(bench: Bench) -> None:
         bench.offer()
-        await bench.asked(1)
-        bench.line.asked[0][2].set_result(b"\0\1\0\0\xff\xff")
+        await bench.queried(1)
+        bench.line.queries[0][2].set_result(b"\0\1\0\0\xff\xff")
         await asyncio.sleep(0.005)
         assert bench.known().state == "unreadable"
         assert "cannot be read" in bench.reason()
@@ -457,9 +457,9 @@ def test_after_a_set_the_node_is_asked_how_it_is() -> None:
                 one, 0.7, "p1", lambda press, answer: corrected.append((press, answer))
             )
         )
-        await bench.asked(3)
+        await bench.queried(3)
         assert bench.reason() == "In progress: waiting for the robot."
-        request = INTERFACES.decode(f"{SET[1]}_Request", bench.line.asked[2][1])
+        request = INTERFACES.decode(f"{SET[1]}_Request", bench.line.queries[2][1])
         (sent,) = request.parameters
         assert (sent.name, sent.value.type, sent.value.double_value) == ("speed", DOUBLE, 0.7)
         await bench.answer(3, SET, results=[{"successful": False, "reason": "too fast"}])

@@ -85,7 +85,7 @@ def test_a_flood_reaches_the_robot_at_the_rate_of_a_client(
     assert mine.process.text.count("press ") <= came[200] + 2
 
 
-def test_what_is_too_many_is_told_and_may_come_later_by_the_same_id(strict: Server) -> None:
+def test_what_is_too_many_gets_429_and_may_come_later_by_the_same_id(strict: Server) -> None:
     answer = used_up(strict)
     assert answer.headers["retry-after"] == "1"
     assert (answer.json()["outcome"], answer.json()["widget"]) == ("refused", "free")
@@ -129,7 +129,7 @@ def test_a_page_without_scripts_shows_the_reason(strict: Server, without_scripts
     until(lambda: TOO_OFTEN in said(), "it is one too many")
 
 
-def test_a_press_on_a_socket_is_told_so_and_a_flood_closes_it(strict: Server) -> None:
+def test_a_press_on_a_socket_gets_that_answer_and_a_flood_closes_it(strict: Server) -> None:
     used_up(strict)
     with strict.socket() as socket:
         answer = socket.press(widget="free", inputs={})
@@ -169,7 +169,7 @@ def test_a_cancel_is_sent_however_much_was_pressed(strict: Server) -> None:
     until(lambda: strict.widget("count")["outcome"] == "canceled", "it was canceled")
 
 
-def test_cancels_of_the_same_goal_again_and_again_are_told_so(strict: Server) -> None:
+def test_cancels_of_the_same_goal_again_and_again_are_refused(strict: Server) -> None:
     def cancel(**form: Any) -> httpx.Response:
         return strict.http.post("/widgets/count/cancel", **form)
 

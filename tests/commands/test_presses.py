@@ -153,7 +153,7 @@ def test_the_robots_namespace_stands_before_the_key() -> None:
     assert [key for key, _ in bench.way.sent] == ["robot1/free"]
 
 
-def test_a_press_that_nobody_listens_to_is_sent_but_unknown(bench: Bench) -> None:
+def test_a_press_without_a_subscriber_is_sent_but_unknown(bench: Bench) -> None:
     bench.way.listened_to = False
     receipt = bench.press()
     assert (receipt.outcome, receipt.cause) == ("unknown", "")
@@ -408,7 +408,7 @@ def test_the_oldest_receipts_are_forgotten() -> None:
 
 
 @pytest.mark.parametrize(("permitted", "level"), [(True, logging.INFO), (False, logging.WARNING)])
-def test_the_log_tells_who_pressed_what_and_what_came_of_it(
+def test_the_log_says_who_pressed_what_with_which_result(
     bench: Bench, caplog: pytest.LogCaptureFixture, permitted: bool, level: int
 ) -> None:
     permits(bench.robot, permitted)
@@ -425,7 +425,7 @@ class Locked:
 
     def __init__(self) -> None:
         self.bench = Bench()
-        self.other = Principal(Clients().seen("0" * 32, "192.0.2.7"))
+        self.other = Principal(Clients().identify("0" * 32, "192.0.2.7"))
         control = ControlAuthority(ControlRules(required=True), "", monotonic=lambda: NOW)
         control.take(self.other)
         self.bench.may_press = control.verdict
@@ -445,7 +445,7 @@ def test_a_press_of_who_has_control_is_sent() -> None:
     assert locked.bench.press(who=locked.other).outcome == "published"
 
 
-def test_the_link_is_told_before_control_and_control_before_an_interlock() -> None:
+def test_the_reason_is_the_link_before_control_and_control_before_an_interlock() -> None:
     bench = Locked().bench
     permits(bench.robot, False)
     assert "has control" in refused(bench, bench.press("guarded", press_id="p1"))[1]

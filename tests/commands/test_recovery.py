@@ -21,7 +21,7 @@ from app.dialect import bridge_dialect
 from app.errors import LogError
 from app.permission.interlocks import call_blocked
 from app.robot.command_status import IDLE
-from tests.commands.test_calls_and_goals import COUNT, Bench, asked, sample_of, tell_states
+from tests.commands.test_calls_and_goals import COUNT, Bench, queried, sample_of, tell_states
 from tests.support.builders import BRIDGE, INTERFACES
 from tests.support.words import english
 
@@ -67,8 +67,8 @@ def test_the_log_knows_of_which_presses_it_has_no_end(tmp_path: Path) -> None:
         await log.stop()
 
     asyncio.run(test())
-    told = [(one.press.press, one.outcome, one.accepted) for one in found(tmp_path)]
-    assert told == [
+    outcomes = [(one.press.press, one.outcome, one.accepted) for one in found(tmp_path)]
+    assert outcomes == [
         ("silent", "timed_out", False),
         ("goes on", "unknown", True),
         ("cut off", "", False),
@@ -97,9 +97,9 @@ class Rig:
     async def started(self, questions: int = 1) -> None:
         """Resumed, and the robot was asked as often."""
         await self.resuming.start()
-        await asked(self.bench, questions)
+        await queried(self.bench, questions)
 
-    def told(self, press_id: str = "g1") -> list[str]:
+    def outcomes(self, press_id: str = "g1") -> list[str]:
         rows_ = reversed(rows(self.folder, Filter(every=True), None, 1000))
         return [row.entry.outcome for row in rows_ if row.entry.press == press_id]
 
@@ -137,8 +137,8 @@ def run(folder: Path, test: Test, *outcomes: str) -> None:
     asyncio.run(whole())
 
 
-def asked_for(rig: Rig, number: int = -1) -> bytes:
-    key, payload, _ = rig.bench.line.asked[number]
+def queried_goal(rig: Rig, number: int = -1) -> bytes:
+    key, payload, _ = rig.bench.line.queries[number]
     assert key == "count/_action/get_result"
     return bytes(INTERFACES.decode(TYPES.get_result_request, payload).goal_id.uuid)
 
@@ -150,7 +150,7 @@ def test_an_accepted_goal_is_in_doubt_and_asked_for_by_its_entry(tmp_path: Path)
         assert "may still be running" in str(shown.text)
         assert (shown.busy, shown.can_cancel, shown.goal, shown.press) == (True, True, "UNKNOWN", "g1")
         assert rig.lock == "perhaps_busy"
-        assert asked_for(rig) == goal_id(entry.hash).bytes
+        assert queried_goal(rig) == goal_id(entry.hash).bytes
         assert rig.bench.line.timeouts == [LATE_S]
         tell_states(rig.bench, (bytes(16), 2))
         assert rig.bench.shown == shown
@@ -158,9 +158,9 @@ def test_an_accepted_goal_is_in_doubt_and_asked_for_by_its_entry(tmp_path: Path)
         assert (rig.bench.shown.goal, rig.lock) == ("EXECUTING", "busy")
         await rig.answer(status=4)
         assert str(rig.bench.shown.text).startswith("Succeeded at ")
-        assert len(rig.bench.line.asked) == 1
+        assert len(rig.bench.line.queries) == 1
         await rig.log.stop()
-        assert rig.told() == ["", "accepted", "unknown", "accepted", "succeeded"]
+        assert rig.outcomes() == ["", "accepted", "unknown", "accepted", "succeeded"]
 
     run(tmp_path, test, "accepted")
 
@@ -170,12 +170,12 @@ def test_it_is_asked_for_until_it_is_known(tmp_path: Path, monkeypatch: pytest.M
 
     async def test(rig: Rig, entry: Entry) -> None:
         await rig.started()
-        rig.bench.line.asked[0][2].set_result(None)
-        await asked(rig.bench, 2)
+        rig.bench.line.queries[0][2].set_result(None)
+        await queried(rig.bench, 2)
         assert rig.lock == "perhaps_busy"
         tell_states(rig.bench, (goal_id(entry.hash).bytes, 2))
-        rig.bench.line.asked[1][2].set_result(None)
-        await asked(rig.bench, 3)
+        rig.bench.line.queries[1][2].set_result(None)
+        await queried(rig.bench, 3)
         assert rig.bench.line.timeouts == [LATE_S, LATE_S, RESULT_S]
         assert rig.lock == "busy"
 
@@ -191,7 +191,7 @@ def test_it_is_asked_for_and_can_be_canceled_only_when_its_server_is_offered(tmp
         tell_states(rig.bench, (goal_id(entry.hash).bytes, 2))
         assert rig.bench.shown.goal == "UNKNOWN"
         rig.bench.robot.graph.apply_token(token, True)
-        await asked(rig.bench, 1)
+        await queried(rig.bench, 1)
         assert rig.bench.shown.goal == "EXECUTING"
 
     run(tmp_path, test, "accepted")
@@ -203,14 +203,14 @@ def test_a_cut_leaves_it_in_doubt(tmp_path: Path) -> None:
         rig.bench.lose_the_bridge()
         assert (rig.bench.shown.busy, rig.bench.shown.can_cancel) == (True, False)
         rig.bench.robot.graph.apply_token(bridge_dialect.bridge_token(BRIDGE), True)
-        await asked(rig.bench, 2)
+        await queried(rig.bench, 2)
         assert rig.bench.shown.can_cancel
-        assert asked_for(rig) == goal_id(entry.hash).bytes
+        assert queried_goal(rig) == goal_id(entry.hash).bytes
 
     run(tmp_path, test, "accepted")
 
 
-def test_its_feedback_tells_that_it_is_under_way(tmp_path: Path) -> None:
+def test_its_feedback_says_that_it_is_under_way(tmp_path: Path) -> None:
     async def test(rig: Rig, entry: Entry) -> None:
         await rig.started()
         goal = {"uuid": goal_id(entry.hash).bytes}
@@ -239,7 +239,7 @@ def test_what_the_robot_does_not_know_opens_and_is_logged(
         assert words in str(rig.bench.shown.text)
         assert rig.lock == ""
         await rig.log.stop()
-        assert rig.told() == ["", *before, "unknown", "unknown"]
+        assert rig.outcomes() == ["", *before, "unknown", "unknown"]
         assert len(found(tmp_path)) == 1
         again = Rig(await opened(tmp_path), tmp_path)
         await again.resuming.start()
@@ -249,7 +249,7 @@ def test_what_the_robot_does_not_know_opens_and_is_logged(
     run(tmp_path, test, *before)
 
 
-def test_an_end_that_came_meanwhile_has_no_time_of_its_own(tmp_path: Path) -> None:
+def test_an_end_in_the_meantime_has_no_time_of_its_own(tmp_path: Path) -> None:
     async def test(rig: Rig, entry: Entry) -> None:
         await rig.started()
         await rig.answer(status=5)
@@ -262,7 +262,7 @@ def test_one_that_was_never_heard_of_locks_for_a_while_only(tmp_path: Path) -> N
     async def test(rig: Rig, entry: Entry) -> None:
         await rig.started()
         assert rig.bench.line.timeouts == [LATE_S]
-        rig.bench.line.asked[0][2].set_result(None)
+        rig.bench.line.queries[0][2].set_result(None)
         await rig.open()
         assert "No news of this goal from the robot for 60 s" in str(rig.bench.shown.text)
         assert rig.lock == ""
@@ -276,7 +276,7 @@ def test_a_cancel_finds_it_under_way(tmp_path: Path) -> None:
         assert await canceled(rig, 0) == "accepted"
         assert rig.bench.shown.goal == "CANCELING"
         await rig.log.stop()
-        assert rig.told()[-1] == "accepted"
+        assert rig.outcomes()[-1] == "accepted"
 
     run(tmp_path, test, "accepted")
 
@@ -285,8 +285,8 @@ def test_a_cancel_that_the_robot_knows_no_goal_for_asks_for_it_anew(tmp_path: Pa
     async def test(rig: Rig, entry: Entry) -> None:
         await rig.started()
         assert await canceled(rig, 2) == "rejected"
-        await asked(rig.bench, 3)
-        assert asked_for(rig) == goal_id(entry.hash).bytes
+        await queried(rig.bench, 3)
+        assert queried_goal(rig) == goal_id(entry.hash).bytes
         await rig.answer(status=0)
         assert rig.lock == ""
 
@@ -296,8 +296,8 @@ def test_a_cancel_that_the_robot_knows_no_goal_for_asks_for_it_anew(tmp_path: Pa
 async def canceled(rig: Rig, return_code: int) -> str:
     request, response = INTERFACES.service_types("action_msgs/srv/CancelGoal")
     cancel = asyncio.create_task(rig.bench.actions.cancel(rig.bench.count, "g1"))
-    await asked(rig.bench, 2)
-    info = INTERFACES.decode(request, rig.bench.line.asked[-1][1]).goal_info
+    await queried(rig.bench, 2)
+    info = INTERFACES.decode(request, rig.bench.line.queries[-1][1]).goal_info
     goal = {"goal_id": {"uuid": info.goal_id.uuid}, "stamp": {"sec": 0, "nanosec": 0}}
     goals = [] if return_code else [goal]
     rig.bench.line.answer(response, return_code=return_code, goals_canceling=goals)
@@ -313,7 +313,7 @@ def test_a_press_id_that_was_used_twice_is_of_two_goals(
     async def test(rig: Rig, entry: Entry) -> None:
         again = await pressed(rig.log, "g1", "accepted")
         await rig.started(questions=2)
-        assert {asked_for(rig, 0), asked_for(rig, 1)} == {
+        assert {queried_goal(rig, 0), queried_goal(rig, 1)} == {
             goal_id(one.hash).bytes for one in (entry, again)
         }
 
@@ -327,7 +327,7 @@ def test_no_more_are_asked_for_than_may_be_sent_and_the_newest_is_shown(tmp_path
         await rig.started(questions=MAX_UNANSWERED)
         assert rig.bench.shown.press == f"n{MAX_UNANSWERED}"
         await asyncio.sleep(0.02)
-        assert len(rig.bench.line.asked) == MAX_UNANSWERED
+        assert len(rig.bench.line.queries) == MAX_UNANSWERED
 
     run(tmp_path, test, "accepted")
 
@@ -368,8 +368,8 @@ def test_while_the_log_can_not_be_read_it_is_said_that_nothing_is_known(
             assert str(rig.bench.shown.text).endswith(f"is still running: {GONE}")
             assert (rig.bench.shown.busy, rig.bench.shown.can_cancel) == (needed, False)
             await asyncio.sleep(0.03)
-            assert rig.bench.line.asked == []
-        await asked(rig.bench, 1)
+            assert rig.bench.line.queries == []
+        await queried(rig.bench, 1)
         assert rig.bench.shown.press == "g1"
 
     run(tmp_path, test, "accepted")
@@ -382,7 +382,7 @@ def test_what_the_robot_said_while_the_log_could_not_be_read_counts(
         with unreadable(rig, monkeypatch, unneeded=False):
             await rig.resuming.start()
             tell_states(rig.bench, (goal_id(entry.hash).bytes, 2))
-        await asked(rig.bench, 1)
+        await queried(rig.bench, 1)
         assert rig.bench.line.timeouts == [RESULT_S]
         assert (rig.bench.shown.goal, rig.lock) == ("EXECUTING", "busy")
 
@@ -397,18 +397,18 @@ def test_what_was_sent_while_the_log_could_not_be_read_stays_shown(
             await rig.resuming.start()
             assert rig.lock == ""
             start = rig.bench.send_goal("own")
-            await asked(rig.bench, 1)
+            await queried(rig.bench, 1)
             rig.bench.answer_goal(accepted=True)
             await start
-            await asked(rig.bench, 2)
-        await asked(rig.bench, 3)
-        assert asked_for(rig) == goal_id(entry.hash).bytes
+            await queried(rig.bench, 2)
+        await queried(rig.bench, 3)
+        assert queried_goal(rig) == goal_id(entry.hash).bytes
         assert (rig.bench.shown.press, rig.bench.shown.goal) == ("own", "ACCEPTED")
 
     run(tmp_path, test, "accepted")
 
 
-def test_a_log_that_is_not_open_yet_tells_nothing(tmp_path: Path) -> None:
+def test_a_log_that_is_not_open_yet_says_nothing(tmp_path: Path) -> None:
     async def test() -> None:
         log = OperatorLog(tmp_path, Limits())
         with pytest.raises(LogError, match="cannot be read"):

@@ -53,7 +53,7 @@ def press(kiosk: Server, widget: str, press_id: str, **inputs: Any) -> httpx.Res
     return kiosk.http.post(f"/widgets/{widget}", json={"id": press_id, "inputs": inputs})
 
 
-def told(answer: httpx.Response) -> tuple[int, str, str, str]:
+def receipt_of(answer: httpx.Response) -> tuple[int, str, str, str]:
     receipt = answer.json()
     return answer.status_code, receipt["id"], receipt["outcome"], receipt["reason"]
 
@@ -64,24 +64,24 @@ def test_a_press_that_comes_again_after_a_kill_is_sent_once(
     robot.subscribe(topic="/said", type=TEXT)
     kiosk = start()
     until(lambda: robot.publishers(topic="/said"), "its reader has found the bridge's writer")
-    said = told(press(kiosk, "say", "say-1", words="once"))
+    said = receipt_of(press(kiosk, "say", "say-1", words="once"))
     assert said[2] == "published"
-    called = told(press(kiosk, "enable", "enable-1"))
+    called = receipt_of(press(kiosk, "enable", "enable-1"))
     robot.answer_set_enabled(success=False, message="no \u202e")
-    refused = told(press(kiosk, "enable", "enable-2"))
-    unsendable = told(press(kiosk, "say", "say-2", words=7))
-    locked = told(press(kiosk, "nowhere", "nowhere-1"))
+    refused = receipt_of(press(kiosk, "enable", "enable-2"))
+    unsendable = receipt_of(press(kiosk, "say", "say-2", words=7))
+    locked = receipt_of(press(kiosk, "nowhere", "nowhere-1"))
     assert [called[2], refused[2], unsendable[0], locked[0]] == ["succeeded", "rejected", 422, 503]
     kiosk.end(signal.SIGKILL)
     kiosk = start()
     until(lambda: robot.publishers(topic="/said"), "its reader has found the bridge's writer")
     for _ in range(2):
-        assert told(press(kiosk, "say", "say-1", words="once")) == said
-        assert told(press(kiosk, "enable", "enable-1")) == called
-        assert told(press(kiosk, "enable", "enable-2")) == refused
-        assert told(press(kiosk, "say", "say-2", words=7)) == unsendable
-        assert told(press(kiosk, "nowhere", "nowhere-1")) == locked
-    assert told(press(kiosk, "say", "say-3", words="last"))[2] == "published"
+        assert receipt_of(press(kiosk, "say", "say-1", words="once")) == said
+        assert receipt_of(press(kiosk, "enable", "enable-1")) == called
+        assert receipt_of(press(kiosk, "enable", "enable-2")) == refused
+        assert receipt_of(press(kiosk, "say", "say-2", words=7)) == unsendable
+        assert receipt_of(press(kiosk, "nowhere", "nowhere-1")) == locked
+    assert receipt_of(press(kiosk, "say", "say-3", words="last"))[2] == "published"
     until(lambda: len(robot.heard(topic="/said")) >= 2, "the last one is heard")
     assert [message["data"] for message in robot.heard(topic="/said")] == ["once", "last"]
     assert len(robot.requests("/set_enabled")) == 2
@@ -158,7 +158,7 @@ def pressed(number: int, robot: str = "") -> Entry:
     return new_entry("pressed", origin, {"n": number}, press=f"p{number}", action="press", robot=robot)
 
 
-def test_a_log_tells_of_a_press_that_it_has(tmp_path: Path) -> None:
+def test_a_log_says_of_a_press_that_it_has(tmp_path: Path) -> None:
     async def work() -> None:
         for again in (False, True):
             log = OperatorLog(tmp_path, Limits())

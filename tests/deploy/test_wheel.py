@@ -105,8 +105,8 @@ def machine(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Machine:
 def test_a_wheel_is_installed_as_the_service_page_says(machine: Machine, wheel: Path) -> None:
     commands = of_pages(SERVICE)
     assert sum("pip install" in one for one in commands) == 2
-    told = machine.run(f"{RELEASE}/bin/operator-panel --version")
-    assert told.stdout.split() == ["operator-panel", wheel.name.split("-")[1]]
+    version = machine.run(f"{RELEASE}/bin/operator-panel --version")
+    assert version.stdout.split() == ["operator-panel", wheel.name.split("-")[1]]
     check = machine.run(f"{RELEASE}/bin/operator-panel check /etc/operator-panel/panel.toml")
     assert check.returncode == 0, check.stderr
     # Installed, it needs no file of the checkout: these are its own.

@@ -34,7 +34,7 @@ from tests.support.parts import Bridge, RosNode, free_port, until
 TRIGGER = "std_srvs/srv/Trigger"
 LIST_PARAMETERS = "rcl_interfaces/srv/ListParameters"
 JOINTS = "sensor_msgs/msg/JointState"
-SEEN = (
+ANNOUNCED = (
     "/permission",
     "/words",
     "/stamped",
@@ -73,7 +73,7 @@ def robot(shared: Bridge) -> Iterator[RosNode]:
     node.subscribe("/heard", STRING)
     node.advertise("/cell/elsewhere", STRING)
     offered = [f"/system_controller/{name}_parameters" for name in ("list", "get")]
-    until(lambda: announced(client, *SEEN, "/heard", *offered), "the bridge has announced them")
+    until(lambda: announced(client, *ANNOUNCED, "/heard", *offered), "the bridge has announced them")
     yield node
     client.close()
     node.end()
@@ -98,17 +98,17 @@ BROKEN: list[tuple[str, str, list[tuple[str, str]]]] = [
         [("topic_type", "/words")],
     ),
     (
-        "a topic that nobody publishes",
+        "a topic that no node publishes",
         panel_of(readout("/wrods")),
         [("topic_no_publisher", "/wrods")],
     ),
     (
-        "a press that nobody hears",
-        panel_of(button("/nobody")),
-        [("topic_no_subscriber", "/nobody")],
+        "a press without a subscriber",
+        panel_of(button("/unheard")),
+        [("topic_no_subscriber", "/unheard")],
     ),
     (
-        "a permission that nobody publishes",
+        "a permission that no node publishes",
         panel_of(interlock("/nowhere")),
         [("permission_no_publisher", "/nowhere")],
     ),
@@ -133,7 +133,7 @@ BROKEN: list[tuple[str, str, list[tuple[str, str]]]] = [
         [("topic_qos", "/lossy")],
     ),
     (
-        "a service that nobody offers",
+        "a service that no node offers",
         panel_of(call("/no_service", TRIGGER)),
         [("service_absent", "/no_service")],
     ),
@@ -158,7 +158,7 @@ BROKEN: list[tuple[str, str, list[tuple[str, str]]]] = [
         [("parameters_absent", "/arm")],
     ),
     (
-        "an action that nobody offers",
+        "an action that no node offers",
         panel_of(action("/no_action")),
         [("action_absent", "/no_action")],
     ),
@@ -195,7 +195,7 @@ def test_where_all_is_well_nothing_is_named(shared: Bridge, robot: RosNode, setu
     assert "clock of the bridge's machine is within 1 s" in facts
 
 
-def test_a_publisher_that_ends_after_its_message_is_told_from_one_that_is_not_there(
+def test_a_publisher_that_ends_after_its_message_is_no_absent_one(
     shared: Bridge, robot: RosNode, setup: Setup
 ) -> None:
     text = panel_of(interlock("/hasty"))
@@ -235,12 +235,12 @@ def test_of_several_robots_each_is_looked_at(shared: Bridge, robot: RosNode, set
     assert set(found.graphs) == {"left"}
 
 
-def test_nobody_listens(setup: Setup) -> None:
+def test_a_topic_without_a_subscriber(setup: Setup) -> None:
     endpoint = f"tcp/127.0.0.1:{free_port()}"
     assert named(setup.findings(WELL, endpoint)) == [("no_router", endpoint)]
 
 
-def test_a_name_that_nobody_knows(setup: Setup) -> None:
+def test_a_name_that_is_unknown(setup: Setup) -> None:
     endpoint = "tcp/robot.invalid:7447"
     assert named(setup.findings(WELL, endpoint)) == [("host_unknown", endpoint)]
 

@@ -87,7 +87,7 @@ def server() -> Iterator[Server]:
     mine.end()
 
 
-def test_a_server_of_ours_is_told_from_another_program(setup: Setup, server: Server) -> None:
+def test_a_server_of_ours_is_not_taken_for_another_program(setup: Setup, server: Server) -> None:
     setup.port, setup.data = server.port, server.data
     found = setup.diagnose(panel_of(), NO_ROUTER).report
     assert found.codes()[:2] == ["server_running", "server_not_ready"]
@@ -162,7 +162,7 @@ def test_a_screen_is_measured(
     assert codes(setup) == expected
 
 
-def test_the_key_that_comes_out_too_small_is_told_in_mm(setup: Setup) -> None:
+def test_the_key_that_comes_out_too_small_is_reported_in_mm(setup: Setup) -> None:
     connect(setup.screens, edid(1280, 800, 150, 94))
     found = setup.diagnose(panel_of(), NO_ROUTER).report.findings[0]
     assert "a key of 20 mm is 11 mm wide" in found.what

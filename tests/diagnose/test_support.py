@@ -64,9 +64,9 @@ def test_what_is_listed_is_what_it_holds_without_secrets(
     path = setup.folder / "bundle.zip"
     options = ["--zenoh", str(zenoh), "-o", str(path), "--yes"]
     assert main(command(setup, demo, *options)) == 0
-    told = capsys.readouterr().out
+    output = capsys.readouterr().out
     found = files_of(path)
-    assert {line.split()[0] for line in told.splitlines() if line.startswith("  ")} == set(found)
+    assert {line.split()[0] for line in output.splitlines() if line.startswith("  ")} == set(found)
     assert set(found) - {"logs/journal.txt"} == {
         "doctor.json",
         "versions.json",
@@ -136,7 +136,7 @@ def test_it_asks_before_it_writes(
     assert len(list(quick.folder.glob("operator-panel-support-*.zip"))) == (status == 0)
 
 
-def test_where_nobody_can_be_asked_it_says_so(
+def test_without_a_terminal_it_says_so(
     quick: Setup, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(sys, "stdin", io.StringIO("y\n"))
@@ -160,8 +160,8 @@ def test_the_journal_is_asked_for_the_last_hour_of_our_units(
     program.write_text('#!/bin/sh\necho "$@"\n')
     program.chmod(0o755)
     monkeypatch.setenv("PATH", f"{tmp_path}:{os.environ['PATH']}")
-    asked = journal().split()
-    assert {"--unit=operator-panel*", "--unit=zenoh-bridge*", "--since=-3600s"} <= set(asked)
+    command = journal().split()
+    assert {"--unit=operator-panel*", "--unit=zenoh-bridge*", "--since=-3600s"} <= set(command)
 
 
 @pytest.mark.parametrize("line", ["x" * 99 + "\n", "a=b " * 24 + "\n", "key\n", '"' * 99 + "\n"])

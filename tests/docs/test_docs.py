@@ -130,9 +130,9 @@ def test_a_press_is_answered_as_its_example_shows(kiosk: Server) -> None:
 
 
 def test_a_press_by_websocket_is_answered_as_its_example_shows(kiosk: Server) -> None:
-    asked, expected = shown("reference/http.md", "json")[1:3]
+    request, expected = shown("reference/http.md", "json")[1:3]
     with kiosk.socket() as socket:
-        socket.say(asked)
+        socket.say(request)
         said = socket.hear()
     assert set(said) == set(json.loads(expected))
     assert as_response(said).status_code == 200

@@ -63,7 +63,7 @@ def test_each_key_has_a_description_and_an_example_that_it_takes() -> None:
     assert [str(error) for error in of_all.iter_errors(examples)] == []
 
 
-def test_a_key_that_nobody_has_described_is_named() -> None:
+def test_a_key_without_a_description_is_named() -> None:
     with pytest.raises(KeyError, match='does not say what "shade" of "panel" means'):
         schema.about("panel", "shade")
 
@@ -135,18 +135,18 @@ def test_each_sentence_locks_and_has_advice_or_is_known_to_lock_nothing() -> Non
 
 
 def test_advice_is_for_sentences_that_are_there() -> None:
-    told = {code for group, codes in locks.ADVICE.items() if group != locks.OTHERS for code in codes}
+    advised = {code for group, codes in locks.ADVICE.items() if group != locks.OTHERS for code in codes}
     plain = {code for code in locks.ADVICE[locks.OTHERS]["codes"] if "*" not in code}
-    assert told | plain <= set(SENTENCES)
-    assert told.isdisjoint(plain)
+    assert advised | plain <= set(SENTENCES)
+    assert advised.isdisjoint(plain)
 
 
 def test_what_the_code_locks_by_has_advice() -> None:
     source = "".join(path.read_text() for path in places.modules())
     codes = set(re.findall(r'\b(?:locked\(|Verdict\(False, )"(\w+)"', source)) & set(SENTENCES)
     assert {"joining", "forbidden", "busy"} <= codes
-    told = {code for group, codes in locks.ADVICE.items() if group != locks.OTHERS for code in codes}
-    assert codes <= told
+    advised = {code for group, codes in locks.ADVICE.items() if group != locks.OTHERS for code in codes}
+    assert codes <= advised
 
 
 def test_the_japanese_advice_is_for_the_same_sentences_and_names_keys_as_they_are() -> None:
@@ -178,9 +178,9 @@ def test_each_setting_is_described() -> None:
 
 def test_each_dependency_has_its_reason() -> None:
     described = tomllib.loads((ROOT / "pyproject.toml").read_text())
-    asked = [*described["project"]["dependencies"]]
-    asked += [one for group in described["dependency-groups"].values() for one in group]
-    names = {match[0] for one in asked if isinstance(one, str) and (match := re.match(r"[\w-]+", one))}
+    wanted = [*described["project"]["dependencies"]]
+    wanted += [one for group in described["dependency-groups"].values() for one in group]
+    names = {match[0] for one in wanted if isinstance(one, str) and (match := re.match(r"[\w-]+", one))}
     rows = (ROOT / "docs/architecture.md").read_text().split("## Dependencies")[1]
     assert [name for name in sorted(names) if not re.search(rf"\b{name}\b", rows)] == []
 

@@ -50,9 +50,9 @@ def test_each_dependency_has_its_reason() -> None:
     with (ROOT / "pyproject.toml").open("rb") as file:
         described = tomllib.load(file)
     groups = described["dependency-groups"]
-    asked = [*described["project"]["dependencies"], *groups["dev"]]
-    asked += [one for one in groups["test"] if isinstance(one, str)]
+    wanted = [*described["project"]["dependencies"], *groups["dev"]]
+    wanted += [one for one in groups["test"] if isinstance(one, str)]
     rows = TEXT.split("## Dependencies")[1]
-    names = {re.split(r"[^\w-]", one, maxsplit=1)[0] for one in asked}
+    names = {re.split(r"[^\w-]", one, maxsplit=1)[0] for one in wanted}
     assert "" not in names
     assert [name for name in sorted(names) if not re.search(rf"\b{name}\b", rows)] == []

@@ -166,7 +166,7 @@ class Publishers:
         """Within the block, a new publisher exists; returns when the bridge has removed it."""
         self._observer.forget()
         self._by[vendor].publish(True, kind)
-        until(lambda: self._observer.appeared, "the bridge tells of it", within_s=GONE_WITHIN_S)
+        until(lambda: self._observer.appeared, "the bridge announces it", within_s=GONE_WITHIN_S)
         yield
         self._by[vendor].finish(0.0)
         self._alone()

@@ -203,7 +203,7 @@ def test_messages_of_ten_megabytes(rig: Rig, server: Server) -> None:
     presses = presser.end()
     rig.robot.publish("/heard", {"data": "short"})
     until(lambda: watch.widgets["heard"]["text"] == "short", "shown")
-    assert not any(not seen.enabled for seen in watch.seen["kept"] if seen.at > began)
+    assert not any(not state.enabled for state in watch.states["kept"] if state.at > began)
     watch.end()
     rig.robot.withdraw("/heard")
     account = accounted(presses, lambda: rig.arrivals("guarded"), lambda _: True, limit(2.0))

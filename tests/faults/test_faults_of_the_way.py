@@ -24,7 +24,7 @@ server = fixtures.server
 CUT_OFF = "No connection to the robot"
 DELAY_S = 0.3
 LOSS = 0.1
-SEEN_S = 1.0
+NOTICED_S = 1.0
 LATE_IMPAIRED_S = 5.0
 CUTS_S = (1, 5, 30) if LONG else (1, 5)
 
@@ -60,7 +60,7 @@ def test_a_frozen_bridge(rig: Rig, server: Server) -> None:
         server,
         rig.bridge.freeze,
         rig.bridge.thaw,
-        locks_within_s=SEEN_S,
+        locks_within_s=NOTICED_S,
         lasts_s=4.0,
         late_s=5.0,
         because=CUT_OFF,
@@ -129,7 +129,7 @@ def test_a_cable_that_is_cut(cable: Cable, far_rig: Rig, tmp_path: Path) -> None
                 server,
                 cable.cut,
                 cable.restore,
-                locks_within_s=SEEN_S,
+                locks_within_s=NOTICED_S,
                 lasts_s=seconds,
                 late_s=3.0,
                 because=CUT_OFF,
@@ -183,11 +183,11 @@ def impaired(cable: Cable, rig: Rig, server: Server, seconds: float) -> tuple[Ac
         presses_work(presser)
     presses = presser.end()
     watch.end()
-    held = not any(not seen.enabled for seen in watch.seen["kept"] if seen.at > began)
+    held = not any(not state.enabled for state in watch.states["kept"] if state.at > began)
     account = accounted(
         presses,
         lambda: rig.arrivals("guarded"),
         lambda press: held or press.answered_at < began - UNDER_WAY_S or press.at > cleared_at,
         limit(LATE_IMPAIRED_S),
     )
-    return account, sum(not seen.enabled for seen in watch.seen["pulsed"] if seen.at > began)
+    return account, sum(not state.enabled for state in watch.states["pulsed"] if state.at > began)

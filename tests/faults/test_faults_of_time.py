@@ -43,7 +43,7 @@ def test_a_clock_that_is_set_back_and_forward(rig: Rig, tmp_path: Path) -> None:
         presses = presser.end()
         watch.end()
     clock.clean(server.process.pid)
-    assert [seen for seen in watch.seen["pulsed"] if "older than" in (seen.reason or "")] == []
+    assert [state for state in watch.states["pulsed"] if "older than" in (state.reason or "")] == []
     account = accounted(presses, lambda: rig.arrivals("paced"), lambda _: True, limit(2.0))
     record(
         "wall clock set an hour back, then forward",

@@ -18,7 +18,7 @@ DEAD_AFTER_S: Final = 10.0
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
+class InterlockState:
     """A state of an interlock in the events; `at` in monotonic seconds."""
 
     at: float
@@ -30,14 +30,14 @@ class Watch:
     """Reads an event stream in a thread, and keeps each state of the interlocks with its time."""
 
     def __init__(self, server: Server) -> None:
-        self.seen: dict[str, list[Seen]] = {}
+        self.states: dict[str, list[InterlockState]] = {}
         self.widgets: dict[str, dict[str, Any]] = {}
         self.failed = ""
         self._server = server
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._read, daemon=True)
         self._thread.start()
-        until(lambda: self.seen or self.failed, "the stream begins")
+        until(lambda: self.states or self.failed, "the stream begins")
 
     def _read(self) -> None:
         try:
@@ -63,14 +63,16 @@ class Watch:
         if name.endswith(suffix):
             shown = {name.removesuffix(suffix): data}
         for interlock, state in shown.items():
-            self.seen.setdefault(interlock, []).append(Seen(now, state["enabled"], state["reason"]))
+            self.states.setdefault(interlock, []).append(
+                InterlockState(now, state["enabled"], state["reason"])
+            )
         for widget, state in {"snapshot": data.get("widgets", {}), "update": data}.get(
             name, {}
         ).items():
             self.widgets.setdefault(widget, {}).update(state)
 
-    def now(self, interlock: str) -> Seen:
-        return self.seen[interlock][-1]
+    def now(self, interlock: str) -> InterlockState:
+        return self.states[interlock][-1]
 
     def locked_after(
         self, since: float, interlock: str, within_s: float, because: str = ""
@@ -78,11 +80,11 @@ class Watch:
         """Seconds from `since` to the first later lock whose reason contains `because`, and its
         reason."""
 
-        def found() -> Seen | None:
-            locks = (s for s in self.seen[interlock] if s.at >= since and not s.enabled)
+        def found() -> InterlockState | None:
+            locks = (s for s in self.states[interlock] if s.at >= since and not s.enabled)
             return next((s for s in locks if because in (s.reason or "")), None)
 
-        lock: Seen = until(found, f"{interlock} locked, is {self.now(interlock)}", within_s)
+        lock: InterlockState = until(found, f"{interlock} locked, is {self.now(interlock)}", within_s)
         return lock.at - since, lock.reason or ""
 
     def opened(self, interlock: str, within_s: float = ENOUGH_S) -> None:
@@ -95,9 +97,9 @@ class Watch:
 
     def was_open(self, interlock: str, since: float, to: float) -> bool:
         """Whether the interlock was shown as permitted at any moment in between."""
-        seen = self.seen[interlock]
-        shown_at_first = [s for s in seen if s.at <= since][-1:]
-        return any(s.enabled for s in (*shown_at_first, *(s for s in seen if since < s.at <= to)))
+        states = self.states[interlock]
+        shown_at_first = [s for s in states if s.at <= since][-1:]
+        return any(s.enabled for s in (*shown_at_first, *(s for s in states if since < s.at <= to)))
 
     def end(self) -> None:
         self._over.set()

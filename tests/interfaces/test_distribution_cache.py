@@ -115,12 +115,12 @@ print(json.dumps({"hashes": hashes, **loaded}))
 def started(folder: Path) -> dict[str, object]:
     """What a process knows and has loaded that has read its modules and its panel."""
     env = {k: v for k, v in os.environ.items() if not k.startswith("KIOSK_")}
-    told = subprocess.run(
+    ran = subprocess.run(
         [sys.executable, "-c", STARTED],
         env=env | {"KIOSK_DATA": str(folder)},
         cwd=ROOT,
         capture_output=True,
         check=True,
     )
-    found: dict[str, object] = json.loads(told.stdout)
+    found: dict[str, object] = json.loads(ran.stdout)
     return found

@@ -151,7 +151,7 @@ def _plain(value: Any) -> Any:
 
 
 def test_what_is_read_at_its_place_is_what_was_sent(cell: Interfaces) -> None:
-    seen = {"key": 0, "beside": 0, "index": 0, "unknown": 0}
+    counts = {"key": 0, "beside": 0, "index": 0, "unknown": 0}
     for seed in range(600):
         walker = Walker(cell, seed)
         fields = Samples(cell.structures, seed).fields("cell_msgs/msg/Store")
@@ -165,9 +165,9 @@ def test_what_is_read_at_its_place_is_what_was_sent(cell: Interfaces) -> None:
             else:
                 assert plain(value) == plain(wanted), (seed, written(way))
             for how, _ in way:
-                seen[how] = seen.get(how, 0) + 1
-            seen["unknown"] += wanted is UNKNOWN
-    assert min(seen.values()) > 50, seen
+                counts[how] = counts.get(how, 0) + 1
+            counts["unknown"] += wanted is UNKNOWN
+    assert min(counts.values()) > 50, counts
 
 
 def test_of_every_type_that_is_built_in_each_field_is_read(cell: Interfaces) -> None:

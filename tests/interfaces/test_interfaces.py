@@ -321,7 +321,7 @@ def test_an_unknown_type_is_refused_with_the_nearest() -> None:
         assert f"ROS 2 jazzy; did you mean {near}" in str(caught.value)
 
 
-def test_a_package_that_is_nowhere_is_told() -> None:
+def test_a_package_that_is_nowhere_is_a_fault() -> None:
     with pytest.raises(InterfaceError, match=r"there is no package cell_msgs: its folder") as caught:
         INTERFACES.require("cell_msgs/msg/Jog")
     assert caught.value.package == "cell_msgs"

@@ -82,7 +82,7 @@ def test_without_a_name_the_panel_of_the_environment_is_checked(
     assert str(faulty) in capsys.readouterr().err
 
 
-def test_a_wrong_environment_is_told_without_a_traceback(
+def test_a_wrong_environment_is_reported_without_a_traceback(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("KIOSK_MODE", "maybe")
@@ -107,7 +107,7 @@ def test_several_panels_are_checked_and_the_worst_one_is_the_status(
     assert main([str(SHIPPED), str(SHIPPED)]) == 0
 
 
-def test_it_tells_how_it_is_used(capsys: pytest.CaptureFixture[str]) -> None:
+def test_it_says_how_it_is_used(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as ended:
         main(["--help"])
     assert ended.value.code == 0
@@ -168,7 +168,7 @@ def test_an_interlock_that_locks_nothing_is_noted(
     path.write_text(SHIPPED.read_text() + spare)
     assert main([str(path)]) == 0
     line = len(path.read_text().splitlines()) - 3
-    told = [one for one in capsys.readouterr().out.splitlines() if "locks nothing" in one]
-    assert told == [
+    notes = [one for one in capsys.readouterr().out.splitlines() if "locks nothing" in one]
+    assert notes == [
         f'  note: interlock[1] "spare", line {line}: locks nothing: no control has interlock = "spare"'
     ]

@@ -99,7 +99,7 @@ def test_a_condition_permits_or_says_what_is_and_what_must_be(
     assert said(robot, interlock, {"data": bad}) == f"Air pressure {reason}"
 
 
-def test_constants_stand_for_their_values_and_are_told_by_their_names(tmp_path: Path) -> None:
+def test_constants_stand_for_their_values_and_are_shown_by_their_names(tmp_path: Path) -> None:
     conditions = (
         'field = "power_supply_status"\n'
         'one_of = ["POWER_SUPPLY_STATUS_CHARGING", "POWER_SUPPLY_STATUS_FULL"]'
@@ -120,7 +120,7 @@ def test_constants_stand_for_their_values_and_are_told_by_their_names(tmp_path: 
         ("max = 1", "Air pressure is 2: it must be 1 or less."),
     ],
 )
-def test_a_level_is_told_by_its_name_where_the_file_names_one(
+def test_a_level_is_shown_by_its_name_where_the_file_names_one(
     tmp_path: Path, condition: str, reason: str
 ) -> None:
     conditions = f'field = "level"\n{condition}'

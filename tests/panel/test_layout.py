@@ -199,7 +199,7 @@ def test_three_keys_fill_the_frame(tmp_path: Path) -> None:
     assert place == "frame.widget"
 
 
-def test_what_is_wrong_in_a_group_and_in_the_frame_is_told_together(tmp_path: Path) -> None:
+def test_what_is_wrong_in_a_group_and_in_the_frame_is_reported_together(tmp_path: Path) -> None:
     """The rest is checked beside stand-ins of what is no widget at all."""
     given = tables(
         {"columns": "three", "widget": [{**HEARD, "kind": "redout"}, {**FREE, "type": "x/msg/Y"}]},

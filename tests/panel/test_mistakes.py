@@ -34,11 +34,11 @@ INTERNAL: Final = re.compile(
     r"pydantic|valid(ation|ator)|Literal|<class|Traceback|datetime|\bNone\b|\bTrue\b|\bFalse\b|\bdict\b"
     r"|\btuple\b|\bstr\b|[Ii]nput should|should match|pattern|regex|\[a-z|\(\?|\[0-9\]|\^|\$"
 )
-Told = Callable[[str], list[Fault]]
+FaultsOf = Callable[[str], list[Fault]]
 
 
 @pytest.fixture(scope="module")
-def told(tmp_path_factory: pytest.TempPathFactory) -> Told:
+def faults_of(tmp_path_factory: pytest.TempPathFactory) -> FaultsOf:
     """The faults of a text as a panel file, beside which the interfaces are that it names."""
     folder: Path = tmp_path_factory.mktemp("cell")
     messages = folder / "msgs/cell_msgs/msg"
@@ -59,8 +59,8 @@ def told(tmp_path_factory: pytest.TempPathFactory) -> Told:
     return faults
 
 
-def the_one(told: Told, text: str) -> Fault:
-    (fault,) = told(text)
+def the_one(faults_of: FaultsOf, text: str) -> Fault:
+    (fault,) = faults_of(text)
     assert INTERNAL.search(str(fault)) is None, str(fault)
     assert len(str(fault)) < 500, str(fault)
     return fault
@@ -95,8 +95,8 @@ def lacking(table: Mapping[str, Any], model: Any, where: str = "") -> Iterator[s
             yield from lacking({k: v for part in parts for k, v in part.items()}, within, f"{key}.")
 
 
-def test_the_panel_with_everything_is_good_and_has_everything(told: Told) -> None:
-    assert told(GOOD) == []
+def test_the_panel_with_everything_is_good_and_has_everything(faults_of: FaultsOf) -> None:
+    assert faults_of(GOOD) == []
     conditions = [f"interlock.{key}" for key in (*CONDITIONS, "unit")]  # not all fit one interlock
     # There are robots, which have their own namespaces.
     assert list(lacking(TABLES, Panel)) == ["namespace", *conditions]
@@ -136,8 +136,8 @@ def key_of(number: int) -> str:
 
 
 @pytest.mark.parametrize("number", KEYS, ids=shown)
-def test_a_value_that_is_of_no_use_is_one_fault(told: Told, number: int) -> None:
-    fault = the_one(told, with_line(number, f"{key_of(number)} = 1979-05-27"))
+def test_a_value_that_is_of_no_use_is_one_fault(faults_of: FaultsOf, number: int) -> None:
+    fault = the_one(faults_of, with_line(number, f"{key_of(number)} = 1979-05-27"))
     assert fault.line == number
     assert fault.id == ("" if key_of(number) == "id" else id_at(number))
     assert fault.place.endswith(key_of(number))
@@ -147,16 +147,16 @@ OPTIONS: Final = ("value = 1", "value = 2")  # of a select: each may be a table
 
 
 @pytest.mark.parametrize("number", [n for n in KEYS if LINES[n - 1] not in OPTIONS], ids=shown)
-def test_a_table_where_none_belongs_is_one_fault(told: Told, number: int) -> None:
-    fault = the_one(told, with_line(number, f"{key_of(number)} = {{ a = 1 }}"))
+def test_a_table_where_none_belongs_is_one_fault(faults_of: FaultsOf, number: int) -> None:
+    fault = the_one(faults_of, with_line(number, f"{key_of(number)} = {{ a = 1 }}"))
     assert fault.line == number
     assert fault.place.removesuffix(".a").endswith(key_of(number))
 
 
 @pytest.mark.parametrize("number", [*KEYS, *HEADERS], ids=shown)
-def test_a_misspelt_key_or_table_is_one_fault(told: Told, number: int) -> None:
+def test_a_misspelt_key_or_table_is_one_fault(faults_of: FaultsOf, number: int) -> None:
     name = key_of(number)
-    fault = the_one(told, with_line(number, LINES[number - 1].replace(name, f"{name}x", 1)))
+    fault = the_one(faults_of, with_line(number, LINES[number - 1].replace(name, f"{name}x", 1)))
     assert fault.line == number
     in_message = re.search(r"\.(message|release|request|goal)\.", fault.place)
     hint = "unknown field" if in_message else f'did you mean "{name.rpartition(".")[2]}"?'
@@ -174,11 +174,11 @@ SHOWS_AT: Final[Mapping[str, str]] = {
 
 
 @pytest.mark.parametrize("number", KEYS, ids=shown)
-def test_what_is_left_out_is_one_fault_at_most(told: Told, number: int) -> None:
-    found = told(with_line(number, "#"))
+def test_what_is_left_out_is_one_fault_at_most(faults_of: FaultsOf, number: int) -> None:
+    found = faults_of(with_line(number, "#"))
     if not found:
         return  # it has a default
-    fault = the_one(told, with_line(number, "#"))
+    fault = the_one(faults_of, with_line(number, "#"))
     header = max((n for n in HEADERS if n < number), default=0)
     elsewhere = SHOWS_AT.get(LINES[number - 1])
     lines = [header] if elsewhere is None else [LINES.index(elsewhere) + 1 if elsewhere else 0]
@@ -186,8 +186,8 @@ def test_what_is_left_out_is_one_fault_at_most(told: Told, number: int) -> None:
 
 
 @pytest.mark.parametrize("number", HEADERS, ids=shown)
-def test_a_header_that_is_left_out_is_one_fault(told: Told, number: int) -> None:
-    the_one(told, with_line(number, "#"))
+def test_a_header_that_is_left_out_is_one_fault(faults_of: FaultsOf, number: int) -> None:
+    the_one(faults_of, with_line(number, "#"))
 
 
 def changed(old: str, new: str) -> str:
@@ -200,9 +200,9 @@ MISTAKES: Final = tomllib.loads((TESTS / "mistakes.toml").read_text())["mistake"
 
 
 @pytest.mark.parametrize("mistake", MISTAKES, ids=lambda mistake: mistake["new"][:60])
-def test_a_mistake_is_one_fault_in_words(told: Told, mistake: Mapping[str, str]) -> None:
+def test_a_mistake_is_one_fault_in_words(faults_of: FaultsOf, mistake: Mapping[str, str]) -> None:
     text = changed(mistake["old"], mistake["new"])
-    fault = the_one(told, text)
+    fault = the_one(faults_of, text)
     assert fault.place == mistake["place"], str(fault)
     assert mistake["words"] in fault.message
     after = text.splitlines()
@@ -213,14 +213,14 @@ def test_a_mistake_is_one_fault_in_words(told: Told, mistake: Mapping[str, str])
     assert fault.line == line, str(fault)
 
 
-def test_it_is_not_toml(told: Told) -> None:
+def test_it_is_not_toml(faults_of: FaultsOf) -> None:
     for old, new, line in (
         ('title = "Robot cell 1"', "title = Robot cell 1", 2),
         ('label = "Speed"', 'label = "Speed', 102),
         ('kind = "slider"', 'kind = "slider"\nkind = "number"', 102),
         ("min = -1.0", "min : -1.0", 105),
     ):
-        fault = the_one(told, changed(old, new))
+        fault = the_one(faults_of, changed(old, new))
         assert (fault.place, fault.line) == ("", line)
 
 
@@ -243,7 +243,9 @@ DAMAGE: Final = st.one_of(
     deadline=None,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
-def test_whatever_is_wrong_is_told_in_words(told: Told, damages: list[tuple[Any, ...]]) -> None:
+def test_whatever_is_wrong_is_reported_in_words(
+    faults_of: FaultsOf, damages: list[tuple[Any, ...]]
+) -> None:
     lines = list(LINES)
     for what, at, *more in damages:
         match what, *more:
@@ -255,6 +257,6 @@ def test_whatever_is_wrong_is_told_in_words(told: Told, damages: list[tuple[Any,
                 lines[at] = lines[at].partition("=")[0] + f"= {value}"
             case "mistyped", column, character:
                 lines[at] = lines[at][:column] + character + lines[at][column + 1 :]
-    for fault in told("\n".join(lines)):
+    for fault in faults_of("\n".join(lines)):
         assert INTERNAL.search(str(fault)) is None, str(fault)
         assert fault.line or "." not in fault.place

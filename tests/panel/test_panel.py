@@ -473,7 +473,7 @@ def test_a_key_that_stands_too_far_below_is_one_fault(
     assert faults(load, given) == {place: f"unknown key; it belongs to {where}"}
 
 
-def test_keys_that_are_unknown_in_a_widget_are_told_together(load: Load) -> None:
+def test_keys_that_are_unknown_in_a_widget_are_reported_together(load: Load) -> None:
     text = {**MESSAGE, "constants": "A", "order": 2}
     page = {"id": "one", "title": "One", "widget": [text]}
     assert faults(load, tables(page=[page])) == {
@@ -495,7 +495,7 @@ def test_faults_of_one_cause_are_one_and_tell_of_the_others(load: Load) -> None:
     }
 
 
-def test_a_package_that_is_nowhere_is_told_once(load: Load) -> None:
+def test_a_package_that_is_nowhere_is_reported_once(load: Load) -> None:
     lamps = [{**LAMP, "id": name.lower(), "type": f"my_robot/msg/{name}"} for name in ("Arm", "Leg")]
     page = {"id": "one", "title": "One", "widget": lamps}
     ((place, why),) = faults(load, tables(page=[page])).items()
@@ -504,7 +504,7 @@ def test_a_package_that_is_nowhere_is_told_once(load: Load) -> None:
     assert why.endswith("(also at page[0].widget[1].type)")
 
 
-def test_faults_are_told_in_the_order_of_the_file(load: Load, tmp_path: Path) -> None:
+def test_faults_are_reported_in_the_order_of_the_file(load: Load, tmp_path: Path) -> None:
     path = tmp_path / "cell.toml"
     path.write_text(
         '[[page]]\nid = "A"\ntitle = "One"\n[[interlock]]\nid = "a"\n'
@@ -545,13 +545,13 @@ def test_a_widget_id_is_unique_over_all_pages(load: Load) -> None:
     }
 
 
-def test_all_faults_of_the_shape_are_told_at_once(load: Load) -> None:
+def test_all_faults_of_the_shape_are_reported_at_once(load: Load) -> None:
     given = with_widget(1, topic="free", span=0)
     del given["title"]
     assert list(faults(load, given)) == ["title", f"{BUTTON}.span", f"{BUTTON}.topic"]
 
 
-def test_all_faults_of_names_and_messages_are_told_at_once(load: Load) -> None:
+def test_all_faults_of_names_and_messages_are_reported_at_once(load: Load) -> None:
     given = with_widget(1, interlock="other", message={"data": 5})
     given["interlock"] = [{**INTERLOCK, "field": "value"}, {**INTERLOCK, "id": "b", "type": TEXT}]
     assert sorted(faults(load, given)) == [
@@ -726,8 +726,8 @@ def test_an_interface_file_that_the_panel_does_not_need_may_have_a_fault(
     for name in ("Wear", "Tool"):
         (tmp_path / f"msgs/cell_msgs/msg/{name}.msg").write_text("float31 kelvin\n")
     load(with_doors("closed[0]"))
-    told = map(str, check_panel(tmp_path / "cell.toml").notes)
-    (note,) = (one for one in told if one.startswith("note: interfaces"))
+    notes = map(str, check_panel(tmp_path / "cell.toml").notes)
+    (note,) = (one for one in notes if one.startswith("note: interfaces"))
     assert note.startswith(
         "note: interfaces[0], line 1: cell_msgs/msg/Tool can't be used, and this panel "
     )

@@ -99,7 +99,7 @@ def test_an_id_is_no_longer_than_an_id_may_be() -> None:
     assert id_at("interlock[0]", {"interlock": [{"id": "x" * 1000}]}) == "x" * 64
 
 
-def test_what_is_nested_too_deep_is_told_without_lines() -> None:
+def test_what_is_nested_too_deep_is_reported_without_lines() -> None:
     text = "a = " + "[" * 3000 + "]" * 3000
     (fault,) = add_locations([Fault("a", "is wrong")], text, {})
     assert fault.line == 0

@@ -1,4 +1,4 @@
-"""Inputs, displays and QoS in a panel file: typed templates and what is told of a wrong one."""
+"""Inputs, displays and QoS in a panel file: typed templates and the faults of a wrong one."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -111,7 +111,7 @@ def test_an_input_fits_a_field_of_its_type(widgets: tuple[Mapping[str, Any], ...
         ),
     ],
 )  # fmt: skip
-def test_an_input_of_another_type_is_told_with_the_type_of_the_field(
+def test_an_input_of_another_type_is_reported_with_the_type_of_the_field(
     widgets: tuple[Mapping[str, Any], ...], fault: str
 ) -> None:
     (found,) = faults(*widgets)
@@ -205,7 +205,7 @@ def test_a_fault_deep_in_a_message_has_its_whole_place() -> None:
         ),
     ],
 )  # fmt: skip
-def test_a_fault_of_an_input_or_a_display_is_told(widget: Mapping[str, Any], fault: str) -> None:
+def test_a_fault_of_an_input_or_a_display_is_reported(widget: Mapping[str, Any], fault: str) -> None:
     (found,) = faults(widget)
     assert found.startswith(f"page[0].widget[0].{fault}")
 
@@ -306,7 +306,7 @@ def test_a_topics_qos_is_found_by_its_name() -> None:
     assert panel.qos("/heard").wire_qos.transient_local
 
 
-def test_what_depends_on_a_fault_that_is_told_already_is_not_judged() -> None:
+def test_what_depends_on_a_reported_fault_is_not_judged() -> None:
     panel = panel_of(MESSAGE, std("Float64", "{message}"))
     assert list(find_faults(panel, INTERFACES, {"message"})) == []
     assert [type(f) for f in find_faults(panel, INTERFACES, {"other"})] == [Fault]
@@ -348,7 +348,7 @@ def test_every_distribution_has_the_services_of_parameters(distro: str) -> None:
         ({"interlock": "door"}, '.interlock: no interlock "door"; there is operation'),
     ],
 )
-def test_a_parameter_that_does_not_fit_is_told(more: dict[str, Any], fault: str) -> None:
+def test_a_parameter_that_does_not_fit_is_reported(more: dict[str, Any], fault: str) -> None:
     assert faults({**PARAMETER, **more}) == [f"page[0].widget[0]{fault}"]
 
 
@@ -368,7 +368,7 @@ def test_a_parameter_has_one_type_in_a_panel() -> None:
         ({"step": 0}, "greater than 0"),
     ],
 )
-def test_a_parameter_whose_shape_is_wrong_is_told(more: dict[str, Any], fault: str) -> None:
+def test_a_parameter_whose_shape_is_wrong_is_reported(more: dict[str, Any], fault: str) -> None:
     with pytest.raises(ValidationError, match=fault):
         panel_of({**PARAMETER, **more})
 

@@ -101,8 +101,8 @@ class Grounds:
         self.said_at = 0.0
 
     def hold(self, now: float) -> bool:
-        told = self.way(now) and not self.wrong_type and self.value is True
-        if not told or (self.unheard and self.publisher):
+        permits = self.way(now) and not self.wrong_type and self.value is True
+        if not permits or (self.unheard and self.publisher):
             return False
         return not self.strict or (self.publisher and self.fresh(now))
 
@@ -237,13 +237,13 @@ class Panels(RuleBasedStateMachine):
 
     @precondition(lambda self: self.grounds.bridge)
     @rule(silent=some.booleans())
-    def bridge_is_asked(self, silent: bool) -> None:
+    def bridge_is_queried(self, silent: bool) -> None:
         self.robot.graph.update_versions({} if silent else {BRIDGE: "1"})
         self.grounds.silent = silent
 
     @precondition(lambda self: self.grounds.bridge)
     @rule(deaf=some.booleans())
-    def bridge_tells_its_routes(self, deaf: bool) -> None:
+    def bridge_reports_its_routes(self, deaf: bool) -> None:
         self.robot.graph.update_routes([Route(BRIDGE, "pub", self.key, BOOL, has_reader=not deaf)])
         self.grounds.unheard = deaf
 
@@ -300,15 +300,15 @@ class Panels(RuleBasedStateMachine):
     @rule(press_id=IDS, widget=BUTTONS, text=some.sampled_from(["a", "b"]))
     def pressed(self, press_id: str, widget: str, text: str) -> None:
         self.pressed_last = (press_id, widget, text)
-        puts, asked = len(self.way.put_texts), len(self.way.queries)
+        puts, queries = len(self.way.put_texts), len(self.way.queries)
         inputs = {"message": text}
         self.pending.append(self.loop.create_task(self.presses.press(widget, inputs, press_id, FROM)))
         self.loop.spin()
         if len(self.way.put_texts) > puts:
             assert self.grounds.hold(self.now), "sent without its grounds"
-        if len(self.way.queries) > asked:
+        if len(self.way.queries) > queries:
             assert self.grounds.way(self.now), "asked without a way"
-        self.sent += [press_id] * (len(self.way.put_texts) - puts + len(self.way.queries) - asked)
+        self.sent += [press_id] * (len(self.way.put_texts) - puts + len(self.way.queries) - queries)
 
     @rule()
     def pressed_again(self) -> None:
@@ -360,10 +360,10 @@ class Panels(RuleBasedStateMachine):
         done = [task for task in self.pending if task.done()]
         self.pending = [task for task in self.pending if not task.done()]
         for task in done:
-            told: Any = task.result()
-            kept = self.presses.receipt(told.id)
+            receipt: Any = task.result()
+            kept = self.presses.receipt(receipt.id)
             assert kept is not None
-            assert told.outcome == kept.outcome or told.outcome in CORRECTED
+            assert receipt.outcome == kept.outcome or receipt.outcome in CORRECTED
 
 
 Panels.TestCase.settings = FEW

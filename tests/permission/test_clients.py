@@ -1,4 +1,4 @@
-"""Browsers are told apart by their tokens, and named so that an operator knows which is meant."""
+"""Browsers are identified by their tokens, and named so that an operator knows which is meant."""
 
 import pytest
 
@@ -25,8 +25,8 @@ def test_a_token_is_random_and_long() -> None:
 
 
 def test_what_others_see_of_a_token_is_another_thing_and_stays_the_same() -> None:
-    first = Clients().seen(token(1), "192.0.2.7")
-    again = Clients().seen(token(1), "192.0.2.7")
+    first = Clients().identify(token(1), "192.0.2.7")
+    again = Clients().identify(token(1), "192.0.2.7")
     assert first.id == again.id == public_id(token(1))
     assert first.id not in token(1)
     assert public_id(token(2)) != first.id
@@ -34,15 +34,15 @@ def test_what_others_see_of_a_token_is_another_thing_and_stays_the_same() -> Non
 
 def test_browsers_are_numbered_as_they_come() -> None:
     browsers = Clients()
-    names = [browsers.seen(token(n), "192.0.2.7").name for n in (1, 2, 1, 3)]
+    names = [browsers.identify(token(n), "192.0.2.7").name for n in (1, 2, 1, 3)]
     assert english(names) == ["Panel 1", "Panel 2", "Panel 1", "Panel 3"]
 
 
 def test_the_name_in_a_sentence_has_the_address_of_another_machine() -> None:
     browsers = Clients()
-    far = browsers.seen(token(1), "192.0.2.7")
-    near = browsers.seen(token(2), "127.0.0.1")
-    more = browsers.seen(token(3), "::1")
+    far = browsers.identify(token(1), "192.0.2.7")
+    near = browsers.identify(token(2), "127.0.0.1")
+    more = browsers.identify(token(3), "::1")
     assert (str(far.title), str(far)) == ("Panel 1 (192.0.2.7)", "Panel 1 (192.0.2.7)")
     assert (str(near.title), str(near)) == (
         "The panel at the cell",
@@ -70,39 +70,39 @@ def test_the_name_in_a_sentence_has_the_address_of_another_machine() -> None:
     ],
 )
 def test_only_loopback_is_at_the_cell(address: str, local: bool, shown: str) -> None:
-    for browser in (Clients().seen(token(1), address), anonymous(address)):
+    for browser in (Clients().identify(token(1), address), anonymous(address)):
         assert (browser.local, browser.address) == (local, shown)
 
 
 def test_a_token_that_is_carried_to_another_machine_is_no_longer_at_the_cell() -> None:
     browsers = Clients()
-    assert browsers.seen(token(1), "127.0.0.1").local
-    moved = browsers.seen(token(1), "192.0.2.7")
+    assert browsers.identify(token(1), "127.0.0.1").local
+    moved = browsers.identify(token(1), "192.0.2.7")
     assert (moved.local, str(moved.name)) == (False, "Panel 1")
 
 
 def test_who_moves_in_the_network_keeps_the_name() -> None:
     browsers = Clients()
-    browsers.seen(token(1), "192.0.2.1")
-    browsers.seen(token(2), "192.0.2.2")
-    assert str(browsers.seen(token(2), "192.0.2.9")) == "Panel 2 (192.0.2.9)"
+    browsers.identify(token(1), "192.0.2.1")
+    browsers.identify(token(2), "192.0.2.2")
+    assert str(browsers.identify(token(2), "192.0.2.9")) == "Panel 2 (192.0.2.9)"
 
 
 def test_those_not_seen_for_longest_are_forgotten_and_their_numbers_free() -> None:
     browsers = Clients()
     for number in range(BROWSERS_KEPT):
-        browsers.seen(token(number), "192.0.2.7")
-    browsers.seen(token(0), "192.0.2.7")
-    assert browsers.seen(token(9999), "192.0.2.7").number == BROWSERS_KEPT + 1
-    assert browsers.seen(token(9998), "192.0.2.7").number == 2
-    assert browsers.seen(token(0), "192.0.2.7").number == 1
+        browsers.identify(token(number), "192.0.2.7")
+    browsers.identify(token(0), "192.0.2.7")
+    assert browsers.identify(token(9999), "192.0.2.7").number == BROWSERS_KEPT + 1
+    assert browsers.identify(token(9998), "192.0.2.7").number == 2
+    assert browsers.identify(token(0), "192.0.2.7").number == 1
 
 
 def test_who_does_not_come_back_takes_no_number() -> None:
     browsers = Clients()
     first = new_client(token(1), "192.0.2.7")
     assert (first.id, first.local) == (public_id(token(1)), False)
-    assert browsers.seen(token(2), "192.0.2.7").number == 1
+    assert browsers.identify(token(2), "192.0.2.7").number == 1
 
 
 def test_a_stranger_has_no_id() -> None:

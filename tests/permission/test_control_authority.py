@@ -25,9 +25,9 @@ TAKEOVER_S = RULES.takeover_after_s
 FORM_LIFE_S = 35.0
 
 _KNOWN = Clients()
-ANN, BOB, CY = (Principal(_KNOWN.seen(f"{n:032x}", f"192.0.2.{n}")) for n in (1, 2, 3))
-CELL, CELL2 = (Principal(_KNOWN.seen(f"{n:032x}", "127.0.0.1")) for n in (8, 9))
-NOBODY = Principal(anonymous("192.0.2.99"))
+ANN, BOB, CY = (Principal(_KNOWN.identify(f"{n:032x}", f"192.0.2.{n}")) for n in (1, 2, 3))
+CELL, CELL2 = (Principal(_KNOWN.identify(f"{n:032x}", "127.0.0.1")) for n in (8, 9))
+ANONYMOUS = Principal(anonymous("192.0.2.99"))
 
 
 class Room:
@@ -35,9 +35,9 @@ class Room:
 
     def __init__(self, rules: ControlRules = RULES, robot: str = "Robot 1") -> None:
         self.now = 1000.0
-        self.told: list[str] = []
+        self.logged: list[str] = []
         self.control = ControlAuthority(
-            rules, robot, monotonic=lambda: self.now, wall=lambda: self.now, tell=self.told.append
+            rules, robot, monotonic=lambda: self.now, wall=lambda: self.now, tell=self.logged.append
         )
 
     def pass_s(self, seconds: float, *alive: Principal, touched: bool = False) -> None:
@@ -67,7 +67,7 @@ def held(room: Room) -> Room:
 
 
 @pytest.fixture
-def asked(held: Room) -> Room:
+def requested(held: Room) -> Room:
     """Ann has control, and Bob asks for it."""
     assert held.control.ask(BOB) == ""
     return held
@@ -75,12 +75,12 @@ def asked(held: Room) -> Room:
 
 def test_where_it_is_not_required_everybody_may_press() -> None:
     room = Room(ControlRules(required=False))
-    assert all(room.may(one) for one in (ANN, CELL, NOBODY))
+    assert all(room.may(one) for one in (ANN, CELL, ANONYMOUS))
     assert not room.control.view()["required"]
     assert room.control.until == math.inf
 
 
-def test_at_first_nobody_has_it(room: Room) -> None:
+def test_at_first_no_client_has_it(room: Room) -> None:
     assert room.control.holder is None
     verdict = room.control.verdict(ANN)
     assert (verdict.permitted, verdict.code) == (False, "control_free")
@@ -90,7 +90,7 @@ def test_at_first_nobody_has_it(room: Room) -> None:
 
 def test_who_takes_it_may_press_and_all_others_read_who_has_it(held: Room) -> None:
     assert held.may(ANN)
-    for other in (BOB, CELL, NOBODY):
+    for other in (BOB, CELL, ANONYMOUS):
         verdict = held.control.verdict(other)
         assert verdict.code == "control_held"
         assert english(verdict.reason) == "Panel 1 (192.0.2.1) has control of Robot 1."
@@ -110,10 +110,10 @@ def test_a_press_takes_nothing(room: Room) -> None:
 
 
 def test_taking_twice_is_taking_once(held: Room) -> None:
-    lines = len(held.told)
+    lines = len(held.logged)
     assert held.control.take(ANN) == ""
     assert held.control.holder == ANN
-    assert len(held.told) == lines
+    assert len(held.logged) == lines
 
 
 def test_what_another_has_is_not_taken(held: Room) -> None:
@@ -122,22 +122,22 @@ def test_what_another_has_is_not_taken(held: Room) -> None:
 
 
 def test_who_has_no_token_gets_nothing(room: Room) -> None:
-    assert room.control.take(NOBODY) == room.control.ask(NOBODY) == "control_stranger"
+    assert room.control.take(ANONYMOUS) == room.control.ask(ANONYMOUS) == "control_stranger"
     assert room.control.until == math.inf
     room.control.take(ANN)
-    assert room.control.take(NOBODY) == room.control.ask(NOBODY) == "control_stranger"
+    assert room.control.take(ANONYMOUS) == room.control.ask(ANONYMOUS) == "control_stranger"
     assert (room.control.holder, room.control.requester) == (ANN, None)
-    assert room.control.give(NOBODY, "") == room.control.release(NOBODY) == "control_not_yours"
+    assert room.control.give(ANONYMOUS, "") == room.control.release(ANONYMOUS) == "control_not_yours"
 
 
-def test_the_panel_at_the_cell_takes_over(asked: Room) -> None:
-    assert asked.control.take(CELL) == ""
-    assert asked.control.holder == CELL
-    assert not asked.may(ANN)
-    assert asked.control.requester == BOB  # whose request is now shown there
+def test_the_panel_at_the_cell_takes_over(requested: Room) -> None:
+    assert requested.control.take(CELL) == ""
+    assert requested.control.holder == CELL
+    assert not requested.may(ANN)
+    assert requested.control.requester == BOB  # whose request is now shown there
 
 
-def test_the_panel_at_the_cell_asks_nobody(held: Room) -> None:
+def test_the_panel_at_the_cell_needs_no_consent(held: Room) -> None:
     assert held.control.ask(CELL) == ""
     assert held.control.holder == CELL
 
@@ -163,8 +163,8 @@ def test_the_holder_asks_for_nothing(held: Room) -> None:
     assert held.control.requester is None
 
 
-def test_a_request_is_shown_to_all(asked: Room) -> None:
-    view = asked.control.view()
+def test_a_request_is_shown_to_all(requested: Room) -> None:
+    view = requested.control.view()
     assert (view["holder"], view["asker"]) == (ANN.client.id, BOB.client.id)
     assert english(view["asker_name"]) == "Panel 2 (192.0.2.2)"
     assert english(view["holder_text"]) == (
@@ -176,63 +176,63 @@ def test_a_request_is_shown_to_all(asked: Room) -> None:
     assert view["since"] == "1970-01-01T00:16:40.000+00:00"
 
 
-def test_who_asks_may_not_press(asked: Room) -> None:
-    assert asked.may(ANN)
-    assert not asked.may(BOB)
+def test_who_asks_may_not_press(requested: Room) -> None:
+    assert requested.may(ANN)
+    assert not requested.may(BOB)
 
 
-def test_one_asks_at_a_time(asked: Room) -> None:
-    assert asked.control.ask(BOB) == ""
-    assert asked.control.ask(CY) == "control_asked_by"
-    assert asked.control.requester == BOB
+def test_one_asks_at_a_time(requested: Room) -> None:
+    assert requested.control.ask(BOB) == ""
+    assert requested.control.ask(CY) == "control_asked_by"
+    assert requested.control.requester == BOB
 
 
-def test_the_holder_gives(asked: Room) -> None:
-    assert asked.control.give(ANN, BOB.client.id) == ""
-    assert (asked.control.holder, asked.control.requester) == (BOB, None)
-    assert not asked.may(ANN)
+def test_the_holder_gives(requested: Room) -> None:
+    assert requested.control.give(ANN, BOB.client.id) == ""
+    assert (requested.control.holder, requested.control.requester) == (BOB, None)
+    assert not requested.may(ANN)
 
 
-def test_the_holder_keeps_and_the_request_can_be_repeated_later(asked: Room) -> None:
-    assert asked.control.keep(ANN, BOB.client.id) == ""
-    assert (asked.control.holder, asked.control.requester) == (ANN, None)
-    assert asked.control.ask(BOB) == "control_denied"
-    assert asked.control.ask(CY) == ""  # another one may
-    asked.control.keep(ANN, CY.client.id)
-    asked.pass_s(ASK_AGAIN_S, ANN)
-    assert asked.control.ask(BOB) == ""
+def test_the_holder_keeps_and_the_request_can_be_repeated_later(requested: Room) -> None:
+    assert requested.control.keep(ANN, BOB.client.id) == ""
+    assert (requested.control.holder, requested.control.requester) == (ANN, None)
+    assert requested.control.ask(BOB) == "control_denied"
+    assert requested.control.ask(CY) == ""  # another one may
+    requested.control.keep(ANN, CY.client.id)
+    requested.pass_s(ASK_AGAIN_S, ANN)
+    assert requested.control.ask(BOB) == ""
 
 
 @pytest.mark.parametrize("act", [ControlAuthority.give, ControlAuthority.keep])
-@pytest.mark.parametrize("who", [BOB, CY, CELL, NOBODY])
+@pytest.mark.parametrize("who", [BOB, CY, CELL, ANONYMOUS])
 def test_only_the_holder_answers_a_request(
-    asked: Room, act: Callable[[ControlAuthority, Principal, str], Refusal], who: Principal
+    requested: Room, act: Callable[[ControlAuthority, Principal, str], Refusal], who: Principal
 ) -> None:
-    assert act(asked.control, who, BOB.client.id) == "control_not_yours"
-    assert (asked.control.holder, asked.control.requester) == (ANN, BOB)
+    assert act(requested.control, who, BOB.client.id) == "control_not_yours"
+    assert (requested.control.holder, requested.control.requester) == (ANN, BOB)
 
 
 @pytest.mark.parametrize("act", [ControlAuthority.give, ControlAuthority.keep])
 @pytest.mark.parametrize("to", [CY.client.id, ANN.client.id, ""])
 def test_an_answer_is_for_the_request_that_was_on_the_screen(
-    asked: Room, act: Callable[[ControlAuthority, Principal, str], Refusal], to: str
+    requested: Room, act: Callable[[ControlAuthority, Principal, str], Refusal], to: str
 ) -> None:
-    assert act(asked.control, ANN, to) == "control_not_yours"
-    assert (asked.control.holder, asked.control.requester) == (ANN, BOB)
+    assert act(requested.control, ANN, to) == "control_not_yours"
+    assert (requested.control.holder, requested.control.requester) == (ANN, BOB)
 
 
-def test_a_request_that_was_withdrawn_can_not_be_granted(asked: Room) -> None:
-    assert asked.control.release(BOB) == ""
-    assert asked.control.give(ANN, BOB.client.id) == "control_not_yours"
-    assert asked.control.holder == ANN
+def test_a_request_that_was_withdrawn_can_not_be_granted(requested: Room) -> None:
+    assert requested.control.release(BOB) == ""
+    assert requested.control.give(ANN, BOB.client.id) == "control_not_yours"
+    assert requested.control.holder == ANN
 
 
-def test_a_request_goes_through_without_a_touch(asked: Room) -> None:
-    asked.pass_s(TAKEOVER_S - 0.5, ANN, BOB)
-    assert asked.control.holder == ANN
-    asked.pass_s(0.5, ANN, BOB)
-    assert (asked.control.holder, asked.control.requester) == (BOB, None)
-    assert not asked.may(ANN)
+def test_a_request_goes_through_without_a_touch(requested: Room) -> None:
+    requested.pass_s(TAKEOVER_S - 0.5, ANN, BOB)
+    assert requested.control.holder == ANN
+    requested.pass_s(0.5, ANN, BOB)
+    assert (requested.control.holder, requested.control.requester) == (BOB, None)
+    assert not requested.may(ANN)
 
 
 def test_the_holder_has_the_whole_time_from_the_request_on(held: Room) -> None:
@@ -242,33 +242,33 @@ def test_the_holder_has_the_whole_time_from_the_request_on(held: Room) -> None:
     assert held.control.holder == ANN
 
 
-def test_every_touch_makes_a_request_wait_longer(asked: Room) -> None:
-    asked.pass_s(5 * TAKEOVER_S, ANN, BOB, touched=True)
-    assert asked.control.holder == ANN
-    asked.pass_s(TAKEOVER_S, ANN, BOB)
-    assert asked.control.holder == BOB
+def test_every_touch_makes_a_request_wait_longer(requested: Room) -> None:
+    requested.pass_s(5 * TAKEOVER_S, ANN, BOB, touched=True)
+    assert requested.control.holder == ANN
+    requested.pass_s(TAKEOVER_S, ANN, BOB)
+    assert requested.control.holder == BOB
 
 
-def test_a_touch_of_another_counts_for_nothing(asked: Room) -> None:
+def test_a_touch_of_another_counts_for_nothing(requested: Room) -> None:
     for _ in range(int(TAKEOVER_S)):
-        asked.pass_s(1, ANN)
-        asked.control.keepalive(BOB, True)
-        asked.control.touch(CY)
-    assert asked.control.holder == BOB
+        requested.pass_s(1, ANN)
+        requested.control.keepalive(BOB, True)
+        requested.control.touch(CY)
+    assert requested.control.holder == BOB
 
 
-def test_a_press_is_a_touch(asked: Room) -> None:
-    asked.pass_s(TAKEOVER_S - 1, ANN, BOB)
-    asked.control.touch(ANN)
-    asked.pass_s(TAKEOVER_S - 1, ANN, BOB)
-    assert asked.control.holder == ANN
+def test_a_press_is_a_touch(requested: Room) -> None:
+    requested.pass_s(TAKEOVER_S - 1, ANN, BOB)
+    requested.control.touch(ANN)
+    requested.pass_s(TAKEOVER_S - 1, ANN, BOB)
+    assert requested.control.holder == ANN
 
 
-def test_who_got_it_has_time_before_it_is_taken_again(asked: Room) -> None:
-    asked.pass_s(TAKEOVER_S, ANN, BOB)
-    asked.control.ask(ANN)
-    asked.pass_s(TAKEOVER_S - 1, ANN, BOB)
-    assert asked.control.holder == BOB
+def test_who_got_it_has_time_before_it_is_taken_again(requested: Room) -> None:
+    requested.pass_s(TAKEOVER_S, ANN, BOB)
+    requested.control.ask(ANN)
+    requested.pass_s(TAKEOVER_S - 1, ANN, BOB)
+    assert requested.control.holder == BOB
 
 
 def test_a_shorter_time_may_be_set() -> None:
@@ -290,13 +290,13 @@ def test_who_gives_it_up_frees_it(held: Room) -> None:
     assert held.control.view()["since"] == ""
 
 
-def test_who_gives_it_up_while_asked_gives_it(asked: Room) -> None:
-    asked.control.release(ANN)
-    assert (asked.control.holder, asked.control.requester) == (BOB, None)
+def test_who_gives_it_up_while_asked_gives_it(requested: Room) -> None:
+    requested.control.release(ANN)
+    assert (requested.control.holder, requested.control.requester) == (BOB, None)
 
 
-@pytest.mark.parametrize("who", [BOB, CELL, NOBODY])
-def test_nobody_gives_up_what_another_has(held: Room, who: Principal) -> None:
+@pytest.mark.parametrize("who", [BOB, CELL, ANONYMOUS])
+def test_no_client_gives_up_what_another_has(held: Room, who: Principal) -> None:
     assert held.control.release(who) == "control_not_yours"
     assert held.control.holder == ANN
 
@@ -316,20 +316,20 @@ def test_a_lost_holder_frees_it_in_time(held: Room) -> None:
     assert held.control.holder is None
 
 
-def test_a_lost_holder_passes_it_to_who_asks(asked: Room) -> None:
-    asked.pass_s(LIFE_S, BOB)
-    assert (asked.control.holder, asked.control.requester) == (BOB, None)
+def test_a_lost_holder_passes_it_to_who_asks(requested: Room) -> None:
+    requested.pass_s(LIFE_S, BOB)
+    assert (requested.control.holder, requested.control.requester) == (BOB, None)
 
 
-def test_a_request_ends_with_its_asker(asked: Room) -> None:
-    asked.pass_s(LIFE_S, ANN)
-    assert (asked.control.holder, asked.control.requester) == (ANN, None)
+def test_a_request_ends_with_its_asker(requested: Room) -> None:
+    requested.pass_s(LIFE_S, ANN)
+    assert (requested.control.holder, requested.control.requester) == (ANN, None)
 
 
-def test_a_lost_holder_and_a_lost_asker_leave_it_free(asked: Room) -> None:
-    asked.now += 3600
-    assert (asked.control.holder, asked.control.requester) == (None, None)
-    assert not asked.may(BOB)
+def test_a_lost_holder_and_a_lost_asker_leave_it_free(requested: Room) -> None:
+    requested.now += 3600
+    assert (requested.control.holder, requested.control.requester) == (None, None)
+    assert not requested.may(BOB)
 
 
 def test_who_was_lost_takes_it_like_anybody(held: Room) -> None:
@@ -397,8 +397,8 @@ def test_what_was_given_up_is_taken_by_a_button_only(room: Room) -> None:
     assert room.control.holder == CELL
 
 
-def test_every_role_is_told_by_the_view(room: Room) -> None:
-    everybody = (ANN, BOB, CY, CELL, NOBODY)
+def test_every_role_is_in_the_view(room: Room) -> None:
+    everybody = (ANN, BOB, CY, CELL, ANONYMOUS)
     assert {room.role(one) for one in everybody} == {"free"}
     room.control.take(ANN)
     assert [room.role(one) for one in everybody] == ["holding", "held", "held", "over", "held"]
@@ -406,12 +406,12 @@ def test_every_role_is_told_by_the_view(room: Room) -> None:
     assert [room.role(one) for one in everybody] == ["asked", "asking", "held", "over", "held"]
 
 
-def test_the_log_tells_every_change_with_who_it_was(asked: Room) -> None:
-    asked.control.give(ANN, BOB.client.id)
-    asked.control.take(CELL)
-    asked.now += LIFE_S
-    asked.control.advance()
-    assert asked.told == [
+def test_the_log_says_every_change_with_who_it_was(requested: Room) -> None:
+    requested.control.give(ANN, BOB.client.id)
+    requested.control.take(CELL)
+    requested.now += LIFE_S
+    requested.control.advance()
+    assert requested.logged == [
         "control taken by Panel 1 (192.0.2.1)",
         "Panel 2 (192.0.2.2) asks for control",
         "control given by Panel 1 (192.0.2.1), now of Panel 2 (192.0.2.2)",
@@ -455,7 +455,7 @@ def test_one_line_requires_it(tmp_path: Path) -> None:
         ("[control]\nrequired = true\nlocl = true", 'control.locl: unknown key; did you mean "local"?'),
     ],
 )
-def test_what_is_wrong_with_the_table_is_told_with_all_else(
+def test_what_is_wrong_with_the_table_is_reported_with_all_else(
     tmp_path: Path, table: str, fault: str
 ) -> None:
     with pytest.raises(PanelError) as caught:
@@ -466,7 +466,7 @@ def test_what_is_wrong_with_the_table_is_told_with_all_else(
 
 # Whatever they do, in whatever order.
 
-EVERYBODY = (ANN, BOB, CY, CELL, CELL2, NOBODY)
+EVERYBODY = (ANN, BOB, CY, CELL, CELL2, ANONYMOUS)
 WHO = st.sampled_from(EVERYBODY)
 SCRIPTED = st.booleans()
 SECONDS = st.floats(0, 45, allow_nan=False)
@@ -580,17 +580,17 @@ class Everybody(RuleBasedStateMachine):
         assert holder is None or holder.client.id
 
     @invariant()
-    def nobody_absent_holds_or_asks(self) -> None:
+    def no_absent_client_holds_or_asks(self) -> None:
         for one in (self.room.control.holder, self.room.control.requester):
             assert one is None or self.alive_until[one] > self.room.now
 
     @invariant()
-    def nobody_gets_it_by_accident(self) -> None:
+    def no_client_gets_it_by_accident(self) -> None:
         for one in (self.room.control.holder, self.room.control.requester):
             assert one is None or one.client.id in self.wanted
 
     @invariant()
-    def nobody_asks_for_what_is_free_or_own(self) -> None:
+    def no_client_asks_for_what_is_free_or_own(self) -> None:
         asker = self.room.control.requester
         assert asker is None or self.room.control.holder not in (None, asker)
 

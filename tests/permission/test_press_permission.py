@@ -47,10 +47,10 @@ def alarm(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(press_permission, "CHECKS", (*CHECKS[:3], row, *CHECKS[3:]))
 
 
-def test_the_first_that_locks_is_told() -> None:
+def test_the_first_that_locks_is_reported() -> None:
     everything = Grounds(locked("control"), "The disk is full.", ending=True)
-    asked = question(link=locked("link"), interlocks=[locked("one")], grounds=everything)
-    assert permission(asked).code == "link"
+    one_press = question(link=locked("link"), interlocks=[locked("one")], grounds=everything)
+    assert permission(one_press).code == "link"
     assert permission(question(interlocks=[locked("one")], grounds=everything)).code == "ending"
     without = Grounds(locked("control"), "The disk is full.")
     log = permission(question(interlocks=[locked("one")], grounds=without))
@@ -68,7 +68,7 @@ def test_when_time_alone_would_change_it_is_the_soonest_of_all() -> None:
     assert permission(question()).until == math.inf
 
 
-def test_verdicts_of_several_are_told_in_their_order() -> None:
+def test_verdicts_of_several_are_reported_in_their_order() -> None:
     pair = combined([locked("one"), locked("two")])
     assert combined([PERMITTED, locked("zero"), pair]).reasons == [
         "locked by zero",

@@ -6,7 +6,7 @@ from app.permission.clients import Clients
 from app.permission.control_authority import ControlAuthority
 from app.permission.principal import Principal
 
-CLIENT = Clients().seen("1" * 32, "192.0.2.1")
+CLIENT = Clients().identify("1" * 32, "192.0.2.1")
 
 
 def test_without_users_a_principal_is_its_client() -> None:

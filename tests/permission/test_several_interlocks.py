@@ -13,7 +13,7 @@ from app.permission.control_authority_view import NO_CONTROL, ControlView
 from app.permission.interlocks import PERMITTED, Verdict
 from app.permission.press_permission import combined, judged
 from app.robot.state import RobotState
-from app.view.view import build_view, seen_as
+from app.view.view import build_view, for_role
 from tests.browser.test_pages import SIZES as LARGE
 from tests.commands.test_holds import JOG, MOVES, SPEED, STOPS
 from tests.commands.test_holds import Bench as HoldBench
@@ -78,7 +78,7 @@ def test_all_have_to_permit(permitted: bool, closed: bool) -> None:
     assert english(verdict.reason) == (reasons[0] if reasons else None)
 
 
-def test_the_order_of_the_file_says_which_is_told_first() -> None:
+def test_the_order_of_the_file_says_which_is_reported_first() -> None:
     panel = cell(MESSAGE, {**GUARDED, "interlock": ["doors", "operation"]})
     robot = robot_there(panel)
     permits(robot, False)
@@ -98,13 +98,13 @@ def test_the_first_that_grows_old_ends_it() -> None:
     ]
 
 
-def test_one_reason_is_told_once() -> None:
+def test_one_reason_is_reported_once() -> None:
     locked = Verdict(False, "waiting", WAITS)
     assert combined([locked, locked]).reasons == [WAITS]
     assert combined([]) is combined([PERMITTED, PERMITTED]) is PERMITTED
 
 
-def test_without_a_way_nothing_else_is_told() -> None:
+def test_without_a_way_that_is_the_only_reason() -> None:
     panel = cell()
     robot = robot_there(panel)
     robot.link_up = False
@@ -113,7 +113,7 @@ def test_without_a_way_nothing_else_is_told() -> None:
     ]
 
 
-def test_what_is_against_the_command_itself_is_told_first() -> None:
+def test_what_is_against_the_command_itself_is_reported_first() -> None:
     panel = cell()
     robot = robot_there(panel)
     endpoint(robot, "MS", "/guarded", BOOL)
@@ -141,15 +141,15 @@ def test_a_view_lists_all_reasons_of_a_control_with_several() -> None:
     assert shown["guarded"] == {"enabled": True, "reason": None, "reasons": "", "more": ""}
 
 
-def test_who_has_not_control_is_told_that_alone() -> None:
+def test_without_control_that_is_the_only_reason() -> None:
     panel = cell(control={"required": True})
     robot = robot_there(panel)
-    control: ControlView = {**NO_CONTROL, "required": True, "text": "Nobody has control."}
-    lock = Verdict(False, "control_free", "Nobody has control.")
-    seen = build_view(panel, robot, NOW, control=control, control_lock=lock)
-    view = seen_as(seen.view, seen.without_control, "free")
+    control: ControlView = {**NO_CONTROL, "required": True, "text": "Not in control."}
+    lock = Verdict(False, "control_free", "Not in control.")
+    built = build_view(panel, robot, NOW, control=control, control_lock=lock)
+    view = for_role(built.view, built.without_control, "free")
     assert view["widgets"]["guarded"] == {
-        "enabled": False, "reason": "Nobody has control.", "reasons": "Nobody has control.", "more": "",
+        "enabled": False, "reason": "Not in control.", "reasons": "Not in control.", "more": "",
     }  # fmt: skip
     assert view["widgets"]["message"] == {}
 
@@ -279,7 +279,7 @@ def test_an_operator_with_gloves_reads_all_reasons(
     context.close()
 
 
-def test_a_page_without_its_server_tells_that_alone(
+def test_a_page_without_its_server_shows_that_alone(
     page: Page, servers: Callable[[Server], Server], tmp_path: Path
 ) -> None:
     mine = servers(demo_server(tmp_path, PANEL))

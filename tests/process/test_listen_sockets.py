@@ -25,7 +25,7 @@ def test_a_listening_socket_is_found_and_no_other() -> None:
     assert listen_sockets.listener_names() == before
 
 
-def test_who_waits_for_it_is_told_when_it_listens() -> None:
+def test_who_waits_for_it_is_notified_when_it_listens() -> None:
     async def work() -> None:
         waiting = asyncio.create_task(listen_sockets.wait_for_listener(listen_sockets.listener_names()))
         await asyncio.sleep(0)

@@ -1,4 +1,4 @@
-"""The first signal waits for what has to be told; no other one takes its place, but a second Ctrl+C."""
+"""The first signal waits for the answers that are due; a second Ctrl+C ends at once, no other does."""
 
 import asyncio
 import faulthandler
@@ -35,8 +35,8 @@ def heard() -> Iterator[list[int]]:
     faulthandler.cancel_dump_traceback_later()
 
 
-class Told:
-    """A process that was told to end, and has not told all yet."""
+class EndingProcess:
+    """A process after a signal to end, with answers that are still due."""
 
     def __init__(self) -> None:
         self.ending, self.may_end = asyncio.Event(), asyncio.Event()
@@ -57,16 +57,16 @@ class Told:
 
 
 @pytest.mark.parametrize(("by", "later"), [(TERM, TERM), (INT, TERM), (HUP, HUP), (HUP, TERM)])
-def test_who_listened_is_told_after_it_and_once(
+def test_who_listened_is_notified_after_it_and_once(
     heard: list[int], by: signal.Signals, later: signal.Signals
 ) -> None:
     async def run() -> None:
-        told = Told()
+        process = EndingProcess()
         with ExitStack() as stack:
-            await told.by(by, stack)
+            await process.by(by, stack)
             signal.raise_signal(later)
             assert heard == []
-            await told.ended()
+            await process.ended()
 
     asyncio.run(run())
     assert heard == [INT if by is INT else TERM]
@@ -74,12 +74,12 @@ def test_who_listened_is_told_after_it_and_once(
 
 def test_a_second_interrupt_waits_for_nothing_and_a_third_one_is_passed_on(heard: list[int]) -> None:
     async def run() -> None:
-        told = Told()
+        process = EndingProcess()
         with ExitStack() as stack:
-            await told.by(INT, stack)
+            await process.by(INT, stack)
             signal.raise_signal(INT)
             assert heard == [INT]
-            await told.ended()
+            await process.ended()
             assert heard == [INT]
             signal.raise_signal(INT)
 
@@ -87,7 +87,7 @@ def test_a_second_interrupt_waits_for_nothing_and_a_third_one_is_passed_on(heard
     assert heard == [INT, INT]
 
 
-def test_what_fails_in_it_is_logged_and_keeps_nobody(
+def test_what_fails_in_it_is_logged_and_stops_nothing_else(
     heard: list[int], caplog: pytest.LogCaptureFixture
 ) -> None:
     async def fail() -> None:

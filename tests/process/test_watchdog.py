@@ -1,4 +1,4 @@
-"""What the service manager is told, on a real socket of its protocol, by the real server."""
+"""What the service manager is sent, on a real socket of its protocol, by the real server."""
 
 import asyncio
 import os
@@ -56,8 +56,8 @@ class Listener:
         """The next message with this name."""
         end = time.monotonic() + 20
         while time.monotonic() < end:
-            if name in (told := self.next()):
-                return told
+            if name in (message := self.next()):
+                return message
         raise AssertionError(f"no {name}")
 
     def silent_for(self, name: str, seconds: float) -> bool:
@@ -90,7 +90,7 @@ def listener(tmp_path: Path) -> Iterator[Listener]:
 
 
 @pytest.mark.real_time
-def test_it_tells_ready_when_it_serves_then_how_it_is_and_that_it_ends(address: str) -> None:
+def test_it_says_ready_when_it_serves_then_how_it_is_and_that_it_ends(address: str) -> None:
     manager = Listener(address)
     port = free_port()
     command = [sys.executable, "-m", "uvicorn", "app.main:app", "--port", str(port)]
@@ -101,9 +101,9 @@ def test_it_tells_ready_when_it_serves_then_how_it_is_and_that_it_ends(address: 
         assert answer.status_code == 200  # the first request, at once
         times = []
         for _ in range(5):
-            told = manager.until("WATCHDOG")
+            message = manager.until("WATCHDOG")
             times.append(time.monotonic())
-            assert "STATUS" in told
+            assert "STATUS" in message
         assert max(later - earlier for earlier, later in pairwise(times)) < INTERVAL_S
         until(lambda: ready(manager), "the state in words")
         process.send(signal.SIGTERM)
@@ -132,7 +132,7 @@ def test_no_ping_while_a_callback_holds_the_links_lock(
 ) -> None:
     process, http = wounded
     process.send(signal.SIGUSR1)
-    until(lambda: "does not respond" in listener.next()["STATUS"], "it is told")
+    until(lambda: "does not respond" in listener.next()["STATUS"], "it is reported")
     assert listener.silent_for("WATCHDOG", 2 * INTERVAL_S)
     assert http.get("/healthz").status_code == 200
     assert process.count("[FATAL]") == 1
@@ -184,10 +184,10 @@ def test_the_interval_is_this_processs_own(env: dict[str, str], interval_s: floa
     assert ServiceManager(env).interval_s is None
 
 
-def test_a_manager_that_does_not_listen_is_told_of_once(
+def test_a_manager_that_does_not_listen_is_logged_once(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
-    manager = ServiceManager({"NOTIFY_SOCKET": str(tmp_path / "nobody")})
+    manager = ServiceManager({"NOTIFY_SOCKET": str(tmp_path / "no-listener")})
     manager.notify("READY=1")
     manager.notify("WATCHDOG=1")
     assert len(caplog.records) == 1
@@ -200,5 +200,5 @@ def test_a_state_is_one_line() -> None:
     assert len(status_line("x" * 10_000)) < 4096
 
 
-def test_nothing_runs_where_nobody_asked() -> None:
+def test_nothing_runs_without_a_service_manager() -> None:
     asyncio.run(asyncio.wait_for(Watchdog(ServiceManager({}), lambda: (), lambda: "").run(), 1))

@@ -209,12 +209,12 @@ class Cell:
         self.recordings = Recordings(folder, self.rules.max_mb, 1)
         robot = RobotState(self.panel, INTERFACES, DIALECT, KIOSK)
         self.recorder = Recorder(self.panel, self.rules, INTERFACES, robot, "", self.recordings)
-        self.told = 0
+        self.notified = 0
         self.recordings.add_listener(self._count)
         self.recordings.start()
 
     def _count(self) -> None:
-        self.told += 1
+        self.notified += 1
 
     def says(self, text: str, ago: float = 0.0) -> None:
         payload = INTERFACES.encode(TEXT, {"data": text})
@@ -268,9 +268,9 @@ def test_a_recording_goes_from_before_a_press_to_after_it(run: Callable[..., Non
         received = messages(cell.folder, "/heard")
         assert received[1].log_time - received[0].log_time == pytest.approx(4e9, rel=0.1)
         assert {message.publish_time for message in received} == {1_500_000_000}
-        told = [json.loads(m.data) for m in messages(cell.folder, PRESS_TOPIC)]
-        assert [one["outcome"] for one in told] == [None, "published"]
-        assert told[1] == {
+        presses = [json.loads(m.data) for m in messages(cell.folder, PRESS_TOPIC)]
+        assert [one["outcome"] for one in presses] == [None, "published"]
+        assert presses[1] == {
             "id": "p1",
             "widget": "free",
             "who": "10.0.0.1",
@@ -283,14 +283,14 @@ def test_a_recording_goes_from_before_a_press_to_after_it(run: Callable[..., Non
     run(test)
 
 
-def test_presses_that_come_meanwhile_prolong_the_same_file(run: Callable[..., None]) -> None:
+def test_presses_during_a_recording_prolong_the_same_file(run: Callable[..., None]) -> None:
     async def test(cell: Cell) -> None:
         for number in range(8):  # each well within the window of the last, together longer than one
             cell.press(f"p{number}", "refused" if number % 2 else "published")
             await asyncio.sleep(0.05)
         await cell.finished()
-        told = [json.loads(m.data)["id"] for m in messages(cell.folder, PRESS_TOPIC)]
-        assert told == [f"p{number}" for number in range(8) for _ in range(2)]
+        presses = [json.loads(m.data)["id"] for m in messages(cell.folder, PRESS_TOPIC)]
+        assert presses == [f"p{number}" for number in range(8) for _ in range(2)]
 
     run(test)
 
@@ -302,8 +302,8 @@ def test_a_recording_waits_for_the_receipt(run: Callable[..., None]) -> None:
         assert list(cell.folder.glob("*.mcap")) == []
         cell.press("slow", "timed_out")
         await cell.finished()
-        told = [json.loads(m.data)["outcome"] for m in messages(cell.folder, PRESS_TOPIC)]
-        assert told[-1] == "timed_out"
+        presses = [json.loads(m.data)["outcome"] for m in messages(cell.folder, PRESS_TOPIC)]
+        assert presses[-1] == "timed_out"
 
     run(test)
 
@@ -345,7 +345,7 @@ def test_the_folder_stays_within_its_bound(run: Callable[..., None]) -> None:
     run(test, before_s=0.0)
 
 
-def test_a_disk_that_takes_nothing_is_told_and_a_press_tries_again(
+def test_a_disk_that_takes_nothing_is_reported_and_a_press_tries_again(
     run: Callable[..., None], caplog: pytest.LogCaptureFixture
 ) -> None:
     async def test(cell: Cell) -> None:
@@ -356,7 +356,7 @@ def test_a_disk_that_takes_nothing_is_told_and_a_press_tries_again(
         cell.folder.rmdir()
         cell.folder.write_text("in the way")
         cell.press()
-        while not cell.told:
+        while not cell.notified:
             await asyncio.sleep(0.01)
         assert "Presses are not recorded: " in str(cell.recordings.fault)
         assert "They are sent as usual." in str(cell.recordings.fault)
@@ -367,7 +367,7 @@ def test_a_disk_that_takes_nothing_is_told_and_a_press_tries_again(
         while cell.recordings.fault:
             await asyncio.sleep(0.01)
         await asyncio.sleep(0)
-        assert cell.told == 2
+        assert cell.notified == 2
 
     run(test)
     assert "recording stopped, in " in caplog.text

@@ -87,7 +87,7 @@ def test_nodes_go_with_their_bridge(graph: Graph) -> None:
         ("MP", OTHER_KIOSK, "MP"),
     ],
 )
-def test_a_counterpart_of_another_type_is_told(
+def test_a_counterpart_of_another_type_is_reported(
     graph: Graph, panel_role: TopicRole, zid: str, role: TopicRole
 ) -> None:
     graph.apply_token(topic_token(zid, role, "a", TEXT), True)
@@ -125,7 +125,9 @@ def test_a_type_is_right_again_when_the_wrong_one_ends(graph: Graph) -> None:
 
 
 @pytest.mark.parametrize(("role", "direction"), [("MS", "pub"), ("MP", "sub")])
-def test_a_bridges_route_of_another_type_is_told(graph: Graph, role: TopicRole, direction: str) -> None:
+def test_a_bridges_route_of_another_type_is_reported(
+    graph: Graph, role: TopicRole, direction: str
+) -> None:
     graph.update_routes([Route(BRIDGE, "pub" if direction == "pub" else "sub", "a", TEXT)])
     assert graph.mismatched_type(role, "a", BOOL) == TEXT
     assert graph.mismatched_type(role, "a", TEXT) is None
@@ -238,7 +240,7 @@ LATCHED = Qos(transient_local=True)
         ("MP", Qos(depth=1), Qos(depth=5), None),
     ],
 )
-def test_a_qos_that_dds_would_not_match_is_told(
+def test_a_qos_that_dds_would_not_match_is_reported(
     graph: Graph, role: TopicRole, robots: Qos, panels: Qos, code: str | None
 ) -> None:
     theirs: TopicRole = "MP" if role == "MS" else "MS"
@@ -272,11 +274,11 @@ def test_a_robots_bridges_are_those_of_its_namespace() -> None:
     graph = Graph(DIALECT, KIOSK, "/robot1")
     for zid in ("b1", "b2", "b3"):
         graph.apply_token(bridge_token(zid), True)
-    assert graph.bridges == {"b1", "b2", "b3"}  # no one has told yet
+    assert graph.bridges == {"b1", "b2", "b3"}  # none has reported its namespace yet
     graph.update_namespaces({"b1": "/robot1", "b2": "/robot10"})
     assert graph.bridges == {"b1"}
     graph.apply_token(bridge_token("b1"), False)
-    assert graph.bridges == {"b3"}  # it may be the robot's: it has not told
+    assert graph.bridges == {"b3"}  # it may be the robot's: it has not reported its namespace
     graph.update_namespaces({"b3": ""})
     assert graph.bridges == {"b3"}  # robots with namespaces of their own are behind it
     graph.update_namespaces({"b3": "/robot2"})

@@ -77,9 +77,11 @@ def test_a_raw_picture_has_its_colours(encoding: str, pixel: bytes, colour: tupl
     found = shown(raw(encoding, 17, 9, data[:-3], step=step))
     assert found.size == (17, 9)
     for at in ((0, 0), (16, 0), (0, 8), (16, 8)):
-        seen = found.convert("RGB").getpixel(at)
-        assert isinstance(seen, tuple)
-        assert all(abs(one - other) <= 8 for one, other in zip(seen, colour, strict=True)), seen
+        shown_pixel = found.convert("RGB").getpixel(at)
+        assert isinstance(shown_pixel, tuple)
+        assert all(abs(one - other) <= 8 for one, other in zip(shown_pixel, colour, strict=True)), (
+            shown_pixel
+        )
 
 
 @pytest.mark.parametrize(

@@ -123,7 +123,7 @@ def test_what_comes_from_a_cache_is_never_fresh(robot: RobotState) -> None:
     assert says(robot, JOINED + 30.0)
 
 
-def test_the_inbox_tells_what_came_from_a_cache() -> None:
+def test_the_inbox_says_what_came_from_a_cache() -> None:
     inbox = Inbox(lambda _: None)
     inbox.put_cached(KEY, TRUE, None)
     assert inbox.drain().samples[KEY].cached

@@ -219,7 +219,7 @@ ORDERS: list[tuple[tuple[Event, ...], str]] = [
     ((true, appears, goes, appears, true), "permitted"),
     ((appears, true, goes, appears), "new_publisher"),
     ((appears, goes), "waiting"),
-    ((true, appears, appears), "permitted"),  # told twice
+    ((true, appears, appears), "permitted"),  # announced twice
 ]
 
 
@@ -244,7 +244,7 @@ def test_the_reason_names_the_topic(incoming: Incoming) -> None:
     )
 
 
-def test_a_new_session_starts_without_the_doubts_of_the_last(incoming: Incoming) -> None:
+def test_a_new_session_starts_without_the_silence_of_the_last(incoming: Incoming) -> None:
     for event in (true, appears, goes, appears, looked):
         event(incoming)
     incoming.robot.mark_link_lost()

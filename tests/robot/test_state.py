@@ -27,10 +27,10 @@ class Counted:
 
     def __init__(self, data: bytes) -> None:
         self.data = data
-        self.asked = 0
+        self.reads = 0
 
     def __bytes__(self) -> bytes:
-        self.asked += 1
+        self.reads += 1
         return self.data
 
     def __len__(self) -> int:
@@ -79,10 +79,10 @@ def test_a_namespace_stands_before_every_key() -> None:
 def test_a_sample_is_decoded_once_and_only_when_it_is_asked_for(robot: RobotState) -> None:
     payload = Counted(INTERFACES.encode(TEXT, {"data": "hello"}))
     robot.update(robot.key("/heard"), Sample(payload, 1, 0.0, 0.0, BRIDGE))
-    assert payload.asked == 0
+    assert payload.reads == 0
     robot.reading("/heard")
     robot.reading("/heard")
-    assert payload.asked == 1
+    assert payload.reads == 1
 
 
 def test_bytes_that_are_no_message_are_unreadable(robot: RobotState) -> None:

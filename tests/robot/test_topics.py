@@ -307,8 +307,8 @@ def test_a_whole_message_of_many_elements_is_not_built() -> None:
 def test_the_most_parameters_that_one_event_may_have_are_read_in_a_moment() -> None:
     event = "rcl_interfaces/msg/ParameterEvent"
     one = {"value": {"type": 4, "string_value": "x" * 20}}
-    told = [{"name": f"parameter_{number}", **one} for number in range(1990)]
-    data = INTERFACES.encode(event, {"node": "/arm", "changed_parameters": told})
+    changed = [{"name": f"parameter_{number}", **one} for number in range(1990)]
+    data = INTERFACES.encode(event, {"node": "/arm", "changed_parameters": changed})
     took = []
     for _ in range(5):  # the least: another program shares the processor
         before = time.thread_time()

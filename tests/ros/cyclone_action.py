@@ -1,4 +1,4 @@
-"""The action server /fibonacci, with goals that run side by side and end as a test tells them."""
+"""The action server /fibonacci, with goals that run side by side and end as a test wants."""
 
 import threading
 import time
@@ -51,7 +51,7 @@ class Goal:
 
 
 class Fibonacci:
-    """A goal of order n ends with n + 1 numbers, one more at each step, each told as feedback."""
+    """A goal of order n ends with n + 1 numbers, one more at each step, each published as feedback."""
 
     def __init__(self, node: Node, name: str = "/fibonacci") -> None:
         self.step_s = 0.05

@@ -1,7 +1,7 @@
 """A ROS 2 node on Cyclone DDS itself, on the wire as rmw_cyclonedds makes one.
 
 Topics are `rt/<name>`, a service's requests `rq/<name>Request` and its replies `rr/<name>Reply`,
-each with rmw_cyclonedds' header. `ros_discovery_info` tells which of them are this node's.
+each with rmw_cyclonedds' header. `ros_discovery_info` says which of them are this node's.
 """
 
 import sys
@@ -147,7 +147,7 @@ class Node:
         self._thread.start()
 
     def tell(self) -> None:
-        """Tells which readers and writers are this node's; again whenever they have changed."""
+        """Publishes which readers and writers are this node's; again whenever they have changed."""
         node = NodeEntitiesInfo("/", self.name, list(self._readers), list(self._writers))
         self._info.write(ParticipantEntitiesInfo(_gid(self._participant), [node]))
 

@@ -105,7 +105,7 @@ class Parameters:
         self._node_name = f"/{node.name}"
         self._declared = {p.descriptor.name: p for p in robot_parameters()}
         self._silent: dict[str, float | None] = {}
-        self._asked: list[str] = []
+        self._requests: list[str] = []
         self.refusal = ""  # why every set is refused
         self._events = node.advertise(
             "/parameter_events", ParameterEvent, qos_of(1000, user_data=f"typehash={EVENT_HASH};")
@@ -128,7 +128,7 @@ class Parameters:
 
     def _served(self, service: str, handler: Callable[..., None]) -> Callable[..., None]:
         def serve(request: Any, answer: Answer) -> None:
-            self._asked.append(service)
+            self._requests.append(service)
             delay = self._silent.get(service, 0.0)
             if delay == 0.0:
                 handler(request, answer)
@@ -139,16 +139,16 @@ class Parameters:
 
         return serve
 
-    def asked(self, service: str) -> int:
+    def requests(self, service: str) -> int:
         """How often a service was asked."""
-        return self._asked.count(service)
+        return self._requests.count(service)
 
     def answer(self, service: str, seconds: float | None) -> None:
         """After how many seconds a service does what it is asked and answers; None: never."""
         self._silent[service] = seconds
 
     def declare(self, name: str, value: Any, **more: Any) -> None:
-        """Declares a parameter, or declares it again, and tells of it."""
+        """Declares a parameter, or declares it again, and publishes the change."""
         type_ = kind_of(value)
         self._declared[name] = Declared(ParameterDescriptor(name, type_, **more), value)
         self._tell([], new=[self._declared[name]])
@@ -165,7 +165,7 @@ class Parameters:
         return {name: p.value for name, p in self._declared.items()}
 
     def take(self, name: str, value: Any) -> None:
-        """The robot itself changes a parameter, whatever its descriptor says, and tells of it."""
+        """The robot itself changes a parameter, whatever its descriptor says; publishes it."""
         self._declared[name].value = value
         self._tell([self._declared[name]])
 
@@ -212,5 +212,5 @@ class Parameters:
         self, changed: list[Declared], new: Sequence[Declared] = (), deleted: Sequence[Declared] = ()
     ) -> None:
         stamp = Time.at(time.time_ns())
-        told = [[p.parameter for p in some] for some in (new, changed, deleted)]
-        self._events.write(ParameterEvent(stamp, self._node_name, *told))
+        names = [[p.parameter for p in some] for some in (new, changed, deleted)]
+        self._events.write(ParameterEvent(stamp, self._node_name, *names))

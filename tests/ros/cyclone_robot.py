@@ -111,8 +111,8 @@ class Commands:
     def refuse_parameters(self, reason: str) -> None:
         self._parameters.refusal = reason
 
-    def asked_parameters(self, service: str) -> int:
-        return self._parameters.asked(service)
+    def parameter_requests(self, service: str) -> int:
+        return self._parameters.requests(service)
 
     def advertise(self, topic: str, type: str, **qos: Any) -> None:
         idl, hash_ = TOPIC_TYPES[type]

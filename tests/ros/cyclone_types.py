@@ -328,7 +328,7 @@ class DescribeParameters_Response(IdlStruct, typename=parameter_service("Describ
     descriptors: sequence[ParameterDescriptor]
 
 
-# Descriptions of types, and a message whose package nobody else has.
+# Descriptions of types, and a message whose package is not known elsewhere.
 
 
 @dataclass

@@ -164,14 +164,14 @@ class Commands:
         """`ros2 topic pub --once`: advertise, wait for a subscriber, publish, go away.
 
         Like that tool, it lets some time pass between the match and the message: a reader that
-        has not discovered this writer yet would miss it, whoever reads.
+        has not discovered this writer yet would miss it, whatever reads.
         """
         self.advertise(topic, type)
         publisher = self.publishers[topic]
         end = time.monotonic() + timeout_s
         while publisher.get_subscription_count() == 0:
             if time.monotonic() > end:
-                raise TimeoutError(f"nobody subscribes to {topic}")
+                raise TimeoutError(f"no node subscribes to {topic}")
             time.sleep(0.01)
         time.sleep(0.3)
         self.publish(topic, fields)

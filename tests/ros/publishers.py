@@ -81,7 +81,7 @@ class Commands:
         end = time.monotonic() + MATCHED_WITHIN_S
         while matched and self._publisher.subscribers() == 0:
             if time.monotonic() > end:
-                raise TimeoutError(f"nobody subscribes to {topic}")
+                raise TimeoutError(f"no node subscribes to {topic}")
             time.sleep(0.1)  # as the command line looks
         for number in range(times):
             time.sleep(period_s if number else 0)

@@ -100,7 +100,7 @@ class TinyRobot:
         self._session = session
         self.zid = str(session.zid())
         self.heard: list[tuple[str, bytes]] = []
-        self.asked: list[bytes] = []
+        self.attachments: list[bytes] = []
         self._declared: list[Any] = [
             session.declare_subscriber(
                 "7/go/std_msgs::msg::String/h1", Callback(self._hear, indirect=False)
@@ -139,7 +139,7 @@ class TinyRobot:
     def _serve(self, query: zenoh.Query) -> None:
         with query:
             assert query.attachment is not None
-            self.asked.append(query.attachment.to_bytes())
+            self.attachments.append(query.attachment.to_bytes())
             answer = INTERFACES.encode(f"{TRIGGER}_Response", {"success": True, "message": "done"})
             query.reply("7/reset/std_srvs::srv::Trigger/h2", answer)
 
@@ -180,7 +180,7 @@ def test_a_robot_without_a_bridge_is_reached_by_its_own_keys(peer: tuple[str, ze
         await when(lambda: one.publisher.view["widgets"]["reset"]["enabled"])
         receipt = await one.presses.press("reset", {}, "p3", FROM)
         assert receipt.outcome == "succeeded", receipt.reason
-        assert robot.asked == [b"1 of " + zid]
+        assert robot.attachments == [b"1 of " + zid]
         own = {f"tiny/{one.link.zid}/node", f"tiny/{one.link.zid}/MP/go/std_msgs%msg%String"}
         assert own <= await asyncio.to_thread(robot.nodes)
 

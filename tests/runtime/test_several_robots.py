@@ -102,8 +102,8 @@ def test_nothing_is_pressed_for_an_unnamed_robot(ten: Server) -> None:
     unknown = ten.robot("r99").press("operation", "whose?")
     assert unknown.status_code == 404
     assert 'no robot "r99"' in unknown.json()["error"]
-    for nobody in (ten, ten.robot("r99")):
-        with pytest.raises(InvalidStatus), nobody.socket():
+    for absent in (ten, ten.robot("r99")):
+        with pytest.raises(InvalidStatus), absent.socket():
             raise AssertionError("it opened")
     for number in range(MANY):
         assert "whose?" not in heard(ten.robot(f"r{number + 1}"))
@@ -111,11 +111,11 @@ def test_nothing_is_pressed_for_an_unnamed_robot(ten: Server) -> None:
 
 def test_a_press_by_what_another_robots_page_showed_is_refused(ten: Server, way: str) -> None:
     ten = ten.by(way)
-    seen = ten.robot("r1").snapshot()["id"]
-    answer = ten.robot("r2").press("operation", "not this one", seen=seen)
+    event_id = ten.robot("r1").snapshot()["id"]
+    answer = ten.robot("r2").press("operation", "not this one", seen=event_id)
     assert (answer.status_code, answer.json()["outcome"]) == (409, "refused")
     assert "another robot" in answer.json()["reason"]
-    assert ten.robot("r1").press("operation", "this one", seen=seen).status_code == 200
+    assert ten.robot("r1").press("operation", "this one", seen=event_id).status_code == 200
 
 
 def test_a_form_leads_back_to_its_robot(ten: Server) -> None:

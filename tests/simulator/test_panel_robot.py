@@ -365,7 +365,7 @@ progress_max = 50
 """
 
 
-def test_an_action_tells_its_progress_and_ends_with_a_result(loaded: Loaded) -> None:
+def test_an_action_says_its_progress_and_ends_with_a_result(loaded: Loaded) -> None:
     robot = Stepped(loaded(f'{ACTION}[demo."/go"]\nduration_s = 4\nresult = {{ sequence = [5] }}\n'))
     action = robot.run(1).robot.actions["/go"]
     assert action.begin(b"a" * 16, SimpleNamespace())
@@ -583,7 +583,7 @@ def test_each_kind_is_simulated(kind: str, of: type[BaseWidget]) -> None:
     assert callable(find_row(SIMULATED, of.model_construct(id="one", label="One", kind=kind)))
 
 
-def test_a_topic_that_no_row_tells_of_has_values_all_the_same(
+def test_a_topic_without_a_row_has_values_all_the_same(
     loaded: Loaded, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """As of a kind with several topics, which the panel subscribes to."""

@@ -85,18 +85,18 @@ def test_a_count_before_its_last_number_refuses_a_cancel_as_rclpy_does() -> None
     assert robot.result(b"a") == (4, [0, 1, 1])
 
 
-def asked(service: str, *names: str) -> Any:
+def values_of(service: str, *names: str) -> Any:
     response = DemoRobot().parameters.serve(f"{NODE}/{service}", SimpleNamespace(names=names))
     (answer,) = response.values()
     return answer
 
 
-def test_its_parameters_are_described_and_told_as_rclcpp_does() -> None:
-    speed, serial = asked("describe_parameters", "speed", "serial")
+def test_its_parameters_are_described_and_answered_as_rclcpp_does() -> None:
+    speed, serial = values_of("describe_parameters", "speed", "serial")
     assert speed["floating_point_range"] == [{"from_value": 0.0, "to_value": 500.0, "step": 10.0}]
     assert (speed["read_only"], serial["read_only"]) == (False, True)
-    assert [one["double_value"] for one in asked("get_parameters", "speed")] == [120.0]
-    assert asked("get_parameters", "speed", "nothing") == []
+    assert [one["double_value"] for one in values_of("get_parameters", "speed")] == [120.0]
+    assert values_of("get_parameters", "speed", "nothing") == []
 
 
 @pytest.mark.parametrize(
@@ -121,8 +121,8 @@ def test_its_parameters_are_set_or_refused_with_words(
     request = SimpleNamespace(parameters=[given])
     (result,) = robot.parameters.serve(f"{NODE}/set_parameters", request)["results"]
     assert result == {"successful": not reason, "reason": reason}
-    told = [fields for topic, fields in robot.step(0.0) if topic == EVENTS]
-    assert [one["changed_parameters"][0]["name"] for one in told] == ([] if reason else [name])
+    events = [fields for topic, fields in robot.step(0.0) if topic == EVENTS]
+    assert [one["changed_parameters"][0]["name"] for one in events] == ([] if reason else [name])
 
 
 PANEL = """
@@ -180,7 +180,7 @@ def test_a_panel_sets_and_follows_its_parameters(
 
 
 @pytest.mark.parametrize("command", ["app.simulator", "app.log", "app.log verify"])
-def test_a_command_tells_how_it_is_used(command: str) -> None:
+def test_a_command_says_how_it_is_used(command: str) -> None:
     words = [sys.executable, "-m", *command.split(), "--help"]
     said = subprocess.run(
         words, cwd=ROOT, capture_output=True, text=True, check=True, timeout=30
@@ -235,7 +235,7 @@ def test_a_server_cancels_its_counts_and_is_refused_before_the_last_number(
         """Its last number comes after half a second: a busy machine may be too late for that."""
         until(lambda: kiosk.widget("short")["enabled"], "the last one is over")
         assert kiosk.http.post("/widgets/short", json={"inputs": {}}).json()["outcome"] == "accepted"
-        told = kiosk.http.post("/widgets/short/cancel").json()
-        return str(told["reason"]).startswith("The robot refused to cancel at ")
+        answer = kiosk.http.post("/widgets/short/cancel").json()
+        return str(answer["reason"]).startswith("The robot refused to cancel at ")
 
     until(refused, "a cancel is refused")

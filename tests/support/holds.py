@@ -65,7 +65,7 @@ def permit(
 
 
 def ended(server: Server) -> list[tuple[str, str]]:
-    """(code, sentence) of every end that the log tells."""
+    """(code, sentence) of every end in the log."""
     found = map(ENDED.search, list(server.process.lines))
     return [(one[1], one[2]) for one in found if one]
 

@@ -18,7 +18,7 @@ from tests.support.parts import CHROMIUM, ROOT, Process, free_port
 
 WITHOUT_GPU = ("--no-sandbox", "--disable-gpu")
 HEADLESS_FLAGS = ("--headless=new", *WITHOUT_GPU)
-ASKED_WITHIN_S = 2.0
+ANSWER_WITHIN_S = 2.0
 ALIVE_WITHIN_S = 2.0
 
 PRESS = """(text) => {
@@ -58,7 +58,7 @@ class KioskScreen:
         """The pages that the browser has; none while it does not answer."""
         with suppress(httpx.HTTPError):
             url = f"http://127.0.0.1:{self.port}/json/list"
-            found = httpx.get(url, timeout=ASKED_WITHIN_S, trust_env=False).json()
+            found = httpx.get(url, timeout=ANSWER_WITHIN_S, trust_env=False).json()
             return [one for one in found if one["type"] == "page"]
         return []
 
@@ -76,10 +76,10 @@ class KioskScreen:
         """Whether one page is shown, of the panel, whose events are young and which draws."""
         if len(self.pages()) != 1:
             return False
-        seen = self.evaluate(LOOK)
-        if not seen or not seen["url"].startswith(self.url) or seen["age_s"] is None:
+        page = self.evaluate(LOOK)
+        if not page or not page["url"].startswith(self.url) or page["age_s"] is None:
             return False
-        return bool(seen["drawn"] and seen["age_s"] < ALIVE_WITHIN_S)
+        return bool(page["drawn"] and page["age_s"] < ALIVE_WITHIN_S)
 
     def press_on(self, name: str) -> None:
         self.evaluate(f"({PRESS_ON})({json.dumps(name)})")
@@ -90,7 +90,7 @@ class KioskScreen:
     def processes(self, kind: str) -> list[int]:
         """Those of a kind: "browser", "renderer" or "GPU"."""
         url = f"http://127.0.0.1:{self.port}/json/version"
-        at = httpx.get(url, timeout=ASKED_WITHIN_S, trust_env=False).json()["webSocketDebuggerUrl"]
+        at = httpx.get(url, timeout=ANSWER_WITHIN_S, trust_env=False).json()["webSocketDebuggerUrl"]
         found = _called(at, "SystemInfo.getProcessInfo", {}) or {}
         return [one["id"] for one in found["processInfo"] if one["type"] == kind]
 
@@ -105,10 +105,10 @@ class KioskScreen:
 
 def _called(url: str, method: str, params: Mapping[str, Any]) -> dict[str, Any] | None:
     try:
-        with connect(url, open_timeout=ASKED_WITHIN_S, max_size=None) as socket:
+        with connect(url, open_timeout=ANSWER_WITHIN_S, max_size=None) as socket:
             socket.send(json.dumps({"id": 1, "method": method, "params": params}))
             while True:
-                message = json.loads(socket.recv(ASKED_WITHIN_S))
+                message = json.loads(socket.recv(ANSWER_WITHIN_S))
                 if message.get("id") == 1:
                     return dict(message.get("result", {}))
     except (OSError, TimeoutError, WebSocketException):

@@ -61,9 +61,9 @@ HOSTILE_TYPES = [
 @pytest.mark.parametrize("latched", [True, False])
 def test_a_token_shows_what_it_was_made_from(role: TopicRole, key: str, latched: bool) -> None:
     made = token("b1", role, key, BOOL, Qos(transient_local=latched), HASH)
-    seen = parsed(made)
-    assert seen is not None
-    assert seen == Endpoint("b1", role, key, BOOL, latched, True)
+    endpoint = parsed(made)
+    assert endpoint is not None
+    assert endpoint == Endpoint("b1", role, key, BOOL, latched, True)
 
 
 def test_a_token_is_one_key_expression_of_the_bridges_form() -> None:
@@ -109,8 +109,8 @@ def test_a_hostile_type_never_becomes_a_token(type_name: str) -> None:
 def test_a_bridges_token_of_a_topic_is_read_in_its_short_forms(
     qos: str, latched: bool, reliable: bool | None
 ) -> None:
-    seen = parsed(f"@/b1/@ros2_lv/MP/arm§state/std_msgs§msg§Bool/{qos}")
-    assert seen == Endpoint("b1", "MP", "arm/state", BOOL, latched, reliable)
+    endpoint = parsed(f"@/b1/@ros2_lv/MP/arm§state/std_msgs§msg§Bool/{qos}")
+    assert endpoint == Endpoint("b1", "MP", "arm/state", BOOL, latched, reliable)
 
 
 def test_a_bridges_own_token_shows_the_bridge() -> None:
@@ -180,7 +180,7 @@ def test_what_is_no_topics_route_is_none(key: str) -> None:
     assert bridge_dialect.route_of(key) is None
 
 
-def test_an_answer_tells_whose_it_is() -> None:
+def test_an_answer_says_whose_it_is() -> None:
     assert bridge_dialect.zid_of(bridge_dialect.version("b1")) == "b1"
 
 
@@ -199,14 +199,14 @@ def test_a_server_is_read_from_its_token(role: ServerRole) -> None:
 
 
 @pytest.mark.parametrize(
-    "told", ["x" * 50_000, "a\u202eb", "std msgs", "", "a//b", "std_msgs/msg/Bool\n"]
+    "type_name", ["x" * 50_000, "a\u202eb", "std msgs", "", "a//b", "std_msgs/msg/Bool\n"]
 )
-def test_a_type_that_can_not_be_one_is_no_type(told: str) -> None:
-    assert valid_type(told) == NO_TYPE
-    if told:
-        seen = parsed(f"@/b1/@ros2_lv/MP/enabled/{told.replace('/', '§')}/:1:0:0,1:")
-        assert seen is None or seen.type == NO_TYPE
-    node = {"publishers": [{"name": "/enabled", "type": told}], "subscribers": []}
+def test_a_type_that_can_not_be_one_is_no_type(type_name: str) -> None:
+    assert valid_type(type_name) == NO_TYPE
+    if type_name:
+        endpoint = parsed(f"@/b1/@ros2_lv/MP/enabled/{type_name.replace('/', '§')}/:1:0:0,1:")
+        assert endpoint is None or endpoint.type == NO_TYPE
+    node = {"publishers": [{"name": "/enabled", "type": type_name}], "subscribers": []}
     assert [one.type for one in bridge_dialect.endpoints_of("@/b1/ros2/node/g/n", node, "")] == [
         NO_TYPE
     ]

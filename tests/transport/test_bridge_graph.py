@@ -17,13 +17,15 @@ BOOL = "std_msgs::msg::dds_::Bool_"
 def entity(
     zid: str, participant: str, role: str, name: str, type_name: str = BOOL, **qos: Any
 ) -> tuple[str, Any]:
-    told = {"topic_name": f"rt{name}", "type_name": type_name, "qos": qos}
-    return f"@/{zid}/ros2/dds/{participant}/{role}/{participant[:30]}03/rt{name}", told
+    answer = {"topic_name": f"rt{name}", "type_name": type_name, "qos": qos}
+    return f"@/{zid}/ros2/dds/{participant}/{role}/{participant[:30]}03/rt{name}", answer
 
 
 def node(zid: str, participant: str, name: str, **lists: list[str]) -> tuple[str, Any]:
-    told = {part: [{"name": one, "type": "x/msg/Y"} for one in names] for part, names in lists.items()}
-    return f"@/{zid}/ros2/node/{participant}{name}", told
+    answer = {
+        part: [{"name": one, "type": "x/msg/Y"} for one in names] for part, names in lists.items()
+    }
+    return f"@/{zid}/ros2/node/{participant}{name}", answer
 
 
 def token(zid: str, role: str, key: str, type_name: str, qos: str = ":1:::") -> str:
@@ -70,7 +72,7 @@ def test_what_is_left_out_is_the_default_of_dds(role: str, reliable: bool) -> No
 
 
 @pytest.mark.parametrize(
-    ("key", "told"),
+    ("key", "answer"),
     [
         (f"@/a/ros2/dds/{FAST}", {"key": FAST}),  # a participant
         (f"@/a/ros2/dds/{FAST}/writer/x/rt/on", None),
@@ -80,14 +82,21 @@ def test_what_is_left_out_is_the_default_of_dds(role: str, reliable: bool) -> No
         (f"@/a/ros2/dds/{FAST}/writer/x/rt/o n", {"topic_name": "rt/o n", "type_name": BOOL}),
     ],
 )
-def test_what_is_no_topic_of_ros_is_left_out(key: str, told: Any) -> None:
-    assert entity_of(key, told) is None
-    assert ros_graph(GraphAnswers(versions={"a": "v1"}, entities=[(key, told)])).robots[0].topics == ()
+def test_what_is_no_topic_of_ros_is_left_out(key: str, answer: Any) -> None:
+    assert entity_of(key, answer) is None
+    assert (
+        ros_graph(GraphAnswers(versions={"a": "v1"}, entities=[(key, answer)])).robots[0].topics == ()
+    )
 
 
 def test_the_qos_in_a_token() -> None:
-    told = qos_of(f"@/a/@ros2_lv/MP/on/t/:1:1:0,7:typehash={HASH};")
-    assert (told.reliable, told.transient_local, told.depth, told.type_hash) == (True, True, 7, HASH)
+    answer = qos_of(f"@/a/@ros2_lv/MP/on/t/:1:1:0,7:typehash={HASH};")
+    assert (answer.reliable, answer.transient_local, answer.depth, answer.type_hash) == (
+        True,
+        True,
+        7,
+        HASH,
+    )
     assert qos_of("@/a/@ros2_lv/MS/on/t/:0:::").reliable is False
     assert qos_of("@/a/@ros2_lv/MS/on/t/::::").reliable is None
     assert qos_of("@/a/@ros2_lv/MS/on/t/K:1::1,:").keep_all
@@ -195,12 +204,12 @@ def test_each_namespace_is_a_robot_and_a_silent_bridge_is_in_the_graph() -> None
 
 
 def test_a_route_of_the_bridge() -> None:
-    told = json.loads(
+    answer = json.loads(
         '{"dds_reader":"01","local_nodes":["/io"],"remote_routes":["p:on"],"ros2_name":"/on",'
         '"ros2_type":"std_msgs/msg/Bool"}'
     )
     robot = read(
-        versions={"a": "v1"}, routes=[("@/a/ros2/route/topic/pub/on", told), ("@/a/ros2/route/x", {})]
+        versions={"a": "v1"}, routes=[("@/a/ros2/route/topic/pub/on", answer), ("@/a/ros2/route/x", {})]
     )
     (route,) = robot.routes
     assert (route.kind, route.direction, route.name, route.endpoint) == ("topic", "pub", "/on", "01")

@@ -1,4 +1,4 @@
-"""The bridges' silence: by a clock that the test sets, on a link that answers when it is told to."""
+"""The bridges' silence: by a clock that the test sets, on a link whose answers the test sets."""
 
 import asyncio
 import time
@@ -28,12 +28,12 @@ LAN_S = 0.001
 def network(silence: LivenessDetector, took_s: float, begin: float, count: int) -> float:
     """Questions of which each is answered after so long; returns when the last one was."""
     events = [(begin + n * EVERY_S, None) for n in range(count)]
-    heard = [(asked + took_s, asked) for asked, _ in events]
-    for now, asked in sorted([*events, *heard], key=lambda one: one[0]):
-        if asked is None:
+    heard = [(sent_at + took_s, sent_at) for sent_at, _ in events]
+    for now, sent_at in sorted([*events, *heard], key=lambda one: one[0]):
+        if sent_at is None:
             silence.ask(now)
         else:
-            silence.hear(asked, now)
+            silence.hear(sent_at, now)
         silence.judge(now)
     return max(now for now, _ in heard)
 
@@ -103,7 +103,7 @@ class Line:
     """A link on which each question waits until the test answers it."""
 
     def __init__(self) -> None:
-        self.asked: list[tuple[str, asyncio.Future[bool]]] = []
+        self.queries: list[tuple[str, asyncio.Future[bool]]] = []
         self.answers = True
         self.frozen = ""  # a bridge that does not answer
         self.fails = False
@@ -113,7 +113,7 @@ class Line:
             raise LinkError("no session")
         assert within_s == LONGEST_S
         answered = asyncio.get_running_loop().create_future()
-        self.asked.append((selector, answered))
+        self.queries.append((selector, answered))
         if self.answers and not (self.frozen and selector == bridge_dialect.version(self.frozen)):
             answered.set_result(True)
         return [(selector, b"1")] if await answered else []
@@ -129,11 +129,11 @@ def run(
 ) -> None:
     async def benched() -> None:
         line, robot = Line(), robot_there(small_panel())
-        told: list[bool] = []
-        mine = BridgeLiveness(robot, line, lambda: told.append(robot.is_responding))
+        changes: list[bool] = []
+        mine = BridgeLiveness(robot, line, lambda: changes.append(robot.is_responding))
         mine.start()
         try:
-            await test(line, robot, mine, told)
+            await test(line, robot, mine, changes)
         finally:
             await mine.stop()
         assert len(asyncio.all_tasks()) == 1
@@ -154,27 +154,27 @@ async def until(what: Callable[[], object]) -> None:
 
 
 def test_each_bridge_is_asked_again_and_again() -> None:
-    async def test(line: Line, robot: RobotState, mine: BridgeLiveness, told: list[bool]) -> None:
-        await until(lambda: len(line.asked) > 5)
-        assert {selector for selector, _ in line.asked} == {bridge_dialect.version(BRIDGE)}
-        assert (robot.is_responding, told) == (True, [])
+    async def test(line: Line, robot: RobotState, mine: BridgeLiveness, changes: list[bool]) -> None:
+        await until(lambda: len(line.queries) > 5)
+        assert {selector for selector, _ in line.queries} == {bridge_dialect.version(BRIDGE)}
+        assert (robot.is_responding, changes) == (True, [])
 
     run(test)
 
 
-def test_silence_is_told_and_its_end() -> None:
-    async def test(line: Line, robot: RobotState, mine: BridgeLiveness, told: list[bool]) -> None:
+def test_silence_is_reported_and_its_end() -> None:
+    async def test(line: Line, robot: RobotState, mine: BridgeLiveness, changes: list[bool]) -> None:
         line.answers = False
         await until(lambda: not robot.is_responding)
         line.answers = True
         await until(lambda: robot.is_responding)
-        assert told == [False, True]
+        assert changes == [False, True]
 
     run(test)
 
 
 def test_another_bridge_is_not_the_silent_one() -> None:
-    async def test(line: Line, robot: RobotState, mine: BridgeLiveness, told: list[bool]) -> None:
+    async def test(line: Line, robot: RobotState, mine: BridgeLiveness, changes: list[bool]) -> None:
         line.answers = False
         await until(lambda: not robot.is_responding)
         robot.mark_link_lost()
@@ -184,7 +184,7 @@ def test_another_bridge_is_not_the_silent_one() -> None:
 
 
 def test_without_a_session_nothing_is_asked_and_nothing_arrives() -> None:
-    async def test(line: Line, robot: RobotState, mine: BridgeLiveness, told: list[bool]) -> None:
+    async def test(line: Line, robot: RobotState, mine: BridgeLiveness, changes: list[bool]) -> None:
         line.fails = True
         assert not await mine.flushed()
 
@@ -202,14 +202,14 @@ def test_a_loop_that_stood_still_is_no_silence(monkeypatch: pytest.MonkeyPatch) 
         line.answers = False
         mine.start()
         loop = asyncio.get_running_loop()
-        await until(lambda: line.asked)
+        await until(lambda: line.queries)
 
         def stand_still() -> None:
             """Its time is up before anyone looks at the answer."""
             nonlocal clock
             time.sleep(0.15)
             clock = 3.0
-            line.asked[0][1].set_result(True)
+            line.queries[0][1].set_result(True)
 
         loop.call_soon(stand_still)
         await asyncio.sleep(0.01)
@@ -220,7 +220,7 @@ def test_a_loop_that_stood_still_is_no_silence(monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_a_press_is_published_when_the_bridge_has_answered_after_it() -> None:
-    async def test(line: Line, robot: RobotState, mine: BridgeLiveness, told: list[bool]) -> None:
+    async def test(line: Line, robot: RobotState, mine: BridgeLiveness, changes: list[bool]) -> None:
         presses = presses_of(small_panel(), robot, line, reached=mine.flushed)
 
         async def press(press_id: str) -> str:
@@ -229,26 +229,26 @@ def test_a_press_is_published_when_the_bridge_has_answered_after_it() -> None:
 
         assert (await press("p1")).startswith("published: Sent on /free")
         line.answers = False
-        told_so = await press("p2")
-        assert told_so.startswith("unknown: Sent on /free")
-        assert "has not responded since" in told_so
+        receipt = await press("p2")
+        assert receipt.startswith("unknown: Sent on /free")
+        assert "has not responded since" in receipt
 
     run(test)
 
 
 def test_a_frozen_bridge_stays_silent_when_another_comes_or_goes() -> None:
-    async def test(line: Line, robot: RobotState, mine: BridgeLiveness, told: list[bool]) -> None:
+    async def test(line: Line, robot: RobotState, mine: BridgeLiveness, changes: list[bool]) -> None:
         robot.graph.apply_token(bridge_dialect.bridge_token("b2"), True)
-        await until(lambda: bridge_dialect.version("b2") in {selector for selector, _ in line.asked})
+        await until(lambda: bridge_dialect.version("b2") in {selector for selector, _ in line.queries})
         line.frozen = BRIDGE
-        await until(lambda: told == [False])
+        await until(lambda: changes == [False])
         robot.graph.apply_token(bridge_dialect.bridge_token("b2"), False)
         await asyncio.sleep(5 * bridge_liveness.EVERY_S)
         robot.graph.apply_token(bridge_dialect.bridge_token("b3"), True)
         await asyncio.sleep(5 * bridge_liveness.EVERY_S)
-        assert told == [False]
+        assert changes == [False]
         line.frozen = ""
-        await until(lambda: told == [False, True])
+        await until(lambda: changes == [False, True])
 
     run(test)
 
@@ -261,37 +261,37 @@ def test_after_a_standstill_all_that_waited_is_taken_in_first(monkeypatch: pytes
     async def benched() -> None:
         nonlocal clock
         line, robot = Line(), robot_there(small_panel())
-        told: list[str] = []
+        changes: list[str] = []
 
         def tell() -> None:
-            told.append(link_verdict(robot, clock).code)
+            changes.append(link_verdict(robot, clock).code)
 
         mine = BridgeLiveness(robot, line, tell, lambda: clock)
         line.answers = False
         mine.start()
 
-        async def asked(count: int) -> None:
-            await until(lambda: len(line.asked) >= count)
+        async def queried(count: int) -> None:
+            await until(lambda: len(line.queries) >= count)
 
         def answer(number: int) -> None:
-            line.asked[number - 1][1].set_result(True)
+            line.queries[number - 1][1].set_result(True)
 
-        await asked(1)
+        await queried(1)
         clock += 0.1
         mine.look()
         assert robot.is_caught_up
         clock += 3.0
         mine.look()  # as it is before each press is judged
-        before = len(line.asked)
-        assert told == ["catching_up"]
+        before = len(line.queries)
+        assert changes == ["catching_up"]
         answer(1)
-        await asked(before + 1)
+        await queried(before + 1)
         answer(before + 1)
-        await asked(before + 2)
+        await queried(before + 2)
         assert not robot.is_caught_up
         clock += 0.01
-        later = len(line.asked)
-        await asked(later + 1)
+        later = len(line.queries)
+        await queried(later + 1)
         answer(later + 1)
         await until(lambda: robot.is_caught_up)
         await mine.stop()

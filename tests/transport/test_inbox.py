@@ -118,7 +118,7 @@ def test_what_a_cache_has_without_a_stamp_counts_before_anything_is_published(in
     assert inbox.drain().samples["heard"].payload == b"new"
 
 
-def test_a_cache_is_told_once_and_at_once(inbox: Inbox, woken: list[bool]) -> None:
+def test_a_cache_is_delivered_once_and_at_once(inbox: Inbox, woken: list[bool]) -> None:
     inbox.cache("heard", "heard/@adv/pub/b1/uhlc/_")
     assert (inbox.drain().caches, woken) == ([("heard", "heard/@adv/pub/b1/uhlc/_")], [True])
     assert inbox.drain().caches == []

@@ -28,49 +28,49 @@ class Bridges:
 def run(test: Callable[[Bridges, CoalescedQuery], Awaitable[None]]) -> None:
     async def both() -> None:
         bridges = Bridges()
-        asked = CoalescedQuery(bridges.ask)
-        await test(bridges, asked)
-        await asked.stop()
+        readiness = CoalescedQuery(bridges.ask)
+        await test(bridges, readiness)
+        await readiness.stop()
 
     asyncio.run(both())
 
 
 def test_who_asks_at_once_shares_one_question() -> None:
-    async def test(bridges: Bridges, asked: CoalescedQuery) -> None:
-        assert await asyncio.gather(*(asked.answers() for _ in range(100))) == [True] * 100
+    async def test(bridges: Bridges, readiness: CoalescedQuery) -> None:
+        assert await asyncio.gather(*(readiness.answers() for _ in range(100))) == [True] * 100
         assert bridges.questions == 1
 
     run(test)
 
 
 def test_there_are_two_questions_a_second_at_most() -> None:
-    async def test(bridges: Bridges, asked: CoalescedQuery) -> None:
+    async def test(bridges: Bridges, readiness: CoalescedQuery) -> None:
         loop = asyncio.get_running_loop()
         end = loop.time() + 2.2 * EVERY_S
         while loop.time() < end:
-            assert await asked.answers()
+            assert await readiness.answers()
             await asyncio.sleep(0.01)
         assert bridges.questions == 3
 
     run(test)
 
 
-def test_what_is_told_is_not_older_than_that() -> None:
-    async def test(bridges: Bridges, asked: CoalescedQuery) -> None:
-        assert await asked.answers()
+def test_an_answer_is_not_older_than_that() -> None:
+    async def test(bridges: Bridges, readiness: CoalescedQuery) -> None:
+        assert await readiness.answers()
         bridges.answer = False
         await asyncio.sleep(EVERY_S)
-        assert not await asked.answers()
+        assert not await readiness.answers()
 
     run(test)
 
 
 @pytest.mark.real_time
-def test_no_answer_takes_a_second_at_most_and_one_who_leaves_stops_nobody() -> None:
-    async def test(bridges: Bridges, asked: CoalescedQuery) -> None:
+def test_no_answer_takes_a_second_at_most_and_one_who_leaves_stops_no_other() -> None:
+    async def test(bridges: Bridges, readiness: CoalescedQuery) -> None:
         bridges.asleep = True
         began = asyncio.get_running_loop().time()
-        leaving, staying = (asyncio.ensure_future(asked.answers()) for _ in range(2))
+        leaving, staying = (asyncio.ensure_future(readiness.answers()) for _ in range(2))
         await asyncio.sleep(0.1)
         leaving.cancel()
         assert await staying is False
@@ -81,8 +81,8 @@ def test_no_answer_takes_a_second_at_most_and_one_who_leaves_stops_nobody() -> N
 
 
 def test_a_link_that_can_not_ask_has_no_answer() -> None:
-    async def test(bridges: Bridges, asked: CoalescedQuery) -> None:
+    async def test(bridges: Bridges, readiness: CoalescedQuery) -> None:
         bridges.answer = LinkError("no session")
-        assert not await asked.answers()
+        assert not await readiness.answers()
 
     run(test)

@@ -77,7 +77,7 @@ def tokens(zid: str, count: int) -> list[str]:
     ("content", "why"),
     [(None, "No such file or directory"), ('{ mode: "pear" }', "unknown variant `pear`"), ("{", "1:2")],
 )
-def test_a_configuration_that_can_not_be_used_is_told_in_the_users_terms(
+def test_a_configuration_that_can_not_be_used_is_reported_in_the_users_terms(
     tmp_path: Path, content: str | None, why: str
 ) -> None:
     path = tmp_path / "zenoh.json5"
@@ -97,7 +97,7 @@ def test_a_configuration_that_can_not_be_used_is_told_in_the_users_terms(
         ("[]", ()),
     ],
 )
-def test_a_link_tells_where_it_connects(connect: str, endpoints: tuple[str, ...]) -> None:
+def test_a_link_says_where_it_connects(connect: str, endpoints: tuple[str, ...]) -> None:
     config = config_to("tcp/127.0.0.1:9")
     config.insert_json5("connect/endpoints", connect)
     link = ZenohSession(config, lambda _: None, DIALECT)
@@ -139,7 +139,7 @@ def test_a_session_is_renewed_in_the_middle_of_what_comes_in(
 
 
 def test_a_burst_is_not_dropped(peer: tuple[str, zenoh.Session], linked: Linked) -> None:
-    """With Zenoh's own queue some of these were lost, more on a busy machine, and no one was told."""
+    """With Zenoh's own queue some of these were lost, more on a busy machine, without an error."""
     _, session = peer
     heard: list[bytes] = []
 
@@ -184,7 +184,7 @@ def test_a_link_that_takes_nothing_stops_the_loop_once_and_not_for_long() -> Non
             link.put("b", bytes(20_000))
             took.append(time.monotonic() - began)
         began = time.monotonic()
-        asyncio.run(asked(link))
+        asyncio.run(send_query(link))
         took.append(time.monotonic() - began)
         peer.kill()
         link.close()
@@ -193,7 +193,7 @@ def test_a_link_that_takes_nothing_stops_the_loop_once_and_not_for_long() -> Non
     assert long[0] < 2 * BLOCKED_MOST_US / 1e6
 
 
-async def asked(link: ZenohSession) -> None:
+async def send_query(link: ZenohSession) -> None:
     """A question is sent, and not waited for."""
     link.query("b", b"", 0.1).cancel()
 

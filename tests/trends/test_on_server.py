@@ -151,7 +151,7 @@ def test_a_killed_server_has_the_values_from_before(
     assert begins[-1] >= before[-1][0], "the time without a server is a gap"
 
 
-def test_a_full_disk_is_told_and_trends_go_on(
+def test_a_full_disk_is_reported_and_trends_go_on(
     tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:
     panel = PANEL.replace("[[page]]", "[log]\nenabled = false\n[[page]]", 1)

@@ -21,11 +21,11 @@ def looked() -> tuple[RobotState, Camera, LookedAt]:
     panel = panel_of(CAMERA)
     robot = robot_there(panel)
     (widget,) = (w for w in panel.widgets() if isinstance(w, Camera))
-    seen = robot.looked_at[robot.key("/cam")] = LookedAt(RECEIVED, 0.0)
-    return robot, widget, seen
+    received = robot.looked_at[robot.key("/cam")] = LookedAt(RECEIVED, 0.0)
+    return robot, widget, received
 
 
-def test_nothing_is_known_while_nobody_looks() -> None:
+def test_nothing_is_known_while_no_page_shows_it() -> None:
     robot, widget, _ = looked()
     robot.looked_at.clear()
     assert shown(robot, widget, RECEIVED) == ("waiting", "camera_waiting", float("inf"))
@@ -39,8 +39,8 @@ def test_a_picture_is_old_after_a_second_and_its_age_counts() -> None:
 
 
 def test_a_picture_that_can_not_be_shown_says_why() -> None:
-    robot, widget, seen = looked()
-    seen.problem = "broken"
+    robot, widget, received = looked()
+    received.problem = "broken"
     assert shown(robot, widget, RECEIVED)[:2] == ("unreadable", "broken")
 
 

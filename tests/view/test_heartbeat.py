@@ -1,4 +1,4 @@
-"""One heartbeat for all streams: its timer, what it tells, and when it goes along with news."""
+"""One heartbeat for all streams: its timer, what it says, and when it goes along with news."""
 
 import asyncio
 import json
@@ -33,13 +33,13 @@ class Beating:
         await self.woken.wait()
 
 
-def test_it_tells_the_time_and_has_no_id() -> None:
+def test_it_says_the_time_and_has_no_id() -> None:
     before = clock.server_now()
     ((name, data, event_id),) = events_in(beat().decode())
-    told = json.loads(data)
+    beats = json.loads(data)
     assert (name, event_id) == ("beat", "")
-    assert re.fullmatch(r"\d\d:\d\d:\d\d", told["clock"])
-    assert round(before * 1000) <= told["now"] <= round(clock.server_now() * 1000)
+    assert re.fullmatch(r"\d\d:\d\d:\d\d", beats["clock"])
+    assert round(before * 1000) <= beats["now"] <= round(clock.server_now() * 1000)
 
 
 def test_it_beats_while_somebody_hears_it(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -82,7 +82,7 @@ def test_with_the_last_who_hears_it_its_timer_ends() -> None:
     run(work)
 
 
-def test_a_beat_that_is_nearly_due_goes_along_and_wakes_nobody_itself() -> None:
+def test_a_beat_that_is_nearly_due_goes_along_and_wakes_no_stream_itself() -> None:
     async def work() -> None:
         beating = Beating()
         with beating.heart.heard():
@@ -98,7 +98,7 @@ def test_a_beat_that_is_nearly_due_goes_along_and_wakes_nobody_itself() -> None:
     run(work)
 
 
-def test_where_nobody_hears_it_none_goes_along() -> None:
+def test_without_a_listener_none_goes_along() -> None:
     async def work() -> None:
         beating = Beating()
         beating.heart.along()

@@ -167,10 +167,10 @@ def test_a_parameter_that_can_not_be_set_is_no_fault_of_a_link(
     for name, type_name in (GET, DESCRIBE, SET):
         robot.graph.apply_token(server_token(BRIDGE_ZID, "SS", f"arm/{name}", type_name), True)
     robot.parameters["speed"] = known
-    seen = english(build_view(panel, robot, NOW).view)
-    assert reason in english(seen["widgets"]["speed"]["reason"])
-    assert {lamp["locks"] for lamp in seen["link"].values()} == {"Locks nothing."}
-    assert {lamp["reason"] for lamp in seen["link"].values()} == {""}
+    view = english(build_view(panel, robot, NOW).view)
+    assert reason in english(view["widgets"]["speed"]["reason"])
+    assert {lamp["locks"] for lamp in view["link"].values()} == {"Locks nothing."}
+    assert {lamp["reason"] for lamp in view["link"].values()} == {""}
 
 
 def test_what_the_log_locks_is_no_fault_of_a_link() -> None:
@@ -201,9 +201,9 @@ def test_an_old_value_that_is_only_shown_is_no_silence() -> None:
     endpoint(robot, "MP", ENABLED, BOOL)
     says(robot, "/heard", "hello", at=NOW)
     permits(robot, at=NOW + 60)
-    seen = build_view(panel, robot, NOW + 60)
-    assert seen.view["widgets"]["heard"]["state"] == "old"
-    assert (seen.view["link"]["node"]["state"], seen.view["link"]["node"]["reason"]) == ("ok", "")
+    built = build_view(panel, robot, NOW + 60)
+    assert built.view["widgets"]["heard"]["state"] == "old"
+    assert (built.view["link"]["node"]["state"], built.view["link"]["node"]["reason"]) == ("ok", "")
 
 
 def test_a_forbidding_interlock_gets_old_too_and_time_shows_it() -> None:

@@ -95,9 +95,9 @@ def test_a_robots_name_is_in_the_language_of_who_reads_it() -> None:
     )
     robot = RobotState(panel, INTERFACES, DIALECT, KIOSK, panel.robots[0])
     assert robot.name == "Left arm"
-    seen = build_view(panel, robot, NOW)
-    assert isinstance(seen.robot["name"], Text)
-    assert localized(seen.robot, "de")["name"] == "Linker Arm"
+    built = build_view(panel, robot, NOW)
+    assert isinstance(built.robot["name"], Text)
+    assert localized(built.robot, "de")["name"] == "Linker Arm"
 
 
 def test_a_template_of_a_page_knows_the_language_of_its_reader(tmp_path: Path) -> None:

@@ -59,7 +59,7 @@ def test_every_event_has_the_id_of_the_version_it_leads_to(
     old = publisher.view
     permits(robot)
     publisher.post(view_of(robot, fault="x"))
-    ids = {event_id for _, _, event_id in events_in(publisher.since(1, old).decode())}
+    ids = {event_id for _, _, event_id in events_in(publisher.events_since(1, old).decode())}
     assert ids == {f"{publisher.boot}-2"}
 
 
@@ -73,7 +73,7 @@ def test_a_changed_permission_is_sent_by_its_name_and_at_its_widgets(
     old = publisher.view
     permits(robot)
     publisher.post(view_of(robot))
-    assert events(publisher.since(1, old)) == {
+    assert events(publisher.events_since(1, old)) == {
         "operation-enabled-updated": {"enabled": True, "reason": None},
         "update": {"guarded": {"enabled": True, "reason": None}},
         "link": english(publisher.view["link"]),  # the node locks nothing any more
@@ -87,24 +87,24 @@ def test_of_a_widget_only_what_changed_is_sent(publisher: ViewPublisher, robot: 
     old = publisher.view
     says(robot, "/heard", "two")
     publisher.post(view_of(robot))
-    assert events(publisher.since(2, old)) == {"update": {"heard": {"text": "two"}}}
+    assert events(publisher.events_since(2, old)) == {"update": {"heard": {"text": "two"}}}
 
 
 def test_a_page_gets_its_own_widgets_only(robot: RobotState) -> None:
     pages = {"one": {"guarded"}, "two": {"heard"}}
     publisher = ViewPublisher(view_of(robot), "r1", pages=pages)
-    assert {page: set(publisher.seen_as("", page)["widgets"]) for page in pages} == pages
-    assert publisher.seen_as("", "gone") is publisher.view
+    assert {page: set(publisher.for_role("", page)["widgets"]) for page in pages} == pages
+    assert publisher.for_role("", "gone") is publisher.view
     assert set(events(publisher.snapshot(page="two"))["snapshot"]["widgets"]) == {"heard"}
-    old = {page: publisher.seen_as("", page) for page in ("one", "two", "")}
+    old = {page: publisher.for_role("", page) for page in ("one", "two", "")}
     says(robot, "/heard", "one")
     publisher.post(view_of(robot))
-    sent = {page: events(publisher.since(1, view, page=page)) for page, view in old.items()}
+    sent = {page: events(publisher.events_since(1, view, page=page)) for page, view in old.items()}
     assert sent["one"] == {}
     assert set(sent["two"]["update"]) == set(sent[""]["update"]) == {"heard"}
     permits(robot)
     publisher.post(view_of(robot))
-    late = events(publisher.since(1, old["one"], page="one"))
+    late = events(publisher.events_since(1, old["one"], page="one"))
     assert set(late["update"]) == {"guarded"}
     assert late["operation-enabled-updated"]["enabled"]
 
@@ -113,7 +113,7 @@ def test_a_changed_light_is_sent_with_all_lights(publisher: ViewPublisher, robot
     old = publisher.view
     robot.graph.update_versions({})
     publisher.post(view_of(robot))
-    sent = events(publisher.since(1, old))
+    sent = events(publisher.events_since(1, old))
     assert sent["link"] == english(publisher.view["link"])
     assert sent["link"]["bridge"]["text"] == "no response"
 
@@ -121,7 +121,7 @@ def test_a_changed_light_is_sent_with_all_lights(publisher: ViewPublisher, robot
 def test_a_changed_notice_is_sent(publisher: ViewPublisher, robot: RobotState) -> None:
     old = publisher.view
     publisher.post(view_of(robot, fault="cell.toml can't be used"))
-    assert events(publisher.since(1, old)) == {
+    assert events(publisher.events_since(1, old)) == {
         "notice": {"banner": "", "fault": "cell.toml can't be used"}
     }
 
@@ -136,15 +136,15 @@ def test_a_slow_reader_skips_to_the_newest(publisher: ViewPublisher, robot: Robo
     for word in ("one", "two", "three"):
         says(robot, "/heard", word)
         publisher.post(view_of(robot))
-    assert events(publisher.since(1, old))["update"]["heard"]["text"] == "three"
-    assert b"two" not in publisher.since(1, old)
+    assert events(publisher.events_since(1, old))["update"]["heard"]["text"] == "three"
+    assert b"two" not in publisher.events_since(1, old)
 
 
 def test_what_changed_and_changed_back_is_not_sent(publisher: ViewPublisher, robot: RobotState) -> None:
     old = publisher.view
     publisher.post(view_of(robot, fault="x"))
     publisher.post(view_of(robot))
-    assert (publisher.version, publisher.since(1, old)) == (3, b"")
+    assert (publisher.version, publisher.events_since(1, old)) == (3, b"")
 
 
 def test_streams_that_are_equally_far_share_the_same_bytes(
@@ -153,7 +153,7 @@ def test_streams_that_are_equally_far_share_the_same_bytes(
     old = publisher.view
     permits(robot)
     publisher.post(view_of(robot))
-    assert publisher.since(1, old) is publisher.since(1, old)
+    assert publisher.events_since(1, old) is publisher.events_since(1, old)
     assert publisher.snapshot() is publisher.snapshot()
 
 
@@ -162,7 +162,7 @@ def test_prepared_bytes_are_never_of_an_older_view(publisher: ViewPublisher, rob
     for word in ("one", "two"):
         says(robot, "/heard", word)
         publisher.post(view_of(robot))
-        assert events(publisher.since(1, old))["update"]["heard"]["text"] == word
+        assert events(publisher.events_since(1, old))["update"]["heard"]["text"] == word
         assert events(publisher.snapshot())["snapshot"]["widgets"]["heard"]["text"] == word
 
 
@@ -173,9 +173,9 @@ def test_no_text_of_the_robots_breaks_the_stream(
     old = publisher.view
     says(robot, "/heard", text)
     publisher.post(view_of(robot))
-    assert list(events(publisher.since(1, old))) == ["update"]
-    assert events(publisher.since(1, old))["update"]["heard"]["text"] == printable(text)
-    for sent in (publisher.since(1, old), publisher.snapshot()):
+    assert list(events(publisher.events_since(1, old))) == ["update"]
+    assert events(publisher.events_since(1, old))["update"]["heard"]["text"] == printable(text)
+    for sent in (publisher.events_since(1, old), publisher.snapshot()):
         assert len(sent.decode().splitlines()) == sent.count(b"\n")
 
 
@@ -196,7 +196,7 @@ def test_what_says_all_of_something_is_encoded_once_for_streams_however_far(
         return json.dumps(encoded[-1]).encode()
 
     monkeypatch.setattr("app.view.publisher.encoded", encode)
-    sent = [events(publisher.since(version, view)) for version, view in enumerate(views, 1)]
+    sent = [events(publisher.events_since(version, view)) for version, view in enumerate(views, 1)]
     assert all(one["operation-enabled-updated"] == {"enabled": True, "reason": None} for one in sent)
     assert all(one["link"] == english(publisher.view["link"]) for one in sent)
     assert [one["update"] for one in sent] == encoded[1:2] + encoded[4:]
@@ -211,12 +211,12 @@ def test_each_language_has_events_of_its_own_encoded_once(
     permits(robot)
     publisher.post(view_of(robot))
     with catalogues_in(tmp_path):
-        german, sent = publisher.since(1, old, "de"), publisher.since(1, old)
+        german, sent = publisher.events_since(1, old, "de"), publisher.events_since(1, old)
         assert events(german)["link"]["node"]["locks"] == "Sperrt nichts."
         assert events(publisher.snapshot("de"))["snapshot"]["link"] == events(german)["link"]
         assert events(sent)["link"]["node"]["locks"] == "Locks nothing."
-        assert events(sent) == events(publisher.since(1, old))
-        assert publisher.since(1, old, "de") is german
+        assert events(sent) == events(publisher.events_since(1, old))
+        assert publisher.events_since(1, old, "de") is german
 
 
 def test_who_is_behind_does_not_wait(publisher: ViewPublisher, robot: RobotState) -> None:
@@ -266,7 +266,7 @@ def test_the_end_wakes_who_waits(publisher: ViewPublisher) -> None:
     assert publisher.closed
 
 
-def test_after_the_end_nobody_waits(publisher: ViewPublisher) -> None:
+def test_after_the_end_no_one_waits(publisher: ViewPublisher) -> None:
     publisher.close()
     run(publisher.news(1, 0))
 

@@ -71,20 +71,20 @@ def say(robot: RobotState, topic: str, word: str | None, at: float) -> None:
 def test_a_frame_of_values_is_what_a_look_at_everything_would_show(story: list[Said]) -> None:
     robot = there(PANEL)
     now = NOW
-    seen = build_view(PANEL, robot, now)
+    built = build_view(PANEL, robot, now)
     displays = [w for w in PANEL.widgets() if isinstance(w, Display)]
     for topic, word, later in story:
         now += later
         say(robot, topic, word, now)
-        if now >= seen.rest:
-            seen = build_view(PANEL, robot, now)
+        if now >= built.rest:
+            built = build_view(PANEL, robot, now)
         else:
-            stale = [w for w in displays if w.topic == topic or seen.displays[w.id] <= now]
-            seen = update_displays(seen, stale, robot, now)
+            stale = [w for w in displays if w.topic == topic or built.displays[w.id] <= now]
+            built = update_displays(built, stale, robot, now)
         whole = build_view(PANEL, robot, now)
-        assert seen.view == whole.view
-        assert seen.displays == whole.displays
-        assert seen.rest <= whole.rest  # or it is looked at earlier than need be
+        assert built.view == whole.view
+        assert built.displays == whole.displays
+        assert built.rest <= whole.rest  # or it is looked at earlier than need be
 
 
 def showing_of(panel: Panel, robot: RobotState) -> ViewRefresher:
@@ -141,6 +141,6 @@ def test_a_sight_changes_when_the_first_of_its_parts_does() -> None:
     robot = there(PANEL)
     says(robot, "/aged", "x")
     says(robot, "/lamp", True, BOOL)
-    seen: ViewWithDeadlines = build_view(PANEL, robot, NOW)
-    assert seen.until == NOW + 2.0
-    assert seen.displays == {"heard": float("inf"), "aged": NOW + 2.0, "lamp": NOW + 3.0}
+    built: ViewWithDeadlines = build_view(PANEL, robot, NOW)
+    assert built.until == NOW + 2.0
+    assert built.displays == {"heard": float("inf"), "aged": NOW + 2.0, "lamp": NOW + 3.0}

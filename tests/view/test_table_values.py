@@ -138,7 +138,7 @@ def test_what_is_kept_is_bounded() -> None:
     assert robot.names() == [f"p{MAX_KEYS}"]
 
 
-def test_messages_wait_in_a_bounded_queue_and_the_view_is_told_when_they_are_decoded() -> None:
+def test_messages_wait_in_a_bounded_queue_and_the_view_is_notified_when_they_are_decoded() -> None:
     robot = Robot(key="name")
     entries = robot.state.keyed_entries
     decoded: list[str] = []

@@ -44,8 +44,8 @@ def view_of(robot: RobotState, now: float = NOW, **more: Any) -> View:
 def heard(robot: RobotState, now: float = NOW, **widget: Any) -> tuple[dict[str, Any], float]:
     """The readout of /heard, and when time changes it."""
     panel = panel_of({**HEARD, **widget})
-    seen = build_view(panel, robot, now)
-    return seen.view["widgets"]["heard"], seen.until
+    built = build_view(panel, robot, now)
+    return built.view["widgets"]["heard"], built.until
 
 
 def test_a_view_has_every_widget_and_interlock(robot: RobotState) -> None:
@@ -149,7 +149,7 @@ def test_the_lights_show_how_far_the_way_goes(
 
 
 @pytest.mark.parametrize(
-    ("role", "topic", "seen"),
+    ("role", "topic", "present"),
     [
         ("MP", "/heard", True),
         ("MP", ENABLED, True),
@@ -160,10 +160,10 @@ def test_the_lights_show_how_far_the_way_goes(
     ],
 )
 def test_a_node_is_one_that_the_panel_talks_with(
-    robot: RobotState, role: Any, topic: str, seen: bool
+    robot: RobotState, role: Any, topic: str, present: bool
 ) -> None:
     endpoint(robot, role, topic, BOOL)
-    assert (view_of(robot)["link"]["node"]["state"] == "ok") is seen
+    assert (view_of(robot)["link"]["node"]["state"] == "ok") is present
 
 
 @pytest.mark.parametrize(("service", "state"), [("reset", "ok"), ("other", "wait")])
@@ -238,7 +238,7 @@ def test_what_was_unreadable_before_a_cut_is_waited_for(robot: RobotState) -> No
         (7200.0, "old", "2 h old", 7260.0),
     ],
 )
-def test_a_readout_with_a_greatest_age_tells_its_age(
+def test_a_readout_with_a_greatest_age_says_its_age(
     robot: RobotState, age: float, state: str, note: str | None, changes_at: float
 ) -> None:
     says(robot, "/heard", "hello", at=NOW)

@@ -97,7 +97,7 @@ def test_each_file_is_packed_once_and_for_all(static: Path, templates: Path) -> 
         assert asset.packed == again[name].packed
 
 
-def test_browsers_are_told_what_a_file_is(static: Path, templates: Path) -> None:
+def test_browsers_get_the_type_of_a_file(static: Path, templates: Path) -> None:
     files = loaded(static, templates).files
     assert (files["kiosk.css"].media_type, files["main.js"].media_type) == (
         "text/css",

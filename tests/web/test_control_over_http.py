@@ -172,7 +172,7 @@ def test_a_denied_request(client: Callable[..., Client]) -> None:
     assert again.json()["reason"].startswith("The request was denied")
 
 
-def test_a_request_goes_through_while_nobody_touches(
+def test_a_request_goes_through_without_a_touch_of_the_holder(
     client: Callable[..., Client], kiosk: Server
 ) -> None:
     ann, bob = client("192.0.2.1"), client("192.0.2.2")
@@ -406,7 +406,7 @@ def test_each_robot_has_its_own_control(tmp_path: Path) -> None:
         kiosk.end()
 
 
-def test_after_a_restart_nobody_has_it(
+def test_after_a_restart_no_client_has_it(
     client: Callable[..., Client], kiosk: Server, tmp_path: Path
 ) -> None:
     ann = client("192.0.2.1")

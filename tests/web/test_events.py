@@ -29,7 +29,7 @@ def view_of(robot: RobotState) -> View:
 
 
 class Client:
-    """The server's side of one browser: takes what is sent while it reads, tells when it goes."""
+    """The server's side of one browser: takes what is sent while it reads, and says when it goes."""
 
     def __init__(self) -> None:
         self.got: list[Message] = []
@@ -126,13 +126,13 @@ def test_who_does_not_read_costs_one_event_and_then_gets_the_newest() -> None:
             client.read(False)
             bench.says("first")
             await turns()
-            sending, seen = client.sending, len(other.got)
+            sending, received = client.sending, len(other.got)
             for number in range(1000):
                 bench.says(str(number))
                 await asyncio.sleep(0)
             await turns()
             assert client.sending == sending
-            assert len(other.got) > seen  # no one else waits for it
+            assert len(other.got) > received  # no one else waits for it
             assert len(bench.board._prepared) <= 2
             client.read(True)
             await turns()
@@ -162,7 +162,7 @@ def test_a_browser_that_goes_leaves_nothing_behind() -> None:
         async with bench.stream() as (client, task):
             assert bench.open == 1
             client.read(False)
-            bench.says("nobody reads this")
+            bench.says("no client reads this")
             await turns()
             client.go()
             await task
@@ -184,14 +184,14 @@ def test_the_end_of_the_board_ends_it() -> None:
     run(work)
 
 
-def test_what_fails_ends_it_and_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_fails_ends_it_and_is_logged(monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(*_: object) -> bytes:
         raise ValueError("no")
 
     async def work() -> None:
         bench = Bench()
         async with bench.stream() as (_, task):
-            monkeypatch.setattr(bench.board, "since", fail)
+            monkeypatch.setattr(bench.board, "events_since", fail)
             bench.says("one")
             with pytest.raises(ExceptionGroup, match="TaskGroup"):
                 await task

@@ -43,8 +43,8 @@ class Room:
         self.robot = robot_there(PANEL)
         permits(self.robot)
         self.control = ControlAuthority(RULES, "", monotonic=lambda: NOW)
-        seen = self.build()
-        self.board = ViewPublisher(seen.view, "r1", seen.without_control)
+        built = self.build()
+        self.board = ViewPublisher(built.view, "r1", built.without_control)
         self._clients = Clients()
 
     def build(self) -> ViewWithDeadlines:
@@ -52,11 +52,11 @@ class Room:
         return build_view(PANEL, self.robot, NOW, control=control.view(), control_lock=control.lock)
 
     def post(self) -> None:
-        seen = self.build()
-        self.board.post(seen.view, seen.without_control)
+        built = self.build()
+        self.board.post(built.view, built.without_control)
 
     def who(self, number: int) -> Principal:
-        return Principal(self._clients.seen(f"{number:032x}", "192.0.2.1"))
+        return Principal(self._clients.identify(f"{number:032x}", "192.0.2.1"))
 
     async def stream(self, number: int, until: AsyncExitStack) -> Client:
         client, who = Client(), self.who(number)
@@ -137,5 +137,5 @@ def test_500_streams_share_what_is_encoded(monkeypatch: pytest.MonkeyPatch) -> N
 
 def test_without_control_in_the_panel_file_all_streams_are_one() -> None:
     room = Room()
-    assert room.board.seen_as("") is room.board.view
-    assert room.board.seen_as("held") is room.board.seen_as("held")
+    assert room.board.for_role("") is room.board.view
+    assert room.board.for_role("held") is room.board.for_role("held")

@@ -43,9 +43,9 @@ def prompt(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
 class Socket:
     """One hold, spoken by hand."""
 
-    def __init__(self, connection: ClientConnection, seen: str) -> None:
+    def __init__(self, connection: ClientConnection, event_id: str) -> None:
         self._connection = connection
-        self.seen = seen
+        self.event_id = event_id
         self.number = 0
         self.lease = ""
         self.hear()
@@ -60,7 +60,7 @@ class Socket:
         self._connection.send(json.dumps({"stamp": self.stamp, "after": after, **what}))
 
     def begin(self, **more: Any) -> dict[str, Any]:
-        self.say(do="begin", **{"inputs": {"speed": 0.5}, "seen": self.seen, **more})
+        self.say(do="begin", **{"inputs": {"speed": 0.5}, "seen": self.event_id, **more})
         said = self.hear()
         self.lease = said.get("lease", "")
         return said
@@ -71,7 +71,7 @@ class Socket:
         return self.hear()
 
     def beat_until_it_ends(self) -> dict[str, Any]:
-        """As a browser does, which sends on until it is told."""
+        """As a browser does, which sends on until it gets the answer."""
         while (said := self.beat())["state"] == "held":
             time.sleep(0.05)
         return said
@@ -91,10 +91,10 @@ def opened(server: Server, **headers: str) -> Iterator[Socket]:
         return json.loads(events_in(text)[0][1])
 
     until(lambda: snapshot()["widgets"]["jog"]["enabled"], "the demo robot permits", within_s=40)
-    seen = snapshot()["id"]
+    event_id = snapshot()["id"]
     url = f"ws://127.0.0.1:{server.port}{server.base}/widgets/jog/hold"
     with connect(url, additional_headers=headers) as connection:
-        yield Socket(connection, seen)
+        yield Socket(connection, event_id)
 
 
 @contextmanager
@@ -179,7 +179,7 @@ def test_a_hold_is_let_go_by_who_has_no_answer_yet(demo: Server) -> None:
         assert said["code"] == "hold_released"
 
 
-def test_who_lets_go_before_a_hold_begins_is_told_that_it_did_not(demo: Server) -> None:
+def test_who_lets_go_before_a_hold_begins_gets_the_answer_that_it_did_not(demo: Server) -> None:
     with opened(demo) as socket:
         socket.say(do="end", why="released")
         said = socket.hear()
@@ -190,7 +190,9 @@ def test_who_lets_go_before_a_hold_begins_is_told_that_it_did_not(demo: Server) 
 
 
 @pytest.mark.real_time
-def test_a_heartbeat_for_a_hold_that_is_over_is_told_so_and_revives_nothing(prompt: Server) -> None:
+def test_a_heartbeat_for_a_hold_that_is_over_gets_that_answer_and_revives_nothing(
+    prompt: Server,
+) -> None:
     with held(prompt) as socket:
         said = socket.hear()
         assert (said["state"], said["outcome"]) == ("ended", "aborted")
@@ -272,7 +274,7 @@ def test_who_lets_go_while_the_entry_is_written_holds_nothing(prompt: Server) ->
         with opened(prompt) as socket:
             db = sqlite3.connect(prompt.data / NAME, isolation_level=None)
             db.execute("BEGIN IMMEDIATE")
-            socket.say(do="begin", inputs={"speed": 0.5}, seen=socket.seen)
+            socket.say(do="begin", inputs={"speed": 0.5}, seen=socket.event_id)
             socket.say(do="end", why="released", lease="")
             time.sleep(0.1)
             assert prompt.widget("jog")["held"] is False
@@ -419,7 +421,7 @@ def test_a_terminal_that_closes_ends_it_as_any_end_of_the_server(
     assert "the panel server is shutting down" in said["reason"]
 
 
-def test_a_server_that_ends_tells_it_though_the_robot_has_to_be_asked_first(
+def test_a_server_that_ends_reports_it_though_the_robot_has_to_be_queried_first(
     own_bridge: Bridge, own_node: RosNode, tmp_path: Path, servers: Callable[[Server], Server]
 ) -> None:
     own_node.advertise("/operation_enabled", "std_msgs/msg/Bool")
@@ -445,7 +447,7 @@ def test_a_server_that_ends_waits_for_no_browser_that_does_not_close(
         mine.process.wait(15)  # it waits for nothing else, and for that 40 s
 
 
-def test_nobody_presses_a_hold(demo: Server) -> None:
+def test_a_hold_can_not_be_pressed(demo: Server) -> None:
     assert demo.http.post("/widgets/jog", json={"inputs": {"speed": 0.5}}).status_code == 404
 
 

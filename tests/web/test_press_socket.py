@@ -19,7 +19,7 @@ from tests.support.parts import ROOT, PressSocket, Server, as_response, until, z
 from tests.web.test_server import reads_nothing
 
 WAITS_S: Final = 1.5
-LATER_S: Final = 1.2  # than a server that is told to end gives who reads nothing
+LATER_S: Final = 1.2  # than an ending server gives a client that reads nothing
 FREE: Final = """
     [[page.widget]]
     id = "free"
@@ -57,7 +57,7 @@ def press(name: str, press_id: str = "", **more: Any) -> str:
 
 
 def logged(kiosk: Server, press_id: str) -> str:
-    """The line in the server's log that tells the result of a press."""
+    """The line in the server's log with the result of a press."""
     return next((line for line in kiosk.process.lines if f"press {press_id} of" in line), "")
 
 
@@ -71,7 +71,7 @@ def test_a_slow_answer_holds_up_no_other_press(kiosk: Server) -> None:
     assert (first["code"], second["code"]) == ("sent_to_nobody", "timed_out")
 
 
-def test_too_many_presses_at_once_are_told_so_and_none_is_lost(kiosk: Server) -> None:
+def test_too_many_presses_at_once_are_refused_and_none_is_lost(kiosk: Server) -> None:
     with kiosk.socket() as socket, kiosk.socket() as other:
         for name in MUTE:
             socket.say(press(name, f"many.{name}"))
@@ -97,7 +97,7 @@ def test_who_leaves_before_the_answer_loses_only_that(kiosk: Server) -> None:
     assert (again.status_code, again.json()["outcome"]) == (504, "timed_out")
 
 
-def test_a_server_that_ends_tells_what_came_of_a_press_that_is_under_way(tmp_path: Path) -> None:
+def test_a_server_that_ends_reports_the_result_of_a_press_that_is_under_way(tmp_path: Path) -> None:
     with slow(tmp_path) as mine, mine.socket() as socket:
         socket.say(press(MUTE[0], "late"))
         until(lambda: mine.widget(MUTE[0])["busy"], "it is under way")
@@ -151,7 +151,7 @@ def test_who_comes_while_it_ends_and_reads_nothing_holds_it_up_no_longer(tmp_pat
             mine.process.wait(10)
 
 
-def test_what_is_no_press_is_told_so(kiosk: Server) -> None:
+def test_what_is_no_press_gets_an_error(kiosk: Server) -> None:
     with kiosk.socket() as socket:
         for text, why in (
             (b"\0", "the message is not text"),

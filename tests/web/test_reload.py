@@ -85,7 +85,7 @@ def test_a_panel_with_a_fault_is_a_page_that_says_where_until_it_is_mended(
 
 
 @pytest.mark.parametrize("fault", ["{% endblok %}", "{{ page.titel }}", "{{ 1 + words }}"])
-def test_a_template_with_a_fault_is_told_and_the_page_comes_back_by_itself(
+def test_a_template_with_a_fault_is_reported_and_the_page_comes_back_by_itself(
     checkout: Checkout, page: Page, fault: str
 ) -> None:
     page.goto(checkout.server.url)

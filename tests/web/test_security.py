@@ -17,7 +17,7 @@ Named = Mapping[str, str] | list[tuple[str, str]]
 OWN = {"host": "localhost:8000"}
 
 
-def asked(
+def answer_to(
     method: str, path: str, headers: Named, answer: PlainTextResponse | None = None
 ) -> httpx.Response:
     """What comes back through the doors; inside, everything is answered with "in"."""
@@ -32,7 +32,7 @@ def asked(
 
 
 def let_in(method: str, path: str, headers: Named) -> bool:
-    answer = asked(method, path, headers)
+    answer = answer_to(method, path, headers)
     assert (answer.status_code, answer.text == "in") in ((200, True), (403, False))
     return answer.status_code == 200
 
@@ -78,7 +78,7 @@ def test_the_panel_answers_to_its_names_at_any_port(method: str, host: str) -> N
 )
 @pytest.mark.parametrize("path", ["/", "/events", "/widgets/x", "/healthz"])
 def test_a_host_that_is_no_name_of_the_panel_is_refused(path: str, host: str) -> None:
-    answer = asked("GET", path, {"host": host})
+    answer = answer_to("GET", path, {"host": host})
     assert answer.status_code == 403
     assert answer.json() == {
         "error": f'"{host}" is not a name of this panel: KIOSK_HOSTS lists the names it answers to'
@@ -124,7 +124,7 @@ def test_the_panels_own_page_may_press_and_listen(
 def test_a_page_of_another_origin_may_neither_press_nor_listen(
     method: str, path: str, origin: str
 ) -> None:
-    answer = asked(method, path, {**OWN, "origin": origin})
+    answer = answer_to(method, path, {**OWN, "origin": origin})
     assert answer.status_code == 403
     assert answer.json() == {"error": f'a page of "{origin}" asked for this'}
 
@@ -132,7 +132,7 @@ def test_a_page_of_another_origin_may_neither_press_nor_listen(
 @pytest.mark.parametrize("site", ["cross-site", "same-site", "", "Same-Origin", "other"])
 @pytest.mark.parametrize(("method", "path"), GUARDED)
 def test_a_page_of_another_site_may_neither_press_nor_listen(method: str, path: str, site: str) -> None:
-    answer = asked(method, path, {**OWN, "sec-fetch-site": site})
+    answer = answer_to(method, path, {**OWN, "sec-fetch-site": site})
     assert answer.status_code == 403
     assert answer.json() == {"error": f"a page of another site ({site}) asked for this"}
 
@@ -176,12 +176,12 @@ def test_a_link_on_another_site_may_lead_to_the_panel(path: str) -> None:
 
 
 def test_the_head_of_the_stream_is_guarded_like_the_stream() -> None:
-    assert asked("HEAD", "/events", {**OWN, "sec-fetch-site": "cross-site"}).status_code == 403
+    assert answer_to("HEAD", "/events", {**OWN, "sec-fetch-site": "cross-site"}).status_code == 403
 
 
 @pytest.mark.parametrize("host", ["localhost:8000", "evil.example"])
 def test_every_answer_has_the_security_headers(host: str) -> None:
-    headers = asked("GET", "/", {"host": host}).headers
+    headers = answer_to("GET", "/", {"host": host}).headers
     assert {name: headers.get(name) for name in SECURITY_HEADERS} == SECURITY_HEADERS
     assert "frame-ancestors 'none'" in headers["content-security-policy"]
     assert "unsafe" not in headers["content-security-policy"]
@@ -189,7 +189,7 @@ def test_every_answer_has_the_security_headers(host: str) -> None:
 
 @pytest.mark.parametrize("media_type", ["text/css", "text/javascript", "text/event-stream"])
 def test_what_is_no_document_has_those_that_are_not_about_documents(media_type: str) -> None:
-    headers = asked("GET", "/", OWN, PlainTextResponse("in", media_type=media_type)).headers
+    headers = answer_to("GET", "/", OWN, PlainTextResponse("in", media_type=media_type)).headers
     assert headers["x-content-type-options"] == "nosniff"
     assert headers["cross-origin-resource-policy"] == "same-origin"
     assert "content-security-policy" not in headers
@@ -197,14 +197,14 @@ def test_what_is_no_document_has_those_that_are_not_about_documents(media_type: 
 
 def test_an_answer_may_set_a_security_header_itself() -> None:
     own = PlainTextResponse("in", headers={"referrer-policy": "no-referrer"})
-    assert asked("GET", "/", OWN, own).headers.get_list("referrer-policy") == ["no-referrer"]
+    assert answer_to("GET", "/", OWN, own).headers.get_list("referrer-policy") == ["no-referrer"]
 
 
 def test_what_is_no_http_passes() -> None:
-    seen: list[str] = []
+    passed: list[str] = []
 
     async def inside(scope: Scope, receive: Receive, send: Send) -> None:
-        seen.append(scope["type"])
+        passed.append(scope["type"])
 
     async def nothing() -> dict[str, str]:
         return {}
@@ -213,7 +213,7 @@ def test_what_is_no_http_passes() -> None:
         raise AssertionError(message)
 
     asyncio.run(RequestGuard(inside, HOSTS)({"type": "lifespan"}, nothing, nowhere))
-    assert seen == ["lifespan"]
+    assert passed == ["lifespan"]
 
 
 @pytest.mark.parametrize("origin", ["http://[", "//", "http://localhost:8000.evil", "localhost:8000"])

@@ -300,11 +300,11 @@ def test_it_ends_soon_with_fifty_streams_and_sockets_open(
         assert sockets[-1].press(widget="operation", inputs={"message": "x"}).status_code == 200
         streams = [many.send(many.build_request("GET", "/events"), stream=True) for _ in range(50)]
         until(lambda: "kiosk_streams 50.0" in mine.http.get("/metrics").text, "50 streams")
-        told_at = time.monotonic()
+        signalled_at = time.monotonic()
         mine.process.send(signal.SIGTERM)
         for stream in streams:
             stream.read()  # to its end, which is in order
-        assert time.monotonic() - told_at < 1.0
+        assert time.monotonic() - signalled_at < 1.0
         mine.process.wait(3)
         for socket in sockets:
             with pytest.raises(ConnectionClosed):
@@ -325,7 +325,7 @@ def test_it_ends_while_it_connects_to_what_says_nothing(tmp_path: Path) -> None:
         taken.close()
 
 
-def test_it_leaves_what_stands_still_at_its_end_and_tells_where() -> None:
+def test_it_leaves_what_stands_still_at_its_end_and_says_where() -> None:
     mine = Server(ROOT, app="tests.support.apps.standing:app")
     assert mine.end(signal.SIGTERM, timeout_s=10) == 1
     assert "Timeout (0:00:01)!" in mine.process.text
@@ -357,13 +357,13 @@ def test_it_ends_though_somebody_reads_nothing_of_what_they_asked_for() -> None:
 )
 @pytest.mark.parametrize("packed", ["gzip", "identity"])
 def test_head_answers_as_get_without_a_body(demo: Server, path: str, packed: str) -> None:
-    def asked(method: str) -> httpx.Response:
+    def answer_to(method: str) -> httpx.Response:
         return demo.http.request(method, path, headers={"accept-encoding": packed})
 
     def lengths() -> list[str]:
-        return [asked(method).headers["content-length"] for method in ("HEAD", "GET")]
+        return [answer_to(method).headers["content-length"] for method in ("HEAD", "GET")]
 
-    head, got = asked("HEAD"), asked("GET")
+    head, got = answer_to("HEAD"), answer_to("GET")
     assert (head.status_code, head.content) == (got.status_code, b"")
     for name in set(got.headers) - {"date", "set-cookie", "content-length"}:
         assert head.headers[name] == got.headers[name]
@@ -371,7 +371,7 @@ def test_head_answers_as_get_without_a_body(demo: Server, path: str, packed: str
     assert int(head.headers["content-length"]) > 0
 
 
-def test_head_of_a_static_file_tells_its_length(demo: Server) -> None:
+def test_head_of_a_static_file_says_its_length(demo: Server) -> None:
     found = re.search(r"/static/\w+/kiosk\.css", demo.http.get("/").text)
     assert found
     head, got = demo.http.head(found[0]), demo.http.get(found[0])
@@ -393,7 +393,7 @@ def test_what_only_takes_posts_or_gets_says_so(demo: Server) -> None:
         assert (answer.status_code, answer.headers["allow"]) == (405, allowed)
 
 
-def test_a_client_that_reads_nothing_holds_up_nobody(demo: Server) -> None:
+def test_a_client_that_reads_nothing_delays_no_other(demo: Server) -> None:
     with demo.http.stream("GET", "/events", timeout=30) as stalled:
         assert stalled.status_code == 200
         with demo.stream() as stream:

@@ -238,7 +238,7 @@ def address_of(server: Server, **headers: str) -> str:
     return row[7]
 
 
-def test_a_forwarded_address_counts_for_nothing_whatever_uvicorn_was_told(
+def test_a_forwarded_address_counts_for_nothing_whatever_the_options_of_uvicorn(
     servers: Callable[[Server], Server],
 ) -> None:
     mine = servers(Server(ROOT, options=["--forwarded-allow-ips", "*"], FORWARDED_ALLOW_IPS="*"))
@@ -278,7 +278,7 @@ def test_what_a_proxy_says_is_at_the_cell_only_where_the_proxy_is(
     async def app(scope: Scope, receive: Receive, send: Send) -> None:
         found.append(scope["client"][0])
 
-    async def asked() -> None:
+    async def serve() -> None:
         scope = {
             "type": "http",
             "client": (peer, 1),
@@ -287,7 +287,7 @@ def test_what_a_proxy_says_is_at_the_cell_only_where_the_proxy_is(
         queue: asyncio.Queue[Any] = asyncio.Queue()
         await Proxies(app, ["127.0.0.1", "192.0.2.2"])(scope, queue.get, queue.put)
 
-    asyncio.run(asked())
+    asyncio.run(serve())
     assert found == [client]
 
 
@@ -313,7 +313,7 @@ def test_a_port_in_use_is_one_sentence(plain: Server, tmp_path: Path) -> None:
     assert f"can't listen on 127.0.0.1 port {plain.port}: another program does, perhaps" in said
 
 
-def test_the_start_tells_what_it_uses_and_where_it_is(servers: Callable[[Server], Server]) -> None:
+def test_the_start_says_what_it_uses_and_where_it_is(servers: Callable[[Server], Server]) -> None:
     panel = ROOT / "app/panel.toml"
     mine = servers(Server(ROOT, KIOSK_MODE="live"))
     until(

@@ -1,5 +1,5 @@
 """The colours of static/css/tokens.css: each text has the contrast of WCAG 2.2 AA in every theme, and
-what tells a key or a field from its surroundings that of 1.4.11."""
+the contrast of a key or a field with its surroundings that of 1.4.11."""
 
 import re
 from collections.abc import Mapping

@@ -220,19 +220,19 @@ def _duplicate_ids(table: str, ids: list[str]) -> Iterator[Fault]:
 
 
 def _duplicate_widget_ids(panel: Panel) -> Iterator[Fault]:
-    seen: dict[str, str] = {}
+    places: dict[str, str] = {}
     ids = [page.id for page in panel.pages]
     for p, page in enumerate(panel.pages):
         for at, widget in page.placed():
             place = f"page[{p}].{at}"
-            if widget.id in seen and page.id not in ids[:p]:  # not in a page with a duplicate id
-                yield Fault(f"{place}.id", f'"{widget.id}" is already the id of {seen[widget.id]}')
-            seen.setdefault(widget.id, place)
+            if widget.id in places and page.id not in ids[:p]:  # not in a page with a duplicate id
+                yield Fault(f"{place}.id", f'"{widget.id}" is already the id of {places[widget.id]}')
+            places.setdefault(widget.id, place)
     for w, widget in enumerate(panel.frame.widgets):
-        if widget.id in seen:
-            already = f'"{widget.id}" is already the id of {seen[widget.id]}'
+        if widget.id in places:
+            already = f'"{widget.id}" is already the id of {places[widget.id]}'
             yield Fault(f"frame.widget[{w}].id", already)
-        seen.setdefault(widget.id, f"frame.widget[{w}]")
+        places.setdefault(widget.id, f"frame.widget[{w}]")
 
 
 def _topic_conflicts(panel: Panel, reported: Sequence[str]) -> Iterator[Fault]:

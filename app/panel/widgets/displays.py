@@ -148,7 +148,7 @@ def constant_faults(place: str, readout: NamedByConstants, interfaces: Interface
 
 
 class HasStates(HasField, Protocol):
-    """What tells values apart by lamps."""
+    """A widget that shows each value by a lamp of its own."""
 
     @property
     def states(self) -> tuple[LampState, ...]: ...

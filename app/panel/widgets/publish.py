@@ -71,7 +71,7 @@ class SinglePublish(PublishPress):
         if self.confirm is not None:
             yield from _confirm_faults(f"{place}.confirm", self.confirm, checking)
         elif self.one_shot:
-            what = "needs `confirm`: without it nothing tells when the command was answered"
+            what = "needs `confirm`: without it the panel does not know when the command is done"
             yield Fault(f"{place}.one_shot", what)
 
 

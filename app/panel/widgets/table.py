@@ -186,7 +186,7 @@ class Table(TopicWidget, DisplayWidget):
         if sort is None:
             return
         if (sort.first == "newest") != (sort.by is None):
-            what = "is for the largest or smallest" if sort.by else "is missing: the field that tells"
+            what = "is for the largest or smallest" if sort.by else "is missing: the field to sort by"
             yield Fault(f"{place}.sort.by", what)
         elif sort.by is not None:
             yield from self._entry_faults(f"{place}.sort.by", sort.by, interfaces)

@@ -1,1 +1,1 @@
-"""Values of messages, made from their types and what a panel tells of its fields."""
+"""Values of messages, made from their types and what a panel says of its fields."""

@@ -4,10 +4,8 @@ from typing import Final
 
 from app.web.gallery.examples import (
     ACTION,
-    ASKED,
     CALL,
     CALLED,
-    DOUBTS,
     ENABLED,
     FREE,
     HELD,
@@ -16,8 +14,10 @@ from app.web.gallery.examples import (
     LOCKED,
     LOCKED_BY_TWO,
     LONG,
+    NOT_LIVE,
     PRESSED,
     PUBLISH,
+    REQUESTED,
     REST,
     RUNS,
     Example,
@@ -45,7 +45,7 @@ KEYS: Final = (
     Example("called", "call", CALL, CALLED | {"busy": True, "result": "Calling /reset"}, marks=PRESSED),
     Example("succeeded", "call", CALL, CALLED | {"outcome": "succeeded", "result": "Done 14:31:58"}),
     Example("rejected, long", "call", CALL, CALLED | {"outcome": "rejected", "result": LONG}),
-    Example("hold asked", "hold", HOLD, FREE | LET_GO, marks=ASKED),
+    Example("hold asked", "hold", HOLD, FREE | LET_GO, marks=REQUESTED),
     Example("held", "hold", HOLD, FREE | {"held": True, "holding": "held 0.8 s"}, marks=HELD),
     Example("hold locked", "hold", HOLD, LOCKED | LET_GO),
 )
@@ -97,7 +97,7 @@ STEPS: Final = (
             | {"state": state, "reason": note, "note": note, "step_up": "", "step_down": ""}
             | ({} if state == "old" else {"text": "—"}),
         )
-        for state, note in DOUBTS.items()
+        for state, note in NOT_LIVE.items()
     ),
 )
 JOYSTICK: Final[Table] = {

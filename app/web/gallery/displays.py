@@ -3,7 +3,7 @@
 from typing import Final
 
 from app.panel.widgets.log_view import LEVELS as LOG_LEVELS
-from app.web.gallery.examples import DOUBTS, TOPIC, Example, Table, Texts
+from app.web.gallery.examples import NOT_LIVE, TOPIC, Example, Table, Texts
 
 VALUE: Final[Table] = TOPIC | {"label": "Vacuum", "unit": "kPa"}
 READOUTS: Final = (
@@ -16,7 +16,7 @@ READOUTS: Final = (
             VALUE,
             {"state": state, "text": "−71 kPa" if state == "old" else "—", "note": note},
         )
-        for state, note in DOUBTS.items()
+        for state, note in NOT_LIVE.items()
     ),
 )
 LAMP: Final[Table] = {
@@ -48,7 +48,7 @@ LAMPS: Final = (
                 "shape": "waiting" if state == "missing" else state,
             },
         )
-        for state, note in DOUBTS.items()
+        for state, note in NOT_LIVE.items()
     ),
     Example("a value of no state", "indicator", LAMP, LIVE | {"text": "Value 3", "shape": "unknown"}),
 )

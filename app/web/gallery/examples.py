@@ -93,10 +93,10 @@ RUNS: Final[Table] = {
 LONG: Final = "Rejected by the robot at 14:31:58: the gripper still holds a box of the last layer"
 PRESSED: Final[Texts] = {'type="submit"': 'type="submit" aria-busy="true"'}
 ENABLED: Final[Texts] = {" disabled>": ">"}
-ASKED: Final[Texts] = ENABLED | {'data-kind="hold"': 'data-kind="hold" data-hold="asked"'}
+REQUESTED: Final[Texts] = ENABLED | {'data-kind="hold"': 'data-kind="hold" data-hold="asked"'}
 HELD: Final[Texts] = ENABLED | {'data-kind="hold"': 'data-kind="hold" data-hold="held"'}
 LET_GO: Final[Table] = {"held": False, "holding": ""}
-DOUBTS: Final[Texts] = {
+NOT_LIVE: Final[Texts] = {
     "waiting": "Nothing received on /door",
     "old": "2 min old",
     "unreadable": "/door is not std_msgs/msg/Bool",

@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from app.web.gallery.examples import DOUBTS, TOPIC, Example, Table
+from app.web.gallery.examples import NOT_LIVE, TOPIC, Example, Table
 
 GAUGE: Final[Table] = TOPIC | {
     "label": "Air inlet",
@@ -55,7 +55,7 @@ GAUGES: Final = tuple(
                 (IN_RANGE if state == "old" else DOUBTFUL)
                 | {"state": state, "level": "", "note": note},
             )
-            for state, note in DOUBTS.items()
+            for state, note in NOT_LIVE.items()
         ),
     )
 )
@@ -118,7 +118,7 @@ JOINT_ROWS: Final = (
             (JOINTS_LIVE | {"joint_levels": [""] * 4} if state == "old" else JOINTS_UNKNOWN)
             | {"state": state, "note": note},
         )
-        for state, note in DOUBTS.items()
+        for state, note in NOT_LIVE.items()
     ),
 )
 LEVELS: Final = (
@@ -165,7 +165,7 @@ TABLES: Final = (
             TABLE,
             FILLED | {"state": state, "note": note, "table_rows": ROWS if state == "old" else []},
         )
-        for state, note in DOUBTS.items()
+        for state, note in NOT_LIVE.items()
         if state != "missing"
     ),
 )

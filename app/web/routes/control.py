@@ -14,7 +14,7 @@ from app.errors import InputError, NotFound
 from app.i18n import localized
 from app.panel.base import ID
 from app.permission.control_authority import LIFE_S
-from app.permission.control_authority_view import role, seen_as
+from app.permission.control_authority_view import for_role, role
 from app.permission.principal import Principal
 from app.runtime.robot_session import RobotSession
 from app.web.app_state import CurrentSession, CurrentState
@@ -114,13 +114,15 @@ async def act(act: Act, request: Request, state: CurrentState, session: CurrentS
     given = await _given(Acting, request)
     # One rendered page has one id for all its buttons, and each button is an act of its own.
     act_id = (f"{given.id}.{act}" if form else given.id) if given.id else secrets.token_hex(8)
-    asked = ActRequest(act, who, given.to)
+    requested = ActRequest(act, who, given.to)
     if not state.limits.admit(who):
-        receipt = session.control_acts.limited(asked, act_id)
+        receipt = session.control_acts.limited(requested, act_id)
     else:
         at = None if form or given.at is None else given.at.timestamp()
         with state.in_flight.track():
-            receipt = await session.control_acts.act(asked, act_id, at, FORM_LIFE_S if form else LIFE_S)
+            receipt = await session.control_acts.act(
+                requested, act_id, at, FORM_LIFE_S if form else LIFE_S
+            )
     answer = _page(session, given.page, receipt) if form else _json(request, session, who, receipt)
     return keep(answer, request, token)
 
@@ -141,7 +143,7 @@ def _json(request: Request, session: RobotSession, who: Principal, receipt: ActR
         **receipt.as_json(),
         "done": receipt.done,
         "browser": who.client.id,
-        "control": seen_as(control, role(control, who, session.control.rules)),
+        "control": for_role(control, role(control, who, session.control.rules)),
     }
     headers = {"retry-after": str(RETRY_AFTER_S)} if receipt.cause == "limit" else None
     content = localized(content, language_of(request))
@@ -150,7 +152,7 @@ def _json(request: Request, session: RobotSession, who: Principal, receipt: ActR
 
 def _required(session: RobotSession) -> None:
     if not session.control.rules.required:
-        raise NotFound("on this panel nobody needs control: its file has no [control] required = true")
+        raise NotFound("this panel does not require control: its file has no [control] required = true")
 
 
 async def _given(model: type[Fields], request: Request) -> Fields:

@@ -105,17 +105,17 @@ class EventStream(Response):
         board, heartbeat, language = self._board, self._board.heartbeat, self._language
         page = self._page
         now = self._role()
-        version, view, beats = board.version, board.seen_as(now, page), heartbeat.count
+        version, view, beats = board.version, board.for_role(now, page), heartbeat.count
         retry = f"retry: {RECONNECT_MS}\n\n".encode()
         await send(_body(retry + board.snapshot(language, now, page) + self._first + beat(language)))
         while not board.closed:
             await board.news(version, beats)
             was, now = now, self._role()
             newer = board.version > version
-            chunk = board.since(version, view, language, was, now, page) if newer else b""
+            chunk = board.events_since(version, view, language, was, now, page) if newer else b""
             if heartbeat.count > beats:
                 chunk += heartbeat.event(language)
-            version, view, beats = board.version, board.seen_as(now, page), heartbeat.count
+            version, view, beats = board.version, board.for_role(now, page), heartbeat.count
             if chunk:
                 await send(_body(chunk))
         await send({"type": "http.response.body", "body": b"", "more_body": False})

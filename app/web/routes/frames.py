@@ -105,7 +105,7 @@ class _FrameSocket:
         self._socket = socket
         self._feed = feed
         self._camera = camera
-        self._asked = asyncio.Event()
+        self._requested = asyncio.Event()
         self._language = language_of(socket)
 
     async def run(self) -> None:
@@ -115,7 +115,7 @@ class _FrameSocket:
             try:
                 while (message := await received(self._socket))["type"] == "websocket.receive":
                     if message.get("text"):
-                        self._asked.set()
+                        self._requested.set()
             finally:
                 writing.cancel()
                 await asyncio.gather(writing, return_exceptions=True)
@@ -124,8 +124,8 @@ class _FrameSocket:
         """Sends the newest picture each time that one is asked for, not too often."""
         loop, number = asyncio.get_running_loop(), 0
         while True:
-            await self._asked.wait()
-            self._asked.clear()
+            await self._requested.wait()
+            self._requested.clear()
             shown, picture = await _next(self._feed, self._camera, number)
             due, number = loop.time() + 1 / self._camera.max_hz, shown.number
             about: dict[str, Any] = {

@@ -218,7 +218,7 @@ def _context(
         inside=None,
         base=session.base,
         robot=session.entry.id if session.entry else "",
-        view=board.seen_as(role(board.view["control"], who, rules)),
+        view=board.for_role(role(board.view["control"], who, rules)),
         sections=SECTIONS,
         event_id=board.id,
         revision=board.revision,

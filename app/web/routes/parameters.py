@@ -15,7 +15,7 @@ from app.web.routes.press_forms import page_after
 router = APIRouter()
 
 
-class Asked(BaseModel):
+class ReadAnswer(BaseModel):
     """Whether the node is queried; its answer comes with the events. `reason` is why it is not."""
 
     asked: bool
@@ -24,13 +24,13 @@ class Asked(BaseModel):
 
 @router.post(
     "/widgets/{widget}/read",
-    response_model=Asked,
+    response_model=ReadAnswer,
     status_code=202,
     summary="Ask the node of a parameter for it once more",
     responses=errors(403, 404, 408, 413, 422)
     | {
         303: {"description": "of a form: back to the page"},
-        409: {"model": Asked, "description": "its node is not there"},
+        409: {"model": ReadAnswer, "description": "its node is not there"},
     },
 )
 async def read(widget: str, request: Request, session: CurrentSession) -> Response:
@@ -38,5 +38,5 @@ async def read(widget: str, request: Request, session: CurrentSession) -> Respon
     why = session.read_again(widget)
     if kind_of(request) == FORM:
         return RedirectResponse(page_after(session, widget, ""), status_code=303)
-    answer = Asked(asked=not why, reason=render(why, language_of(request)))
+    answer = ReadAnswer(asked=not why, reason=render(why, language_of(request)))
     return JSONResponse(answer.model_dump(), status_code=409 if why else 202)

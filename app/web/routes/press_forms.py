@@ -30,7 +30,7 @@ class Reader(NamedTuple):
 
 CONFIRMED: Final = "_confirmed"  # a form's field: the server has asked, and this is the yes
 TAP_AGAIN_S: Final = 0.7  # as the page's scripts have it
-ASKED_S: Final = 30.0  # the answer is a press, and no later one
+QUESTION_LIFE_S: Final = 30.0  # the answer is a press, and no later one
 
 
 async def pressed_by_form(
@@ -83,7 +83,7 @@ def _ask(
         display=reader.display,
         panel=session.panel,
         banner=session.publisher.view["notice"]["banner"],
-        asked=ask_of(session, pressed),
+        question=ask_of(session, pressed),
         action=f"{session.base}/widgets/{widget}",
         back=page_after(session, widget, "", shown_on),
         fields={
@@ -91,7 +91,7 @@ def _ask(
             "_page": shown_on,
             CONFIRMED: "yes",
             "_seen": session.publisher.id,
-            "_until": str(round(clock.server_now() + ASKED_S, 3)),
+            "_until": str(round(clock.server_now() + QUESTION_LIFE_S, 3)),
             "_since": str(round(clock.server_now(), 3)),
         },
         typed=printable_texts(inputs),
@@ -122,8 +122,8 @@ def _until(inputs: dict[str, str]) -> float | None:
 def _is_second_tap(inputs: dict[str, str]) -> bool:
     """Whether a page without scripts is pressed sooner than anyone reads it: by the second tap of what
     brought it. Scripts tell by themselves; a page that loaded itself was not tapped for."""
-    since = _moment(inputs, "_since")
-    return since is not None and clock.server_now() - since < TAP_AGAIN_S
+    shown_at = _moment(inputs, "_since")
+    return shown_at is not None and clock.server_now() - shown_at < TAP_AGAIN_S
 
 
 def _moment(inputs: dict[str, str], name: str) -> float | None:

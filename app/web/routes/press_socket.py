@@ -103,7 +103,7 @@ class _PressSocket:
         state, socket = self._state, self._socket
         try:
             session = state.fleet.session(socket.path_params.get("robot"))
-            receipt = await pressed(state, session, self._caller.seen(state), said.widget, said)
+            receipt = await pressed(state, session, self._caller.principal(state), said.widget, said)
         except KioskError as error:
             await self._answer(said.id, error.status, error=error.text)
         except Exception:
