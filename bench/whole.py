@@ -19,10 +19,12 @@ from typing import Any, Final
 
 from playwright.sync_api import sync_playwright
 
+from app.kiosk.browser import FLAGS
 from bench.parts import Meter, family, pss_mib, rss_mib
 from bench.unattended import Unattended
 from tests.support.parts import Bridge, RosNode, live, until
 
+SCREEN: Final = ("--kiosk", "--remote-debugging-pipe")
 QUICK: Final = bool(os.environ.get("QUICK"))
 DOMAIN: Final = 98
 FOR_S: Final = 3.0 if QUICK else 20.0
@@ -66,6 +68,8 @@ label = "Count"
 topic = "{COUNT}"
 type = "std_msgs/msg/Float64"
 """
+# As on a kiosk, but in no window, and by root.
+BROWSER: Final = (*(flag for flag in FLAGS if flag not in SCREEN), "--no-sandbox", "--disable-gpu")
 BUTTON: Final = '[data-widget="first"] button[type="submit"]'
 PRESS: Final = """(button) => {
   const press = () => button.disabled || button.click();
@@ -94,7 +98,7 @@ class WholeKiosk:
         server = live(bridge.endpoint, folder, KIOSK_PANEL=str(folder / "panel.toml"))
         stack.callback(server.end)
         until(lambda: server.http.get("/healthz").is_success, "the server answers", every_s=0.01)
-        self.browser = Unattended(playwright, folder / "profile", server.url)
+        self.browser = Unattended(playwright, folder / "profile", server.url, BROWSER)
         stack.callback(self.browser.close)
         with self.browser.attached() as page:
             page.locator(f"{BUTTON}:enabled").wait_for()

@@ -45,6 +45,8 @@ FLAGS: Final = (
     "--disable-renderer-backgrounding",
     "--disable-features=Translate,MediaRouter,OptimizationHints,InterestFeedContentSuggestions,"
     "CalculateNativeWinOcclusion,TouchpadOverscrollHistoryNavigation,SpareRendererForSitePerProcess",
+    # It runs without a sandbox of its own on Linux anyway: 25 MB less than as a process.
+    "--enable-features=NetworkServiceInProcess2",
     "--password-store=basic",
     "--autoplay-policy=no-user-gesture-required",
     "--disk-cache-size=8388608",
