@@ -2,6 +2,7 @@
 
 import asyncio
 from contextlib import suppress
+from time import monotonic
 from typing import TYPE_CHECKING, Final
 from urllib.parse import urlsplit
 
@@ -9,6 +10,7 @@ if TYPE_CHECKING:
     import ssl
 
 ANSWERS_WITHIN_S: Final = 1.0
+POLL_S: Final = 0.1
 
 
 async def server_answers(url: str, path: str = "/healthz") -> bool:
@@ -18,6 +20,14 @@ async def server_answers(url: str, path: str = "/healthz") -> bool:
             return await _status(url, path) == 200
     except (OSError, TimeoutError, ValueError):
         return False
+
+
+async def answers_within(url: str, within_s: float) -> bool:
+    """The same, of a server that may be starting."""
+    end = monotonic() + within_s
+    while not (answers := await server_answers(url)) and monotonic() < end:
+        await asyncio.sleep(POLL_S)
+    return answers
 
 
 async def _status(url: str, path: str) -> int:

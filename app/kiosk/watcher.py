@@ -25,12 +25,15 @@ from app.kiosk.devtools import DevToolsError
 from app.kiosk.judge import Action, Judge
 from app.kiosk.language import panel_language
 from app.kiosk.night import Night
-from app.kiosk.server_probe import server_answers
+from app.kiosk.server_probe import answers_within, server_answers
 from app.process.sd_notify import ServiceManager, status_line
 
 log = logging.getLogger("kiosk.screen")
 
 LOOK_INTERVAL_S: Final = 1.0
+WAITING_INTERVAL_S: Final = 0.2  # while the panel is not shown
+# A server that starts with the machine mostly answers by then: the waiting page is not made for it.
+SERVER_STARTS_WITHIN_S: Final = 2.0
 # From this age of the last event on the server is asked whether it answers.
 YOUNG_S: Final = 2.0
 # After a start that failed, so that a missing part does not fill the machine's log.
@@ -58,6 +61,7 @@ class Watcher:
         self._browser: Browser | None = None
         self._judge = Judge()
         self._starts_failed = 0
+        self._interval_s = LOOK_INTERVAL_S
         self._stopping = False
         self._waiting = folder / "waiting.html"
 
@@ -72,7 +76,7 @@ class Watcher:
                     self._starts_failed += 1
                     await asyncio.sleep(PAUSE_S)
                 else:
-                    await asyncio.sleep(LOOK_INTERVAL_S)
+                    await asyncio.sleep(self._interval_s)
                 self._tell()
         finally:
             self._stopping = True
@@ -103,7 +107,7 @@ class Watcher:
         profile = self._folder / "profile"
         if self._starts_failed:  # perhaps by what is in it
             shutil.rmtree(profile, ignore_errors=True)
-        up = await server_answers(self._config.url)
+        up = await answers_within(self._config.url, SERVER_STARTS_WITHIN_S)
         url = self._config.url if up else await self._waiting_url()
         flags = (*self._compositor.flags, *self._language_flags(), *self._config.flags)
         self._browser = Browser(self._program, flags, profile)
@@ -111,6 +115,7 @@ class Watcher:
         if self._night.dark:
             await self._browser.ignore_input(True)
         self._starts_failed = 0
+        self._interval_s = LOOK_INTERVAL_S if up else WAITING_INTERVAL_S
         self._judge = Judge()
         log.info("the browser shows %s", "the panel" if up else "that the server does not answer yet")
 
@@ -121,6 +126,7 @@ class Watcher:
         if self._night.dark:
             look = replace(look, drawn=True)
         verdict = self._judge.judge(look, server, monotonic())
+        self._interval_s = WAITING_INTERVAL_S if look.waiting else LOOK_INTERVAL_S
         if verdict.action is not Action.NONE:
             log.info("%s: %s", verdict.reason, verdict.action.value)
         if verdict.action is Action.OPEN_PANEL:
