@@ -3,7 +3,7 @@ frame to DevTools would take a fifth of its CPU time."""
 
 import subprocess
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
@@ -20,20 +20,14 @@ class Unattended:
     """One browser with one page in the foreground. DevTools are attached before and after a measurement
     only."""
 
-    def __init__(
-        self,
-        playwright: Playwright,
-        profile: Path,
-        url: str = "about:blank",
-        flags: Sequence[str] = CHROMIUM_FLAGS,
-    ) -> None:
+    def __init__(self, playwright: Playwright, profile: Path, url: str = "about:blank") -> None:
         """`profile` is an empty folder."""
         self._playwright = playwright
         self._port_file = profile / "DevToolsActivePort"
         self._process = subprocess.Popen(
             [
                 CHROMIUM,
-                *flags,
+                *CHROMIUM_FLAGS,
                 "--headless=new",
                 "--window-size=1280,800",
                 f"--user-data-dir={profile}",

@@ -1,10 +1,11 @@
-"""`python -m bench.whole`: what the whole kiosk takes: the server and its Chromium, on the real bridge.
+"""`python -m bench.whole`: what the whole kiosk takes, on the real bridge: the server, Chromium, and
+what watches the screen (`operator-panel kiosk`, without a compositor).
 
 The page is that of the reference system: a text, two buttons that an interlock locks, and a value.
-Measured: from the start of the server to a button that can be pressed; memory and processor time at
+Measured: from the start of all at once to a button that can be pressed; memory and processor time at
 rest and with 10 messages a second; the closed loop: a real node permits, the button opens, a script
-presses it at once, and the node has the command. With `QUICK=1` it takes some seconds, to check that it
-works. Prints JSON.
+presses it at once, and the node has the command. Memory is shared with any other Chromium that runs on
+the machine. With `QUICK=1` it takes some seconds, to check that it works. Prints JSON.
 """
 
 import json
@@ -13,18 +14,17 @@ import statistics
 import tempfile
 import threading
 import time
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any, Final
 
-from playwright.sync_api import sync_playwright
+from playwright.sync_api import Page, sync_playwright
 
-from app.kiosk.browser import FLAGS
 from bench.parts import Meter, family, pss_mib, rss_mib
-from bench.unattended import Unattended
-from tests.support.parts import Bridge, RosNode, live, until
+from tests.support.parts import Bridge, RosNode, free_port, live, until
+from tests.support.screen import KioskScreen
 
-SCREEN: Final = ("--kiosk", "--remote-debugging-pipe")
 QUICK: Final = bool(os.environ.get("QUICK"))
 DOMAIN: Final = 98
 FOR_S: Final = 3.0 if QUICK else 20.0
@@ -68,9 +68,8 @@ label = "Count"
 topic = "{COUNT}"
 type = "std_msgs/msg/Float64"
 """
-# As on a kiosk, but in no window, and by root.
-BROWSER: Final = (*(flag for flag in FLAGS if flag not in SCREEN), "--no-sandbox", "--disable-gpu")
 BUTTON: Final = '[data-widget="first"] button[type="submit"]'
+IS_OPEN: Final = f"document.querySelector({BUTTON!r})?.disabled === false"
 PRESS: Final = """(button) => {
   const press = () => button.disabled || button.click();
   new MutationObserver(press).observe(button, { attributes: true, attributeFilter: ["disabled"] });
@@ -93,20 +92,30 @@ class WholeKiosk:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="bench-whole-")))
         (folder / "panel.toml").write_text(PANEL)
         (folder / "profile").mkdir()
-        playwright = stack.enter_context(sync_playwright())
+        self._playwright = stack.enter_context(sync_playwright())
+        panel, port = folder / "panel.toml", free_port()
         began = time.monotonic()
-        server = live(bridge.endpoint, folder, KIOSK_PANEL=str(folder / "panel.toml"))
+        self._screen = KioskScreen(
+            f"http://127.0.0.1:{port}", folder / "screen", "--compositor=none", f"--panel={panel}"
+        )
+        stack.callback(self._screen.end)
+        server = live(bridge.endpoint, folder, port, KIOSK_PANEL=str(panel))
         stack.callback(server.end)
-        until(lambda: server.http.get("/healthz").is_success, "the server answers", every_s=0.01)
-        self.browser = Unattended(playwright, folder / "profile", server.url, BROWSER)
-        stack.callback(self.browser.close)
-        with self.browser.attached() as page:
-            page.locator(f"{BUTTON}:enabled").wait_for()
+        until(lambda: self._screen.evaluate(IS_OPEN), "the button is open", every_s=0.01)
         self.live_s = time.monotonic() - began
-        self._server = server.process.pid
+        self._roots = server.process.pid, self._screen.process.pid
 
     def pids(self) -> set[int]:
-        return family((self._server,)) | self.browser.pids()
+        return family(self._roots)
+
+    @contextmanager
+    def attached(self) -> Iterator[Page]:
+        """The page, with a second client of DevTools beside the watcher."""
+        browser = self._playwright.chromium.connect_over_cdp(f"http://127.0.0.1:{self._screen.port}")
+        try:
+            yield browser.contexts[0].pages[0]
+        finally:
+            browser.close()  # closes only the connection
 
     def cost(self) -> dict[str, float]:
         """Over `FOR_S`: memory at the end, and processor time in % of one core."""
@@ -135,7 +144,7 @@ class WholeKiosk:
 
     def closed_loop(self) -> dict[str, float]:
         """Milliseconds from the node's permission to the command that it has."""
-        with self.browser.attached() as page:
+        with self.attached() as page:
             page.locator(BUTTON).evaluate(PRESS)
             page.locator("h1, h2").first.dispatch_event("pointerdown")  # as the first touch of a page
         spent: list[float] = []
