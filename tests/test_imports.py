@@ -66,10 +66,10 @@ SPEAK_ZENOH = {
 # The bridge's dialect and peer, and who else may know them.
 OF_THE_BRIDGE = ("app.dialect.bridge_", "app.transport.bridge_")
 WIRE_THE_BRIDGE = {
-    "app.cli.robot_link",
-    "app.cli.scaffold",
-    "app.cli.topic_reader",
     "app.cli.bridge_config",
+    "app.cli.robot.link",
+    "app.cli.robot.scaffold",
+    "app.cli.robot.topic_reader",
     "app.diagnose.link",
     "app.diagnose.robot",
     "app.diagnose.watch",

@@ -24,7 +24,7 @@ HIGHEST_DOMAIN: Final = 232
 
 
 def main(arguments: Sequence[str], prog: str = PROG) -> int:
-    parser = _parser(prog)
+    parser = make_parser(prog)
     given = parser.parse_args(arguments)
     try:
         panel = load_panel(given.panel or Settings.from_environment().panel)
@@ -91,7 +91,7 @@ def _node(text: str) -> str:
     return text
 
 
-def _parser(prog: str) -> Parser:
+def make_parser(prog: str) -> Parser:
     parser = Parser(
         prog=prog,
         description="Writes a configuration of the bridge that lets through what a panel needs.",

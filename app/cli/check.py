@@ -17,7 +17,7 @@ GOOD, FAULTY, UNREADABLE = range(3)
 
 
 def main(arguments: Sequence[str], prog: str = PROG) -> int:
-    given = _parser(prog).parse_args(arguments)
+    given = make_parser(prog).parse_args(arguments)
     try:
         paths = given.panel or [Settings.from_environment().panel]
     except KioskError as error:
@@ -47,7 +47,7 @@ def _summary(path: Path, panel: Panel) -> str:
     return f"{path}: good: {what}"
 
 
-def _parser(prog: str) -> Parser:
+def make_parser(prog: str) -> Parser:
     parser = Parser(
         prog=prog,
         description="Tells every fault of panel files, with its place and what would be right.",

@@ -7,10 +7,11 @@ starting Python, and only the names of topics ask the robot. Source of the synta
 
 import argparse
 import shlex
-from collections.abc import Iterator, Mapping, Sequence
-from importlib import import_module
+from collections.abc import Iterator, Sequence
 from typing import Final
 
+from app.cli.command import program_parser
+from app.cli.command_table import COMMANDS
 from app.cli.parser import Parser
 from app.settings import APP
 
@@ -19,22 +20,16 @@ SHELLS: Final = ("bash", "zsh", "fish")
 TOPIC: Final = "TOPIC"  # the argument of the commands whose argument is a topic's name
 TOPICS: Final = f"{APP} topics --wait 1 2>/dev/null"
 
-
 Parsers = Sequence[tuple[str, str, argparse.ArgumentParser]]  # (command, what it does, its parser)
 
 
-def print_completion(
-    commands: Mapping[str, str],
-    program: argparse.ArgumentParser,
-    arguments: Sequence[str],
-    prog: str = PROG,
-) -> int:
-    """Prints the completion of these commands; `program` has the options before any command."""
-    shell = _parser(prog).parse_args(arguments).shell
+def main(arguments: Sequence[str], prog: str = PROG) -> int:
+    shell = make_parser(prog).parse_args(arguments).shell
     parsers = [
-        (name, text, import_module(f"app.cli.{name.replace('-', '_')}")._parser(f"{APP} {name}"))
-        for name, text in commands.items()
+        (name, command.about, command.load().make_parser(f"{APP} {name}"))
+        for name, command in COMMANDS.items()
     ]
+    program = program_parser()  # of the options before any command
     print(_fish(parsers, program) if shell == "fish" else _bash(parsers, program, shell == "zsh"))
     return 0
 
@@ -119,7 +114,7 @@ def _fish_option(action: argparse.Action) -> str:
     return " ".join([*parts, f"-d {shlex.quote(help_text)}"])
 
 
-def _parser(prog: str) -> Parser:
+def make_parser(prog: str) -> Parser:
     parser = Parser(
         prog=prog,
         description="Prints a shell's completion of commands, options and the robot's topics.",

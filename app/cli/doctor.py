@@ -27,7 +27,7 @@ LONGEST_LISTEN_S: Final = 600.0
 
 
 def main(arguments: Sequence[str], prog: str = PROG) -> int:
-    given = _parser(prog).parse_args(arguments)
+    given = make_parser(prog).parse_args(arguments)
     try:
         settings = settings_of(given)
         found = asyncio.run(diagnose(settings, options_of(given)))
@@ -86,7 +86,7 @@ def _line(one: Finding) -> str:
     return f"{one.severity:8} {one.code}{robot}: {one.what}"
 
 
-def _parser(prog: str) -> Parser:
+def make_parser(prog: str) -> Parser:
     made = Parser(
         prog=prog,
         description="Finds out what is wrong between a panel, this machine and the robot, and says what"

@@ -1,6 +1,7 @@
-"""`operator-panel install | uninstall | update`: the panel as services of this machine.
+"""`operator-panel install`: the panel as services of this machine.
 
-Exit status: 0 done, 1 it could not be done, 2 a mistake on the command line, or not confirmed.
+Exit status, of `update` and `uninstall` too: 0 done, 1 it could not be done, 2 a mistake on the command
+line, or not confirmed.
 """
 
 import sys
@@ -12,29 +13,20 @@ from app.cli.parser import USAGE_ERROR, Parser
 from app.errors import SettingsError
 from app.install.assets import checked_wheel
 from app.install.host import Host
-from app.install.plan import Options, steps, uninstall_steps
-from app.install.step import Step, apply, describe, revert
-from app.install.update import URL, SystemdServices, Updater
+from app.install.plan import Options, steps
+from app.install.step import apply, describe
 
-PROG = "python -m app.cli"
-
-
-def install(arguments: Sequence[str], prog: str = f"{PROG} install") -> int:
-    return _run(_install, _parser(prog), arguments)
+PROG = "python -m app.cli install"
 
 
-def uninstall(arguments: Sequence[str], prog: str = f"{PROG} uninstall") -> int:
-    return _run(_uninstall, _uninstall_parser(prog), arguments)
+def main(arguments: Sequence[str], prog: str = PROG) -> int:
+    return exit_status(_install, make_parser(prog).parse_args(arguments))
 
 
-def update(arguments: Sequence[str], prog: str = f"{PROG} update") -> int:
-    parser = _update_parser(prog)
-    return _run(lambda given: _update(parser, given), parser, arguments)
-
-
-def _run(what: Callable[[Namespace], int], parser: Parser, arguments: Sequence[str]) -> int:
+def exit_status(work: Callable[[Namespace], int], given: Namespace) -> int:
+    """That of the work; 1 with the sentence if it can't be done."""
     try:
-        return what(parser.parse_args(arguments))
+        return work(given)
     except (SettingsError, OSError) as error:
         print(error, file=sys.stderr)
         return 1
@@ -56,39 +48,14 @@ def _install(given: Namespace) -> int:
         print(line)
     if given.dry_run:
         return 0
-    if not _confirmed(given, plan, host):
+    if not confirmed(given):
         return USAGE_ERROR
-    print("installed" if apply(plan, host, _say) else "everything was done before")
+    print("installed" if apply(plan, host, print_progress) else "everything was done before")
     return 0
 
 
-def _uninstall(given: Namespace) -> int:
-    host = Host(given.root.resolve())
-    plan = uninstall_steps(host)
-    print("stops and removes the services, the releases, and the browser's user")
-    print("keeps /etc/operator-panel, /var/lib/operator-panel (the operator's log) and the packages")
-    if given.dry_run:
-        return 0
-    if not _confirmed(given, plan, host):
-        return USAGE_ERROR
-    revert(plan, host, _say)
-    return 0
-
-
-def _update(parser: Parser, given: Namespace) -> int:
-    if given.back and given.wheel is not None:
-        parser.error("either a wheel or --back")
-    host = Host(given.root.resolve())
-    url = given.url if host.runs_systemd else None
-    updater = Updater(host=host, services=SystemdServices(host), url=url, say=_say)
-    if given.back:
-        updater.back()
-    else:
-        updater.update(checked_wheel(given.wheel), given.wheels and given.wheels.resolve())
-    return 0
-
-
-def _confirmed(given: Namespace, plan: Sequence[Step], host: Host) -> bool:
+def confirmed(given: Namespace) -> bool:
+    """By --yes or by the user."""
     if given.yes:
         return True
     if not sys.stdin.isatty():
@@ -97,14 +64,14 @@ def _confirmed(given: Namespace, plan: Sequence[Step], host: Host) -> bool:
     return input("go on? [y/N] ").strip().lower() in ("y", "yes")
 
 
-def _say(text: str) -> None:
+def print_progress(text: str) -> None:
     print(text, flush=True)
 
 
-def _parser(prog: str) -> Parser:
+def make_parser(prog: str) -> Parser:
     parser = Parser(
         prog=prog,
-        description="Installs the panel as services of this machine: server, compositor, browser. Says"
+        description="Installs the panel as services of this machine: server, compositor, browser. Lists"
         " first what it will do. Can be run again: only what is missing is done.",
     )
     add = parser.add_argument
@@ -114,47 +81,19 @@ def _parser(prog: str) -> Parser:
     add("--no-screen", action="store_true", help="the server alone, for browsers elsewhere")
     add("--touch-matrix", default="", metavar="'A B C D E F'", help="libinput's calibration matrix")
     add("--any-system", action="store_true", help="not only Debian 12 and 13 and Ubuntu 24.04")
-    _add_common(parser)
-    _add_wheels(parser)
+    add_questions(parser)
+    add_root(parser)
+    add_wheels(parser)
     return parser
 
 
-def _uninstall_parser(prog: str) -> Parser:
-    parser = Parser(
-        prog=prog,
-        description="Takes back what install did. Panel file, settings and the operator's log stay.",
-    )
-    _add_common(parser)
-    return parser
+def add_questions(parser: Parser) -> None:
+    """--dry-run, --yes."""
+    parser.add_argument("--dry-run", action="store_true", help="only list what would be done")
+    parser.add_argument("--yes", action="store_true", help="go on without a question")
 
 
-def _update_parser(prog: str) -> Parser:
-    parser = Parser(
-        prog=prog,
-        description="Installs another version beside the one that runs, and starts it. If its server or"
-        " page does not come up within a minute, the version of before runs again.",
-    )
-    parser.add_argument(
-        "wheel",
-        nargs="?",
-        type=Path,
-        metavar="WHEEL",
-        help="of the other version; default: the wheel that this runs from",
-    )
-    parser.add_argument("--back", action="store_true", help="run the version of before again")
-    parser.add_argument("--url", default=URL, help="where the server answers; default: %(default)s")
-    _add_root(parser)
-    _add_wheels(parser)
-    return parser
-
-
-def _add_common(parser: Parser) -> None:
-    parser.add_argument("--dry-run", action="store_true", help="only say what would be done")
-    parser.add_argument("--yes", action="store_true", help="do not ask whether to go on")
-    _add_root(parser)
-
-
-def _add_root(parser: Parser) -> None:
+def add_root(parser: Parser) -> None:
     parser.add_argument(
         "--root",
         type=Path,
@@ -164,7 +103,7 @@ def _add_root(parser: Parser) -> None:
     )
 
 
-def _add_wheels(parser: Parser) -> None:
+def add_wheels(parser: Parser) -> None:
     parser.add_argument(
         "--wheels",
         type=Path,

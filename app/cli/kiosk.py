@@ -29,7 +29,7 @@ PROG = "python -m app.cli kiosk"
 
 
 def main(arguments: Sequence[str], prog: str = PROG) -> int:
-    given = vars(_parser(prog).parse_args(arguments))
+    given = vars(make_parser(prog).parse_args(arguments))
     file, folder = given.pop("config"), given.pop("folder")
     logging.basicConfig(format="[%(levelname)s] %(message)s", level=logging.INFO)
     try:
@@ -57,7 +57,7 @@ async def _run(config: KioskConfig, folder: Path) -> None:
         await running
 
 
-def _parser(prog: str) -> Parser:
+def make_parser(prog: str) -> Parser:
     parser = Parser(
         prog=prog,
         description="Shows the panel on this machine's screen: starts a compositor and the browser,"

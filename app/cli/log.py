@@ -17,7 +17,7 @@ PROG = "python -m app.log"
 
 
 def main(arguments: Sequence[str], prog: str = PROG) -> int:
-    given = _parser(prog).parse_args(arguments)
+    given = make_parser(prog).parse_args(arguments)
     try:
         found = verify(given.data or _usual_folder(), given.head)
     except KioskError as error:
@@ -38,7 +38,7 @@ def _usual_folder() -> Path:
     return settings.data_folder(settings.mode or load_panel(settings.panel).mode)
 
 
-def _parser(prog: str) -> Parser:
+def make_parser(prog: str) -> Parser:
     parser = Parser(prog=prog, description="The operator's log.")
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
     check = commands.add_parser("verify", help="check that no entry was changed")

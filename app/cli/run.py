@@ -32,7 +32,7 @@ VARIABLES: Mapping[str, str] = {
 
 
 def main(arguments: Sequence[str], prog: str = PROG) -> int:
-    parser = _parser(prog)
+    parser = make_parser(prog)
     given = parser.parse_args(arguments)
     if (given.ssl_certfile is None) != (given.ssl_keyfile is None):
         parser.error("--ssl-certfile and --ssl-keyfile are given together")
@@ -81,7 +81,7 @@ def _port(text: str) -> int:
     return port
 
 
-def _parser(prog: str) -> Parser:
+def make_parser(prog: str) -> Parser:
     parser = Parser(
         prog=prog,
         description="Serves a panel to browsers.",

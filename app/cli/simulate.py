@@ -35,7 +35,7 @@ report = partial(print, file=sys.stderr, flush=True)
 
 
 def main(arguments: Sequence[str], prog: str = PROG) -> int:
-    parser = _parser(prog)
+    parser = make_parser(prog)
     given = _sorted_out(parser, parser.parse_args(arguments))
     namespace = given.namespace.rstrip("/")
     if not NAMESPACE.fullmatch(namespace):
@@ -105,7 +105,7 @@ def _rate(text: str) -> float:
     return rate
 
 
-def _parser(prog: str) -> Parser:
+def make_parser(prog: str) -> Parser:
     parser = Parser(
         prog=prog,
         usage=f"{prog} [-h] [--bag FILE [--loop] [--rate RATE]] [PANEL] [ENDPOINT [NAMESPACE]]",

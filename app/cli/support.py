@@ -21,7 +21,7 @@ PROG: Final = "python -m app.cli support"
 
 
 def main(arguments: Sequence[str], prog: str = PROG) -> int:
-    given = _parser(prog).parse_args(arguments)
+    given = make_parser(prog).parse_args(arguments)
     file = given.output or Path(time.strftime("operator-panel-support-%Y%m%d-%H%M%S.zip"))
     if not given.list and not given.yes and not sys.stdin.isatty():
         print("nobody can be asked here: give --yes to write it, or --list", file=sys.stderr)
@@ -66,7 +66,7 @@ def _wanted(file: Path) -> bool:
     return input(f"Write {file}? [y/N] ").strip().lower() in ("y", "yes")
 
 
-def _parser(prog: str) -> Parser:
+def make_parser(prog: str) -> Parser:
     parser = Parser(
         prog=prog,
         description="Collects what support needs to know in a zip file: panel, settings, versions, the"

@@ -1,6 +1,39 @@
-"""`operator-panel uninstall`: see `app.cli.install`."""
+"""`operator-panel uninstall`: takes back what `install` did. Exit status: see `app.cli.install`."""
 
-from app.cli.install import _uninstall_parser as _parser
-from app.cli.install import uninstall as main
+from argparse import Namespace
+from collections.abc import Sequence
 
-__all__ = ["_parser", "main"]
+from app.cli.install import add_questions, add_root, confirmed, exit_status, print_progress
+from app.cli.parser import USAGE_ERROR, Parser
+from app.install.host import Host
+from app.install.plan import uninstall_steps
+from app.install.step import revert
+
+PROG = "python -m app.cli uninstall"
+
+
+def main(arguments: Sequence[str], prog: str = PROG) -> int:
+    return exit_status(_uninstall, make_parser(prog).parse_args(arguments))
+
+
+def _uninstall(given: Namespace) -> int:
+    host = Host(given.root.resolve())
+    plan = uninstall_steps(host)
+    print("stops and removes the services, the releases, and the browser's user")
+    print("keeps /etc/operator-panel, /var/lib/operator-panel (the operator's log) and the packages")
+    if given.dry_run:
+        return 0
+    if not confirmed(given):
+        return USAGE_ERROR
+    revert(plan, host, print_progress)
+    return 0
+
+
+def make_parser(prog: str) -> Parser:
+    parser = Parser(
+        prog=prog,
+        description="Takes back what install did. Panel file, settings and the operator's log stay.",
+    )
+    add_questions(parser)
+    add_root(parser)
+    return parser

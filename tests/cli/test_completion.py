@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from app.cli.command import COMMANDS, main
+from app.cli.command import main
+from app.cli.command_table import COMMANDS
 from app.cli.completion import SHELLS
 from app.interfaces import DISTROS
 

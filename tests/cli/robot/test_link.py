@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from app.cli.hz import Rate
-from app.cli.robot_link import Place, add_options, place_of, topic_named
-from app.cli.topic_reader import TopicReader
+from app.cli.robot.hz import Rate
+from app.cli.robot.link import Place, add_options, place_of, topic_named
+from app.cli.robot.topic_reader import TopicReader
 from app.errors import LinkError, PanelError
 from app.graph.model import Bridge, EndpointQos, RobotGraph, RosGraph, Topic, TopicEndpoint
 

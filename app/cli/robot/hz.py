@@ -17,8 +17,8 @@ from statistics import fmean, pstdev
 from typing import Any, Final
 
 from app.cli.parser import Parser
-from app.cli.robot_link import GONE, add_options, ended, opened, place_of, seconds
-from app.cli.topic_reader import TopicReader
+from app.cli.robot.link import GONE, add_options, ended, opened, place_of, seconds
+from app.cli.robot.topic_reader import TopicReader
 
 PROG = "python -m app.cli hz"
 EVERY_S: Final = 1.0
@@ -51,7 +51,7 @@ class Rate:
 
 
 def main(arguments: Sequence[str], prog: str = PROG) -> int:
-    given = _parser(prog).parse_args(arguments)
+    given = make_parser(prog).parse_args(arguments)
     return ended(lambda: _measure(given))
 
 
@@ -97,7 +97,7 @@ def _window(text: str) -> int:
     raise ValueError
 
 
-def _parser(prog: str) -> Parser:
+def make_parser(prog: str) -> Parser:
     parser = Parser(
         prog=prog,
         description="Shows how often a topic is published, once a second, by when its messages arrive"

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from app.cli.parser import Parser
-from app.cli.robot_link import (
+from app.cli.robot.link import (
     GONE,
     Place,
     add_options,
@@ -22,7 +22,7 @@ from app.cli.robot_link import (
     place_of,
     seconds,
 )
-from app.cli.topic_reader import endpoint_for
+from app.cli.robot.topic_reader import endpoint_for
 from app.errors import DecodeError, KioskError, PanelError
 from app.graph.model import Node, RobotGraph, RosGraph, Server, Topic
 from app.graph.node_services import NodeParameter, NodeServices
@@ -47,7 +47,7 @@ class ScaffoldError(KioskError):
 
 
 def main(arguments: Sequence[str], prog: str = PROG) -> int:
-    given = _parser(prog).parse_args(arguments)
+    given = make_parser(prog).parse_args(arguments)
     return ended(lambda: _scaffold(given))
 
 
@@ -203,7 +203,7 @@ def _written(target: Path, text: str, draft: Draft) -> int:
     return 0 if live or not widgets else GONE
 
 
-def _parser(prog: str) -> Parser:
+def make_parser(prog: str) -> Parser:
     parser = Parser(
         prog=prog,
         description="Writes a first panel file that fits what is on a robot now: lamps, gauges, joints,"

@@ -11,10 +11,10 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
-from app.cli.message_text import Shape, csv_line, yaml_text
 from app.cli.parser import Parser
-from app.cli.robot_link import GONE, add_options, ended, opened, place_of, seconds
-from app.cli.topic_reader import TopicReader, value_in
+from app.cli.robot.link import GONE, add_options, ended, opened, place_of, seconds
+from app.cli.robot.message_text import Shape, csv_line, yaml_text
+from app.cli.robot.topic_reader import TopicReader, value_in
 from app.errors import DecodeError
 from app.interfaces import Interfaces, to_plain
 from app.printable import printable
@@ -24,7 +24,7 @@ SEPARATOR = "---"
 
 
 def main(arguments: Sequence[str], prog: str = PROG) -> int:
-    given = _parser(prog).parse_args(arguments)
+    given = make_parser(prog).parse_args(arguments)
     return ended(lambda: _echo(given))
 
 
@@ -71,7 +71,7 @@ def _written(given: Any) -> Callable[[Any], str]:
     return lambda value: f"{yaml_text(value, shape)}\n{SEPARATOR}"
 
 
-def _parser(prog: str) -> Parser:
+def make_parser(prog: str) -> Parser:
     parser = Parser(
         prog=prog,
         description="Shows the messages of a topic, through the robot's bridge and without ROS.",

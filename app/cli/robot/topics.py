@@ -9,7 +9,7 @@ from dataclasses import asdict
 from typing import Any
 
 from app.cli.parser import Parser
-from app.cli.robot_link import add_options, check_namespace, ended, opened, place_of, shown_topics
+from app.cli.robot.link import add_options, check_namespace, ended, opened, place_of, shown_topics
 from app.graph.model import RobotGraph, Topic, TopicEndpoint
 from app.printable import printable
 
@@ -18,7 +18,7 @@ Found = Mapping[str, tuple[RobotGraph, Topic]]
 
 
 def main(arguments: Sequence[str], prog: str = PROG) -> int:
-    given = _parser(prog).parse_args(arguments)
+    given = make_parser(prog).parse_args(arguments)
     return ended(lambda: _list(given))
 
 
@@ -72,7 +72,7 @@ def _plain(name: str, robot: RobotGraph, topic: Topic) -> dict[str, Any]:
     }
 
 
-def _parser(prog: str) -> Parser:
+def make_parser(prog: str) -> Parser:
     parser = Parser(
         prog=prog,
         description="Lists the topics of a robot, through its bridge and without ROS.",

@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from app.cli.message_text import Shape, csv_line, yaml_text
-from app.cli.topic_reader import value_in
+from app.cli.robot.message_text import Shape, csv_line, yaml_text
+from app.cli.robot.topic_reader import value_in
 from app.interfaces import load_interfaces
 
 INTERFACES = load_interfaces("jazzy")

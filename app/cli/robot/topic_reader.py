@@ -5,7 +5,7 @@ from collections.abc import AsyncIterator
 from dataclasses import dataclass
 from typing import Any, Final
 
-from app.cli.robot_link import Place, topic_named
+from app.cli.robot.link import Place, topic_named
 from app.dialect.endpoint import OwnEndpoint
 from app.errors import InterfaceError, LinkError
 from app.graph.model import RobotGraph, RosGraph, Topic
