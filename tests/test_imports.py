@@ -68,7 +68,7 @@ OF_THE_BRIDGE = ("app.dialect.bridge_", "app.transport.bridge_")
 WIRE_THE_BRIDGE = {
     "app.cli.bridge_config",
     "app.cli.robot.link",
-    "app.cli.robot.scaffold",
+    "app.cli.robot.survey",
     "app.cli.robot.topic_reader",
     "app.diagnose.link",
     "app.diagnose.robot",

@@ -10,6 +10,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
+from app.cli.arguments import PANEL_HELP
+from app.cli.output import OutputError, add_force, draft_of
 from app.cli.parser import Parser
 from app.errors import KioskError
 from app.interfaces.names import TOPIC
@@ -37,13 +39,10 @@ def main(arguments: Sequence[str], prog: str = PROG) -> int:
         print(text, end="")
         return 0
     try:
-        with given.output.open("w" if given.force else "x", encoding="utf-8") as file:
-            file.write(text)
-    except FileExistsError:
-        print(f"{given.output} is there already: --force replaces it", file=sys.stderr)
-        return 1
-    except OSError as error:
-        print(f"{given.output} can't be written: {error.strerror}", file=sys.stderr)
+        with draft_of(given.output, given.force) as draft:
+            draft.write_text(text, encoding="utf-8")
+    except OutputError as error:
+        print(error, file=sys.stderr)
         return 1
     return 0
 
@@ -98,15 +97,9 @@ def make_parser(prog: str) -> Parser:
         epilog="Start the bridge with it: ROS_DISTRO=jazzy zenoh-bridge-ros2dds -c bridge.json5",
     )
     add = parser.add_argument
-    add(
-        "panel",
-        nargs="?",
-        type=Path,
-        metavar="PANEL",
-        help="the panel file; without one that of KIOSK_PANEL, else the shipped one",
-    )
+    add("panel", nargs="?", type=Path, metavar="PANEL", help=PANEL_HELP)
     add("-o", "--output", type=Path, metavar="FILE", help="where to write it; default: standard output")
-    add("--force", action="store_true", help="replace FILE if it is there")
+    add_force(parser)
     add(
         "--domain",
         type=_domain,

@@ -5,14 +5,13 @@ Exit status: 0 all is well (notes do not count), 1 there are findings, 2 it coul
 
 import asyncio
 import json
+import os
 import sys
-from argparse import ArgumentTypeError
 from collections.abc import Sequence
-from dataclasses import replace
 from itertools import groupby
-from pathlib import Path
 from typing import Any, Final
 
+from app.cli.arguments import add_settings, environment, port, seconds
 from app.cli.parser import Parser
 from app.diagnose.doctor import Diagnosis, Options, diagnose
 from app.diagnose.findings import SEVERITIES, Finding, Report
@@ -43,9 +42,7 @@ def main(arguments: Sequence[str], prog: str = PROG) -> int:
 
 def settings_of(given: Any) -> Settings:
     """The settings of the environment, with what the command line says instead."""
-    said = {name: getattr(given, name) for name in ("panel", "zenoh", "mode", "data")}
-    paths = {name: value for name, value in said.items() if value is not None}
-    return replace(Settings.from_environment(), **paths)
+    return Settings.from_environment({**os.environ, **environment(given)})
 
 
 def options_of(given: Any) -> Options:
@@ -103,43 +100,13 @@ def make_parser(prog: str) -> Parser:
 def add_options(parser: Parser) -> None:
     """The options of `run` that a diagnosis needs, and how long it listens."""
     add = parser.add_argument
-    add(
-        "panel",
-        nargs="?",
-        type=_path,
-        metavar="PANEL",
-        help="the panel file; without one that of KIOSK_PANEL, else the shipped one",
-    )
+    add_settings(parser)
     add("--host", default="127.0.0.1", help="where the server listens; default: %(default)s")
-    add("--port", default=8000, type=_port, help="default: %(default)s")
-    add("--mode", choices=("demo", "live"), help="instead of what the panel file says (KIOSK_MODE)")
-    add("--zenoh", type=_path, metavar="FILE", help="Zenoh configuration (KIOSK_ZENOH)")
-    add("--data", type=_path, metavar="FOLDER", help="the server's data folder (KIOSK_DATA)")
+    add("--port", default=8000, type=port, help="default: %(default)s")
     add(
         "--listen",
-        type=_seconds,
+        type=seconds(LONGEST_LISTEN_S),
         default=LISTEN_S,
         metavar="SECONDS",
         help="how long to listen to the robot at most; default: %(default)g",
     )
-
-
-def _path(text: str) -> Path:
-    return Path(text).expanduser().resolve()
-
-
-def _port(text: str) -> int:
-    port = int(text) if text.isascii() and text.isdigit() else 0
-    if not 0 < port < 1 << 16:
-        raise ArgumentTypeError(f'"{text}" is not a port: 1 to 65535')
-    return port
-
-
-def _seconds(text: str) -> float:
-    try:
-        seconds = float(text)
-    except ValueError:
-        seconds = -1.0
-    if not 0 < seconds <= LONGEST_LISTEN_S:
-        raise ArgumentTypeError(f'"{text}" is not a time: up to {LONGEST_LISTEN_S:g} seconds')
-    return seconds

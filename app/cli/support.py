@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Final
 
 from app.cli.doctor import add_options, as_json, options_of, settings_of
+from app.cli.output import OutputError, writing
 from app.cli.parser import Parser
 from app.diagnose.bundle import Part, Sources, journal, parts, write
 from app.diagnose.doctor import diagnose
@@ -24,7 +25,7 @@ def main(arguments: Sequence[str], prog: str = PROG) -> int:
     given = make_parser(prog).parse_args(arguments)
     file = given.output or Path(time.strftime("operator-panel-support-%Y%m%d-%H%M%S.zip"))
     if not given.list and not given.yes and not sys.stdin.isatty():
-        print("nobody can be asked here: give --yes to write it, or --list", file=sys.stderr)
+        print("this is no terminal to ask at: give --yes to write it, or --list", file=sys.stderr)
         return 2
     try:
         settings, options = settings_of(given), options_of(given)
@@ -41,12 +42,10 @@ def main(arguments: Sequence[str], prog: str = PROG) -> int:
         print("nothing was written")
         return 2
     try:
-        size = write(file, made)
-    except FileExistsError:
-        print(f"{file} is there already", file=sys.stderr)
-        return 1
-    except OSError as error:
-        print(f"{file} can't be written: {error.strerror}", file=sys.stderr)
+        with writing(file):
+            size = write(file, made)
+    except OutputError as error:
+        print(error, file=sys.stderr)
         return 1
     print(f"{file}: {_size(size)}")
     return 0

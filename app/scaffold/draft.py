@@ -26,14 +26,14 @@ TREND_KEYS: Final = ("topic", "type", "qos", "field", "label", "unit", "scale", 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Known:
     """What was read of a robot: names without the panel's namespace. `samples` is a message of a topic,
-    by its name, where one came. `unasked` are nodes whose parameters can't be read."""
+    by its name, where one arrived. `unreadable` are nodes whose parameters can't be read."""
 
     topics: Sequence[Topic] = ()
     services: Sequence[Server] = ()
     actions: Sequence[Server] = ()
     parameters: Sequence[NodeParameter] = ()
     samples: Mapping[str, Any] = field(default_factory=dict)
-    unasked: Sequence[str] = ()
+    unreadable: Sequence[str] = ()
 
 
 def shown(topics: Iterable[Topic]) -> Iterator[Topic]:
@@ -69,7 +69,7 @@ def make_draft(known: Known, interfaces: Interfaces, base: Draft) -> Draft:
         entries += _of_server(server, interfaces, remarks)
     for one in known.parameters:
         entries += controls.parameter(one)
-    remarks += [f"parameters of {node}: {CYCLONE_ONLY}" for node in known.unasked]
+    remarks += [f"parameters of {node}: {CYCLONE_ONLY}" for node in known.unreadable]
     return replace(base, interlocks=interlocks, pages=_pages(entries), remarks=remarks)
 
 

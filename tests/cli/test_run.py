@@ -13,6 +13,7 @@ import pytest
 import uvicorn
 
 from app.cli import run
+from app.cli.arguments import environment
 from app.cli.command import main
 from app.settings import PACKAGE
 from app.web.serving import OPTIONS
@@ -60,7 +61,7 @@ def test_the_server_gets_the_limits(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_an_option_is_a_variable() -> None:
     words = "cell.toml --zenoh z.json5 --mode live --data d --name a --name b --proxy 192.0.2.1"
     given = run.make_parser("x").parse_args([*words.split(), "--log-level", "debug"])
-    assert run._environment(vars(given)) == {
+    assert environment(given) == {
         "KIOSK_PANEL": "cell.toml",
         "KIOSK_ZENOH": "z.json5",
         "KIOSK_MODE": "live",
@@ -69,7 +70,7 @@ def test_an_option_is_a_variable() -> None:
         "KIOSK_PROXIES": "192.0.2.1",
         "KIOSK_LOG_LEVEL": "debug",
     }
-    assert run._environment(vars(run.make_parser("x").parse_args([]))) == {}
+    assert environment(run.make_parser("x").parse_args([])) == {}
 
 
 def test_a_port_in_use_is_one_sentence() -> None:

@@ -148,7 +148,7 @@ def test_a_file_that_is_there_is_kept(quick: Setup, capsys: pytest.CaptureFixtur
     path = quick.folder / "bundle.zip"
     path.write_text("mine")
     assert main(command(quick, None, "--yes", "-o", str(path))) == 1
-    assert "is there already" in capsys.readouterr().err
+    assert "exists: give another name with -o" in capsys.readouterr().err
     assert path.read_text() == "mine"
     assert main(command(quick, None, "--yes", "-o", str(quick.folder / "no/bundle.zip"))) == 1
 

@@ -193,7 +193,7 @@ def test_pages_are_namespaces_and_nodes() -> None:
 
 
 def test_what_has_no_widget_is_named() -> None:
-    text = text_of(**CELL, unasked=["/cell_io"])
+    text = text_of(**CELL, unreadable=["/cell_io"])
     assert "# - /pose (geometry_msgs/msg/Pose)" in text
     assert "# - /add (example_interfaces/srv/AddTwoInts): give its request" in text
     assert "# - /old (std_srvs/srv/Trigger), on Fast DDS: the bridge reaches" in text

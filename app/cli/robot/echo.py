@@ -11,8 +11,9 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
+from app.cli.arguments import seconds, whole_number
 from app.cli.parser import Parser
-from app.cli.robot.link import GONE, add_options, ended, opened, place_of, seconds
+from app.cli.robot.link import GONE, add_options, ended, opened, place_of
 from app.cli.robot.message_text import Shape, csv_line, yaml_text
 from app.cli.robot.topic_reader import TopicReader, value_in
 from app.errors import DecodeError
@@ -82,7 +83,7 @@ def make_parser(prog: str) -> Parser:
     add("topic", metavar="TOPIC", help="such as /speed")
     add("type", nargs="?", metavar="TYPE", help="only where it has several on the robot")
     add("--once", action="store_true", help="one message, then end")
-    add("--timeout", type=seconds, metavar="S", help="end if nothing came in so many seconds")
+    add("--timeout", type=seconds(), metavar="S", help="end if nothing came in so many seconds")
     add("--field", metavar="PATH", help='only this field, such as pose.position.x or "status[0].name"')
     form = parser.add_mutually_exclusive_group().add_argument
     form("--csv", action="store_true", help="one line of values with commas for each message")
@@ -91,7 +92,7 @@ def make_parser(prog: str) -> Parser:
     add(
         "-l",
         "--truncate-length",
-        type=int,
+        type=whole_number(1),
         default=128,
         metavar="N",
         help="so many elements of a list and characters of a text; default: %(default)s",

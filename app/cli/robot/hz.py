@@ -11,13 +11,13 @@ import time
 from collections import deque
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
 from itertools import pairwise
 from statistics import fmean, pstdev
 from typing import Any, Final
 
+from app.cli.arguments import seconds, whole_number
 from app.cli.parser import Parser
-from app.cli.robot.link import GONE, add_options, ended, opened, place_of, seconds
+from app.cli.robot.link import GONE, add_options, ended, opened, place_of
 from app.cli.robot.topic_reader import TopicReader
 
 PROG = "python -m app.cli hz"
@@ -25,17 +25,11 @@ EVERY_S: Final = 1.0
 WINDOW: Final = 10_000  # messages, as that of ros2
 
 
-@dataclass(slots=True)
 class Rate:
-    """When the newest messages arrived (monotonic seconds)."""
+    """When the newest messages arrived (monotonic seconds), `window` of them."""
 
-    window: int = WINDOW
-    arrivals: deque[float] = field(default_factory=deque)
-
-    def add(self, at: float) -> None:
-        self.arrivals.append(at)
-        while len(self.arrivals) > self.window:
-            self.arrivals.popleft()
+    def __init__(self, window: int = WINDOW) -> None:
+        self.arrivals = deque[float](maxlen=window)
 
     def __str__(self) -> str:
         """Two lines, as `ros2 topic hz` writes them; "" for less than two messages."""
@@ -66,7 +60,7 @@ async def _measure(given: Any) -> int:
                 async with asyncio.timeout(given.duration):
                     async for sample in reader.samples():
                         if not sample.cached:  # published at an unknown time
-                            rate.add(sample.at)
+                            rate.arrivals.append(sample.at)
         finally:
             showing.cancel()
     if given.duration is None:
@@ -76,25 +70,19 @@ async def _measure(given: Any) -> int:
 
 
 async def _show(rate: Rate) -> None:
-    """Each second what is new; a topic that falls silent is said once."""
-    last, told = 0.0, False
+    """Each second what is new; a topic that falls silent is reported once."""
+    last, silent = 0.0, False
     while True:
         await asyncio.sleep(EVERY_S)
         newest = rate.arrivals[-1] if rate.arrivals else 0.0
         if newest != last and str(rate):
             print(rate, flush=True)
-            told = False
-        elif newest == last and not told:
-            silent = f" for {time.monotonic() - newest:.1f} s" if newest else " yet"
-            print(f"no new messages{silent}", file=sys.stderr, flush=True)
-            told = True
+            silent = False
+        elif newest == last and not silent:
+            since = f" for {time.monotonic() - newest:.1f} s" if newest else " yet"
+            print(f"no new messages{since}", file=sys.stderr, flush=True)
+            silent = True
         last = newest
-
-
-def _window(text: str) -> int:
-    if text.isdecimal() and int(text) > 1:
-        return int(text)
-    raise ValueError
 
 
 def make_parser(prog: str) -> Parser:
@@ -109,7 +97,7 @@ def make_parser(prog: str) -> Parser:
     add(
         "-w",
         "--window",
-        type=_window,
+        type=whole_number(2),
         default=WINDOW,
         metavar="N",
         help="of how many messages; default: %(default)s",
@@ -117,7 +105,7 @@ def make_parser(prog: str) -> Parser:
     add(
         "--for",
         dest="duration",
-        type=seconds,
+        type=seconds(),
         metavar="S",
         help="end after so many seconds, with the rate of them",
     )

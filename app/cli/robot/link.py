@@ -9,11 +9,12 @@ import asyncio
 import os
 import sys
 from collections.abc import AsyncIterator, Callable, Coroutine
-from contextlib import asynccontextmanager, suppress
+from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from app.cli.arguments import seconds
 from app.errors import KioskError, LinkError
 from app.graph.model import RobotGraph, RosGraph, Topic, near
 from app.interfaces import DISTROS
@@ -75,7 +76,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add("--distro", choices=DISTROS, help=f"of ROS 2; default: {DEFAULT_DISTRO}")
     add(
         "--wait",
-        type=seconds,
+        type=seconds(),
         default=CONNECT_S,
         metavar="S",
         help="seconds to wait for a connection; default: %(default)g",
@@ -87,13 +88,6 @@ def namespace(text: str) -> str:
     if not NAMESPACE.fullmatch(given):
         raise argparse.ArgumentTypeError(f'"{text}" is not a ROS 2 namespace, like /robot1')
     return given
-
-
-def seconds(text: str) -> float:
-    with suppress(ValueError):
-        if 0 < float(text) < float("inf"):
-            return float(text)
-    raise argparse.ArgumentTypeError(f'"{text}" is not a number of seconds above 0')
 
 
 def place_of(given: Any) -> Place:

@@ -137,5 +137,5 @@ def test_a_rate_is_that_of_the_window() -> None:
     rate = Rate(window=3)
     assert str(rate) == ""
     for at in (0.0, 1.0, 1.5, 2.0):
-        rate.add(at)
+        rate.arrivals.append(at)
     assert str(rate) == ("average rate: 2.000\n\tmin: 0.500s max: 0.500s std dev: 0.00000s window: 3")

@@ -1,0 +1,86 @@
+"""Arguments that several commands have: types whose mistake is one sentence, and the settings."""
+
+from argparse import ArgumentTypeError
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from math import inf
+from typing import Any, Final
+
+from app.cli.parser import Parser
+
+HIGHEST_PORT: Final = 65_535
+PANEL_HELP: Final = "the panel file; without one that of KIOSK_PANEL, else the shipped one"
+# Options that stand for a variable of the environment, and go before it.
+VARIABLES: Final[Mapping[str, str]] = {
+    "panel": "KIOSK_PANEL",
+    "zenoh": "KIOSK_ZENOH",
+    "mode": "KIOSK_MODE",
+    "data": "KIOSK_DATA",
+    "names": "KIOSK_HOSTS",
+    "proxies": "KIOSK_PROXIES",
+    "log_level": "KIOSK_LOG_LEVEL",
+}
+
+
+def add_settings(parser: Parser) -> None:
+    """PANEL, --mode, --zenoh, --data."""
+    add = parser.add_argument
+    add("panel", nargs="?", metavar="PANEL", help=PANEL_HELP)
+    add("--mode", choices=("demo", "live"), help="instead of what the panel file says (KIOSK_MODE)")
+    add("--zenoh", metavar="FILE", help="Zenoh configuration (KIOSK_ZENOH)")
+    add("--data", metavar="FOLDER", help="where the operator's log and recordings are (KIOSK_DATA)")
+
+
+def environment(given: Any) -> dict[str, str]:
+    """The variables of the options that were given; several names are one list."""
+    found = {}
+    for option, variable in VARIABLES.items():
+        value = getattr(given, option, None)
+        if value is not None:
+            found[variable] = ",".join(value) if isinstance(value, list) else str(value)
+    return found
+
+
+def port(text: str) -> int:
+    """Of a server that runs: 1 to 65535."""
+    if not 0 < (number := _digits(text)) <= HIGHEST_PORT:
+        raise ArgumentTypeError(f'"{text}" is not a port: 1 to {HIGHEST_PORT}')
+    return number
+
+
+def port_to_listen(text: str) -> int:
+    """0 for any that is free."""
+    if not 0 <= (number := _digits(text)) <= HIGHEST_PORT:
+        raise ArgumentTypeError(
+            f'"{text}" is not a port: 1 to {HIGHEST_PORT}, or 0 for any that is free'
+        )
+    return number
+
+
+def whole_number(lowest: int) -> Callable[[str], int]:
+    """The type of a number from `lowest` on."""
+
+    def checked(text: str) -> int:
+        if (number := _digits(text)) < lowest:
+            raise ArgumentTypeError(f'"{text}" is not a whole number from {lowest} on')
+        return number
+
+    return checked
+
+
+def seconds(most: float = inf) -> Callable[[str], float]:
+    """The type of a time above 0."""
+    right = "a number of seconds above 0" if most == inf else f"up to {most:g} seconds"
+
+    def checked(text: str) -> float:
+        with suppress(ValueError):
+            if 0 < float(text) <= most and float(text) < inf:
+                return float(text)
+        raise ArgumentTypeError(f'"{text}" is not a time: {right}')
+
+    return checked
+
+
+def _digits(text: str) -> int:
+    """-1 for anything else."""
+    return int(text) if text.isascii() and text.isdigit() else -1
