@@ -1,7 +1,7 @@
 """`operator-panel update`: another release in place of the one that runs. Exit status: see
 `app.cli.install`."""
 
-from argparse import Namespace
+from argparse import ArgumentTypeError, Namespace
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -33,6 +33,12 @@ def _update(given: Namespace) -> int:
     return 0
 
 
+def _url(text: str) -> str:
+    if not text.startswith(("http://", "https://")):
+        raise ArgumentTypeError(f'"{text}" is not the address of a server, like {URL}')
+    return text.rstrip("/")
+
+
 def make_parser(prog: str) -> Parser:
     parser = Parser(
         prog=prog,
@@ -48,7 +54,7 @@ def make_parser(prog: str) -> Parser:
         help="of the other version; default: the wheel that this runs from",
     )
     add("--back", action="store_true", help="run the version of before again")
-    add("--url", default=URL, help="where the server answers; default: %(default)s")
+    add("--url", type=_url, default=URL, help="where the server answers; default: %(default)s")
     add_root(parser)
     add_wheels(parser)
     return parser

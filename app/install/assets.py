@@ -1,5 +1,6 @@
 """The files of deploy/ as a wheel has them, and which wheel this program was read from."""
 
+import sys
 import zipfile
 from pathlib import Path
 from typing import Final
@@ -30,8 +31,10 @@ class Assets:
 
 
 def own_wheel() -> Path | None:
-    """The wheel file that this program runs from; None if it is installed or a checkout."""
-    return next((part for part in PACKAGE.parents if part.name.endswith(SUFFIX)), None)
+    """The wheel that this program runs from: its file, or that which its release was made of. None in a
+    checkout."""
+    runs_from = (part for part in PACKAGE.parents if part.name.endswith(SUFFIX))
+    return next(runs_from, None) or next(Path(sys.prefix).glob(f"{NAME}*{SUFFIX}"), None)
 
 
 def checked_wheel(given: Path | None) -> Path:

@@ -3,7 +3,7 @@
 import shutil
 from dataclasses import dataclass
 
-from app.install.host import Host
+from app.install.host import Host, StepFailed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,7 +48,9 @@ class UsersFile:
 
     def is_done(self, host: Host) -> bool:
         path = host.path(self.path)
-        return path.exists() and (not self.replaces or path.read_text() == self.content)
+        if not self.replaces:
+            return path.exists()
+        return path.is_file() and path.read_text(errors="replace") == self.content
 
     def do(self, host: Host) -> None:
         path = host.path(self.path)
@@ -75,11 +77,15 @@ class Masked:
         return f"mask {self.unit} ({self.about})"
 
     def is_done(self, host: Host) -> bool:
-        return host.path(self.path).is_symlink()
+        path = host.path(self.path)
+        return path.is_symlink() and str(path.readlink()) == "/dev/null"
 
     def do(self, host: Host) -> None:
-        host.path(self.path).parent.mkdir(parents=True, exist_ok=True)
-        host.path(self.path).symlink_to("/dev/null")
+        path = host.path(self.path)
+        if path.exists() or path.is_symlink():
+            raise StepFailed(f"{self.path} is not of this installation: remove it, then run this again")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.symlink_to("/dev/null")
 
     def undo(self, host: Host) -> str:
         if not self.is_done(host):

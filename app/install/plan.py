@@ -65,13 +65,13 @@ def steps(options: Options, host: Host) -> list[Step]:
         release,
         UsersFile(
             path=PANEL,
-            content=_given(options.panel) or assets.text("panel.toml"),
+            content=_content(options.panel, assets, "panel.toml"),
             about=str(options.panel or "the shipped panel with a simulated robot"),
             replaces=options.panel is not None,
         ),
         UsersFile(
             path=f"{ETC}/zenoh.json5",
-            content=_given(options.zenoh) or assets.text("zenoh.json5"),
+            content=_content(options.zenoh, assets, "zenoh.json5"),
             about=str(options.zenoh or "how the robot's bridge is reached"),
             replaces=options.zenoh is not None,
         ),
@@ -118,7 +118,7 @@ def _of_the_screen(options: Options, assets: Assets) -> list[Step]:
 
 
 def uninstall_steps(host: Host) -> list[Step]:
-    """What there may be to take back, whatever was installed."""
+    """All that an installation may have made."""
     here = Path(__file__)  # the names of files count here, not what is in them
     return [
         Packages([*ALWAYS, *FOR_THE_SCREEN, CHROMIUM]),
@@ -168,8 +168,13 @@ def _packages(options: Options, host: Host) -> list[str]:
     return [*names, CHROMIUM]
 
 
-def _given(path: Path | None) -> str:
+def _content(given: Path | None, assets: Assets, shipped: str) -> str:
+    """Of the user's file, else of the shipped one."""
+    if given is None:
+        return assets.text(shipped)
     try:
-        return path.read_text() if path else ""
+        return given.read_text(encoding="utf-8")
     except OSError as error:
-        raise SettingsError(f"{path} can't be read: {error.strerror}") from error
+        raise SettingsError(f"{given} can't be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise SettingsError(f"{given} can't be read: it is not UTF-8 text") from error

@@ -107,11 +107,20 @@ class Release:
         return ["--no-index", f"--find-links={self.wheels}"]
 
 
+def remove_old(host: Host) -> None:
+    """Removes all releases but that which runs and the one before it."""
+    keep = {linked(host, "current"), linked(host, "previous")}
+    for release in host.path(RELEASES).iterdir():
+        if release.name not in keep:
+            shutil.rmtree(release, ignore_errors=True)
+
+
 @dataclass(frozen=True, slots=True)
 class Current:
-    """The release that runs. Releases other than it and the one before are removed."""
+    """The release that runs. With `removes_old` releases older than the one before are removed."""
 
     name: str
+    removes_old: bool = True
 
     def describe(self, host: Host) -> str:
         return f"make {self.name} the release that runs"
@@ -124,10 +133,8 @@ class Current:
         if before:
             link_to(host, "previous", before)
         link_to(host, "current", self.name)
-        keep = {self.name, before}
-        for release in host.path(RELEASES).iterdir():
-            if release.name not in keep:
-                shutil.rmtree(release, ignore_errors=True)
+        if self.removes_old:
+            remove_old(host)
 
     def undo(self, host: Host) -> str:
         return ""  # goes with the releases

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Protocol
 
 from app.install.host import Host
+from app.install.system import Unit
 
 
 class Step(Protocol):
@@ -18,7 +19,7 @@ class Step(Protocol):
         """StepFailed if it can't be done."""
 
     def undo(self, host: Host) -> str:
-        """Takes it back; says what was done, "" for nothing."""
+        """Takes it back; returns what was done, "" for nothing."""
 
 
 def describe(steps: Sequence[Step], host: Host) -> Iterator[str]:
@@ -28,10 +29,11 @@ def describe(steps: Sequence[Step], host: Host) -> Iterator[str]:
 
 
 def apply(steps: Sequence[Step], host: Host, say: Callable[[str], object]) -> int:
-    """Does the steps that are not done, in their order; returns how many there were."""
+    """Does the steps that are not done, in their order; returns how many there were. A unit that
+    runs is started again after any of them, so that it has what they changed."""
     done = 0
     for step in steps:
-        if not step.is_done(host):
+        if (done and isinstance(step, Unit)) or not step.is_done(host):
             say(step.describe(host))
             step.do(host)
             done += 1

@@ -3,18 +3,17 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from app.install.host import APT_ENV, Host
+from app.install.host import APT_ENV, Host, StepFailed
 
 
 @dataclass(frozen=True, slots=True)
 class Packages:
-    """Debian packages. They stay at the end: other programs may use them by then."""
+    """Debian packages. `undo` keeps them: other programs may use them."""
 
     names: Sequence[str]
 
     def _missing(self, host: Host) -> list[str]:
-        asked = ["dpkg-query", "--show", "--showformat=${db:Status-Status}"]
-        return [name for name in self.names if not _installed(host, [*asked, name])]
+        return [name for name in self.names if not _is_installed(host, name)]
 
     def describe(self, host: Host) -> str:
         return f"install the packages {', '.join(self._missing(host) or self.names)} (apt-get)"
@@ -28,12 +27,16 @@ class Packages:
         host.run([*get, *self._missing(host)], APT_ENV)
 
     def undo(self, host: Host) -> str:
-        there = [name for name in self.names if name not in self._missing(host)]
+        there = [name for name in self.names if _is_installed(host, name)]
         return f"kept the packages {', '.join(there)}" if there else ""
 
 
-def _installed(host: Host, asked: Sequence[str]) -> bool:
-    return host.succeeds(asked) and host.run(asked) == "installed"
+def _is_installed(host: Host, package: str) -> bool:
+    query = ["dpkg-query", "--show", "--showformat=${db:Status-Status}", package]
+    try:
+        return host.run(query) == "installed"
+    except StepFailed:  # a package that dpkg does not know
+        return False
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +51,7 @@ class User:
 
     def is_done(self, host: Host) -> bool:
         passwd = host.path("/etc/passwd")
-        return passwd.exists() and f"\n{self.name}:" in f"\n{passwd.read_text()}"
+        return passwd.exists() and f"\n{self.name}:" in f"\n{passwd.read_text(errors='replace')}"
 
     def do(self, host: Host) -> None:
         host.run(["systemd-sysusers", self.file])
@@ -62,7 +65,8 @@ class User:
 
 @dataclass(frozen=True, slots=True)
 class Unit:
-    """A unit that starts with the machine, and now. Its file is another step's."""
+    """A unit that starts with the machine, and now: again after a step that changed something. Its file
+    is another step's."""
 
     name: str
 

@@ -5,20 +5,33 @@ import urllib.error
 import urllib.request
 from collections.abc import Callable
 from dataclasses import dataclass
+from http.client import HTTPException
 from pathlib import Path
 from typing import Final, Protocol
 
+from app.errors import SettingsError
 from app.install.assets import Assets
 from app.install.host import Host, StepFailed
 from app.install.plan import PANEL, SCREEN, SERVER, own_files
-from app.install.release import CheckedPanel, Current, Release, forget, linked, wheel_in
+from app.install.release import (
+    CheckedPanel,
+    Current,
+    Release,
+    forget,
+    link_to,
+    linked,
+    remove_old,
+    wheel_in,
+)
 from app.install.step import apply
 
 COMES_WITHIN_S: Final = 60.0
 STAYS_S: Final = 3.0
-ASKED_EVERY_S: Final = 0.5
-ASKED_WITHIN_S: Final = 5.0
+POLL_S: Final = 0.5
+RESPONDS_WITHIN_S: Final = 5.0
 URL: Final = "http://127.0.0.1:8000"
+# The server is on this machine: a proxy of the environment is not for it.
+DIRECT: Final = urllib.request.build_opener(urllib.request.ProxyHandler({}))
 Say = Callable[[str], object]
 
 
@@ -53,8 +66,8 @@ class Updater:
     stays_s: float = STAYS_S
 
     def update(self, wheel: Path, wheels: Path | None = None) -> None:
-        """Installs `wheel` and runs it. If its server or page does not come, the release of before runs
-        again. StepFailed with the reason."""
+        """Installs `wheel` and runs it. If it can't be started, or its server or page does not come up,
+        the release of before runs again. StepFailed with the reason."""
         lock = Assets(wheel).text("deploy/requirements.lock")
         release = Release(wheel=wheel, lock=lock, wheels=wheels)
         if linked(self.host, "current") == release.name:
@@ -71,37 +84,43 @@ class Updater:
         self._switch(before)
 
     def _switch(self, name: str) -> None:
-        before = linked(self.host, "current")
+        before, older = linked(self.host, "current"), linked(self.host, "previous")
         was_ready = self._status("/readyz") == 200
-        self._run(name)
-        reason = self._does_not_come(was_ready)
+        reason = self._start(name, was_ready)
         if not reason:
+            remove_old(self.host)
             self.say(f"{name} runs")
             return
         if not before:
             raise StepFailed(f"{name} does not come up: {reason}")
         self.say(f"{name} does not come up ({reason}): {before} is started again")
-        self._run(before)
+        again = self._start(before, was_ready)
         forget(self.host, name)
-        again = self._does_not_come(was_ready)
+        if older and older != name:
+            link_to(self.host, "previous", older)
         end = f"; nor does {before}: {again}" if again else f": {before} runs again"
         raise StepFailed(f"{name} does not come up: {reason}{end}")
 
-    def _run(self, name: str) -> None:
+    def _start(self, name: str, was_ready: bool) -> str:
+        """Starts a release; why it is not good, "" if it is."""
         screen = self.host.path(f"/etc/systemd/system/{SCREEN}").exists()
-        files = own_files(Assets(wheel_in(self.host, name)), screen)
-        apply([*files, Current(name)], self.host, self.say)
-        self.services.restart()
+        try:
+            files = own_files(Assets(wheel_in(self.host, name)), screen)
+            apply([*files, Current(name, removes_old=False)], self.host, self.say)
+            self.services.restart()
+        except (SettingsError, OSError) as error:
+            return str(error)
+        return self._missing_in_time(was_ready)
 
-    def _does_not_come(self, was_ready: bool) -> str:
-        """Why the release is not good; "" if it is. A robot that was off before may be off after."""
+    def _missing_in_time(self, was_ready: bool) -> str:
+        """What does not come up, "" for nothing. A robot that was off before may be off after."""
         if self.url is None:
             return ""
         end = time.monotonic() + self.comes_within_s
         while reason := self._missing(was_ready):
             if time.monotonic() > end:
                 return f"{reason} within {self.comes_within_s:g} s"
-            time.sleep(ASKED_EVERY_S)
+            time.sleep(POLL_S)
         time.sleep(self.stays_s)
         reason = self._missing(was_ready)
         return f"{reason} any more" if reason else ""
@@ -120,9 +139,9 @@ class Updater:
         if self.url is None:
             return 0
         try:
-            with urllib.request.urlopen(f"{self.url}{path}", timeout=ASKED_WITHIN_S) as response:
+            with DIRECT.open(f"{self.url}{path}", timeout=RESPONDS_WITHIN_S) as response:
                 return int(response.status) if shows in response.read() else 0
         except urllib.error.HTTPError as error:
             return error.code
-        except OSError:
+        except (OSError, HTTPException):
             return 0

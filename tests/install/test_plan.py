@@ -16,7 +16,7 @@ from app.install.panel_files import UsersCopy
 from app.install.plan import PANEL, SCREEN, SERVER, Options, own_files, steps, touch_rule
 from app.install.release import Current, Release, link_to, linked, release_name
 from app.install.step import Step, apply, describe, revert
-from app.install.system import Packages, User
+from app.install.system import Packages, Unit, User
 from tests.support.parts import ROOT
 
 SHIPPED = {
@@ -207,6 +207,70 @@ def test_a_calibration_that_is_none_is_named(matrix: tuple[str, ...]) -> None:
 def test_the_rule_of_a_touch_screen_is_one_for_udev() -> None:
     rule = touch_rule(("0", "-1", "1", "1", "0", "0"))
     assert 'ENV{LIBINPUT_CALIBRATION_MATRIX}="0 -1 1 1 0 0"' in rule
+
+
+@pytest.mark.parametrize("option", ["panel", "zenoh"])
+def test_a_file_of_the_users_is_never_the_shipped_one(host: Host, tmp_path: Path, option: str) -> None:
+    mine = tmp_path / "mine"
+    mine.write_bytes(b"")
+    wheel = make_wheel(tmp_path)
+    given = Options(wheel=wheel, panel=mine) if option == "panel" else Options(wheel=wheel, zenoh=mine)
+    apply(of_files(steps(given, host)), host, str)
+    name = {"panel": PANEL, "zenoh": "/etc/operator-panel/zenoh.json5"}[option]
+    assert host.path(name).read_text() == ""
+    mine.write_bytes(b'title = "caf\xe9"\n')
+    with pytest.raises(SettingsError, match="mine can't be read: it is not UTF-8 text"):
+        steps(given, host)
+
+
+def test_a_file_in_another_encoding_is_replaced(host: Host, tmp_path: Path) -> None:
+    host.path(PANEL).parent.mkdir(parents=True)
+    host.path(PANEL).write_bytes(b"# caf\xe9\n")
+    mine = tmp_path / "cell1.toml"
+    mine.write_text("# mine\n")
+    apply(of_files(steps(Options(wheel=make_wheel(tmp_path), panel=mine), host)), host, str)
+    assert host.path(PANEL).read_text() == "# mine\n"
+    assert host.path(f"{PANEL}.before").read_bytes() == b"# caf\xe9\n"
+
+
+def test_a_unit_that_is_linked_elsewhere_is_not_masked_and_is_kept(host: Host) -> None:
+    masked = Masked(unit="ctrl-alt-del.target", about="")
+    link = host.path(masked.path)
+    link.parent.mkdir(parents=True)
+    link.symlink_to("/lib/systemd/system/reboot.target")
+    assert not masked.is_done(host)
+    with pytest.raises(
+        StepFailed, match=r"ctrl-alt-del\.target is not of this installation: remove it"
+    ):
+        masked.do(host)
+    assert masked.undo(host) == ""
+    assert link.is_symlink()
+
+
+class Started(Unit):
+    """A unit that runs."""
+
+    def is_done(self, host: Host) -> bool:
+        return True
+
+    def do(self, host: Host) -> None:
+        host.path("/started").touch()
+
+
+@pytest.mark.parametrize("changed", [False, True])
+def test_a_unit_that_runs_is_started_again_when_something_changed(host: Host, changed: bool) -> None:
+    file = OwnFile(path="/etc/x", content="new", about="")
+    host.path("/etc/x").write_text("old" if changed else "new")
+    assert apply([file, Started(SERVER)], host, str) == 2 * changed
+    assert host.path("/started").exists() is changed
+
+
+def test_an_installed_release_has_its_wheel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "prefix", str(tmp_path))
+    with pytest.raises(SettingsError, match="the wheel is missing"):
+        checked_wheel(None)
+    wheel = make_wheel(tmp_path)
+    assert checked_wheel(None) == wheel
 
 
 def test_a_user_is_there_when_the_machine_has_it(host: Host) -> None:

@@ -2,19 +2,21 @@
 
 import threading
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import pytest
 
+from app.cli.command import main
 from app.install.host import Host, StepFailed
 from app.install.release import RELEASES, Current, link_to, linked, release_name
 from app.install.update import Updater
 from tests.install.test_plan import make_wheel
 
 UP = {"/healthz": (200, "ok"), "/": (200, "<p data-widget>"), "/readyz": (200, "ready")}
+CUT = "cut off"  # the text of a response that ends before its length
 Pages = Mapping[str, tuple[int, str]]
 
 
@@ -26,9 +28,13 @@ class Serving:
     served: dict[str, Pages]
     pages: Pages = field(default_factory=dict)
     restarts: int = 0
+    fails: int = 0  # so many restarts from now on
 
     def restart(self) -> None:
         self.restarts += 1
+        if self.fails:
+            self.fails -= 1
+            raise StepFailed("systemctl failed")
         self.pages = self.served[linked(self.host, "current")]
 
 
@@ -38,6 +44,8 @@ def serving(services: Serving) -> Iterator[str]:
         def do_GET(self) -> None:
             status, text = services.pages.get(self.path, (503, ""))
             self.send_response(status)
+            if text == CUT:
+                self.send_header("Content-Length", "1000")
             self.end_headers()
             self.wfile.write(text.encode())
 
@@ -47,9 +55,11 @@ def serving(services: Serving) -> Iterator[str]:
     with ThreadingHTTPServer(("127.0.0.1", 0), Handler) as server:
         thread = threading.Thread(target=server.serve_forever, args=(0.01,))
         thread.start()
-        yield f"http://127.0.0.1:{server.server_port}"
-        server.shutdown()
-        thread.join()
+        try:
+            yield f"http://127.0.0.1:{server.server_port}"
+        finally:
+            server.shutdown()
+            thread.join()
 
 
 class Machine:
@@ -156,3 +166,46 @@ def test_both_that_do_not_come_up_are_named(tmp_path: Path) -> None:
     with pytest.raises(StepFailed, match=f"nor does {machine.first}"):
         machine.update()
     assert machine.runs == machine.first
+
+
+def test_a_start_that_fails_is_undone_too(tmp_path: Path) -> None:
+    machine = Machine(tmp_path, UP)
+    machine.services.fails = 1
+    with pytest.raises(StepFailed, match="systemctl failed") as raised:
+        machine.update()
+    assert str(raised.value).endswith(f"{machine.first} runs again")
+    assert machine.runs == machine.first
+
+
+def test_a_response_that_is_cut_off_is_none(tmp_path: Path) -> None:
+    machine = Machine(tmp_path, {**UP, "/": (200, CUT)})
+    with pytest.raises(StepFailed, match="its page does not come"):
+        machine.update()
+    assert machine.runs == machine.first
+
+
+def test_a_proxy_is_not_used_for_this_machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("http_proxy", "http://127.0.0.1:1")
+    machine = Machine(tmp_path, UP)
+    machine.update()
+    assert machine.runs == machine.second
+
+
+@pytest.mark.parametrize("good", [False, True])
+def test_only_an_update_that_is_good_takes_the_place_of_the_way_back(
+    tmp_path: Path, good: bool
+) -> None:
+    machine = Machine(tmp_path, UP if good else {})
+    older = machine.host.path(f"{RELEASES}/0.0.1-a")
+    older.mkdir()
+    link_to(machine.host, "previous", older.name)
+    with nullcontext() if good else pytest.raises(StepFailed):
+        machine.update()
+    assert linked(machine.host, "previous") == (machine.first if good else older.name)
+    assert older.exists() is not good
+
+
+def test_an_address_that_is_none_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["update", "--url", "127.0.0.1:8000"])
+    assert '"127.0.0.1:8000" is not the address of a server, like http://' in capsys.readouterr().err
