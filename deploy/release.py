@@ -52,6 +52,25 @@ def check_version(tag: str | None) -> None:
         raise ReleaseError(f'CHANGELOG.md has no "## {version()} – YYYY-MM-DD": what was "Unreleased"')
 
 
+def empty(folder: Path) -> None:
+    """Makes the folder, without the files of an earlier release. ReleaseError if it has others."""
+    folder.mkdir(parents=True, exist_ok=True)
+    others = sorted(path.name for path in folder.iterdir() if not is_of_release(path))
+    if others:
+        raise ReleaseError(f"{folder} has {', '.join(others[:3])}: name a folder for the release alone")
+    for path in folder.iterdir():
+        path.unlink()
+
+
+def is_of_release(path: Path) -> bool:
+    named = path.name.startswith("operator_panel-") or path.name in (
+        "SHA256SUMS",
+        LOCK.name,
+        ".gitignore",
+    )
+    return named and path.is_file()
+
+
 def build(folder: Path) -> Path:
     """Wheel and sdist; the wheel. The sdist gives the same wheel as the checkout."""
     run("-m", "build", "--no-isolation", "--sdist", "--wheel", "--outdir", str(folder), str(ROOT))
@@ -89,9 +108,9 @@ def try_out(wheel: Path) -> None:
         run(*pip, "--require-hashes", "-r", str(LOCK), python=python)
         run(*pip, "--no-deps", str(wheel), python=python)
         command = f"{folder}/venv/bin/operator-panel"
-        said = subprocess.check_output([command, "--version"], cwd=folder, text=True).strip()
-        if said != f"operator-panel {version()}":
-            raise ReleaseError(f'the installed wheel says "{said}", not version {version()}')
+        printed = subprocess.check_output([command, "--version"], cwd=folder, text=True).strip()
+        if printed != f"operator-panel {version()}":
+            raise ReleaseError(f'the installed wheel prints "{printed}", not version {version()}')
         with serving(command, Path(folder)) as port:
             wait_until_ready(port)
 
@@ -116,10 +135,12 @@ def serving(command: str, folder: Path) -> Iterator[int]:
 
 
 def wait_until_ready(port: int) -> None:
+    # The server is on this machine: a proxy of the environment is not for it.
+    direct = urllib.request.build_opener(urllib.request.ProxyHandler({}))
     until = time.monotonic() + STARTS_WITHIN_S
     while True:
         try:
-            with urllib.request.urlopen(f"http://127.0.0.1:{port}/readyz", timeout=5):
+            with direct.open(f"http://127.0.0.1:{port}/readyz", timeout=5):
                 return
         except OSError as error:  # 503 is one, too
             if time.monotonic() > until:
@@ -151,8 +172,7 @@ def main() -> int:
     given = parser.parse_args()
     try:
         check_version(given.tag)
-        shutil.rmtree(given.folder, ignore_errors=True)
-        given.folder.mkdir(parents=True)
+        empty(given.folder)
         wheel = build(given.folder)
         describe(given.folder)
         pack_docs(given.folder)

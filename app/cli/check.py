@@ -27,16 +27,16 @@ def main(arguments: Sequence[str], prog: str = PROG) -> int:
 
 
 def checked(path: Path, verbose: bool = False) -> int:
-    """Prints what there is to say of one panel file; its exit status."""
+    """Prints the faults or notes of one panel file; its exit status."""
     try:
         found = check_panel(path)
     except PanelError as error:
         print(error, file=sys.stderr, flush=True)
         return UNREADABLE if error.unreadable else FAULTY
-    said = [_summary(path, found.panel), *map(str, found.notes)]
+    lines = [_summary(path, found.panel), *map(str, found.notes)]
     if verbose:
-        said += [line for remark in found.previews for line in str(remark).splitlines()]
-    print("\n  ".join(said), flush=True)
+        lines += [line for remark in found.previews for line in str(remark).splitlines()]
+    print("\n  ".join(lines), flush=True)
     return GOOD
 
 
@@ -50,7 +50,7 @@ def _summary(path: Path, panel: Panel) -> str:
 def make_parser(prog: str) -> Parser:
     parser = Parser(
         prog=prog,
-        description="Tells every fault of panel files, with its place and what would be right.",
+        description="Lists every fault of panel files, with its place and what would be right.",
         epilog="Exit status, of the worst file: 0 good (notes are no faults), 1 faults, 2 unreadable.",
     )
     parser.add_argument(

@@ -48,7 +48,7 @@ def program_parser() -> Parser:
         description="An operator's touch panel for ROS 2 robots.",
         epilog="commands:\n"
         + "".join(f"  {name:15}{command.about}\n" for name, command in COMMANDS.items())
-        + f"\n`{APP} COMMAND --help` tells the options of a command.",
+        + f"\n`{APP} COMMAND --help` lists the options of a command.",
         formatter_class=RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"{APP} {_version()}")

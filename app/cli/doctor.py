@@ -72,9 +72,9 @@ def as_text(report: Report, verbose: bool = False) -> str:
         for severity in SEVERITIES
         if (number := sum(one.severity == severity for one in ordered))
     ]
-    said = ", ".join(f"{number} {severity}{'s' * (number > 1)}" for number, severity in counts)
+    listed = ", ".join(f"{number} {severity}{'s' * (number > 1)}" for number, severity in counts)
     what = "All is well" if report.is_well else "Something is wrong"
-    lines.append(f"{what}: {said or 'nothing was found'}, {len(report.facts)} checks were passed.")
+    lines.append(f"{what}: {listed or 'nothing was found'}, {len(report.facts)} checks were passed.")
     return "\n".join(lines)
 
 

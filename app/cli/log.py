@@ -33,7 +33,7 @@ def main(arguments: Sequence[str], prog: str = PROG) -> int:
 def _usual_folder() -> Path:
     """That of a server that was started with these settings."""
     settings = Settings.from_environment()
-    if settings.data is not None:  # a panel file with a fault is no reason not to look
+    if settings.data is not None:  # a panel file with a fault does not matter then
         return settings.data
     return settings.data_folder(settings.mode or load_panel(settings.panel).mode)
 

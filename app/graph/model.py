@@ -156,8 +156,8 @@ class Node:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BridgeRoute:
     """A route of a bridge. `local_nodes` are of the robot, `remote` the Zenoh peers ("<zid>:<key>")
-    that use it. `active`: None if the bridge does not say. `endpoint` is the bridge's own DDS reader
-    or writer for it, "" for none."""
+    that use it. `active`: None if the bridge does not report it. `endpoint` is the bridge's own DDS
+    reader or writer for it, "" for none."""
 
     bridge: str
     kind: RouteKind
@@ -223,8 +223,8 @@ class RobotGraph:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RosGraph:
     """All robots that are reached by one link, by namespace. Bridges of one namespace are one robot's.
-    `peers` is what panels and tools hold in the graph, as far as the router tells: to peers it tells of
-    clients only. Who uses a route is in `BridgeRoute.remote`, of all of them."""
+    `peers` is what panels and tools hold in the graph, as far as the router reports it: to peers it
+    reports clients only. Who uses a route is in `BridgeRoute.remote`, of all of them."""
 
     robots: tuple[RobotGraph, ...] = ()
     peers: tuple[PeerEndpoint, ...] = ()

@@ -1,6 +1,6 @@
-"""What nodes say of themselves by their own services: parameters, and the types that they use.
+"""What nodes describe by their own services: parameters, and the types that they use.
 
-A node is asked only where its service can be called (`Server.can_be_called`): on another DDS than
+A node is called only where its service can be called (`Server.can_be_called`): on another DDS than
 the bridge's a request is misread, and a node that never answers leaves it in the bridge for good.
 """
 
@@ -52,28 +52,28 @@ class Caller(Protocol):
 
 
 class NodeServices:
-    """Asks the nodes of one robot."""
+    """Calls the services of one robot's nodes."""
 
     def __init__(self, robot: RobotGraph, interfaces: Interfaces, caller: Caller) -> None:
         self._robot = robot
         self._interfaces = interfaces
         self._caller = caller
-        self._silent: set[str] = set()  # nodes that are not asked again
+        self._silent: set[str] = set()  # nodes that are not called again
 
     def has_parameters(self, node: Node) -> bool:
         """Whether its parameters can be read through the bridge."""
-        return all(self._can_ask(node.name, name, kind) for name, kind in (LIST, DESCRIBE, GET))
+        return all(self._can_call(node.name, name, kind) for name, kind in (LIST, DESCRIBE, GET))
 
     async def parameters(self, node: Node) -> tuple[NodeParameter, ...] | None:
         """The node's parameters, sorted by name; None if they can't be read."""
         if not self.has_parameters(node):
             return None
-        listed = await self._ask(node.name, LIST, {"prefixes": [], "depth": 0})
+        listed = await self._call(node.name, LIST, {"prefixes": [], "depth": 0})
         if listed is None:
             return None
         names = sorted(listed.result.names)
-        described = await self._ask(node.name, DESCRIBE, {"names": names}) if names else None
-        values = await self._ask(node.name, GET, {"names": names}) if described is not None else None
+        described = await self._call(node.name, DESCRIBE, {"names": names}) if names else None
+        values = await self._call(node.name, GET, {"names": names}) if described is not None else None
         if values is None or described is None:
             return None if names else ()
         pairs = zip(described.descriptors, values.values, strict=False)
@@ -87,21 +87,21 @@ class NodeServices:
                 continue
             request = {"type_name": endpoint.type, "type_hash": endpoint.type_hash}
             for node in endpoint.nodes:
-                if not self._can_ask(node, SERVICE, SERVICE_TYPE_NAME):
+                if not self._can_call(node, SERVICE, SERVICE_TYPE_NAME):
                     continue
                 fields = {**request, "include_type_sources": False}
-                answer = await self._ask(node, (SERVICE, SERVICE_TYPE_NAME), fields)
+                answer = await self._call(node, (SERVICE, SERVICE_TYPE_NAME), fields)
                 if answer is not None and answer.successful:
                     return definitions_of(answer.type_description, endpoint.type_hash)
         return None
 
-    def _can_ask(self, node: str, service: str, type_name: str) -> bool:
+    def _can_call(self, node: str, service: str, type_name: str) -> bool:
         server = self._robot.service(f"{node}/{service}")
         known = server is not None and server.type == type_name and server.can_be_called
         return known and node not in self._silent
 
-    async def _ask(self, node: str, service: tuple[str, str], fields: Mapping[str, Any]) -> Any:
-        """The response; None for none, and then the node is not asked again."""
+    async def _call(self, node: str, service: tuple[str, str], fields: Mapping[str, Any]) -> Any:
+        """The response; None for none, and then the node is not called again."""
         try:
             request, response = self._interfaces.service_types(service[1])
             payload = self._interfaces.encode(request, fields)

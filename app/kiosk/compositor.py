@@ -16,7 +16,7 @@ from app.kiosk.child import Child
 from app.kiosk.config import KioskConfig
 
 STARTS_WITHIN_S: Final = 20.0
-SAYS_WITHIN_S: Final = 5.0
+RESPONDS_WITHIN_S: Final = 5.0
 POLL_S: Final = 0.05
 DISPLAY_FILE: Final = "wayland-display"
 
@@ -92,7 +92,7 @@ class Compositor:
         """Turns the outputs on or off."""
         state = "on" if on else "off"
         # "power" has replaced "dpms"; sway 1.7 has the latter alone, later ones have both.
-        await self._say("output", "*", "dpms", state)
+        await self._send("output", "*", "dpms", state)
 
     async def end(self) -> None:
         if self._child is not None:
@@ -102,24 +102,24 @@ class Compositor:
         """A touch is where it is seen: on a rotated output too."""
         output = self._config.output or await asyncio.to_thread(self._first_output)
         if output:
-            await self._say("input", "type:touch", "map_to_output", output)
+            await self._send("input", "type:touch", "map_to_output", output)
 
     def _first_output(self) -> str:
-        asked = ["swaymsg", "--raw", "--type", "get_outputs"]
+        query = ["swaymsg", "--raw", "--type", "get_outputs"]
         with suppress(OSError, ValueError, subprocess.SubprocessError, LookupError):
             found = subprocess.run(
-                asked, env=self._env, capture_output=True, timeout=SAYS_WITHIN_S, check=True
+                query, env=self._env, capture_output=True, timeout=RESPONDS_WITHIN_S, check=True
             )
             return str(json.loads(found.stdout)[0]["name"])
         return ""
 
-    async def _say(self, *command: str) -> None:
+    async def _send(self, *command: str) -> None:
         if self._config.compositor == "none" or not self.runs:
             return
         with suppress(OSError, TimeoutError):
-            said = Child(["swaymsg", "--quiet", *command], self._env)
+            message = Child(["swaymsg", "--quiet", *command], self._env)
             try:
-                async with asyncio.timeout(SAYS_WITHIN_S):
-                    await said.ended.wait()
+                async with asyncio.timeout(RESPONDS_WITHIN_S):
+                    await message.ended.wait()
             finally:
-                await said.end()
+                await message.end()

@@ -41,8 +41,7 @@ class KioskConfig:
     off_between: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        parts = urlsplit(self.url)
-        if parts.scheme not in ("http", "https") or parts.hostname not in LOOPBACK:
+        if not _is_of_this_machine(self.url):
             raise SettingsError(
                 f'url is "{self.url}": the address of the panel server on this machine, such as '
                 "http://127.0.0.1:8000/"
@@ -65,6 +64,15 @@ class KioskConfig:
         """`http://127.0.0.1:8000`, with which every page of the panel begins."""
         parts = urlsplit(self.url)
         return f"{parts.scheme}://{parts.netloc}"
+
+
+def _is_of_this_machine(url: str) -> bool:
+    try:
+        parts = urlsplit(url)
+        port = parts.port
+    except ValueError:  # a bracket without its other, or no port
+        return False
+    return parts.scheme in ("http", "https") and parts.hostname in LOOPBACK and port != 0
 
 
 def runtime_folder(env: Mapping[str, str] = os.environ) -> Path:

@@ -56,7 +56,7 @@ class Judge:
         self._silent_before = -LONGEST_PAUSE_S
 
     def judge(self, look: Look, server_answers: bool | None, now: float) -> Verdict:
-        """`server_answers` is None if it was not asked: a page with young events shows that it does.
+        """`server_answers` is None if it was not queried: a page with young events shows that it does.
         `now` is in seconds of a monotonic clock."""
         verdict = self._judge(look, server_answers, now)
         if verdict.action is Action.OPEN_PANEL and not look.waiting:
@@ -100,11 +100,11 @@ class Judge:
         again = now - self._silent_before < 4 * self._pause_s
         self._silent_before = now
         self._pause_s = min(2 * self._pause_s, LONGEST_PAUSE_S)
-        said = "the page has no events though the server answers"
-        return Verdict(Action.RESTART if again else Action.OPEN_PANEL, said)
+        action = Action.RESTART if again else Action.OPEN_PANEL
+        return Verdict(action, "the page has no events though the server answers")
 
     def _lasts(self, what: str, holds: bool, for_s: float, now: float) -> bool:
-        """Whether `what` has held since `for_s` or longer."""
+        """Whether `what` has held for `for_s` seconds or longer."""
         if not holds:
             self._since.pop(what, None)
             return False

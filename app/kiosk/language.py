@@ -1,4 +1,4 @@
-"""The language of a panel file, as the browser asks for it at first."""
+"""The language of a panel file, as the browser requests it at first."""
 
 import re
 import tomllib
@@ -9,8 +9,8 @@ TAG: Final = re.compile(r"[A-Za-z]{2,3}(-[A-Za-z0-9]{2,8})*")
 
 
 def panel_language(panel: Path) -> str:
-    """`language` of the file, "en" where it does not say; "" if it can't be read: what is wrong with
-    the file is the server's to tell."""
+    """`language` of the file, "en" where it does not say; "" if it can't be read: the server
+    reports what is wrong with it."""
     try:
         given = tomllib.loads(panel.read_text()).get("language", "en")
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError):

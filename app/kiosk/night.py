@@ -1,6 +1,6 @@
 """The screen goes off when it is not touched for long. The touch that wakes it presses nothing.
 
-swayidle tells of idleness by signals: SIGUSR1 when the time is up, SIGUSR2 at the next touch.
+swayidle reports idleness by signals: SIGUSR1 when the time is up, SIGUSR2 at the next touch.
 """
 
 import asyncio
@@ -66,6 +66,7 @@ class Night:
             self._turning.cancel()
 
     def _listen(self, env: Mapping[str, str]) -> None:
+        self._turn(False)  # a new watch does not know of a screen that went off before it
         loop = asyncio.get_running_loop()
         loop.add_signal_handler(signal.SIGUSR1, self._turn, True)
         loop.add_signal_handler(signal.SIGUSR2, self._turn, False)

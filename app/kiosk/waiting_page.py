@@ -29,11 +29,11 @@ i { width: 2em; height: 2em; border: .3em solid #555; border-top-color: #fff; bo
 
 def waiting_page(title: str, languages: Sequence[str]) -> str:
     """The page's HTML: what it waits for in each language, and after a minute what to do."""
-    said = "".join(_sentences(language) for language in languages)
+    sentences = "".join(_sentences(language) for language in languages)
     return (
         f'<!doctype html><html lang="{languages[0]}" data-theme="dark"><meta charset="utf-8">'
         f"<title>{escape(title)}</title><style>{STYLE}</style>"
-        f"<body data-waiting><h1>{escape(title)}</h1><i></i><div>{said}</div>"
+        f"<body data-waiting><h1>{escape(title)}</h1><i></i><div>{sentences}</div>"
     )
 
 

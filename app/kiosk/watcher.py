@@ -34,7 +34,7 @@ LOOK_INTERVAL_S: Final = 1.0
 WAITING_INTERVAL_S: Final = 0.2  # while the panel is not shown
 # A server that starts with the machine mostly answers by then: the waiting page is not made for it.
 SERVER_STARTS_WITHIN_S: Final = 2.0
-# From this age of the last event on the server is asked whether it answers.
+# From this age of the last event on the server is queried.
 YOUNG_S: Final = 2.0
 # After a start that failed, so that a missing part does not fill the machine's log.
 PAUSE_S: Final = 1.0
@@ -77,7 +77,7 @@ class Watcher:
                     await asyncio.sleep(PAUSE_S)
                 else:
                     await asyncio.sleep(self._interval_s)
-                self._tell()
+                self._notify()
         finally:
             self._stopping = True
             self._manager.notify("STOPPING=1")
@@ -157,7 +157,7 @@ class Watcher:
         language = panel_language(Path(self._config.panel))
         return (f"--accept-lang={language}",) if language else ()
 
-    def _tell(self) -> None:
+    def _notify(self) -> None:
         shown = "the browser runs" if self._browser is not None else "the browser does not start"
         ready = ["READY=1"] if self._browser is not None else []
         self._manager.notify(*ready, "WATCHDOG=1", status_line(shown))

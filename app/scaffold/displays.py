@@ -7,7 +7,7 @@ from typing import Any, Final
 from app.graph.model import Topic
 from app.interfaces import Interfaces
 from app.scaffold.entry import Entry
-from app.scaffold.fields import NUMBERS, Shown, is_text, range_for, shown_fields
+from app.scaffold.fields import NUMBERS, Shown, range_for, shown_fields
 from app.scaffold.naming import NEGATIVE, label_of, page_of
 
 JOINTS: Final = "sensor_msgs/msg/JointState"
@@ -19,7 +19,7 @@ NODES_PAGE: Final = "nodes"
 
 
 def displays(topic: Topic, interfaces: Interfaces, sample: Any = None) -> Iterator[Entry]:
-    """The widgets of a topic that the robot publishes. `sample` is one of its messages, if one came."""
+    """The widgets of a topic that the robot publishes. `sample` is one of its messages, or None."""
     nodes = {node for one in topic.publishers for node in one.nodes}
     about = {"topic": topic.name, "type": topic.type, **_qos(topic)}
     page = page_of(topic.name, nodes)
@@ -41,7 +41,7 @@ def displays(topic: Topic, interfaces: Interfaces, sample: Any = None) -> Iterat
 
 
 def _qos(topic: Topic) -> dict[str, Any]:
-    """The panel asks for reliable, which a best-effort publisher does not match."""
+    """Reliable is the panel's default; a best-effort publisher does not match it."""
     return {} if topic.reliable else {"qos": {"reliability": "best_effort"}}
 
 
@@ -59,7 +59,7 @@ def _field(topic: Topic, page: str, about: Mapping[str, Any], shown: Shown, valu
     keys: dict[str, Any] = {"label": label, **about, **field}
     if shown.kind == "bool":
         return _lamp(name, page, keys, label)
-    if is_text(shown.kind) or shown.kind not in NUMBERS:
+    if shown.kind not in NUMBERS:
         return Entry(kind="readout", name=name, page=page, keys={**keys, "span": 6})
     keys |= {"unit": shown.unit} if shown.unit else {}
     keys |= {"scale": shown.scale} if shown.scale != 1.0 else {}
@@ -78,7 +78,7 @@ def _whole(value: float) -> float:
 
 
 def _lamp(name: str, page: str, keys: dict[str, Any], label: str) -> Entry:
-    """One that tells of a fault is red where it is on."""
+    """A lamp; that of a fault is red where it is on."""
     on, off = {"value": True, "text": "On"}, {"value": False, "text": "Off"}
     if NEGATIVE.search(name):
         on |= {"text": label, "shape": "cross", "colour": "red"}

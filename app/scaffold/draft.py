@@ -96,7 +96,7 @@ def _of_topic(topic: Topic, interfaces: Interfaces, sample: Any) -> list[Entry]:
 
 def _why_not(topic: Topic) -> str:
     if topic.type == JOINTS:
-        return f"{topic.name}: no message came that names its joints"
+        return f"{topic.name}: no message arrived that names its joints"
     return f"{topic.name} ({topic.type})"
 
 
@@ -116,7 +116,7 @@ def _of_server(server: Server, interfaces: Interfaces, remarks: list[str]) -> li
 
 
 def _interlocks(topics: Iterable[Topic]) -> Iterator[InterlockCandidate]:
-    """Bools that look like permissions: those of a telling name first, of these the latched ones."""
+    """Bools that look like permissions: those whose name permits first, of these the latched ones."""
     candidates = [
         topic
         for topic in shown(topics)
@@ -131,8 +131,7 @@ def _interlocks(topics: Iterable[Topic]) -> Iterator[InterlockCandidate]:
 
 
 def _may_permit(topic: Topic) -> bool:
-    """A latched bool is a state that others go by. Of one that tells of a fault, true permits
-    nothing."""
+    """A latched bool is a state that other nodes act on. That of a fault permits nothing."""
     return permits(topic.name) or (topic.latched and not NEGATIVE.search(topic.name))
 
 

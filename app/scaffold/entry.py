@@ -1,4 +1,4 @@
-"""The parts of a panel file that is being made: widgets with their keys, and what is said of them."""
+"""The parts of a panel file that is being made: widgets with their keys, and the comments on them."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from math import floor, isfinite, log10
 from typing import Final
 
-from app.interfaces import STRING_TYPES, Interfaces
+from app.interfaces import Interfaces
 from app.interfaces.definitions import FLOAT_TYPES, INTEGER_RANGES
 from app.simulator.values.guesses import NAMES
 
@@ -131,10 +131,6 @@ def shown_fields(type_name: str, interfaces: Interfaces) -> Iterator[Shown]:
         number = one.type.name in NUMBERS
         text = ".2f" if one.type.name in FLOAT_TYPES else ""
         yield Shown(field=one.name, kind="float64" if number else one.type.name, word=word, format=text)
-
-
-def is_text(kind: str) -> bool:
-    return kind in STRING_TYPES
 
 
 def range_for(shown: Shown, names: tuple[str, ...], value: float | None) -> tuple[float, float]:

@@ -7,7 +7,7 @@ from typing import Final
 MAX_ID: Final = 60
 MAX_LABEL: Final = 40
 GENERAL: Final = "robot"
-# Names of bools that tell of a fault: true does not permit anything.
+# Names of bools that report a fault: true does not permit anything.
 NEGATIVE: Final = re.compile(
     r"error|fault|fail|emergency|e_?stop|stopped|alarm|warn|blocked|collision|jam|abort|disable|inhibit",
     re.IGNORECASE,

@@ -17,11 +17,14 @@ def toml_text(draft: Draft, controls: bool = False) -> str:
     """The file. `controls`: keys that act on the robot are live, each behind the first interlock."""
     lines = [*_head(draft), *_interlocks(draft)]
     taken: set[str] = set()
+    pages: set[str] = set()
     for page, entries in draft.pages.items():
-        lines += _page(page, taken)
+        own_id = id_of(page, pages)
+        pages.add(own_id)
+        lines += _page(page, own_id)
         for entry in entries:
             if controls and entry.kind == "label":
-                continue  # it says that they are commented out
+                continue  # it stands for those that are commented out
             live = not entry.control or (controls and bool(draft.interlocks))
             lines += _widget(entry, id_of(entry.name, taken), draft, live, taken)
     if draft.remarks:
@@ -73,14 +76,14 @@ def _interlocks(draft: Draft) -> Iterator[str]:
         if one.kept:
             yield "require_publisher = true  # locks when its publisher is gone"
         else:
-            yield "max_age_s = 2.0  # locks when it is not heard for so long"
+            yield "max_age_s = 2.0  # locks when no message arrives for so long"
         yield ""
 
 
-def _page(page: str, taken: set[str]) -> Iterator[str]:
+def _page(page: str, own_id: str) -> Iterator[str]:
     yield ""
     yield "[[page]]"
-    yield f"id = {_value(id_of(page, ()))}"
+    yield f"id = {_value(own_id)}"
     yield f"title = {_value(label_of(page))}"
 
 

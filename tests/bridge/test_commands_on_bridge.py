@@ -140,7 +140,7 @@ def test_hz_of_a_silent_topic_has_no_rate(cyclone_bridge: Bridge, io: RosNode) -
             "no topic /operation_enable is there: did you mean /operation_en",
         ),
         (("hz", "/joint_states"), "no topic /joint_states is there: did you mean /arm/joint_states?"),
-        (("echo", "/start", BOOL, "--once", "--timeout", "0.5"), "nothing came on /start in 0.5 s"),
+        (("echo", "/start", BOOL, "--once", "--timeout", "0.5"), "no message on /start in 0.5 s"),
         (
             ("echo", "/start", "a_msgs/msg/B"),
             "/start is std_msgs/msg/Bool on the robot, not a_msgs/msg",

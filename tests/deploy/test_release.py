@@ -53,6 +53,21 @@ def test_a_ros_package_of_another_version_is_no_release(checkout: ModuleType) ->
         checkout.check_version(None)
 
 
+def test_only_files_of_a_release_are_removed(tmp_path: Path) -> None:
+    folder = tmp_path / "release"
+    release.empty(folder)
+    for name in ("operator_panel-0.1.0-py3-none-any.whl", "SHA256SUMS", "requirements.lock"):
+        (folder / name).touch()
+    release.empty(folder)
+    assert list(folder.iterdir()) == []
+    (folder / "SHA256SUMS").touch()
+    (folder / "operator_panel-src").mkdir()
+    (folder / "mine.txt").touch()
+    with pytest.raises(release.ReleaseError, match=r"has mine\.txt, operator_panel-src: name a folder"):
+        release.empty(folder)
+    assert len(list(folder.iterdir())) == 3
+
+
 def test_the_sdist_gives_the_wheel_of_the_checkout(tmp_path: Path) -> None:
     wheel = release.build(tmp_path)
     assert wheel.name == f"operator_panel-{release.version()}-py3-none-any.whl"

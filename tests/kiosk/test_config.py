@@ -49,6 +49,8 @@ def test_what_is_given_goes_before_the_file(tmp_path: Path) -> None:
         ('flags = "x"', "flags must be a list"),
         ('url = "http://192.0.2.1:8000/"', "on this machine"),
         ('url = "file:///etc/passwd"', "on this machine"),
+        ('url = "http://[::1/"', "on this machine"),
+        ('url = "http://127.0.0.1:99999/"', "on this machine"),
         ('compositor = "x11"', "one of sway, none"),
         ('output = "HDMI\\nbindsym"', "only letters"),
         ("rotate =", "can't be read"),

@@ -192,6 +192,17 @@ def test_pages_are_namespaces_and_nodes() -> None:
     assert [page["id"] for page in pages] == ["arm", "cell_io", "plc", "robot", "nodes"]
 
 
+def test_pages_of_similar_namespaces_have_ids_of_their_own(tmp_path: Path) -> None:
+    topics = [
+        published(f"/{page}/{name}", "std_msgs/msg/Float64")
+        for page in ("armLeft", "arm_left")
+        for name in ("speed", "load")
+    ]
+    path = tmp_path / "cell.toml"
+    path.write_text(text_of(topics=topics))
+    assert [page.id for page in check_panel(path).panel.pages] == ["arm_left", "arm_left_2"]
+
+
 def test_what_has_no_widget_is_named() -> None:
     text = text_of(**CELL, unreadable=["/cell_io"])
     assert "# - /pose (geometry_msgs/msg/Pose)" in text
@@ -204,7 +215,7 @@ def test_what_has_no_widget_is_named() -> None:
         in unknown
     )
     joints = text_of(topics=[published("/joint_states", "sensor_msgs/msg/JointState")])
-    assert "# - /joint_states: no message came that names its joints" in joints
+    assert "# - /joint_states: no message arrived that names its joints" in joints
 
 
 @pytest.mark.parametrize(

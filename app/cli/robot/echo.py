@@ -1,7 +1,7 @@
 """`operator-panel echo TOPIC [TYPE]`: the messages of a topic, as `ros2 topic echo` shows them.
 
-Exit status: 0 it was ended, or has shown what was asked for; 1 no robot, no such topic, or nothing came
-in time; 2 a mistake on the command line.
+Exit status: 0 it was ended, or has shown one message with --once; 1 no robot, no such topic, or no
+message in time; 2 a mistake on the command line.
 """
 
 import asyncio
@@ -44,13 +44,13 @@ async def _echo(given: Any) -> int:
                     if given.once:
                         return 0
         except TimeoutError:
-            print(f"nothing came on {reader.topic.name} in {given.timeout:g} s", file=sys.stderr)
+            print(f"no message on {reader.topic.name} in {given.timeout:g} s", file=sys.stderr)
             return GONE
     return 0
 
 
 def _show(data: bytes, interfaces: Interfaces, type_name: str, given: Any) -> None:
-    """One message; one that can't be decoded is told of, and the next one is awaited."""
+    """One message. If it can't be decoded, the error is printed in its place."""
     try:
         value = value_in(data, interfaces, type_name, given.field or "")
     except DecodeError as error:
@@ -77,13 +77,13 @@ def make_parser(prog: str) -> Parser:
         prog=prog,
         description="Shows the messages of a topic, through the robot's bridge and without ROS.",
         epilog="Its type is that on the robot, and its QoS the publisher's. Ctrl-C ends it. Exit"
-        " status: 1 no robot, no such topic, or nothing came in time.",
+        " status: 1 no robot, no such topic, or no message in time.",
     )
     add = parser.add_argument
     add("topic", metavar="TOPIC", help="such as /speed")
     add("type", nargs="?", metavar="TYPE", help="only where it has several on the robot")
     add("--once", action="store_true", help="one message, then end")
-    add("--timeout", type=seconds(), metavar="S", help="end if nothing came in so many seconds")
+    add("--timeout", type=seconds(), metavar="S", help="end if no message arrives in so many seconds")
     add("--field", metavar="PATH", help='only this field, such as pose.position.x or "status[0].name"')
     form = parser.add_mutually_exclusive_group().add_argument
     form("--csv", action="store_true", help="one line of values with commas for each message")

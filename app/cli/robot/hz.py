@@ -1,6 +1,6 @@
 """`operator-panel hz TOPIC`: how often a topic is published, as `ros2 topic hz` shows it.
 
-Exit status: 0 it was ended; 1 no robot, no such topic, or nothing came; 2 a mistake on the command
+Exit status: 0 it was ended; 1 no robot, no such topic, or no message; 2 a mistake on the command
 line.
 """
 

@@ -1,6 +1,6 @@
 """The options by which a command finds a robot, and the robot's graph that they lead to.
 
-Exit status of the commands that use it: 1 what is asked for is not there, 2 a mistake on the command
+Exit status of the commands that use it: 1 there is no such robot or topic, 2 a mistake on the command
 line.
 """
 
@@ -148,7 +148,7 @@ def shown_topics(graph: RosGraph, below: str) -> dict[str, tuple[RobotGraph, Top
 
 
 def check_namespace(graph: RosGraph, below: str) -> None:
-    """LinkError if nothing is below a namespace that was asked for."""
+    """LinkError if no topic is below the namespace."""
     if below and not shown_topics(graph, below):
         robots = [robot.namespace for robot in graph.robots if robot.namespace]
         hint = f": the bridges have {', '.join(robots)}" if robots else ": no bridge has a namespace"
@@ -168,7 +168,7 @@ def topic_named(graph: RosGraph, below: str, given: str) -> tuple[RobotGraph, To
 
 
 def ended(work: Callable[[], Coroutine[Any, Any, int]]) -> int:
-    """Runs a command to its end. Ctrl-C and a reader that goes (`| head`) end it without words."""
+    """Runs a command to its end. Ctrl-C and a closed output (`| head`) end it without a message."""
     try:
         return asyncio.run(work())
     except KeyboardInterrupt:

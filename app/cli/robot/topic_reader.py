@@ -1,4 +1,4 @@
-"""One topic of a robot, found by its name: its type, how to decode it, its messages as they come."""
+"""One topic of a robot, found by its name: its type, how to decode it, its messages as they arrive."""
 
 import sys
 from collections.abc import AsyncIterator
@@ -80,7 +80,7 @@ class TopicReader:
     async def samples(self) -> AsyncIterator[Sample]:
         """Each sample, that which a latched publisher has kept first."""
         if not self.topic.publishers:
-            print(f"nobody publishes {self.topic.name} now; waiting", file=sys.stderr, flush=True)
+            print(f"no node publishes {self.topic.name} now; waiting", file=sys.stderr, flush=True)
         own = endpoint_for(self.topic, self.type)
         async for _, sample in self.observer.listen([own], hold=bool(self.topic.publishers)):
             yield sample
